@@ -1,0 +1,24 @@
+#include <fmt/format.h>
+
+#include "command.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm::app {
+
+void add_version_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand("version", "Print the version of tpm");
+  add_format_option(*command, session);
+  command->callback([&session] {
+    session.run = [&session] {
+      if (session.json()) {
+        fmt::print("{}", to_text(Json{{"version", version()}}));
+      } else {
+        fmt::print("tpm {}\n", version());
+      }
+      return 0;
+    };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,24 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+namespace tpm::app {
+
+/// What every command shares. A command registers its options on a CLI11 subcommand and sets `run`
+/// in that subcommand's callback; main() calls it once, after the whole command line was read, and
+/// nothing that CLI11 filled in is used if reading failed.
+struct Session {
+  std::string format = "text";   ///< --format: text or json
+  std::function<int()> run;      ///< the chosen command; returns the exit code
+
+  [[nodiscard]] bool json() const { return format == "json"; }
+};
+
+/// Adds --format text|json to a command.
+void add_format_option(CLI::App& command, Session& session);
+
+// One function per file cmd_*.cpp.
+void add_version_command(CLI::App& app, Session& session);
+
+}  // namespace tpm::app

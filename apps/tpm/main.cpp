@@ -1,0 +1,53 @@
+// The program `tpm`: reads the command line, runs one command, turns errors into one line.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+
+namespace tpm::app {
+
+void add_format_option(CLI::App& command, Session& session) {
+  command.add_option("--format", session.format, "Output format: text or json")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+}
+
+namespace {
+
+int run(int argc, char** argv) {
+  CLI::App app{"tpm: check a viscoelastic soft-tissue model against data", "tpm"};
+  app.require_subcommand(1);
+  app.footer("Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
+             "Each command explains itself: tpm COMMAND --help");
+  Session session;
+  add_version_command(app, session);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& wanted) {  // --help
+    return app.exit(wanted);
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "tpm: {}; see tpm --help\n", error.what());
+    return static_cast<int>(ExitCode::usage);
+  }
+  return session.run();
+}
+
+}  // namespace
+}  // namespace tpm::app
+
+int main(int argc, char** argv) {
+  try {
+    return tpm::app::run(argc, argv);
+  } catch (const tpm::Error& error) {
+    fmt::print(stderr, "tpm: {}\n", error.what());
+    return static_cast<int>(error.code());
+  } catch (const std::exception& error) {
+    // Nothing in the library throws anything else on purpose: this is a defect of tpm.
+    fmt::print(stderr, "tpm: internal error: {}; please report it\n", error.what());
+    return static_cast<int>(tpm::ExitCode::numerical);
+  }
+}

@@ -1,0 +1,14 @@
+# Compile options of our own code only; dependencies come in as system headers.
+add_library(tpm_options INTERFACE)
+target_compile_options(tpm_options INTERFACE -Wall -Wextra -Wconversion -Wshadow
+  $<$<BOOL:${TPM_WARNINGS_AS_ERRORS}>:-Werror>)
+# g++ 12 reports overlapping copies inside std::string::replace that cannot happen (GCC bug 105651).
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  target_compile_options(tpm_options INTERFACE -Wno-restrict)
+endif()
+# Bit-identity is promised per binary: no contraction that another compiler flag could move.
+target_compile_options(tpm_options INTERFACE -ffp-contract=off)
+if(TPM_SANITIZE)
+  add_compile_options(-fsanitize=${TPM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${TPM_SANITIZE})
+endif()

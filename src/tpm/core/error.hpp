@@ -1,0 +1,47 @@
+#pragma once
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace tpm {
+
+/// What a program that stops with an error returns to the shell. 1 is kept for "ran to the end, and
+/// the answer is no" (a data check or a gradient check that failed).
+enum class ExitCode : int {
+  success = 0,
+  answer_is_no = 1,
+  usage = 2,        ///< the command line itself
+  bad_input = 3,    ///< a file or a value in it
+  numerical = 4,    ///< a solver gave up
+  environment = 5,  ///< something outside: cannot write, missing helper program
+};
+
+/// An error with the three things a person needs, printed as one line:
+/// "WHERE: WHAT; expected EXPECTED".
+class Error : public std::runtime_error {
+ public:
+  /// @param where file, file:line, key or option; may be empty
+  /// @param what  what is wrong, without a full stop
+  /// @param expected what would have been right; may be empty
+  Error(ExitCode code, std::string_view where, std::string_view what,
+        std::string_view expected = {});
+
+  [[nodiscard]] ExitCode code() const noexcept { return code_; }
+
+  /// Adds an outer place in front ("fit.json" before "key 'E'"): used where the inner function
+  /// does not know which file it works on.
+  [[nodiscard]] Error within(std::string_view outer) const;
+
+ private:
+  ExitCode code_;
+};
+
+/// Shorthand for the most common kind.
+[[nodiscard]] Error bad_input(std::string_view where, std::string_view what,
+                              std::string_view expected = {});
+
+/// Text from outside made safe for a one-line message: control characters and bytes that are not
+/// UTF-8 become '?', and anything longer than `limit` characters is cut with "...".
+[[nodiscard]] std::string printable(std::string_view text, std::size_t limit = 60);
+
+}  // namespace tpm

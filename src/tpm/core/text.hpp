@@ -1,0 +1,17 @@
+#pragma once
+#include <string>
+
+namespace tpm {
+
+/// Shortest decimal text that reads back as the same double; the same on every machine.
+[[nodiscard]] std::string shortest(double value);
+
+/// `digits` significant digits in the way people write numbers (12.3, 0.00123, 1.23e+07): never a
+/// trailing exponent of zero, always a point as decimal sign. Non-finite values give "inf", "-inf"
+/// and "nan".
+[[nodiscard]] std::string significant(double value, int digits);
+
+/// `decimals` digits after the point.
+[[nodiscard]] std::string fixed(double value, int decimals);
+
+}  // namespace tpm

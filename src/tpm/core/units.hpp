@@ -1,0 +1,55 @@
+#pragma once
+#include <string>
+#include <string_view>
+
+namespace tpm {
+
+/// The physical dimensions the project speaks of. Every number inside is SI; units exist only at
+/// the edges (files, tables, messages) and are converted here and nowhere else.
+enum class Dimension {
+  dimensionless,
+  time,       // s
+  length,     // m
+  area,       // m^2
+  force,      // N
+  stress,     // Pa, also moduli
+  viscosity,  // Pa s
+  speed,      // m/s
+  frequency,  // Hz
+};
+
+/// A unit of measurement: value_SI = value * to_si.
+struct Unit {
+  std::string symbol;  ///< as the project writes it, e.g. "kPa", "mm^2", "Pa s"
+  Dimension dimension;
+  double to_si;
+};
+
+/// Looks a unit up by the ways people write it ("mm", "Pa.s", "Pa s", "mm/s", "mm^2", "mm2", "N",
+/// "sec"). Case matters where it does in SI (mN is not MN). Throws Error(bad_input) naming the
+/// known units of `expected` if the text is unknown or of another dimension.
+/// @param where place for the error message
+[[nodiscard]] Unit parse_unit(std::string_view text, Dimension expected, std::string_view where);
+
+/// As above, any dimension.
+[[nodiscard]] Unit parse_unit(std::string_view text, std::string_view where);
+
+/// True if `text` is a unit that parse_unit knows.
+[[nodiscard]] bool is_unit(std::string_view text) noexcept;
+
+/// The SI unit symbol of a dimension ("" for dimensionless).
+[[nodiscard]] std::string_view si_symbol(Dimension dimension) noexcept;
+
+/// The name in words ("length", "viscosity").
+[[nodiscard]] std::string_view dimension_name(Dimension dimension) noexcept;
+
+/// "12 kPa" -> 12000. A quantity is one finite number, white space and one unit (no unit only for
+/// a dimensionless quantity). Throws Error(bad_input).
+[[nodiscard]] double parse_quantity(std::string_view text, Dimension expected,
+                                    std::string_view where);
+
+/// One finite decimal number, all of the text, point as decimal sign, locale-independent.
+/// Throws Error(bad_input) (also for nan, inf and overflow such as 1e400).
+[[nodiscard]] double parse_number(std::string_view text, std::string_view where);
+
+}  // namespace tpm

@@ -1,0 +1,7 @@
+#include "tpm/core/version.hpp"
+
+namespace tpm {
+
+std::string_view version() noexcept { return TPM_VERSION; }
+
+}  // namespace tpm

@@ -1,0 +1,27 @@
+#pragma once
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+namespace tpm {
+
+/// Keys keep the order in which they were written: reports are compared byte for byte.
+using Json = nlohmann::ordered_json;
+
+/// Strict JSON: duplicate keys, numbers that overflow and anything after the value are errors
+/// (Error(bad_input) with file, line and column), which nlohmann-json alone lets pass.
+[[nodiscard]] Json parse_json(std::string_view text, std::string_view where);
+
+/// read_file and parse_json.
+[[nodiscard]] Json read_json(const std::filesystem::path& path);
+
+/// Pretty-printed with two spaces and a final line feed. Throws Error(numerical) naming the key
+/// if a number is not finite, instead of writing null.
+[[nodiscard]] std::string to_text(const Json& value);
+
+/// Checks `value` against the JSON Schema `schemas/NAME.schema.json` of share_dir(). Throws
+/// Error(bad_input): "where: key /a/b: what", the first violation.
+void check_schema(const Json& value, std::string_view schema_name, std::string_view where);
+
+}  // namespace tpm
