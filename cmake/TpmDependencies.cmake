@@ -5,6 +5,7 @@ find_package(nlohmann_json 3.11 REQUIRED)
 find_package(fmt 9 REQUIRED)
 find_package(CLI11 2.1 QUIET)
 find_package(Ceres 2.1 REQUIRED)
+find_package(Boost 1.74 REQUIRED)  # headers: quadrature and quantiles of Boost.Math
 find_package(SUNDIALS 6.4 REQUIRED COMPONENTS cvodes sunmatrixdense sunlinsoldense nvecserial)
 find_package(muparser 2.3 REQUIRED)
 find_package(utf8cpp 3.2 REQUIRED)
@@ -28,7 +29,7 @@ mark_as_advanced(TPM_CSV_INCLUDE TPM_CSV_LIBRARY)
 
 if(NOT TPM_FIND_ONLY)
   add_library(tpm_ceres INTERFACE)
-  target_link_libraries(tpm_ceres INTERFACE Ceres::ceres)
+  target_link_libraries(tpm_ceres INTERFACE Ceres::ceres Boost::headers)
   add_library(tpm_sundials INTERFACE)
   target_link_libraries(tpm_sundials INTERFACE SUNDIALS::cvodes SUNDIALS::nvecserial
     SUNDIALS::sunmatrixdense SUNDIALS::sunlinsoldense)

@@ -9,8 +9,8 @@ namespace tpm::app {
 /// in that subcommand's callback; main() calls it once, after the whole command line was read, and
 /// nothing that CLI11 filled in is used if reading failed.
 struct Session {
-  std::string format = "text";   ///< --format: text or json
-  std::function<int()> run;      ///< the chosen command; returns the exit code
+  std::string format = "text";  ///< --format: text or json
+  std::function<int()> run;     ///< the chosen command; returns the exit code
 
   [[nodiscard]] bool json() const { return format == "json"; }
 };

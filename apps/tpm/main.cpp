@@ -20,8 +20,9 @@ namespace {
 int run(int argc, char** argv) {
   CLI::App app{"tpm: check a viscoelastic soft-tissue model against data", "tpm"};
   app.require_subcommand(1);
-  app.footer("Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
-             "Each command explains itself: tpm COMMAND --help");
+  app.footer(
+      "Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
+      "Each command explains itself: tpm COMMAND --help");
   Session session;
   add_version_command(app, session);
 

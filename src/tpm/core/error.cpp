@@ -21,7 +21,9 @@ Error::Error(ExitCode code, std::string_view where, std::string_view what,
              std::string_view expected)
     : std::runtime_error(one_line(where, what, expected)), code_(code) {}
 
-Error Error::within(std::string_view outer) const { return {code_, outer, what()}; }
+Error Error::within(std::string_view outer) const {
+  return {code_, outer, what()};
+}
 
 Error bad_input(std::string_view where, std::string_view what, std::string_view expected) {
   return {ExitCode::bad_input, where, what, expected};

@@ -2,6 +2,8 @@
 
 namespace tpm {
 
-std::string_view version() noexcept { return TPM_VERSION; }
+std::string_view version() noexcept {
+  return TPM_VERSION;
+}
 
 }  // namespace tpm

@@ -56,9 +56,9 @@ Json parse_json(std::string_view text, std::string_view where) {
     throw bad_input(where, printable(what, 160), "valid JSON");
   }
   if (!watcher.duplicate().empty()) {
-    throw bad_input(where, fmt::format("key '{}' stands twice in one object",
-                                       printable(watcher.duplicate())),
-                    "each key once");
+    throw bad_input(
+        where, fmt::format("key '{}' stands twice in one object", printable(watcher.duplicate())),
+        "each key once");
   }
   return value;
 }

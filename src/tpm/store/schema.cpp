@@ -63,10 +63,10 @@ void check_schema(const Json& value, std::string_view schema_name, std::string_v
   while (results.popError(error)) {
     if (error.context.size() > innermost.context.size()) innermost = error;
   }
-  throw bad_input(where,
-                  fmt::format("key {}: {}", pointer(innermost.context),
-                              in_plain_words(innermost.description)),
-                  fmt::format("what schemas/{}.schema.json describes", schema_name));
+  throw bad_input(
+      where,
+      fmt::format("key {}: {}", pointer(innermost.context), in_plain_words(innermost.description)),
+      fmt::format("what schemas/{}.schema.json describes", schema_name));
 }
 
 }  // namespace tpm

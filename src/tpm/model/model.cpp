@@ -1,0 +1,55 @@
+#include "tpm/model/model.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/model/closed_form.hpp"
+#include "tpm/model/cvodes_element.hpp"
+
+namespace tpm {
+
+std::vector<std::string> model_names() {
+  return {"closed_form", "cvodes"};
+}
+
+std::unique_ptr<Model> make_model(std::string_view name, const ModelOptions& options) {
+  if (name == "closed_form") return std::make_unique<ClosedForm>(options);
+  if (name == "cvodes") return std::make_unique<CvodesElement>(options);
+  throw bad_input("model", fmt::format("unknown formulation '{}'", printable(name)),
+                  fmt::format("one of {}", fmt::join(model_names(), ", ")));
+}
+
+std::vector<std::string> validity_flags(const TpmParameters& p, double peak_depth_m) {
+  constexpr double kValid_m = 0.010;   // Sec. 3.1: "should remain within 10mm"
+  constexpr double kDamage_m = 0.012;  // Sec. 3.1, ref. [11]
+  constexpr double kMaximumAngle = std::numbers::pi / 6.0;
+  std::vector<std::string> flags;
+  if (peak_depth_m > kDamage_m) {
+    flags.push_back(fmt::format("indentation of {:.4g} mm is over 12 mm, where liver is damaged",
+                                peak_depth_m * 1e3));
+  } else if (peak_depth_m > kValid_m) {
+    flags.push_back(fmt::format("indentation of {:.4g} mm is over the paper's validity of 10 mm",
+                                peak_depth_m * 1e3));
+  }
+  const double angle = std::atan(peak_depth_m / p.spacing_m);
+  if (angle > kMaximumAngle) {
+    flags.push_back(fmt::format("bonds turn by {:.4g} degrees, over the paper's 30",
+                                angle * 180.0 / std::numbers::pi));
+  }
+  return flags;
+}
+
+void require_times_within(const Protocol& protocol, std::span<const double> times_s) {
+  for (const double t : times_s) {
+    if (t >= protocol.start_s() && t <= protocol.end_s()) continue;
+    throw bad_input(protocol.name(), fmt::format("asked for t = {} s", shortest(t)),
+                    fmt::format("a time from {} to {} s", shortest(protocol.start_s()),
+                                shortest(protocol.end_s())));
+  }
+}
+
+}  // namespace tpm

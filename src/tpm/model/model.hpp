@@ -1,0 +1,82 @@
+#pragma once
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/material/tpm_element.hpp"
+#include "tpm/protocol/protocol.hpp"
+
+namespace tpm {
+
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// What a model answers: one value per asked time (N or m, after the protocol's drive) and, where
+/// asked for, the derivative of each value with respect to each natural parameter.
+struct Response {
+  Eigen::VectorXd value;  ///< size n_times
+  RowMatrix sensitivity;  ///< n_times x n_parameters, SI over SI; 0 x 0 unless asked for
+};
+
+enum class Want { values, values_and_sensitivity };
+
+/// How lambda1 enters. `exact` is lambda1(e(t)); the paper freezes it at one value.
+struct TensionRule {
+  enum class Kind { exact, frozen_at_peak, frozen_at_value };
+  Kind kind = Kind::exact;
+  double lambda1_Pa = 0.0;  ///< used by frozen_at_value
+
+  [[nodiscard]] static TensionRule exact() { return {}; }
+  /// lambda1 of the largest imposed displacement, as in Tables 1-4.
+  [[nodiscard]] static TensionRule frozen_at_peak() { return {Kind::frozen_at_peak, 0.0}; }
+  [[nodiscard]] static TensionRule frozen(double lambda1) {
+    return {Kind::frozen_at_value, lambda1};
+  }
+};
+
+/// The one question that tables, fits, sweeps and plans ask: how does the tissue respond to this
+/// protocol at these times? A formulation is one implementation, registered in make_model().
+class Model {
+ public:
+  Model() = default;
+  Model(const Model&) = delete;
+  Model& operator=(const Model&) = delete;
+  virtual ~Model() = default;
+
+  [[nodiscard]] virtual std::string_view name() const = 0;
+
+  /// Names, dimensions and order of the parameter vector.
+  [[nodiscard]] virtual std::span<const ParameterDescription> parameters() const = 0;
+
+  /// @param times_s any order, each within [protocol.start_s(), protocol.end_s()]; at a jump the
+  ///        value just after it is meant
+  /// @param parameters SI values in the order of parameters()
+  /// Throws Error(bad_input) for parameters out of range, Error(numerical) if a solver fails.
+  [[nodiscard]] virtual Response respond(const Protocol& protocol, std::span<const double> times_s,
+                                         std::span<const double> parameters, Want want) const = 0;
+};
+
+/// Numerical settings; the closed form has none.
+struct ModelOptions {
+  TensionRule tension;
+  double relative_tolerance = 1e-10;  ///< CVODES, of states and sensitivities
+};
+
+/// Known formulations: "closed_form" and "cvodes". Throws Error(bad_input) naming them for any
+/// other name.
+[[nodiscard]] std::unique_ptr<Model> make_model(std::string_view name,
+                                                const ModelOptions& options = {});
+
+[[nodiscard]] std::vector<std::string> model_names();
+
+/// Limits of the model in the paper that a run has passed (text, one line each): indentation over
+/// 10 mm (validity), over 12 mm (damage), a lateral bond turned by more than pi/6.
+[[nodiscard]] std::vector<std::string> validity_flags(const TpmParameters& p, double peak_depth_m);
+
+/// Throws Error(bad_input) unless every time lies in the protocol.
+void require_times_within(const Protocol& protocol, std::span<const double> times_s);
+
+}  // namespace tpm

@@ -1,0 +1,56 @@
+#pragma once
+#include <span>
+#include <string>
+#include <vector>
+
+namespace tpm {
+
+/// What the experiment imposes; the response is the other one.
+enum class Drive {
+  displacement,  ///< indentation depth in m; the response is the contact force in N
+  force,         ///< load in N; the response is the indentation depth in m
+};
+
+/// A point of the imposed history.
+struct Knot {
+  double time_s;
+  double value;  ///< m or N, after the drive
+};
+
+/// The imposed history: piecewise linear between knots, at rest (value 0) before the first one.
+/// Two knots at one time are a jump; a first knot with value other than 0 is a jump from rest.
+class Protocol {
+ public:
+  /// Throws Error(bad_input) unless there is at least one knot, all finite, times not decreasing
+  /// and no more than two knots at one time.
+  Protocol(Drive drive, std::vector<Knot> knots, std::string name = "history");
+
+  [[nodiscard]] Drive drive() const noexcept { return drive_; }
+  [[nodiscard]] std::span<const Knot> knots() const noexcept { return knots_; }
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] double start_s() const noexcept { return knots_.front().time_s; }
+  [[nodiscard]] double end_s() const noexcept { return knots_.back().time_s; }
+  /// Largest absolute imposed value.
+  [[nodiscard]] double peak() const noexcept;
+
+ private:
+  Drive drive_;
+  std::vector<Knot> knots_;
+  std::string name_;
+};
+
+/// Jump to a depth at t = 0, held for `hold_s`.
+[[nodiscard]] Protocol step_and_hold(double depth_m, double hold_s);
+
+/// From rest to `depth_m` (> 0) at constant speed `rate_m_per_s` (> 0), then held for `hold_s`
+/// (>= 0). The ramp ends at depth / rate.
+[[nodiscard]] Protocol ramp_and_hold(double depth_m, double rate_m_per_s, double hold_s);
+
+/// Constant load from t = 0 on.
+[[nodiscard]] Protocol creep(double load_N, double duration_s);
+
+/// A measured history, linear between its samples. Both spans of one length, times increasing.
+[[nodiscard]] Protocol measured_history(Drive drive, std::span<const double> time_s,
+                                        std::span<const double> value);
+
+}  // namespace tpm

@@ -1,0 +1,45 @@
+#pragma once
+// SUNDIALS objects that free themselves, and the one place that knows the differences between its
+// major versions.
+#include <cvodes/cvodes.h>
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_config.h>
+#include <sunlinsol/sunlinsol_dense.h>
+#include <sunmatrix/sunmatrix_dense.h>
+
+#include <memory>
+#include <string_view>
+#include <type_traits>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm::sundials {
+
+struct FreeContext {
+  void operator()(SUNContext c) const { SUNContext_Free(&c); }
+};
+struct FreeVector {
+  void operator()(N_Vector v) const { N_VDestroy(v); }
+};
+struct FreeMatrix {
+  void operator()(SUNMatrix m) const { SUNMatDestroy(m); }
+};
+struct FreeSolver {
+  void operator()(SUNLinearSolver s) const { SUNLinSolFree(s); }
+};
+struct FreeCvodes {
+  void operator()(void* memory) const { CVodeFree(&memory); }
+};
+
+using Context = std::unique_ptr<std::remove_pointer_t<SUNContext>, FreeContext>;
+using Vector = std::unique_ptr<std::remove_pointer_t<N_Vector>, FreeVector>;
+using Matrix = std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix>;
+using LinearSolver = std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeSolver>;
+using Cvodes = std::unique_ptr<void, FreeCvodes>;
+
+/// Throws Error(numerical) "CVODES: CALL: FLAG" for a negative return value.
+void check(int flag, std::string_view call);
+
+[[nodiscard]] Context make_context();
+
+}  // namespace tpm::sundials
