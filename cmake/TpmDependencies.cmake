@@ -1,16 +1,27 @@
-# Finds every dependency with find_package. Packages whose names or targets differ between releases
-# are wrapped in one tpm_* interface target each, so that the difference stays in this file.
-find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(nlohmann_json 3.11 REQUIRED)
-find_package(fmt 9 REQUIRED)
-find_package(CLI11 2.1 QUIET)
-find_package(Ceres 2.1 REQUIRED)
-find_package(Boost 1.74 REQUIRED)  # headers: quadrature and quantiles of Boost.Math
-find_package(SUNDIALS 6.4 REQUIRED COMPONENTS cvodes sunmatrixdense sunlinsoldense nvecserial)
-find_package(muparser 2.3 REQUIRED)
-find_package(utf8cpp 3.2 REQUIRED)
-find_package(valijson REQUIRED)
-find_package(OpenSSL 3 REQUIRED COMPONENTS Crypto)
+# Finds every dependency. Read twice: by the build, and by the installed package (then with
+# TPM_CONSUMER set), so that nothing installed holds the path of a dependency. Packages whose names
+# or targets differ between releases are wrapped in one imported tpm_* target each, so that the
+# difference stays in this file.
+
+# In a consumer a missing dependency makes tpmkit "not found", as find_package(tpmkit) promises.
+macro(tpm_find)
+  if(TPM_CONSUMER)
+    find_dependency(${ARGV})
+  else()
+    find_package(${ARGV} REQUIRED)
+  endif()
+endmacro()
+
+# --- in the public headers ----------------------------------------------------------------------
+tpm_find(Eigen3 3.4 NO_MODULE)
+tpm_find(nlohmann_json 3.11)
+tpm_find(fmt 9)
+
+# --- linked by the library ----------------------------------------------------------------------
+tpm_find(Ceres 2.1)
+tpm_find(SUNDIALS 6.4 COMPONENTS cvodes sunmatrixdense sunlinsoldense nvecserial)
+tpm_find(muparser 2.3)
+tpm_find(OpenSSL 3 COMPONENTS Crypto)
 
 # libsundials-dev brings the MPI build of HDF5 along, which is not thread safe: the serial one is
 # asked for by name, and an MPI one is refused rather than linked silently.
@@ -19,7 +30,7 @@ set(HDF5_USE_STATIC_LIBRARIES OFF)
 if(NOT HDF5_C_COMPILER_EXECUTABLE)
   find_program(HDF5_C_COMPILER_EXECUTABLE NAMES h5cc)
 endif()
-find_package(HDF5 1.10 REQUIRED COMPONENTS C)
+tpm_find(HDF5 1.10 COMPONENTS C)
 if(HDF5_IS_PARALLEL)
   message(FATAL_ERROR "HDF5: found the MPI build (${HDF5_C_LIBRARIES}); expected the serial one (Debian: libhdf5-dev)")
 endif()
@@ -27,20 +38,26 @@ find_path(TPM_CSV_INCLUDE csv.h REQUIRED)
 find_library(TPM_CSV_LIBRARY csv REQUIRED)
 mark_as_advanced(TPM_CSV_INCLUDE TPM_CSV_LIBRARY)
 
-if(NOT TPM_FIND_ONLY)
-  add_library(tpm_ceres INTERFACE)
-  target_link_libraries(tpm_ceres INTERFACE Ceres::ceres Boost::headers)
-  add_library(tpm_sundials INTERFACE)
-  target_link_libraries(tpm_sundials INTERFACE SUNDIALS::cvodes SUNDIALS::nvecserial
-    SUNDIALS::sunmatrixdense SUNDIALS::sunlinsoldense)
-  add_library(tpm_hdf5 INTERFACE)
-  target_include_directories(tpm_hdf5 SYSTEM INTERFACE ${HDF5_INCLUDE_DIRS})
-  target_link_libraries(tpm_hdf5 INTERFACE ${HDF5_C_LIBRARIES})
-  add_library(tpm_muparser INTERFACE)
-  target_link_libraries(tpm_muparser INTERFACE muparser::muparser)
-  add_library(tpm_csv INTERFACE)
-  target_include_directories(tpm_csv SYSTEM INTERFACE ${TPM_CSV_INCLUDE})
-  target_link_libraries(tpm_csv INTERFACE ${TPM_CSV_LIBRARY})
-  add_library(tpm_valijson INTERFACE)
-  target_link_libraries(tpm_valijson INTERFACE utf8::cpp valijson)
+add_library(tpm_ceres INTERFACE IMPORTED)
+target_link_libraries(tpm_ceres INTERFACE Ceres::ceres)
+add_library(tpm_sundials INTERFACE IMPORTED)
+target_link_libraries(tpm_sundials INTERFACE SUNDIALS::cvodes SUNDIALS::nvecserial
+  SUNDIALS::sunmatrixdense SUNDIALS::sunlinsoldense)
+add_library(tpm_hdf5 INTERFACE IMPORTED)
+target_include_directories(tpm_hdf5 INTERFACE ${HDF5_INCLUDE_DIRS})
+target_link_libraries(tpm_hdf5 INTERFACE ${HDF5_C_LIBRARIES})
+add_library(tpm_muparser INTERFACE IMPORTED)
+target_link_libraries(tpm_muparser INTERFACE muparser::muparser)
+add_library(tpm_csv INTERFACE IMPORTED)
+target_include_directories(tpm_csv INTERFACE ${TPM_CSV_INCLUDE})
+target_link_libraries(tpm_csv INTERFACE ${TPM_CSV_LIBRARY})
+
+# --- headers that only our own sources read, and the program's ----------------------------------
+if(NOT TPM_CONSUMER)
+  find_package(Boost 1.74 REQUIRED)  # quadrature and quantiles of Boost.Math
+  find_package(utf8cpp 3.2 REQUIRED)
+  find_package(valijson REQUIRED)
+  add_library(tpm_header_only INTERFACE IMPORTED)
+  target_link_libraries(tpm_header_only INTERFACE Boost::headers utf8::cpp valijson)
+  find_package(CLI11 2.1 REQUIRED)
 endif()

@@ -1,0 +1,21 @@
+# shellcheck shell=bash
+# The Debian packages that the project needs: the one list. Sourced, not run.
+
+# What builds and runs the program and draws its figures.
+packages_run=(
+  g++ cmake ninja-build
+  libeigen3-dev libceres-dev libsundials-dev libboost-dev
+  libhdf5-dev nlohmann-json3-dev libvalijson-dev libcsv-dev libutfcpp-dev libssl-dev
+  libmuparser-dev libcli11-dev libfmt-dev
+  python3 python3-numpy python3-matplotlib
+)
+
+# What the tests need besides.
+packages_test=(
+  catch2 librapidcheck-dev python3-scipy python3-h5py
+)
+
+# What checks the sources.
+packages_lint=(
+  git clang-format clang-tidy
+)

@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# Builds tpm and makes the report on the paper: its tables, figures, claims and fits, recomputed.
+# The report is out/paper/report.html; nothing outside this folder is written except packages.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+source scripts/install_packages.sh
+
+install_missing "to build and run tpm" "${packages_run[@]}"
+find_python numpy matplotlib
+
+configure release -DTPM_BUILD_TESTS=OFF
+say "building (build/release)"
+build release
+
+say "recomputing the paper"
+build/release/tpm report --output out/paper
+say "the report; open it in a browser:"
+echo "$PWD/out/paper/report.html"
