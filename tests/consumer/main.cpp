@@ -11,8 +11,8 @@ int main() {
   const auto model = tpm::make_model("closed_form");
   const double at_start = 0.0;
   const tpm::TpmVector paper = tpm::to_vector(tpm::TpmParameters{});
-  const tpm::Response response = model->respond(tpm::step_and_hold(4e-3, 30.0), {&at_start, 1},
-                                                paper, tpm::Want::values);
+  const tpm::Response response =
+      model->respond(tpm::step_and_hold(4e-3, 30.0), {&at_start, 1}, paper, tpm::Want::values);
   const double force_N = response.value[0];
   std::printf("tpmkit %s: %.4f N\n", std::string(tpm::version()).c_str(), force_N);
   return std::floor(force_N * 1e3) == 613.0 ? 0 : 1;
