@@ -1,0 +1,254 @@
+#!/usr/bin/env python3
+"""Draws the figures described in a figures.json of `tpm`, one SVG each.
+
+    draw_figures.py FIGURES.json FOLDER [--png]
+
+Where a number comes from decides how it looks: what the model computes is a line; what was measured
+or printed is filled; what is assumed is open, hatched or dashed, and the legend says so. The same
+input gives the same bytes.
+"""
+
+import argparse
+import json
+import re
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
+from matplotlib.lines import Line2D  # noqa: E402
+from matplotlib.patches import Patch, Rectangle  # noqa: E402
+
+# Lengths in inches, so that text keeps its size whatever the number of panels.
+PANEL_WIDTH, PANEL_HEIGHT = 3.75, 2.75
+LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 0.62, 0.12, 0.32, 0.66, 0.50
+LEGEND_ROW, NOTE_ROW = 0.20, 0.19
+
+# Okabe and Ito's palette: told apart by people with any of the usual colour deficiencies.
+MODEL_COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
+DATA_COLOURS = ["#222222", "#8A5A00", "#5B2A86", "#666666"]
+DATA_MARKERS = ["o", "s", "D", "^"]
+# Later lines are thinner: where curves coincide, all of them show.
+LINE_WIDTHS = [3.4, 2.2, 1.2, 0.9]
+
+PROVENANCE = {
+    "model": "computed by tpm",
+    "table": "printed in a table of the paper",
+    "text": "printed in the paper's text",
+    "abstract": "from the abstract of the original experiment",
+    "derived": "computed from printed numbers",
+    "assumed": "chosen, not measured: open, hatched or dashed",
+    "digitized": "read off a figure",
+    "measured": "raw recording",
+}
+
+STYLE = {
+    "svg.fonttype": "path",
+    "svg.hashsalt": "tpmkit",
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "axes.titlesize": 9,
+    "axes.labelsize": 8.5,
+    "legend.fontsize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "hatch.linewidth": 0.7,
+}
+
+
+def is_assumed(series):
+    """True if the value itself, or its place on the axis, is somebody's choice."""
+    return series["provenance"] == "assumed" or "assumed" in series
+
+
+def legend_text(series):
+    """The label and, in brackets, where the numbers come from."""
+    origin = series["provenance"]
+    if "assumed" in series:
+        origin += f"; {series['assumed']} assumed"
+    return f"{series['label']} [{origin}]"
+
+
+def looks(figure):
+    """Colour, marker and width of each label: one look per label throughout the figure."""
+    chosen = {}
+    lines = data = 0
+    for series in (s for panel in figure["panels"] for s in panel["series"]):
+        if series["label"] in chosen:
+            continue
+        if series["kind"] == "line":
+            chosen[series["label"]] = {
+                "color": MODEL_COLOURS[lines % len(MODEL_COLOURS)],
+                "width": LINE_WIDTHS[min(lines, len(LINE_WIDTHS) - 1)],
+            }
+            lines += 1
+        else:
+            chosen[series["label"]] = {
+                "color": DATA_COLOURS[data % len(DATA_COLOURS)],
+                "marker": DATA_MARKERS[data % len(DATA_MARKERS)],
+            }
+            data += 1
+    return chosen
+
+
+def draw_line(axes, series, look):
+    style = dict(color=look["color"], linewidth=look["width"], linestyle="--" if is_assumed(series) else "-")
+    axes.plot(series["x"], series["y"], zorder=3, **style)
+    return Line2D([], [], **style)
+
+
+def draw_points(axes, series, look):
+    face = "white" if is_assumed(series) else look["color"]
+    style = dict(marker=look["marker"], markersize=5, markerfacecolor=face, markeredgecolor=look["color"], linestyle="none")
+    axes.errorbar(series["x"], series["y"], yerr=series.get("sd"), ecolor=look["color"], elinewidth=1, capsize=2.5, zorder=5, **style)
+    return Line2D([], [], **style)
+
+
+def draw_band(axes, series, look):
+    if is_assumed(series):
+        style = dict(facecolor="none", edgecolor=look["color"], hatch="////", linewidth=0.6, linestyle="--")
+    else:
+        style = dict(facecolor=look["color"], alpha=0.22, linewidth=0)
+    axes.fill_between(series["x"], series["lower"], series["upper"], zorder=1, **style)
+    return Patch(**style)
+
+
+def bracket_style(series, look):
+    if is_assumed(series):
+        return dict(facecolor="none", edgecolor=look["color"], hatch="//////", linewidth=0.8, linestyle="--")
+    return dict(facecolor=look["color"], alpha=0.35, linewidth=0)
+
+
+def draw_bracket(axes, series, look):
+    """Reserves the room; finish_bracket() draws once the limits of the axes are known."""
+    axes.plot(series["x"], series["lower"], linestyle="none")
+    axes.plot(series["x"], series["upper"], linestyle="none")
+    return Patch(**bracket_style(series, look))
+
+
+def finish_bracket(axes, series, look, half_width=5.0):
+    """An upright bar of fixed width on the page [points] from lower to upper at each x."""
+    pixels = half_width * axes.figure.dpi / 72
+    to_page, to_data = axes.transData, axes.transData.inverted()
+    for x, lower, upper in zip(series["x"], series["lower"], series["upper"]):
+        centre = to_page.transform((x, lower))
+        left = to_data.transform((centre[0] - pixels, centre[1]))[0]
+        right = to_data.transform((centre[0] + pixels, centre[1]))[0]
+        axes.add_patch(Rectangle((left, lower), right - left, upper - lower, zorder=2, **bracket_style(series, look)))
+        axes.hlines([lower, upper], left, right, color=look["color"], linewidth=1.3, zorder=4)
+
+
+def draw_mark(axes, series, look):
+    face = "white" if is_assumed(series) else look["color"]
+    style = dict(marker=look["marker"], markersize=6, markerfacecolor=face, markeredgecolor=look["color"], linestyle="none")
+    axes.plot(series["x"], series["y"], zorder=6, clip_on=False, **style)
+    for x, y in zip(series["x"], series["y"]):
+        axes.annotate(series["text"], (x, y), xytext=(-6, 5), textcoords="offset points", ha="right", va="bottom",
+                      color=look["color"], fontsize=8, zorder=6)
+    return Line2D([], [], **style)
+
+
+DRAW = {"line": draw_line, "points": draw_points, "band": draw_band, "bracket": draw_bracket, "mark": draw_mark}
+
+
+def axis_label(axis):
+    return f"{axis['quantity']} [{axis['unit']}]" if axis["unit"] else axis["quantity"]
+
+
+def draw_panel(axes, panel, look, handles):
+    """Draws one panel and adds a handle per new legend text to `handles`."""
+    for series in panel["series"]:
+        handle = DRAW[series["kind"]](axes, series, look[series["label"]])
+        handles.setdefault(legend_text(series), handle)
+    axes.set_title(panel["title"], loc="left")
+    for name, axis in (("x", panel["x"]), ("y", panel["y"])):
+        getattr(axes, f"set_{name}label")(axis_label(axis))
+        if axis["logarithmic"]:
+            getattr(axes, f"set_{name}scale")("log")
+        getattr(axes, f"set_{name}lim")(axis.get("lower"), axis.get("upper"))
+    for series in panel["series"]:
+        if series["kind"] == "bracket":
+            finish_bracket(axes, series, look[series["label"]])
+
+
+def provenance_note(figure):
+    present = []
+    for series in (s for panel in figure["panels"] for s in panel["series"]):
+        for word in [series["provenance"]] + (["assumed"] if "assumed" in series else []):
+            if word not in present:
+                present.append(word)
+    return [f"[{word}] {PROVENANCE[word]}" for word in present]
+
+
+def wrap(parts, per_row):
+    return ["    ".join(parts[i:i + per_row]) for i in range(0, len(parts), per_row)]
+
+
+def draw_figure(figure):
+    """The figure, laid out from the bottom: provenance, legend, panels."""
+    panels, look = figure["panels"], looks(figure)
+    labels = {legend_text(s) for panel in panels for s in panel["series"]}
+    columns = 1 if len(panels) == 1 else 2
+    width = LEFT + len(panels) * PANEL_WIDTH + (len(panels) - 1) * GAP + RIGHT
+    if len(panels) == 1:
+        width += 1.6
+    notes = wrap(provenance_note(figure), 2 if len(panels) == 1 else 3)
+    rows = -(-len(labels) // columns)
+    below = BELOW_AXIS + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08
+    height = TOP + PANEL_HEIGHT + below
+    page = plt.figure(figsize=(width, height))
+    panel_width = (width - LEFT - RIGHT - (len(panels) - 1) * GAP) / len(panels)
+    handles = {}
+    for i, panel in enumerate(panels):
+        left = LEFT + i * (panel_width + GAP)
+        axes = page.add_axes([left / width, below / height, panel_width / width, PANEL_HEIGHT / height])
+        draw_panel(axes, panel, look, handles)
+    page.legend(handles.values(), handles.keys(), loc="upper left", ncol=columns, frameon=False, borderaxespad=0,
+                bbox_to_anchor=(LEFT / width, (below - BELOW_AXIS) / height), handlelength=2.2, labelspacing=0.45)
+    for i, note in enumerate(notes):
+        page.text(LEFT / width, (0.08 + (len(notes) - 1 - i) * NOTE_ROW) / height, note, fontsize=7, color="#555555", va="bottom")
+    return page
+
+
+def with_own_ids(svg, prefix):
+    """Several figures stand in one page: their ids must not meet."""
+    svg = re.sub(r'\bid="', f'id="{prefix}-', svg)
+    svg = re.sub(r'href="#', f'href="#{prefix}-', svg)
+    return re.sub(r"url\(#", f"url(#{prefix}-", svg)
+
+
+def save(figure, folder, png):
+    page = draw_figure(figure)
+    path = folder / f"{figure['id']}.svg"
+    page.savefig(path, metadata={"Date": None, "Creator": None})
+    path.write_text(with_own_ids(path.read_text(encoding="utf-8"), figure["id"]), encoding="utf-8")
+    if png:
+        page.savefig(folder / f"{figure['id']}.png", dpi=130, metadata={"Software": None})
+    plt.close(page)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("figures", type=Path, help="figures.json as written by tpm")
+    parser.add_argument("folder", type=Path, help="where the drawings go")
+    parser.add_argument("--png", action="store_true", help="write a PNG beside each SVG")
+    arguments = parser.parse_args()
+    try:
+        figures = json.loads(arguments.figures.read_text(encoding="utf-8"))["figures"]
+        arguments.folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError, KeyError) as error:
+        sys.exit(f"draw_figures.py: {arguments.figures}: {error}; expected a figures.json of tpm and a folder to write to")
+    matplotlib.rcParams.update(STYLE)
+    for figure in figures:
+        save(figure, arguments.folder, arguments.png)
+
+
+if __name__ == "__main__":
+    main()

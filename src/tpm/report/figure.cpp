@@ -1,0 +1,109 @@
+#include "tpm/report/figure.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+namespace {
+
+std::string_view kind_name(Series::Kind kind) {
+  switch (kind) {
+    case Series::Kind::line:
+      return "line";
+    case Series::Kind::points:
+      return "points";
+    case Series::Kind::band:
+      return "band";
+    case Series::Kind::bracket:
+      return "bracket";
+    case Series::Kind::mark:
+      return "mark";
+  }
+  return "";
+}
+
+/// Six digits are more than a drawing shows, and the same on every machine.
+Json numbers(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double v : values) list.push_back(std::stod(fmt::format("{:.6g}", v)));
+  return list;
+}
+
+void require_drawable(const Series& s, const std::string& where) {
+  const bool range = s.kind == Series::Kind::band || s.kind == Series::Kind::bracket;
+  const std::size_t n = s.x.size();
+  const bool matching = range ? s.lower.size() == n && s.upper.size() == n : s.y.size() == n;
+  if (!matching || (!s.sd.empty() && s.sd.size() != n)) {
+    throw Error(ExitCode::numerical, where, "the arrays of a series differ in length");
+  }
+  for (const auto* values : {&s.x, &s.y, &s.sd, &s.lower, &s.upper}) {
+    for (const double v : *values) {
+      if (!std::isfinite(v)) throw Error(ExitCode::numerical, where, "a value is not finite");
+    }
+  }
+}
+
+Json axis_json(const Axis& axis) {
+  Json json{{"quantity", axis.quantity}, {"unit", axis.unit}, {"logarithmic", axis.logarithmic}};
+  if (axis.lower) json["lower"] = *axis.lower;
+  if (axis.upper) json["upper"] = *axis.upper;
+  return json;
+}
+
+Json series_json(const Series& s) {
+  Json json{{"kind", kind_name(s.kind)}, {"label", s.label}, {"provenance", s.provenance}};
+  if (!s.assumed.empty()) json["assumed"] = s.assumed;
+  if (!s.text.empty()) json["text"] = s.text;
+  json["x"] = numbers(s.x);
+  for (const auto& [key, values] : {std::pair{"y", &s.y}, std::pair{"sd", &s.sd},
+                                    std::pair{"lower", &s.lower}, std::pair{"upper", &s.upper}}) {
+    if (!values->empty()) json[key] = numbers(*values);
+  }
+  return json;
+}
+
+Json panel_json(const Panel& panel, const std::string& where) {
+  Json series = Json::array();
+  for (const Series& s : panel.series) {
+    require_drawable(s, fmt::format("{}, '{}'", where, s.label));
+    series.push_back(series_json(s));
+  }
+  return Json{{"title", panel.title},
+              {"x", axis_json(panel.x)},
+              {"y", axis_json(panel.y)},
+              {"series", std::move(series)}};
+}
+
+}  // namespace
+
+Json to_json(const std::vector<Figure>& figures) {
+  Json list = Json::array();
+  for (const Figure& figure : figures) {
+    Json panels = Json::array();
+    for (const Panel& panel : figure.panels) {
+      panels.push_back(panel_json(panel, fmt::format("figure {}", figure.id)));
+    }
+    list.push_back(Json{{"id", figure.id},
+                        {"title", figure.title},
+                        {"caption", figure.caption},
+                        {"panels", std::move(panels)}});
+  }
+  return Json{{"figures", std::move(list)}};
+}
+
+Series line(std::string label, std::vector<double> x, std::vector<double> y) {
+  Series s;
+  s.kind = Series::Kind::line;
+  s.label = std::move(label);
+  s.provenance = "model";
+  s.x = std::move(x);
+  s.y = std::move(y);
+  return s;
+}
+
+}  // namespace tpm

@@ -1,0 +1,60 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// One thing drawn in a panel. All numbers are in the units of the panel's axes.
+struct Series {
+  enum class Kind {
+    line,     ///< x, y: a curve
+    points,   ///< x, y, and `sd` if known: separate readings
+    band,     ///< x, lower, upper: a range over a stretch of x
+    bracket,  ///< x, lower, upper: a range known at single places only; nothing is drawn between
+    mark,     ///< x, y: a single value, written out beside its place as `text`
+  };
+  Kind kind = Kind::line;
+  std::string label;       ///< for the legend; same label, same colour in all panels of a figure
+  std::string provenance;  ///< "model", or a word of provenance_name()
+  std::string assumed;     ///< what of its place is assumed ("time"); empty if nothing
+  std::vector<double> x;
+  std::vector<double> y;
+  std::vector<double> sd;
+  std::vector<double> lower;
+  std::vector<double> upper;
+  std::string text;
+};
+
+struct Axis {
+  std::string quantity;  ///< "contact force"
+  std::string unit;      ///< "N"; may be empty
+  bool logarithmic = false;
+  std::optional<double> lower;  ///< limits; what is not given follows the data
+  std::optional<double> upper;
+};
+
+struct Panel {
+  std::string title;
+  Axis x;
+  Axis y;
+  std::vector<Series> series;
+};
+
+/// A figure as data: scripts/draw_figures.py draws it, and it can be redrawn without recomputing.
+struct Figure {
+  std::string id;  ///< name of the file it is drawn into, without ending
+  std::string title;
+  std::string caption;
+  std::vector<Panel> panels;
+};
+
+/// The content of figures.json. Throws Error(numerical) if the arrays of a series differ in length
+/// or hold a number that is not finite.
+[[nodiscard]] Json to_json(const std::vector<Figure>& figures);
+
+[[nodiscard]] Series line(std::string label, std::vector<double> x, std::vector<double> y);
+
+}  // namespace tpm
