@@ -25,14 +25,14 @@ from matplotlib.patches import Patch, Rectangle  # noqa: E402
 # Lengths in inches, so that text keeps its size whatever the number of panels.
 PANEL_WIDTH, PANEL_HEIGHT = 3.75, 2.75
 LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 0.62, 0.12, 0.32, 0.66, 0.50
-LEGEND_ROW, NOTE_ROW = 0.20, 0.19
+LEGEND_ROW, NOTE_ROW = 0.172, 0.16
 
 # Okabe and Ito's palette: told apart by people with any of the usual colour deficiencies.
 MODEL_COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 DATA_COLOURS = ["#222222", "#8A5A00", "#5B2A86", "#666666"]
 DATA_MARKERS = ["o", "s", "D", "^"]
 # Later lines are thinner: where curves coincide, all of them show.
-LINE_WIDTHS = [3.4, 2.2, 1.2, 0.9]
+LINE_WIDTHS = [2.8, 1.8, 1.1, 0.8]
 
 PROVENANCE = {
     "model": "computed by tpm",
@@ -150,7 +150,7 @@ def draw_mark(axes, series, look):
     style = dict(marker=look["marker"], markersize=6, markerfacecolor=face, markeredgecolor=look["color"], linestyle="none")
     axes.plot(series["x"], series["y"], zorder=6, clip_on=False, **style)
     for x, y in zip(series["x"], series["y"]):
-        axes.annotate(series["text"], (x, y), xytext=(-6, 5), textcoords="offset points", ha="right", va="bottom",
+        axes.annotate(series["text"], (x, y), xytext=(0, 6), textcoords="offset points", ha="center", va="bottom",
                       color=look["color"], fontsize=8, zorder=6)
     return Line2D([], [], **style)
 
@@ -245,6 +245,7 @@ def main():
         arguments.folder.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError, KeyError) as error:
         sys.exit(f"draw_figures.py: {arguments.figures}: {error}; expected a figures.json of tpm and a folder to write to")
+    matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
     matplotlib.rcParams.update(STYLE)
     for figure in figures:
         save(figure, arguments.folder, arguments.png)

@@ -1,0 +1,112 @@
+#include "tpm/report/draw.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "tpm/core/error.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+/// What became of a program that was run.
+struct Outcome {
+  int status = 0;            ///< exit status; 127 if it could not be started
+  std::string error_output;  ///< what it wrote to standard error
+};
+
+std::string read_to_end(int fd) {
+  std::string text;
+  std::array<char, 4096> buffer{};
+  for (;;) {
+    const ssize_t n = ::read(fd, buffer.data(), buffer.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return text;
+    text.append(buffer.data(), static_cast<std::size_t>(n));
+  }
+}
+
+int wait_for(pid_t child) {
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) return 127;
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+/// Runs a program (searched for on the path) without a shell, its standard output discarded.
+Outcome run(const std::vector<std::string>& words) {
+  std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
+  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+
+  std::array<int, 2> ends{};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
+    throw Error(ExitCode::environment, words.front(),
+                fmt::format("no pipe to it: {}", std::strerror(errno)));
+  }
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+  pid_t child = 0;
+  const int failed =
+      ::posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  ::close(ends[1]);
+  Outcome outcome;
+  if (failed == 0) {
+    outcome.error_output = read_to_end(ends[0]);
+    outcome.status = wait_for(child);
+  } else {
+    outcome = {127, std::strerror(failed)};
+  }
+  ::close(ends[0]);
+  return outcome;
+}
+
+std::string last_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  const auto start = text.rfind('\n');
+  return start == std::string::npos ? text : text.substr(start + 1);
+}
+
+}  // namespace
+
+std::string find_drawing_python() {
+  std::vector<std::string> candidates;
+  if (const char* chosen = std::getenv("TPMKIT_PYTHON"); chosen != nullptr && *chosen != '\0') {
+    candidates.emplace_back(chosen);
+  }
+  candidates.insert(candidates.end(), {"python3", "/usr/bin/python3"});
+  for (const std::string& python : candidates) {
+    if (run({python, "-c", "import matplotlib"}).status == 0) return python;
+  }
+  throw Error(ExitCode::environment, "figures",
+              fmt::format("no Python with matplotlib; tried {}", fmt::join(candidates, ", ")),
+              "Debian's python3-matplotlib, or TPMKIT_PYTHON naming an interpreter that has it");
+}
+
+void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
+                  const std::filesystem::path& folder, Drawings drawings) {
+  const std::string script = (share_dir() / "scripts" / "draw_figures.py").string();
+  std::vector<std::string> words{python, script, figures_json.string(), folder.string()};
+  if (drawings == Drawings::svg_and_png) words.emplace_back("--png");
+  const Outcome outcome = run(words);
+  if (outcome.status == 0) return;
+  throw Error(ExitCode::environment, script,
+              fmt::format("ended with status {}: {}", outcome.status,
+                          printable(last_line(outcome.error_output), 200)));
+}
+
+}  // namespace tpm

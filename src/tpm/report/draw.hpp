@@ -1,0 +1,20 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+namespace tpm {
+
+/// The Python interpreter that draws: the first of $TPMKIT_PYTHON, python3 and /usr/bin/python3
+/// that has matplotlib (a version manager's python3 often has not). Throws Error(environment)
+/// naming those tried.
+[[nodiscard]] std::string find_drawing_python();
+
+enum class Drawings { svg, svg_and_png };
+
+/// Draws every figure of a figures.json into `folder`, one file each, with
+/// scripts/draw_figures.py. Throws Error(environment) with the last words of the script if it
+/// fails.
+void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
+                  const std::filesystem::path& folder, Drawings drawings = Drawings::svg);
+
+}  // namespace tpm
