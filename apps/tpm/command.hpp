@@ -20,5 +20,6 @@ void add_format_option(CLI::App& command, Session& session);
 
 // One function per file cmd_*.cpp.
 void add_version_command(CLI::App& app, Session& session);
+void add_fit_command(CLI::App& app, Session& session);
 
 }  // namespace tpm::app
