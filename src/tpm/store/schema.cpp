@@ -125,9 +125,7 @@ Error in_plain_words(const Violation& violation, const Json& root, std::string_v
     return fmt::format("{}: key {}", where, pointer(place));
   };
   if (said.starts_with(kUnknown)) {
-    const auto colon = said.find(": ");
     path.push_back(quoted_word(said));
-    if (path.back().empty() && colon != std::string::npos) path.back() = plain(said.substr(colon + 2));
     return bad_input(at(path), "unknown key",
                      rules.contains("properties") ? "one of " + key_list(rules.at("properties"))
                                                   : std::string("no such key"));
