@@ -88,24 +88,11 @@ double deviance_at(const ResidualFunction& function, std::span<const double> nat
   return r.squaredNorm() - function.offset();
 }
 
-Minimum minimise(const ResidualFunction& function, std::span<const FitParameter> parameters,
-                 std::span<const double> start, const FixedMask& fixed) {
-  keep_ceres_quiet();
-  Minimum minimum;
-  minimum.natural.assign(start.begin(), start.end());
-  std::vector<std::size_t> free;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!fixed.empty() && fixed[i]) continue;
-    free.push_back(i);
-    minimum.natural[i] = std::clamp(minimum.natural[i], parameters[i].lower, parameters[i].upper);
-  }
-  if (free.empty()) {
-    minimum.deviance = deviance_at(function, minimum.natural);
-    minimum.usable = minimum.converged = std::isfinite(minimum.deviance);
-    minimum.message = "nothing to estimate";
-    return minimum;
-  }
+namespace {
 
+/// One Ceres run over the parameters in `free`, from and to `minimum.natural`.
+void descend(const ResidualFunction& function, std::span<const FitParameter> parameters,
+             const std::vector<std::size_t>& free, Minimum& minimum) {
   std::vector<double> theta;
   for (const std::size_t i : free) theta.push_back(parameters[i].theta(minimum.natural[i]));
   ceres::Problem problem;
@@ -126,16 +113,79 @@ Minimum minimise(const ResidualFunction& function, std::span<const FitParameter>
   options.update_state_every_iteration = true;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
-
   for (std::size_t j = 0; j < free.size(); ++j) {
     const FitParameter& p = parameters[free[j]];
     minimum.natural[free[j]] = std::clamp(p.natural(theta[j]), p.lower, p.upper);
   }
+  minimum.iterations += static_cast<int>(summary.iterations.size());
+  minimum.converged = summary.termination_type == ceres::CONVERGENCE;
+  minimum.message = summary.message;
+}
+
+/// Which of the candidates a descent would push through a bound, or none if it cannot be told.
+FixedMask pressed_against_bound(const ResidualFunction& function,
+                                std::span<const FitParameter> parameters,
+                                const std::vector<double>& natural, const FixedMask& fixed) {
+  FixedMask pressed(parameters.size(), false);
+  Eigen::VectorXd r;
+  RowMatrix jacobian;
+  if (!function.evaluate(natural, r, &jacobian)) return pressed;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const FitParameter& p = parameters[i];
+    if (!fixed.empty() && fixed[i]) continue;
+    const double slope = p.natural_slope(p.theta(natural[i]));
+    const double gradient = jacobian.col(static_cast<Eigen::Index>(i)).dot(r) * slope;
+    const bool at_theta_lower = p.reversed() ? p.at_upper(natural[i]) : p.at_lower(natural[i]);
+    const bool at_theta_upper = p.reversed() ? p.at_lower(natural[i]) : p.at_upper(natural[i]);
+    pressed[i] = (at_theta_lower && gradient > 0.0) || (at_theta_upper && gradient < 0.0);
+  }
+  return pressed;
+}
+
+/// Puts pressed parameters exactly on their bound.
+void snap_to_bounds(std::span<const FitParameter> parameters, const FixedMask& pressed,
+                    std::vector<double>& natural) {
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (!pressed[i]) continue;
+    natural[i] = parameters[i].at_lower(natural[i]) ? parameters[i].lower : parameters[i].upper;
+  }
+}
+
+}  // namespace
+
+Minimum minimise(const ResidualFunction& function, std::span<const FitParameter> parameters,
+                 std::span<const double> start, const FixedMask& fixed) {
+  keep_ceres_quiet();
+  Minimum minimum;
+  minimum.natural.assign(start.begin(), start.end());
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (!fixed.empty() && fixed[i]) continue;
+    minimum.natural[i] = std::clamp(minimum.natural[i], parameters[i].lower, parameters[i].upper);
+  }
+  // Ceres cuts each step at the bounds, which makes the other parameters creep while one of them
+  // presses against its bound. So the pressed ones are held and the rest is solved again, until
+  // the set of pressed parameters stays the same.
+  FixedMask held(parameters.size(), false);
+  constexpr int kMostRounds = 12;
+  for (int round = 0; round < kMostRounds; ++round) {
+    std::vector<std::size_t> free;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      if (!held[i] && (fixed.empty() || !fixed[i])) free.push_back(i);
+    }
+    if (free.empty()) {
+      minimum.converged = true;
+      minimum.message = "nothing to estimate, or every parameter at a bound";
+    } else {
+      descend(function, parameters, free, minimum);
+    }
+    const FixedMask pressed = pressed_against_bound(function, parameters, minimum.natural, fixed);
+    snap_to_bounds(parameters, pressed, minimum.natural);
+    if (pressed == held) break;
+    held = pressed;
+    if (round + 1 == kMostRounds) minimum.converged = false;
+  }
   minimum.deviance = deviance_at(function, minimum.natural);
   minimum.usable = std::isfinite(minimum.deviance);
-  minimum.converged = summary.termination_type == ceres::CONVERGENCE;
-  minimum.iterations = static_cast<int>(summary.iterations.size());
-  minimum.message = summary.message;
   return minimum;
 }
 
