@@ -23,7 +23,7 @@ from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
 
 # Lengths in inches, so that text keeps its size whatever the number of panels.
-PANEL_WIDTH, PANEL_HEIGHT = 3.75, 2.75
+PAGE_WIDTH, SINGLE_PAGE_WIDTH, PANEL_HEIGHT = 8.9, 6.1, 2.75
 LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 0.62, 0.12, 0.32, 0.66, 0.50
 LEGEND_ROW, NOTE_ROW = 0.172, 0.16
 
@@ -196,9 +196,7 @@ def draw_figure(figure):
     panels, look = figure["panels"], looks(figure)
     labels = {legend_text(s) for panel in panels for s in panel["series"]}
     columns = 1 if len(panels) == 1 else 2
-    width = LEFT + len(panels) * PANEL_WIDTH + (len(panels) - 1) * GAP + RIGHT
-    if len(panels) == 1:
-        width += 1.6
+    width = SINGLE_PAGE_WIDTH if len(panels) == 1 else PAGE_WIDTH
     notes = wrap(provenance_note(figure), 2 if len(panels) == 1 else 3)
     rows = -(-len(labels) // columns)
     below = BELOW_AXIS + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08

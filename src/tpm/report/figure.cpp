@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
 
 namespace tpm {
 namespace {
@@ -30,7 +31,7 @@ std::string_view kind_name(Series::Kind kind) {
 /// Six digits are more than a drawing shows, and the same on every machine.
 Json numbers(const std::vector<double>& values) {
   Json list = Json::array();
-  for (const double v : values) list.push_back(std::stod(fmt::format("{:.6g}", v)));
+  for (const double v : values) list.push_back(rounded(v, 6));
   return list;
 }
 

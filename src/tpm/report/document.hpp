@@ -1,0 +1,73 @@
+#pragma once
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace tpm {
+
+/// How a verdict is tinted where there is colour; the words always carry the meaning.
+enum class Tone { plain, good, fair, bad };
+
+struct Cell {
+  std::string text;
+  Tone tone = Tone::plain;
+};
+
+struct Column {
+  std::string title;
+  bool numeric = false;  ///< aligned to the right
+};
+
+// --- blocks -------------------------------------------------------------------------------------
+// Text in them is plain; `words between backticks` are code.
+
+struct Heading {
+  int level = 2;  ///< 2 for a section, 3 within one
+  std::string text;
+};
+
+struct Paragraph {
+  std::string text;
+};
+
+struct Bullets {
+  std::vector<Cell> items;
+};
+
+struct Table {
+  std::string caption;
+  std::vector<Column> columns;
+  std::vector<std::vector<Cell>> rows;  ///< each as long as `columns`
+};
+
+struct Picture {
+  std::string id;  ///< of the Figure, and of its drawing figures/ID.svg
+  std::string title;
+  std::string caption;
+};
+
+using Block = std::variant<Heading, Paragraph, Bullets, Table, Picture>;
+
+/// A report as a list of blocks, independent of how it is rendered.
+struct Document {
+  std::string title;
+  std::string subtitle;
+  std::vector<Block> blocks;
+
+  void heading(int level, std::string text);
+  void paragraph(std::string text);
+  void bullets(std::vector<Cell> items);
+  void table(Table table);
+  void picture(Picture picture);
+};
+
+/// GitHub-flavoured Markdown; pictures are links to figures/ID.svg beside it.
+[[nodiscard]] std::string to_markdown(const Document& document);
+
+/// One self-contained HTML page for screen, phone and paper.
+/// @param drawings the SVG text of each picture, by id; Error(environment) if one is missing
+[[nodiscard]] std::string to_html(const Document& document,
+                                  const std::map<std::string, std::string>& drawings);
+
+}  // namespace tpm

@@ -1,0 +1,146 @@
+#include "tpm/report/fit_figures.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "tpm/core/error.hpp"
+#include "tpm/fit/uncertainty.hpp"
+
+namespace tpm {
+namespace {
+
+Axis parameter_axis(const FitParameter& p) {
+  return {p.name, p.unit.symbol, p.scale != Scale::linear, {}, {}};
+}
+
+/// The declared noise scale holds for a fit only if it holds for each of its data sets.
+bool scale_known(const FitConfig& config) {
+  for (const DataChoice& d : config.data) {
+    if (!d.noise.scale_known) return false;
+  }
+  return true;
+}
+
+/// Rise of the deviance at the limits of the confidence interval of one parameter.
+double interval_rise(const FitResult& fit) {
+  const Threshold threshold{fit.config.level, scale_known(fit.config), fit.value_count,
+                            static_cast<int>(fit.parameters.size())};
+  return threshold.rise(fit.best.deviance);
+}
+
+Panel profile_panel(const FitResult& fit, const ParameterResult& result, double rise) {
+  Series profile = line("profile", {}, {});
+  // Far above the limit a profile only squeezes the part that matters.
+  const double ceiling = 4.0 * rise;
+  for (const ProfilePoint& point : result.profile.points) {
+    const double risen = point.deviance - fit.best.deviance;
+    if (risen > ceiling) continue;
+    profile.x.push_back(point.natural / result.parameter.unit.to_si);
+    profile.y.push_back(risen);
+  }
+  Panel panel{
+      "", parameter_axis(result.parameter), {"rise of the deviance", "", false, 0.0, {}}, {}};
+  panel.y.upper = 1.6 * rise;
+  Series limit = line(fmt::format("limit of the {:.4g} % interval", 100.0 * fit.config.level),
+                      {profile.x.front(), profile.x.back()}, {rise, rise});
+  Series best;
+  best.kind = Series::Kind::points;
+  best.label = "best fit";
+  best.provenance = "derived";
+  best.x = {result.estimate / result.parameter.unit.to_si};
+  best.y = {0.0};
+  panel.series = {std::move(profile), std::move(limit), std::move(best)};
+  return panel;
+}
+
+Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::string& name,
+                        double stated) {
+  Series interval;
+  interval.kind = Series::Kind::bracket;
+  Series estimate;
+  estimate.kind = Series::Kind::points;
+  Axis axis;
+  double unit = 1.0;
+  for (const FitVariant& variant : study.variants) {
+    if (variant.noise != noise) continue;
+    const ParameterResult& p = parameter_of(variant.result, name);
+    unit = p.parameter.unit.to_si;
+    axis = parameter_axis(p.parameter);
+    interval.label = fmt::format("{:.4g} % interval", 100.0 * variant.result.config.level);
+    interval.x.push_back(variant.rate_m_per_s * 1e3);
+    interval.lower.push_back(p.lower.value_or(p.parameter.lower) / unit);
+    interval.upper.push_back(p.upper.value_or(p.parameter.upper) / unit);
+    estimate.x.push_back(variant.rate_m_per_s * 1e3);
+    estimate.y.push_back(p.estimate / unit);
+  }
+  interval.provenance = "derived";
+  interval.assumed = "ramp rate";
+  estimate.label = "best fit";
+  estimate.provenance = "derived";
+  estimate.assumed = "ramp rate";
+  Series value = line("stated in the paper", {0.0, 5.0}, {stated / unit, stated / unit});
+  value.provenance = "text";
+  Panel panel{fmt::format("noise {}", noise_kind_name(noise)),
+              {"assumed ramp rate", "mm/s", false, 0.0, 5.0},
+              std::move(axis),
+              {}};
+  panel.series = {std::move(interval), std::move(estimate), std::move(value)};
+  return panel;
+}
+
+}  // namespace
+
+const ParameterResult& parameter_of(const FitResult& fit, const std::string& name) {
+  for (const ParameterResult& p : fit.parameters) {
+    if (p.parameter.name == name) return p;
+  }
+  throw bad_input(fit.config.title, fmt::format("does not estimate '{}'", name));
+}
+
+TpmParameters model_parameters(const FitResult& fit) {
+  TpmVector vector = to_vector(fit.config.fixed);
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+    for (const TpmIndex index : fit.config.parameters[i].sets) {
+      vector[static_cast<std::size_t>(index)] = fit.best.natural[i];
+    }
+  }
+  return from_vector(vector);
+}
+
+std::string estimate_words(const FitResult& fit) {
+  std::vector<std::string> words;
+  for (const ParameterResult& p : fit.parameters) {
+    words.push_back(fmt::format("{} = {}", p.parameter.name, in_unit(p.parameter, p.estimate)));
+  }
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+Figure profile_figure(const FitResult& fit) {
+  Figure figure{"fit_profiles",
+                "Likelihood profiles",
+                "Each parameter is held at a value and the others are fitted again. Where the "
+                "curve stays below the limit, the data cannot tell the values apart.",
+                {}};
+  const double rise = interval_rise(fit);
+  for (const ParameterResult& p : fit.parameters) {
+    if (!p.profile.points.empty()) figure.panels.push_back(profile_panel(fit, p, rise));
+  }
+  return figure;
+}
+
+Figure sensitivity_figure(const FitStudy& study, const std::string& parameter, double stated) {
+  Figure figure{fmt::format("fit_sensitivity_{}", parameter),
+                fmt::format("What {} depends on", parameter),
+                "The ramp rate and the kind of noise are not stated in the paper. Each bar is the "
+                "interval of one fit; a bar that ends at the edge of the searched range is open "
+                "there.",
+                {}};
+  for (const NoiseKind noise :
+       {NoiseKind::relative_to_datum, NoiseKind::log, NoiseKind::relative_to_model}) {
+    figure.panels.push_back(sensitivity_panel(study, noise, parameter, stated));
+  }
+  return figure;
+}
+
+}  // namespace tpm

@@ -1,0 +1,98 @@
+#include "tpm/study/fit_variations.hpp"
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <utility>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/curve/load.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::array kRates_m_per_s{1e-3, 2e-3, 4e-3};
+constexpr std::array kNoises{NoiseKind::relative_to_datum, NoiseKind::log,
+                             NoiseKind::relative_to_model};
+
+bool is_ramp(const DataChoice& data) {
+  return data.protocol.kind == ProtocolChoice::Kind::ramp_hold;
+}
+
+FitConfig with_assumptions(FitConfig config, double rate_m_per_s, NoiseKind noise) {
+  for (DataChoice& data : config.data) {
+    if (!is_ramp(data)) continue;
+    data.protocol.rate_m_per_s = rate_m_per_s;
+    data.protocol.rate_provenance = Provenance::assumed;
+    data.noise.kind = noise;
+  }
+  return config;
+}
+
+FitConfig without_depth(FitConfig config, double depth_m) {
+  for (DataChoice& data : config.data) {
+    Selector selector;
+    selector.depth_m = depth_m;
+    data.hold_out.push_back(selector);
+  }
+  config.hypotheses.clear();  // they are tested once, on all of the data
+  return config;
+}
+
+/// Depths of the ramp-and-hold data sets, rising.
+std::set<double> tested_depths(const FitConfig& config) {
+  std::set<double> depths;
+  for (const DataChoice& data : config.data) {
+    if (!is_ramp(data)) continue;
+    for (const Datum& datum : load_points(data.dataset).data) {
+      if (datum.depth_m) depths.insert(*datum.depth_m);
+    }
+  }
+  return depths;
+}
+
+}  // namespace
+
+FitStudy run_fit_study(const FitConfig& config) {
+  const std::set<double> depths = tested_depths(config);
+  if (depths.empty()) {
+    throw bad_input(config.title, "no data set is a ramp-and-hold", "at least one");
+  }
+  FitStudy study;
+  Progress progress("fitting", 1 + kRates_m_per_s.size() * kNoises.size() + depths.size());
+  study.reference = run_fit(config);
+  progress.advance();
+  for (const double rate : kRates_m_per_s) {
+    for (const NoiseKind noise : kNoises) {
+      study.variants.push_back({rate, noise, run_fit(with_assumptions(config, rate, noise))});
+      progress.advance();
+    }
+  }
+  for (const double depth : depths) {
+    study.held_out.push_back({depth, run_fit(without_depth(config, depth))});
+    progress.advance();
+  }
+  return study;
+}
+
+Json variants_json(const FitStudy& study) {
+  Json list = Json::array();
+  for (const FitVariant& v : study.variants) {
+    Json item{{"rate_m_per_s", v.rate_m_per_s}, {"noise", noise_kind_name(v.noise)}};
+    item["fit"] = to_json(v.result);
+    list.push_back(std::move(item));
+  }
+  return Json{{"variants", std::move(list)}};
+}
+
+Json held_out_json(const FitStudy& study) {
+  Json list = Json::array();
+  for (const HeldOutFit& h : study.held_out) {
+    list.push_back(Json{{"depth_m", rounded(h.depth_m, 6)}, {"fit", to_json(h.result)}});
+  }
+  return Json{{"held_out", std::move(list)}};
+}
+
+}  // namespace tpm
