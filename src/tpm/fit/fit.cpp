@@ -46,7 +46,10 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
   std::vector<Minimum> ends;
   Progress progress("fitting from random starts", count);
   for (const auto& start : latin_hypercube_starts(parameters, count, seed)) {
-    const Minimum m = minimise(function, parameters, start);
+    // Both first steps are tried from every start; the deeper end counts.
+    Minimum m = minimise(function, parameters, start);
+    const Minimum other = minimise(function, parameters, start, {}, FirstStep::cautious);
+    if (other.usable && (!m.usable || other.deviance < m.deviance)) m = other;
     ++result.run;
     if (m.usable) {
       ends.push_back(m);

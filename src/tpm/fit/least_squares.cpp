@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 #include <glog/logging.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <mutex>
@@ -59,8 +60,9 @@ class FreeThetaCost final : public ceres::CostFunction {
   std::vector<double> natural_;
 };
 
-ceres::Solver::Options solver_options() {
+ceres::Solver::Options solver_options(FirstStep first_step) {
   ceres::Solver::Options options;
+  options.initial_trust_region_radius = first_step == FirstStep::bold ? 1e4 : 10.0;
   options.minimizer_type = ceres::TRUST_REGION;
   options.trust_region_strategy_type = ceres::LEVENBERG_MARQUARDT;
   options.linear_solver_type = ceres::DENSE_QR;
@@ -92,7 +94,7 @@ namespace {
 
 /// One Ceres run over the parameters in `free`, from and to `minimum.natural`.
 void descend(const ResidualFunction& function, std::span<const FitParameter> parameters,
-             const std::vector<std::size_t>& free, Minimum& minimum) {
+             const std::vector<std::size_t>& free, FirstStep first_step, Minimum& minimum) {
   std::vector<double> theta;
   for (const std::size_t i : free) theta.push_back(parameters[i].theta(minimum.natural[i]));
   ceres::Problem problem;
@@ -108,7 +110,7 @@ void descend(const ResidualFunction& function, std::span<const FitParameter> par
       problem.SetParameterUpperBound(theta.data(), index, p.theta_upper());
     }
   }
-  ceres::Solver::Options options = solver_options();
+  ceres::Solver::Options options = solver_options(first_step);
   // Ceres does not write back the better point when it ends in FAILURE: keep the state current.
   options.update_state_every_iteration = true;
   ceres::Solver::Summary summary;
@@ -151,10 +153,51 @@ void snap_to_bounds(std::span<const FitParameter> parameters, const FixedMask& p
   }
 }
 
+/// Gauss-Newton steps from the end of a descent: a descent judges by the sum of squares, which is
+/// flat to rounding while the parameters still have half their digits to gain. Stops when steps no
+/// longer shrink, leave the bounds or raise the sum of squares beyond rounding.
+void polish(const ResidualFunction& function, std::span<const FitParameter> parameters,
+            const std::vector<std::size_t>& free, std::vector<double>& natural) {
+  const auto n = static_cast<Eigen::Index>(free.size());
+  Eigen::VectorXd r;
+  RowMatrix jacobian;
+  double last_step = std::numeric_limits<double>::infinity();
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    if (!function.evaluate(natural, r, &jacobian)) return;
+    Eigen::MatrixXd j(r.size(), n);
+    Eigen::VectorXd length(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const std::size_t i = free[static_cast<std::size_t>(k)];
+      j.col(k) = jacobian.col(static_cast<Eigen::Index>(i)) *
+                 parameters[i].natural_slope(parameters[i].theta(natural[i]));
+      length[k] = j.col(k).norm();
+      if (!(length[k] > 0.0)) return;
+      j.col(k) /= length[k];
+    }
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(j);
+    if (qr.rank() < n) return;
+    const Eigen::VectorXd scaled = -qr.solve(r);
+    const double step = scaled.norm();
+    if (!(step < 0.5 * last_step) || !(step > 0.0)) return;
+    last_step = step;
+    std::vector<double> next = natural;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const FitParameter& p = parameters[free[static_cast<std::size_t>(k)]];
+      double& value = next[free[static_cast<std::size_t>(k)]];
+      value = p.natural(p.theta(value) + scaled[k] / length[k]);
+      if (!(value >= p.lower && value <= p.upper)) return;
+    }
+    Eigen::VectorXd r_next;
+    const bool usable = function.evaluate(next, r_next, nullptr);
+    if (!usable || r_next.squaredNorm() > r.squaredNorm() * (1.0 + 1e-10)) return;
+    natural = std::move(next);
+  }
+}
+
 }  // namespace
 
 Minimum minimise(const ResidualFunction& function, std::span<const FitParameter> parameters,
-                 std::span<const double> start, const FixedMask& fixed) {
+                 std::span<const double> start, const FixedMask& fixed, FirstStep first_step) {
   keep_ceres_quiet();
   Minimum minimum;
   minimum.natural.assign(start.begin(), start.end());
@@ -166,9 +209,10 @@ Minimum minimise(const ResidualFunction& function, std::span<const FitParameter>
   // presses against its bound. So the pressed ones are held and the rest is solved again, until
   // the set of pressed parameters stays the same.
   FixedMask held(parameters.size(), false);
+  std::vector<std::size_t> free;
   constexpr int kMostRounds = 12;
   for (int round = 0; round < kMostRounds; ++round) {
-    std::vector<std::size_t> free;
+    free.clear();
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       if (!held[i] && (fixed.empty() || !fixed[i])) free.push_back(i);
     }
@@ -176,7 +220,7 @@ Minimum minimise(const ResidualFunction& function, std::span<const FitParameter>
       minimum.converged = true;
       minimum.message = "nothing to estimate, or every parameter at a bound";
     } else {
-      descend(function, parameters, free, minimum);
+      descend(function, parameters, free, first_step, minimum);
     }
     const FixedMask pressed = pressed_against_bound(function, parameters, minimum.natural, fixed);
     snap_to_bounds(parameters, pressed, minimum.natural);
@@ -184,6 +228,7 @@ Minimum minimise(const ResidualFunction& function, std::span<const FitParameter>
     held = pressed;
     if (round + 1 == kMostRounds) minimum.converged = false;
   }
+  if (minimum.converged && !free.empty()) polish(function, parameters, free, minimum.natural);
   minimum.deviance = deviance_at(function, minimum.natural);
   minimum.usable = std::isfinite(minimum.deviance);
   return minimum;

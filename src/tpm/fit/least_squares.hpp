@@ -46,12 +46,17 @@ struct Minimum {
 /// Which parameters keep their value.
 using FixedMask = std::vector<bool>;
 
+/// How far the first step may go: nearly a full Gauss-Newton step, or a short one. Which valley a
+/// far start falls into can depend on it (NIST BoxBOD, first start; MGH17, first start).
+enum class FirstStep { bold, cautious };
+
 /// Trust-region descent (Ceres, Levenberg-Marquardt with box bounds) in theta.
 /// @param start natural values within the bounds (a start outside is moved to the bound)
 /// @param fixed empty, or one flag per parameter
 [[nodiscard]] Minimum minimise(const ResidualFunction& function,
                                std::span<const FitParameter> parameters,
-                               std::span<const double> start, const FixedMask& fixed = {});
+                               std::span<const double> start, const FixedMask& fixed = {},
+                               FirstStep first_step = FirstStep::bold);
 
 /// Deviance at a point; NaN if it cannot be evaluated.
 [[nodiscard]] double deviance_at(const ResidualFunction& function, std::span<const double> natural);
