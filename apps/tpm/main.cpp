@@ -27,6 +27,7 @@ int run(int argc, char** argv) {
   add_version_command(app, session);
   add_fit_command(app, session);
   add_data_command(app, session);
+  add_report_command(app, session);
 
   try {
     app.parse(argc, argv);

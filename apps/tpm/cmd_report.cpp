@@ -1,0 +1,33 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/paper_report.hpp"
+
+namespace tpm::app {
+namespace {
+
+int report(const std::string& folder) {
+  const std::string python = find_drawing_python();  // before minutes of work, not after
+  const PaperReport paper = make_paper_report();
+  write_paper_report(paper, folder, python);
+  for (const std::string& sentence : summary_sentences(paper)) fmt::print("- {}\n", sentence);
+  fmt::print("written to {}: report.html, report.md, tables.*, audit.json, fit_*.json, figures\n",
+             folder);
+  return 0;
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "report", "Recompute the paper: tables, audit, fits and figures in one report");
+  auto folder = std::make_shared<std::string>("out/paper");
+  command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
+  command->footer("Example:\n  tpm report --output out/paper");
+  command->callback([folder, &session] { session.run = [folder] { return report(*folder); }; });
+}
+
+}  // namespace tpm::app

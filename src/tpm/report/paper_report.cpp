@@ -1,0 +1,137 @@
+#include "tpm/report/paper_report.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <utility>
+
+#include "tpm/core/text.hpp"
+#include "tpm/curve/load.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/fit_figures.hpp"
+#include "tpm/report/run_record.hpp"
+#include "tpm/report/sections.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/study/claims.hpp"
+
+namespace tpm {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Wall time of a call, noted under a name.
+template <class Work>
+auto timed(std::map<std::string, double>& seconds, const char* part, Work work) {
+  const auto start = std::chrono::steady_clock::now();
+  auto result = work();
+  seconds[part] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+/// The paper's two creep experiments (Sec. 4.2, Figs. 8 and 9).
+std::vector<PrintedCreep> printed_creep() {
+  return {{"8", 0.196, 179.0, 3.8e-3}, {"9", 0.98, 5800.0, 10.86e-3}};
+}
+
+PaperFigureData figure_data(const FitResult& fit) {
+  PaperFigureData data;
+  data.fitted = model_parameters(fit);
+  data.fitted_as = estimate_words(fit);
+  data.static_bands = load_points("evren_static");
+  data.relaxation = load_points("evren_relaxation");
+  data.creep = load_points("amy_creep");
+  data.printed_creep = printed_creep();
+  return data;
+}
+
+std::vector<Figure> all_figures(const PaperReport& report) {
+  std::vector<Figure> figures = paper_figures(report.figure_data);
+  figures.push_back(profile_figure(report.fits.reference));
+  figures.push_back(
+      sensitivity_figure(report.fits, "eta1", report.figure_data.paper.eta1_Pa_s));
+  return figures;
+}
+
+/// Results carry 6 significant digits, so that machines whose last bits differ write the same.
+constexpr int kDigits = 6;
+
+void round_numbers(Json& value) {
+  if (value.is_number_float()) {
+    value = rounded(value.get<double>(), kDigits);
+  } else if (value.is_structured()) {
+    for (auto& item : value) round_numbers(item);
+  }
+}
+
+void write_json(const fs::path& path, Json value) {
+  round_numbers(value);
+  write_file(path, to_text(value));
+}
+
+std::map<std::string, std::string> draw(const PaperReport& report, const fs::path& folder,
+                                        const std::string& python) {
+  write_json(folder / "figures.json", to_json(report.figures));
+  draw_figures(python, folder / "figures.json", folder / "figures");
+  std::map<std::string, std::string> drawings;
+  for (const Figure& figure : report.figures) {
+    drawings[figure.id] = read_file(folder / "figures" / (figure.id + ".svg"));
+  }
+  return drawings;
+}
+
+}  // namespace
+
+PaperReport make_paper_report() {
+  PaperReport report;
+  std::map<std::string, double> seconds;
+  const fs::path claims_file = paper_claims_path();
+  const Json claims = read_json(claims_file);
+  report.audit = timed(seconds, "audit", [&] { return run_audit(claims, claims_file.filename().string()); });
+  const auto printed = read_printed_tables(claims, claims_file.filename().string());
+  TableRequest request;
+  report.tables = timed(seconds, "tables", [&] { return make_tables(request, printed); });
+  request.mode = TableMode::consistent;
+  report.consistent = make_tables(request, printed);
+  const fs::path config = share_dir() / "configs" / "liver_relaxation.json";
+  report.fits = timed(seconds, "fits", [&] { return run_fit_study(read_fit_config(config)); });
+  report.figure_data = figure_data(report.fits.reference);
+  report.figures = all_figures(report);
+  report.seconds = std::move(seconds);
+  return report;
+}
+
+Document paper_document(const PaperReport& report) {
+  Document document;
+  document.title = "The three-parameter liver model with tension, recomputed";
+  document.subtitle =
+      "Bao et al., A New Hybrid Viscoelastic Soft Tissue Model based on Meshless Method for Haptic "
+      "Surgical Simulation, Open Biomed. Eng. J. 2013, 7:116-124, doi 10.2174/1874120701307010116. "
+      "Its tables, claims and figures against its own equations and data.";
+  add_summary(document, report);
+  add_data(document, report);
+  add_tables(document, report);
+  add_audit(document, report);
+  add_fits(document, report);
+  add_paper_figures(document, report);
+  add_validity(document, report);
+  add_assumptions(document, report);
+  return document;
+}
+
+void write_paper_report(const PaperReport& report, const fs::path& folder,
+                        const std::string& python) {
+  std::map<std::string, double> seconds = report.seconds;
+  const auto drawings =
+      timed(seconds, "drawing", [&] { return draw(report, folder, python); });
+  const Document document = paper_document(report);
+  write_file(folder / "report.md", to_markdown(document));
+  write_file(folder / "report.html", to_html(document, drawings));
+  write_json(folder / "tables.json", to_json(report.tables));
+  write_json(folder / "audit.json", to_json(report.audit));
+  write_json(folder / "fit_relaxation.json", to_json(report.fits.reference));
+  write_json(folder / "fit_sensitivity.json", variants_json(report.fits));
+  write_json(folder / "fit_held_out.json", held_out_json(report.fits));
+  write_file(folder / "report.run.json", to_text(run_record(seconds)));
+}
+
+}  // namespace tpm

@@ -1,0 +1,221 @@
+// The section on fits: estimates, intervals, minima, readings, sensitivity, held-out depths.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/report/fit_figures.hpp"
+#include "tpm/report/sections.hpp"
+
+namespace tpm {
+namespace {
+
+std::string in_unit_or_open(const FitParameter& p, const std::optional<double>& limit) {
+  return limit ? in_unit(p, *limit) : "open";
+}
+
+std::string interval(const ParameterResult& p) {
+  if (p.verdict == Verdict::not_profiled) return "not profiled";
+  return fmt::format("{} to {}", in_unit_or_open(p.parameter, p.lower),
+                     in_unit_or_open(p.parameter, p.upper));
+}
+
+Tone tone_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::identified:
+      return Tone::good;
+    case Verdict::lower_only:
+    case Verdict::upper_only:
+      return Tone::fair;
+    case Verdict::flat:
+      return Tone::bad;
+    case Verdict::not_profiled:
+      break;
+  }
+  return Tone::plain;
+}
+
+/// A standardised residual beyond 2 is unusual, beyond 3 wrong.
+Tone tone_of_residual(double standardised) {
+  const double size = std::abs(standardised);
+  return size > 3.0 ? Tone::bad : size > 2.0 ? Tone::fair : Tone::plain;
+}
+
+std::string probability(double p) {
+  return p < 1e-4 ? significant(p, 2) : fixed(p, 4);
+}
+
+Table estimates_table(const FitResult& fit) {
+  Table table{"",
+              {{"parameter"},
+               {"estimate", true},
+               {"standard error", true},
+               {fmt::format("{:.4g} % interval", 100.0 * fit.config.level), true},
+               {"verdict"}},
+              {}};
+  for (const ParameterResult& p : fit.parameters) {
+    table.rows.push_back(
+        {{p.parameter.name},
+         {in_unit(p.parameter, p.estimate)},
+         {p.standard_error ? in_unit(p.parameter, *p.standard_error) : "-"},
+         {interval(p)},
+         {std::string(verdict_name(p.verdict)), tone_of(p.verdict)}});
+  }
+  return table;
+}
+
+std::vector<Cell> findings(const FitResult& fit) {
+  std::vector<Cell> items;
+  for (const ParameterResult& p : fit.parameters) items.push_back({p.words});
+  for (const HypothesisResult& h : fit.hypotheses) {
+    items.push_back({h.words, h.excluded ? Tone::bad : Tone::plain});
+  }
+  if (!fit.weakest_words.empty()) items.push_back({fit.weakest_words});
+  std::string chi_square = fmt::format("chi-square {} with {} degrees of freedom",
+                                       significant(fit.chi_square, 4), fit.degrees_of_freedom);
+  if (fit.chi_square_p) chi_square += fmt::format(", p = {}", probability(*fit.chi_square_p));
+  items.push_back({std::move(chi_square)});
+  for (const std::string& flag : fit.flags) items.push_back({flag, Tone::fair});
+  return items;
+}
+
+/// "2 mm", or "2 to 3 mm" where the starts that ended here spread.
+std::string spread(const FitParameter& p, double low, double high) {
+  const std::string from = in_unit(p, low);
+  const std::string to = in_unit(p, high);
+  return from == to ? from : fmt::format("{} to {}", from, to);
+}
+
+Table minima_table(const FitResult& fit) {
+  Table table{fmt::format("Where {} starts ended ({} failed). {} agree with the best to 5 digits.",
+                          fit.starts_run, fit.starts_failed, fit.starts_agreeing),
+              {{"deviance", true}, {"starts", true}},
+              {}};
+  for (const ParameterResult& p : fit.parameters) table.columns.push_back({p.parameter.name, true});
+  for (const DistinctMinimum& m : fit.minima) {
+    std::vector<Cell> row{{significant(m.minimum.deviance, 6)}, {std::to_string(m.starts)}};
+    for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+      row.push_back({spread(fit.parameters[i].parameter, m.low[i], m.high[i])});
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+std::string observed(const FitDatum& d) {
+  const bool force = d.observable == Observable::contact_force;
+  const double unit = force ? 1.0 : 1e-3;
+  const std::string_view symbol = force ? "N" : "mm";
+  if (d.value) return fmt::format("{} {}", significant(*d.value / unit, 4), symbol);
+  return fmt::format("{} to {} {}", significant(*d.lower / unit, 3), significant(*d.upper / unit, 3),
+                     symbol);
+}
+
+std::string predicted(const FittedDatum& d, bool with_sd) {
+  const bool force = d.datum.observable == Observable::contact_force;
+  const double unit = force ? 1.0 : 1e-3;
+  const std::string_view symbol = force ? "N" : "mm";
+  if (with_sd && d.predicted_sd) {
+    return fmt::format("{} ± {} {}", significant(d.predicted / unit, 4),
+                       significant(*d.predicted_sd / unit, 2), symbol);
+  }
+  return fmt::format("{} {}", significant(d.predicted / unit, 4), symbol);
+}
+
+Table readings_table(const FitResult& fit) {
+  Table table{"Readings and the fitted model. z is the difference in standard deviations.",
+              {{"data set"},
+               {"reading"},
+               {"provenance"},
+               {"observed", true},
+               {"model", true},
+               {"z", true}},
+              {}};
+  for (const FittedDatum& d : fit.data) {
+    table.rows.push_back({{d.datum.dataset},
+                          {d.datum.label},
+                          {std::string(provenance_name(d.datum.provenance))},
+                          {observed(d.datum)},
+                          {predicted(d, false)},
+                          {fixed(d.standardised, 2), tone_of_residual(d.standardised)}});
+  }
+  return table;
+}
+
+Table sensitivity_table(const FitStudy& study) {
+  Table table{"The same fit under other assumptions; intervals behind the estimates.",
+              {{"ramp rate", true}, {"noise"}},
+              {}};
+  for (const ParameterResult& p : study.reference.parameters) {
+    table.columns.push_back({p.parameter.name});
+  }
+  table.columns.push_back({"chi-square", true});
+  for (const Hypothesis& h : study.reference.config.hypotheses) table.columns.push_back({h.name});
+  for (const FitVariant& v : study.variants) {
+    std::vector<Cell> row{{fmt::format("{:.4g} mm/s", v.rate_m_per_s * 1e3)},
+                          {std::string(noise_kind_name(v.noise))}};
+    for (const ParameterResult& p : v.result.parameters) {
+      row.push_back({fmt::format("{} ({})", in_unit(p.parameter, p.estimate), interval(p)),
+                     tone_of(p.verdict)});
+    }
+    row.push_back({significant(v.result.chi_square, 4)});
+    for (const HypothesisResult& h : v.result.hypotheses) {
+      row.push_back({fmt::format("{}, p = {}", h.excluded ? "excluded" : "not excluded",
+                                 probability(h.p_value)),
+                     h.excluded ? Tone::bad : Tone::plain});
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table held_out_table(const FitStudy& study) {
+  Table table{"Each depth in turn left out of the fit and predicted by the rest. ± is the standard "
+              "error from the parameters alone.",
+              {{"depth", true},
+               {"reading"},
+               {"observed", true},
+               {"predicted", true},
+               {"difference", true},
+               {"z", true}},
+              {}};
+  for (const HeldOutFit& h : study.held_out) {
+    for (const FittedDatum& d : h.result.data) {
+      if (!d.datum.held_out || !d.datum.value) continue;
+      const double percent = 100.0 * (d.predicted - *d.datum.value) / *d.datum.value;
+      table.rows.push_back({{fmt::format("{:.4g} mm", h.depth_m * 1e3)},
+                            {d.datum.label},
+                            {observed(d.datum)},
+                            {predicted(d, true)},
+                            {fmt::format("{:+.1f} %", percent)},
+                            {fixed(d.standardised, 2), tone_of_residual(d.standardised)}});
+    }
+  }
+  return table;
+}
+
+}  // namespace
+
+void add_fits(Document& document, const PaperReport& report) {
+  const FitStudy& study = report.fits;
+  const FitResult& fit = study.reference;
+  document.heading(2, "Fits");
+  document.paragraph(fmt::format(
+      "{}. {} values, {} bands. The eight numbers that are fitted validate nothing by "
+      "themselves; the held-out depths below do.",
+      fit.config.title, fit.value_count, fit.band_count));
+  document.table(estimates_table(fit));
+  document.bullets(findings(fit));
+  document.picture(caption_of(report, "fit_profiles"));
+  document.heading(3, "Starts and minima");
+  document.table(minima_table(fit));
+  document.heading(3, "Readings");
+  document.table(readings_table(fit));
+  document.heading(3, "What the answer depends on");
+  document.table(sensitivity_table(study));
+  document.picture(caption_of(report, "fit_sensitivity_eta1"));
+  document.heading(3, "Held-out depths");
+  document.table(held_out_table(study));
+}
+
+}  // namespace tpm
