@@ -306,8 +306,9 @@ void add_data_import_command(CLI::App& data, Session& session) {
   auto arguments = std::make_shared<ImportArguments>();
   command->add_option("files", arguments->files, "Files to import; sheets as several files")
       ->required();
-  command->add_option("-o,--output", arguments->output,
-                      "Name of the curve; a folder if there are several")
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "Name of the curve; a folder if there are several")
       ->required();
   command->add_flag("--force", arguments->force, "Replace files that exist");
   add_text_options(*command, *arguments);
@@ -318,7 +319,8 @@ void add_data_import_command(CLI::App& data, Session& session) {
   command->footer(
       "Examples:\n"
       "  tpm data import export.csv -o mine/liver --contact-force \"0.05 N\"\n"
-      "  tpm data import fig7.json -o mine/fig7 --x time:s --y contact_force:N --depth \"4 mm\" \\\n"
+      "  tpm data import fig7.json -o mine/fig7 --x time:s --y contact_force:N --depth \"4 mm\" "
+      "\\\n"
       "      --time-origin end_of_ramp\n"
       "JSON: a list of objects with source, csv, id and understood (what was found in the file)");
   command->callback([&session, arguments] {

@@ -224,7 +224,8 @@ Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, H5T_class_t kind,
   }
   size = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.get()));
   // A damaged extent must not become an allocation of that size.
-  if (size > fs::file_size(path_)) fail(name, "says it is larger than the file", "a whole HDF5 file");
+  if (size > fs::file_size(path_))
+    fail(name, "says it is larger than the file", "a whole HDF5 file");
   return set;
 }
 
