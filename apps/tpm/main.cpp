@@ -25,6 +25,8 @@ int run(int argc, char** argv) {
       "Each command explains itself: tpm COMMAND --help");
   Session session;
   add_version_command(app, session);
+  add_fit_command(app, session);
+  add_data_command(app, session);
 
   try {
     app.parse(argc, argv);

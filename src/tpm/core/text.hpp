@@ -11,6 +11,10 @@ namespace tpm {
 /// and "nan".
 [[nodiscard]] std::string significant(double value, int digits);
 
+/// The double nearest to `value` written with `digits` significant digits: what results store so
+/// that they agree between machines, whose last bits differ. Non-finite values stay as they are.
+[[nodiscard]] double rounded(double value, int digits);
+
 /// `decimals` digits after the point.
 [[nodiscard]] std::string fixed(double value, int decimals);
 

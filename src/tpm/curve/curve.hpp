@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/core/units.hpp"
+
 namespace tpm {
 
 /// Where a number comes from. It travels with every datum into every table and figure.
@@ -15,11 +17,40 @@ enum class Provenance { table, text, abstract, derived, assumed, digitized, meas
 /// Throws Error(bad_input) naming the seven known words.
 [[nodiscard]] Provenance parse_provenance(std::string_view text, std::string_view where);
 
+/// What a column of measured numbers holds.
+enum class Quantity {
+  time,               ///< s
+  indentation_depth,  ///< m, positive into the tissue
+  contact_force,      ///< N, positive in compression
+  load,               ///< N, imposed
+  relative_length,    ///< length over reference length, dimensionless
+  stress,             ///< Pa
+  abscissa,           ///< x of a problem without physical meaning, a plain number
+  ordinate,           ///< its y
+};
+
+/// The word used in files: "indentation_depth".
+[[nodiscard]] std::string_view quantity_name(Quantity quantity) noexcept;
+
+/// Throws Error(bad_input) naming the known words.
+[[nodiscard]] Quantity parse_quantity_name(std::string_view text, std::string_view where);
+
+[[nodiscard]] Dimension quantity_dimension(Quantity quantity) noexcept;
+
+/// The short name that begins a column header or a JSON key: "depth", "force", "time".
+[[nodiscard]] std::string_view quantity_short_name(Quantity quantity) noexcept;
+
+/// Short name and SI unit, as machine-readable output writes it: "depth_m", "relative_length".
+/// `part` ("lower", "sd") goes between the two: "force_lower_N".
+[[nodiscard]] std::string si_key(Quantity quantity, std::string_view part = {});
+
 /// What a datum reports, and so what a model must answer.
 enum class Observable {
   contact_force,      ///< N, under an imposed indentation depth
   indentation_depth,  ///< m, under an imposed load
 };
+
+[[nodiscard]] Quantity observable_quantity(Observable observable) noexcept;
 
 /// The indenter of an experiment.
 struct Probe {
@@ -43,8 +74,8 @@ struct CurveHeader {
 /// One reading: a value, or a band [lower, upper] where only a range is known.
 struct Datum {
   std::string label;              ///< e.g. "peak", "end"; empty if the file has no labels
-  std::optional<double> depth_m;  ///< imposed indentation depth
-  std::optional<double> load_N;   ///< imposed load
+  std::optional<double> depth_m;  ///< imposed indentation depth, at least 0
+  std::optional<double> load_N;   ///< imposed load, at least 0
   std::optional<double> time_s;   ///< see PointSet::time_origin; none for a static reading
   std::optional<double> value;    ///< SI; none for a band
   std::optional<double> lower;    ///< SI; set together with upper, for a band
@@ -61,6 +92,12 @@ struct Datum {
 /// What the times of a point set count from.
 enum class TimeOrigin { none, end_of_ramp, load_applied };
 
+/// "none", "end_of_ramp" or "load_applied".
+[[nodiscard]] std::string_view time_origin_name(TimeOrigin origin) noexcept;
+
+/// Throws Error(bad_input) naming the known words.
+[[nodiscard]] TimeOrigin parse_time_origin(std::string_view text, std::string_view where);
+
 /// Readings from separate experiments: the printed numbers of a paper.
 struct PointSet {
   CurveHeader header;
@@ -70,14 +107,51 @@ struct PointSet {
   std::vector<Datum> data;
 };
 
-/// A recording: time, indentation depth and contact force sampled together, time increasing.
+/// A recording: what was imposed (`drive`) and what was observed (`response`), sampled together.
+/// For an indentation they are depth and contact force, for a stretched strip relative length and
+/// stress. All non-empty vectors have the length of `response`.
 struct Recording {
   CurveHeader header;
   Provenance provenance = Provenance::measured;
-  std::vector<double> time_s;
-  std::vector<double> depth_m;
-  std::vector<double> force_N;
-  std::vector<double> force_sd_N;  ///< empty if the file has none
+  Quantity drive_quantity = Quantity::indentation_depth;
+  Quantity response_quantity = Quantity::contact_force;
+  std::vector<double> time_s;       ///< strictly increasing; empty if the file has no times
+  std::vector<double> drive;        ///< SI; empty if only the response was recorded
+  std::vector<double> response;     ///< SI; never empty
+  std::vector<double> response_sd;  ///< SI, at least 0; empty if the file has none
+
+  /// The drive of an indentation. Throws Error(bad_input), naming the recording, if the drive is
+  /// something else or missing.
+  [[nodiscard]] const std::vector<double>& depth_m() const;
+  /// The response of an indentation. Throws Error(bad_input) if the response is no contact force.
+  [[nodiscard]] const std::vector<double>& force_N() const;
+  /// Its standard deviation, empty if the file has none. Throws as force_N().
+  [[nodiscard]] const std::vector<double>& force_sd_N() const;
+};
+
+/// A single value of the literature that belongs to no curve: a modulus, a time constant.
+struct NamedValue {
+  std::string name;             ///< unique in its file: "carter_elastic_modulus"
+  std::string quantity;         ///< in words: "elastic modulus"
+  Unit unit;                    ///< as printed; the numbers below are SI
+  std::optional<double> value;  ///< none for a range
+  std::optional<double> lower;  ///< a range may be open on one side ("up to 50 %")
+  std::optional<double> upper;
+  std::optional<double> plus_minus;  ///< what is printed after the sign, whatever it means
+  Provenance provenance = Provenance::assumed;
+  std::string where;
+  std::string formula;  ///< only for provenance `derived`, and always there
+  std::string note;
+  int line = 0;
+};
+
+/// Single values, in the order of the file.
+struct ValueSet {
+  CurveHeader header;
+  std::vector<NamedValue> values;
+
+  /// Throws Error(bad_input) naming the file if there is no such value.
+  [[nodiscard]] const NamedValue& at(std::string_view name) const;
 };
 
 }  // namespace tpm

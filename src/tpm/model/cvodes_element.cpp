@@ -299,6 +299,10 @@ Response CvodesElement::respond(const Protocol& protocol, std::span<const double
   }
   if (protocol.peak() == 0.0) return response;
 
+  if (std::any_of(times_s.begin(), times_s.end(), [](double t) { return std::isinf(t); })) {
+    throw bad_input(protocol.name(), "an integrator does not reach t = infinity",
+                    "a finite time, or the model 'closed_form'");
+  }
   std::vector<std::size_t> order(times_s.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
@@ -326,13 +330,13 @@ Response CvodesElement::respond(const Protocol& protocol, std::span<const double
       return next < order.size() && (last || times_s[order[next]] < to.time_s);
     };
     while (due() && times_s[order[next]] == from.time_s) record(order[next++]);
-    if (last) break;
-    run.restart(from.time_s, to.time_s);
+    if (next == order.size()) break;
+    run.restart(from.time_s, last ? times_s[order.back()] : to.time_s);
     while (due()) {
       run.advance_to(times_s[order[next]]);
       record(order[next++]);
     }
-    run.advance_to(to.time_s);
+    if (!last) run.advance_to(to.time_s);
   }
   return response;
 }

@@ -26,8 +26,11 @@ void require_not_negative(double value, std::string_view what, std::string_view 
 
 }  // namespace
 
-Protocol::Protocol(Drive drive, std::vector<Knot> knots, std::string name)
-    : drive_(drive), knots_(std::move(knots)), name_(std::move(name)) {
+Protocol::Protocol(Drive drive, std::vector<Knot> knots, std::string name, bool holds_forever)
+    : drive_(drive),
+      knots_(std::move(knots)),
+      name_(std::move(name)),
+      holds_forever_(holds_forever) {
   if (knots_.empty()) throw bad_input("protocol", "has no knots", "at least one");
   for (std::size_t i = 0; i < knots_.size(); ++i) {
     if (!std::isfinite(knots_[i].time_s) || !std::isfinite(knots_[i].value)) {
@@ -51,6 +54,7 @@ double Protocol::peak() const noexcept {
 }
 
 Protocol step_and_hold(double depth_m, double hold_s) {
+  if (std::isinf(hold_s)) return {Drive::displacement, {{0.0, depth_m}}, "step and hold", true};
   require_not_negative(hold_s, "hold", "s");
   return {Drive::displacement, {{0.0, depth_m}, {hold_s, depth_m}}, "step and hold"};
 }
@@ -66,6 +70,7 @@ Protocol ramp_and_hold(double depth_m, double rate_m_per_s, double hold_s) {
 }
 
 Protocol creep(double load_N, double duration_s) {
+  if (std::isinf(duration_s)) return {Drive::force, {{0.0, load_N}}, "creep", true};
   require_positive(duration_s, "duration", "s");
   return {Drive::force, {{0.0, load_N}, {duration_s, load_N}}, "creep"};
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,13 +24,18 @@ class Protocol {
  public:
   /// Throws Error(bad_input) unless there is at least one knot, all finite, times not decreasing
   /// and no more than two knots at one time.
-  Protocol(Drive drive, std::vector<Knot> knots, std::string name = "history");
+  /// @param holds_forever the last value is kept for ever: times up to and including infinity may
+  ///        be asked for, and infinity means full relaxation
+  Protocol(Drive drive, std::vector<Knot> knots, std::string name = "history",
+           bool holds_forever = false);
 
   [[nodiscard]] Drive drive() const noexcept { return drive_; }
   [[nodiscard]] std::span<const Knot> knots() const noexcept { return knots_; }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] double start_s() const noexcept { return knots_.front().time_s; }
-  [[nodiscard]] double end_s() const noexcept { return knots_.back().time_s; }
+  [[nodiscard]] double end_s() const noexcept {
+    return holds_forever_ ? std::numeric_limits<double>::infinity() : knots_.back().time_s;
+  }
   /// Largest absolute imposed value.
   [[nodiscard]] double peak() const noexcept;
 
@@ -37,16 +43,17 @@ class Protocol {
   Drive drive_;
   std::vector<Knot> knots_;
   std::string name_;
+  bool holds_forever_;
 };
 
-/// Jump to a depth at t = 0, held for `hold_s`.
+/// Jump to a depth at t = 0, held for `hold_s` (may be infinite).
 [[nodiscard]] Protocol step_and_hold(double depth_m, double hold_s);
 
 /// From rest to `depth_m` (> 0) at constant speed `rate_m_per_s` (> 0), then held for `hold_s`
 /// (>= 0). The ramp ends at depth / rate.
 [[nodiscard]] Protocol ramp_and_hold(double depth_m, double rate_m_per_s, double hold_s);
 
-/// Constant load from t = 0 on.
+/// Constant load from t = 0 on, for `duration_s` (may be infinite).
 [[nodiscard]] Protocol creep(double load_N, double duration_s);
 
 /// A measured history, linear between its samples. Both spans of one length, times increasing.

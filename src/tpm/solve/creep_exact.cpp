@@ -91,6 +91,7 @@ CreepUnderConstantLoad::CreepUnderConstantLoad(const TpmParameters& p, double lo
 }
 
 double CreepUnderConstantLoad::remaining_log(double time_s) const {
+  if (std::isinf(time_s)) return time_s;
   // Solve reduced_time(start e^-y) = t / tau for y; the left side rises strictly with y.
   const Problem<double> p = plain(p_, stress_length_);
   const double gap = final_ - start_;

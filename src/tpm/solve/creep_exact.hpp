@@ -17,7 +17,7 @@ class CreepUnderConstantLoad {
   /// Throws Error(bad_input) if E2 = 0 and E' = 0, or if nothing carries the load in the end.
   CreepUnderConstantLoad(const TpmParameters& p, double load_N);
 
-  /// @param time_s >= 0 since the load was applied
+  /// @param time_s >= 0 since the load was applied, may be infinite
   [[nodiscard]] double depth_m(double time_s) const;
 
   /// d depth / d parameter at constant time and load, in the order of kTpmParameterTable.

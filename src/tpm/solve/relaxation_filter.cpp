@@ -40,7 +40,8 @@ void run_relaxation(
     while (next < order.size() && (last || times_s[order[next]] < to.time_s)) {
       // Each asked time is reached from the knot in one update, so nothing accumulates.
       const double part = times_s[order[next]] - from.time_s;
-      const double u = part > 0.0 ? from.value + (to.value - from.value) * (part / h) : from.value;
+      const double u =
+          part > 0.0 && !last ? from.value + (to.value - from.value) * (part / h) : from.value;
       const RelaxationState then =
           part > 0.0 ? state.after(relaxation_weights(part / tau_s), from.value, u) : state;
       report(order[next], u, then);

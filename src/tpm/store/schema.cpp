@@ -14,39 +14,142 @@
 namespace tpm {
 namespace {
 
+using Path = std::vector<std::string>;
+using Violation = valijson::ValidationResults::Error;
+
 /// valijson's contexts are lists such as ["<root>", "[data]", "[0]"]; people read /data/0.
-std::string pointer(const std::vector<std::string>& context) {
-  std::string path;
+Path path_of(const std::vector<std::string>& context) {
+  Path path;
   for (std::size_t i = 1; i < context.size(); ++i) {
     std::string part = context[i];
     if (part.size() > 1 && part.front() == '[' && part.back() == ']') {
       part = part.substr(1, part.size() - 2);
     }
-    path += "/" + part;
+    path.push_back(std::move(part));
   }
-  return path.empty() ? "/" : path;
+  return path;
 }
 
-/// In words of the file's author rather than of JSON Schema.
-std::string in_plain_words(const std::string& description) {
-  constexpr std::string_view kUnknown =
-      "Object contains a property that could not be validated using 'properties' or "
-      "'additionalProperties' constraints: ";
-  if (description.starts_with(kUnknown)) {
-    std::string key = description.substr(kUnknown.size());
-    while (!key.empty() && key.back() == '.') key.pop_back();
-    return "unknown key " + key;
+std::string pointer(const Path& path) {
+  std::string text;
+  for (const std::string& part : path) text += "/" + printable(part);
+  return text.empty() ? "/" : text;
+}
+
+/// Follows "#/definitions/x"; other references do not occur in our schemas.
+const Json& resolved(const Json& schema, const Json& root) {
+  if (!schema.is_object() || !schema.contains("$ref")) return schema;
+  const auto reference = schema.at("$ref").get<std::string>();
+  return root.at(Json::json_pointer(reference.substr(1)));
+}
+
+/// The part of the schema that speaks of one member of an object or list; null if none does.
+Json member_schema(const Json& schema, const std::string& part) {
+  if (schema.contains("properties") && schema.at("properties").contains(part)) {
+    return schema.at("properties").at(part);
   }
-  std::string plain = description;
-  while (!plain.empty() && plain.back() == '.') plain.pop_back();
-  return plain;
+  for (const char* every : {"additionalProperties", "items"}) {
+    if (schema.contains(every) && schema.at(every).is_object()) return schema.at(every);
+  }
+  return nullptr;
+}
+
+Json schema_at(const Json& root, const Path& path) {
+  Json schema = root;
+  for (const std::string& part : path) {
+    schema = member_schema(resolved(schema, root), part);
+    if (!schema.is_object()) return nullptr;
+  }
+  return schema;
+}
+
+std::string joined(const Json& words) {
+  std::string text;
+  for (const Json& word : words) {
+    text += text.empty() ? "" : ", ";
+    text += word.is_string() ? word.get<std::string>() : word.dump();
+  }
+  return text;
+}
+
+std::string key_list(const Json& properties) {
+  std::string text;
+  for (const auto& [key, value] : properties.items()) text += (text.empty() ? "" : ", ") + key;
+  return text;
+}
+
+std::string type_words(const Json& type) {
+  return type.is_array() ? joined(type) : type.get<std::string>();
+}
+
+/// What a value at this place should have been, in words of the file's author.
+std::string expectation(const Json& schema, const Json& root) {
+  if (!schema.is_object()) return {};
+  const Json& rules = resolved(schema, root);
+  std::string text;
+  if (rules.contains("enum")) {
+    text = "one of " + joined(rules.at("enum"));
+  } else if (rules.contains("type")) {
+    text = "JSON type " + type_words(rules.at("type"));
+  }
+  for (const Json* part : {&schema, &rules}) {
+    if (!part->contains("description")) continue;
+    const auto description = part->at("description").get<std::string>();
+    return text.empty() ? description : fmt::format("{} ({})", text, description);
+  }
+  return text;
+}
+
+/// The word in single quotes at the end of valijson's message.
+std::string quoted_word(const std::string& description) {
+  const auto end = description.rfind('\'');
+  if (end == std::string::npos || end == 0) return {};
+  const auto begin = description.rfind('\'', end - 1);
+  return begin == std::string::npos ? "" : description.substr(begin + 1, end - begin - 1);
+}
+
+/// valijson's words for what went wrong, without its full stop.
+std::string plain(std::string description) {
+  while (!description.empty() && description.back() == '.') description.pop_back();
+  return printable(description, 160);
+}
+
+Error in_plain_words(const Violation& violation, const Json& root, std::string_view where) {
+  Path path = path_of(violation.context);
+  const std::string& said = violation.description;
+  const Json schema = schema_at(root, path);
+  const Json& rules = resolved(schema, root);
+  constexpr std::string_view kUnknown = "Object contains a property that could not be validated";
+  constexpr std::string_view kMissing = "Missing required property";
+  const auto at = [where](const Path& place) {
+    return fmt::format("{}: key {}", where, pointer(place));
+  };
+  if (said.starts_with(kUnknown)) {
+    path.push_back(quoted_word(said));
+    return bad_input(at(path), "unknown key",
+                     rules.contains("properties") ? "one of " + key_list(rules.at("properties"))
+                                                  : std::string("no such key"));
+  }
+  if (said.starts_with(kMissing)) {
+    path.push_back(quoted_word(said));
+    return bad_input(at(path), "is missing", expectation(schema_at(root, path), root));
+  }
+  const std::string expected = expectation(schema, root);
+  if (said.find("enum") != std::string::npos) {
+    return bad_input(at(path), "is none of the known words", expected);
+  }
+  if (said.find("'type' constraint") != std::string::npos) {
+    return bad_input(at(path), "is of the wrong type", expected);
+  }
+  return bad_input(at(path), plain(said), expected);
 }
 
 }  // namespace
 
 void check_schema(const Json& value, std::string_view schema_name, std::string_view where) {
   const auto path = share_dir() / "schemas" / fmt::format("{}.schema.json", schema_name);
-  const nlohmann::json schema_document = read_json(path);
+  const Json root = read_json(path);
+  const nlohmann::json schema_document = root;
   const nlohmann::json document = value;
 
   valijson::Schema schema;
@@ -58,15 +161,14 @@ void check_schema(const Json& value, std::string_view schema_name, std::string_v
     return;
   }
   // The innermost violation is the cause; those around it only say that something inside is wrong.
-  valijson::ValidationResults::Error error;
-  valijson::ValidationResults::Error innermost;
+  Violation error;
+  Violation innermost;
   while (results.popError(error)) {
-    if (error.context.size() > innermost.context.size()) innermost = error;
+    if (innermost.description.empty() || error.context.size() > innermost.context.size()) {
+      innermost = error;
+    }
   }
-  throw bad_input(
-      where,
-      fmt::format("key {}: {}", pointer(innermost.context), in_plain_words(innermost.description)),
-      fmt::format("what schemas/{}.schema.json describes", schema_name));
+  throw in_plain_words(innermost, root, where);
 }
 
 }  // namespace tpm

@@ -1,0 +1,178 @@
+// tpm data: list, show, check and pack. The importer is in cmd_data_import.cpp.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "command.hpp"
+#include "data_text.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/curve/load.hpp"
+#include "tpm/curve/pack.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm::app {
+namespace fs = std::filesystem;
+namespace {
+
+bool is_packed(const std::string& path) {
+  const auto ending = fs::path(path).extension();
+  return ending == ".h5" || ending == ".hdf5";
+}
+
+/// The curves of one argument: one for an id or a CSV file, several for an HDF5 file.
+std::vector<Curve> load_all(const std::string& argument) {
+  if (is_packed(argument)) return unpack_curves(argument);
+  return {load_curve(argument)};
+}
+
+int list(const Session& session) {
+  const auto curves = list_curves();
+  if (session.json()) {
+    Json json = Json::array();
+    for (const CurveSummary& curve : curves) {
+      json.push_back({{"id", curve.id},
+                      {"kind", curve.kind},
+                      {"rows", curve.size},
+                      {"title", curve.title}});
+    }
+    fmt::print("{}", to_text(json));
+    return 0;
+  }
+  std::vector<std::vector<std::string>> table{{"id", "kind", "rows", "title"}};
+  for (const CurveSummary& curve : curves) {
+    table.push_back({curve.id, curve.kind, std::to_string(curve.size), curve.title});
+  }
+  fmt::print("{}", aligned(table));
+  return 0;
+}
+
+int show(const Session& session, const std::string& argument, bool all_rows) {
+  const auto curves = load_all(argument);
+  if (session.json()) {
+    Json json = Json::array();
+    for (const Curve& curve : curves) json.push_back(curve_json(curve));
+    fmt::print("{}", to_text(is_packed(argument) ? json : json.front()));
+    return 0;
+  }
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    fmt::print("{}{}", i == 0 ? "" : "\n", curve_text(curves[i], all_rows));
+  }
+  return 0;
+}
+
+/// Every file is checked and every failure reported, one line each.
+int check(const Session& session, const std::vector<std::string>& files) {
+  Json report = Json::array();
+  bool sound = true;
+  for (const std::string& file : files) {
+    try {
+      std::size_t rows = 0;
+      for (const Curve& curve : load_all(file)) rows += curve_size(curve);
+      report.push_back({{"file", file}, {"ok", true}, {"rows", rows}});
+      if (!session.json()) fmt::print("{}: ok, {} rows\n", file, rows);
+    } catch (const Error& error) {
+      sound = false;
+      report.push_back({{"file", file}, {"ok", false}, {"error", error.what()}});
+      if (!session.json()) fmt::print(stderr, "tpm: {}\n", error.what());
+    }
+  }
+  if (session.json()) fmt::print("{}", to_text(report));
+  return static_cast<int>(sound ? ExitCode::success : ExitCode::answer_is_no);
+}
+
+int pack(const Session& session, const std::vector<std::string>& arguments,
+         const std::string& output, bool force) {
+  if (!force && fs::exists(output)) {
+    throw bad_input(output, "the file exists", "another --output, or --force");
+  }
+  std::vector<Curve> curves;
+  for (const std::string& argument : arguments) {
+    for (Curve& curve : load_all(argument)) curves.push_back(std::move(curve));
+  }
+  pack_curves(output, curves);
+  if (session.json()) {
+    fmt::print("{}", to_text(Json{{"file", output}, {"curves", curves.size()}}));
+  } else {
+    fmt::print("{}: {} curves\n", output, curves.size());
+  }
+  return 0;
+}
+
+void add_list(CLI::App& data, Session& session) {
+  CLI::App* command = data.add_subcommand("list", "List the curves that come with tpm");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm data list\n"
+      "JSON: a list of objects with id, kind (points, recording, values), rows, title");
+  command->callback([&session] { session.run = [&session] { return list(session); }; });
+}
+
+void add_show(CLI::App& data, Session& session) {
+  CLI::App* command = data.add_subcommand("show", "Print a curve with its provenance");
+  auto argument = std::make_shared<std::string>();
+  auto all_rows = std::make_shared<bool>(false);
+  command->add_option("curve", *argument, "Id, or .csv, .json or .h5 file")->required();
+  command->add_flag("--all", *all_rows, "Print every sample of a recording");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm data show evren_relaxation\n"
+      "JSON, all numbers SI: id, kind, title, citation, doi, specimen, probe, note, sha256 and\n"
+      "  points: observable, time_origin, time_provenance, data with label, depth_m, load_N,\n"
+      "          time_s, force_N or depth_m (band: force_lower_N, force_upper_N), provenance\n"
+      "  recording: provenance, samples with time_s, depth_m, force_N, force_sd_N as lists\n"
+      "  values: values with name, quantity, unit_SI, value, lower, upper, provenance\n"
+      "An .h5 file gives a list of such objects.");
+  command->callback([&session, argument, all_rows] {
+    session.run = [&session, argument, all_rows] { return show(session, *argument, *all_rows); };
+  });
+}
+
+void add_check(CLI::App& data, Session& session) {
+  CLI::App* command = data.add_subcommand("check", "Check curve files; exit code 1 if one fails");
+  auto files = std::make_shared<std::vector<std::string>>();
+  command->add_option("files", *files, "Ids, or .csv, .json or .h5 files")->required();
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm data check mine/*.csv\n"
+      "JSON: a list of objects with file, ok, rows or error");
+  command->callback(
+      [&session, files] { session.run = [&session, files] { return check(session, *files); }; });
+}
+
+void add_pack(CLI::App& data, Session& session) {
+  struct Options {
+    std::vector<std::string> curves;
+    std::string output;
+    bool force = false;
+  };
+  CLI::App* command = data.add_subcommand("pack", "Write curves into one HDF5 file");
+  auto options = std::make_shared<Options>();
+  command->add_option("curves", options->curves, "Ids, or .csv, .json or .h5 files")->required();
+  command->add_option("-o,--output", options->output, "The HDF5 file (.h5)")->required();
+  command->add_flag("--force", options->force, "Replace a file that exists");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm data pack evren_relaxation evren_static -o curves.h5\n"
+      "JSON: file, curves (how many)");
+  command->callback([&session, options] {
+    session.run = [&session, options] {
+      return pack(session, options->curves, options->output, options->force);
+    };
+  });
+}
+
+}  // namespace
+
+void add_data_command(CLI::App& app, Session& session) {
+  CLI::App* data = app.add_subcommand("data", "List, show, check, import and pack measured curves");
+  data->require_subcommand(1);
+  data->footer("Example:\n  tpm data show evren_relaxation");
+  add_list(*data, session);
+  add_show(*data, session);
+  add_check(*data, session);
+  add_data_import_command(*data, session);
+  add_pack(*data, session);
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,329 @@
+// tpm data import: brings digitised figures and testing-machine exports into the project's form.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/curve/import.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm::app {
+namespace fs = std::filesystem;
+namespace {
+
+/// The command line as it was typed; options() turns it into numbers and checks it.
+struct ImportArguments {
+  std::vector<std::string> files;
+  std::string output;
+  bool force = false;
+  std::string from = "auto";
+  std::string separator = "auto";
+  std::string decimal = "auto";
+  std::string encoding = "auto";
+  std::string header_rows;
+  std::string time, drive, response, sd;
+  std::string drive_quantity, response_quantity;
+  std::vector<std::string> units;
+  std::string negate = "none";
+  std::string contact_force;
+  std::string contact_samples = "3";
+  std::string x, y, dataset, depth, load;
+  std::string time_origin = "none";
+  std::string provenance, title, citation, doi, specimen, probe_shape, probe_diameter, note;
+};
+
+int parse_count(const std::string& text, int least, const std::string& option) {
+  const double value = parse_number(text, option);
+  constexpr double kMost = 1e6;
+  if (value != static_cast<int>(std::min(value, kMost)) || value < least) {
+    throw Error(ExitCode::usage, option, fmt::format("'{}' is no such count", printable(text)),
+                fmt::format("a whole number from {}", least));
+  }
+  return static_cast<int>(value);
+}
+
+double positive(const std::string& text, Dimension dimension, const std::string& option) {
+  const double value = parse_quantity(text, dimension, option);
+  if (value <= 0.0) throw Error(ExitCode::usage, option, "is not positive", "a value above 0");
+  return value;
+}
+
+DelimitedOptions text_options(const ImportArguments& arguments) {
+  DelimitedOptions text;
+  if (arguments.separator == "comma") text.separator = ',';
+  if (arguments.separator == "semicolon") text.separator = ';';
+  if (arguments.separator == "tab") text.separator = '\t';
+  if (arguments.decimal != "auto") text.decimal_comma = arguments.decimal == "comma";
+  text.latin1 = arguments.encoding == "latin-1";
+  return text;
+}
+
+CurveHeader header_options(const ImportArguments& arguments, Provenance provenance) {
+  CurveHeader header;
+  header.title = arguments.title;
+  header.citation = arguments.citation;
+  header.doi = arguments.doi;
+  header.specimen = arguments.specimen;
+  header.note = arguments.note;
+  header.probe.shape = arguments.probe_shape;
+  if (!arguments.probe_diameter.empty()) {
+    header.probe.diameter_m =
+        positive(arguments.probe_diameter, Dimension::length, "--probe-diameter");
+  }
+  if (header.probe.diameter_m || !header.probe.shape.empty()) header.probe.provenance = provenance;
+  return header;
+}
+
+std::map<std::string, std::string> unit_options(const std::vector<std::string>& pairs) {
+  std::map<std::string, std::string> units;
+  for (const std::string& pair : pairs) {
+    const auto equals = pair.rfind('=');
+    if (equals == std::string::npos || equals == 0) {
+      throw Error(ExitCode::usage, "--unit", fmt::format("'{}' has no '='", printable(pair)),
+                  "COLUMN=UNIT, such as \"Force=N\"");
+    }
+    static_cast<void>(parse_unit(pair.substr(equals + 1), "--unit"));
+    units[pair.substr(0, equals)] = pair.substr(equals + 1);
+  }
+  return units;
+}
+
+ImportOptions options_of(const ImportArguments& arguments) {
+  ImportOptions options;
+  options.format = parse_import_format(arguments.from, "--from");
+  options.text = text_options(arguments);
+  if (!arguments.header_rows.empty()) {
+    options.header_rows = parse_count(arguments.header_rows, 0, "--header-rows");
+  }
+  options.time_column = arguments.time;
+  options.drive_column = arguments.drive;
+  options.response_column = arguments.response;
+  options.sd_column = arguments.sd;
+  if (!arguments.drive_quantity.empty()) {
+    options.drive_quantity = parse_quantity_name(arguments.drive_quantity, "--drive-quantity");
+  }
+  if (!arguments.response_quantity.empty()) {
+    options.response_quantity =
+        parse_quantity_name(arguments.response_quantity, "--response-quantity");
+  }
+  options.units = unit_options(arguments.units);
+  options.negate_drive = arguments.negate == "drive" || arguments.negate == "both";
+  options.negate_response = arguments.negate == "response" || arguments.negate == "both";
+  if (!arguments.contact_force.empty()) {
+    options.contact_force_N =
+        positive(arguments.contact_force, Dimension::force, "--contact-force");
+  }
+  options.contact_samples = parse_count(arguments.contact_samples, 1, "--contact-samples");
+  if (!arguments.x.empty()) options.x = parse_axis(arguments.x, "--x");
+  if (!arguments.y.empty()) options.y = parse_axis(arguments.y, "--y");
+  options.dataset = arguments.dataset;
+  if (!arguments.depth.empty()) {
+    options.depth_m = positive(arguments.depth, Dimension::length, "--depth");
+  }
+  if (!arguments.load.empty()) {
+    options.load_N = positive(arguments.load, Dimension::force, "--load");
+  }
+  options.time_origin = parse_time_origin(arguments.time_origin, "--time-origin");
+  if (!arguments.provenance.empty()) {
+    options.provenance = parse_provenance(arguments.provenance, "--provenance");
+  }
+  options.header = header_options(arguments, options.provenance.value_or(Provenance::measured));
+  return options;
+}
+
+/// A file name from any text: letters, digits and '_'.
+std::string file_stem(std::string_view text) {
+  std::string stem;
+  for (const char c : text) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '_';
+    if (plain) {
+      stem += c;
+    } else if (!stem.empty() && stem.back() != '_') {
+      stem += '_';
+    }
+  }
+  while (!stem.empty() && stem.back() == '_') stem.pop_back();
+  return stem.empty() ? "curve" : stem;
+}
+
+/// One curve on its way to the disk.
+struct Target {
+  std::string source;
+  fs::path csv;
+  ImportedCurve curve;
+};
+
+void name_target(Target& target, const fs::path& stem) {
+  CurveHeader& header = target.curve.description.header;
+  header.id = stem.filename().string();
+  if (header.title.empty()) {
+    header.title = target.curve.name.empty() ? header.id : printable(target.curve.name, 200);
+  }
+  const std::string origin = "imported from " + fs::path(target.source).filename().string();
+  header.note += (header.note.empty() ? "" : "; ") + printable(origin, 200);
+  target.csv = stem.string() + ".csv";
+}
+
+/// One curve takes the name --output; several go into it as a folder.
+std::vector<Target> plan(const ImportArguments& arguments, const ImportOptions& options) {
+  std::vector<Target> targets;
+  for (const std::string& file : arguments.files) {
+    std::vector<ImportedCurve> curves = import_curves(file, options);
+    const std::string stem = file_stem(fs::path(file).stem().string());
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+      Target target{file, {}, std::move(curves[i])};
+      std::string name = stem;
+      if (curves.size() > 1) name += fmt::format("_{}_{}", i + 1, file_stem(target.curve.name));
+      name_target(target, fs::path(arguments.output) / name);
+      targets.push_back(std::move(target));
+    }
+  }
+  if (targets.size() == 1) {
+    fs::path single = arguments.output;
+    if (single.extension() == ".csv" || single.extension() == ".json") single.replace_extension();
+    targets.front().curve.description.header.note = options.header.note;
+    targets.front().curve.description.header.title = options.header.title;
+    name_target(targets.front(), single);
+  }
+  return targets;
+}
+
+void require_free(const std::vector<Target>& targets) {
+  for (const Target& target : targets) {
+    for (const fs::path& path : {target.csv, fs::path(target.csv).replace_extension(".json")}) {
+      if (fs::exists(path)) {
+        throw bad_input(path.string(), "the file exists", "another --output, or --force");
+      }
+    }
+  }
+}
+
+void print_text(const std::vector<Target>& targets) {
+  for (const Target& target : targets) {
+    fmt::print("{} -> {}\n", target.source, target.csv.string());
+    for (const Finding& finding : target.curve.findings) {
+      fmt::print("  {}: {}\n", finding.what, finding.value);
+    }
+  }
+}
+
+void print_json(const std::vector<Target>& targets) {
+  Json report = Json::array();
+  for (const Target& target : targets) {
+    Json understood = Json::object();
+    for (const Finding& finding : target.curve.findings) understood[finding.what] = finding.value;
+    report.push_back({{"source", target.source},
+                      {"csv", target.csv.string()},
+                      {"id", target.curve.description.header.id},
+                      {"understood", understood}});
+  }
+  fmt::print("{}", to_text(report));
+}
+
+/// Nothing is written before every file was understood.
+int import_files(const Session& session, const ImportArguments& arguments) {
+  const std::vector<Target> targets = plan(arguments, options_of(arguments));
+  if (!arguments.force) require_free(targets);
+  for (const Target& target : targets) {
+    const Json description = description_json(target.curve.description);
+    check_schema(description, "curve", target.csv.string());
+    write_file(target.csv, target.curve.csv);
+    write_file(fs::path(target.csv).replace_extension(".json"), to_text(description));
+  }
+  session.json() ? print_json(targets) : print_text(targets);
+  return 0;
+}
+
+void add_text_options(CLI::App& command, ImportArguments& a) {
+  command.add_option("--from", a.from, "auto, machine, wpd-csv, wpd-json or engauge")
+      ->check(CLI::IsMember({"auto", "machine", "wpd-csv", "wpd-json", "engauge"}));
+  command.add_option("--separator", a.separator, "auto, comma, semicolon or tab")
+      ->check(CLI::IsMember({"auto", "comma", "semicolon", "tab"}));
+  command.add_option("--decimal", a.decimal, "Decimal sign: auto, point or comma")
+      ->check(CLI::IsMember({"auto", "point", "comma"}));
+  command.add_option("--encoding", a.encoding, "auto (UTF-8 or marked UTF-16) or latin-1")
+      ->check(CLI::IsMember({"auto", "latin-1"}));
+}
+
+void add_machine_options(CLI::App& command, ImportArguments& a) {
+  const char* group = "Testing machines";
+  const auto add = [&](const char* name, std::string& target, const char* help) {
+    return command.add_option(name, target, help)->group(group);
+  };
+  add("--header-rows", a.header_rows, "Rows above the samples, if not found by themselves");
+  add("--time", a.time, "Time column: title, or number from 1");
+  add("--drive", a.drive, "Column of what was imposed (displacement)");
+  add("--response", a.response, "Column of what was observed (force)");
+  add("--sd", a.sd, "Column of the standard deviation of the response");
+  add("--drive-quantity", a.drive_quantity, "indentation_depth, relative_length or abscissa");
+  add("--response-quantity", a.response_quantity, "contact_force, stress or ordinate");
+  command.add_option("--unit", a.units, "COLUMN=UNIT where the file does not say, repeatable")
+      ->group(group);
+  add("--negate", a.negate, "Turn the sign of: none, drive, response or both")
+      ->check(CLI::IsMember({"none", "drive", "response", "both"}));
+  add("--contact-force", a.contact_force,
+      "Start time and depth where the force reaches this, such as \"0.05 N\"");
+  add("--contact-samples", a.contact_samples, "Samples in a row that must reach it (3)");
+}
+
+void add_figure_options(CLI::App& command, ImportArguments& a) {
+  const char* group = "Digitised figures";
+  const auto add = [&](const char* name, std::string& target, const char* help) {
+    return command.add_option(name, target, help)->group(group);
+  };
+  add("--x", a.x, "What the x axis shows, such as time:s or indentation_depth:mm");
+  add("--y", a.y, "What the y axis shows, such as contact_force:N");
+  add("--dataset", a.dataset, "Only the dataset of this name");
+  add("--depth", a.depth, "Imposed depth of a relaxation curve, such as \"4 mm\"");
+  add("--load", a.load, "Imposed load of a creep curve, such as \"0.98 N\"");
+  add("--time-origin", a.time_origin, "With --depth or --load: end_of_ramp or load_applied");
+}
+
+void add_description_options(CLI::App& command, ImportArguments& a) {
+  const char* group = "Description";
+  const auto add = [&](const char* name, std::string& target, const char* help) {
+    return command.add_option(name, target, help)->group(group);
+  };
+  add("--provenance", a.provenance, "Else measured for machines and digitized for figures");
+  add("--title", a.title, "One line that says what the curve is");
+  add("--citation", a.citation, "Authors, journal, year, pages");
+  add("--doi", a.doi, "Bare DOI");
+  add("--specimen", a.specimen, "What was tested");
+  add("--probe-shape", a.probe_shape, "hemisphere, sphere, flat punch or cone");
+  add("--probe-diameter", a.probe_diameter, "Such as \"4 mm\"");
+  add("--note", a.note, "What a reader has to know");
+}
+
+}  // namespace
+
+void add_data_import_command(CLI::App& data, Session& session) {
+  CLI::App* command = data.add_subcommand("import", "Import digitised figures and machine exports");
+  auto arguments = std::make_shared<ImportArguments>();
+  command->add_option("files", arguments->files, "Files to import; sheets as several files")
+      ->required();
+  command->add_option("-o,--output", arguments->output,
+                      "Name of the curve; a folder if there are several")
+      ->required();
+  command->add_flag("--force", arguments->force, "Replace files that exist");
+  add_text_options(*command, *arguments);
+  add_machine_options(*command, *arguments);
+  add_figure_options(*command, *arguments);
+  add_description_options(*command, *arguments);
+  add_format_option(*command, session);
+  command->footer(
+      "Examples:\n"
+      "  tpm data import export.csv -o mine/liver --contact-force \"0.05 N\"\n"
+      "  tpm data import fig7.json -o mine/fig7 --x time:s --y contact_force:N --depth \"4 mm\" \\\n"
+      "      --time-origin end_of_ramp\n"
+      "JSON: a list of objects with source, csv, id and understood (what was found in the file)");
+  command->callback([&session, arguments] {
+    session.run = [&session, arguments] { return import_files(session, *arguments); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/fit/fit.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct FitOptions {
+  std::string config;
+  std::string output;
+  std::string rate;
+  std::string hold_out_depth;
+  std::string starts;
+  std::string seed;
+};
+
+std::uint64_t parse_count(const std::string& text, const char* option, double smallest) {
+  const double value = parse_number(text, option);
+  if (value < smallest || value > 1e9 || value != static_cast<double>(static_cast<long>(value))) {
+    throw Error(ExitCode::usage, option, fmt::format("'{}'", printable(text)),
+                fmt::format("a whole number from {} to 1000000000", smallest));
+  }
+  return static_cast<std::uint64_t>(value);
+}
+
+FitConfig configured(const FitOptions& options) {
+  FitConfig config = read_fit_config(options.config);
+  if (!options.starts.empty()) config.starts = parse_count(options.starts, "--starts", 1);
+  if (!options.seed.empty()) config.seed = parse_count(options.seed, "--seed", 0);
+  for (DataChoice& data : config.data) {
+    if (!options.rate.empty() && data.protocol.kind == ProtocolChoice::Kind::ramp_hold) {
+      data.protocol.rate_m_per_s = parse_quantity(options.rate, Dimension::speed, "--rate");
+      data.protocol.rate_provenance = Provenance::assumed;
+    }
+    if (!options.hold_out_depth.empty()) {
+      Selector selector;
+      selector.depth_m = parse_quantity(options.hold_out_depth, Dimension::length, "--hold-out");
+      data.hold_out.push_back(selector);
+    }
+  }
+  return config;
+}
+
+int fit(const FitOptions& options, const Session& session) {
+  const FitResult result = run_fit(configured(options));
+  const std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
+  if (options.output.empty()) {
+    fmt::print("{}", text);
+  } else {
+    write_file(options.output, text);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_fit_command(CLI::App& app, Session& session) {
+  CLI::App* command =
+      app.add_subcommand("fit", "Fit model parameters to curves, with intervals and verdicts");
+  auto options = std::make_shared<FitOptions>();
+  command->add_option("CONFIG", options->config, "JSON configuration (schemas/fit.schema.json)")
+      ->required();
+  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command->add_option("--rate", options->rate, "Assume this ramp rate instead, e.g. \"2 mm/s\"");
+  command->add_option("--hold-out", options->hold_out_depth,
+                      "Predict this depth instead of fitting it, e.g. \"8 mm\"");
+  command->add_option("--starts", options->starts, "Number of starts");
+  command->add_option("--seed", options->seed, "Seed of the random starts, 0 or more");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm fit configs/liver_relaxation.json\n"
+      "  tpm fit configs/liver_relaxation.json --hold-out \"8 mm\" --format json -o fit.json");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return fit(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

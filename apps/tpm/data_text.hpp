@@ -1,0 +1,20 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "tpm/curve/load.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm::app {
+
+/// A table with its columns lined up, two spaces between them, the first row its titles.
+[[nodiscard]] std::string aligned(const std::vector<std::vector<std::string>>& rows);
+
+/// A curve as a person reads it: mm, N, s, kPa, bands as "0.07 - 0.18", provenance in each row.
+/// Of a long recording only the beginning and the end, unless `all_rows`.
+[[nodiscard]] std::string curve_text(const Curve& curve, bool all_rows);
+
+/// A curve as a program reads it: SI, with the unit in the key.
+[[nodiscard]] Json curve_json(const Curve& curve);
+
+}  // namespace tpm::app

@@ -1,0 +1,152 @@
+#include "tpm/curve/curve.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+namespace {
+
+template <typename Enum>
+struct Word {
+  Enum meaning;
+  std::string_view text;
+};
+
+constexpr auto kProvenances = std::to_array<Word<Provenance>>({
+    {Provenance::table, "table"},
+    {Provenance::text, "text"},
+    {Provenance::abstract, "abstract"},
+    {Provenance::derived, "derived"},
+    {Provenance::assumed, "assumed"},
+    {Provenance::digitized, "digitized"},
+    {Provenance::measured, "measured"},
+});
+
+constexpr auto kTimeOrigins = std::to_array<Word<TimeOrigin>>({
+    {TimeOrigin::none, "none"},
+    {TimeOrigin::end_of_ramp, "end_of_ramp"},
+    {TimeOrigin::load_applied, "load_applied"},
+});
+
+struct QuantityWords {
+  Quantity meaning;
+  std::string_view text;
+  std::string_view short_name;
+  Dimension dimension;
+};
+
+constexpr auto kQuantities = std::to_array<QuantityWords>({
+    {Quantity::time, "time", "time", Dimension::time},
+    {Quantity::indentation_depth, "indentation_depth", "depth", Dimension::length},
+    {Quantity::contact_force, "contact_force", "force", Dimension::force},
+    {Quantity::load, "load", "load", Dimension::force},
+    {Quantity::relative_length, "relative_length", "relative_length", Dimension::dimensionless},
+    {Quantity::stress, "stress", "stress", Dimension::stress},
+    {Quantity::abscissa, "abscissa", "x", Dimension::dimensionless},
+    {Quantity::ordinate, "ordinate", "y", Dimension::dimensionless},
+});
+
+template <typename Words, typename Enum>
+const auto& entry_of(const Words& words, Enum meaning) noexcept {
+  return *std::find_if(words.begin(), words.end(),
+                       [meaning](const auto& word) { return word.meaning == meaning; });
+}
+
+template <typename Words>
+auto parse_word(const Words& words, std::string_view kind, std::string_view text,
+                std::string_view where) {
+  std::string known;
+  for (const auto& word : words) {
+    if (word.text == text) return word.meaning;
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", word.text);
+  }
+  throw bad_input(where, fmt::format("unknown {} '{}'", kind, printable(text)),
+                  fmt::format("one of {}", known));
+}
+
+void require_quantity(const CurveHeader& header, Quantity found, Quantity wanted) {
+  if (found == wanted) return;
+  throw bad_input(header.id, fmt::format("the recording holds {}", quantity_name(found)),
+                  quantity_name(wanted));
+}
+
+}  // namespace
+
+std::string_view provenance_name(Provenance provenance) noexcept {
+  return entry_of(kProvenances, provenance).text;
+}
+
+Provenance parse_provenance(std::string_view text, std::string_view where) {
+  return parse_word(kProvenances, "provenance", text, where);
+}
+
+std::string_view quantity_name(Quantity quantity) noexcept {
+  return entry_of(kQuantities, quantity).text;
+}
+
+Quantity parse_quantity_name(std::string_view text, std::string_view where) {
+  return parse_word(kQuantities, "quantity", text, where);
+}
+
+Dimension quantity_dimension(Quantity quantity) noexcept {
+  return entry_of(kQuantities, quantity).dimension;
+}
+
+std::string_view quantity_short_name(Quantity quantity) noexcept {
+  return entry_of(kQuantities, quantity).short_name;
+}
+
+std::string si_key(Quantity quantity, std::string_view part) {
+  std::string key(quantity_short_name(quantity));
+  for (const std::string_view piece : {part, si_symbol(quantity_dimension(quantity))}) {
+    if (!piece.empty()) key.append("_").append(piece);
+  }
+  return key;
+}
+
+Quantity observable_quantity(Observable observable) noexcept {
+  return observable == Observable::contact_force ? Quantity::contact_force
+                                                 : Quantity::indentation_depth;
+}
+
+std::string_view time_origin_name(TimeOrigin origin) noexcept {
+  return entry_of(kTimeOrigins, origin).text;
+}
+
+TimeOrigin parse_time_origin(std::string_view text, std::string_view where) {
+  return parse_word(kTimeOrigins, "time origin", text, where);
+}
+
+const std::vector<double>& Recording::depth_m() const {
+  require_quantity(header, drive_quantity, Quantity::indentation_depth);
+  if (drive.empty()) {
+    throw bad_input(header.id, "the recording has no depths", "indentation_depth");
+  }
+  return drive;
+}
+
+const std::vector<double>& Recording::force_N() const {
+  require_quantity(header, response_quantity, Quantity::contact_force);
+  return response;
+}
+
+const std::vector<double>& Recording::force_sd_N() const {
+  require_quantity(header, response_quantity, Quantity::contact_force);
+  return response_sd;
+}
+
+const NamedValue& ValueSet::at(std::string_view name) const {
+  const auto found = std::find_if(values.begin(), values.end(),
+                                  [name](const NamedValue& value) { return value.name == name; });
+  if (found == values.end()) {
+    throw bad_input(header.id, fmt::format("no value '{}'", printable(name)),
+                    "a name of its first column");
+  }
+  return *found;
+}
+
+}  // namespace tpm

@@ -1,0 +1,45 @@
+#pragma once
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "tpm/core/units.hpp"
+#include "tpm/curve/curve.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// What part of a reading a column holds.
+enum class Bound { value, lower, upper, sd };
+
+/// "value", "lower", "upper" or "sd".
+[[nodiscard]] std::string_view bound_name(Bound bound) noexcept;
+
+/// What the description says of one CSV column.
+struct ColumnDescription {
+  Quantity quantity = Quantity::ordinate;
+  Unit unit;
+  Bound bound = Bound::value;
+  std::optional<Provenance> provenance;  ///< of the column where it differs from the row's
+  std::string note;
+};
+
+/// The JSON file beside a CSV file.
+struct CurveDescription {
+  CurveHeader header;
+  std::string kind;                    ///< "points", "recording" or "values"
+  std::optional<Quantity> observable;  ///< points and recordings
+  TimeOrigin time_origin = TimeOrigin::none;
+  std::optional<Provenance> provenance;  ///< of a whole recording
+  std::map<std::string, ColumnDescription> columns;
+};
+
+/// Reads and checks a description; header.sha256 stays empty. Throws Error(bad_input) naming the
+/// key.
+[[nodiscard]] CurveDescription read_description(const std::filesystem::path& path);
+
+/// The inverse of read_description.
+[[nodiscard]] Json description_json(const CurveDescription& description);
+
+}  // namespace tpm

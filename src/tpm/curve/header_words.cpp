@@ -1,0 +1,168 @@
+#include "tpm/curve/header_words.hpp"
+
+#include <utf8.h>
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "tpm/core/units.hpp"
+
+namespace tpm {
+namespace {
+
+std::string_view trimmed(std::string_view text) noexcept {
+  const auto first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+struct Letter {
+  char32_t accented;
+  char plain;
+};
+
+constexpr auto kLetters = std::to_array<Letter>({
+    {U'\u00E0', 'a'}, {U'\u00E1', 'a'}, {U'\u00E2', 'a'}, {U'\u00E4', 'a'}, {U'\u00E7', 'c'},
+    {U'\u00E8', 'e'}, {U'\u00E9', 'e'}, {U'\u00EA', 'e'}, {U'\u00EB', 'e'}, {U'\u00EC', 'i'},
+    {U'\u00ED', 'i'}, {U'\u00EE', 'i'}, {U'\u00EF', 'i'}, {U'\u00F1', 'n'}, {U'\u00F2', 'o'},
+    {U'\u00F3', 'o'}, {U'\u00F4', 'o'}, {U'\u00F6', 'o'}, {U'\u00F9', 'u'}, {U'\u00FA', 'u'},
+    {U'\u00FB', 'u'}, {U'\u00FC', 'u'},
+});
+
+/// A lower-case letter or digit without accents; a space for everything else.
+char folded(char32_t c) {
+  // Latin-1 capitals lie 0x20 below their small letters, as in ASCII.
+  const bool capital = (c >= U'A' && c <= U'Z') || (c >= U'\u00C0' && c <= U'\u00DE');
+  if (capital) c += 0x20;
+  if ((c >= U'a' && c <= U'z') || (c >= U'0' && c <= U'9')) return static_cast<char>(c);
+  const auto letter = std::find_if(kLetters.begin(), kLetters.end(),
+                                   [c](const Letter& l) { return l.accented == c; });
+  return letter == kLetters.end() ? ' ' : letter->plain;
+}
+
+std::vector<std::string> words_of(std::string_view name) {
+  std::vector<std::string> words(1);
+  for (const char32_t c : utf8::utf8to32(std::string(name))) {
+    const char plain = folded(c);
+    if (plain != ' ') {
+      words.back() += plain;
+    } else if (!words.back().empty()) {
+      words.emplace_back();
+    }
+  }
+  if (words.back().empty()) words.pop_back();
+  return words;
+}
+
+struct TitleWord {
+  std::string_view word;
+  Recognized meaning;
+};
+
+constexpr Recognized kTime{ColumnRole::time, Quantity::time, 0};
+constexpr Recognized kForce{ColumnRole::response, Quantity::contact_force, 0};
+constexpr Recognized kStress{ColumnRole::response, Quantity::stress, 1};
+constexpr Recognized kDepth{ColumnRole::drive, Quantity::indentation_depth, 0};
+constexpr Recognized kDisplacement{ColumnRole::drive, Quantity::indentation_depth, 1};
+constexpr Recognized kTravel{ColumnRole::drive, Quantity::indentation_depth, 2};
+constexpr Recognized kCrosshead{ColumnRole::drive, Quantity::indentation_depth, 3};
+constexpr Recognized kStretch{ColumnRole::drive, Quantity::relative_length, 4};
+constexpr Recognized kSd{ColumnRole::sd, Quantity::contact_force, 0};
+
+constexpr auto kWords = std::to_array<TitleWord>({
+    {"time", kTime},
+    {"temps", kTime},
+    {"zeit", kTime},
+    {"prufzeit", kTime},
+    {"testzeit", kTime},
+    {"tiempo", kTime},
+    {"tempo", kTime},
+    {"force", kForce},
+    {"load", kForce},
+    {"kraft", kForce},
+    {"standardkraft", kForce},
+    {"prufkraft", kForce},
+    {"fuerza", kForce},
+    {"forza", kForce},
+    {"f", kForce},
+    {"stress", kStress},
+    {"spannung", kStress},
+    {"contrainte", kStress},
+    {"depth", kDepth},
+    {"indentation", kDepth},
+    {"penetration", kDepth},
+    {"eindringtiefe", kDepth},
+    {"profondeur", kDepth},
+    {"enfoncement", kDepth},
+    {"displacement", kDisplacement},
+    {"extension", kDisplacement},
+    {"elongation", kDisplacement},
+    {"allongement", kDisplacement},
+    {"deplacement", kDisplacement},
+    {"dehnung", kDisplacement},
+    {"verlangerung", kDisplacement},
+    {"verformung", kDisplacement},
+    {"verschiebung", kDisplacement},
+    {"desplazamiento", kDisplacement},
+    {"spostamento", kDisplacement},
+    {"standardweg", kTravel},
+    {"weg", kTravel},
+    {"course", kTravel},
+    {"stroke", kTravel},
+    {"traverse", kCrosshead},
+    {"crosshead", kCrosshead},
+    {"traversenweg", kCrosshead},
+    {"position", kCrosshead},
+    {"stretch", kStretch},
+    {"sd", kSd},
+    {"stdev", kSd},
+    {"stddev", kSd},
+    {"x", {ColumnRole::drive, Quantity::abscissa, 9}},
+    {"y", {ColumnRole::response, Quantity::ordinate, 9}},
+});
+
+/// The text before and after the last separator, if a unit stands after it.
+std::optional<ColumnTitle> split_at(std::string_view title, std::string_view separator) {
+  const auto cut = title.rfind(separator);
+  if (cut == std::string_view::npos) return std::nullopt;
+  const auto unit = trimmed(title.substr(cut + separator.size()));
+  if (!is_unit(unit)) return std::nullopt;
+  return ColumnTitle{std::string(trimmed(title.substr(0, cut))), std::string(unit)};
+}
+
+}  // namespace
+
+std::string_view without_brackets(std::string_view cell) noexcept {
+  const std::string_view text = trimmed(cell);
+  const bool bracketed = text.size() > 1 && ((text.front() == '(' && text.back() == ')') ||
+                                             (text.front() == '[' && text.back() == ']'));
+  return bracketed ? trimmed(text.substr(1, text.size() - 2)) : text;
+}
+
+ColumnTitle split_title(std::string_view title) {
+  const std::string_view text = trimmed(title);
+  const auto open = text.find_last_of("([");
+  if (open != std::string_view::npos && open > 0) {
+    const auto unit = without_brackets(text.substr(open));
+    if (is_unit(unit)) return {std::string(trimmed(text.substr(0, open))), std::string(unit)};
+  }
+  for (const std::string_view separator : {" / ", ", ", " in ", "_"}) {
+    if (auto split = split_at(text, separator)) return *split;
+  }
+  return {std::string(text), {}};
+}
+
+std::optional<Recognized> recognize_title(std::string_view name) {
+  std::optional<Recognized> found;
+  for (const std::string& word : words_of(name)) {
+    const auto known = std::find_if(kWords.begin(), kWords.end(),
+                                    [&word](const TitleWord& w) { return w.word == word; });
+    if (known == kWords.end()) continue;
+    // "Course traverse absolue" is crosshead travel: the word that says more counts.
+    if (!found || known->meaning.rank > found->rank) found = known->meaning;
+  }
+  return found;
+}
+
+}  // namespace tpm

@@ -1,0 +1,34 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "tpm/curve/curve.hpp"
+
+namespace tpm {
+
+/// A column title taken apart: "Force [N]", "Force (N)", "Force / N", "Force, N", "Kraft in N" and
+/// "force_N" all give {"Force", "N"}. The unit is empty if there is none that parse_unit knows.
+struct ColumnTitle {
+  std::string name;
+  std::string unit;
+};
+
+[[nodiscard]] ColumnTitle split_title(std::string_view title);
+
+/// A cell of a unit row without its brackets: "[mm]" -> "mm".
+[[nodiscard]] std::string_view without_brackets(std::string_view cell) noexcept;
+
+/// What a column of a testing machine may be used for.
+enum class ColumnRole { time, drive, response, sd };
+
+/// What a title says in English, French, German, Spanish or Italian.
+struct Recognized {
+  ColumnRole role;
+  Quantity quantity;
+  int rank;  ///< the smaller, the closer to the specimen: depth before crosshead travel
+};
+
+[[nodiscard]] std::optional<Recognized> recognize_title(std::string_view name);
+
+}  // namespace tpm

@@ -1,0 +1,110 @@
+#pragma once
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/curve/curve.hpp"
+#include "tpm/curve/description.hpp"
+#include "tpm/store/delimited.hpp"
+
+namespace tpm {
+
+/// What wrote the file that is imported.
+enum class ImportFormat {
+  automatic,  ///< found out from the content
+  machine,    ///< testing machine: header rows, then samples
+  wpd_csv,    ///< WebPlotDigitizer: x and y without header, or dataset names over X,Y pairs
+  wpd_json,   ///< WebPlotDigitizer project: version 4 (datasetColl) or version 3 (wpd)
+  engauge,    ///< Engauge Digitizer: x,Curve1,Curve2 in one block or one block for each curve
+};
+
+/// "machine", "wpd-csv", ...
+[[nodiscard]] std::string_view import_format_name(ImportFormat format) noexcept;
+
+/// Throws Error(bad_input) naming the known words.
+[[nodiscard]] ImportFormat parse_import_format(std::string_view text, std::string_view where);
+
+/// What one axis of a digitised figure shows.
+struct Axis {
+  Quantity quantity = Quantity::time;
+  Unit unit;
+};
+
+/// "contact_force:N" or "abscissa". Throws Error(bad_input).
+[[nodiscard]] Axis parse_axis(std::string_view text, std::string_view where);
+
+/// What the user says about a file; everything left out is found in the file or is an error that
+/// names the option. Nothing is guessed: a column without a unit is not imported.
+struct ImportOptions {
+  ImportFormat format = ImportFormat::automatic;
+  DelimitedOptions text;
+  CurveHeader header;                    ///< id is set for each curve; sha256 is ignored
+  std::optional<Provenance> provenance;  ///< else `measured` for machines, `digitized` for figures
+
+  // Testing machines. A column is chosen by its name or its number from 1.
+  std::optional<int> header_rows;
+  std::string time_column;
+  std::string drive_column;
+  std::string response_column;
+  std::string sd_column;
+  std::optional<Quantity> drive_quantity;
+  std::optional<Quantity> response_quantity;
+  std::map<std::string, std::string> units;  ///< column name or number -> unit
+  bool negate_drive = false;                 ///< for machines that count tension positive
+  bool negate_response = false;
+  std::optional<double> contact_force_N;  ///< above 0: samples before contact are left out
+  int contact_samples = 3;                ///< how many samples in a row must reach it, from 1
+
+  // Digitised figures.
+  std::optional<Axis> x;
+  std::optional<Axis> y;
+  std::string dataset;            ///< only the dataset of this name
+  std::optional<double> depth_m;  ///< imposed depth of a digitised relaxation curve
+  std::optional<double> load_N;   ///< imposed load of a digitised creep curve
+  TimeOrigin time_origin = TimeOrigin::none;
+};
+
+/// One thing that was understood, in words ("separator", "comma").
+struct Finding {
+  std::string what;
+  std::string value;
+};
+
+/// A column as it stood in the file.
+struct ImportedColumn {
+  Quantity quantity = Quantity::ordinate;
+  Unit unit;
+  Bound bound = Bound::value;
+  std::vector<double> values;  ///< in `unit`, not SI: written as they were read
+  bool shifted = false;        ///< zero was moved, so that the last digits are rounding noise
+};
+
+/// One curve of an imported file, before it is given the project's own form.
+struct ImportedSeries {
+  std::string name;                     ///< dataset or sheet; may be empty
+  std::vector<ImportedColumn> columns;  ///< all of one length
+  std::vector<int> lines;               ///< of the samples in the file; empty if they have none
+  std::vector<Finding> findings;
+};
+
+/// A curve in the project's own form: `csv` and `description` are what the two files hold.
+struct ImportedCurve {
+  std::string name;
+  CurveDescription description;
+  std::string csv;
+  std::vector<Finding> findings;
+};
+
+/// Reads a foreign file. Throws Error(bad_input) with file, line and column. A digitised file may
+/// hold several curves; a machine export holds one.
+///
+/// Digitised curves become points where the imposed quantity is known: force over depth, force over
+/// time with `depth_m` and `time_origin`, depth over time with `load_N` and `time_origin`. All
+/// others become recordings.
+[[nodiscard]] std::vector<ImportedCurve> import_curves(const std::filesystem::path& path,
+                                                       const ImportOptions& options);
+
+}  // namespace tpm

@@ -1,0 +1,286 @@
+#include "tpm/curve/import_machine.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/curve/contact.hpp"
+#include "tpm/curve/header_words.hpp"
+
+namespace tpm {
+namespace {
+
+/// A column as the header shows it.
+struct Column {
+  std::size_t index;
+  std::string name;   ///< may be empty
+  std::string unit;   ///< may be empty
+  std::optional<Recognized> meaning;
+
+  [[nodiscard]] std::string label() const {
+    return name.empty() ? fmt::format("column {}", index + 1)
+                        : fmt::format("column {} '{}'", index + 1, printable(name));
+  }
+};
+
+struct Header {
+  std::size_t rows = 0;
+  std::string sheet;
+  std::vector<Column> columns;
+};
+
+bool holds_samples(const DelimitedRow& row, bool decimal_comma) {
+  std::size_t filled = 0;
+  std::size_t numbers = 0;
+  for (const std::string& field : row.fields) {
+    if (field.empty()) continue;
+    ++filled;
+    if (is_number(field, decimal_comma)) ++numbers;
+  }
+  return numbers >= 2 && 2 * numbers > filled;
+}
+
+std::size_t count_header_rows(const DelimitedTable& table, const std::string& file) {
+  const auto& rows = table.rows;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    // One row of numbers may be specimen data in the header; samples come in rows of one width.
+    const bool last = i + 1 == rows.size();
+    if (holds_samples(rows[i], table.decimal_comma) &&
+        (last || (rows[i].fields.size() == rows[i + 1].fields.size() &&
+                  holds_samples(rows[i + 1], table.decimal_comma)))) {
+      return i;
+    }
+  }
+  throw bad_input(file, "no row with two or more numbers",
+                  "samples, or another separator or decimal sign");
+}
+
+bool is_unit_row(const DelimitedRow& row) {
+  std::size_t units = 0;
+  for (const std::string& field : row.fields) {
+    if (field.empty() || field == "-") continue;
+    if (!is_unit(without_brackets(field))) return false;
+    ++units;
+  }
+  return units > 0;
+}
+
+std::string field_or_empty(const DelimitedRow& row, std::size_t index) {
+  return index < row.fields.size() ? row.fields[index] : std::string();
+}
+
+/// A row above the titles that repeats one text names the sheet.
+std::string sheet_name(const DelimitedRow& row) {
+  std::string name;
+  for (const std::string& field : row.fields) {
+    if (field.empty()) continue;
+    if (!name.empty() && field != name) return {};
+    name = field;
+  }
+  return name;
+}
+
+/// Units given by name or number go before those of the file.
+std::string chosen_unit(const Column& column, const ImportOptions& options) {
+  for (const auto& [selector, unit] : options.units) {
+    if (selector == column.name || selector == std::to_string(column.index + 1)) return unit;
+  }
+  return column.unit;
+}
+
+Header read_header(const DelimitedTable& table, const std::string& file,
+                   const ImportOptions& options) {
+  Header header;
+  header.rows = options.header_rows ? static_cast<std::size_t>(*options.header_rows)
+                                    : count_header_rows(table, file);
+  if (header.rows >= table.rows.size()) {
+    throw bad_input(file, fmt::format("{} header rows but only {} rows", header.rows,
+                                      table.rows.size()),
+                    "samples below the header");
+  }
+  const DelimitedRow none;
+  const DelimitedRow* units = &none;
+  const DelimitedRow* titles = &none;
+  for (std::size_t i = header.rows; i-- > 0;) {
+    const DelimitedRow& row = table.rows[i];
+    if (units == &none && titles == &none && is_unit_row(row)) {
+      units = &row;
+    } else if (titles == &none) {
+      titles = &row;
+    } else if (header.sheet.empty()) {
+      header.sheet = sheet_name(row);
+    }
+  }
+  for (std::size_t i = 0; i < table.rows[header.rows].fields.size(); ++i) {
+    const ColumnTitle title = split_title(field_or_empty(*titles, i));
+    const std::string unit(without_brackets(field_or_empty(*units, i)));
+    Column column{i, title.name, unit.empty() ? title.unit : unit, recognize_title(title.name)};
+    column.unit = chosen_unit(column, options);
+    header.columns.push_back(std::move(column));
+  }
+  return header;
+}
+
+std::string column_list(const Header& header) {
+  std::string list;
+  for (const Column& column : header.columns) {
+    list += fmt::format("{}{}", list.empty() ? "" : ", ", column.label());
+  }
+  return printable(list, 200);
+}
+
+const Column& column_by_selector(const Header& header, const std::string& selector,
+                                 const std::string& file) {
+  for (const Column& column : header.columns) {
+    if (column.name == selector) return column;
+  }
+  std::size_t number = 0;
+  const char* end = selector.data() + selector.size();
+  const auto parsed = std::from_chars(selector.data(), end, number);
+  if (parsed.ec == std::errc{} && parsed.ptr == end && number >= 1 &&
+      number <= header.columns.size()) {
+    return header.columns[number - 1];
+  }
+  throw bad_input(file, fmt::format("no column '{}'", printable(selector)), column_list(header));
+}
+
+const Column* column_by_title(const Header& header, ColumnRole role) {
+  const Column* best = nullptr;
+  for (const Column& column : header.columns) {
+    if (!column.meaning || column.meaning->role != role) continue;
+    if (best == nullptr || column.meaning->rank < best->meaning->rank) best = &column;
+  }
+  return best;
+}
+
+const Column* find_column(const Header& header, ColumnRole role, const std::string& selector,
+                          const std::string& file) {
+  if (!selector.empty()) return &column_by_selector(header, selector, file);
+  return column_by_title(header, role);
+}
+
+Unit unit_of(const Column& column, Quantity quantity, const std::string& file) {
+  const Dimension dimension = quantity_dimension(quantity);
+  const std::string where = fmt::format("{}: {}", file, column.label());
+  if (column.unit.empty() && dimension != Dimension::dimensionless) {
+    throw bad_input(where, "has no unit",
+                    fmt::format("--unit \"{}={}\" or another unit of {}",
+                                column.name.empty() ? std::to_string(column.index + 1)
+                                                    : printable(column.name),
+                                si_symbol(dimension), dimension_name(dimension)));
+  }
+  return parse_unit(column.unit, dimension, where);
+}
+
+/// A column titled "F" in kPa holds a stress: the unit says what the title cannot.
+Quantity response_quantity(const Column& column, const ImportOptions& options) {
+  if (options.response_quantity) return *options.response_quantity;
+  const bool stress_unit = is_unit(column.unit) &&
+                           parse_unit(column.unit, column.name).dimension == Dimension::stress;
+  if (stress_unit) return Quantity::stress;
+  return column.meaning && column.meaning->role == ColumnRole::response
+             ? column.meaning->quantity
+             : Quantity::contact_force;
+}
+
+Quantity drive_quantity(const Column& column, const ImportOptions& options) {
+  if (options.drive_quantity) return *options.drive_quantity;
+  return column.meaning && column.meaning->role == ColumnRole::drive
+             ? column.meaning->quantity
+             : Quantity::indentation_depth;
+}
+
+/// Builds the series column by column and says which column became what.
+class SeriesReader {
+ public:
+  SeriesReader(const DelimitedTable& table, const Header& header, const std::string& file)
+      : table_(table), header_(header), file_(file) {
+    for (std::size_t i = header.rows; i < table.rows.size(); ++i) {
+      if (table.rows[i].fields.size() != header.columns.size()) {
+        throw bad_input(fmt::format("{}:{}", file, table.rows[i].line),
+                        fmt::format("{} fields in this row", table.rows[i].fields.size()),
+                        fmt::format("{} as in the first row of samples", header.columns.size()));
+      }
+      series_.lines.push_back(table.rows[i].line);
+    }
+  }
+
+  void add(const Column& column, Quantity quantity, Bound bound, bool negate) {
+    ImportedColumn imported;
+    imported.quantity = quantity;
+    imported.bound = bound;
+    imported.unit = unit_of(column, quantity, file_);
+    for (std::size_t i = header_.rows; i < table_.rows.size(); ++i) {
+      const double value =
+          parse_field(table_.rows[i].fields[column.index], table_.decimal_comma,
+                      fmt::format("{}:{}: {}", file_, table_.rows[i].line, column.label()));
+      imported.values.push_back(negate ? 0.0 - value : value);  // 0, not -0
+    }
+    series_.findings.push_back(
+        {bound == Bound::sd ? "standard deviation" : std::string(quantity_name(quantity)),
+         fmt::format("{}{}{}{}", column.label(), imported.unit.symbol.empty() ? "" : ", ",
+                     imported.unit.symbol, negate ? ", negated" : "")});
+    used_.push_back(column.index);
+    series_.columns.push_back(std::move(imported));
+  }
+
+  [[nodiscard]] ImportedSeries take() {
+    std::string unused;
+    for (const Column& column : header_.columns) {
+      if (std::find(used_.begin(), used_.end(), column.index) != used_.end()) continue;
+      unused += fmt::format("{}{}", unused.empty() ? "" : ", ", column.label());
+    }
+    if (!unused.empty()) series_.findings.push_back({"not used", printable(unused, 200)});
+    return std::move(series_);
+  }
+
+ private:
+  const DelimitedTable& table_;
+  const Header& header_;
+  const std::string& file_;
+  ImportedSeries series_;
+  std::vector<std::size_t> used_;
+};
+
+}  // namespace
+
+ImportedSeries read_machine(const DelimitedTable& table, const std::string& file,
+                            const ImportOptions& options) {
+  const Header header = read_header(table, file, options);
+  const Column* time = find_column(header, ColumnRole::time, options.time_column, file);
+  const Column* drive = find_column(header, ColumnRole::drive, options.drive_column, file);
+  const Column* response =
+      find_column(header, ColumnRole::response, options.response_column, file);
+  const Column* sd = find_column(header, ColumnRole::sd, options.sd_column, file);
+  if (response == nullptr) {
+    throw bad_input(file, "no column is recognised as a force or stress",
+                    fmt::format("--response with one of {}", column_list(header)));
+  }
+  if (time == nullptr && drive == nullptr) {
+    throw bad_input(file, "no column is recognised as time or displacement",
+                    fmt::format("--time or --drive with one of {}", column_list(header)));
+  }
+
+  const Quantity observed = response_quantity(*response, options);
+  SeriesReader reader(table, header, file);
+  if (time != nullptr) reader.add(*time, Quantity::time, Bound::value, false);
+  if (drive != nullptr) {
+    reader.add(*drive, drive_quantity(*drive, options), Bound::value, options.negate_drive);
+  }
+  reader.add(*response, observed, Bound::value, options.negate_response);
+  if (sd != nullptr) reader.add(*sd, observed, Bound::sd, false);
+
+  ImportedSeries series = reader.take();
+  series.name = header.sheet;
+  series.findings.insert(series.findings.begin(),
+                         {"header rows", fmt::format("{}{}{}", header.rows,
+                                                     header.sheet.empty() ? "" : ", sheet ",
+                                                     printable(header.sheet))});
+  start_at_contact(series, file, options);
+  return series;
+}
+
+}  // namespace tpm

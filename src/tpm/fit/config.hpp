@@ -1,0 +1,84 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/curve/curve.hpp"
+#include "tpm/fit/noise.hpp"
+#include "tpm/fit/parameter.hpp"
+#include "tpm/material/tpm_element.hpp"
+#include "tpm/model/model.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// How the readings of a data set were imposed.
+struct ProtocolChoice {
+  enum class Kind {
+    ramp_hold,  ///< to each datum's depth at `rate`, then held; times count from the ramp's end
+    step_hold,  ///< at once to each datum's depth, then held; times count from the step
+    static_,    ///< infinitely slow: the equilibrium force at each depth
+    creep,      ///< each datum's load applied at once and held; times count from then
+    measured,   ///< the recording's own displacement history
+  };
+  Kind kind = Kind::ramp_hold;
+  double rate_m_per_s = 0.0;                  ///< ramp_hold
+  std::optional<Provenance> rate_provenance;  ///< how well the rate is known
+};
+
+[[nodiscard]] std::string_view protocol_kind_name(ProtocolChoice::Kind kind) noexcept;
+
+/// Picks readings of a data set. A missing condition matches everything.
+struct Selector {
+  std::optional<double> depth_m;
+  std::optional<double> load_N;
+  std::optional<std::string> label;
+
+  [[nodiscard]] bool matches(const Datum& datum) const;
+};
+
+/// One data set of a fit.
+struct DataChoice {
+  std::string dataset;  ///< id of a shipped curve, or a path
+  ProtocolChoice protocol;
+  Noise noise;
+  std::vector<Selector> exclude;   ///< not used at all
+  std::vector<Selector> hold_out;  ///< not fitted, but predicted
+};
+
+/// An estimated parameter and the model parameters that take its value.
+struct EstimatedParameter {
+  FitParameter fit;
+  std::vector<TpmIndex> sets;
+};
+
+/// A claim about parameters, tested by holding them: "eta1 = 5 Pa s".
+struct Hypothesis {
+  std::string name;
+  std::vector<std::pair<std::string, double>> values;  ///< estimated parameter, SI value
+};
+
+/// Everything that decides the result of a fit (schemas/fit.schema.json).
+struct FitConfig {
+  std::string title;
+  std::string model = "closed_form";
+  TensionRule tension;
+  std::vector<EstimatedParameter> parameters;
+  TpmParameters fixed;  ///< what no estimated parameter sets
+  std::vector<DataChoice> data;
+  RobustLoss loss;
+  std::size_t starts = 50;
+  std::uint64_t seed = 0;
+  double level = 0.95;
+  bool profiles = true;
+  std::vector<Hypothesis> hypotheses;
+  std::filesystem::path folder;  ///< where relative paths of data sets are looked up
+};
+
+/// Reads and checks a configuration. Throws Error(bad_input) with the file and the key.
+[[nodiscard]] FitConfig read_fit_config(const std::filesystem::path& path);
+[[nodiscard]] FitConfig parse_fit_config(const Json& document, std::string_view where);
+
+}  // namespace tpm

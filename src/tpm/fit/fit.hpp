@@ -1,0 +1,100 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/config.hpp"
+#include "tpm/fit/experiment_residuals.hpp"
+#include "tpm/fit/least_squares.hpp"
+#include "tpm/fit/uncertainty.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// What the data say about one parameter.
+enum class Verdict {
+  identified,   ///< the interval is closed on both sides
+  lower_only,   ///< only a lower limit: larger values up to the bound cannot be told apart
+  upper_only,   ///< only an upper limit
+  flat,         ///< no limit within the bounds
+  not_profiled  ///< profiles were switched off
+};
+
+[[nodiscard]] std::string_view verdict_name(Verdict verdict) noexcept;
+
+/// Result for one estimated parameter; SI.
+struct ParameterResult {
+  FitParameter parameter;
+  double estimate = 0.0;
+  std::optional<double> standard_error;  ///< linearised, in natural units
+  std::optional<double> lower, upper;    ///< confidence limits by profile likelihood
+  bool at_lower_bound = false, at_upper_bound = false;
+  Verdict verdict = Verdict::not_profiled;
+  std::string words;  ///< one sentence
+  Profile profile;
+};
+
+/// A minimum that at least one start ended in.
+struct DistinctMinimum {
+  Minimum minimum;
+  int starts = 0;                 ///< how many ended here (deviance equal to 1e-5)
+  std::vector<double> low, high;  ///< smallest and largest of each parameter among them, SI
+};
+
+struct HypothesisResult {
+  Hypothesis hypothesis;
+  Minimum minimum;    ///< the other parameters re-optimised
+  double rise = 0.0;  ///< of the deviance above the best fit
+  double p_value = 1.0;
+  bool excluded = false;  ///< p < 1 - level
+  std::string words;
+};
+
+/// One reading with the fitted model's answer.
+struct FittedDatum {
+  FitDatum datum;
+  double predicted = 0.0;              ///< SI
+  std::optional<double> predicted_sd;  ///< from the parameters' covariance
+  double standardised = 0.0;           ///< (predicted - value) / sigma after the noise model
+};
+
+struct FitResult {
+  FitConfig config;
+  Minimum best;
+  int value_count = 0, band_count = 0;
+  double chi_square = 0.0;             ///< sum of squared standardised residuals, bands included
+  int degrees_of_freedom = 0;          ///< values less estimated parameters
+  std::optional<double> chi_square_p;  ///< only for a known noise scale and dof > 0
+  double variance_factor = 1.0;
+  std::vector<ParameterResult> parameters;
+  Covariance covariance;
+  std::string weakest_words;
+  int starts_run = 0, starts_failed = 0, starts_agreeing = 0;
+  std::vector<DistinctMinimum> minima;  ///< rising deviance
+  std::vector<HypothesisResult> hypotheses;
+  std::vector<FittedDatum> data;
+  std::vector<std::string> flags;  ///< what a reader must know (text, one line each)
+};
+
+/// Minimum over many starts, intervals, verdicts, hypotheses. Deterministic for a given config.
+/// Throws Error(bad_input) for data that do not fit the configuration, Error(numerical) if no
+/// start ends in a usable point.
+[[nodiscard]] FitResult run_fit(const FitConfig& config);
+
+/// The same for any residuals: the part of run_fit that does not know what is fitted. Fills best,
+/// parameters, covariance, starts and minima.
+[[nodiscard]] FitResult fit_residuals(const ResidualFunction& function,
+                                      std::vector<FitParameter> parameters, std::size_t starts,
+                                      std::uint64_t seed, Threshold threshold, bool profiles);
+
+/// Machine-readable result, keys in docs/json.md, numbers rounded to 6 significant digits so that
+/// they agree between machines.
+[[nodiscard]] Json to_json(const FitResult& result);
+
+/// Plain text for a terminal.
+[[nodiscard]] std::string to_terminal_text(const FitResult& result);
+
+/// "12.3 kPa": a value in the parameter's own unit, 4 significant digits.
+[[nodiscard]] std::string in_unit(const FitParameter& parameter, double natural);
+
+}  // namespace tpm

@@ -1,0 +1,94 @@
+#include <fmt/format.h>
+
+#include "tpm/core/text.hpp"
+#include "tpm/fit/fit.hpp"
+
+namespace tpm {
+namespace {
+
+std::string interval_text(const ParameterResult& p) {
+  if (p.verdict == Verdict::not_profiled) return "-";
+  const auto side = [&](const std::optional<double>& limit) {
+    return limit ? significant(*limit / p.parameter.unit.to_si, 4) : std::string("open");
+  };
+  return fmt::format("{} .. {}", side(p.lower), side(p.upper));
+}
+
+std::string parameter_table(const FitResult& result) {
+  std::string text =
+      fmt::format("{:<10} {:>12} {:>12}  {:<24} {:<8} {}\n", "parameter", "estimate", "std. error",
+                  fmt::format("{:.4g} % interval", 100.0 * result.config.level), "unit", "verdict");
+  for (const ParameterResult& p : result.parameters) {
+    const double unit = p.parameter.unit.to_si;
+    text += fmt::format("{:<10} {:>12} {:>12}  {:<24} {:<8} {}\n", p.parameter.name,
+                        significant(p.estimate / unit, 5),
+                        p.standard_error ? significant(*p.standard_error / unit, 3) : "-",
+                        interval_text(p), p.parameter.unit.symbol, verdict_name(p.verdict));
+  }
+  return text;
+}
+
+std::string data_table(const FitResult& result) {
+  std::string text = fmt::format("{:<18} {:<14} {:>18} {:>10} {:>8}  {:<10} {}\n", "data set",
+                                 "reading", "observed", "model", "z", "provenance", "");
+  for (const FittedDatum& d : result.data) {
+    const bool force = d.datum.observable == Observable::contact_force;
+    const double unit = force ? 1.0 : 1e-3;
+    const std::string symbol = force ? "N" : "mm";
+    const std::string observed =
+        d.datum.value ? fmt::format("{} {}", significant(*d.datum.value / unit, 4), symbol)
+                      : fmt::format("{}-{} {}", significant(*d.datum.lower / unit, 3),
+                                    significant(*d.datum.upper / unit, 3), symbol);
+    text += fmt::format("{:<18} {:<14} {:>18} {:>10} {:>8.2f}  {:<10} {}\n", d.datum.dataset,
+                        d.datum.label, observed, significant(d.predicted / unit, 4), d.standardised,
+                        provenance_name(d.datum.provenance), d.datum.held_out ? "held out" : "");
+  }
+  return text;
+}
+
+std::string minima_table(const FitResult& result) {
+  std::string text = fmt::format(
+      "{} starts, {} failed, {} agree with the best in chi-square and every parameter to 5 "
+      "digits\n",
+      result.starts_run, result.starts_failed, result.starts_agreeing);
+  for (const DistinctMinimum& m : result.minima) {
+    text += fmt::format("  deviance {:<12} {:>3} starts:", significant(m.minimum.deviance, 6),
+                        m.starts);
+    for (std::size_t i = 0; i < m.low.size(); ++i) {
+      const FitParameter& p = result.parameters[i].parameter;
+      const std::string low = significant(m.low[i] / p.unit.to_si, 4);
+      const std::string high = significant(m.high[i] / p.unit.to_si, 4);
+      text += fmt::format(" {} {}{}", p.name, low, low == high ? "" : " to " + high);
+      if (!p.unit.symbol.empty()) text += " " + p.unit.symbol;
+      text += i + 1 < m.low.size() ? "," : "\n";
+    }
+  }
+  return text;
+}
+
+/// Recordings have hundreds of readings; a terminal wants a sentence.
+constexpr std::size_t kMostRows = 40;
+
+}  // namespace
+
+std::string to_terminal_text(const FitResult& result) {
+  std::string text = result.config.title + "\n\n" + parameter_table(result) + "\n";
+  text += fmt::format("chi-square {} from {} values and {} bands, {} degrees of freedom",
+                      significant(result.chi_square, 6), result.value_count, result.band_count,
+                      result.degrees_of_freedom);
+  if (result.chi_square_p) text += fmt::format(", p = {}", significant(*result.chi_square_p, 2));
+  text += "\n\n";
+  for (const ParameterResult& p : result.parameters) text += "- " + p.words + "\n";
+  for (const HypothesisResult& h : result.hypotheses) text += "- " + h.words + "\n";
+  if (!result.weakest_words.empty()) text += "- " + result.weakest_words + "\n";
+  text += "\n" + minima_table(result) + "\n";
+  if (result.data.size() <= kMostRows) {
+    text += data_table(result);
+  } else {
+    text += fmt::format("{} readings; --format json lists them\n", result.data.size());
+  }
+  for (const std::string& flag : result.flags) text += "note: " + flag + "\n";
+  return text;
+}
+
+}  // namespace tpm

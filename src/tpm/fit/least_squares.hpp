@@ -1,0 +1,70 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/parameter.hpp"
+#include "tpm/model/model.hpp"
+
+namespace tpm {
+
+/// Weighted residuals of everything that is fitted, with exact derivatives. Their sum of squares
+/// less offset() is the deviance: -2 ln L up to a constant that no parameter moves.
+class ResidualFunction {
+ public:
+  ResidualFunction() = default;
+  ResidualFunction(const ResidualFunction&) = delete;
+  ResidualFunction& operator=(const ResidualFunction&) = delete;
+  virtual ~ResidualFunction() = default;
+
+  [[nodiscard]] virtual Eigen::Index residual_count() const = 0;
+
+  /// @param natural parameter values, SI
+  /// @param residual size residual_count()
+  /// @param jacobian d residual / d natural, residual_count() x parameter count, or null
+  /// @return false if the response could not be computed there; the search then turns away. A
+  ///         failure never becomes a zero residual.
+  [[nodiscard]] virtual bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
+                                      RowMatrix* jacobian) const = 0;
+
+  /// Constant part of the sum of squares that is not deviance.
+  [[nodiscard]] virtual double offset() const { return 0.0; }
+};
+
+/// The end of one descent.
+struct Minimum {
+  std::vector<double> natural;  ///< SI
+  double deviance = 0.0;
+  bool usable = false;     ///< the search ended in a finite point it could evaluate
+  bool converged = false;  ///< by one of the tolerances, not by running out of iterations
+  int iterations = 0;
+  std::string message;  ///< the optimiser's own words
+};
+
+/// Which parameters keep their value.
+using FixedMask = std::vector<bool>;
+
+/// How far the first step may go: nearly a full Gauss-Newton step, or a short one. Which valley a
+/// far start falls into can depend on it (NIST BoxBOD, first start; MGH17, first start).
+enum class FirstStep { bold, cautious };
+
+/// Trust-region descent (Ceres, Levenberg-Marquardt with box bounds) in theta.
+/// @param start natural values within the bounds (a start outside is moved to the bound)
+/// @param fixed empty, or one flag per parameter
+[[nodiscard]] Minimum minimise(const ResidualFunction& function,
+                               std::span<const FitParameter> parameters,
+                               std::span<const double> start, const FixedMask& fixed = {},
+                               FirstStep first_step = FirstStep::bold);
+
+/// Deviance at a point; NaN if it cannot be evaluated.
+[[nodiscard]] double deviance_at(const ResidualFunction& function, std::span<const double> natural);
+
+/// Seeded starts: the first is the nominal one, the others a Latin hypercube over the bounds,
+/// uniform in ln p on the log and inverse_square scales. Every seed, also 0, gives its own starts,
+/// the same on every machine.
+[[nodiscard]] std::vector<std::vector<double>> latin_hypercube_starts(
+    std::span<const FitParameter> parameters, std::size_t count, std::uint64_t seed);
+
+}  // namespace tpm

@@ -1,0 +1,234 @@
+#include "tpm/fit/uncertainty.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/tools/roots.hpp>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+
+double Threshold::variance_factor(double minimum_deviance) const {
+  if (scale_known) return 1.0;
+  if (data_count <= parameter_count) {
+    throw bad_input("noise",
+                    fmt::format("the scale of the noise is to be estimated from {} data with {} "
+                                "parameters",
+                                data_count, parameter_count),
+                    "more data than parameters, or a known scale");
+  }
+  return minimum_deviance / (data_count - parameter_count);
+}
+
+double Threshold::rise(double minimum_deviance, int constrained) const {
+  if (scale_known) {
+    return boost::math::quantile(boost::math::chi_squared(constrained), level);
+  }
+  const double factor = variance_factor(minimum_deviance);
+  const boost::math::fisher_f f(constrained, data_count - parameter_count);
+  return factor * constrained * boost::math::quantile(f, level);
+}
+
+double Threshold::p_value(double rise, double minimum_deviance, int constrained) const {
+  rise = std::max(rise, 0.0);
+  if (scale_known) {
+    return boost::math::cdf(boost::math::complement(boost::math::chi_squared(constrained), rise));
+  }
+  const boost::math::fisher_f f(constrained, data_count - parameter_count);
+  return boost::math::cdf(
+      boost::math::complement(f, rise / variance_factor(minimum_deviance) / constrained));
+}
+
+Covariance linear_covariance(const ResidualFunction& function,
+                             std::span<const FitParameter> parameters, const Minimum& minimum,
+                             const Threshold& threshold) {
+  Covariance c;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const double value = minimum.natural[i];
+    if (!parameters[i].at_lower(value) && !parameters[i].at_upper(value)) c.free.push_back(i);
+  }
+  const auto n = static_cast<Eigen::Index>(c.free.size());
+  Eigen::VectorXd r;
+  RowMatrix jacobian;
+  if (n == 0 || !function.evaluate(minimum.natural, r, &jacobian)) return c;
+  Eigen::MatrixXd j(jacobian.rows(), n);
+  Eigen::VectorXd length(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const std::size_t i = c.free[static_cast<std::size_t>(k)];
+    const double slope = parameters[i].natural_slope(parameters[i].theta(minimum.natural[i]));
+    j.col(k) = jacobian.col(static_cast<Eigen::Index>(i)) * slope;
+    length[k] = j.col(k).norm();
+    if (length[k] > 0.0) j.col(k) /= length[k];
+  }
+  // Columns of length 1 make the rank decision independent of units.
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(j, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  c.singular_values = svd.singularValues();
+  const Eigen::MatrixXd& v = svd.matrixV();
+  Eigen::VectorXd weakest = v.col(n - 1);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (length[k] > 0.0) weakest[k] /= length[k];
+  }
+  c.weakest_direction = weakest.normalized();
+  constexpr double kRankTolerance = 1e-10;
+  c.full_rank = length.minCoeff() > 0.0 && c.singular_values[n - 1] > kRankTolerance;
+  if (!c.full_rank) return c;
+  const Eigen::MatrixXd root = v * c.singular_values.cwiseInverse().asDiagonal();
+  Eigen::MatrixXd covariance = root * root.transpose();
+  covariance = length.cwiseInverse().asDiagonal() * covariance * length.cwiseInverse().asDiagonal();
+  const bool estimable = threshold.scale_known || threshold.data_count > threshold.parameter_count;
+  if (estimable) covariance *= threshold.variance_factor(minimum.deviance);
+  c.theta_sd = covariance.diagonal().cwiseSqrt();
+  c.correlation =
+      c.theta_sd.cwiseInverse().asDiagonal() * covariance * c.theta_sd.cwiseInverse().asDiagonal();
+  return c;
+}
+
+namespace {
+
+/// One side of a profile.
+class ProfileWalk {
+ public:
+  ProfileWalk(const ResidualFunction& function, std::span<const FitParameter> parameters,
+              const Minimum& minimum, std::size_t index, double rise)
+      : function_(function),
+        parameters_(parameters),
+        minimum_(minimum),
+        index_(index),
+        rise_(rise),
+        fixed_(parameters.size(), false) {
+    fixed_[index] = true;
+  }
+
+  /// @param direction +1 or -1 in theta
+  /// @return theta of the limit, or nothing if the bound comes first or a better minimum was met
+  std::optional<double> run(int direction, double first_step, Profile& profile) {
+    const FitParameter& p = parameters_[index_];
+    const double bound = direction > 0 ? p.theta_upper() : p.theta_lower();
+    double theta = p.theta(minimum_.natural[index_]);
+    double risen = 0.0;
+    double step = first_step;
+    warm_ = minimum_.natural;
+    for (int steps = 0; steps < 400 && (bound - theta) * direction > 0.0; ++steps) {
+      double next = theta + direction * step;
+      if ((bound - next) * direction < 1e-3 * step) next = bound;
+      const Minimum m = constrained(next);
+      if (!m.usable) {
+        ++profile.failures;
+        step *= 0.25;
+        continue;
+      }
+      const double risen_next = m.deviance - minimum_.deviance;
+      if (risen_next < -kBetterBy * (1.0 + minimum_.deviance)) {
+        profile.better = m;
+        return std::nullopt;
+      }
+      if (risen_next > 4.0 * rise_ && risen < 0.5 * rise_ && step > 1e-6 * first_step) {
+        step *= 0.25;  // too far to draw a profile from
+        continue;
+      }
+      profile.points.push_back({m.natural[index_], m.deviance});
+      warm_ = m.natural;
+      if (risen_next >= rise_) return limit_between(theta, next);
+      const double gained = risen_next - risen;
+      if (gained < 0.08 * rise_) step *= 2.0;
+      if (gained > 0.35 * rise_) step *= 0.5;
+      theta = next;
+      risen = risen_next;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  static constexpr double kBetterBy = 1e-7;
+
+  /// The other parameters re-optimised, from where the walk stands and, because a profile may
+  /// change valleys, from the unconstrained minimum.
+  Minimum constrained(double theta) const {
+    const FitParameter& p = parameters_[index_];
+    const double value = std::clamp(p.natural(theta), p.lower, p.upper);
+    std::vector<double> start = warm_;
+    start[index_] = value;
+    Minimum m = minimise(function_, parameters_, start, fixed_);
+    if (!m.usable || m.deviance > minimum_.deviance + rise_) {
+      start = minimum_.natural;
+      start[index_] = value;
+      const Minimum other = minimise(function_, parameters_, start, fixed_);
+      if (other.usable && (!m.usable || other.deviance < m.deviance)) m = other;
+    }
+    return m;
+  }
+
+  /// sqrt(rise) is nearly linear in theta, which the root finder likes.
+  double limit_between(double inside, double outside) const {
+    const auto excess = [&](double theta) {
+      const Minimum m = constrained(theta);
+      const double risen = m.usable ? std::max(m.deviance - minimum_.deviance, 0.0)
+                                    : std::numeric_limits<double>::max();
+      return std::sqrt(risen) - std::sqrt(rise_);
+    };
+    const double low = std::min(inside, outside);
+    const double high = std::max(inside, outside);
+    const double f_low = excess(low);
+    const double f_high = excess(high);
+    if (f_low == 0.0) return low;
+    if (f_high == 0.0) return high;
+    if (f_low * f_high > 0.0) return outside;
+    const double width = 1e-9 * (std::abs(outside) + std::abs(outside - inside));
+    std::uintmax_t iterations = 60;
+    const auto bracket = boost::math::tools::toms748_solve(
+        excess, low, high, f_low, f_high,
+        [width](double a, double b) { return std::abs(b - a) <= width; }, iterations);
+    return 0.5 * (bracket.first + bracket.second);
+  }
+
+  const ResidualFunction& function_;
+  std::span<const FitParameter> parameters_;
+  const Minimum& minimum_;
+  std::size_t index_;
+  double rise_;
+  FixedMask fixed_;
+  std::vector<double> warm_;
+};
+
+double first_step(const FitParameter& p, std::size_t index, const Covariance& covariance,
+                  double rise) {
+  const double width = p.theta_upper() - p.theta_lower();
+  double step = std::isfinite(width) ? width / 50.0 : 0.1;
+  if (!covariance.full_rank) return step;
+  const auto place = std::find(covariance.free.begin(), covariance.free.end(), index);
+  if (place == covariance.free.end()) return step;
+  const double sd = covariance.theta_sd[place - covariance.free.begin()];
+  const double from_sd = 0.3 * sd * std::sqrt(rise);
+  return std::isfinite(width) ? std::min(from_sd, width / 10.0) : from_sd;
+}
+
+}  // namespace
+
+Profile profile_likelihood(const ResidualFunction& function,
+                           std::span<const FitParameter> parameters, const Minimum& minimum,
+                           std::size_t index, const Covariance& covariance,
+                           const Threshold& threshold) {
+  const FitParameter& p = parameters[index];
+  const double rise = threshold.rise(minimum.deviance);
+  Profile profile;
+  profile.points.push_back({minimum.natural[index], minimum.deviance});
+  ProfileWalk walk(function, parameters, minimum, index, rise);
+  const double step = first_step(p, index, covariance, rise);
+  for (const int direction : {-1, +1}) {
+    const std::optional<double> theta = walk.run(direction, step, profile);
+    if (profile.better) return profile;
+    if (!theta) continue;
+    const bool is_upper = (direction > 0) != p.reversed();
+    (is_upper ? profile.upper : profile.lower) = p.natural(*theta);
+  }
+  std::sort(profile.points.begin(), profile.points.end(),
+            [](const ProfilePoint& a, const ProfilePoint& b) { return a.natural < b.natural; });
+  return profile;
+}
+
+}  // namespace tpm

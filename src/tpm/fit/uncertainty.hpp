@@ -1,0 +1,67 @@
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/least_squares.hpp"
+
+namespace tpm {
+
+/// How far the deviance may rise inside a confidence set.
+struct Threshold {
+  double level = 0.95;      ///< in (0, 1)
+  bool scale_known = true;  ///< sigma known: chi-square; known up to a factor: F
+  int data_count = 0;       ///< n, bands not counted
+  int parameter_count = 0;  ///< k
+
+  /// Estimated variance factor: 1 if known, else deviance / (n - k). Throws Error(bad_input) if
+  /// it must be estimated and n <= k.
+  [[nodiscard]] double variance_factor(double minimum_deviance) const;
+  /// Rise of the deviance allowed for `constrained` (>= 1) parameters at once.
+  [[nodiscard]] double rise(double minimum_deviance, int constrained = 1) const;
+  /// Probability of a rise at least this large if the constrained values are true.
+  [[nodiscard]] double p_value(double rise, double minimum_deviance, int constrained = 1) const;
+};
+
+/// Linearised uncertainty at a minimum, in theta, of the parameters that are neither fixed nor at
+/// a bound.
+struct Covariance {
+  std::vector<std::size_t> free;  ///< indices of those parameters
+  Eigen::VectorXd theta_sd;       ///< standard errors in theta; empty if not of full rank
+  Eigen::MatrixXd correlation;
+  Eigen::VectorXd singular_values;    ///< of the Jacobian in theta, each column scaled to length 1
+  Eigen::VectorXd weakest_direction;  ///< unit vector in theta that the data see least
+  bool full_rank = false;
+};
+
+[[nodiscard]] Covariance linear_covariance(const ResidualFunction& function,
+                                           std::span<const FitParameter> parameters,
+                                           const Minimum& minimum, const Threshold& threshold);
+
+/// A point of a likelihood profile: one parameter held, the others re-optimised.
+struct ProfilePoint {
+  double natural;  ///< SI
+  double deviance;
+};
+
+/// The profile of one parameter and the confidence interval it gives. A limit that is missing was
+/// not reached within the bounds.
+struct Profile {
+  std::vector<ProfilePoint> points;  ///< rising in the natural value
+  std::optional<double> lower;
+  std::optional<double> upper;
+  std::optional<Minimum> better;  ///< a deeper minimum met on the way; the profile is then void
+  int failures = 0;               ///< constrained fits that could not be evaluated
+};
+
+/// Walks outwards from the minimum in theta with adaptive steps until the deviance has risen by
+/// the threshold (then the limit is bracketed and found to 1e-9 of theta's width) or the bound is
+/// reached.
+[[nodiscard]] Profile profile_likelihood(const ResidualFunction& function,
+                                         std::span<const FitParameter> parameters,
+                                         const Minimum& minimum, std::size_t index,
+                                         const Covariance& covariance, const Threshold& threshold);
+
+}  // namespace tpm

@@ -1,0 +1,69 @@
+#pragma once
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tpm {
+
+/// How the characters of a text file are stored.
+enum class Encoding { utf8, utf8_with_mark, utf16_little_endian, utf16_big_endian, latin1 };
+
+/// "UTF-8", "UTF-16 LE", ... as people write it.
+[[nodiscard]] std::string_view encoding_name(Encoding encoding) noexcept;
+
+/// What the reader is told; whatever is left open is found out from the text.
+struct DelimitedOptions {
+  std::optional<char> separator;      ///< ',', ';' or '\t'
+  std::optional<bool> decimal_comma;  ///< "3,5" is three and a half; never with separator ','
+  bool latin1 = false;                ///< read bytes as ISO 8859-1 unless a byte order mark says more
+  bool ragged = false;                ///< let rows differ in their number of fields
+  std::size_t longest_line = std::size_t{1} << 20;  ///< bytes after conversion to UTF-8
+};
+
+/// One row of fields, with the line it starts on (from 1).
+struct DelimitedRow {
+  int line = 0;
+  std::vector<std::string> fields;
+};
+
+/// A delimited text file, taken apart but not interpreted.
+struct DelimitedTable {
+  Encoding encoding = Encoding::utf8;
+  char separator = ',';
+  bool decimal_comma = false;
+  std::vector<DelimitedRow> rows;     ///< without comments and blank lines
+  std::vector<std::string> comments;  ///< lines that start with '#', without it
+};
+
+/// Takes delimited text apart: UTF-8 with or without byte order mark or UTF-16 with one; fields may
+/// be quoted with '"' and then hold separators and line ends; a line that starts with '#' is a
+/// comment; line ends may be LF, CRLF or CR. The separator is the first of tab, semicolon and comma
+/// that stands in at least half of the lines.
+///
+/// Throws Error(bad_input), naming the line and never repeating it, for bytes that are not text, a
+/// line that is too long, a stray or unfinished quote, no rows at all, and (unless `ragged`) a row
+/// whose number of fields differs from the first row's.
+[[nodiscard]] DelimitedTable parse_delimited(std::string_view bytes, std::string_view where,
+                                             const DelimitedOptions& options = {});
+
+/// read_file and parse_delimited.
+[[nodiscard]] DelimitedTable read_delimited(const std::filesystem::path& path,
+                                            const DelimitedOptions& options = {});
+
+/// A field as a finite number, with the table's decimal sign. Throws Error(bad_input).
+[[nodiscard]] double parse_field(std::string_view field, bool decimal_comma,
+                                 std::string_view where);
+
+/// True if parse_field would succeed.
+[[nodiscard]] bool is_number(std::string_view field, bool decimal_comma);
+
+/// A field in quotes where the text needs them, for a comma-separated file.
+[[nodiscard]] std::string quoted_field(std::string_view text);
+
+/// "comma", "semicolon" or "tab".
+[[nodiscard]] std::string_view separator_name(char separator) noexcept;
+
+}  // namespace tpm

@@ -1,0 +1,84 @@
+#pragma once
+#include <hdf5.h>
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tpm {
+
+/// Owns one HDF5 identifier and closes it with the function that belongs to its kind.
+class Hdf5Handle {
+ public:
+  using Closer = herr_t (*)(hid_t);
+  Hdf5Handle() = default;
+  Hdf5Handle(hid_t id, Closer closer) : id_(id), closer_(closer) {}
+  ~Hdf5Handle() { reset(); }
+  Hdf5Handle(Hdf5Handle&& other) noexcept;
+  Hdf5Handle& operator=(Hdf5Handle&& other) noexcept;
+  Hdf5Handle(const Hdf5Handle&) = delete;
+  Hdf5Handle& operator=(const Hdf5Handle&) = delete;
+
+  [[nodiscard]] hid_t get() const noexcept { return id_; }
+  [[nodiscard]] bool valid() const noexcept { return id_ >= 0; }
+  void reset() noexcept;
+
+ private:
+  hid_t id_ = -1;
+  Closer closer_ = nullptr;
+};
+
+/// Writes an HDF5 file under a temporary name in the same folder; commit() gives it its name. A
+/// writer that is destroyed without commit() leaves nothing behind. Paths inside the file are
+/// absolute ("/curves/a/time"); groups on the way are created. No time stamps are stored, so that
+/// the same content gives the same bytes. Errors are Error(environment).
+class Hdf5Writer {
+ public:
+  explicit Hdf5Writer(std::filesystem::path path);
+  ~Hdf5Writer();
+  Hdf5Writer(const Hdf5Writer&) = delete;
+  Hdf5Writer& operator=(const Hdf5Writer&) = delete;
+
+  void group(const std::string& name);
+  void numbers(const std::string& name, const std::vector<double>& values);
+  void texts(const std::string& name, const std::vector<std::string>& values);
+  /// Attaches a text to a group or dataset that stands already.
+  void attribute(const std::string& object, const std::string& name, const std::string& text);
+  void commit();
+
+ private:
+  [[nodiscard]] Hdf5Handle dataset(const std::string& name, hid_t type, std::size_t size);
+  [[noreturn]] void fail(const std::string& what) const;
+
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;
+  Hdf5Handle file_;
+  bool committed_ = false;
+};
+
+/// Reads an HDF5 file. Every error is Error(bad_input) with file and object name; HDF5's own error
+/// stack is never printed.
+class Hdf5Reader {
+ public:
+  explicit Hdf5Reader(std::filesystem::path path);
+
+  [[nodiscard]] bool has(const std::string& name) const;
+  /// Names of the members of a group, in alphabetical order.
+  [[nodiscard]] std::vector<std::string> members(const std::string& group) const;
+  [[nodiscard]] std::vector<double> numbers(const std::string& name) const;
+  [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
+  [[nodiscard]] bool has_attribute(const std::string& object, const std::string& name) const;
+  [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;
+
+ private:
+  [[nodiscard]] Hdf5Handle open_dataset(const std::string& name, H5T_class_t kind,
+                                        std::size_t& size) const;
+  [[noreturn]] void fail(const std::string& object, const std::string& what,
+                         std::string_view expected) const;
+
+  std::filesystem::path path_;
+  Hdf5Handle file_;
+};
+
+}  // namespace tpm
