@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kWidth = 100;
 constexpr std::size_t kLabel = 13;
 
-std::string with_unit(const Quantity& quantity, int digits) {
+std::string with_unit(const AuditQuantity& quantity, int digits) {
   const std::string number = significant(quantity.value, digits);
   return quantity.unit.symbol.empty() ? number : number + " " + quantity.unit.symbol;
 }

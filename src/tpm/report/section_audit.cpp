@@ -22,7 +22,7 @@ Tone tone_of(AuditVerdict verdict) {
   return Tone::bad;
 }
 
-std::string with_unit(const std::optional<PrintedQuantity>& quantity) {
+std::string with_unit(const std::optional<AuditQuantity>& quantity) {
   if (!quantity) return "-";
   const std::string number = significant(quantity->value, 4);
   return quantity->unit.symbol.empty() ? number : number + " " + quantity->unit.symbol;

@@ -41,7 +41,7 @@ const Kind& kind_named(const std::string& name, std::string_view at) {
 
 using Placeholders = std::map<std::string, std::string, std::less<>>;
 
-std::string number_text(const Quantity& quantity) {
+std::string number_text(const AuditQuantity& quantity) {
   return with_unit(significant(quantity.value, 4), quantity.unit);
 }
 

@@ -20,7 +20,7 @@ enum class AuditVerdict {
 [[nodiscard]] std::string_view verdict_name(AuditVerdict verdict) noexcept;
 
 /// A number in the unit in which people read it.
-struct Quantity {
+struct AuditQuantity {
   double value = 0.0;
   Unit unit;
 };
@@ -29,7 +29,7 @@ struct Quantity {
 struct AuditInput {
   std::string name;
   std::string printed;  ///< as printed, with unit; empty if computed or bound by the claim
-  Quantity value;
+  AuditQuantity value;
   std::string where;
 };
 
@@ -46,7 +46,7 @@ struct AuditCause {
 struct AuditDetail {
   std::string what;
   std::string printed;
-  Quantity recomputed;
+  AuditQuantity recomputed;
   std::string verdict;
   std::optional<double> difference_percent;
 };
@@ -66,8 +66,8 @@ struct Finding {
   std::string where;
   std::string claim;                   ///< the paper's words, quoted or paraphrased
   std::string printed;                 ///< what is printed, with unit
-  std::optional<Quantity> recomputed;  ///< in the printed unit
-  std::optional<Quantity> bound;       ///< right-hand side of an inequality
+  std::optional<AuditQuantity> recomputed;  ///< in the printed unit
+  std::optional<AuditQuantity> bound;       ///< right-hand side of an inequality
   std::string expression;              ///< what was evaluated
   std::vector<AuditInput> inputs;
   AuditVerdict verdict = AuditVerdict::cannot_be_told;

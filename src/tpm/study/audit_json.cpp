@@ -7,14 +7,14 @@ Json optional_number(const std::optional<double>& value) {
   return value ? Json(*value) : Json();
 }
 
-Json quantity_json(const Quantity& quantity) {
+Json quantity_json(const AuditQuantity& quantity) {
   return {{"value", quantity.value},
           {"unit", quantity.unit.symbol},
           {"value_SI", quantity.value * quantity.unit.to_si},
           {"unit_SI", si_symbol(quantity.unit.dimension)}};
 }
 
-Json optional_quantity(const std::optional<Quantity>& quantity) {
+Json optional_quantity(const std::optional<AuditQuantity>& quantity) {
   return quantity ? quantity_json(*quantity) : Json();
 }
 
