@@ -21,6 +21,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodFormatter  # noqa: E402
 
 # Lengths in inches, so that text keeps its size whatever the number of panels.
 PAGE_WIDTH, SINGLE_PAGE_WIDTH, PANEL_HEIGHT = 8.9, 6.1, 2.75
@@ -107,7 +108,7 @@ def draw_line(axes, series, look):
 def draw_points(axes, series, look):
     face = "white" if is_assumed(series) else look["color"]
     style = dict(marker=look["marker"], markersize=5, markerfacecolor=face, markeredgecolor=look["color"], linestyle="none")
-    axes.errorbar(series["x"], series["y"], yerr=series.get("sd"), ecolor=look["color"], elinewidth=1, capsize=2.5, zorder=5, **style)
+    axes.errorbar(series["x"], series["y"], yerr=series.get("sd"), ecolor=look["color"], elinewidth=1, capsize=2.5, zorder=5, clip_on=False, **style)
     return Line2D([], [], **style)
 
 
@@ -159,7 +160,24 @@ DRAW = {"line": draw_line, "points": draw_points, "band": draw_band, "bracket": 
 
 
 def axis_label(axis):
-    return f"{axis['quantity']} [{axis['unit']}]" if axis["unit"] else axis["quantity"]
+    quantity = plain_name(axis["quantity"])
+    return f"{quantity} [{axis['unit']}]" if axis["unit"] else quantity
+
+
+def plain_name(text):
+    """The project's plain names as print writes them."""
+    return text.replace("eta1", "η₁").replace("lambda1", "λ₁")
+
+
+def tick_short_log_axis(axis_of_plot, limits):
+    """Below one decade powers of ten are too far apart: plain numbers at round values."""
+    low, high = limits
+    if high / low > 10:
+        return
+    places = [v for v in MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high) if low <= v <= high]
+    axis_of_plot.set_major_locator(FixedLocator(places))
+    axis_of_plot.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis_of_plot.set_minor_locator(NullLocator())
 
 
 def draw_panel(axes, panel, look, handles):
@@ -173,6 +191,8 @@ def draw_panel(axes, panel, look, handles):
         if axis["logarithmic"]:
             getattr(axes, f"set_{name}scale")("log")
         getattr(axes, f"set_{name}lim")(axis.get("lower"), axis.get("upper"))
+        if axis["logarithmic"]:
+            tick_short_log_axis(getattr(axes, f"{name}axis"), getattr(axes, f"get_{name}lim")())
     for series in panel["series"]:
         if series["kind"] == "bracket":
             finish_bracket(axes, series, look[series["label"]])

@@ -62,6 +62,10 @@ struct Document {
   void picture(Picture picture);
 };
 
+/// Writes the project's plain names and numbers as print does, outside code: eta1 as η₁, lambda1 as
+/// λ₁, 2.6e+05 as 2.6·10⁵.
+void typeset(Document& document);
+
 /// GitHub-flavoured Markdown; pictures are links to figures/ID.svg beside it.
 [[nodiscard]] std::string to_markdown(const Document& document);
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "tpm/core/error.hpp"
@@ -29,11 +30,12 @@ double interval_rise(const FitResult& fit) {
   return threshold.rise(fit.best.deviance);
 }
 
-Panel profile_panel(const FitResult& fit, const ParameterResult& result, double rise) {
+Panel profile_panel(const FitResult& fit, const DrawnProfile& drawn, double rise) {
+  const ParameterResult& result = fit.parameters[drawn.parameter];
   Series profile = line("profile", {}, {});
   // Far above the limit a profile only squeezes the part that matters.
-  const double ceiling = 4.0 * rise;
-  for (const ProfilePoint& point : result.profile.points) {
+  const double ceiling = 2.0 * rise;
+  for (const ProfilePoint& point : drawn.points) {
     const double risen = point.deviance - fit.best.deviance;
     if (risen > ceiling) continue;
     profile.x.push_back(point.natural / result.parameter.unit.to_si);
@@ -81,7 +83,7 @@ Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::strin
   estimate.assumed = "ramp rate";
   Series value = line("stated in the paper", {0.0, 5.0}, {stated / unit, stated / unit});
   value.provenance = "text";
-  Panel panel{fmt::format("noise {}", noise_kind_name(noise)),
+  Panel panel{fmt::format("noise {}", noise_words(noise)),
               {"assumed ramp rate", "mm/s", false, 0.0, 5.0},
               std::move(axis),
               {}};
@@ -116,15 +118,21 @@ std::string estimate_words(const FitResult& fit) {
   return fmt::format("{}", fmt::join(words, ", "));
 }
 
-Figure profile_figure(const FitResult& fit) {
+std::string noise_words(NoiseKind noise) {
+  std::string words(noise_kind_name(noise));
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
+}
+
+Figure profile_figure(const FitStudy& study) {
   Figure figure{"fit_profiles",
                 "Likelihood profiles",
                 "Each parameter is held at a value and the others are fitted again. Where the "
                 "curve stays below the limit, the data cannot tell the values apart.",
                 {}};
-  const double rise = interval_rise(fit);
-  for (const ParameterResult& p : fit.parameters) {
-    if (!p.profile.points.empty()) figure.panels.push_back(profile_panel(fit, p, rise));
+  const double rise = interval_rise(study.reference);
+  for (const DrawnProfile& drawn : study.profiles) {
+    figure.panels.push_back(profile_panel(study.reference, drawn, rise));
   }
   return figure;
 }

@@ -5,14 +5,17 @@
 namespace tpm {
 
 /// Rise of the deviance along each parameter, the others re-optimised, with the level that bounds
-/// the confidence interval. An empty list of panels if the fit was not profiled.
-[[nodiscard]] Figure profile_figure(const FitResult& fit);
+/// the confidence interval. No panels if the fit was not profiled.
+[[nodiscard]] Figure profile_figure(const FitStudy& study);
 
 /// Estimate and interval of one parameter against the assumed ramp rate, one panel per noise
 /// convention.
 /// @param stated the value that the paper states, SI
 [[nodiscard]] Figure sensitivity_figure(const FitStudy& study, const std::string& parameter,
                                         double stated);
+
+/// "relative to datum"
+[[nodiscard]] std::string noise_words(NoiseKind noise);
 
 /// The model's parameters at the minimum of a fit.
 [[nodiscard]] TpmParameters model_parameters(const FitResult& fit);

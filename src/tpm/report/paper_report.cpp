@@ -5,12 +5,14 @@
 #include <chrono>
 #include <utility>
 
+#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/load.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_figures.hpp"
 #include "tpm/report/run_record.hpp"
 #include "tpm/report/sections.hpp"
+#include "tpm/report/study_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/claims.hpp"
 
@@ -28,27 +30,35 @@ auto timed(std::map<std::string, double>& seconds, const char* part, Work work) 
   return result;
 }
 
-/// The paper's two creep experiments (Sec. 4.2, Figs. 8 and 9).
-std::vector<PrintedCreep> printed_creep() {
-  return {{"8", 0.196, 179.0, 3.8e-3}, {"9", 0.98, 5800.0, 10.86e-3}};
+/// The two creep experiments of Sec. 4.2, by the names that data/paper_claims.json gives them.
+std::vector<PrintedCreep> printed_creep(const ClaimSet& claims) {
+  const auto value = [&](std::string_view name) {
+    const PrintedSymbol* symbol = claims.symbol(name);
+    if (symbol == nullptr) {
+      throw bad_input(claims.file, fmt::format("has no symbol '{}'", name),
+                      "the printed numbers of Figs. 8 and 9");
+    }
+    return symbol->si;
+  };
+  return {{"8", value("load_small"), value("lambda_small"), value("depth_small_end")},
+          {"9", value("load_figure9"), value("lambda_large"), value("depth_large_end")}};
 }
 
-PaperFigureData figure_data(const FitResult& fit) {
+PaperFigureData figure_data(const FitResult& fit, const ClaimSet& claims) {
   PaperFigureData data;
   data.fitted = model_parameters(fit);
   data.fitted_as = estimate_words(fit);
   data.static_bands = load_points("evren_static");
   data.relaxation = load_points("evren_relaxation");
   data.creep = load_points("amy_creep");
-  data.printed_creep = printed_creep();
+  data.printed_creep = printed_creep(claims);
   return data;
 }
 
 std::vector<Figure> all_figures(const PaperReport& report) {
   std::vector<Figure> figures = paper_figures(report.figure_data);
-  figures.push_back(profile_figure(report.fits.reference));
-  figures.push_back(
-      sensitivity_figure(report.fits, "eta1", report.figure_data.paper.eta1_Pa_s));
+  figures.push_back(profile_figure(report.fits));
+  figures.push_back(sensitivity_figure(report.fits, "eta1", report.figure_data.paper.eta1_Pa_s));
   return figures;
 }
 
@@ -86,15 +96,16 @@ PaperReport make_paper_report() {
   std::map<std::string, double> seconds;
   const fs::path claims_file = paper_claims_path();
   const Json claims = read_json(claims_file);
-  report.audit = timed(seconds, "audit", [&] { return run_audit(claims, claims_file.filename().string()); });
-  const auto printed = read_printed_tables(claims, claims_file.filename().string());
+  const std::string file = claims_file.filename().string();
+  report.audit = timed(seconds, "audit", [&] { return run_audit(claims, file); });
+  const auto printed = read_printed_tables(claims, file);
   TableRequest request;
   report.tables = timed(seconds, "tables", [&] { return make_tables(request, printed); });
   request.mode = TableMode::consistent;
   report.consistent = make_tables(request, printed);
   const fs::path config = share_dir() / "configs" / "liver_relaxation.json";
   report.fits = timed(seconds, "fits", [&] { return run_fit_study(read_fit_config(config)); });
-  report.figure_data = figure_data(report.fits.reference);
+  report.figure_data = figure_data(report.fits.reference, read_claims(claims, file));
   report.figures = all_figures(report);
   report.seconds = std::move(seconds);
   return report;
@@ -115,17 +126,21 @@ Document paper_document(const PaperReport& report) {
   add_paper_figures(document, report);
   add_validity(document, report);
   add_assumptions(document, report);
+  typeset(document);
   return document;
 }
 
 void write_paper_report(const PaperReport& report, const fs::path& folder,
                         const std::string& python) {
   std::map<std::string, double> seconds = report.seconds;
-  const auto drawings =
-      timed(seconds, "drawing", [&] { return draw(report, folder, python); });
+  const auto drawings = timed(seconds, "drawing", [&] { return draw(report, folder, python); });
   const Document document = paper_document(report);
   write_file(folder / "report.md", to_markdown(document));
   write_file(folder / "report.html", to_html(document, drawings));
+  const TableDocument tables = tables_document(report.tables);
+  write_file(folder / "tables.md", render(tables, TableStyle::markdown));
+  write_file(folder / "tables.tex", render(tables, TableStyle::latex));
+  write_file(folder / "tables.csv", tables_csv(report.tables));
   write_json(folder / "tables.json", to_json(report.tables));
   write_json(folder / "audit.json", to_json(report.audit));
   write_json(folder / "fit_relaxation.json", to_json(report.fits.reference));

@@ -116,19 +116,20 @@ void add_assumptions(Document& document, const PaperReport& report) {
                    "derived from the printed 0.613 N.",
                    p.l0_m * 1e3, p.A0_m2 * 1e6)}};
   for (const DataChoice& d : report.fits.reference.config.data) {
-    items.push_back({fmt::format("`{}`: ramp rate of {:.4g} mm/s and noise {} of {:.3g} % of the "
-                                 "reading; neither is stated.",
-                                 d.dataset, d.protocol.rate_m_per_s * 1e3,
-                                 noise_kind_name(d.noise.kind), 100.0 * d.noise.relative)});
+    items.push_back(
+        {fmt::format("`{}`: ramp rate of {:.4g} mm/s and noise {} ({:.3g} %); "
+                     "neither is stated.",
+                     d.dataset, d.protocol.rate_m_per_s * 1e3, noise_words(d.noise.kind),
+                     100.0 * d.noise.relative)});
   }
   for (const PointSet* set : data_sets(report)) {
     if (set->time_provenance != Provenance::assumed) continue;
-    items.push_back({fmt::format("`{}`: what its times count from, or that they belong to the "
-                                 "readings at all, is not stated; {} is taken.",
-                                 set->header.id,
-                                 set->time_origin == TimeOrigin::end_of_ramp
-                                     ? "the end of the ramp"
-                                     : "the end of the creep")});
+    items.push_back(
+        {fmt::format("`{}`: what its times count from, or that they belong to the "
+                     "readings at all, is not stated; {} is taken.",
+                     set->header.id,
+                     set->time_origin == TimeOrigin::end_of_ramp ? "the end of the ramp"
+                                                                 : "the end of the creep")});
   }
   items.push_back({"The range of static forces is compared with the relaxed force, t → ∞."});
   items.push_back(

@@ -54,12 +54,11 @@ Table estimates_table(const FitResult& fit) {
                {"verdict"}},
               {}};
   for (const ParameterResult& p : fit.parameters) {
-    table.rows.push_back(
-        {{p.parameter.name},
-         {in_unit(p.parameter, p.estimate)},
-         {p.standard_error ? in_unit(p.parameter, *p.standard_error) : "-"},
-         {interval(p)},
-         {std::string(verdict_name(p.verdict)), tone_of(p.verdict)}});
+    table.rows.push_back({{p.parameter.name},
+                          {in_unit(p.parameter, p.estimate)},
+                          {p.standard_error ? in_unit(p.parameter, *p.standard_error) : "-"},
+                          {interval(p)},
+                          {std::string(verdict_name(p.verdict)), tone_of(p.verdict)}});
   }
   return table;
 }
@@ -107,8 +106,8 @@ std::string observed(const FitDatum& d) {
   const double unit = force ? 1.0 : 1e-3;
   const std::string_view symbol = force ? "N" : "mm";
   if (d.value) return fmt::format("{} {}", significant(*d.value / unit, 4), symbol);
-  return fmt::format("{} to {} {}", significant(*d.lower / unit, 3), significant(*d.upper / unit, 3),
-                     symbol);
+  return fmt::format("{} to {} {}", significant(*d.lower / unit, 3),
+                     significant(*d.upper / unit, 3), symbol);
 }
 
 std::string predicted(const FittedDatum& d, bool with_sd) {
@@ -123,14 +122,10 @@ std::string predicted(const FittedDatum& d, bool with_sd) {
 }
 
 Table readings_table(const FitResult& fit) {
-  Table table{"Readings and the fitted model. z is the difference in standard deviations.",
-              {{"data set"},
-               {"reading"},
-               {"provenance"},
-               {"observed", true},
-               {"model", true},
-               {"z", true}},
-              {}};
+  Table table{
+      "Readings and the fitted model. z is the difference in standard deviations.",
+      {{"data set"}, {"reading"}, {"provenance"}, {"observed", true}, {"model", true}, {"z", true}},
+      {}};
   for (const FittedDatum& d : fit.data) {
     table.rows.push_back({{d.datum.dataset},
                           {d.datum.label},
@@ -142,23 +137,47 @@ Table readings_table(const FitResult& fit) {
   return table;
 }
 
+/// "13.46 (11.82 to 14.85)" in the unit of the column; an open side is named.
+std::string estimate_and_interval(const ParameterResult& p) {
+  const double unit = p.parameter.unit.to_si;
+  const auto limit = [&](const std::optional<double>& value) {
+    return value ? significant(*value / unit, 4) : std::string("open");
+  };
+  return fmt::format("{} ({} to {})", significant(p.estimate / unit, 4), limit(p.lower),
+                     limit(p.upper));
+}
+
+std::vector<Cell> assumptions_of(const FitVariant& v) {
+  return {{fmt::format("{:.4g} mm/s", v.rate_m_per_s * 1e3)}, {noise_words(v.noise)}};
+}
+
 Table sensitivity_table(const FitStudy& study) {
-  Table table{"The same fit under other assumptions; intervals behind the estimates.",
+  Table table{"Estimates and intervals of the same fit under other assumptions.",
               {{"ramp rate", true}, {"noise"}},
               {}};
   for (const ParameterResult& p : study.reference.parameters) {
-    table.columns.push_back({p.parameter.name});
+    table.columns.push_back(
+        {fmt::format("{} [{}]", p.parameter.name, p.parameter.unit.symbol), true});
   }
   table.columns.push_back({"chi-square", true});
-  for (const Hypothesis& h : study.reference.config.hypotheses) table.columns.push_back({h.name});
   for (const FitVariant& v : study.variants) {
-    std::vector<Cell> row{{fmt::format("{:.4g} mm/s", v.rate_m_per_s * 1e3)},
-                          {std::string(noise_kind_name(v.noise))}};
+    std::vector<Cell> row = assumptions_of(v);
     for (const ParameterResult& p : v.result.parameters) {
-      row.push_back({fmt::format("{} ({})", in_unit(p.parameter, p.estimate), interval(p)),
-                     tone_of(p.verdict)});
+      row.push_back({estimate_and_interval(p), tone_of(p.verdict)});
     }
     row.push_back({significant(v.result.chi_square, 4)});
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table claims_table(const FitStudy& study) {
+  Table table{"Whether the data exclude a claim, and its p, under the same assumptions.",
+              {{"ramp rate", true}, {"noise"}},
+              {}};
+  for (const Hypothesis& h : study.reference.config.hypotheses) table.columns.push_back({h.name});
+  for (const FitVariant& v : study.variants) {
+    std::vector<Cell> row = assumptions_of(v);
     for (const HypothesisResult& h : v.result.hypotheses) {
       row.push_back({fmt::format("{}, p = {}", h.excluded ? "excluded" : "not excluded",
                                  probability(h.p_value)),
@@ -170,15 +189,16 @@ Table sensitivity_table(const FitStudy& study) {
 }
 
 Table held_out_table(const FitStudy& study) {
-  Table table{"Each depth in turn left out of the fit and predicted by the rest. ± is the standard "
-              "error from the parameters alone.",
-              {{"depth", true},
-               {"reading"},
-               {"observed", true},
-               {"predicted", true},
-               {"difference", true},
-               {"z", true}},
-              {}};
+  Table table{
+      "Each depth in turn left out of the fit and predicted by the rest. ± is the standard "
+      "error from the parameters alone.",
+      {{"depth", true},
+       {"reading"},
+       {"observed", true},
+       {"predicted", true},
+       {"difference", true},
+       {"z", true}},
+      {}};
   for (const HeldOutFit& h : study.held_out) {
     for (const FittedDatum& d : h.result.data) {
       if (!d.datum.held_out || !d.datum.value) continue;
@@ -200,10 +220,10 @@ void add_fits(Document& document, const PaperReport& report) {
   const FitStudy& study = report.fits;
   const FitResult& fit = study.reference;
   document.heading(2, "Fits");
-  document.paragraph(fmt::format(
-      "{}. {} values, {} bands. The eight numbers that are fitted validate nothing by "
-      "themselves; the held-out depths below do.",
-      fit.config.title, fit.value_count, fit.band_count));
+  document.paragraph(
+      fmt::format("{}. {} values, {} bands. The eight numbers that are fitted validate nothing by "
+                  "themselves; the held-out depths below do.",
+                  fit.config.title, fit.value_count, fit.band_count));
   document.table(estimates_table(fit));
   document.bullets(findings(fit));
   document.picture(caption_of(report, "fit_profiles"));
@@ -213,6 +233,7 @@ void add_fits(Document& document, const PaperReport& report) {
   document.table(readings_table(fit));
   document.heading(3, "What the answer depends on");
   document.table(sensitivity_table(study));
+  document.table(claims_table(study));
   document.picture(caption_of(report, "fit_sensitivity_eta1"));
   document.heading(3, "Held-out depths");
   document.table(held_out_table(study));

@@ -13,10 +13,11 @@ namespace {
 
 Cell tables_sentence(const TablesResult& tables) {
   const CellCounts& c = tables.summary.force_from_printed_lambda1;
-  return {fmt::format("Tables 1 to 4: {} of {} printed forces follow from the printed λ₁, {} of them "
-                      "only by cutting digits off; {} are off in the last digit, {} differ.",
-                      c.explained(), c.cells, c.by_truncation, c.last_digit_off, c.differ),
-          c.explained() == c.cells ? Tone::good : Tone::fair};
+  return {
+      fmt::format("Tables 1 to 4: {} of {} printed forces follow from the printed λ₁, {} of them "
+                  "only by cutting digits off; {} are off in the last digit, {} differ.",
+                  c.explained(), c.cells, c.by_truncation, c.last_digit_off, c.differ),
+      c.explained() == c.cells ? Tone::good : Tone::fair};
 }
 
 Cell audit_sentence(const AuditReport& audit) {
@@ -54,7 +55,8 @@ Cell held_out_sentence(const FitStudy& study) {
 std::vector<Cell> verdicts(const PaperReport& report) {
   const TpmParameters& paper = report.figure_data.paper;
   std::vector<Cell> items{
-      tables_sentence(report.tables), audit_sentence(report.audit),
+      tables_sentence(report.tables),
+      audit_sentence(report.audit),
       {fmt::format("The stated η₁ = {:.4g} Pa s gives a relaxation time of {:.3g} ms: no force "
                    "relaxes over 30 s, and no speed of 1 to 4 mm/s can matter.",
                    paper.eta1_Pa_s, paper.relaxation_time_s() * 1e3),

@@ -53,6 +53,35 @@ std::set<double> tested_depths(const FitConfig& config) {
   return depths;
 }
 
+/// Evenly spaced in theta over the stretch that the interval search walked, each point refitted
+/// from the one before, from the minimum outwards.
+DrawnProfile drawn_profile(const ExperimentResiduals& residuals, const FitResult& fit,
+                           std::size_t index) {
+  constexpr int kIntervalsPerSide = 24;
+  const auto& walked = fit.parameters[index].profile.points;
+  std::vector<FitParameter> parameters;
+  for (const ParameterResult& p : fit.parameters) parameters.push_back(p.parameter);
+  const FitParameter& own = parameters[index];
+  FixedMask fixed(parameters.size(), false);
+  fixed[index] = true;
+
+  DrawnProfile drawn{index, {{fit.best.natural[index], fit.best.deviance}}};
+  const double best = own.theta(fit.best.natural[index]);
+  for (const double end : {walked.front().natural, walked.back().natural}) {
+    std::vector<double> start = fit.best.natural;
+    for (int i = 1; i <= kIntervalsPerSide; ++i) {
+      start[index] = own.natural(best + (own.theta(end) - best) * i / kIntervalsPerSide);
+      const Minimum minimum = minimise(residuals, parameters, start, fixed);
+      if (!minimum.usable || end == fit.best.natural[index]) break;
+      start = minimum.natural;
+      drawn.points.push_back({start[index], minimum.deviance});
+    }
+  }
+  std::sort(drawn.points.begin(), drawn.points.end(),
+            [](const ProfilePoint& a, const ProfilePoint& b) { return a.natural < b.natural; });
+  return drawn;
+}
+
 }  // namespace
 
 FitStudy run_fit_study(const FitConfig& config) {
@@ -63,6 +92,11 @@ FitStudy run_fit_study(const FitConfig& config) {
   FitStudy study;
   Progress progress("fitting", 1 + kRates_m_per_s.size() * kNoises.size() + depths.size());
   study.reference = run_fit(config);
+  const ExperimentResiduals residuals(config);
+  for (std::size_t i = 0; i < study.reference.parameters.size(); ++i) {
+    if (study.reference.parameters[i].profile.points.empty()) continue;
+    study.profiles.push_back(drawn_profile(residuals, study.reference, i));
+  }
   progress.advance();
   for (const double rate : kRates_m_per_s) {
     for (const NoiseKind noise : kNoises) {

@@ -18,11 +18,19 @@ struct HeldOutFit {
   FitResult result;
 };
 
+/// A profile likelihood dense enough to be drawn: the interval search of run_fit takes as few steps
+/// as it can.
+struct DrawnProfile {
+  std::size_t parameter = 0;         ///< index into FitResult::parameters
+  std::vector<ProfilePoint> points;  ///< rising in the natural value
+};
+
 /// One configuration, what it depends on, and whether it predicts.
 struct FitStudy {
-  FitResult reference;               ///< the configuration as it stands
-  std::vector<FitVariant> variants;  ///< every rate with every noise convention, rates outermost
-  std::vector<HeldOutFit> held_out;  ///< each depth of the data in turn
+  FitResult reference;                 ///< the configuration as it stands
+  std::vector<DrawnProfile> profiles;  ///< of `reference`, one per parameter
+  std::vector<FitVariant> variants;    ///< every rate with every noise convention, rates outermost
+  std::vector<HeldOutFit> held_out;    ///< each depth of the data in turn
 };
 
 /// Runs the configuration at ramp rates of 1, 2 and 4 mm/s under three noise conventions of the
