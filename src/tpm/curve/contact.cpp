@@ -32,7 +32,8 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
     return;
   }
   const ImportedColumn* force = find(series, Quantity::contact_force);
-  if (force == nullptr) throw bad_input(file, "has no force to find contact with", "a force column");
+  if (force == nullptr)
+    throw bad_input(file, "has no force to find contact with", "a force column");
   const double threshold = *options.contact_force_N / force->unit.to_si;
   const auto contact = std::search_n(force->values.begin(), force->values.end(),
                                      options.contact_samples, threshold, std::greater_equal<>());
@@ -57,7 +58,8 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
   }
   series.lines.erase(series.lines.begin(), series.lines.begin() + static_cast<std::ptrdiff_t>(row));
   series.findings.push_back(
-      {"contact", fmt::format("{}; counted from there, {} samples before it left out", found, row)});
+      {"contact",
+       fmt::format("{}; counted from there, {} samples before it left out", found, row)});
 }
 
 }  // namespace tpm

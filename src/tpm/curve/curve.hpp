@@ -54,37 +54,37 @@ enum class Observable {
 
 /// The indenter of an experiment.
 struct Probe {
-  std::string shape;                 ///< "hemisphere", "sphere", "flat punch"; empty if unknown
+  std::string shape;  ///< "hemisphere", "sphere", "flat punch"; empty if unknown
   std::optional<double> diameter_m;
   std::optional<Provenance> provenance;
 };
 
 /// What a data file says about itself, from its JSON description.
 struct CurveHeader {
-  std::string id;        ///< file name without ending, e.g. "evren_relaxation"
+  std::string id;  ///< file name without ending, e.g. "evren_relaxation"
   std::string title;
   std::string citation;  ///< authors, journal, year, pages
   std::string doi;
   std::string specimen;
   Probe probe;
   std::string note;
-  std::string sha256;    ///< of the CSV bytes
+  std::string sha256;  ///< of the CSV bytes
 };
 
 /// One reading: a value, or a band [lower, upper] where only a range is known.
 struct Datum {
-  std::string label;                  ///< e.g. "peak", "end"; empty if the file has no labels
-  std::optional<double> depth_m;      ///< imposed indentation depth, at least 0
-  std::optional<double> load_N;       ///< imposed load, at least 0
-  std::optional<double> time_s;       ///< see PointSet::time_origin; none for a static reading
-  std::optional<double> value;        ///< SI; none for a band
-  std::optional<double> lower;        ///< SI; set together with upper, for a band
+  std::string label;              ///< e.g. "peak", "end"; empty if the file has no labels
+  std::optional<double> depth_m;  ///< imposed indentation depth, at least 0
+  std::optional<double> load_N;   ///< imposed load, at least 0
+  std::optional<double> time_s;   ///< see PointSet::time_origin; none for a static reading
+  std::optional<double> value;    ///< SI; none for a band
+  std::optional<double> lower;    ///< SI; set together with upper, for a band
   std::optional<double> upper;
-  std::optional<double> sd;           ///< standard deviation, SI, if the file has one
+  std::optional<double> sd;  ///< standard deviation, SI, if the file has one
   Provenance provenance = Provenance::assumed;
-  std::string where;                  ///< "Table 2", "abstract"
+  std::string where;  ///< "Table 2", "abstract"
   std::string note;
-  int line = 0;                       ///< line of the CSV file
+  int line = 0;  ///< line of the CSV file
 
   [[nodiscard]] bool is_band() const noexcept { return lower.has_value(); }
 };
@@ -131,16 +131,16 @@ struct Recording {
 
 /// A single value of the literature that belongs to no curve: a modulus, a time constant.
 struct NamedValue {
-  std::string name;                  ///< unique in its file: "carter_elastic_modulus"
-  std::string quantity;              ///< in words: "elastic modulus"
-  Unit unit;                         ///< as printed; the numbers below are SI
-  std::optional<double> value;       ///< none for a range
-  std::optional<double> lower;       ///< a range may be open on one side ("up to 50 %")
+  std::string name;             ///< unique in its file: "carter_elastic_modulus"
+  std::string quantity;         ///< in words: "elastic modulus"
+  Unit unit;                    ///< as printed; the numbers below are SI
+  std::optional<double> value;  ///< none for a range
+  std::optional<double> lower;  ///< a range may be open on one side ("up to 50 %")
   std::optional<double> upper;
   std::optional<double> plus_minus;  ///< what is printed after the sign, whatever it means
   Provenance provenance = Provenance::assumed;
   std::string where;
-  std::string formula;               ///< only for provenance `derived`, and always there
+  std::string formula;  ///< only for provenance `derived`, and always there
   std::string note;
   int line = 0;
 };

@@ -28,8 +28,8 @@ struct ColumnDescription {
 /// The JSON file beside a CSV file.
 struct CurveDescription {
   CurveHeader header;
-  std::string kind;                      ///< "points", "recording" or "values"
-  std::optional<Quantity> observable;    ///< points and recordings
+  std::string kind;                    ///< "points", "recording" or "values"
+  std::optional<Quantity> observable;  ///< points and recordings
   TimeOrigin time_origin = TimeOrigin::none;
   std::optional<Provenance> provenance;  ///< of a whole recording
   std::map<std::string, ColumnDescription> columns;

@@ -41,7 +41,7 @@ struct Axis {
 struct ImportOptions {
   ImportFormat format = ImportFormat::automatic;
   DelimitedOptions text;
-  CurveHeader header;  ///< id is set for each curve; sha256 is ignored
+  CurveHeader header;                    ///< id is set for each curve; sha256 is ignored
   std::optional<Provenance> provenance;  ///< else `measured` for machines, `digitized` for figures
 
   // Testing machines. A column is chosen by its name or its number from 1.
@@ -55,15 +55,15 @@ struct ImportOptions {
   std::map<std::string, std::string> units;  ///< column name or number -> unit
   bool negate_drive = false;                 ///< for machines that count tension positive
   bool negate_response = false;
-  std::optional<double> contact_force_N;     ///< above 0: samples before contact are left out
-  int contact_samples = 3;                   ///< how many samples in a row must reach it, from 1
+  std::optional<double> contact_force_N;  ///< above 0: samples before contact are left out
+  int contact_samples = 3;                ///< how many samples in a row must reach it, from 1
 
   // Digitised figures.
   std::optional<Axis> x;
   std::optional<Axis> y;
-  std::string dataset;             ///< only the dataset of this name
-  std::optional<double> depth_m;   ///< imposed depth of a digitised relaxation curve
-  std::optional<double> load_N;    ///< imposed load of a digitised creep curve
+  std::string dataset;            ///< only the dataset of this name
+  std::optional<double> depth_m;  ///< imposed depth of a digitised relaxation curve
+  std::optional<double> load_N;   ///< imposed load of a digitised creep curve
   TimeOrigin time_origin = TimeOrigin::none;
 };
 

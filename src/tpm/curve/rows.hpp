@@ -28,8 +28,7 @@ class CurveRows {
   [[nodiscard]] std::string place(std::size_t row, Quantity quantity, Bound bound) const;
 
   /// SI; none if there is no such column or the field is empty.
-  [[nodiscard]] std::optional<double> number(std::size_t row, Quantity quantity,
-                                             Bound bound) const;
+  [[nodiscard]] std::optional<double> number(std::size_t row, Quantity quantity, Bound bound) const;
   /// As number(), and an error below `least` (SI).
   [[nodiscard]] std::optional<double> at_least(std::size_t row, Quantity quantity, Bound bound,
                                                double least) const;
