@@ -1,0 +1,116 @@
+#include <fmt/format.h>
+
+#include "tpm/core/text.hpp"
+#include "tpm/report/study_report.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::size_t kWidth = 100;
+constexpr std::size_t kLabel = 13;
+
+std::string with_unit(const Quantity& quantity, int digits) {
+  const std::string number = significant(quantity.value, digits);
+  return quantity.unit.symbol.empty() ? number : number + " " + quantity.unit.symbol;
+}
+
+std::string recomputed_text(const Finding& finding) {
+  if (finding.recomputed) return with_unit(*finding.recomputed, 4);
+  if (finding.cells) {
+    return fmt::format("{} of {}", finding.cells->by_rounding + finding.cells->by_truncation,
+                       finding.cells->cells);
+  }
+  return "-";
+}
+
+std::string entry(std::string_view label, std::string_view text) {
+  if (text.empty()) return {};
+  const std::string head = fmt::format("    {:<{}}", label, kLabel - 4);
+  return wrapped(head + std::string(text), kWidth, kLabel) + "\n";
+}
+
+std::string inputs_text(const Finding& finding) {
+  std::string text;
+  for (const AuditInput& input : finding.inputs) {
+    if (!text.empty()) text += ", ";
+    text += fmt::format("{} = {}", input.name,
+                        input.printed.empty() ? with_unit(input.value, 4) : input.printed);
+  }
+  return text;
+}
+
+/// Cells that follow need no line of their own.
+std::string details_text(const Finding& finding) {
+  std::string out;
+  for (const AuditDetail& detail : finding.details) {
+    if (detail.verdict.starts_with("exact") && finding.details.size() > 4) continue;
+    out += fmt::format("    {:<{}}{}: {} against {}, {}\n", "", kLabel - 4, detail.what,
+                       detail.printed, with_unit(detail.recomputed, 4), detail.verdict);
+  }
+  return out;
+}
+
+std::string finding_text(const Finding& finding) {
+  const std::string mark = finding.stands() ? "ok" : "!!";
+  std::string out = fmt::format("{}  {}  [{}]\n", finding.verdict == AuditVerdict::cannot_be_told
+                                                      ? "??"
+                                                      : mark,
+                                finding.id, finding.verdict_words());
+  // "paper" first: the reader knows the paper, not our names.
+  out += entry("paper", fmt::format("{}: {}", finding.where, finding.claim));
+  out += entry("printed", fmt::format("{}   recomputed {}", finding.printed, recomputed_text(finding)));
+  out += entry("by", finding.expression);
+  out += entry("with", inputs_text(finding));
+  for (const AuditCause& cause : finding.causes) {
+    out += entry("given by", fmt::format("{}  ({})", cause.text, significant(cause.recomputed, 5)));
+  }
+  out += details_text(finding);
+  out += entry("so", finding.consequence);
+  return out + "\n";
+}
+
+std::string summary_text(const AuditReport& report) {
+  std::string text;
+  for (const AuditVerdict verdict :
+       {AuditVerdict::holds, AuditVerdict::holds_by_truncation, AuditVerdict::last_digit_off,
+        AuditVerdict::differs, AuditVerdict::contradicted, AuditVerdict::cannot_be_told}) {
+    if (!text.empty()) text += ", ";
+    text += fmt::format("{} {}", report.count(verdict), verdict_name(verdict));
+  }
+  return fmt::format("{} claims: {}.\n", report.findings.size(), text);
+}
+
+}  // namespace
+
+std::string audit_text(const AuditReport& report, bool all) {
+  std::string out = report.title + "\n\n";
+  std::size_t left_out = 0;
+  for (const Finding& finding : report.findings) {
+    if (finding.stands() && !all) {
+      ++left_out;
+      continue;
+    }
+    out += finding_text(finding);
+  }
+  if (left_out > 0) out += fmt::format("{} claims that hold are not shown (--all).\n", left_out);
+  return out + summary_text(report);
+}
+
+TableDocument audit_document(const AuditReport& report) {
+  TableDocument document;
+  document.title = "Audit";
+  document.introduction = {report.title};
+  TableSection section;
+  section.title = "Claims recomputed";
+  section.columns = {"claim", "where", "printed", "recomputed", "verdict", "consequence"};
+  for (const Finding& finding : report.findings) {
+    section.rows.push_back({finding.id, finding.where, finding.printed, recomputed_text(finding),
+                            finding.verdict_words(), finding.consequence});
+  }
+  document.sections.push_back(std::move(section));
+  document.conclusion = {summary_text(report)};
+  document.conclusion.front().pop_back();
+  return document;
+}
+
+}  // namespace tpm

@@ -1,0 +1,36 @@
+#pragma once
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tpm {
+
+/// A table ready to be written: text cells only, no physics.
+struct TableSection {
+  std::string title;
+  std::vector<std::string> columns;
+  std::vector<std::vector<std::string>> rows;  ///< each as long as `columns`
+  std::vector<bool> right_aligned;             ///< per column; missing ones are left-aligned
+};
+
+/// Sections with remarks before and after them.
+struct TableDocument {
+  std::string title;
+  std::vector<std::string> introduction;
+  std::vector<TableSection> sections;
+  std::vector<std::string> conclusion;
+};
+
+enum class TableStyle { text, markdown, latex };
+
+/// Aligned columns for a terminal, GitHub-flavoured Markdown, or LaTeX with the booktabs package.
+/// Text from outside is escaped as the style needs. Ends with a line feed.
+[[nodiscard]] std::string render(const TableDocument& document, TableStyle style);
+
+/// One CSV line (RFC 4180 quoting) with a line feed.
+[[nodiscard]] std::string csv_line(const std::vector<std::string>& cells);
+
+/// Breaks text into lines of at most `width` columns at spaces, each after the first indented.
+[[nodiscard]] std::string wrapped(std::string_view text, std::size_t width, std::size_t indent);
+
+}  // namespace tpm

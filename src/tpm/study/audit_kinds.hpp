@@ -1,0 +1,36 @@
+#pragma once
+#include "tpm/study/claim_reader.hpp"
+#include "tpm/study/printed_number.hpp"
+
+namespace tpm {
+
+/// Each fills the verdict and the numbers of a finding from one claim; id, kind and quote are
+/// there already. All throw Error(bad_input) naming the claim.
+
+/// "value": `printed` against `expression`, `terms` or `solve`.
+void check_value(const ClaimReader& claim, Finding& finding);
+/// "range": two printed numbers against `expression` at the ends of `over`.
+void check_range(const ClaimReader& claim, Finding& finding);
+/// "band": the value must lie between two printed numbers; with `tables`, in every row between the
+/// columns named in `band`.
+void check_band(const ClaimReader& claim, Finding& finding);
+/// "agree": `left` and `right` must be equal within `tolerance` (relative, 1e-9), at every value of
+/// `vary`; with `transform`, `left` is a Laplace transform whose inverse is meant.
+void check_agree(const ClaimReader& claim, Finding& finding);
+/// "inequality": `left` `relation` `right`.
+void check_inequality(const ClaimReader& claim, Finding& finding);
+/// "dimension": the unit of the symbol `expression` must be of `claimed_dimension`.
+void check_dimension(const ClaimReader& claim, Finding& finding);
+/// "table": every cell of the `series` columns of `tables` against its expression.
+void check_table(const ClaimReader& claim, Finding& finding);
+/// "misfit": measured columns against their expressions, in percent; with `relative_error` a
+/// chi-square test at 95 %, without it there is nothing to hold "close" to.
+void check_misfit(const ClaimReader& claim, Finding& finding);
+
+/// The audit's word for a comparison of digits.
+[[nodiscard]] AuditVerdict audit_verdict(DigitVerdict verdict) noexcept;
+
+/// "0.613 N"; just the number if the unit is 1.
+[[nodiscard]] std::string with_unit(std::string_view number, const Unit& unit);
+
+}  // namespace tpm
