@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <set>
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
@@ -170,25 +171,32 @@ void name_target(Target& target, const fs::path& stem) {
 }
 
 /// One curve takes the name --output; several go into it as a folder.
+fs::path stem_of(const ImportArguments& arguments, const std::string& source,
+                 const std::string& curve_name, std::size_t index, std::size_t of) {
+  if (arguments.files.size() == 1 && of == 1) {
+    const fs::path single = arguments.output;
+    const bool ending = single.extension() == ".csv" || single.extension() == ".json";
+    return ending ? fs::path(single).replace_extension() : single;
+  }
+  std::string name = file_stem(fs::path(source).stem().string());
+  if (of > 1) name += fmt::format("_{}_{}", index + 1, file_stem(curve_name));
+  return fs::path(arguments.output) / name;
+}
+
 std::vector<Target> plan(const ImportArguments& arguments, const ImportOptions& options) {
   std::vector<Target> targets;
+  std::set<fs::path> taken;
   for (const std::string& file : arguments.files) {
     std::vector<ImportedCurve> curves = import_curves(file, options);
-    const std::string stem = file_stem(fs::path(file).stem().string());
     for (std::size_t i = 0; i < curves.size(); ++i) {
-      Target target{file, {}, std::move(curves[i])};
-      std::string name = stem;
-      if (curves.size() > 1) name += fmt::format("_{}_{}", i + 1, file_stem(target.curve.name));
-      name_target(target, fs::path(arguments.output) / name);
-      targets.push_back(std::move(target));
+      const fs::path stem = stem_of(arguments, file, curves[i].name, i, curves.size());
+      targets.push_back({file, {}, std::move(curves[i])});
+      name_target(targets.back(), stem);
+      if (!taken.insert(targets.back().csv).second) {
+        throw bad_input(file, fmt::format("a second curve for {}", targets.back().csv.string()),
+                        "files of different names");
+      }
     }
-  }
-  if (targets.size() == 1) {
-    fs::path single = arguments.output;
-    if (single.extension() == ".csv" || single.extension() == ".json") single.replace_extension();
-    targets.front().curve.description.header.note = options.header.note;
-    targets.front().curve.description.header.title = options.header.title;
-    name_target(targets.front(), single);
   }
   return targets;
 }

@@ -102,7 +102,7 @@ std::string recording_text(const Recording& recording, bool all_rows) {
   const double response_si = shown_unit(recording.response_quantity).to_si;
   for (std::size_t i = 0; i < size; ++i) {
     if (!all_rows && size > 2 * kEnds && i == kEnds) {
-      table.push_back({"...", "", "", "", fmt::format("{} more", size - 2 * kEnds)});
+      table.push_back({"", "", "", "", fmt::format("... {} more", size - 2 * kEnds)});
       i = size - kEnds;
     }
     table.push_back({at(recording.time_s, i, 1.0), at(recording.drive, i, drive_si),

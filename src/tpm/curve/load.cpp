@@ -21,10 +21,11 @@ struct CurveFiles {
   fs::path rows;
 };
 
+/// The curves of the data folder: its CSV files (claims about papers stand there as JSON alone).
 std::vector<std::string> known_ids() {
   std::vector<std::string> ids;
   for (const auto& entry : fs::directory_iterator(share_dir() / "data")) {
-    if (entry.path().extension() == ".json") ids.push_back(entry.path().stem().string());
+    if (entry.path().extension() == ".csv") ids.push_back(entry.path().stem().string());
   }
   std::sort(ids.begin(), ids.end());
   return ids;
