@@ -10,6 +10,7 @@ input gives the same bytes.
 
 import argparse
 import json
+import math
 import re
 import sys
 from pathlib import Path
@@ -21,7 +22,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch, Rectangle  # noqa: E402
-from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodFormatter  # noqa: E402
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator  # noqa: E402
 
 # Lengths in inches, so that text keeps its size whatever the number of panels.
 PAGE_WIDTH, SINGLE_PAGE_WIDTH, PANEL_HEIGHT = 8.9, 6.1, 2.75
@@ -170,14 +171,28 @@ def plain_name(text):
 
 
 def tick_short_log_axis(axis_of_plot, limits):
-    """Below one decade powers of ten are too far apart: plain numbers at round values."""
+    """Below two decades powers of ten are too far apart: 1, 2, 5 times them, or round values."""
     low, high = limits
-    if high / low > 10:
+    if high / low > 100:
         return
-    places = [v for v in MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high) if low <= v <= high]
-    axis_of_plot.set_major_locator(FixedLocator(places))
-    axis_of_plot.set_major_formatter(StrMethodFormatter("{x:g}"))
+    if high / low > 8:
+        powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        places = [m * 10.0**k for k in powers for m in (1, 2, 5)]
+    else:
+        places = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    axis_of_plot.set_major_locator(FixedLocator([v for v in places if low <= v <= high]))
+    axis_of_plot.set_major_formatter(FuncFormatter(plain_number))
     axis_of_plot.set_minor_locator(NullLocator())
+
+
+def plain_number(value, _position):
+    """12.5, or 2·10⁵ where that is shorter."""
+    if value < 1e4:
+        return f"{value:g}"
+    exponent = math.floor(math.log10(value * (1 + 1e-12)))
+    factor = value / 10.0**exponent
+    power = "10" + str(exponent).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return power if abs(factor - 1) < 1e-9 else f"{factor:g}·{power}"
 
 
 def draw_panel(axes, panel, look, handles):

@@ -27,14 +27,16 @@ nav a { display: inline-block; margin-right: 1.1rem; }
 .wide { overflow-x: auto; margin: .8rem 0 1.2rem; }
 table { border-collapse: collapse; font-size: .9rem; }
 caption { text-align: left; color: var(--soft); padding-bottom: .35rem; }
-th, td { padding: .3rem .7rem; border-bottom: 1px solid var(--rule); text-align: left; vertical-align: top; }
+th, td { padding: .3rem .7rem; border-bottom: 1px solid var(--rule); text-align: left; vertical-align: top;
+         min-width: 3.2rem; }
 th { background: var(--tint); }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .good { color: #0b5d2a; } td.good { background: #e9f6ec; }
 .fair { color: #6b4a00; } td.fair { background: #fdf3dc; }
 .bad { color: #93200f; } td.bad { background: #fdebe7; }
 figure { margin: 1.2rem 0 1.8rem; overflow-x: auto; }
-figure svg { display: block; width: 100%; min-width: 34rem; height: auto; max-height: none; }
+figure svg { display: block; max-width: none; }
+@media (min-width: 58rem) { figure svg { max-width: 100%; height: auto; } }
 figcaption { color: var(--soft); font-size: .92rem; max-width: 46rem; }
 figcaption b { color: var(--ink); }
 @media print {
@@ -43,7 +45,7 @@ figcaption b { color: var(--ink); }
   h2 { break-after: avoid; } h3 { break-after: avoid; }
   figure, tr { break-inside: avoid; }
   .wide, figure { overflow: visible; }
-  figure svg { min-width: 0; }
+  figure svg { max-width: 100%; height: auto; }
 }
 )css";
 

@@ -1,6 +1,9 @@
 // The section on the audit: each claim of the paper, recomputed.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
+
 #include "tpm/core/text.hpp"
 #include "tpm/report/sections.hpp"
 
@@ -38,37 +41,72 @@ std::string consequence(const Finding& finding) {
   return text;
 }
 
+/// "holds 20, holds by truncation 2, ..." with every verdict that occurs.
+std::string counts(const AuditReport& audit) {
+  std::vector<std::string> parts;
+  for (const AuditVerdict verdict :
+       {AuditVerdict::holds, AuditVerdict::holds_by_truncation, AuditVerdict::last_digit_off,
+        AuditVerdict::differs, AuditVerdict::contradicted, AuditVerdict::cannot_be_told}) {
+    const int n = audit.count(verdict);
+    if (n > 0) parts.push_back(fmt::format("{} {}", verdict_name(verdict), n));
+  }
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+/// Topics in the order in which they first occur.
+std::vector<std::string> topics(const AuditReport& audit) {
+  std::vector<std::string> list;
+  for (const Finding& f : audit.findings) {
+    if (std::find(list.begin(), list.end(), f.topic) == list.end()) list.push_back(f.topic);
+  }
+  return list;
+}
+
+/// "2 Eq. 18" -> "Eq. 18", "tables" -> "Tables": the number only orders the claims file.
+std::string heading_of(const std::string& topic) {
+  std::string text = topic.substr(std::min(topic.find_first_not_of("0123456789 "), topic.size()));
+  if (!text.empty()) {
+    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  }
+  return text;
+}
+
+Table empty_table() {
+  return {"",
+          {{"where"},
+           {"claim"},
+           {"printed", true},
+           {"recomputed", true},
+           {"verdict"},
+           {"what follows"}},
+          {}};
+}
+
+std::vector<Cell> row(const Finding& f) {
+  return {{f.where},
+          {f.claim},
+          {f.printed},
+          {with_unit(f.recomputed)},
+          {f.verdict_words(), tone_of(f.verdict)},
+          {consequence(f)}};
+}
+
 }  // namespace
 
 void add_audit(Document& document, const PaperReport& report) {
   const AuditReport& audit = report.audit;
   document.heading(2, "Audit");
-  document.paragraph(fmt::format(
-      "{} claims of the paper, each recomputed from its own equations and numbers. {} stand ({} of "
-      "them with digits cut off instead of rounded), {} are off in the last digit, {} differ, {} "
-      "are contradicted, {} cannot be told.",
-      audit.findings.size(),
-      audit.count(AuditVerdict::holds) + audit.count(AuditVerdict::holds_by_truncation),
-      audit.count(AuditVerdict::holds_by_truncation), audit.count(AuditVerdict::last_digit_off),
-      audit.count(AuditVerdict::differs), audit.count(AuditVerdict::contradicted),
-      audit.count(AuditVerdict::cannot_be_told)));
-  Table table{"",
-              {{"where"},
-               {"claim"},
-               {"printed", true},
-               {"recomputed", true},
-               {"verdict"},
-               {"what follows"}},
-              {}};
-  for (const Finding& f : audit.findings) {
-    table.rows.push_back({{f.where},
-                          {f.claim},
-                          {f.printed},
-                          {with_unit(f.recomputed)},
-                          {f.verdict_words(), tone_of(f.verdict)},
-                          {consequence(f)}});
+  document.paragraph(
+      fmt::format("{} claims of the paper, each recomputed from its own equations and numbers: {}.",
+                  audit.findings.size(), counts(audit)));
+  for (const std::string& topic : topics(audit)) {
+    Table table = empty_table();
+    for (const Finding& f : audit.findings) {
+      if (f.topic == topic) table.rows.push_back(row(f));
+    }
+    document.heading(3, heading_of(topic));
+    document.table(std::move(table));
   }
-  document.table(std::move(table));
 }
 
 }  // namespace tpm

@@ -124,12 +124,11 @@ void add_assumptions(Document& document, const PaperReport& report) {
   }
   for (const PointSet* set : data_sets(report)) {
     if (set->time_provenance != Provenance::assumed) continue;
-    items.push_back(
-        {fmt::format("`{}`: what its times count from, or that they belong to the "
-                     "readings at all, is not stated; {} is taken.",
-                     set->header.id,
-                     set->time_origin == TimeOrigin::end_of_ramp ? "the end of the ramp"
-                                                                 : "the end of the creep")});
+    const bool ramp = set->time_origin == TimeOrigin::end_of_ramp;
+    items.push_back({fmt::format("`{}`: {}", set->header.id,
+                                 ramp ? "its times are taken to count from the end of the ramp."
+                                      : "its ranges are taken to be those at the end of the creep, "
+                                        "not those of the whole curve.")});
   }
   items.push_back({"The range of static forces is compared with the relaxed force, t → ∞."});
   items.push_back(
