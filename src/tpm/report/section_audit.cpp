@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/sections.hpp"
@@ -62,13 +61,9 @@ std::vector<std::string> topics(const AuditReport& audit) {
   return list;
 }
 
-/// "2 Eq. 18" -> "Eq. 18", "tables" -> "Tables": the number only orders the claims file.
+/// "2 Eq. 18" -> "Claims: Eq. 18"; the number only orders the claims file.
 std::string heading_of(const std::string& topic) {
-  std::string text = topic.substr(std::min(topic.find_first_not_of("0123456789 "), topic.size()));
-  if (!text.empty()) {
-    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
-  }
-  return text;
+  return "Claims: " + topic.substr(std::min(topic.find_first_not_of("0123456789 "), topic.size()));
 }
 
 Table empty_table() {
