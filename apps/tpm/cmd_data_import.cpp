@@ -271,6 +271,7 @@ void add_machine_options(CLI::App& command, ImportArguments& a) {
   add("--drive-quantity", a.drive_quantity, "indentation_depth, relative_length or abscissa");
   add("--response-quantity", a.response_quantity, "contact_force, stress or ordinate");
   command.add_option("--unit", a.units, "COLUMN=UNIT where the file does not say, repeatable")
+      ->allow_extra_args(false)
       ->group(group);
   add("--negate", a.negate, "Turn the sign of: none, drive, response or both")
       ->check(CLI::IsMember({"none", "drive", "response", "both"}));

@@ -65,6 +65,7 @@ class GroupWriter {
   template <typename Rows, typename Member>
   void texts(const std::string& name, const Rows& rows, Member member) {
     std::vector<std::string> values;
+    values.reserve(rows.size());
     for (const auto& row : rows) values.emplace_back(std::invoke(member, row));
     file_.texts(group_ + "/" + name, values);
   }

@@ -91,6 +91,7 @@ namespace {
 void descend(const ResidualFunction& function, std::span<const FitParameter> parameters,
              const std::vector<std::size_t>& free, FirstStep first_step, Minimum& minimum) {
   std::vector<double> theta;
+  theta.reserve(free.size());
   for (const std::size_t i : free) theta.push_back(parameters[i].theta(minimum.natural[i]));
   ceres::Problem problem;
   problem.AddResidualBlock(new FreeThetaCost(function, parameters, free, minimum.natural), nullptr,
