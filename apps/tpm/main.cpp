@@ -26,6 +26,8 @@ int run(int argc, char** argv) {
   Session session;
   add_version_command(app, session);
   add_fit_command(app, session);
+  add_tables_command(app, session);
+  add_audit_command(app, session);
   add_data_command(app, session);
 
   try {
