@@ -27,6 +27,8 @@ void add_format_option(CLI::App& command, Session& session);
 void add_version_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
 void add_coverage_command(CLI::App& app, Session& session);
+void add_tables_command(CLI::App& app, Session& session);
+void add_audit_command(CLI::App& app, Session& session);
 void add_data_command(CLI::App& app, Session& session);
 void add_data_import_command(CLI::App& data, Session& session);  // below `tpm data`
 

@@ -39,6 +39,8 @@ int run(int argc, char** argv) {
   add_version_command(app, session);
   add_fit_command(app, session);
   add_coverage_command(app, session);
+  add_tables_command(app, session);
+  add_audit_command(app, session);
   add_data_command(app, session);
 
   try {

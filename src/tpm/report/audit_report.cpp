@@ -52,13 +52,13 @@ std::string details_text(const Finding& finding) {
 
 std::string finding_text(const Finding& finding) {
   const std::string mark = finding.stands() ? "ok" : "!!";
-  std::string out = fmt::format("{}  {}  [{}]\n", finding.verdict == AuditVerdict::cannot_be_told
-                                                      ? "??"
-                                                      : mark,
-                                finding.id, finding.verdict_words());
+  std::string out =
+      fmt::format("{}  {}  [{}]\n", finding.verdict == AuditVerdict::cannot_be_told ? "??" : mark,
+                  finding.id, finding.verdict_words());
   // "paper" first: the reader knows the paper, not our names.
   out += entry("paper", fmt::format("{}: {}", finding.where, finding.claim));
-  out += entry("printed", fmt::format("{}   recomputed {}", finding.printed, recomputed_text(finding)));
+  out += entry("printed",
+               fmt::format("{}   recomputed {}", finding.printed, recomputed_text(finding)));
   out += entry("by", finding.expression);
   out += entry("with", inputs_text(finding));
   for (const AuditCause& cause : finding.causes) {

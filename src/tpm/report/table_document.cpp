@@ -63,7 +63,9 @@ std::string escaped(std::string_view text, TableStyle style) {
       out += '\\';
     }
     if (style == TableStyle::latex && (c == '^' || c == '~' || c == '\\')) {
-      out += c == '^' ? "\\textasciicircum{}" : c == '~' ? "\\textasciitilde{}" : "\\textbackslash{}";
+      out += c == '^'   ? "\\textasciicircum{}"
+             : c == '~' ? "\\textasciitilde{}"
+                        : "\\textbackslash{}";
       continue;
     }
     out += c;
@@ -99,10 +101,11 @@ std::string latex_section(const TableSection& section) {
   for (std::size_t c = 0; c < section.columns.size(); ++c) {
     alignment += right_aligned(section, c) ? 'r' : 'l';
   }
-  std::string out =
-      fmt::format("\\begin{{table}}\n\\caption{{{}}}\n\\begin{{tabular}}{{{}}}\n\\toprule\n{} \\\\\n\\midrule\n",
-                  escaped(section.title, TableStyle::latex), alignment,
-                  joined(section.columns, " & ", TableStyle::latex));
+  std::string out = fmt::format(
+      "\\begin{{table}}\n\\caption{{{}}}\n\\begin{{tabular}}{{{}}}\n\\toprule\n{} "
+      "\\\\\n\\midrule\n",
+      escaped(section.title, TableStyle::latex), alignment,
+      joined(section.columns, " & ", TableStyle::latex));
   for (const auto& row : section.rows) {
     out += joined(row, " & ", TableStyle::latex) + " \\\\\n";
   }
@@ -162,7 +165,8 @@ std::string csv_line(const std::vector<std::string>& cells) {
       continue;
     }
     line += '"';
-    for (const char letter : cells[c]) line += letter == '"' ? std::string("\"\"") : std::string(1, letter);
+    for (const char letter : cells[c])
+      line += letter == '"' ? std::string("\"\"") : std::string(1, letter);
     line += '"';
   }
   return line + "\n";

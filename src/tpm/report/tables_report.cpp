@@ -125,19 +125,20 @@ TableSection band_section(const TablesResult& result) {
 std::vector<std::string> introduction(const TableRequest& request) {
   const TpmParameters& p = request.parameters;
   std::vector<std::string> lines;
-  lines.push_back(fmt::format(
-      "E1 = {} kPa, E2 = {} kPa, E' = {} kPa, A0 = {} mm^2, l0 = {}.",
-      significant(p.E1_Pa * kKilo, 6), significant(p.E2_Pa * kKilo, 6),
-      significant(p.Eprime_Pa * kKilo, 6), significant(p.A0_m2 * 1e6, 6), millimetres(p.l0_m)));
+  lines.push_back(fmt::format("E1 = {} kPa, E2 = {} kPa, E' = {} kPa, A0 = {} mm^2, l0 = {}.",
+                              significant(p.E1_Pa * kKilo, 6), significant(p.E2_Pa * kKilo, 6),
+                              significant(p.Eprime_Pa * kKilo, 6), significant(p.A0_m2 * 1e6, 6),
+                              millimetres(p.l0_m)));
   if (request.mode == TableMode::as_printed) {
     lines.emplace_back(
         "As printed: a step (Eqs. 15 and 16); the end force is the limit t -> infinity.");
   } else {
-    lines.push_back(fmt::format(
-        "Consistent: ramp at {} mm/s (assumed: the tables state no rate), then {} s of hold counted "
-        "from the end of the ramp (assumed); eta1 = {} Pa s, tau = {} s.",
-        significant(request.rate_m_per_s * kMilli, 6), significant(request.hold_s, 6),
-        significant(p.eta1_Pa_s, 6), significant(p.relaxation_time_s(), 4)));
+    lines.push_back(
+        fmt::format("Consistent: ramp at {} mm/s (assumed: the tables state no rate), then {} s of "
+                    "hold counted "
+                    "from the end of the ramp (assumed); eta1 = {} Pa s, tau = {} s.",
+                    significant(request.rate_m_per_s * kMilli, 6), significant(request.hold_s, 6),
+                    significant(p.eta1_Pa_s, 6), significant(p.relaxation_time_s(), 4)));
   }
   return lines;
 }
@@ -194,10 +195,10 @@ TableDocument tables_document(const TablesResult& result) {
 }
 
 std::string tables_csv(const TablesResult& result) {
-  std::string out = csv_line({"printed_where", "depth_m", "spacing_m", "quantity", "computed_SI",
-                              "unit_SI", "printed", "printed_unit", "window_width_SI", "verdict",
-                              "from_printed_lambda1_SI", "from_printed_lambda1_verdict", "measured",
-                              "misfit_percent"});
+  std::string out =
+      csv_line({"printed_where", "depth_m", "spacing_m", "quantity", "computed_SI", "unit_SI",
+                "printed", "printed_unit", "window_width_SI", "verdict", "from_printed_lambda1_SI",
+                "from_printed_lambda1_verdict", "measured", "misfit_percent"});
   for (const TableRow& row : result.rows) {
     for (const Line& line : lines_of(row)) {
       const std::string_view si_unit = line.quantity == "lambda1" ? "Pa" : "N";
@@ -206,8 +207,8 @@ std::string tables_csv(const TablesResult& result) {
     }
   }
   for (const BandRow& row : result.bands) {
-    out += csv_line(csv_cells("relaxed force", row.depth_m, row.spacing_m, row.printed_where,
-                              row.force, "N"));
+    out += csv_line(
+        csv_cells("relaxed force", row.depth_m, row.spacing_m, row.printed_where, row.force, "N"));
   }
   return out;
 }

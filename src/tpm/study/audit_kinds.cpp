@@ -140,8 +140,8 @@ void check_value(const ClaimReader& claim, Finding& finding) {
   finding.verdict = audit_verdict(check.verdict);
   finding.difference_percent = check.difference_percent;
   if (!check.explained()) {
-    finding.causes = search_causes(claim, value, scope, printed, unit,
-                                   searchable(claim, finding.inputs));
+    finding.causes =
+        search_causes(claim, value, scope, printed, unit, searchable(claim, finding.inputs));
   }
 }
 
@@ -173,8 +173,8 @@ void check_range(const ClaimReader& claim, Finding& finding) {
     }
     finding.inputs = value.inputs(scope);
     if (check.explained()) continue;
-    for (auto& cause : search_causes(claim, value, scope, printed, unit,
-                                     searchable(claim, finding.inputs), 2)) {
+    for (auto& cause :
+         search_causes(claim, value, scope, printed, unit, searchable(claim, finding.inputs), 2)) {
       cause.text = fmt::format("{}: {}", with_unit(printed.text, unit), cause.text);
       finding.causes.push_back(std::move(cause));
     }
@@ -210,8 +210,9 @@ void check_agree(const ClaimReader& claim, Finding& finding) {
     finding.inputs = claim.inputs(right, scope);
     if (!claim.has("transform")) append(finding.inputs, claim.inputs(left, scope));
   }
-  finding.expression = claim.has("transform") ? fmt::format("inverse Laplace of {} = {}", left, right)
-                                              : fmt::format("{} = {}", left, right);
+  finding.expression = claim.has("transform")
+                           ? fmt::format("inverse Laplace of {} = {}", left, right)
+                           : fmt::format("{} = {}", left, right);
   finding.verdict = worst <= tolerance ? AuditVerdict::holds : AuditVerdict::contradicted;
 }
 
@@ -230,8 +231,7 @@ void check_inequality(const ClaimReader& claim, Finding& finding) {
   finding.inputs = claim.inputs(left, scope);
   append(finding.inputs, claim.inputs(right, scope));
   if (b != 0.0) finding.difference_percent = 100.0 * (a - b) / std::abs(b);
-  finding.verdict =
-      satisfied(a, relation, b) ? AuditVerdict::holds : AuditVerdict::contradicted;
+  finding.verdict = satisfied(a, relation, b) ? AuditVerdict::holds : AuditVerdict::contradicted;
 }
 
 void check_dimension(const ClaimReader& claim, Finding& finding) {
@@ -251,10 +251,8 @@ void check_dimension(const ClaimReader& claim, Finding& finding) {
   finding.verdict = same ? AuditVerdict::holds : AuditVerdict::contradicted;
   finding.details.push_back({fmt::format("{} is a unit of {}", symbol->unit.symbol,
                                          dimension_name(symbol->unit.dimension)),
-                             example.symbol,
-                             *finding.recomputed,
-                             same ? "agrees" : "does not agree",
-                             std::nullopt});
+                             example.symbol, *finding.recomputed,
+                             same ? "agrees" : "does not agree", std::nullopt});
 }
 
 }  // namespace tpm

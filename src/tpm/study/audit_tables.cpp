@@ -193,8 +193,8 @@ void check_misfit(const ClaimReader& claim, Finding& finding) {
   const double limit = boost::math::quantile(boost::math::chi_squared(data), 0.95);
   finding.recomputed = {squared / (sigma * sigma), plain};
   finding.bound = {limit, plain};
-  finding.verdict = squared / (sigma * sigma) <= limit ? AuditVerdict::holds
-                                                       : AuditVerdict::contradicted;
+  finding.verdict =
+      squared / (sigma * sigma) <= limit ? AuditVerdict::holds : AuditVerdict::contradicted;
 }
 
 }  // namespace tpm

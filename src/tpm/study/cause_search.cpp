@@ -82,8 +82,8 @@ void CauseSearch::add_choice(const AuditInput& input, const PrintedSymbol& symbo
   AuditCause cause;
   cause.only_printed = true;
   cause.recomputed = sum;
-  const bool mixed = std::adjacent_find(choice.begin(), choice.end(), std::not_equal_to<>()) !=
-                     choice.end();
+  const bool mixed =
+      std::adjacent_find(choice.begin(), choice.end(), std::not_equal_to<>()) != choice.end();
   cause.text = input.name + " = ";
   for (std::size_t t = 0; t < (mixed ? choice.size() : 1); ++t) {
     if (t > 0) cause.text += ", ";
@@ -100,7 +100,8 @@ void CauseSearch::try_printed_values(const AuditInput& input) {
   const std::size_t values = symbol->also.size() + 1;
   const std::size_t terms = value_.terms();
   std::size_t combinations = 1;
-  for (std::size_t t = 0; t < terms && combinations <= kMostCombinations; ++t) combinations *= values;
+  for (std::size_t t = 0; t < terms && combinations <= kMostCombinations; ++t)
+    combinations *= values;
   if (combinations > kMostCombinations) {
     throw bad_input(reader_.at(), "too many combinations of terms and printed values",
                     fmt::format("at most {}", kMostCombinations));

@@ -124,8 +124,8 @@ std::vector<PrintedTable> read_printed_tables(const Json& document, std::string_
   if (const auto items = document.find("tables"); items != document.end()) {
     for (const Json& item : *items) tables.push_back(read_table(item, file));
   }
-  require_unique(tables, [](const PrintedTable& t) { return t.id; },
-                 fmt::format("{}: tables", file));
+  require_unique(
+      tables, [](const PrintedTable& t) { return t.id; }, fmt::format("{}: tables", file));
   return tables;
 }
 
@@ -147,8 +147,9 @@ ClaimSet read_claims(const Json& document, std::string_view file) {
   }
   set.tables = read_printed_tables(document, file);
   set.claims = document.at("claims");
-  require_unique(set.claims, [](const Json& c) { return c.at("id").get<std::string>(); },
-                 fmt::format("{}: claims", file));
+  require_unique(
+      set.claims, [](const Json& c) { return c.at("id").get<std::string>(); },
+      fmt::format("{}: claims", file));
   return set;
 }
 

@@ -33,8 +33,9 @@ mu::Parser new_parser() {
 /// muParser reads '=' as an assignment to a variable; a formula has none.
 bool assigns(const std::string& text) {
   for (std::size_t i = text.find('='); i != std::string::npos; i = text.find('=', i + 1)) {
-    const bool comparison = (i > 0 && std::string_view("<>!=").find(text[i - 1]) != std::string::npos) ||
-                            (i + 1 < text.size() && text[i + 1] == '=');
+    const bool comparison =
+        (i > 0 && std::string_view("<>!=").find(text[i - 1]) != std::string::npos) ||
+        (i + 1 < text.size() && text[i + 1] == '=');
     if (!comparison) return true;
   }
   return false;
@@ -92,8 +93,7 @@ struct Evaluator::Impl {
     return definition == definitions.end() ? nullptr : &definition->second;
   }
 
-  double lookup(const std::string& name, const Scope& scope, std::string_view where,
-                int depth) {
+  double lookup(const std::string& name, const Scope& scope, std::string_view where, int depth) {
     if (const auto value = scope.values.find(name); value != scope.values.end()) {
       return value->second;
     }
@@ -146,8 +146,8 @@ struct Evaluator::Impl {
   }
 
   void require_free(const std::string& name, std::string_view where) const {
-    if (symbols.contains(name) || definitions.contains(name) || reserved.GetConst().contains(name) ||
-        reserved.GetFunDef().contains(name)) {
+    if (symbols.contains(name) || definitions.contains(name) ||
+        reserved.GetConst().contains(name) || reserved.GetFunDef().contains(name)) {
       throw bad_input(where, fmt::format("the name '{}' is taken", printable(name)),
                       "a name of its own");
     }

@@ -38,8 +38,7 @@ double ramp_hold_force(double depth, double rate, double time_after_ramp, double
     throw bad_input("ramp_hold_force", "a time before the end of the ramp", "a time of at least 0");
   }
   const Protocol protocol = ramp_and_hold(depth, rate, time_after_ramp);
-  const TpmVector parameters =
-      to_vector({E1, E2, Eprime, eta1, spacing, A0, l0});
+  const TpmVector parameters = to_vector({E1, E2, Eprime, eta1, spacing, A0, l0});
   const std::array times{protocol.end_s()};
   return make_model("closed_form")->respond(protocol, times, parameters, Want::values).value[0];
 }

@@ -91,7 +91,8 @@ DigitCheck compare_digits(const PrintedNumber& printed, double computed) {
   const double u = printed.last_digit;
   const bool negative = std::signbit(printed.value);
   // A printed zero may stand for a small number of either sign.
-  const double sign = printed.value == 0.0 ? (computed < 0.0 ? -1.0 : 1.0) : (negative ? -1.0 : 1.0);
+  const double sign =
+      printed.value == 0.0 ? (computed < 0.0 ? -1.0 : 1.0) : (negative ? -1.0 : 1.0);
   check.verdict = classify((computed - printed.value) * sign / u);
   const double near_zero = printed.value - sign * 0.5 * u;
   const double away = printed.value + sign * u;

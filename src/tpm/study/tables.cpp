@@ -20,8 +20,7 @@ struct Forces {
 };
 
 /// Forces at the two instants of the table, with lambda1 given.
-Forces forces(const TableRequest& request, const TpmParameters& p, double depth_m,
-              double lambda1) {
+Forces forces(const TableRequest& request, const TpmParameters& p, double depth_m, double lambda1) {
   if (request.mode == TableMode::as_printed) {
     constexpr double kForever = std::numeric_limits<double>::infinity();
     return {step_relaxation_force_N(p, lambda1, depth_m, 0.0),
@@ -86,8 +85,7 @@ std::optional<PrintedRow> find_row(const std::vector<PrintedTable>& tables, std:
 }
 
 DigitCheck check_cell(const PrintedRow& row, std::string_view column, double si) {
-  return compare_digits(parse_printed(row.text(column), row.where()),
-                        si / row.unit(column).to_si);
+  return compare_digits(parse_printed(row.text(column), row.where()), si / row.unit(column).to_si);
 }
 
 PrintedCell printed_cell(const PrintedRow& row, std::string_view column, double from_computed,
@@ -173,7 +171,8 @@ void require_valid(const TableRequest& request) {
   require_lengths(request.depths_m, "depths");
   require_lengths(request.spacings_m, "spacings");
   tpm::require_valid(request.parameters, "parameters");
-  for (const auto& [value, name] : {std::pair{request.rate_m_per_s, "rate"}, {request.hold_s, "hold"}}) {
+  for (const auto& [value, name] :
+       {std::pair{request.rate_m_per_s, "rate"}, {request.hold_s, "hold"}}) {
     if (!(value > 0.0) || !std::isfinite(value)) {
       throw bad_input(name, fmt::format("{} in SI units", shortest(value)), "a value above 0");
     }

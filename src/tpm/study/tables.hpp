@@ -18,11 +18,11 @@ enum class TableMode {
 /// A sweep over depths and spacings.
 struct TableRequest {
   TableMode mode = TableMode::as_printed;
-  std::vector<double> depths_m{0.002, 0.004, 0.006, 0.008};     ///< > 0, each once
-  std::vector<double> spacings_m{0.020, 0.025, 0.030, 0.035};   ///< > 0, each once
-  TpmParameters parameters;                                     ///< spacing_m is not used
-  double rate_m_per_s = 0.004;                                  ///< consistent mode, > 0
-  double hold_s = 30.0;                                         ///< consistent mode, > 0
+  std::vector<double> depths_m{0.002, 0.004, 0.006, 0.008};    ///< > 0, each once
+  std::vector<double> spacings_m{0.020, 0.025, 0.030, 0.035};  ///< > 0, each once
+  TpmParameters parameters;                                    ///< spacing_m is not used
+  double rate_m_per_s = 0.004;                                 ///< consistent mode, > 0
+  double hold_s = 30.0;                                        ///< consistent mode, > 0
 };
 
 /// A printed cell and what recomputing it gives, in the printed unit.
@@ -63,7 +63,7 @@ struct BandRow {
   double spacing_m = 0.0;
   std::string printed_where;
   TableCell lambda1;
-  TableCell force;  ///< relaxed force
+  TableCell force;                  ///< relaxed force
   std::string band_low, band_high;  ///< as printed
   Unit band_unit;
   double band_low_N = 0.0, band_high_N = 0.0;
@@ -90,9 +90,9 @@ struct TableSummary {
 
 struct TablesResult {
   TableRequest request;
-  std::vector<TableRow> rows;   ///< depth by depth, spacings within
-  std::vector<BandRow> bands;   ///< only for depths that are both asked for and printed
-  TableSummary summary;         ///< of the relaxation tables (1-4)
+  std::vector<TableRow> rows;  ///< depth by depth, spacings within
+  std::vector<BandRow> bands;  ///< only for depths that are both asked for and printed
+  TableSummary summary;        ///< of the relaxation tables (1-4)
 };
 
 /// Computes the tables. Printed and measured values are attached to the rows whose depth and

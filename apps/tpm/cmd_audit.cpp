@@ -1,0 +1,54 @@
+// tpm audit: recomputes what a paper prints.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/report/study_report.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/json.hpp"
+#include "tpm/study/audit.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct AuditOptions {
+  std::string claims;
+  std::string output;
+  bool all = false;
+};
+
+int run_command(const Session& session, const AuditOptions& options) {
+  const auto path =
+      options.claims.empty() ? paper_claims_path() : std::filesystem::path(options.claims);
+  const AuditReport report = run_audit(read_json(path), path.filename().string());
+  const std::string text =
+      session.json() ? to_text(to_json(report)) : audit_text(report, options.all);
+  if (options.output.empty()) {
+    fmt::print("{}", text);
+  } else {
+    write_file(options.output, text);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_audit_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "audit", "Recompute every claim of a paper from its own equations and numbers");
+  const auto options = std::make_shared<AuditOptions>();
+  command->add_option("claims", options->claims,
+                      "Claims file (default: the paper's, data/paper_claims.json)");
+  command->add_option("--output", options->output, "Write to this file instead of the terminal");
+  command->add_flag("--all", options->all, "Also show the claims that hold");
+  add_format_option(*command, session);
+  command->footer(
+      "Findings are results, not errors: the exit code is 0 when the audit ran.\n"
+      "Example:\n  tpm audit --all\n  tpm audit my_claims.json --format json --output audit.json");
+  command->callback([&session, options] {
+    session.run = [&session, options] { return run_command(session, *options); };
+  });
+}
+
+}  // namespace tpm::app

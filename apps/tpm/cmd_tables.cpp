@@ -1,0 +1,141 @@
+// tpm tables: Tables 1-5 of the paper, recomputed, and the same tables for other inputs.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/report/study_report.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/json.hpp"
+#include "tpm/study/tables.hpp"
+
+namespace tpm::app {
+namespace {
+
+/// Texts as given; empty where the default of TableRequest stands. Numbers are parsed here and not
+/// by CLI11, which takes nan and 1e400 for numbers.
+struct TableOptions {
+  bool as_printed = false;
+  bool consistent = false;
+  std::string depths, spacings;
+  std::string E, E1, E2, Eprime, eta, A0, l0, rate, hold;
+  std::string output;
+  std::string format = "text";
+};
+
+/// A quantity with its unit, or a plain number in the unit that the tables use.
+double in_unit(const std::string& text, std::string_view usual_unit, std::string_view option) {
+  const Unit unit = parse_unit(usual_unit, option);
+  const bool plain = text.find_first_not_of("0123456789.+-eE") == std::string::npos;
+  return plain ? parse_number(text, option) * unit.to_si
+               : parse_quantity(text, unit.dimension, option);
+}
+
+void set(double& target, const std::string& text, std::string_view usual_unit,
+         std::string_view option) {
+  if (!text.empty()) target = in_unit(text, usual_unit, option);
+}
+
+/// "2,4,6 mm" or "2 mm, 0.4 cm": a unit after the last number holds for those without one.
+std::vector<double> lengths(const std::string& text, std::string_view option) {
+  std::vector<std::string> parts;
+  std::size_t from = 0;
+  for (std::size_t comma = text.find(','); from <= text.size(); comma = text.find(',', from)) {
+    const std::size_t end = std::min(comma, text.size());
+    std::string part = text.substr(from, end - from);
+    part.erase(0, part.find_first_not_of(' '));
+    part.erase(part.find_last_not_of(' ') + 1);
+    parts.push_back(std::move(part));
+    from = end + 1;
+  }
+  const auto space = parts.back().find(' ');
+  const std::string unit = space == std::string::npos ? "mm" : parts.back().substr(space + 1);
+  std::vector<double> values;
+  for (const std::string& part : parts) values.push_back(in_unit(part, unit, option));
+  return values;
+}
+
+TableRequest request_of(const TableOptions& options) {
+  if (options.as_printed && options.consistent) {
+    throw Error(ExitCode::usage, "tables", "--as-printed and --consistent exclude each other",
+                "one of them");
+  }
+  TableRequest request;
+  request.mode = options.consistent ? TableMode::consistent : TableMode::as_printed;
+  if (!options.depths.empty()) request.depths_m = lengths(options.depths, "--depths");
+  if (!options.spacings.empty()) request.spacings_m = lengths(options.spacings, "--spacings");
+  TpmParameters& p = request.parameters;
+  for (double* modulus : {&p.E1_Pa, &p.E2_Pa, &p.Eprime_Pa}) set(*modulus, options.E, "kPa", "--E");
+  set(p.E1_Pa, options.E1, "kPa", "--E1");
+  set(p.E2_Pa, options.E2, "kPa", "--E2");
+  set(p.Eprime_Pa, options.Eprime, "kPa", "--Eprime");
+  set(p.eta1_Pa_s, options.eta, "Pa s", "--eta");
+  set(p.A0_m2, options.A0, "mm^2", "--A0");
+  set(p.l0_m, options.l0, "mm", "--l0");
+  set(request.rate_m_per_s, options.rate, "mm/s", "--rate");
+  set(request.hold_s, options.hold, "s", "--hold");
+  return request;
+}
+
+std::string rendered(const TablesResult& result, const std::string& format) {
+  if (format == "json") return to_text(to_json(result));
+  if (format == "csv") return tables_csv(result);
+  const TableStyle style = format == "md"      ? TableStyle::markdown
+                           : format == "latex" ? TableStyle::latex
+                                               : TableStyle::text;
+  return render(tables_document(result), style);
+}
+
+int run_command(const TableOptions& options) {
+  const TableRequest request = request_of(options);
+  const auto path = paper_claims_path();
+  const auto printed = read_printed_tables(read_json(path), path.filename().string());
+  const std::string text = rendered(make_tables(request, printed), options.format);
+  if (options.output.empty()) {
+    fmt::print("{}", text);
+  } else {
+    write_file(options.output, text);
+  }
+  return 0;
+}
+
+void add_options(CLI::App& command, TableOptions& options) {
+  command.add_flag("--as-printed", options.as_printed,
+                   "A step, Eqs. 15 and 16, t -> infinity (default)");
+  command.add_flag("--consistent", options.consistent,
+                   "Ramp-and-hold with the true eta1: end of ramp and end of hold");
+  command.add_option("--depths", options.depths, "Indentation depths (default 2,4,6,8 mm)");
+  command.add_option("--spacings", options.spacings, "Sphere spacings x (default 20,25,30,35 mm)");
+  command.add_option("--E", options.E, "E1, E2 and E' together (default 12 kPa)");
+  command.add_option("--E1", options.E1, "Spring of the Kelvin-Voigt unit");
+  command.add_option("--E2", options.E2, "Series spring");
+  command.add_option("--Eprime", options.Eprime, "Modulus of the lateral bonds");
+  command.add_option("--eta", options.eta, "Dashpot eta1 (default 5 Pa s)");
+  command.add_option("--A0", options.A0, "Area that turns stress into force (default 12.56 mm^2)");
+  command.add_option("--l0", options.l0, "Reference length (default 1 mm)");
+  command.add_option("--rate", options.rate, "Ramp rate with --consistent (assumed: 4 mm/s)");
+  command.add_option("--hold", options.hold, "Hold time with --consistent (default 30 s)");
+  command.add_option("--output", options.output, "Write to this file instead of the terminal");
+  command.add_option("--format", options.format, "Output format: text, md, csv, latex or json")
+      ->check(CLI::IsMember({"text", "md", "csv", "latex", "json"}))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_tables_command(CLI::App& app, Session& session) {
+  CLI::App* command =
+      app.add_subcommand("tables", "Recompute the paper's tables, cell by cell, with verdicts");
+  const auto options = std::make_shared<TableOptions>();
+  add_options(*command, *options);
+  command->footer(
+      "Plain numbers are mm, kPa, Pa s, mm^2, mm/s and s; other units go with the number.\n"
+      "Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35 --E \"12 kPa\"\n"
+      "  tpm tables --consistent --eta \"2e5 Pa s\" --rate \"2 mm/s\" --format md");
+  command->callback(
+      [&session, options] { session.run = [options] { return run_command(*options); }; });
+}
+
+}  // namespace tpm::app
