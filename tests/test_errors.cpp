@@ -196,10 +196,72 @@ std::vector<ErrorCase> hdf5_cases() {
   };
 }
 
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+const std::string kFitConfig = R"({
+  "title": "t",
+  "parameters": {"E": {"start": "12 kPa", "lower": "1 kPa", "upper": "100 kPa", "sets": ["E1", "E2"]}},
+  "data": [{"dataset": "c.csv",
+            "protocol": {"kind": "ramp_hold", "rate": "4 mm/s"},
+            "noise": {"kind": "relative_to_datum", "relative": 0.1}}]
+})";
+
+const std::string kFittedJson = R"({"id": "c", "title": "t", "kind": "points",
+"observable": "contact_force", "time_origin": "end_of_ramp",
+"columns": {"depth_mm": {"quantity": "indentation_depth", "unit": "mm"},
+            "time_s": {"quantity": "time", "unit": "s"},
+            "force_N": {"quantity": "contact_force", "unit": "N"}}})";
+const std::string kFittedCsv =
+    "depth_mm,time_s,force_N,provenance\n2,0,0.32,table\n2,30,0.21,table\n";
+
+std::vector<ErrorCase> fit_config_cases() {
+  const std::string type = "fit configuration";
+  const std::string fit = "fit {}/f.json --format json -o {}/out";
+  const auto config = [](std::string text) {
+    return files({{"c.json", kFittedJson}, {"c.csv", kFittedCsv}, {"f.json", std::move(text)}});
+  };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return config(replaced(kFitConfig, from, to));
+  };
+  const auto data = [](const std::string& from, const std::string& to) {
+    return files({{"c.json", kFittedJson},
+                  {"c.csv", replaced(kFittedCsv, from, to)},
+                  {"f.json", kFitConfig}});
+  };
+  return {
+      {type, "missing", fit, files({})},
+      {type, "empty", fit, config("")},
+      {type, "truncated", fit, config(kFitConfig.substr(0, 120))},
+      {type, "binary garbage", fit, config(kGarbage)},
+      {type, "100 MB line", fit, config(long_line())},
+      {type, "missing key", fit, with("\"title\": \"t\",", "")},
+      {type, "unknown key", fit, with("\"start\"", "\"strat\": \"1 kPa\", \"start\"")},
+      {type, "wrong unit", fit, with("12 kPa", "12 mm")},
+      {type, "no unit", fit, with("12 kPa", "12")},
+      {type, "NaN", fit, with("12 kPa", "nan kPa")},
+      {type, "negative modulus", fit, with("\"1 kPa\"", "\"-1 kPa\"")},
+      {type, "start outside the bounds", fit, with("12 kPa", "120 kPa")},
+      {type, "negative rate", fit, with("4 mm/s", "-4 mm/s")},
+      {type, "negative standard deviation", fit, with("0.1", "-0.1")},
+      {type, "unknown model parameter", fit, with("\"E2\"", "\"E3\"")},
+      {type, "unknown noise", fit, with("relative_to_datum", "gaussian")},
+      {type, "unknown data set", fit, with("c.csv", "livre")},
+      {type, "data set is missing", fit, with("c.csv", "d.csv")},
+      {type, "datum without a depth", fit, data("2,0,0.32", ",0,0.32")},
+      {type, "datum of 0 under relative noise", fit, data("0.32", "0")},
+      {type, "wrong option value", "fit {}/f.json --rate '4 mm' -o {}/out", config(kFitConfig)},
+      {type, "output cannot be written", "fit {}/f.json -o /proc/none/out", config(kFitConfig)},
+  };
+}
+
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
-  for (const auto& cases :
-       {curve_csv_cases(), curve_json_cases(), machine_cases(), digitizer_cases(), hdf5_cases()}) {
+  for (const auto& cases : {curve_csv_cases(), curve_json_cases(), machine_cases(),
+                            digitizer_cases(), hdf5_cases(), fit_config_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

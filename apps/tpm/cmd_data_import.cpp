@@ -173,7 +173,7 @@ void name_target(Target& target, const fs::path& stem) {
 /// One curve takes the name --output; several go into it as a folder.
 fs::path stem_of(const ImportArguments& arguments, const std::string& source,
                  const std::string& curve_name, std::size_t index, std::size_t of) {
-  if (arguments.files.size() == 1 && of == 1) {
+  if (arguments.files.size() == 1 && of == 1 && !arguments.output.empty()) {
     const fs::path single = arguments.output;
     const bool ending = single.extension() == ".csv" || single.extension() == ".json";
     return ending ? fs::path(single).replace_extension() : single;
@@ -211,39 +211,45 @@ void require_free(const std::vector<Target>& targets) {
   }
 }
 
-void print_text(const std::vector<Target>& targets) {
+void print_text(const std::vector<Target>& targets, bool written) {
   for (const Target& target : targets) {
-    fmt::print("{} -> {}\n", target.source, target.csv.string());
+    fmt::print("{} -> {}\n", target.source,
+               written ? target.csv.string() : "nothing written: no --output");
     for (const Finding& finding : target.curve.findings) {
       fmt::print("  {}: {}\n", finding.what, finding.value);
     }
   }
 }
 
-void print_json(const std::vector<Target>& targets) {
+void print_json(const std::vector<Target>& targets, bool written) {
   Json report = Json::array();
   for (const Target& target : targets) {
     Json understood = Json::object();
     for (const Finding& finding : target.curve.findings) understood[finding.what] = finding.value;
     report.push_back({{"source", target.source},
-                      {"csv", target.csv.string()},
+                      {"csv", written ? Json(target.csv.string()) : Json(nullptr)},
                       {"id", target.curve.description.header.id},
                       {"understood", understood}});
   }
   fmt::print("{}", to_text(report));
 }
 
-/// Nothing is written before every file was understood.
-int import_files(const Session& session, const ImportArguments& arguments) {
-  const std::vector<Target> targets = plan(arguments, options_of(arguments));
-  if (!arguments.force) require_free(targets);
+void write_curves(const std::vector<Target>& targets) {
   for (const Target& target : targets) {
     const Json description = description_json(target.curve.description);
     check_schema(description, "curve", target.csv.string());
     write_file(target.csv, target.curve.csv);
     write_file(fs::path(target.csv).replace_extension(".json"), to_text(description));
   }
-  session.json() ? print_json(targets) : print_text(targets);
+}
+
+/// Nothing is written before every file was understood, and nothing at all without --output.
+int import_files(const Session& session, const ImportArguments& arguments) {
+  const bool write = !arguments.output.empty();
+  const std::vector<Target> targets = plan(arguments, options_of(arguments));
+  if (write && !arguments.force) require_free(targets);
+  if (write) write_curves(targets);
+  session.json() ? print_json(targets, write) : print_text(targets, write);
   return 0;
 }
 
@@ -315,10 +321,9 @@ void add_data_import_command(CLI::App& data, Session& session) {
   auto arguments = std::make_shared<ImportArguments>();
   command->add_option("files", arguments->files, "Files to import; sheets as several files")
       ->required();
-  command
-      ->add_option("-o,--output", arguments->output,
-                   "Name of the curve; a folder if there are several")
-      ->required();
+  command->add_option("-o,--output", arguments->output,
+                      "Name of the curve; a folder if there are several. Without it the files are "
+                      "only read, and what was understood is printed");
   command->add_flag("--force", arguments->force, "Replace files that exist");
   add_text_options(*command, *arguments);
   add_machine_options(*command, *arguments);
@@ -331,7 +336,8 @@ void add_data_import_command(CLI::App& data, Session& session) {
       "  tpm data import fig7.json -o mine/fig7 --x time:s --y contact_force:N --depth \"4 mm\" "
       "\\\n"
       "      --time-origin end_of_ramp\n"
-      "JSON: a list of objects with source, csv, id and understood (what was found in the file)");
+      "JSON: a list of objects with source, csv (null if not written), id and understood\n"
+      "(what was found in the file)");
   command->callback([&session, arguments] {
     session.run = [&session, arguments] { return import_files(session, *arguments); };
   });
