@@ -49,6 +49,7 @@ struct MarkdownBlock {
     std::string out = row_text(titles) + row_text(rule);
     for (const auto& row : table.rows) {
       std::vector<std::string> cells;
+      cells.reserve(row.size());
       for (const Cell& cell : row) cells.push_back(escaped(cell.text, true));
       out += row_text(cells);
     }
