@@ -91,7 +91,10 @@ std::string rendered(const TablesResult& result, const std::string& format) {
 int run_command(const TableOptions& options) {
   const TableRequest request = request_of(options);
   const auto path = paper_claims_path();
-  const auto printed = read_printed_tables(read_json(path), path.filename().string());
+  const std::string name = path.filename().string();
+  const Json claims = read_json(path);
+  check_schema(claims, "claims", name);
+  const auto printed = read_printed_tables(claims, name);
   const std::string text = rendered(make_tables(request, printed), options.format);
   if (options.output.empty()) {
     fmt::print("{}", text);

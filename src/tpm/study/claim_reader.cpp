@@ -94,6 +94,7 @@ std::vector<AuditInput> ClaimReader::inputs(const std::string& expression,
     if (symbol != nullptr && !scope.values.contains(name)) {
       input.printed = symbol->value + (unit.symbol.empty() ? "" : " " + unit.symbol);
       input.where = symbol->where;
+      input.provenance = symbol->provenance;
     } else {
       input.where = "this claim";
     }

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "tpm/core/error.hpp"
-#include "tpm/core/text.hpp"
 #include "tpm/core/units.hpp"
 
 namespace tpm {
@@ -58,6 +57,11 @@ PrintedNumber parse_printed(std::string_view text, std::string_view where) {
   return number;
 }
 
+std::string percent_text(double percent) {
+  const int digits = std::abs(percent) >= 99.5 ? 3 : 2;
+  return fmt::format("{:+.{}g} %", percent, digits);
+}
+
 std::string_view verdict_name(DigitVerdict verdict) noexcept {
   switch (verdict) {
     case DigitVerdict::by_rounding:
@@ -81,7 +85,7 @@ std::string DigitCheck::words() const {
   if (verdict != DigitVerdict::differs || !difference_percent) {
     return std::string(verdict_name(verdict));
   }
-  return fmt::format("differs by {:+.2g} %", *difference_percent);
+  return "differs by " + percent_text(*difference_percent);
 }
 
 DigitCheck compare_digits(const PrintedNumber& printed, double computed) {
