@@ -208,7 +208,7 @@ TEST_CASE("a file about anything else works the same way") {
   const Finding inverse = one({{"kind", "agree"},
                                {"left", "1 / (s + 1)"},
                                {"right", "exp(-t)"},
-                               {"tolerance", "1e-4"},
+                               {"tolerance", "1e-3"},
                                {"transform", {{"variable", "s"}, {"time", "t"}}},
                                {"vary", {{"symbol", "t"}, {"values", {"0.1", "1", "3"}}}}});
   CHECK(inverse.verdict == AuditVerdict::holds);

@@ -23,7 +23,7 @@ std::vector<AuditInput> searchable(const ClaimReader& claim, std::vector<AuditIn
   return inputs;
 }
 
-/// f(t) from its Laplace transform by the Gaver-Stehfest sum of 14 terms, good to about 1e-5 for
+/// f(t) from its Laplace transform by the Gaver-Stehfest sum of 14 terms, good to about 1e-4 for
 /// the monotonic decays met here (H. Stehfest, Commun. ACM 13, 47, 1970).
 template <class Transform>
 double inverse_laplace(const Transform& transform, double time) {

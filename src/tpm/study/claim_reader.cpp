@@ -48,7 +48,7 @@ void ClaimReader::bind(Scope& scope, const std::string& name, const std::string&
     return;
   }
   if (const PrintedSymbol* symbol = set_.symbol(name); symbol != nullptr) {
-    const std::string_view unit = std::string_view(value).substr(value.find_first_of(" \t"));
+    const std::string_view unit = std::string_view(value).substr(value.find_first_of(" \t") + 1);
     static_cast<void>(parse_unit(unit, symbol->unit.dimension, fmt::format("{}: {}", at_, name)));
   }
   scope.values[name] = *si;
