@@ -37,6 +37,10 @@ DigitVerdict classify(double distance) {
 }  // namespace
 
 PrintedNumber parse_printed(std::string_view text, std::string_view where) {
+  if (text.find_first_of(" \t\r\n") != std::string_view::npos) {
+    throw bad_input(where, fmt::format("'{}' has white space", printable(text)),
+                    "the printed digits and nothing else");
+  }
   PrintedNumber number;
   number.value = parse_number(text, where);
   number.text = std::string(text);
