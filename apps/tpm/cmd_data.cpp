@@ -31,10 +31,8 @@ int list(const Session& session) {
   if (session.json()) {
     Json json = Json::array();
     for (const CurveSummary& curve : curves) {
-      json.push_back({{"id", curve.id},
-                      {"kind", curve.kind},
-                      {"rows", curve.size},
-                      {"title", curve.title}});
+      json.push_back(
+          {{"id", curve.id}, {"kind", curve.kind}, {"rows", curve.size}, {"title", curve.title}});
     }
     fmt::print("{}", to_text(json));
     return 0;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <set>
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
@@ -170,25 +171,32 @@ void name_target(Target& target, const fs::path& stem) {
 }
 
 /// One curve takes the name --output; several go into it as a folder.
+fs::path stem_of(const ImportArguments& arguments, const std::string& source,
+                 const std::string& curve_name, std::size_t index, std::size_t of) {
+  if (arguments.files.size() == 1 && of == 1 && !arguments.output.empty()) {
+    const fs::path single = arguments.output;
+    const bool ending = single.extension() == ".csv" || single.extension() == ".json";
+    return ending ? fs::path(single).replace_extension() : single;
+  }
+  std::string name = file_stem(fs::path(source).stem().string());
+  if (of > 1) name += fmt::format("_{}_{}", index + 1, file_stem(curve_name));
+  return fs::path(arguments.output) / name;
+}
+
 std::vector<Target> plan(const ImportArguments& arguments, const ImportOptions& options) {
   std::vector<Target> targets;
+  std::set<fs::path> taken;
   for (const std::string& file : arguments.files) {
     std::vector<ImportedCurve> curves = import_curves(file, options);
-    const std::string stem = file_stem(fs::path(file).stem().string());
     for (std::size_t i = 0; i < curves.size(); ++i) {
-      Target target{file, {}, std::move(curves[i])};
-      std::string name = stem;
-      if (curves.size() > 1) name += fmt::format("_{}_{}", i + 1, file_stem(target.curve.name));
-      name_target(target, fs::path(arguments.output) / name);
-      targets.push_back(std::move(target));
+      const fs::path stem = stem_of(arguments, file, curves[i].name, i, curves.size());
+      targets.push_back({file, {}, std::move(curves[i])});
+      name_target(targets.back(), stem);
+      if (!taken.insert(targets.back().csv).second) {
+        throw bad_input(file, fmt::format("a second curve for {}", targets.back().csv.string()),
+                        "files of different names");
+      }
     }
-  }
-  if (targets.size() == 1) {
-    fs::path single = arguments.output;
-    if (single.extension() == ".csv" || single.extension() == ".json") single.replace_extension();
-    targets.front().curve.description.header.note = options.header.note;
-    targets.front().curve.description.header.title = options.header.title;
-    name_target(targets.front(), single);
   }
   return targets;
 }
@@ -203,39 +211,45 @@ void require_free(const std::vector<Target>& targets) {
   }
 }
 
-void print_text(const std::vector<Target>& targets) {
+void print_text(const std::vector<Target>& targets, bool written) {
   for (const Target& target : targets) {
-    fmt::print("{} -> {}\n", target.source, target.csv.string());
+    fmt::print("{} -> {}\n", target.source,
+               written ? target.csv.string() : "nothing written: no --output");
     for (const Finding& finding : target.curve.findings) {
       fmt::print("  {}: {}\n", finding.what, finding.value);
     }
   }
 }
 
-void print_json(const std::vector<Target>& targets) {
+void print_json(const std::vector<Target>& targets, bool written) {
   Json report = Json::array();
   for (const Target& target : targets) {
     Json understood = Json::object();
     for (const Finding& finding : target.curve.findings) understood[finding.what] = finding.value;
     report.push_back({{"source", target.source},
-                      {"csv", target.csv.string()},
+                      {"csv", written ? Json(target.csv.string()) : Json(nullptr)},
                       {"id", target.curve.description.header.id},
                       {"understood", understood}});
   }
   fmt::print("{}", to_text(report));
 }
 
-/// Nothing is written before every file was understood.
-int import_files(const Session& session, const ImportArguments& arguments) {
-  const std::vector<Target> targets = plan(arguments, options_of(arguments));
-  if (!arguments.force) require_free(targets);
+void write_curves(const std::vector<Target>& targets) {
   for (const Target& target : targets) {
     const Json description = description_json(target.curve.description);
     check_schema(description, "curve", target.csv.string());
     write_file(target.csv, target.curve.csv);
     write_file(fs::path(target.csv).replace_extension(".json"), to_text(description));
   }
-  session.json() ? print_json(targets) : print_text(targets);
+}
+
+/// Nothing is written before every file was understood, and nothing at all without --output.
+int import_files(const Session& session, const ImportArguments& arguments) {
+  const bool write = !arguments.output.empty();
+  const std::vector<Target> targets = plan(arguments, options_of(arguments));
+  if (write && !arguments.force) require_free(targets);
+  if (write) write_curves(targets);
+  session.json() ? print_json(targets, write) : print_text(targets, write);
   return 0;
 }
 
@@ -263,6 +277,7 @@ void add_machine_options(CLI::App& command, ImportArguments& a) {
   add("--drive-quantity", a.drive_quantity, "indentation_depth, relative_length or abscissa");
   add("--response-quantity", a.response_quantity, "contact_force, stress or ordinate");
   command.add_option("--unit", a.units, "COLUMN=UNIT where the file does not say, repeatable")
+      ->allow_extra_args(false)
       ->group(group);
   add("--negate", a.negate, "Turn the sign of: none, drive, response or both")
       ->check(CLI::IsMember({"none", "drive", "response", "both"}));
@@ -307,8 +322,8 @@ void add_data_import_command(CLI::App& data, Session& session) {
   command->add_option("files", arguments->files, "Files to import; sheets as several files")
       ->required();
   command->add_option("-o,--output", arguments->output,
-                      "Name of the curve; a folder if there are several")
-      ->required();
+                      "Name of the curve; a folder if there are several. Without it the files are "
+                      "only read, and what was understood is printed");
   command->add_flag("--force", arguments->force, "Replace files that exist");
   add_text_options(*command, *arguments);
   add_machine_options(*command, *arguments);
@@ -318,9 +333,11 @@ void add_data_import_command(CLI::App& data, Session& session) {
   command->footer(
       "Examples:\n"
       "  tpm data import export.csv -o mine/liver --contact-force \"0.05 N\"\n"
-      "  tpm data import fig7.json -o mine/fig7 --x time:s --y contact_force:N --depth \"4 mm\" \\\n"
+      "  tpm data import fig7.json -o mine/fig7 --x time:s --y contact_force:N --depth \"4 mm\" "
+      "\\\n"
       "      --time-origin end_of_ramp\n"
-      "JSON: a list of objects with source, csv, id and understood (what was found in the file)");
+      "JSON: a list of objects with source, csv (null if not written), id and understood\n"
+      "(what was found in the file)");
   command->callback([&session, arguments] {
     session.run = [&session, arguments] { return import_files(session, *arguments); };
   });

@@ -20,19 +20,10 @@ struct FitOptions {
   std::string seed;
 };
 
-std::uint64_t parse_count(const std::string& text, const char* option, double smallest) {
-  const double value = parse_number(text, option);
-  if (value < smallest || value > 1e9 || value != static_cast<double>(static_cast<long>(value))) {
-    throw Error(ExitCode::usage, option, fmt::format("'{}'", printable(text)),
-                fmt::format("a whole number from {} to 1000000000", smallest));
-  }
-  return static_cast<std::uint64_t>(value);
-}
-
 FitConfig configured(const FitOptions& options) {
   FitConfig config = read_fit_config(options.config);
-  if (!options.starts.empty()) config.starts = parse_count(options.starts, "--starts", 1);
-  if (!options.seed.empty()) config.seed = parse_count(options.seed, "--seed", 0);
+  if (!options.starts.empty()) config.starts = parse_whole_number(options.starts, "--starts", 1);
+  if (!options.seed.empty()) config.seed = parse_whole_number(options.seed, "--seed", 0);
   for (DataChoice& data : config.data) {
     if (!options.rate.empty() && data.protocol.kind == ProtocolChoice::Kind::ramp_hold) {
       data.protocol.rate_m_per_s = parse_quantity(options.rate, Dimension::speed, "--rate");

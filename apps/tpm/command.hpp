@@ -1,5 +1,6 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -18,9 +19,14 @@ struct Session {
 /// Adds --format text|json to a command.
 void add_format_option(CLI::App& command, Session& session);
 
+/// Reads a whole number from `smallest` to 1e9. Throws Error(usage) naming the option.
+[[nodiscard]] std::uint64_t parse_whole_number(const std::string& text, const char* option,
+                                               std::uint64_t smallest);
+
 // One function per file cmd_*.cpp.
 void add_version_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
+void add_coverage_command(CLI::App& app, Session& session);
 void add_tables_command(CLI::App& app, Session& session);
 void add_audit_command(CLI::App& app, Session& session);
 void add_data_command(CLI::App& app, Session& session);

@@ -57,8 +57,8 @@ std::string reading(const std::optional<double>& value, const std::optional<doub
 Table without_empty_columns(const Table& rows) {
   Table kept(rows.size());
   for (std::size_t c = 0; c < rows.front().size(); ++c) {
-    const bool filled = std::any_of(rows.begin() + 1, rows.end(),
-                                    [c](const auto& row) { return !row[c].empty(); });
+    const bool filled =
+        std::any_of(rows.begin() + 1, rows.end(), [c](const auto& row) { return !row[c].empty(); });
     if (!filled) continue;
     for (std::size_t r = 0; r < rows.size(); ++r) kept[r].push_back(rows[r][c]);
   }
@@ -75,9 +75,9 @@ std::string points_text(const PointSet& points) {
                "where", "note"}};
   for (const Datum& datum : points.data) {
     table.push_back({force ? cell(datum.depth_m, 1e-3) : cell(datum.load_N, 1.0), datum.label,
-                     cell(datum.time_s, 1.0),
-                     reading(datum.value, datum.lower, datum.upper, to_si), cell(datum.sd, to_si),
-                     std::string(provenance_name(datum.provenance)), datum.where, datum.note});
+                     cell(datum.time_s, 1.0), reading(datum.value, datum.lower, datum.upper, to_si),
+                     cell(datum.sd, to_si), std::string(provenance_name(datum.provenance)),
+                     datum.where, datum.note});
   }
   std::string text;
   if (points.time_origin != TimeOrigin::none) {
@@ -102,7 +102,7 @@ std::string recording_text(const Recording& recording, bool all_rows) {
   const double response_si = shown_unit(recording.response_quantity).to_si;
   for (std::size_t i = 0; i < size; ++i) {
     if (!all_rows && size > 2 * kEnds && i == kEnds) {
-      table.push_back({"...", "", "", "", fmt::format("{} more", size - 2 * kEnds)});
+      table.push_back({"", "", "", "", fmt::format("... {} more", size - 2 * kEnds)});
       i = size - kEnds;
     }
     table.push_back({at(recording.time_s, i, 1.0), at(recording.drive, i, drive_si),

@@ -1,6 +1,7 @@
 // The program `tpm`: reads the command line, runs one command, turns errors into one line.
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cstdio>
 #include <exception>
 
@@ -15,6 +16,17 @@ void add_format_option(CLI::App& command, Session& session) {
       ->capture_default_str();
 }
 
+std::uint64_t parse_whole_number(const std::string& text, const char* option,
+                                 std::uint64_t smallest) {
+  constexpr std::uint64_t kLargest = 1'000'000'000;
+  std::uint64_t value = 0;
+  const auto [stop, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool whole = status == std::errc{} && stop == text.data() + text.size();
+  if (whole && value >= smallest && value <= kLargest) return value;
+  throw Error(ExitCode::usage, option, fmt::format("'{}'", printable(text)),
+              fmt::format("a whole number from {} to {}", smallest, kLargest));
+}
+
 namespace {
 
 int run(int argc, char** argv) {
@@ -26,6 +38,7 @@ int run(int argc, char** argv) {
   Session session;
   add_version_command(app, session);
   add_fit_command(app, session);
+  add_coverage_command(app, session);
   add_tables_command(app, session);
   add_audit_command(app, session);
   add_data_command(app, session);

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "tpm/core/error.hpp"
 
@@ -84,16 +86,14 @@ const Spelling* find_spelling(std::string_view text) {
 }
 
 std::string known_units(std::optional<Dimension> dimension) {
-  std::string list;
-  std::string_view previous;
+  std::vector<std::string_view> symbols;
   for (const Spelling& s : kSpellings) {
-    if (dimension && s.dimension != *dimension) continue;
-    if (s.symbol.empty() || s.symbol == previous) continue;
-    previous = s.symbol;
-    if (!list.empty()) list += ", ";
-    list += s.symbol;
+    if ((dimension && s.dimension != *dimension) || s.symbol.empty()) continue;
+    if (std::find(symbols.begin(), symbols.end(), s.symbol) == symbols.end()) {
+      symbols.push_back(s.symbol);
+    }
   }
-  return list;
+  return fmt::format("{}", fmt::join(symbols, ", "));
 }
 
 }  // namespace

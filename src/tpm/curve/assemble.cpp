@@ -28,10 +28,10 @@ std::string with_unit(double value, const Unit& unit) {
 
 const ImportedColumn* find(const ImportedSeries& series, Quantity quantity,
                            Bound bound = Bound::value) {
-  const auto found = std::find_if(
-      series.columns.begin(), series.columns.end(), [quantity, bound](const auto& column) {
-        return column.quantity == quantity && column.bound == bound;
-      });
+  const auto found = std::find_if(series.columns.begin(), series.columns.end(),
+                                  [quantity, bound](const auto& column) {
+                                    return column.quantity == quantity && column.bound == bound;
+                                  });
   return found == series.columns.end() ? nullptr : &*found;
 }
 
@@ -51,11 +51,11 @@ void require_increasing(const ImportedSeries& series, const std::string& file) {
   if (time == nullptr) return;
   for (std::size_t i = 1; i < time->values.size(); ++i) {
     if (time->values[i] > time->values[i - 1]) continue;
-    throw bad_input(place(series, file, i),
-                    fmt::format("time {} {} does not follow {} {}", shortest(time->values[i]),
-                                time->unit.symbol, shortest(time->values[i - 1]),
-                                time->unit.symbol),
-                    "strictly increasing times");
+    throw bad_input(
+        place(series, file, i),
+        fmt::format("time {} {} does not follow {} {}", shortest(time->values[i]),
+                    time->unit.symbol, shortest(time->values[i - 1]), time->unit.symbol),
+        "strictly increasing times");
   }
 }
 
@@ -66,16 +66,16 @@ void require_not_negative(const ImportedSeries& series, const std::string& file,
   const auto found = std::find_if(column->values.begin(), column->values.end(),
                                   [](double value) { return value < 0.0; });
   if (found == column->values.end()) return;
-  throw bad_input(
-      place(series, file, static_cast<std::size_t>(found - column->values.begin())),
-      fmt::format("{}{} {} is negative", quantity_name(quantity),
-                  bound == Bound::sd ? " standard deviation" : "", shortest(*found)),
-      "at least 0");
+  throw bad_input(place(series, file, static_cast<std::size_t>(found - column->values.begin())),
+                  fmt::format("{}{} {} is negative", quantity_name(quantity),
+                              bound == Bound::sd ? " standard deviation" : "", shortest(*found)),
+                  "at least 0");
 }
 
 void add_time_findings(const ImportedColumn& time, std::vector<Finding>& findings) {
-  findings.push_back({"time range", fmt::format("{} to {}", with_unit(time.values.front(), time.unit),
-                                                with_unit(time.values.back(), time.unit))});
+  findings.push_back(
+      {"time range", fmt::format("{} to {}", with_unit(time.values.front(), time.unit),
+                                 with_unit(time.values.back(), time.unit))});
   if (time.values.size() < 2) return;
   double shortest_step = time.values[1] - time.values[0];
   double longest_step = shortest_step;

@@ -32,7 +32,8 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
     return;
   }
   const ImportedColumn* force = find(series, Quantity::contact_force);
-  if (force == nullptr) throw bad_input(file, "has no force to find contact with", "a force column");
+  if (force == nullptr)
+    throw bad_input(file, "has no force to find contact with", "a force column");
   const double threshold = *options.contact_force_N / force->unit.to_si;
   const auto contact = std::search_n(force->values.begin(), force->values.end(),
                                      options.contact_samples, threshold, std::greater_equal<>());
@@ -40,7 +41,7 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
     throw bad_input(file,
                     fmt::format("the force never stays at {} N for {} samples",
                                 significant(*options.contact_force_N, 6), options.contact_samples),
-                    "a smaller contact force, or --negate if compression counts negative");
+                    "a smaller contact force, or --negate response if compression counts negative");
   }
   const auto row = static_cast<std::size_t>(contact - force->values.begin());
   std::string found = fmt::format("line {}, {}", series.lines[row], reading(*force, row));
@@ -57,7 +58,8 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
   }
   series.lines.erase(series.lines.begin(), series.lines.begin() + static_cast<std::ptrdiff_t>(row));
   series.findings.push_back(
-      {"contact", fmt::format("{}; counted from there, {} samples before it left out", found, row)});
+      {"contact",
+       fmt::format("{}; counted from there, {} samples before it left out", found, row)});
 }
 
 }  // namespace tpm

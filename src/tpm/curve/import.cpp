@@ -153,8 +153,7 @@ std::vector<ImportedCurve> import_curves(const std::filesystem::path& path,
   const bool json = options.format == ImportFormat::wpd_json ||
                     (options.format == ImportFormat::automatic && looks_like_json(bytes));
   if (json) {
-    return assemble_datasets(read_wpd_json(bytes, file), file, options,
-                             {{"format", "wpd-json"}});
+    return assemble_datasets(read_wpd_json(bytes, file), file, options, {{"format", "wpd-json"}});
   }
   DelimitedOptions text = options.text;
   text.ragged = true;  // headers and columns of unequal length; each reader checks its own rows

@@ -51,10 +51,10 @@ std::vector<DigitizedDataset> read_pairs(const DelimitedTable& table, const std:
     for (std::size_t d = 0; d < datasets.size(); ++d) {
       if (is_empty_at(row, 2 * d) && is_empty_at(row, 2 * d + 1)) continue;
       if (is_empty_at(row, 2 * d) || is_empty_at(row, 2 * d + 1)) {
-        throw bad_input(fmt::format("{}:{}", file, row.line),
-                        fmt::format("dataset '{}' has only one of x and y",
-                                    printable(datasets[d].name)),
-                        "both or none");
+        throw bad_input(
+            fmt::format("{}:{}", file, row.line),
+            fmt::format("dataset '{}' has only one of x and y", printable(datasets[d].name)),
+            "both or none");
       }
       datasets[d].x.push_back(coordinate(table, row, 2 * d, file));
       datasets[d].y.push_back(coordinate(table, row, 2 * d + 1, file));

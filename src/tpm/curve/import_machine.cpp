@@ -16,8 +16,8 @@ namespace {
 /// A column as the header shows it.
 struct Column {
   std::size_t index;
-  std::string name;   ///< may be empty
-  std::string unit;   ///< may be empty
+  std::string name;  ///< may be empty
+  std::string unit;  ///< may be empty
   std::optional<Recognized> meaning;
 
   [[nodiscard]] std::string label() const {
@@ -97,8 +97,8 @@ Header read_header(const DelimitedTable& table, const std::string& file,
   header.rows = options.header_rows ? static_cast<std::size_t>(*options.header_rows)
                                     : count_header_rows(table, file);
   if (header.rows >= table.rows.size()) {
-    throw bad_input(file, fmt::format("{} header rows but only {} rows", header.rows,
-                                      table.rows.size()),
+    throw bad_input(file,
+                    fmt::format("{} header rows but only {} rows", header.rows, table.rows.size()),
                     "samples below the header");
   }
   const DelimitedRow none;
@@ -166,11 +166,11 @@ Unit unit_of(const Column& column, Quantity quantity, const std::string& file) {
   const Dimension dimension = quantity_dimension(quantity);
   const std::string where = fmt::format("{}: {}", file, column.label());
   if (column.unit.empty() && dimension != Dimension::dimensionless) {
-    throw bad_input(where, "has no unit",
-                    fmt::format("--unit \"{}={}\" or another unit of {}",
-                                column.name.empty() ? std::to_string(column.index + 1)
-                                                    : printable(column.name),
-                                si_symbol(dimension), dimension_name(dimension)));
+    throw bad_input(
+        where, "has no unit",
+        fmt::format("--unit \"{}={}\" or another unit of {}",
+                    column.name.empty() ? std::to_string(column.index + 1) : printable(column.name),
+                    si_symbol(dimension), dimension_name(dimension)));
   }
   return parse_unit(column.unit, dimension, where);
 }
@@ -178,19 +178,17 @@ Unit unit_of(const Column& column, Quantity quantity, const std::string& file) {
 /// A column titled "F" in kPa holds a stress: the unit says what the title cannot.
 Quantity response_quantity(const Column& column, const ImportOptions& options) {
   if (options.response_quantity) return *options.response_quantity;
-  const bool stress_unit = is_unit(column.unit) &&
-                           parse_unit(column.unit, column.name).dimension == Dimension::stress;
+  const bool stress_unit =
+      is_unit(column.unit) && parse_unit(column.unit, column.name).dimension == Dimension::stress;
   if (stress_unit) return Quantity::stress;
-  return column.meaning && column.meaning->role == ColumnRole::response
-             ? column.meaning->quantity
-             : Quantity::contact_force;
+  return column.meaning && column.meaning->role == ColumnRole::response ? column.meaning->quantity
+                                                                        : Quantity::contact_force;
 }
 
 Quantity drive_quantity(const Column& column, const ImportOptions& options) {
   if (options.drive_quantity) return *options.drive_quantity;
-  return column.meaning && column.meaning->role == ColumnRole::drive
-             ? column.meaning->quantity
-             : Quantity::indentation_depth;
+  return column.meaning && column.meaning->role == ColumnRole::drive ? column.meaning->quantity
+                                                                     : Quantity::indentation_depth;
 }
 
 /// Builds the series column by column and says which column became what.
@@ -252,8 +250,7 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   const Header header = read_header(table, file, options);
   const Column* time = find_column(header, ColumnRole::time, options.time_column, file);
   const Column* drive = find_column(header, ColumnRole::drive, options.drive_column, file);
-  const Column* response =
-      find_column(header, ColumnRole::response, options.response_column, file);
+  const Column* response = find_column(header, ColumnRole::response, options.response_column, file);
   const Column* sd = find_column(header, ColumnRole::sd, options.sd_column, file);
   if (response == nullptr) {
     throw bad_input(file, "no column is recognised as a force or stress",
@@ -275,10 +272,10 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
 
   ImportedSeries series = reader.take();
   series.name = header.sheet;
-  series.findings.insert(series.findings.begin(),
-                         {"header rows", fmt::format("{}{}{}", header.rows,
-                                                     header.sheet.empty() ? "" : ", sheet ",
-                                                     printable(header.sheet))});
+  series.findings.insert(
+      series.findings.begin(),
+      {"header rows", fmt::format("{}{}{}", header.rows, header.sheet.empty() ? "" : ", sheet ",
+                                  printable(header.sheet))});
   start_at_contact(series, file, options);
   return series;
 }

@@ -50,8 +50,8 @@ struct Pixel {
 
 /// Turns pixels into plot coordinates. Points 1 and 2 lie on the x axis and points 3 and 4 on the y
 /// axis, with known values. With the axis directions u = p2 - p1 and v = p4 - p3 a pixel p is
-/// p1 + a u + b v = p3 + c u + d v, and x = x1 + a (x2 - x1), y = y3 + d (y4 - y3); logarithmic axes
-/// interpolate the logarithm.
+/// p1 + a u + b v = p3 + c u + d v, and x = x1 + a (x2 - x1), y = y3 + d (y4 - y3); logarithmic
+/// axes interpolate the logarithm.
 class Calibration {
  public:
   Calibration(const Json& axes, const std::string& where)

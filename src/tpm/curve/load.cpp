@@ -21,10 +21,11 @@ struct CurveFiles {
   fs::path rows;
 };
 
+/// The curves of the data folder: its CSV files (claims about papers stand there as JSON alone).
 std::vector<std::string> known_ids() {
   std::vector<std::string> ids;
   for (const auto& entry : fs::directory_iterator(share_dir() / "data")) {
-    if (entry.path().extension() == ".json") ids.push_back(entry.path().stem().string());
+    if (entry.path().extension() == ".csv") ids.push_back(entry.path().stem().string());
   }
   std::sort(ids.begin(), ids.end());
   return ids;
@@ -36,9 +37,9 @@ CurveFiles find_files(const std::string& path_or_id) {
     CurveFiles files{fs::path(path).replace_extension(".json"),
                      fs::path(path).replace_extension(".csv")};
     if (path.extension() == ".csv" && fs::exists(path) && !fs::exists(files.description)) {
-      throw bad_input(path.string(), "has no description beside it",
-                      fmt::format("{} (tpm data import writes one)",
-                                  files.description.filename().string()));
+      throw bad_input(
+          path.string(), "has no description beside it",
+          fmt::format("{} (tpm data import writes one)", files.description.filename().string()));
     }
     return files;
   }
@@ -83,8 +84,7 @@ void require_reading(const CurveRows& rows, const Datum& datum) {
 void require_imposed(const CurveRows& rows, const Datum& datum, Observable observable) {
   const bool force = observable == Observable::contact_force;
   if (!(force ? datum.depth_m : datum.load_N)) {
-    throw in_row(rows, datum,
-                 force ? "no imposed indentation_depth" : "no imposed load",
+    throw in_row(rows, datum, force ? "no imposed indentation_depth" : "no imposed load",
                  "the imposed quantity in each row");
   }
 }
@@ -93,10 +93,10 @@ Observable parse_observable(const CurveDescription& description, const std::stri
   for (const Observable o : {Observable::contact_force, Observable::indentation_depth}) {
     if (observable_quantity(o) == description.observable) return o;
   }
-  throw bad_input(file + ": key /observable",
-                  fmt::format("'{}' in a file of kind points",
-                              quantity_name(description.observable.value())),
-                  "contact_force or indentation_depth");
+  throw bad_input(
+      file + ": key /observable",
+      fmt::format("'{}' in a file of kind points", quantity_name(description.observable.value())),
+      "contact_force or indentation_depth");
 }
 
 void require_time_origin(const PointSet& points, const CurveRows& rows) {
@@ -255,8 +255,8 @@ std::vector<CurveSummary> list_curves() {
   std::vector<CurveSummary> list;
   for (const std::string& id : known_ids()) {
     const Curve curve = load_curve(id);
-    list.push_back({id, std::string(curve_kind(curve)), curve_size(curve),
-                    curve_header(curve).title});
+    list.push_back(
+        {id, std::string(curve_kind(curve)), curve_size(curve), curve_header(curve).title});
   }
   return list;
 }

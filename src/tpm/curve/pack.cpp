@@ -65,6 +65,7 @@ class GroupWriter {
   template <typename Rows, typename Member>
   void texts(const std::string& name, const Rows& rows, Member member) {
     std::vector<std::string> values;
+    values.reserve(rows.size());
     for (const auto& row : rows) values.emplace_back(std::invoke(member, row));
     file_.texts(group_ + "/" + name, values);
   }
@@ -75,7 +76,7 @@ class GroupWriter {
 };
 
 template <typename Row>
-std::vector<double> gather(const std::vector<Row>& rows, std::optional<double> Row::* member) {
+std::vector<double> gather(const std::vector<Row>& rows, std::optional<double> Row::*member) {
   std::vector<double> values;
   values.reserve(rows.size());
   for (const Row& row : rows) values.push_back(or_missing(row.*member));
@@ -122,7 +123,7 @@ void write(Hdf5Writer& file, const ValueSet& set) {
   group.texts("name", set.values, &NamedValue::name);
   group.texts("quantity", set.values, &NamedValue::quantity);
   group.texts("unit", set.values, [](const NamedValue& value) { return value.unit.symbol; });
-  const auto numbers = [&](const char* name, std::optional<double> NamedValue::* member) {
+  const auto numbers = [&](const char* name, std::optional<double> NamedValue::*member) {
     group.numbers(name, "see dataset quantity", kRowUnit, gather(set.values, member));
   };
   numbers("value", &NamedValue::value);
@@ -140,7 +141,9 @@ void write(Hdf5Writer& file, const ValueSet& set) {
 class GroupReader {
  public:
   GroupReader(const Hdf5Reader& file, std::string file_name, const std::string& id)
-      : file_(file), where_(fmt::format("{}: /curves/{}", file_name, id)), group_("/curves/" + id) {}
+      : file_(file),
+        where_(fmt::format("{}: /curves/{}", file_name, id)),
+        group_("/curves/" + id) {}
 
   [[nodiscard]] const std::string& where() const { return where_; }
 
@@ -171,14 +174,14 @@ class GroupReader {
 
   template <typename Row>
   void numbers(const std::string& name, std::vector<Row>& rows,
-               std::optional<double> Row::* member) {
+               std::optional<double> Row::*member) {
     const std::vector<double> values = numbers(name);
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (!std::isnan(values[i])) rows[i].*member = values[i];
     }
   }
   template <typename Row>
-  void texts(const std::string& name, std::vector<Row>& rows, std::string Row::* member) {
+  void texts(const std::string& name, std::vector<Row>& rows, std::string Row::*member) {
     std::vector<std::string> values = texts(name);
     for (std::size_t i = 0; i < values.size(); ++i) rows[i].*member = std::move(values[i]);
   }
@@ -301,7 +304,8 @@ void pack_curves(const std::filesystem::path& path, const std::vector<Curve>& cu
 std::vector<Curve> unpack_curves(const std::filesystem::path& path) {
   const Hdf5Reader file(path);
   if (!file.has_attribute("/", "format") || file.attribute("/", "format") != kFormat) {
-    throw bad_input(path.string(), "is HDF5 but holds no curves", "a file that tpm data pack wrote");
+    throw bad_input(path.string(), "is HDF5 but holds no curves",
+                    "a file that tpm data pack wrote");
   }
   std::vector<Curve> curves;
   for (const std::string& id : file.members("/curves")) {

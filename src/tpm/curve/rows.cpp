@@ -101,10 +101,10 @@ std::optional<double> CurveRows::at_least(std::size_t row, Quantity quantity, Bo
                                           double least) const {
   const auto value = number(row, quantity, bound);
   if (value && *value < least) {
-    throw bad_input(place(row, quantity, bound),
-                    fmt::format("{} is too small",
-                                printable(field(row, numeric_.at({quantity, bound}).index))),
-                    fmt::format("at least {}", least));
+    throw bad_input(
+        place(row, quantity, bound),
+        fmt::format("{} is too small", printable(field(row, numeric_.at({quantity, bound}).index))),
+        fmt::format("at least {}", least));
   }
   return value;
 }
@@ -132,8 +132,8 @@ std::string CurveRows::text(std::size_t row, std::string_view column) const {
 Provenance CurveRows::provenance(std::size_t row) const {
   const auto found = texts_.find("provenance");
   if (found == texts_.end()) {
-    throw bad_input(fmt::format("{}:{}", file_, table_.rows.front().line),
-                    "no column 'provenance'", "a provenance word in every row");
+    throw bad_input(fmt::format("{}:{}", file_, table_.rows.front().line), "no column 'provenance'",
+                    "a provenance word in every row");
   }
   return parse_provenance(field(row, found->second), place(row, found->second));
 }

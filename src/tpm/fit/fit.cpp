@@ -92,9 +92,13 @@ void profile_all(const ResidualFunction& function, FitResult& result,
   Progress progress("profiling", parameters.size());
   for (int restart = 0; restart < 10; ++restart) {
     bool deeper = false;
+    std::vector<Minimum> candidates{result.best};
+    for (const DistinctMinimum& m : result.minima) {
+      if (!same_deviance(m.minimum.deviance, result.best.deviance)) candidates.push_back(m.minimum);
+    }
     for (std::size_t i = 0; i < parameters.size() && !deeper; ++i) {
       Profile profile =
-          profile_likelihood(function, parameters, result.best, i, result.covariance, threshold);
+          profile_likelihood(function, parameters, candidates, i, result.covariance, threshold);
       if (profile.better) {
         result.best = minimise(function, parameters, profile.better->natural);
         result.covariance = linear_covariance(function, parameters, result.best, threshold);

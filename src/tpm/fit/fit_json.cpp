@@ -52,6 +52,7 @@ Json parameter_json(const ParameterResult& p) {
   j["estimate_SI"] = number(p.estimate);
   j["standard_error_SI"] = optional_number(p.standard_error);
   j["interval_SI"] = {optional_number(p.lower), optional_number(p.upper)};
+  j["interval_connected"] = p.profile.connected;
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
   j["verdict"] = verdict_name(p.verdict);
   j["words"] = p.words;

@@ -8,7 +8,8 @@
 #include <cmath>
 #include <mutex>
 #include <numeric>
-#include <random>
+
+#include "tpm/core/random.hpp"
 
 namespace tpm {
 namespace {
@@ -76,12 +77,6 @@ ceres::Solver::Options solver_options(FirstStep first_step) {
   return options;
 }
 
-/// A uniform number in [0, 1) with 53 bits: std::uniform_real_distribution may differ between
-/// standard libraries, this does not.
-double uniform(std::mt19937_64& generator) {
-  return static_cast<double>(generator() >> 11) * 0x1.0p-53;
-}
-
 }  // namespace
 
 double deviance_at(const ResidualFunction& function, std::span<const double> natural) {
@@ -96,6 +91,7 @@ namespace {
 void descend(const ResidualFunction& function, std::span<const FitParameter> parameters,
              const std::vector<std::size_t>& free, FirstStep first_step, Minimum& minimum) {
   std::vector<double> theta;
+  theta.reserve(free.size());
   for (const std::size_t i : free) theta.push_back(parameters[i].theta(minimum.natural[i]));
   ceres::Problem problem;
   problem.AddResidualBlock(new FreeThetaCost(function, parameters, free, minimum.natural), nullptr,
@@ -238,19 +234,18 @@ std::vector<std::vector<double>> latin_hypercube_starts(std::span<const FitParam
                                                         std::size_t count, std::uint64_t seed) {
   std::vector<std::vector<double>> starts(count, std::vector<double>(parameters.size()));
   if (count == 0) return starts;
-  std::mt19937_64 generator(seed);
+  Random random(seed);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const FitParameter& p = parameters[i];
     starts[0][i] = p.start;
     std::vector<std::size_t> stratum(count - 1);
     std::iota(stratum.begin(), stratum.end(), std::size_t{0});
     for (std::size_t k = stratum.size(); k > 1; --k) {
-      std::swap(stratum[k - 1],
-                stratum[static_cast<std::size_t>(uniform(generator) * static_cast<double>(k))]);
+      std::swap(stratum[k - 1], stratum[random.below(k)]);
     }
     for (std::size_t k = 1; k < count; ++k) {
-      const double share = (static_cast<double>(stratum[k - 1]) + uniform(generator)) /
-                           static_cast<double>(count - 1);
+      const double share =
+          (static_cast<double>(stratum[k - 1]) + random.uniform()) / static_cast<double>(count - 1);
       // An unbounded linear parameter is searched around its start.
       const double low =
           std::isfinite(p.lower) ? p.lower : p.start - 10.0 * (std::abs(p.start) + 1.0);

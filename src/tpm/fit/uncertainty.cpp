@@ -94,10 +94,11 @@ namespace {
 class ProfileWalk {
  public:
   ProfileWalk(const ResidualFunction& function, std::span<const FitParameter> parameters,
-              const Minimum& minimum, std::size_t index, double rise)
+              const Minimum& minimum, double best_deviance, std::size_t index, double rise)
       : function_(function),
         parameters_(parameters),
         minimum_(minimum),
+        best_deviance_(best_deviance),
         index_(index),
         rise_(rise),
         fixed_(parameters.size(), false) {
@@ -110,7 +111,7 @@ class ProfileWalk {
     const FitParameter& p = parameters_[index_];
     const double bound = direction > 0 ? p.theta_upper() : p.theta_lower();
     double theta = p.theta(minimum_.natural[index_]);
-    double risen = 0.0;
+    double risen = minimum_.deviance - best_deviance_;
     double step = first_step;
     warm_ = minimum_.natural;
     for (int steps = 0; steps < 400 && (bound - theta) * direction > 0.0; ++steps) {
@@ -122,8 +123,8 @@ class ProfileWalk {
         step *= 0.25;
         continue;
       }
-      const double risen_next = m.deviance - minimum_.deviance;
-      if (risen_next < -kBetterBy * (1.0 + minimum_.deviance)) {
+      const double risen_next = m.deviance - best_deviance_;
+      if (risen_next < -kBetterBy * (1.0 + best_deviance_)) {
         profile.better = m;
         return std::nullopt;
       }
@@ -154,7 +155,7 @@ class ProfileWalk {
     std::vector<double> start = warm_;
     start[index_] = value;
     Minimum m = minimise(function_, parameters_, start, fixed_);
-    if (!m.usable || m.deviance > minimum_.deviance + rise_) {
+    if (!m.usable || m.deviance > best_deviance_ + rise_) {
       start = minimum_.natural;
       start[index_] = value;
       const Minimum other = minimise(function_, parameters_, start, fixed_);
@@ -167,7 +168,7 @@ class ProfileWalk {
   double limit_between(double inside, double outside) const {
     const auto excess = [&](double theta) {
       const Minimum m = constrained(theta);
-      const double risen = m.usable ? std::max(m.deviance - minimum_.deviance, 0.0)
+      const double risen = m.usable ? std::max(m.deviance - best_deviance_, 0.0)
                                     : std::numeric_limits<double>::max();
       return std::sqrt(risen) - std::sqrt(rise_);
     };
@@ -189,6 +190,7 @@ class ProfileWalk {
   const ResidualFunction& function_;
   std::span<const FitParameter> parameters_;
   const Minimum& minimum_;
+  double best_deviance_;
   std::size_t index_;
   double rise_;
   FixedMask fixed_;
@@ -207,25 +209,54 @@ double first_step(const FitParameter& p, std::size_t index, const Covariance& co
   return std::isfinite(width) ? std::min(from_sd, width / 10.0) : from_sd;
 }
 
+/// A range of natural values, open where a bound was reached.
+struct Range {
+  std::optional<double> lower, upper;
+};
+
+/// Encloses both; tells whether they touch.
+bool enclose(Range& all, const Range& other) {
+  const bool apart = (all.upper && other.lower && *all.upper < *other.lower) ||
+                     (other.upper && all.lower && *other.upper < *all.lower);
+  all.lower = all.lower && other.lower ? std::optional<double>(std::min(*all.lower, *other.lower))
+                                       : std::nullopt;
+  all.upper = all.upper && other.upper ? std::optional<double>(std::max(*all.upper, *other.upper))
+                                       : std::nullopt;
+  return !apart;
+}
+
 }  // namespace
 
 Profile profile_likelihood(const ResidualFunction& function,
-                           std::span<const FitParameter> parameters, const Minimum& minimum,
-                           std::size_t index, const Covariance& covariance,
-                           const Threshold& threshold) {
+                           std::span<const FitParameter> parameters,
+                           std::span<const Minimum> minima, std::size_t index,
+                           const Covariance& covariance, const Threshold& threshold) {
   const FitParameter& p = parameters[index];
-  const double rise = threshold.rise(minimum.deviance);
-  Profile profile;
-  profile.points.push_back({minimum.natural[index], minimum.deviance});
-  ProfileWalk walk(function, parameters, minimum, index, rise);
+  const double best = minima.front().deviance;
+  const double rise = threshold.rise(best);
   const double step = first_step(p, index, covariance, rise);
-  for (const int direction : {-1, +1}) {
-    const std::optional<double> theta = walk.run(direction, step, profile);
-    if (profile.better) return profile;
-    if (!theta) continue;
-    const bool is_upper = (direction > 0) != p.reversed();
-    (is_upper ? profile.upper : profile.lower) = p.natural(*theta);
+  Profile profile;
+  std::optional<Range> all;
+  for (const Minimum& minimum : minima) {
+    if (minimum.deviance - best >= rise) continue;
+    profile.points.push_back({minimum.natural[index], minimum.deviance});
+    ProfileWalk walk(function, parameters, minimum, best, index, rise);
+    Range range;
+    for (const int direction : {-1, +1}) {
+      const std::optional<double> theta = walk.run(direction, step, profile);
+      if (profile.better) return profile;
+      if (!theta) continue;
+      const bool is_upper = (direction > 0) != p.reversed();
+      (is_upper ? range.upper : range.lower) = p.natural(*theta);
+    }
+    if (!all) {
+      all = range;
+    } else if (!enclose(*all, range)) {
+      profile.connected = false;
+    }
   }
+  profile.lower = all->lower;
+  profile.upper = all->upper;
   std::sort(profile.points.begin(), profile.points.end(),
             [](const ProfilePoint& a, const ProfilePoint& b) { return a.natural < b.natural; });
   return profile;

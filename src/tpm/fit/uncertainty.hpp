@@ -52,16 +52,19 @@ struct Profile {
   std::vector<ProfilePoint> points;  ///< rising in the natural value
   std::optional<double> lower;
   std::optional<double> upper;
+  bool connected = true;          ///< false: the values between the limits do not all belong
   std::optional<Minimum> better;  ///< a deeper minimum met on the way; the profile is then void
   int failures = 0;               ///< constrained fits that could not be evaluated
 };
 
-/// Walks outwards from the minimum in theta with adaptive steps until the deviance has risen by
-/// the threshold (then the limit is bracketed and found to 1e-9 of theta's width) or the bound is
-/// reached.
+/// Walks outwards from each minimum in theta with adaptive steps until the deviance has risen by
+/// the threshold above the best one (then the limit is bracketed and found to 1e-9 of theta's
+/// width) or the bound is reached. Several minima within the threshold may give separate ranges:
+/// the limits then enclose them all and `connected` is false.
+/// @param minima rising deviance, the best first
 [[nodiscard]] Profile profile_likelihood(const ResidualFunction& function,
                                          std::span<const FitParameter> parameters,
-                                         const Minimum& minimum, std::size_t index,
+                                         std::span<const Minimum> minima, std::size_t index,
                                          const Covariance& covariance, const Threshold& threshold);
 
 }  // namespace tpm

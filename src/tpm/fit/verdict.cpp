@@ -62,8 +62,9 @@ std::string parameter_words(const ParameterResult& p, double level) {
     case Verdict::identified: {
       const std::string interval =
           fmt::format("{} to {}", in_unit(f, *p.lower), in_unit(f, *p.upper));
-      return fmt::format("{} = {} is identified: {} interval {}", f.name, in_unit(f, p.estimate),
-                         percent(level), interval);
+      return fmt::format("{} = {} is identified: {} interval {}{}", f.name, in_unit(f, p.estimate),
+                         percent(level), interval,
+                         p.profile.connected ? "" : ", not all of it: separate ranges fit");
     }
     case Verdict::lower_only:
       return fmt::format("{} is at least {} ({} interval, one-sided){}", f.name,

@@ -20,12 +20,13 @@ namespace {
 constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
 constexpr std::string_view kTextExpected = "text in UTF-8, or in UTF-16 with a byte order mark";
 
-std::string at_line(std::string_view where, int line) { return fmt::format("{}:{}", where, line); }
+std::string at_line(std::string_view where, int line) {
+  return fmt::format("{}:{}", where, line);
+}
 
 int line_of(std::string_view text, std::size_t position) {
-  return 1 + static_cast<int>(std::count(text.begin(),
-                                         text.begin() + static_cast<std::ptrdiff_t>(position),
-                                         '\n'));
+  return 1 + static_cast<int>(std::count(
+                 text.begin(), text.begin() + static_cast<std::ptrdiff_t>(position), '\n'));
 }
 
 std::string from_utf16(std::string_view bytes, bool big_endian, std::string_view where) {
@@ -178,9 +179,9 @@ void require_same_width(const std::vector<DelimitedRow>& rows, std::string_view 
   const std::size_t width = rows.front().fields.size();
   for (const DelimitedRow& row : rows) {
     if (row.fields.size() != width) {
-      throw bad_input(
-          at_line(where, row.line), fmt::format("{} fields in this row", row.fields.size()),
-          fmt::format("{} fields as in line {}", width, rows.front().line));
+      throw bad_input(at_line(where, row.line),
+                      fmt::format("{} fields in this row", row.fields.size()),
+                      fmt::format("{} fields as in line {}", width, rows.front().line));
     }
   }
 }

@@ -18,8 +18,8 @@ enum class Encoding { utf8, utf8_with_mark, utf16_little_endian, utf16_big_endia
 struct DelimitedOptions {
   std::optional<char> separator;      ///< ',', ';' or '\t'
   std::optional<bool> decimal_comma;  ///< "3,5" is three and a half; never with separator ','
-  bool latin1 = false;                ///< read bytes as ISO 8859-1 unless a byte order mark says more
-  bool ragged = false;                ///< let rows differ in their number of fields
+  bool latin1 = false;  ///< read bytes as ISO 8859-1 unless a byte order mark says more
+  bool ragged = false;  ///< let rows differ in their number of fields
   std::size_t longest_line = std::size_t{1} << 20;  ///< bytes after conversion to UTF-8
 };
 

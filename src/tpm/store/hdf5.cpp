@@ -1,8 +1,10 @@
 #include "tpm/store/hdf5.hpp"
 
 #include <fmt/format.h>
+#include <hdf5.h>
 #include <unistd.h>
 
+#include <type_traits>
 #include <utility>
 
 #include "tpm/core/error.hpp"
@@ -11,6 +13,8 @@
 namespace tpm {
 namespace fs = std::filesystem;
 namespace {
+
+static_assert(std::is_same_v<hid_t, Hdf5Handle::Id> && std::is_same_v<herr_t, int>);
 
 /// Keeps HDF5 from printing its error stack while a call is under way; we report errors ourselves.
 class QuietErrors {
@@ -209,29 +213,30 @@ std::vector<std::string> Hdf5Reader::members(const std::string& group) const {
   return names;
 }
 
-Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, H5T_class_t kind,
+Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, bool as_text,
                                     std::size_t& size) const {
   Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
   if (!set.valid()) fail(name, "no such dataset", "a file that tpm data pack wrote");
   const Hdf5Handle type(H5Dget_type(set.get()), H5Tclose);
   const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
-  const bool right = H5Tget_class(type.get()) == kind &&
+  const bool right = H5Tget_class(type.get()) == (as_text ? H5T_STRING : H5T_FLOAT) &&
                      H5Sget_simple_extent_ndims(space.get()) == 1 &&
-                     (kind != H5T_STRING || H5Tis_variable_str(type.get()) > 0);
+                     (!as_text || H5Tis_variable_str(type.get()) > 0);
   if (!right) {
     fail(name, "is of another type",
-         kind == H5T_STRING ? "a list of texts" : "a list of floating-point numbers");
+         as_text ? "a list of texts" : "a list of floating-point numbers");
   }
   size = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.get()));
   // A damaged extent must not become an allocation of that size.
-  if (size > fs::file_size(path_)) fail(name, "says it is larger than the file", "a whole HDF5 file");
+  if (size > fs::file_size(path_))
+    fail(name, "says it is larger than the file", "a whole HDF5 file");
   return set;
 }
 
 std::vector<double> Hdf5Reader::numbers(const std::string& name) const {
   const QuietErrors quiet;
   std::size_t size = 0;
-  const Hdf5Handle set = open_dataset(name, H5T_FLOAT, size);
+  const Hdf5Handle set = open_dataset(name, false, size);
   std::vector<double> values(size);
   if (H5Dread(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
     fail(name, "cannot be read", "a whole HDF5 file");
@@ -242,7 +247,7 @@ std::vector<double> Hdf5Reader::numbers(const std::string& name) const {
 std::vector<std::string> Hdf5Reader::texts(const std::string& name) const {
   const QuietErrors quiet;
   std::size_t size = 0;
-  const Hdf5Handle set = open_dataset(name, H5T_STRING, size);
+  const Hdf5Handle set = open_dataset(name, true, size);
   const Hdf5Handle type = text_type();
   const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
   BorrowedTexts borrowed(type, space, size);

@@ -1,6 +1,5 @@
 #pragma once
-#include <hdf5.h>
-
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -8,24 +7,26 @@
 
 namespace tpm {
 
-/// Owns one HDF5 identifier and closes it with the function that belongs to its kind.
+/// Owns one HDF5 identifier and closes it with the function that belongs to its kind. Spelled with
+/// plain types, so that users of this header need no HDF5 header.
 class Hdf5Handle {
  public:
-  using Closer = herr_t (*)(hid_t);
+  using Id = std::int64_t;
+  using Closer = int (*)(Id);
   Hdf5Handle() = default;
-  Hdf5Handle(hid_t id, Closer closer) : id_(id), closer_(closer) {}
+  Hdf5Handle(Id id, Closer closer) : id_(id), closer_(closer) {}
   ~Hdf5Handle() { reset(); }
   Hdf5Handle(Hdf5Handle&& other) noexcept;
   Hdf5Handle& operator=(Hdf5Handle&& other) noexcept;
   Hdf5Handle(const Hdf5Handle&) = delete;
   Hdf5Handle& operator=(const Hdf5Handle&) = delete;
 
-  [[nodiscard]] hid_t get() const noexcept { return id_; }
+  [[nodiscard]] Id get() const noexcept { return id_; }
   [[nodiscard]] bool valid() const noexcept { return id_ >= 0; }
   void reset() noexcept;
 
  private:
-  hid_t id_ = -1;
+  Id id_ = -1;
   Closer closer_ = nullptr;
 };
 
@@ -48,7 +49,7 @@ class Hdf5Writer {
   void commit();
 
  private:
-  [[nodiscard]] Hdf5Handle dataset(const std::string& name, hid_t type, std::size_t size);
+  [[nodiscard]] Hdf5Handle dataset(const std::string& name, Hdf5Handle::Id type, std::size_t size);
   [[noreturn]] void fail(const std::string& what) const;
 
   std::filesystem::path path_;
@@ -72,7 +73,7 @@ class Hdf5Reader {
   [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;
 
  private:
-  [[nodiscard]] Hdf5Handle open_dataset(const std::string& name, H5T_class_t kind,
+  [[nodiscard]] Hdf5Handle open_dataset(const std::string& name, bool as_text,
                                         std::size_t& size) const;
   [[noreturn]] void fail(const std::string& object, const std::string& what,
                          std::string_view expected) const;

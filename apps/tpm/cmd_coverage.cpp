@@ -1,0 +1,62 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/fit/coverage.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct CoverageOptions {
+  std::string config;
+  std::string sets = "2000";
+  std::string seed = "0";
+};
+
+std::uint64_t seed_of(const std::string& text) {
+  if (text == "clock") {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return static_cast<std::uint64_t>(now.count()) % 1'000'000'007U;
+  }
+  return parse_whole_number(text, "--seed", 0);
+}
+
+int coverage(const CoverageOptions& options, const Session& session) {
+  const FitConfig config = read_fit_config(options.config);
+  const auto sets = static_cast<int>(parse_whole_number(options.sets, "--sets", 1));
+  const CoverageResult result = check_coverage(config, sets, seed_of(options.seed));
+  fmt::print("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
+  constexpr double kSuspicious = 0.001;
+  for (const ParameterCoverage& p : result.parameters) {
+    if (p.p_value < kSuspicious) return static_cast<int>(ExitCode::answer_is_no);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_coverage_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "coverage", "Check the intervals of a fit by simulation: how often do they hold the truth?");
+  auto options = std::make_shared<CoverageOptions>();
+  command
+      ->add_option("CONFIG", options->config,
+                   "Configuration of tpm fit; its start values are the truth")
+      ->required();
+  command->add_option("--sets", options->sets, "Number of simulated data sets")
+      ->capture_default_str();
+  command->add_option("--seed", options->seed, "Seed, 0 or more, or 'clock'")
+      ->capture_default_str();
+  add_format_option(*command, session);
+  command->footer(
+      "Exit code 1 if a coverage differs from its level at the 0.1 % level (exact binomial test).\n"
+      "Example:\n  tpm coverage configs/coverage_absolute.json --sets 2000 --seed 0");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return coverage(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

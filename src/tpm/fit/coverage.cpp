@@ -1,0 +1,133 @@
+#include "tpm/fit/coverage.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/binomial.hpp>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/fit/fit.hpp"
+
+namespace tpm {
+namespace {
+
+void refuse_what_cannot_be_simulated(const FitConfig& config, const ExperimentResiduals& function) {
+  if (function.band_count() > 0) {
+    throw bad_input("coverage", fmt::format("the data hold {} bands", function.band_count()),
+                    "values only: a band has no noise model to simulate");
+  }
+  if (config.loss.kind != Loss::none) {
+    throw bad_input("coverage", "a robust loss has no chi-square threshold", "loss 'none'");
+  }
+}
+
+/// A datum as the declared noise would scatter it about the truth.
+double simulated(const Noise& noise, const FitDatum& datum, double truth, Random& random) {
+  const double z = random.normal();
+  if (noise.kind == NoiseKind::log) return truth * std::exp(noise.relative * z);
+  const bool absolute = noise.kind == NoiseKind::per_row || noise.kind == NoiseKind::absolute;
+  return truth + z * (absolute ? datum.sigma
+                               : sigma_of(noise, truth, {}, "coverage") *
+                                     (noise.kind == NoiseKind::relative_to_model ? truth : 1.0));
+}
+
+bool holds(const ParameterResult& p, double truth) {
+  return (!p.lower || *p.lower <= truth) && (!p.upper || truth <= *p.upper);
+}
+
+}  // namespace
+
+double binomial_test(int k, int n, double p) {
+  const boost::math::binomial distribution(n, p);
+  const double here = boost::math::pdf(distribution, k);
+  double sum = 0.0;
+  for (int i = 0; i <= n; ++i) {
+    const double there = boost::math::pdf(distribution, i);
+    if (there <= here * (1.0 + 1e-7)) sum += there;
+  }
+  return std::min(sum, 1.0);
+}
+
+CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t seed) {
+  ExperimentResiduals function(config);
+  refuse_what_cannot_be_simulated(config, function);
+  std::vector<FitParameter> parameters;
+  std::vector<double> truth;
+  CoverageResult result;
+  for (const EstimatedParameter& p : config.parameters) {
+    parameters.push_back(p.fit);
+    truth.push_back(p.fit.start);
+    result.parameters.push_back({p.fit.name, 0, 0, 1.0});
+  }
+  Threshold threshold;
+  threshold.level = config.level;
+  threshold.scale_known = config.data.front().noise.scale_known;
+  threshold.data_count = function.value_count();
+  result.seed = seed;
+  result.level = config.level;
+
+  const Eigen::VectorXd expected = function.predict(truth, nullptr);
+  Random random(seed);
+  Progress progress("simulating and fitting", static_cast<std::size_t>(sets));
+  for (int set = 0; set < sets; ++set) {
+    for (const Experiment& experiment : function.experiments()) {
+      for (const std::size_t i : experiment.data) {
+        function.set_value(i, simulated(config.data[experiment.choice].noise, function.data()[i],
+                                        expected[static_cast<Eigen::Index>(i)], random));
+      }
+    }
+    ++result.sets;
+    progress.advance();
+    try {
+      const FitResult fit =
+          fit_residuals(function, parameters, config.starts, config.seed, threshold, true);
+      for (std::size_t i = 0; i < parameters.size(); ++i) {
+        const ParameterResult& p = fit.parameters[i];
+        if (holds(p, truth[i])) ++result.parameters[i].covered;
+        if (p.verdict != Verdict::identified) ++result.parameters[i].one_sided;
+      }
+    } catch (const Error& error) {
+      // A set that cannot be fitted counts as not covered, and is reported.
+      if (error.code() != ExitCode::numerical) throw;
+      ++result.failed;
+    }
+  }
+  for (ParameterCoverage& p : result.parameters) {
+    p.p_value = binomial_test(p.covered, result.sets, result.level);
+  }
+  return result;
+}
+
+Json to_json(const CoverageResult& result) {
+  Json j{{"seed", result.seed}, {"confidence_level", result.level}, {"data_sets", result.sets}};
+  j["failed"] = result.failed;
+  Json list = Json::array();
+  for (const ParameterCoverage& p : result.parameters) {
+    list.push_back({{"name", p.name},
+                    {"covered", p.covered},
+                    {"coverage", rounded(static_cast<double>(p.covered) / result.sets, 6)},
+                    {"open_intervals", p.one_sided},
+                    {"binomial_p_value", rounded(p.p_value, 6)}});
+  }
+  j["parameters"] = std::move(list);
+  return j;
+}
+
+std::string to_terminal_text(const CoverageResult& result) {
+  std::string text = fmt::format("{} simulated data sets, seed {}, {} could not be fitted\n",
+                                 result.sets, result.seed, result.failed);
+  for (const ParameterCoverage& p : result.parameters) {
+    text += fmt::format(
+        "{:<12} {:.2f} % of the {:.4g} % intervals hold the truth (exact binomial "
+        "p = {}; {} intervals open)\n",
+        p.name, 100.0 * p.covered / result.sets, 100.0 * result.level, significant(p.p_value, 2),
+        p.one_sided);
+  }
+  return text;
+}
+
+}  // namespace tpm

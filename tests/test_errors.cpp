@@ -1,0 +1,363 @@
+// Runs the program on bad input of every file type and checks that it answers as promised: one line
+// on standard error, an exit code that is not zero, no output file left behind. The answers are the
+// table docs/errors.md. To add a file type, write a function that returns its cases and add it to
+// all_cases(). After a wanted change run this test with TPM_UPDATE_DOCS=1 and review the table.
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <regex>
+
+#include "temp_folder.hpp"
+#include "tpm/curve/load.hpp"
+#include "tpm/curve/pack.hpp"
+#include "tpm/store/file.hpp"
+
+using namespace tpm;
+using test::TempFolder;
+
+namespace {
+
+/// One bad input and how the program is run on it.
+struct ErrorCase {
+  std::string file_type;
+  std::string what;
+  std::string arguments;  ///< of tpm; "{}" stands for the folder, "{}/out" for what it may write
+  std::function<void(const TempFolder&)> make;  ///< writes the bad files
+};
+
+using Files = std::vector<std::pair<std::string, std::string>>;
+
+std::function<void(const TempFolder&)> files(Files list) {
+  return [list = std::move(list)](const TempFolder& folder) {
+    for (const auto& [name, bytes] : list) {
+      std::ofstream(folder / name, std::ios::binary) << bytes;
+    }
+  };
+}
+
+const std::string kGarbage(
+    "\x7F"
+    "ELF\x02\x01\x00\x00\xFF\xFE\xA0",
+    11);
+constexpr std::size_t kLongLine = 100'000'000;
+
+std::string long_line() {
+  return std::string(kLongLine, '1') + "\n";
+}
+
+const std::string kPointsJson = R"({"id": "c", "title": "t", "kind": "points",
+"observable": "contact_force",
+"columns": {"depth_mm": {"quantity": "indentation_depth", "unit": "mm"},
+            "force_N": {"quantity": "contact_force", "unit": "N"}}})";
+
+const std::string kRecordingJson = R"({"id": "c", "title": "t", "kind": "recording",
+"observable": "contact_force", "provenance": "measured",
+"columns": {"time_s": {"quantity": "time", "unit": "s"},
+            "force_N": {"quantity": "contact_force", "unit": "N"}}})";
+
+std::vector<ErrorCase> curve_csv_cases() {
+  const std::string type = "curve CSV";
+  const std::string show = "data show {}/c.csv";
+  const std::string head = "depth_mm,force_N,provenance\n";
+  const auto points = [](std::string csv) {
+    return files({{"c.json", kPointsJson}, {"c.csv", std::move(csv)}});
+  };
+  return {
+      {type, "missing", show, files({{"c.json", kPointsJson}})},
+      {type, "missing description", show, files({{"c.csv", head}})},
+      {type, "empty", show, points("")},
+      {type, "header only", show, points(head)},
+      {type, "wrong column", show, points("depth_mm,farce_N,provenance\n2,1,table\n")},
+      {type, "missing column", show, points("depth_mm,provenance\n2,table\n")},
+      {type, "no number", show, points(head + "2,high,table\n")},
+      {type, "NaN", show, points(head + "2,nan,table\n")},
+      {type, "overflow", show, points(head + "2,1e400,table\n")},
+      {type, "negative depth", show, points(head + "-2,1,table\n")},
+      {type, "unknown provenance", show, points(head + "2,1,guess\n")},
+      {type, "truncated row", show, points(head + "2,1,table\n4,")},
+      {type, "unclosed quote", show, points(head + "2,1,\"table\n")},
+      {type, "binary garbage", show, points(kGarbage)},
+      {type, "100 MB line", show, points(head + long_line())},
+      {type, "unsorted time", show,
+       files({{"c.json", kRecordingJson}, {"c.csv", "time_s,force_N\n0,0\n2,1\n1,1\n"}})},
+  };
+}
+
+std::vector<ErrorCase> curve_json_cases() {
+  const std::string type = "curve description";
+  const std::string show = "data show {}/c.json";
+  const auto described = [](const std::string& from, const std::string& to) {
+    std::string json = kPointsJson;
+    const auto at = json.find(from);
+    if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
+    json.replace(at, from.size(), to);
+    return files({{"c.json", json}, {"c.csv", "depth_mm,force_N,provenance\n2,1,table\n"}});
+  };
+  const auto json = [](std::string text) { return files({{"c.json", std::move(text)}}); };
+  return {
+      {type, "missing", show, files({})},
+      {type, "empty", show, json("")},
+      {type, "truncated", show, json(kPointsJson.substr(0, 100))},
+      {type, "binary garbage", show, json(kGarbage)},
+      {type, "100 MB line", show, json(long_line())},
+      {type, "missing key", show, described("\"title\": \"t\",", "")},
+      {type, "unknown key", show, described("\"title\"", "\"titel\": \"t\", \"title\"")},
+      {type, "key twice", show, described("\"title\"", "\"title\": \"u\", \"title\"")},
+      {type, "wrong type", show, described("\"t\"", "7")},
+      {type, "unknown kind", show, described("points", "curve")},
+      {type, "unknown quantity", show, described("indentation_depth", "height")},
+      {type, "wrong unit", show, described("\"unit\": \"mm\"", "\"unit\": \"N\"")},
+      {type, "unknown unit", show, described("\"unit\": \"mm\"", "\"unit\": \"furlong\"")},
+      {type, "negative diameter", show,
+       described("\"kind\"", "\"probe\": {\"diameter\": \"-4 mm\"}, \"kind\"")},
+      {type, "id of another file", show, described("\"c\"", "\"d\"")},
+  };
+}
+
+std::vector<ErrorCase> machine_cases() {
+  const std::string type = "machine export";
+  const std::string import = "data import {}/m.csv -o {}/out";
+  const std::string head = "Time,Force,Depth\ns,N,mm\n";
+  const auto machine = [](std::string text) { return files({{"m.csv", std::move(text)}}); };
+  return {
+      {type, "missing", import, files({})},
+      {type, "empty", import, machine("")},
+      {type, "header only", import, machine(head)},
+      {type, "wrong column", import, machine("a,b,c\n0,0,0\n1,1,1\n")},
+      {type, "no unit", import, machine("Time,Force,Depth\n0,0,0\n1,1,1\n")},
+      {type, "wrong unit", import, machine("Time,Force,Depth\ns,mm,mm\n0,0,0\n1,1,1\n")},
+      {type, "no number", import, machine(head + "0,0,0\n1,high,1\n")},
+      {type, "NaN", import, machine(head + "0,0,0\n1,nan,1\n")},
+      {type, "unsorted time", import, machine(head + "0,0,0\n2,1,1\n1,1,1\n")},
+      {type, "negative standard deviation", import,
+       machine("Time,Force,Depth,SD\ns,N,mm,N\n0,0,0,0\n1,1,1,-1\n")},
+      {type, "no contact", import + " --contact-force \"5 N\"", machine(head + "0,0,0\n1,1,1\n")},
+      {type, "truncated row", import, machine(head + "0,0,0\n1,1,1\n2,2")},
+      {type, "UTF-16 without byte order mark", import, machine(std::string("T\0,\0F\0", 6))},
+      {type, "binary garbage", import, machine(kGarbage)},
+      {type, "100 MB line", import, machine(long_line())},
+  };
+}
+
+std::vector<ErrorCase> digitizer_cases() {
+  const std::string type = "WebPlotDigitizer project";
+  const std::string import = "data import {}/w.json -o {}/out --x time:s --y contact_force:N";
+  const auto project = [](std::string text) { return files({{"w.json", std::move(text)}}); };
+  const auto data = [&project](const std::string& points) {
+    return project(R"({"axesColl": [], "datasetColl": [{"name": "d", "axesName": "XY", "data": [)" +
+                   points + "]}]}");
+  };
+  return {
+      {type, "missing", import, files({})},
+      {type, "empty", import, project("")},
+      {type, "truncated", import, project(R"({"datasetColl": [{"name": "d", "da)")},
+      {type, "another JSON file", import, project(R"({"a": 1})")},
+      {type, "no dataset", import, project(R"({"datasetColl": []})")},
+      {type, "no number", import, data(R"({"value": ["a", 1]})")},
+      {type, "null", import, data(R"({"value": [null, 1]})")},
+      {type, "pixels without axes", import, data(R"({"x": 1, "y": 2})")},
+      {type, "one time twice", import, data(R"({"value": [1, 1]}, {"value": [1, 2]})")},
+      {type, "axes not named", "data import {}/w.json -o {}/out", data(R"({"value": [1, 1]})")},
+      {type, "wrong unit", "data import {}/w.json -o {}/out --x time:mm --y contact_force:N",
+       data(R"({"value": [1, 1]})")},
+      {type, "binary garbage", import, project("{" + kGarbage)},
+      {type, "100 MB line", import, project("{" + long_line())},
+  };
+}
+
+std::function<void(const TempFolder&)> packed(double part) {
+  return [part](const TempFolder& folder) {
+    pack_curves(folder / "p.h5", {load_curve("evren_static")});
+    const std::string whole = read_file(folder / "p.h5");
+    const auto size = static_cast<std::size_t>(static_cast<double>(whole.size()) * part);
+    std::ofstream(folder / "p.h5", std::ios::binary) << whole.substr(0, size);
+  };
+}
+
+std::vector<ErrorCase> hdf5_cases() {
+  const std::string type = "HDF5";
+  const std::string show = "data show {}/p.h5";
+  return {
+      {type, "missing", show, files({})},
+      {type, "empty", show, files({{"p.h5", ""}})},
+      {type, "truncated", show, packed(0.5)},
+      {type, "signature only", show, files({{"p.h5", "\x89HDF\r\n\x1a\n"}})},
+      {type, "binary garbage", show, files({{"p.h5", kGarbage}})},
+      {type, "100 MB line", show, files({{"p.h5", long_line()}})},
+      {type, "curve twice", "data pack evren_static evren_static -o {}/out.h5", files({})},
+      {type, "unknown curve", "data pack evren_static nobody -o {}/out.h5", files({})},
+  };
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+const std::string kFitConfig = R"({
+  "title": "t",
+  "parameters": {"E": {"start": "12 kPa", "lower": "1 kPa", "upper": "100 kPa", "sets": ["E1", "E2"]}},
+  "data": [{"dataset": "c.csv",
+            "protocol": {"kind": "ramp_hold", "rate": "4 mm/s"},
+            "noise": {"kind": "relative_to_datum", "relative": 0.1}}]
+})";
+
+const std::string kFittedJson = R"({"id": "c", "title": "t", "kind": "points",
+"observable": "contact_force", "time_origin": "end_of_ramp",
+"columns": {"depth_mm": {"quantity": "indentation_depth", "unit": "mm"},
+            "time_s": {"quantity": "time", "unit": "s"},
+            "force_N": {"quantity": "contact_force", "unit": "N"}}})";
+const std::string kFittedCsv =
+    "depth_mm,time_s,force_N,provenance\n2,0,0.32,table\n2,30,0.21,table\n";
+
+std::vector<ErrorCase> fit_config_cases() {
+  const std::string type = "fit configuration";
+  const std::string fit = "fit {}/f.json --format json -o {}/out";
+  const auto config = [](std::string text) {
+    return files({{"c.json", kFittedJson}, {"c.csv", kFittedCsv}, {"f.json", std::move(text)}});
+  };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return config(replaced(kFitConfig, from, to));
+  };
+  const auto data = [](const std::string& from, const std::string& to) {
+    return files({{"c.json", kFittedJson},
+                  {"c.csv", replaced(kFittedCsv, from, to)},
+                  {"f.json", kFitConfig}});
+  };
+  return {
+      {type, "missing", fit, files({})},
+      {type, "empty", fit, config("")},
+      {type, "truncated", fit, config(kFitConfig.substr(0, 120))},
+      {type, "binary garbage", fit, config(kGarbage)},
+      {type, "100 MB line", fit, config(long_line())},
+      {type, "missing key", fit, with("\"title\": \"t\",", "")},
+      {type, "unknown key", fit, with("\"start\"", "\"strat\": \"1 kPa\", \"start\"")},
+      {type, "wrong unit", fit, with("12 kPa", "12 mm")},
+      {type, "no unit", fit, with("12 kPa", "12")},
+      {type, "NaN", fit, with("12 kPa", "nan kPa")},
+      {type, "negative modulus", fit, with("\"1 kPa\"", "\"-1 kPa\"")},
+      {type, "start outside the bounds", fit, with("12 kPa", "120 kPa")},
+      {type, "negative rate", fit, with("4 mm/s", "-4 mm/s")},
+      {type, "negative standard deviation", fit, with("0.1", "-0.1")},
+      {type, "unknown model parameter", fit, with("\"E2\"", "\"E3\"")},
+      {type, "unknown noise", fit, with("relative_to_datum", "gaussian")},
+      {type, "unknown data set", fit, with("c.csv", "livre")},
+      {type, "data set is missing", fit, with("c.csv", "d.csv")},
+      {type, "datum without a depth", fit, data("2,0,0.32", ",0,0.32")},
+      {type, "datum of 0 under relative noise", fit, data("0.32", "0")},
+      {type, "wrong option value", "fit {}/f.json --rate '4 mm' -o {}/out", config(kFitConfig)},
+      {type, "output cannot be written", "fit {}/f.json -o /proc/none/out", config(kFitConfig)},
+  };
+}
+
+std::vector<ErrorCase> all_cases() {
+  std::vector<ErrorCase> all;
+  for (const auto& cases : {curve_csv_cases(), curve_json_cases(), machine_cases(),
+                            digitizer_cases(), hdf5_cases(), fit_config_cases()}) {
+    all.insert(all.end(), cases.begin(), cases.end());
+  }
+  return all;
+}
+
+std::string replace_all(std::string text, const std::string& from, const std::string& to) {
+  for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+    text.replace(at, from.size(), to);
+  }
+  return text;
+}
+
+struct Answer {
+  int exit_code = 0;
+  std::string error;
+};
+
+Answer run(const std::string& arguments, const TempFolder& folder) {
+  const std::string error_file = folder / "stderr";
+  const std::string command = std::string("\"") + TPM_TEST_PROGRAM + "\" " +
+                              replace_all(arguments, "{}", folder.path().string()) +
+                              " >/dev/null 2>\"" + error_file + "\"";
+  const int status = std::system(command.c_str());
+  REQUIRE(WIFEXITED(status));
+  std::ifstream in(error_file, std::ios::binary);
+  Answer answer{WEXITSTATUS(status), std::string(std::istreambuf_iterator<char>(in), {})};
+  std::filesystem::remove(error_file);
+  return answer;
+}
+
+std::size_t count_files(const TempFolder& folder) {
+  using Iterator = std::filesystem::recursive_directory_iterator;
+  return static_cast<std::size_t>(
+      std::count_if(Iterator(folder.path()), Iterator(),
+                    [](const auto& entry) { return entry.is_regular_file(); }));
+}
+
+/// A row of the table, without anything that differs from machine to machine.
+std::string table_row(const ErrorCase& error_case, const Answer& answer, const TempFolder& folder) {
+  std::string message = answer.error.substr(0, answer.error.find('\n'));
+  message = replace_all(message, folder.path().string() + "/", "");
+  message = replace_all(message, share_dir().string() + "/", "");
+  message = replace_all(message, "|", "\\|");
+  return "| " + error_case.file_type + " | " + error_case.what + " | " +
+         std::to_string(answer.exit_code) + " | `" + message + "` |\n";
+}
+
+}  // namespace
+
+TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md says which") {
+  std::string table =
+      "# What tpm says to bad input\n\n"
+      "Written by `tests/test_errors.cpp`, which runs the program on each of these files; after a\n"
+      "wanted change run it with `TPM_UPDATE_DOCS=1`. Exit codes: 1 the answer is no, 2 command\n"
+      "line, 3 bad input, 4 numerical failure, 5 environment.\n\n"
+      "| file type | fault | exit code | message |\n| --- | --- | --- | --- |\n";
+  for (const ErrorCase& error_case : all_cases()) {
+    INFO(error_case.file_type << ": " << error_case.what);
+    const TempFolder folder;
+    error_case.make(folder);
+    const std::size_t files_before = count_files(folder);
+    const Answer answer = run(error_case.arguments, folder);
+    CAPTURE(answer.error.substr(0, 500));
+    CHECK(answer.exit_code != 0);
+    CHECK(answer.error.starts_with("tpm: "));
+    CHECK(std::count(answer.error.begin(), answer.error.end(), '\n') == 1);
+    CHECK(answer.error.size() < 600);
+    CHECK(answer.error.find("internal error") == std::string::npos);
+    CHECK(count_files(folder) == files_before);
+    table += table_row(error_case, answer, folder);
+  }
+  std::ofstream("errors.md", std::ios::binary) << table;  // beside the test, to compare by hand
+  const std::string committed = std::string(TPM_TEST_SOURCE_DIR) + "/docs/errors.md";
+  if (std::getenv("TPM_UPDATE_DOCS") != nullptr) write_file(committed, table);
+  INFO("docs/errors.md is out of date: run this test with TPM_UPDATE_DOCS=1 and review it");
+  CHECK(read_file(committed) == table);
+}
+
+TEST_CASE("tpm data check reports every failing file and answers no") {
+  const TempFolder folder;
+  files({{"c.json", kPointsJson}, {"c.csv", "depth_mm,force_N,provenance\n2,x,table\n"}})(folder);
+  const Answer answer = run("data check {}/c.csv evren_static {}/missing.csv", folder);
+  CHECK(answer.exit_code == 1);
+  CHECK(std::count(answer.error.begin(), answer.error.end(), '\n') == 2);
+  CHECK(run("data check evren_static", folder).exit_code == 0);
+}
+
+TEST_CASE("tpm data import and pack do not replace files without --force") {
+  const TempFolder folder;
+  files({{"m.csv", "Time (s),Force (N)\n0,0\n1,1\n"}})(folder);
+  CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 0);
+  const std::string first = read_file(folder / "out.csv");
+  CHECK(run("data import {}/m.csv -o {}/out", folder).exit_code == 3);
+  CHECK(run("data import {}/m.csv -o {}/out --force", folder).exit_code == 0);
+  CHECK(read_file(folder / "out.csv") == first);
+  CHECK(run("data pack {}/out.csv -o {}/p.h5", folder).exit_code == 0);
+  CHECK(run("data pack {}/out.csv -o {}/p.h5", folder).exit_code == 3);
+  CHECK(run("data show {}/p.h5 --format json", folder).exit_code == 0);
+}
