@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
@@ -14,13 +15,13 @@
 namespace tpm::app {
 namespace {
 
-/// Texts as given; empty where the default of TableRequest stands. Numbers are parsed here and not
+/// Texts as given; none where the default of TableRequest stands. Numbers are parsed here and not
 /// by CLI11, which takes nan and 1e400 for numbers.
 struct TableOptions {
   bool as_printed = false;
   bool consistent = false;
-  std::string depths, spacings;
-  std::string E, E1, E2, Eprime, eta, A0, l0, rate, hold;
+  std::optional<std::string> depths, spacings;
+  std::optional<std::string> E, E1, E2, Eprime, eta, A0, l0, rate, hold;
   std::string output;
   std::string format = "text";
 };
@@ -33,9 +34,9 @@ double in_unit(const std::string& text, std::string_view usual_unit, std::string
                : parse_quantity(text, unit.dimension, option);
 }
 
-void set(double& target, const std::string& text, std::string_view usual_unit,
+void set(double& target, const std::optional<std::string>& text, std::string_view usual_unit,
          std::string_view option) {
-  if (!text.empty()) target = in_unit(text, usual_unit, option);
+  if (text) target = in_unit(*text, usual_unit, option);
 }
 
 /// "2,4,6 mm" or "2 mm, 0.4 cm": a unit after the last number holds for those without one.
@@ -53,6 +54,7 @@ std::vector<double> lengths(const std::string& text, std::string_view option) {
   const auto space = parts.back().find(' ');
   const std::string unit = space == std::string::npos ? "mm" : parts.back().substr(space + 1);
   std::vector<double> values;
+  values.reserve(parts.size());
   for (const std::string& part : parts) values.push_back(in_unit(part, unit, option));
   return values;
 }
@@ -64,8 +66,8 @@ TableRequest request_of(const TableOptions& options) {
   }
   TableRequest request;
   request.mode = options.consistent ? TableMode::consistent : TableMode::as_printed;
-  if (!options.depths.empty()) request.depths_m = lengths(options.depths, "--depths");
-  if (!options.spacings.empty()) request.spacings_m = lengths(options.spacings, "--spacings");
+  if (options.depths) request.depths_m = lengths(*options.depths, "--depths");
+  if (options.spacings) request.spacings_m = lengths(*options.spacings, "--spacings");
   TpmParameters& p = request.parameters;
   for (double* modulus : {&p.E1_Pa, &p.E2_Pa, &p.Eprime_Pa}) set(*modulus, options.E, "kPa", "--E");
   set(p.E1_Pa, options.E1, "kPa", "--E1");
@@ -91,7 +93,10 @@ std::string rendered(const TablesResult& result, const std::string& format) {
 int run_command(const TableOptions& options) {
   const TableRequest request = request_of(options);
   const auto path = paper_claims_path();
-  const auto printed = read_printed_tables(read_json(path), path.filename().string());
+  const std::string name = path.filename().string();
+  const Json claims = read_json(path);
+  check_schema(claims, "claims", name);
+  const auto printed = read_printed_tables(claims, name);
   const std::string text = rendered(make_tables(request, printed), options.format);
   if (options.output.empty()) {
     fmt::print("{}", text);

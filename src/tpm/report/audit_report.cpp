@@ -14,19 +14,9 @@ std::string with_unit(const AuditQuantity& quantity, int digits) {
   return quantity.unit.symbol.empty() ? number : number + " " + quantity.unit.symbol;
 }
 
-std::string recomputed_text(const Finding& finding) {
-  if (finding.recomputed) return with_unit(*finding.recomputed, 4);
-  if (finding.cells) {
-    return fmt::format("{} of {}", finding.cells->by_rounding + finding.cells->by_truncation,
-                       finding.cells->cells);
-  }
-  return "-";
-}
-
 std::string entry(std::string_view label, std::string_view text) {
   if (text.empty()) return {};
-  const std::string head = fmt::format("    {:<{}}", label, kLabel - 4);
-  return wrapped(head + std::string(text), kWidth, kLabel) + "\n";
+  return fmt::format("    {:<{}}{}\n", label, kLabel - 4, wrapped(text, kWidth, kLabel, kLabel));
 }
 
 std::string inputs_text(const Finding& finding) {
@@ -35,6 +25,7 @@ std::string inputs_text(const Finding& finding) {
     if (!text.empty()) text += ", ";
     text += fmt::format("{} = {}", input.name,
                         input.printed.empty() ? with_unit(input.value, 4) : input.printed);
+    if (input.provenance == "assumed") text += " (assumed)";
   }
   return text;
 }
@@ -51,14 +42,13 @@ std::string details_text(const Finding& finding) {
 }
 
 std::string finding_text(const Finding& finding) {
-  const std::string mark = finding.stands() ? "ok" : "!!";
-  std::string out =
-      fmt::format("{}  {}  [{}]\n", finding.verdict == AuditVerdict::cannot_be_told ? "??" : mark,
-                  finding.id, finding.verdict_words());
+  const bool open = finding.verdict == AuditVerdict::cannot_be_told;
+  const std::string_view mark = finding.stands() ? "ok" : open ? "??" : "!!";
+  std::string out = fmt::format("{}  {}  [{}]\n", mark, finding.id, finding.verdict_words());
   // "paper" first: the reader knows the paper, not our names.
   out += entry("paper", fmt::format("{}: {}", finding.where, finding.claim));
   out += entry("printed",
-               fmt::format("{}   recomputed {}", finding.printed, recomputed_text(finding)));
+               fmt::format("{}   recomputed {}", finding.printed, finding.recomputed_words()));
   out += entry("by", finding.expression);
   out += entry("with", inputs_text(finding));
   for (const AuditCause& cause : finding.causes) {
@@ -104,7 +94,7 @@ TableDocument audit_document(const AuditReport& report) {
   section.title = "Claims recomputed";
   section.columns = {"claim", "where", "printed", "recomputed", "verdict", "consequence"};
   for (const Finding& finding : report.findings) {
-    section.rows.push_back({finding.id, finding.where, finding.printed, recomputed_text(finding),
+    section.rows.push_back({finding.id, finding.where, finding.printed, finding.recomputed_words(),
                             finding.verdict_words(), finding.consequence});
   }
   document.sections.push_back(std::move(section));

@@ -31,6 +31,8 @@ enum class TableStyle { text, markdown, latex };
 [[nodiscard]] std::string csv_line(const std::vector<std::string>& cells);
 
 /// Breaks text into lines of at most `width` columns at spaces, each after the first indented.
-[[nodiscard]] std::string wrapped(std::string_view text, std::size_t width, std::size_t indent);
+/// @param column where the first line starts
+[[nodiscard]] std::string wrapped(std::string_view text, std::size_t width, std::size_t indent,
+                                  std::size_t column = 0);
 
 }  // namespace tpm

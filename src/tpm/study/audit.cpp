@@ -49,11 +49,10 @@ std::string number_text(const AuditQuantity& quantity) {
 Placeholders placeholders(const ClaimReader& claim, const Finding& finding) {
   Placeholders values;
   values["printed"] = finding.printed;
-  if (finding.recomputed) values["recomputed"] = number_text(*finding.recomputed);
+  values["recomputed"] = finding.recomputed_words();
   if (finding.bound) values["bound"] = number_text(*finding.bound);
-  if (finding.difference_percent) {
-    values["difference"] = fmt::format("{:+.2g} %", *finding.difference_percent);
-  }
+  values["difference"] =
+      finding.difference_percent ? percent_text(*finding.difference_percent) : "nothing";
   values["cause"] = finding.causes.empty() ? "no single input" : finding.causes.front().text;
   if (finding.cells) {
     values["count"] = std::to_string(finding.cells->by_rounding + finding.cells->by_truncation);
@@ -137,7 +136,17 @@ std::string Finding::verdict_words() const {
   if (verdict != AuditVerdict::differs || !difference_percent) {
     return std::string(verdict_name(verdict));
   }
-  return fmt::format("differs by {:+.2g} %", *difference_percent);
+  return "differs by " + percent_text(*difference_percent);
+}
+
+std::string Finding::recomputed_words() const {
+  if (kind == "range" && details.size() == 2) {
+    return fmt::format("{} - {}", significant(details[0].recomputed.value, 4),
+                       number_text(details[1].recomputed));
+  }
+  if (recomputed) return number_text(*recomputed);
+  if (!cells) return "-";
+  return fmt::format("{} of {}", cells->by_rounding + cells->by_truncation, cells->cells);
 }
 
 bool Finding::stands() const noexcept {

@@ -31,6 +31,7 @@ struct AuditInput {
   std::string printed;  ///< as printed, with unit; empty if computed or bound by the claim
   AuditQuantity value;
   std::string where;
+  std::string provenance;  ///< one of the words of Provenance; empty if the file says none
 };
 
 /// A changed input that would give the printed number.
@@ -79,6 +80,8 @@ struct Finding {
 
   /// The verdict in words: "differs by 2.3 %".
   [[nodiscard]] std::string verdict_words() const;
+  /// The recomputed number, range or count of cells with its unit, four digits.
+  [[nodiscard]] std::string recomputed_words() const;
   /// True for holds and holds_by_truncation.
   [[nodiscard]] bool stands() const noexcept;
 };

@@ -23,6 +23,7 @@ Json input_json(const AuditInput& input) {
   if (!input.printed.empty()) json["printed"] = input.printed;
   json.update(quantity_json(input.value));
   json["where"] = input.where;
+  if (!input.provenance.empty()) json["provenance"] = input.provenance;
   return json;
 }
 

@@ -23,22 +23,7 @@ std::vector<AuditInput> searchable(const ClaimReader& claim, std::vector<AuditIn
   return inputs;
 }
 
-/// Two printed numbers, low before high.
-std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim) {
-  const Json& printed = claim.required("printed");
-  if (!printed.is_array()) {
-    throw bad_input(claim.at(), "key 'printed' is one number", "two, low and high");
-  }
-  auto low = parse_printed(printed.at(0).get<std::string>(), claim.at());
-  auto high = parse_printed(printed.at(1).get<std::string>(), claim.at());
-  if (!(low.value < high.value)) {
-    throw bad_input(claim.at(), fmt::format("'printed' is {} to {}", low.text, high.text),
-                    "low before high");
-  }
-  return {std::move(low), std::move(high)};
-}
-
-/// f(t) from its Laplace transform by the Gaver-Stehfest sum of 14 terms, good to about 1e-5 for
+/// f(t) from its Laplace transform by the Gaver-Stehfest sum of 14 terms, good to about 1e-4 for
 /// the monotonic decays met here (H. Stehfest, Commun. ACM 13, 47, 1970).
 template <class Transform>
 double inverse_laplace(const Transform& transform, double time) {
@@ -120,6 +105,20 @@ AuditVerdict audit_verdict(DigitVerdict verdict) noexcept {
       return AuditVerdict::differs;
   }
   return AuditVerdict::cannot_be_told;
+}
+
+std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim) {
+  const Json& printed = claim.required("printed");
+  if (!printed.is_array()) {
+    throw bad_input(claim.at(), "key 'printed' is one number", "two, low and high");
+  }
+  auto low = parse_printed(printed.at(0).get<std::string>(), claim.at());
+  auto high = parse_printed(printed.at(1).get<std::string>(), claim.at());
+  if (!(low.value < high.value)) {
+    throw bad_input(claim.at(), fmt::format("'printed' is {} to {}", low.text, high.text),
+                    "low before high");
+  }
+  return {std::move(low), std::move(high)};
 }
 
 std::string with_unit(std::string_view number, const Unit& unit) {
@@ -244,15 +243,13 @@ void check_dimension(const ClaimReader& claim, Finding& finding) {
   const std::string claimed = claim.text("claimed_dimension");
   const Unit example = parse_unit(claimed, claim.at());
   finding.printed = with_unit(symbol->value, symbol->unit);
-  finding.expression = fmt::format("unit of {}", name);
+  finding.expression =
+      fmt::format("'{}' is a unit of {}; a {} is claimed", symbol->unit.symbol,
+                  dimension_name(symbol->unit.dimension), dimension_name(example.dimension));
   finding.recomputed = {parse_number(symbol->value, claim.at()), symbol->unit};
   finding.inputs = claim.inputs(name, {});
   const bool same = example.dimension == symbol->unit.dimension;
   finding.verdict = same ? AuditVerdict::holds : AuditVerdict::contradicted;
-  finding.details.push_back({fmt::format("{} is a unit of {}", symbol->unit.symbol,
-                                         dimension_name(symbol->unit.dimension)),
-                             example.symbol, *finding.recomputed,
-                             same ? "agrees" : "does not agree", std::nullopt});
 }
 
 }  // namespace tpm

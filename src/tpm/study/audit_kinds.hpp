@@ -1,4 +1,6 @@
 #pragma once
+#include <utility>
+
 #include "tpm/study/claim_reader.hpp"
 #include "tpm/study/printed_number.hpp"
 
@@ -29,6 +31,9 @@ void check_misfit(const ClaimReader& claim, Finding& finding);
 
 /// The audit's word for a comparison of digits.
 [[nodiscard]] AuditVerdict audit_verdict(DigitVerdict verdict) noexcept;
+
+/// Key "printed" of a range or a band: two numbers, low before high.
+[[nodiscard]] std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim);
 
 /// "0.613 N"; just the number if the unit is 1.
 [[nodiscard]] std::string with_unit(std::string_view number, const Unit& unit);

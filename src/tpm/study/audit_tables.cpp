@@ -71,10 +71,7 @@ void check_single_band(const ClaimReader& claim, Finding& finding) {
   const ClaimValue value(claim);
   const Scope scope = claim.scope();
   const Unit unit = claim.unit();
-  const Json& printed = claim.required("printed");
-  if (!printed.is_array()) throw bad_input(claim.at(), "'printed' is one number", "low and high");
-  const PrintedNumber low = parse_printed(printed.at(0).get<std::string>(), claim.at());
-  const PrintedNumber high = parse_printed(printed.at(1).get<std::string>(), claim.at());
+  const auto [low, high] = printed_pair(claim);
   const double computed = value.total(scope) / unit.to_si;
   finding.printed = fmt::format("{} - {}", low.text, with_unit(high.text, unit));
   finding.recomputed = {computed, unit};

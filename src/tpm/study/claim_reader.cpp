@@ -48,7 +48,7 @@ void ClaimReader::bind(Scope& scope, const std::string& name, const std::string&
     return;
   }
   if (const PrintedSymbol* symbol = set_.symbol(name); symbol != nullptr) {
-    const std::string_view unit = std::string_view(value).substr(value.find_first_of(" \t"));
+    const std::string_view unit = std::string_view(value).substr(value.find_first_of(" \t") + 1);
     static_cast<void>(parse_unit(unit, symbol->unit.dimension, fmt::format("{}: {}", at_, name)));
   }
   scope.values[name] = *si;
@@ -94,6 +94,7 @@ std::vector<AuditInput> ClaimReader::inputs(const std::string& expression,
     if (symbol != nullptr && !scope.values.contains(name)) {
       input.printed = symbol->value + (unit.symbol.empty() ? "" : " " + unit.symbol);
       input.where = symbol->where;
+      input.provenance = symbol->provenance;
     } else {
       input.where = "this claim";
     }

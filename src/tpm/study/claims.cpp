@@ -34,6 +34,7 @@ PrintedSymbol read_symbol(const Json& item, const Evaluator& evaluator, std::str
   symbol.unit = parse_unit(text_of(item, "unit"), at);
   symbol.si = printed_si(symbol.value, symbol.unit, evaluator, at);
   symbol.where = item.at("where").get<std::string>();
+  symbol.provenance = text_of(item, "provenance");
   if (const auto also = item.find("also"); also != item.end()) {
     for (const Json& other : *also) {
       PrintedAlternative alternative;

@@ -24,6 +24,7 @@ struct PrintedSymbol {
   Unit unit;
   double si = 0.0;
   std::string where;
+  std::string provenance;                ///< empty if not said
   std::vector<PrintedAlternative> also;  ///< printed elsewhere for the same thing
 };
 
@@ -67,7 +68,7 @@ struct ClaimSet {
 [[nodiscard]] std::filesystem::path paper_claims_path();
 
 /// Only the tables of a claims file, which is all that `tpm tables` needs.
-/// @param document checked against schemas/claims.schema.json by the caller or by read_claims
+/// @param document already checked against schemas/claims.schema.json
 [[nodiscard]] std::vector<PrintedTable> read_printed_tables(const Json& document,
                                                             std::string_view file);
 

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "tpm/core/error.hpp"
-#include "tpm/core/text.hpp"
 #include "tpm/core/units.hpp"
 
 namespace tpm {
@@ -38,6 +37,10 @@ DigitVerdict classify(double distance) {
 }  // namespace
 
 PrintedNumber parse_printed(std::string_view text, std::string_view where) {
+  if (text.find_first_of(" \t\r\n") != std::string_view::npos) {
+    throw bad_input(where, fmt::format("'{}' has white space", printable(text)),
+                    "the printed digits and nothing else");
+  }
   PrintedNumber number;
   number.value = parse_number(text, where);
   number.text = std::string(text);
@@ -56,6 +59,11 @@ PrintedNumber parse_printed(std::string_view text, std::string_view where) {
                     "a last digit that is worth more than 1e-308");
   }
   return number;
+}
+
+std::string percent_text(double percent) {
+  const int digits = std::abs(percent) >= 99.5 ? 3 : 2;
+  return fmt::format("{:+.{}g} %", percent, digits);
 }
 
 std::string_view verdict_name(DigitVerdict verdict) noexcept {
@@ -81,7 +89,7 @@ std::string DigitCheck::words() const {
   if (verdict != DigitVerdict::differs || !difference_percent) {
     return std::string(verdict_name(verdict));
   }
-  return fmt::format("differs by {:+.2g} %", *difference_percent);
+  return "differs by " + percent_text(*difference_percent);
 }
 
 DigitCheck compare_digits(const PrintedNumber& printed, double computed) {

@@ -17,6 +17,9 @@ struct PrintedNumber {
 /// Throws Error(bad_input) for anything else (nan, inf, hexadecimal, an overflow, no digits).
 [[nodiscard]] PrintedNumber parse_printed(std::string_view text, std::string_view where);
 
+/// A difference in percent in the way people write it: "+0.82 %", "-34 %", "-100 %".
+[[nodiscard]] std::string percent_text(double percent);
+
 /// How a recomputed number relates to the printed digits.
 enum class DigitVerdict {
   by_rounding,     ///< rounding gives the printed digits
