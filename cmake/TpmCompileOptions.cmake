@@ -11,6 +11,9 @@ target_compile_options(tpm_options INTERFACE -ffp-contract=off)
 if(TPM_SANITIZE)
   add_compile_options(-fsanitize=${TPM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${TPM_SANITIZE})
+  # Under AddressSanitizer Eigen would align by hand, while the packaged Ceres, built without it,
+  # leaves that to malloc: matrices handed from one to the other would be freed wrongly.
+  add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
   # With the instrumentation in the way g++ takes initialised members of std::regex for uninitialised.
   target_compile_options(tpm_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
