@@ -268,7 +268,12 @@ TEST_CASE("bad files are refused") {
   CHECK_THROWS_WITH(run_audit(file, "f.json"), Contains("'c1' stands twice"));
   file = good;
   file["claims"][0]["printed"] = "nan";
-  CHECK_THROWS_AS(run_audit(file, "f.json"), Error);
+  CHECK_THROWS_WITH(run_audit(file, "f.json"),
+                    "f.json: claim 'c1': 'nan' is not a finite number; expected a number such as "
+                    "12.5 or 1.2e-3");
+  file = good;
+  file["tables"][0]["rows"][1][1] = "about 4";
+  CHECK_THROWS_WITH(run_audit(file, "f.json"), Contains("table 'T': 'about 4'"));
   file = good;
   file["symbols"][0]["value"] = "1e400";
   CHECK_THROWS_WITH(run_audit(file, "f.json"), Contains("symbol 'a'"));

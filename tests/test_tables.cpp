@@ -44,7 +44,7 @@ TEST_CASE("a printed number knows the worth of its last digit") {
   CHECK(parse_printed("7.", "here").last_digit == 1.0);
   CHECK_THAT(parse_printed("1.2e-3", "here").last_digit, WithinRel(1e-4, 1e-15));
   CHECK_THAT(parse_printed("1E+3", "here").last_digit, WithinRel(1e3, 1e-15));
-  for (const char* wrong : {"", "nan", "inf", "1e400", "0x1", "1,5", "1.2.3", "1e", "5 mm"}) {
+  for (const char* wrong : {"", "nan", "inf", "1e400", "0x1", "1,5", "1.2.3", "1e", "5 mm", " 5"}) {
     CAPTURE(wrong);
     CHECK_THROWS_AS(parse_printed(wrong, "here"), Error);
   }

@@ -207,8 +207,10 @@ std::string tables_csv(const TablesResult& result) {
     }
   }
   for (const BandRow& row : result.bands) {
-    out += csv_line(
-        csv_cells("relaxed force", row.depth_m, row.spacing_m, row.printed_where, row.force, "N"));
+    auto cells =
+        csv_cells("relaxed force", row.depth_m, row.spacing_m, row.printed_where, row.force, "N");
+    cells[cells.size() - 2] = fmt::format("{} - {}", row.band_low, row.band_high);
+    out += csv_line(cells);
   }
   return out;
 }
