@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "tpm/core/text.hpp"
 #include "tpm/report/sections.hpp"
 
 namespace tpm {
@@ -22,12 +21,6 @@ Tone tone_of(AuditVerdict verdict) {
       break;
   }
   return Tone::bad;
-}
-
-std::string with_unit(const std::optional<AuditQuantity>& quantity) {
-  if (!quantity) return "-";
-  const std::string number = significant(quantity->value, 4);
-  return quantity->unit.symbol.empty() ? number : number + " " + quantity->unit.symbol;
 }
 
 /// What follows from the finding and, where the digits betray it, how the number came about.
@@ -81,7 +74,7 @@ std::vector<Cell> row(const Finding& f) {
   return {{f.where},
           {f.claim},
           {f.printed},
-          {with_unit(f.recomputed)},
+          {f.recomputed_words()},
           {f.verdict_words(), tone_of(f.verdict)},
           {consequence(f)}};
 }

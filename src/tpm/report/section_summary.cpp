@@ -15,7 +15,7 @@ Cell tables_sentence(const TablesResult& tables) {
   const CellCounts& c = tables.summary.force_from_printed_lambda1;
   return {
       fmt::format("Tables 1 to 4: {} of {} printed forces follow from the printed λ₁, {} of them "
-                  "only by cutting digits off; {} are off in the last digit, {} differ.",
+                  "only by cutting digits off. Off in the last digit: {}; different: {}.",
                   c.explained(), c.cells, c.by_truncation, c.last_digit_off, c.differ),
       c.explained() == c.cells ? Tone::good : Tone::fair};
 }
