@@ -1,5 +1,6 @@
-// The relaxation fit against an independent implementation and optimiser: scripts/judge_relaxation.py
-// (numpy and scipy, no code shared), to 5 digits in chi-square, E and eta1, at three ramp rates.
+// The relaxation fit against an independent implementation and optimiser:
+// scripts/judge_relaxation.py (numpy and scipy, no code shared), to 5 digits in chi-square, E and
+// eta1, at three ramp rates.
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -44,10 +45,10 @@ TEST_CASE("an independent optimiser finds the same minimum of the relaxation pro
     CAPTURE(rate);
     config.data[0].protocol.rate_m_per_s = rate * 1e-3;
     const FitResult fit = run_fit(config);
-    const Json judge = parse_json(
-        output_of(python + " '" + source + "/scripts/judge_relaxation.py' '" + source +
-                  "/data/evren_relaxation.csv' --rate " + std::to_string(rate)),
-        "judge");
+    const Json judge =
+        parse_json(output_of(python + " '" + source + "/scripts/judge_relaxation.py' '" + source +
+                             "/data/evren_relaxation.csv' --rate " + std::to_string(rate)),
+                   "judge");
     CHECK_THAT(fit.chi_square, WithinRel(judge.at("chi_square").get<double>(), 1e-5));
     CHECK_THAT(fit.best.natural[0], WithinRel(judge.at("E_Pa").get<double>(), 1e-5));
     CHECK_THAT(fit.best.natural[1], WithinRel(judge.at("eta1_Pa_s").get<double>(), 1e-5));

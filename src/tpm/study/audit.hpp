@@ -65,11 +65,11 @@ struct Finding {
   std::string topic;
   std::string kind;
   std::string where;
-  std::string claim;                   ///< the paper's words, quoted or paraphrased
-  std::string printed;                 ///< what is printed, with unit
+  std::string claim;                        ///< the paper's words, quoted or paraphrased
+  std::string printed;                      ///< what is printed, with unit
   std::optional<AuditQuantity> recomputed;  ///< in the printed unit
   std::optional<AuditQuantity> bound;       ///< right-hand side of an inequality
-  std::string expression;              ///< what was evaluated
+  std::string expression;                   ///< what was evaluated
   std::vector<AuditInput> inputs;
   AuditVerdict verdict = AuditVerdict::cannot_be_told;
   std::optional<double> difference_percent;
