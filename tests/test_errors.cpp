@@ -258,10 +258,47 @@ std::vector<ErrorCase> fit_config_cases() {
   };
 }
 
+const std::string kClaims = R"({
+  "title": "t", "citation": "c",
+  "symbols": [{"name": "k", "value": "2", "unit": "kPa", "where": "p. 1", "quote": "k = 2 kPa",
+               "provenance": "text"}],
+  "claims": [{"id": "doubled", "topic": "1", "kind": "value", "where": "p. 2", "quote": "4 kPa",
+              "printed": "4", "unit": "kPa", "expression": "2 * k",
+              "if_holds": "It is.", "if_fails": "It is not."}]
+})";
+
+std::vector<ErrorCase> claims_cases() {
+  const std::string type = "claims file";
+  const std::string audit = "audit {}/c.json -o {}/out";
+  const auto claims = [](std::string text) { return files({{"c.json", std::move(text)}}); };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return claims(replaced(kClaims, from, to));
+  };
+  return {
+      {type, "missing", audit, files({})},
+      {type, "empty", audit, claims("")},
+      {type, "truncated", audit, claims(kClaims.substr(0, 150))},
+      {type, "binary garbage", audit, claims(kGarbage)},
+      {type, "100 MB line", audit, claims(long_line())},
+      {type, "missing key", audit, with("\"title\": \"t\",", "")},
+      {type, "unknown key", audit, with("\"topic\"", "\"tropic\": \"1\", \"topic\"")},
+      {type, "unknown kind", audit,
+       with("\"value\", \"where\": \"p. 2\"", "\"guess\", \"where\": \"p. 2\"")},
+      {type, "NaN", audit, with("\"value\": \"2\"", "\"value\": \"nan\"")},
+      {type, "printed value is no number", audit,
+       with("\"printed\": \"4\"", "\"printed\": \"four\"")},
+      {type, "wrong unit", audit,
+       with("\"unit\": \"kPa\", \"where\"", "\"unit\": \"kPb\", \"where\"")},
+      {type, "unknown symbol", audit, with("2 * k", "2 * q")},
+      {type, "broken expression", audit, with("2 * k", "2 * (k")},
+      {type, "division by zero", audit, with("2 * k", "k / (k - k)")},
+  };
+}
+
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
   for (const auto& cases : {curve_csv_cases(), curve_json_cases(), machine_cases(),
-                            digitizer_cases(), hdf5_cases(), fit_config_cases()}) {
+                            digitizer_cases(), hdf5_cases(), fit_config_cases(), claims_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

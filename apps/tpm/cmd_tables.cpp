@@ -122,7 +122,7 @@ void add_options(CLI::App& command, TableOptions& options) {
   command.add_option("--l0", options.l0, "Reference length (default 1 mm)");
   command.add_option("--rate", options.rate, "Ramp rate with --consistent (assumed: 4 mm/s)");
   command.add_option("--hold", options.hold, "Hold time with --consistent (default 30 s)");
-  command.add_option("--output", options.output, "Write to this file instead of the terminal");
+  command.add_option("-o,--output", options.output, "Write to this file instead of the terminal");
   command.add_option("--format", options.format, "Output format: text, md, csv, latex or json")
       ->check(CLI::IsMember({"text", "md", "csv", "latex", "json"}))
       ->capture_default_str();
