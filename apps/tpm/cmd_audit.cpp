@@ -5,7 +5,6 @@
 
 #include "command.hpp"
 #include "tpm/report/study_report.hpp"
-#include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/audit.hpp"
 
@@ -24,11 +23,7 @@ int run_command(const Session& session, const AuditOptions& options) {
   const AuditReport report = run_audit(read_json(path), path.filename().string());
   const std::string text =
       session.json() ? to_text(to_json(report)) : audit_text(report, options.all);
-  if (options.output.empty()) {
-    fmt::print("{}", text);
-  } else {
-    write_file(options.output, text);
-  }
+  deliver(text, options.output);
   return 0;
 }
 

@@ -5,7 +5,6 @@
 #include "command.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm::app {
@@ -41,11 +40,7 @@ FitConfig configured(const FitOptions& options) {
 int fit(const FitOptions& options, const Session& session) {
   const FitResult result = run_fit(configured(options));
   const std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
-  if (options.output.empty()) {
-    fmt::print("{}", text);
-  } else {
-    write_file(options.output, text);
-  }
+  deliver(text, options.output);
   return 0;
 }
 

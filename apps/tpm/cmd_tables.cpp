@@ -8,7 +8,6 @@
 #include "command.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/report/study_report.hpp"
-#include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/tables.hpp"
 
@@ -98,11 +97,7 @@ int run_command(const TableOptions& options) {
   check_schema(claims, "claims", name);
   const auto printed = read_printed_tables(claims, name);
   const std::string text = rendered(make_tables(request, printed), options.format);
-  if (options.output.empty()) {
-    fmt::print("{}", text);
-  } else {
-    write_file(options.output, text);
-  }
+  deliver(text, options.output);
   return 0;
 }
 

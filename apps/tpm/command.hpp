@@ -19,6 +19,9 @@ struct Session {
 /// Adds --format text|json to a command.
 void add_format_option(CLI::App& command, Session& session);
 
+/// Prints the text, or writes it to `file` if that is not empty.
+void deliver(const std::string& text, const std::string& file);
+
 /// Reads a whole number from `smallest` to 1e9. Throws Error(usage) naming the option.
 [[nodiscard]] std::uint64_t parse_whole_number(const std::string& text, const char* option,
                                                std::uint64_t smallest);

@@ -7,6 +7,7 @@
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/store/file.hpp"
 
 namespace tpm::app {
 
@@ -14,6 +15,14 @@ void add_format_option(CLI::App& command, Session& session) {
   command.add_option("--format", session.format, "Output format: text or json")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
+}
+
+void deliver(const std::string& text, const std::string& file) {
+  if (file.empty()) {
+    fmt::print("{}", text);
+  } else {
+    write_file(file, text);
+  }
 }
 
 std::uint64_t parse_whole_number(const std::string& text, const char* option,

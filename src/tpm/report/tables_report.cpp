@@ -8,6 +8,11 @@
 namespace tpm {
 namespace {
 
+/// Enough for any use, and the same on machines whose last bits differ.
+std::string ten_digits(double value) {
+  return significant(value, 10);
+}
+
 constexpr double kMilli = 1e3;
 constexpr double kKilo = 1e-3;
 
@@ -153,10 +158,10 @@ std::vector<std::string> csv_cells(std::string_view quantity, double depth_m, do
                                    const std::string& where, const TableCell& cell,
                                    std::string_view si_unit) {
   std::vector<std::string> cells{where,
-                                 shortest(depth_m),
-                                 shortest(spacing_m),
+                                 ten_digits(depth_m),
+                                 ten_digits(spacing_m),
                                  std::string(quantity),
-                                 shortest(cell.value),
+                                 ten_digits(cell.value),
                                  std::string(si_unit)};
   const bool printed = cell.printed.has_value();
   const DigitCheck check = printed ? cell.printed->from_computed_lambda1 : DigitCheck{};
@@ -164,12 +169,12 @@ std::vector<std::string> csv_cells(std::string_view quantity, double depth_m, do
   const double to_si = printed ? cell.printed->unit.to_si : 1.0;
   cells.push_back(check.printed.text);
   cells.push_back(printed ? cell.printed->unit.symbol : std::string{});
-  cells.push_back(printed ? shortest(check.window_width() * to_si) : std::string{});
+  cells.push_back(printed ? ten_digits(check.window_width() * to_si) : std::string{});
   cells.push_back(printed ? std::string(verdict_name(check.verdict)) : std::string{});
-  cells.push_back(other ? shortest(other->computed * to_si) : std::string{});
+  cells.push_back(other ? ten_digits(other->computed * to_si) : std::string{});
   cells.push_back(other ? std::string(verdict_name(other->verdict)) : std::string{});
   cells.push_back(cell.measured ? cell.measured->text : std::string{});
-  cells.push_back(cell.measured ? shortest(cell.measured->misfit_percent) : std::string{});
+  cells.push_back(cell.measured ? ten_digits(cell.measured->misfit_percent) : std::string{});
   return cells;
 }
 
