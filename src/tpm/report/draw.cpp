@@ -84,11 +84,11 @@ std::string last_line(std::string text) {
 }  // namespace
 
 std::string find_drawing_python() {
-  std::vector<std::string> candidates;
+  std::vector<std::string> candidates{"python3", "/usr/bin/python3"};
+  // Whoever names an interpreter wants that one or none.
   if (const char* chosen = std::getenv("TPMKIT_PYTHON"); chosen != nullptr && *chosen != '\0') {
-    candidates.emplace_back(chosen);
+    candidates = {chosen};
   }
-  candidates.insert(candidates.end(), {"python3", "/usr/bin/python3"});
   for (const std::string& python : candidates) {
     if (run({python, "-c", "import matplotlib"}).status == 0) return python;
   }

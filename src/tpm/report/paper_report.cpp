@@ -146,7 +146,9 @@ void write_paper_report(const PaperReport& report, const fs::path& folder,
   write_json(folder / "fit_relaxation.json", to_json(report.fits.reference));
   write_json(folder / "fit_sensitivity.json", variants_json(report.fits));
   write_json(folder / "fit_held_out.json", held_out_json(report.fits));
-  write_file(folder / "report.run.json", to_text(run_record(seconds)));
+  Json record = run_record(seconds);
+  record["drawing_python"] = python;
+  write_file(folder / "report.run.json", to_text(record));
 }
 
 }  // namespace tpm
