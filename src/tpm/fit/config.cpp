@@ -35,6 +35,7 @@ TpmIndex parse_target(std::string_view name, const Place& place) {
     if (kTpmParameterTable[i].name == name) return static_cast<TpmIndex>(i);
   }
   std::vector<std::string_view> known;
+  known.reserve(kTpmParameterTable.size());
   for (const auto& description : kTpmParameterTable) known.push_back(description.name);
   throw bad_input(place.where, fmt::format("no model parameter is called '{}'", printable(name)),
                   fmt::format("one of {}", fmt::join(known, ", ")));
