@@ -5,8 +5,8 @@
 namespace tpm {
 
 /// The Python interpreter that draws: $TPMKIT_PYTHON if it is set, else the first of python3 and
-/// /usr/bin/python3 that has matplotlib (a version manager's python3 often has not). Throws Error(environment)
-/// naming those tried.
+/// /usr/bin/python3 that has matplotlib (a version manager's python3 often has not). Throws
+/// Error(environment) naming those tried.
 [[nodiscard]] std::string find_drawing_python();
 
 enum class Drawings { svg, svg_and_png };
