@@ -12,7 +12,7 @@ packages_run=(
 
 # What the tests need besides.
 packages_test=(
-  catch2 librapidcheck-dev python3-scipy python3-h5py
+  catch2 python3-scipy python3-h5py
 )
 
 # What checks the sources.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/random.hpp"
 #include "tpm/material/tpm_element.hpp"
 #include "tpm/model/model.hpp"
 #include "tpm/solve/creep_exact.hpp"
@@ -264,6 +265,38 @@ TEST_CASE("sensitivities equal central differences of the closed form") {
         const double scale = to_vector(p)[j] / r.value[i];
         CHECK_THAT(r.sensitivity(i, static_cast<Eigen::Index>(j)) * scale,
                    WithinAbs(difference * scale, 2e-9));
+      }
+    }
+  }
+}
+
+TEST_CASE(
+    "random elements: closed form and CVODES agree on ramps and on creep with the true lambda1") {
+  // Moduli, dashpots, spacings, depths and loads over several decades, also E1 = 0.
+  const auto exact = make_model("closed_form");
+  ModelOptions tight;
+  tight.relative_tolerance = 1e-11;
+  const auto cvodes = make_model("cvodes", tight);
+  Random random(2013);
+  const auto decades = [&](double low, double high) {
+    return low * std::pow(high / low, random.uniform());
+  };
+  for (int trial = 0; trial < 60; ++trial) {
+    TpmParameters p;
+    p.E1_Pa = trial % 10 == 0 ? 0.0 : decades(1e2, 1e6);
+    p.E2_Pa = decades(1e2, 1e6);
+    p.Eprime_Pa = decades(1e2, 1e6);
+    p.eta1_Pa_s = decades(1e1, 1e7);
+    p.spacing_m = decades(1e-3, 1.0);
+    const Protocol ramp = ramp_and_hold(decades(1e-4, 1e-2), decades(1e-4, 1e-1), 30.0);
+    const Protocol load = creep(decades(1e-3, 1.0), 30.0);
+    CAPTURE(trial, p.E1_Pa, p.E2_Pa, p.Eprime_Pa, p.eta1_Pa_s, p.spacing_m);
+    for (const Protocol* protocol : {&ramp, &load}) {
+      const std::vector<double> times{0.01, 0.1, 1.0, 10.0, 30.0};
+      const Response a = ask(*exact, *protocol, times, p);
+      const Response b = ask(*cvodes, *protocol, times, p);
+      for (Eigen::Index i = 0; i < a.value.size(); ++i) {
+        CHECK_THAT(b.value[i], WithinAbs(a.value[i], 1e-8 * a.value.cwiseAbs().maxCoeff()));
       }
     }
   }

@@ -370,7 +370,8 @@ TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md 
     CHECK(count_files(folder) == files_before);
     table += table_row(error_case, answer, folder);
   }
-  std::ofstream("errors.md", std::ios::binary) << table;  // beside the test, to compare by hand
+  // Beside the test program, to compare by hand.
+  std::ofstream(TPM_TEST_BINARY_DIR "/errors.md", std::ios::binary) << table;
   const std::string committed = std::string(TPM_TEST_SOURCE_DIR) + "/docs/errors.md";
   if (std::getenv("TPM_UPDATE_DOCS") != nullptr) write_file(committed, table);
   INFO("docs/errors.md is out of date: run this test with TPM_UPDATE_DOCS=1 and review it");

@@ -247,6 +247,11 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
     result.flags.push_back(fmt::format(
         "{} bands are penalised only outside and are not counted as data", result.band_count));
   }
+  if (result.config.loss.kind != Loss::none) {
+    result.flags.push_back(
+        fmt::format("the {} loss has no exact likelihood: the intervals' level is only approximate",
+                    loss_name(result.config.loss.kind)));
+  }
   const TpmParameters p = from_vector(function.model_parameters(result.best.natural));
   double deepest = 0.0;
   for (const Experiment& e : function.experiments()) {
