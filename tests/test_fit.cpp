@@ -96,8 +96,8 @@ void check_gradient(const FitConfig& config, std::uint64_t seed) {
 
 std::filesystem::path temporary_folder() {
   static int count = 0;
-  const auto folder = std::filesystem::temp_directory_path() /
-                      ("tpm_test_fit_" + std::to_string(getpid()) + "_" + std::to_string(count++));
+  auto folder = std::filesystem::temp_directory_path() /
+                ("tpm_test_fit_" + std::to_string(getpid()) + "_" + std::to_string(count++));
   std::filesystem::create_directories(folder);
   return folder;
 }
