@@ -22,7 +22,7 @@ const std::vector<std::string> kResults{
     "audit.json", "fit_relaxation.json", "fit_sensitivity.json", "fit_held_out.json"};
 
 fs::path fresh_report(const char* name) {
-  const fs::path folder = fs::temp_directory_path() / ("tpm_report_" + std::string(name));
+  fs::path folder = fs::temp_directory_path() / ("tpm_report_" + std::string(name));
   fs::remove_all(folder);
   write_paper_report(make_paper_report(), folder, find_drawing_python());
   return folder;
@@ -76,7 +76,9 @@ TEST_CASE("the report is reproduced, and twice byte for byte") {
     INFO(name);
     const std::string text = read_file(first / name);
     CHECK(text == read_file(second / name));
-    CHECK(first_difference(read_file(reference / name), text) == "");
+    const std::string difference = first_difference(read_file(reference / name), text);
+    INFO(difference);
+    CHECK(difference.empty());
   }
   SECTION("the drawings are the same bytes too, and so is the page made of them") {
     CHECK(read_file(first / "report.html") == read_file(second / "report.html"));

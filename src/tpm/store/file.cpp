@@ -102,7 +102,7 @@ fs::path share_dir() {
   std::error_code ec;
   const fs::path program = fs::read_symlink("/proc/self/exe", ec);
   if (!ec) {
-    const fs::path beside = program.parent_path().parent_path() / "share" / "tpmkit";
+    fs::path beside = program.parent_path().parent_path() / "share" / "tpmkit";
     if (has_data(beside)) return beside;
   }
   for (const char* place : {TPM_INSTALL_SHARE, TPM_SOURCE_SHARE}) {

@@ -36,7 +36,7 @@ void require_finite(const Json& value, const std::string& key) {
     throw Error(ExitCode::numerical, key, "the result is not a finite number");
   }
   if (value.is_structured()) {
-    for (const auto& [k, v] : value.items()) require_finite(v, key + "/" + k);
+    for (const auto& [k, v] : value.items()) require_finite(v, fmt::format("{}/{}", key, k));
   }
 }
 
