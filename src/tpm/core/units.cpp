@@ -69,6 +69,11 @@ constexpr auto kSpellings = std::to_array<Spelling>({
     {"Hz", "Hz", Dimension::frequency, 1.0},
     {"kHz", "kHz", Dimension::frequency, 1e3},
     {"1/s", "Hz", Dimension::frequency, 1.0},
+    {"rad/s", "rad/s", Dimension::frequency, 0.15915494309189535},
+    {"N/m", "N/m", Dimension::stiffness, 1.0},
+    {"mN/mm", "N/m", Dimension::stiffness, 1.0},
+    {"N/mm", "N/mm", Dimension::stiffness, 1e3},
+    {"kN/m", "N/mm", Dimension::stiffness, 1e3},
 });
 
 std::string_view trimmed(std::string_view text) {
@@ -118,6 +123,8 @@ std::string_view dimension_name(Dimension dimension) noexcept {
       return "speed";
     case Dimension::frequency:
       return "frequency";
+    case Dimension::stiffness:
+      return "stiffness";
   }
   return "";
 }
@@ -142,6 +149,8 @@ std::string_view si_symbol(Dimension dimension) noexcept {
       return "m/s";
     case Dimension::frequency:
       return "Hz";
+    case Dimension::stiffness:
+      return "N/m";
   }
   return "";
 }

@@ -16,6 +16,7 @@ enum class Dimension {
   viscosity,  // Pa s
   speed,      // m/s
   frequency,  // Hz
+  stiffness,  // N/m
 };
 
 /// A unit of measurement: value_SI = value * to_si.

@@ -1,0 +1,248 @@
+#include "tpm/law/law.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Word {
+  std::string_view text;
+  int value;
+};
+
+constexpr std::array<Word, 3> kKernelWords{{{"linear", static_cast<int>(Kernel::linear)},
+                                            {"hertz", static_cast<int>(Kernel::hertz)},
+                                            {"power", static_cast<int>(Kernel::power)}}};
+
+constexpr std::array<Word, 4> kFractionalWords{
+    {{"fspringpot", static_cast<int>(Fractional::springpot)},
+     {"fmaxwell", static_cast<int>(Fractional::maxwell)},
+     {"fkelvin_voigt", static_cast<int>(Fractional::kelvin_voigt)},
+     {"fzener", static_cast<int>(Fractional::zener)}}};
+
+template <std::size_t N>
+const Word* find_word(const std::array<Word, N>& words, std::string_view text) {
+  for (const Word& word : words) {
+    if (word.text == text) return &word;
+  }
+  return nullptr;
+}
+
+template <std::size_t N>
+std::string_view word_of(const std::array<Word, N>& words, int value) {
+  for (const Word& word : words) {
+    if (word.value == value) return word.text;
+  }
+  return "";
+}
+
+Error unknown_law(std::string_view text, std::string_view where) {
+  return bad_input(
+      where, fmt::format("unknown law '{}'", printable(text)),
+      "KERNEL[-BRANCHES or -FRACTIONAL][-elastic or -relaxing][-fluid][-series], such as "
+      "linear-1-elastic, power-2 or hertz-fzener");
+}
+
+bool is_stretch(const LawSpec& spec) {
+  return spec.drive == Quantity::relative_length;
+}
+
+}  // namespace
+
+std::string law_name(const LawSpec& spec) {
+  std::string name(word_of(kKernelWords, static_cast<int>(spec.kernel)));
+  if (spec.fractional != Fractional::none) {
+    name += '-';
+    name += word_of(kFractionalWords, static_cast<int>(spec.fractional));
+  } else if (spec.branches > 0) {
+    name += fmt::format("-{}", spec.branches);
+  }
+  if (spec.tension == Tension::elastic) name += "-elastic";
+  if (spec.tension == Tension::relaxing) name += "-relaxing";
+  if (!spec.solid) name += "-fluid";
+  if (spec.form == BranchForm::series) name += "-series";
+  return name;
+}
+
+LawSpec parse_law_name(std::string_view text, std::string_view where) {
+  LawSpec spec;
+  spec.branches = 0;
+  std::size_t begin = 0;
+  for (int part = 0; begin <= text.size(); ++part) {
+    const std::size_t end = std::min(text.find('-', begin), text.size());
+    const std::string_view word = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (part == 0) {
+      const Word* kernel = find_word(kKernelWords, word);
+      if (kernel == nullptr) throw unknown_law(text, where);
+      spec.kernel = static_cast<Kernel>(kernel->value);
+    } else if (const Word* fractional = find_word(kFractionalWords, word)) {
+      spec.fractional = static_cast<Fractional>(fractional->value);
+    } else if (word == "elastic") {
+      spec.tension = Tension::elastic;
+    } else if (word == "relaxing") {
+      spec.tension = Tension::relaxing;
+    } else if (word == "fluid") {
+      spec.solid = false;
+    } else if (word == "series") {
+      spec.form = BranchForm::series;
+    } else {
+      const auto [stop, status] =
+          std::from_chars(word.data(), word.data() + word.size(), spec.branches);
+      if (status != std::errc{} || stop != word.data() + word.size()) {
+        throw unknown_law(text, where);
+      }
+    }
+  }
+  require_valid(spec, where);
+  if (law_name(spec) != text) throw unknown_law(text, where);  // parts twice or out of order
+  return spec;
+}
+
+std::string law_words(const LawSpec& spec) {
+  constexpr std::array<std::string_view, kMostBranches + 1> kNumbers{
+      "no", "one", "two", "three", "four", "five", "six", "seven", "eight"};
+  std::string words = spec.kernel == Kernel::linear  ? "linear kernel"
+                      : spec.kernel == Kernel::hertz ? "Hertz kernel"
+                                                     : "power-law kernel";
+  switch (spec.fractional) {
+    case Fractional::none:
+      words += fmt::format(", {} relaxing branch{}",
+                           kNumbers.at(static_cast<std::size_t>(spec.branches)),
+                           spec.branches == 1 ? "" : "es");
+      break;
+    case Fractional::springpot:
+      words += ", spring-pot";
+      break;
+    case Fractional::maxwell:
+      words += ", fractional Maxwell";
+      break;
+    case Fractional::kelvin_voigt:
+      words += ", fractional Kelvin-Voigt";
+      break;
+    case Fractional::zener:
+      words += ", fractional Zener";
+      break;
+  }
+  if (spec.form == BranchForm::series) words += " as a Kelvin chain";
+  if (!spec.solid) words += ", no lasting stiffness";
+  words += spec.tension == Tension::none      ? ", no tension"
+           : spec.tension == Tension::elastic ? ", elastic tension"
+                                              : ", relaxing tension";
+  return words;
+}
+
+void require_valid(const LawSpec& spec, std::string_view where) {
+  if (spec.branches < 0 || spec.branches > kMostBranches) {
+    throw bad_input(where, fmt::format("{} branches", spec.branches),
+                    fmt::format("0 to {} branches", kMostBranches));
+  }
+  if (spec.fractional != Fractional::none &&
+      (spec.branches > 0 || spec.form == BranchForm::series || !spec.solid)) {
+    throw bad_input(where, "a fractional law with branches, 'fluid' or 'series'",
+                    "a fractional element instead of branches");
+  }
+  if (!spec.solid && (spec.branches == 0 || spec.form == BranchForm::series)) {
+    throw bad_input(where, "a fluid without parallel branches",
+                    "at least one branch, not 'series'");
+  }
+  if (spec.form == BranchForm::series && spec.branches == 0) {
+    throw bad_input(where, "a Kelvin chain without units", "at least one branch");
+  }
+  if (spec.tension == Tension::relaxing && spec.branches == 0 &&
+      spec.fractional == Fractional::none) {
+    throw bad_input(where, "nothing relaxes, so tension cannot relax with it", "elastic tension");
+  }
+  if (!(spec.reference > 0.0) || !std::isfinite(spec.reference)) {
+    throw bad_input(where, fmt::format("reference {}", shortest(spec.reference)),
+                    "a reference depth above 0");
+  }
+  const bool indentation =
+      spec.drive == Quantity::indentation_depth && spec.response == Quantity::contact_force;
+  const bool stretch = is_stretch(spec) && spec.response == Quantity::stress;
+  if (!indentation && !stretch) {
+    throw bad_input(
+        where,
+        fmt::format("{} answered by {}", quantity_name(spec.drive), quantity_name(spec.response)),
+        "indentation_depth with contact_force, or relative_length with stress");
+  }
+}
+
+std::vector<LawParameter> law_parameters(const LawSpec& spec) {
+  require_valid(spec, "law");
+  const bool stretch = is_stretch(spec);
+  const Dimension stiffness = stretch ? Dimension::stress : Dimension::stiffness;
+  const Dimension drive = stretch ? Dimension::dimensionless : Dimension::length;
+  std::vector<LawParameter> p;
+  const auto add_stiffness = [&](std::string name, std::string meaning, bool linear) {
+    p.push_back({std::move(name), stiffness, std::move(meaning), linear, false, std::nullopt, 0.0,
+                 kInfinity});
+  };
+  const auto add_time = [&](std::string name, std::string meaning) {
+    p.push_back({std::move(name), Dimension::time, std::move(meaning), false, false, std::nullopt,
+                 0.0, kInfinity});
+  };
+  if (spec.form == BranchForm::series) {
+    add_stiffness("k0", "stiffness at once", false);
+    for (int i = 1; i <= spec.branches; ++i) {
+      add_stiffness(fmt::format("kc{}", i), "spring of a unit of the Kelvin chain", false);
+    }
+    for (int i = 1; i <= spec.branches; ++i) {
+      add_time(fmt::format("T{}", i), "retardation time of that unit");
+    }
+  } else if (spec.fractional != Fractional::none) {
+    const bool has_k_inf =
+        spec.fractional == Fractional::kelvin_voigt || spec.fractional == Fractional::zener;
+    const bool has_tau =
+        spec.fractional == Fractional::maxwell || spec.fractional == Fractional::zener;
+    if (has_k_inf) add_stiffness("k_inf", "stiffness in the end", true);
+    add_stiffness(
+        "k1",
+        has_tau ? "stiffness that relaxes" : "spring-pot: stiffness at 1 s, times Gamma(1-alpha)",
+        true);
+    if (has_tau) add_time("tau1", "relaxation time");
+    p.push_back({"alpha", Dimension::dimensionless, "order of the spring-pot", false, false,
+                 std::nullopt, 0.01, 1.0});
+  } else {
+    if (spec.solid) add_stiffness("k_inf", "stiffness in the end", true);
+    for (int i = 1; i <= spec.branches; ++i) {
+      add_stiffness(fmt::format("k{}", i), "stiffness of a branch", true);
+    }
+    for (int i = 1; i <= spec.branches; ++i) {
+      add_time(fmt::format("tau{}", i), "relaxation time of that branch");
+    }
+  }
+  if (spec.kernel == Kernel::power) {
+    p.push_back({"exponent", Dimension::dimensionless, "exponent m of the kernel", false, false,
+                 std::nullopt, 1.0, 20.0});
+  }
+  if (spec.tension == Tension::elastic) {
+    add_stiffness("k_tension", "secant stiffness of the tension at the reference depth", true);
+  }
+  if (spec.tension == Tension::relaxing) {
+    p.push_back({"tension_ratio", Dimension::dimensionless,
+                 "tension over the rest of the kernel at the reference depth", false, false,
+                 std::nullopt, 0.0, kInfinity});
+  }
+  if (spec.tension != Tension::none) {
+    p.push_back({"spacing", drive, "distance x of lateral neighbours", false, false, kInfinity, 0.0,
+                 kInfinity});
+  }
+  p.push_back({"contact", drive, stretch ? "slack length" : "depth at which contact begins", false,
+               true, 0.0, -kInfinity, kInfinity});
+  p.push_back({"offset", stretch ? Dimension::stress : Dimension::force,
+               "zero error of the response", true, true, 0.0, -kInfinity, kInfinity});
+  return p;
+}
+
+}  // namespace tpm

@@ -1,0 +1,42 @@
+#pragma once
+#include <complex>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tpm/law/law.hpp"
+#include "tpm/model/model.hpp"
+
+namespace tpm {
+
+/// A law of the family, behind the interface that tables, fits and plans ask.
+///
+/// Displacement-driven: exact in time for a drive that is linear between knots (exponential
+/// quadrature of V(u(s)), refined until a quadratic holds to 1e-10 of the peak), in O(n) for each
+/// branch. After detachment (the force would become tensile) the surface recovers freely and the
+/// response is the offset until the probe meets it again.
+class LawModel final : public Model {
+ public:
+  /// Throws Error(bad_input) as require_valid(spec).
+  explicit LawModel(LawSpec spec);
+
+  [[nodiscard]] std::string_view name() const override { return name_; }
+  [[nodiscard]] std::span<const ParameterDescription> parameters() const override {
+    return descriptions_;
+  }
+  [[nodiscard]] Response respond(const Protocol& protocol, std::span<const double> times_s,
+                                 std::span<const double> parameters, Want want) const override;
+
+  [[nodiscard]] const LawSpec& spec() const { return spec_; }
+  [[nodiscard]] const std::vector<LawParameter>& law_parameters() const { return parameters_; }
+  /// Place of a parameter in the vector. Throws Error(bad_input) naming the known ones.
+  [[nodiscard]] std::size_t index(std::string_view parameter) const;
+
+ private:
+  LawSpec spec_;
+  std::string name_;
+  std::vector<LawParameter> parameters_;
+  std::vector<ParameterDescription> descriptions_;
+};
+
+}  // namespace tpm
