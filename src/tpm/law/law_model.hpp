@@ -14,7 +14,8 @@ namespace tpm {
 /// Displacement-driven: exact in time for a drive that is linear between knots (exponential
 /// quadrature of V(u(s)), refined until a quadratic holds to 1e-10 of the peak), in O(n) for each
 /// branch. After detachment (the force would become tensile) the surface recovers freely and the
-/// response is the offset until the probe meets it again.
+/// response is the offset until the probe meets it again. Force-driven: adaptive implicit steps.
+/// Times at infinity are answered by full relaxation.
 class LawModel final : public Model {
  public:
   /// Throws Error(bad_input) as require_valid(spec).
@@ -31,8 +32,13 @@ class LawModel final : public Model {
   [[nodiscard]] const std::vector<LawParameter>& law_parameters() const { return parameters_; }
   /// Place of a parameter in the vector. Throws Error(bad_input) naming the known ones.
   [[nodiscard]] std::size_t index(std::string_view parameter) const;
+  [[nodiscard]] bool linear_in(std::size_t parameter) const override;
 
  private:
+  struct Prepared;
+  [[nodiscard]] Prepared prepare(std::span<const double> values) const;
+  void require_in_range(std::span<const double> values) const;
+
   LawSpec spec_;
   std::string name_;
   std::vector<LawParameter> parameters_;

@@ -57,6 +57,10 @@ class Model {
   /// Throws Error(bad_input) for parameters out of range, Error(numerical) if a solver fails.
   [[nodiscard]] virtual Response respond(const Protocol& protocol, std::span<const double> times_s,
                                          std::span<const double> parameters, Want want) const = 0;
+
+  /// The response to an imposed displacement is linear in this parameter while the others are held:
+  /// a search can solve for it.
+  [[nodiscard]] virtual bool linear_in(std::size_t /*parameter*/) const { return false; }
 };
 
 /// Numerical settings; the closed form has none.

@@ -39,11 +39,17 @@ class Protocol {
   /// Largest absolute imposed value.
   [[nodiscard]] double peak() const noexcept;
 
+  /// The first value was held for ever before the first knot, so that everything has relaxed under
+  /// it (a preload), instead of a jump from 0.
+  [[nodiscard]] bool relaxed_at_start() const noexcept { return relaxed_at_start_; }
+  void set_relaxed_at_start(bool relaxed) noexcept { relaxed_at_start_ = relaxed; }
+
  private:
   Drive drive_;
   std::vector<Knot> knots_;
   std::string name_;
   bool holds_forever_;
+  bool relaxed_at_start_ = false;
 };
 
 /// Jump to a depth at t = 0, held for `hold_s` (may be infinite).

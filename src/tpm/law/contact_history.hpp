@@ -1,0 +1,128 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "tpm/law/kernel.hpp"
+#include "tpm/law/memory.hpp"
+#include "tpm/model/model.hpp"
+#include "tpm/solve/exponential_quadrature.hpp"
+
+namespace tpm {
+
+/// Where the parameters that shape the kernel stand in the parameter vector; -1 if there is none.
+struct KernelPlaces {
+  int exponent = -1;
+  int tension_ratio = -1;
+  int k_tension = -1;
+  int spacing = -1;
+  int contact = -1;
+  int offset = -1;
+};
+
+/// The most parameters of a law in parallel form.
+inline constexpr int kMostLawParameters = 2 * kMostBranches + 8;
+
+/// Derivatives by all parameters of a law, on the stack.
+using Slopes = Eigen::Array<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMostLawParameters, 1>;
+
+/// A law at given parameters, ready to be stepped through a history.
+struct LawAtParameters {
+  Memory memory;
+  KernelShape kernel;
+  TensionShape tension;
+  double k_tension = 0.0;
+  double contact = 0.0;
+  double offset = 0.0;
+  KernelPlaces place;
+  int parameter_count = 0;
+};
+
+/// The contact of one law with a probe: the states of all branches, stepped exactly through pieces
+/// on which the drive is linear, with derivatives by all parameters.
+///
+/// One-sided: the probe only pushes. Where the force would become negative the surface leaves the
+/// probe and recovers under no force until the probe reaches it again.
+class ContactHistory {
+ public:
+  /// @param peak_depth largest depth (or expected depth) of the history, for the tolerances
+  ContactHistory(const LawAtParameters& law, double peak_depth, Want want);
+
+  /// The drive (depth before subtraction of `contact`) was held for ever.
+  void rest_at_drive(double drive);
+  /// An instantaneous change of the drive.
+  void jump_to_drive(double drive);
+  /// The drive moves linearly from `from` to `to` within h > 0.
+  /// @param time_scale largest time of the history: steps that differ by its rounding are equal
+  void move_drive(double from, double to, double h, double time_scale);
+
+  /// The load (offset included) was held for ever.
+  void rest_at_load(double load);
+  /// An instantaneous change of the load.
+  void jump_to_load(double load);
+  /// The load moves linearly within h > 0; adaptive steps, error 1e-10 of the depth's scale each.
+  void move_load(double from, double to, double h, double time_scale);
+
+  /// Contact force (offset included) and its derivatives by all parameters.
+  [[nodiscard]] double force() const;
+  [[nodiscard]] Slopes force_slopes() const;
+  /// Drive that the surface answers (contact included) and its derivatives.
+  [[nodiscard]] double drive() const { return now_.u + law_.contact; }
+  [[nodiscard]] Slopes drive_slopes() const;
+  /// The probe does not touch the surface.
+  [[nodiscard]] bool detached() const { return free_; }
+
+ private:
+  /// A depth u of the surface, V(u), and their derivatives by all parameters.
+  struct Point {
+    double u = 0.0;
+    double v = 0.0;
+    Slopes u_by;
+    Slopes v_by;
+  };
+  /// A V(u) + k_tension T(u) = load + R, what a surface under a given load must satisfy.
+  struct Balance {
+    double a = 0.0;
+    double r = 0.0;
+    Slopes a_by;
+    Slopes r_by;
+  };
+  struct State {
+    Eigen::ArrayXd w;
+    Eigen::ArrayXXd w_by;  ///< parameters x branches
+    Point now;
+    double v_rate = 0.0;
+    Slopes v_rate_by;
+  };
+
+  [[nodiscard]] Slopes zero_slopes() const;
+  /// @param touching at u = 0 the slope just inside the contact is meant, not just outside
+  [[nodiscard]] Point imposed(double drive, bool touching) const;
+  [[nodiscard]] double elastic_force(double v, double u, const Eigen::ArrayXd& w,
+                                     double v_rate) const;
+  void update_weights(double h, double time_scale, bool parabola);
+  void step_branches(const Point& begin, const Point* middle, const Point& end);
+  void accept(const Point& begin, const Point& end, double h);
+  void move_one(double from, double to, double h, double time_scale);
+  void move_smooth(double from, double to, double h, double time_scale, int level);
+  void move_straight(double from, double to, double h, double time_scale, bool parabola);
+  [[nodiscard]] Balance balance_at_once() const;
+  [[nodiscard]] Balance balance_over_step(double h) const;
+  [[nodiscard]] Point surface_under(double load, const Balance& balance, bool loaded) const;
+  void move_load_adaptive(double from, double to, double h, double time_scale, int level);
+  void load_step(double load, double h, double time_scale);
+
+  const LawAtParameters& law_;
+  bool want_slopes_;
+  double v_tolerance_;
+  Eigen::ArrayXd w_, w_next_;
+  Eigen::ArrayXXd w_by_, w_by_next_;
+  Point now_;
+  bool free_ = false;
+  double v_rate_ = 0.0;  ///< dV/dt over the last step, for a dashpot
+  Slopes v_rate_by_;
+  double weights_h_ = -1.0;
+  bool weights_parabola_ = false;
+  std::vector<ParabolaWeights> weights_;
+};
+
+}  // namespace tpm

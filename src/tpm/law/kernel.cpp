@@ -1,0 +1,79 @@
+#include "tpm/law/kernel.hpp"
+
+#include <cmath>
+
+namespace tpm {
+
+TensionShape::Values TensionShape::at(double u) const {
+  if (u <= 0.0) return {0.0, 0.0, 0.0};
+  // With y = 1/x, root = sqrt(1 + u^2 y^2) and q = root (root + 1), phi = u^2 y^2 / q: no
+  // cancellation, and regular at y = 0.
+  const double y = 1.0 / spacing;
+  const auto root = [y](double v) { return std::sqrt(1.0 + v * v * y * y); };
+  const double root_u = root(u);
+  const double root_r = root(reference);
+  const double q_u = root_u * (root_u + 1.0);
+  const double q_r = root_r * (root_r + 1.0);
+  const double value = u * (u / reference) * (u / reference) * (q_r / q_u);
+  const double stretch_u = (2.0 * root_u + 1.0) / (root_u * q_u);  // d ln q / d(v^2 y^2 / 2)
+  const double stretch_r = (2.0 * root_r + 1.0) / (root_r * q_r);
+  const double d_log_y = y * (reference * reference * stretch_r - u * u * stretch_u);
+  return {value, value * (3.0 / u - u * y * y * stretch_u), -y * y * value * d_log_y};
+}
+
+KernelShape::KernelShape(Kernel kernel, double reference, double exponent, double tension_ratio,
+                         double spacing)
+    : kernel_(kernel),
+      reference_(reference),
+      exponent_(kernel == Kernel::linear  ? 1.0
+                : kernel == Kernel::hertz ? 1.5
+                                          : exponent),
+      ratio_(tension_ratio),
+      tension_{reference, spacing} {}
+
+double KernelShape::value(double u) const {
+  if (u <= 0.0) return 0.0;
+  double w = u;
+  if (kernel_ == Kernel::hertz) w = u * std::sqrt(u / reference_);
+  if (kernel_ == Kernel::power) w = reference_ * std::exp(exponent_ * std::log(u / reference_));
+  return ratio_ == 0.0 ? w : w + ratio_ * tension_.at(u).value;
+}
+
+KernelShape::Values KernelShape::at(double u) const {
+  if (u <= 0.0) return {0.0, kernel_ == Kernel::linear ? 1.0 : 0.0, 0.0, 0.0, 0.0};
+  Values k{u, 1.0, 0.0, 0.0, 0.0};
+  if (kernel_ == Kernel::hertz) {
+    const double root = std::sqrt(u / reference_);
+    k.value = u * root;
+    k.slope = 1.5 * root;
+  } else if (kernel_ == Kernel::power) {
+    const double log_u = std::log(u / reference_);
+    k.value = reference_ * std::exp(exponent_ * log_u);
+    k.slope = exponent_ * k.value / u;
+    k.d_exponent = k.value * log_u;
+  }
+  const TensionShape::Values t = tension_.at(u);
+  k.d_ratio = t.value;
+  if (ratio_ != 0.0) {
+    k.value += ratio_ * t.value;
+    k.slope += ratio_ * t.slope;
+    k.d_spacing = ratio_ * t.d_spacing;
+  }
+  return k;
+}
+
+double KernelShape::inverse(double v) const {
+  if (v <= 0.0) return 0.0;
+  double u = kernel_ == Kernel::linear ? v : reference_ * std::pow(v / reference_, 1.0 / exponent_);
+  if (ratio_ == 0.0) return u;
+  // V is convex and the start is not below the root: Newton falls monotonically onto it.
+  for (int i = 0; i < 200; ++i) {
+    const Values k = at(u);
+    const double next = u - (k.value - v) / k.slope;
+    if (!(next < u)) break;
+    u = next;
+  }
+  return u;
+}
+
+}  // namespace tpm

@@ -1,0 +1,45 @@
+#pragma once
+#include "tpm/law/law.hpp"
+
+namespace tpm {
+
+/// T(u) = u phi(u)/phi(u_ref), phi = 1 - cos(arctan(u/x)): the pull of the neighbour bonds, scaled
+/// so that T(u_ref) = u_ref. The spacing x may be infinite (T = u^3/u_ref^2).
+struct TensionShape {
+  double reference;
+  double spacing;
+
+  struct Values {
+    double value, slope, d_spacing;
+  };
+  /// u >= 0
+  [[nodiscard]] Values at(double u) const;
+};
+
+/// V(u) = W(u) + ratio T(u) for u >= 0: what the relaxation acts on. V(0) = 0 and V rises strictly.
+class KernelShape {
+ public:
+  /// @param exponent used by Kernel::power
+  /// @param tension_ratio 0 without relaxing tension
+  KernelShape(Kernel kernel, double reference, double exponent, double tension_ratio,
+              double spacing);
+
+  struct Values {
+    double value, slope, d_exponent, d_ratio, d_spacing;
+  };
+  [[nodiscard]] Values at(double u) const;
+  [[nodiscard]] double value(double u) const;
+  /// u with value(u) = v; v >= 0
+  [[nodiscard]] double inverse(double v) const;
+  /// V is a straight line: histories need no refinement.
+  [[nodiscard]] bool is_linear() const { return kernel_ == Kernel::linear && ratio_ == 0.0; }
+
+ private:
+  Kernel kernel_;
+  double reference_;
+  double exponent_;
+  double ratio_;
+  TensionShape tension_;
+};
+
+}  // namespace tpm

@@ -1,0 +1,205 @@
+#include "tpm/law/law_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/law/contact_history.hpp"
+#include "tpm/law/kelvin_chain.hpp"
+
+namespace tpm {
+namespace {
+
+std::vector<std::size_t> rising_order(std::span<const double> times_s) {
+  std::vector<std::size_t> order(times_s.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (std::is_sorted(times_s.begin(), times_s.end())) return order;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
+  return order;
+}
+
+/// Value of the imposed history inside a piece.
+double between(const Knot& from, const Knot& to, double time) {
+  const double h = to.time_s - from.time_s;
+  return h > 0.0 ? from.value + (to.value - from.value) * ((time - from.time_s) / h) : from.value;
+}
+
+/// Walks a contact through a protocol, stopping at each asked time.
+/// @param report called once for each asked time with its index
+template <class Report>
+void walk(const Protocol& protocol, std::span<const double> times_s, ContactHistory& contact,
+          const Report& report) {
+  const auto order = rising_order(times_s);
+  const auto knots = protocol.knots();
+  const bool displacement = protocol.drive() == Drive::displacement;
+  double time_scale = 0.0;
+  for (const Knot& k : knots) time_scale = std::max(time_scale, std::abs(k.time_s));
+  const auto jump = [&](double value) {
+    displacement ? contact.jump_to_drive(value) : contact.jump_to_load(value);
+  };
+  const auto move = [&](double from, double to, double h) {
+    if (!(h > 0.0)) return;
+    displacement ? contact.move_drive(from, to, h, time_scale)
+                 : contact.move_load(from, to, h, time_scale);
+  };
+  if (protocol.relaxed_at_start()) {
+    displacement ? contact.rest_at_drive(knots.front().value)
+                 : contact.rest_at_load(knots.front().value);
+  } else {
+    jump(knots.front().value);
+  }
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    const bool last = i + 1 == knots.size();
+    const Knot& to = last ? knots[i] : knots[i + 1];
+    Knot at = knots[i];
+    while (next < order.size() && (last || times_s[order[next]] < to.time_s)) {
+      const double time = times_s[order[next]];
+      const Knot there{time, last ? at.value : between(knots[i], to, time)};
+      move(at.value, there.value, there.time_s - at.time_s);
+      at = there;
+      report(order[next]);
+      ++next;
+    }
+    if (last) break;
+    if (to.time_s > knots[i].time_s) {
+      move(at.value, to.value, to.time_s - at.time_s);
+    } else {
+      jump(to.value);
+    }
+  }
+}
+
+}  // namespace
+
+/// The law in parallel form at given parameters, and how its slopes turn into those of the
+/// parameters that were given.
+struct LawModel::Prepared {
+  LawAtParameters law;
+  Eigen::MatrixXd chain_slopes;  ///< d(k_inf, k_i, tau_i)/d(k0, kc_i, T_i); empty if parallel
+};
+
+LawModel::LawModel(LawSpec spec) : spec_(spec), name_(law_name(spec)) {
+  parameters_ = tpm::law_parameters(spec_);
+  descriptions_.reserve(parameters_.size());
+  for (const LawParameter& p : parameters_) {
+    descriptions_.push_back({p.name, p.dimension, p.meaning});
+  }
+}
+
+std::size_t LawModel::index(std::string_view parameter) const {
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    if (parameters_[i].name == parameter) return i;
+  }
+  std::vector<std::string_view> known;
+  known.reserve(parameters_.size());
+  for (const LawParameter& p : parameters_) known.push_back(p.name);
+  throw bad_input(fmt::format("law {}", name_),
+                  fmt::format("no parameter is called '{}'", printable(parameter)),
+                  fmt::format("one of {}", fmt::join(known, ", ")));
+}
+
+bool LawModel::linear_in(std::size_t parameter) const {
+  return parameters_.at(parameter).linear;
+}
+
+void LawModel::require_in_range(std::span<const double> values) const {
+  if (values.size() != parameters_.size()) {
+    throw bad_input(fmt::format("law {}", name_), fmt::format("{} parameters given", values.size()),
+                    fmt::format("{}", parameters_.size()));
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const LawParameter& p = parameters_[i];
+    const bool time_like = p.dimension == Dimension::time || p.name == "spacing";
+    const bool in_series = spec_.form == BranchForm::series && p.dimension != Dimension::time &&
+                           i <= static_cast<std::size_t>(spec_.branches);
+    const bool above = time_like || in_series ? values[i] > p.lower : values[i] >= p.lower;
+    const bool finite = std::isfinite(values[i]) || p.name == "spacing";
+    if (above && values[i] <= p.upper && finite) continue;
+    throw bad_input(fmt::format("law {}", name_),
+                    fmt::format("{} = {}", p.name, shortest(values[i])),
+                    fmt::format("a value {} {}", time_like || in_series ? "above" : "of at least",
+                                shortest(p.lower)));
+  }
+}
+
+LawModel::Prepared LawModel::prepare(std::span<const double> values) const {
+  require_in_range(values);
+  const auto get = [&](std::string_view name, double otherwise, int& place) {
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+      if (parameters_[i].name != name) continue;
+      place = static_cast<int>(i);
+      return values[i];
+    }
+    return otherwise;
+  };
+  KernelPlaces place;
+  const double exponent = get("exponent", 1.0, place.exponent);
+  const double ratio = get("tension_ratio", 0.0, place.tension_ratio);
+  const double k_tension = get("k_tension", 0.0, place.k_tension);
+  const double spacing = get("spacing", std::numeric_limits<double>::infinity(), place.spacing);
+  const double contact = get("contact", 0.0, place.contact);
+  const double offset = get("offset", 0.0, place.offset);
+  Prepared prepared{{{},
+                     KernelShape(spec_.kernel, spec_.reference, exponent, ratio, spacing),
+                     TensionShape{spec_.reference, spacing},
+                     k_tension,
+                     contact,
+                     offset,
+                     place,
+                     static_cast<int>(parameters_.size())},
+                    {}};
+  if (spec_.form == BranchForm::series) {
+    const auto n = static_cast<std::size_t>(spec_.branches);
+    KelvinChain chain;
+    chain.k0 = values[0];
+    chain.k.assign(values.begin() + 1, values.begin() + 1 + spec_.branches);
+    chain.T_s.assign(values.begin() + 1 + spec_.branches, values.begin() + 1 + 2 * spec_.branches);
+    ParallelWithSlopes parallel = to_parallel_with_slopes(chain);
+    std::vector<double> flat{parallel.law.k_inf};
+    flat.insert(flat.end(), parallel.law.k.begin(), parallel.law.k.end());
+    flat.insert(flat.end(), parallel.law.tau_s.begin(), parallel.law.tau_s.end());
+    flat.resize(2 * n + 1);
+    prepared.law.memory = branch_memory(true, spec_.branches, flat);
+    prepared.chain_slopes = std::move(parallel.slopes);
+  } else {
+    prepared.law.memory = branch_memory(spec_.solid, spec_.branches, values);
+  }
+  return prepared;
+}
+
+Response LawModel::respond(const Protocol& protocol, std::span<const double> times_s,
+                           std::span<const double> parameters, Want want) const {
+  require_times_within(protocol, times_s);
+  const Prepared prepared = prepare(parameters);
+  const LawAtParameters& law = prepared.law;
+  const bool displacement = protocol.drive() == Drive::displacement;
+  const double peak = displacement ? protocol.peak() - law.contact : spec_.reference;
+  ContactHistory contact(law, peak, want);
+  Response response;
+  response.value.resize(static_cast<Eigen::Index>(times_s.size()));
+  const bool want_slopes = want == Want::values_and_sensitivity;
+  if (want_slopes) {
+    response.sensitivity.resize(response.value.size(), law.parameter_count);
+  }
+  walk(protocol, times_s, contact, [&](std::size_t i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    response.value[row] = displacement ? contact.force() : contact.drive();
+    if (!want_slopes) return;
+    response.sensitivity.row(row) =
+        (displacement ? contact.force_slopes() : contact.drive_slopes()).matrix().transpose();
+  });
+  if (want_slopes && prepared.chain_slopes.size() > 0) {
+    const Eigen::Index n = prepared.chain_slopes.rows();
+    response.sensitivity.leftCols(n) =
+        (response.sensitivity.leftCols(n) * prepared.chain_slopes).eval();
+  }
+  return response;
+}
+
+}  // namespace tpm

@@ -1,0 +1,333 @@
+// The family of laws against closed forms, quadrature, finite differences and the paper's element.
+#include <boost/math/quadrature/gauss_kronrod.hpp>
+#include <boost/math/quadrature/tanh_sinh.hpp>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/law/kelvin_chain.hpp"
+#include "tpm/law/law_model.hpp"
+#include "tpm/model/closed_form.hpp"
+
+using namespace tpm;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+const std::vector<std::string> kLaws{
+    "linear",           "linear-1",          "linear-2",        "linear-3-elastic",
+    "linear-1-elastic", "linear-2-relaxing", "hertz-1",         "power-2",
+    "linear-2-fluid",   "power-1-elastic",   "linear-2-series", "power-1-elastic-series"};
+
+/// Plausible parameters of any law: stiffnesses of tens of N/m, times around a second.
+std::vector<double> random_parameters(const LawModel& law, Random& random) {
+  std::vector<double> values;
+  for (const LawParameter& p : law.law_parameters()) {
+    const double u = random.uniform();
+    if (p.dimension == Dimension::stiffness) {
+      values.push_back(10.0 * std::pow(10.0, u));
+    } else if (p.dimension == Dimension::time) {
+      values.push_back(0.05 * std::pow(100.0, u));
+    } else if (p.name == "exponent") {
+      values.push_back(1.2 + u);
+    } else if (p.name == "tension_ratio") {
+      values.push_back(0.2 + u);
+    } else if (p.name == "spacing") {
+      values.push_back(0.01 + 0.02 * u);
+    } else if (p.name == "contact") {
+      values.push_back(2e-4 * u);
+    } else {
+      values.push_back(0.01 * u);
+    }
+  }
+  return values;
+}
+
+std::vector<double> evenly(double from, double to, int count) {
+  std::vector<double> times;
+  for (int i = 0; i < count; ++i) times.push_back(from + (to - from) * i / (count - 1));
+  return times;
+}
+
+double largest_difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  return (a - b).cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+TEST_CASE("names of laws go there and back", "[law]") {
+  for (const std::string& name : kLaws) {
+    CHECK(law_name(parse_law_name(name, "test")) == name);
+  }
+  CHECK(law_name(parse_law_name("power-fkelvin_voigt", "test")) == "power-fkelvin_voigt");
+  for (const char* bad :
+       {"", "cubic", "linear-9", "linear-1-elastic-elastic", "linear-elastic-1", "linear-relaxing",
+        "linear-fluid", "linear-2-fluid-series", "linear-", "linear-1-fzener", "linear--1"}) {
+    INFO(bad);
+    CHECK_THROWS_AS(parse_law_name(bad, "test"), Error);
+  }
+}
+
+TEST_CASE("the law linear-1-elastic is the paper's element", "[law]") {
+  Random random(3);
+  LawSpec spec = parse_law_name("linear-1-elastic", "test");
+  spec.reference = 4e-3;
+  const LawModel law(spec);
+  const ClosedForm element({TensionRule::exact()});
+  for (int trial = 0; trial < 20; ++trial) {
+    TpmParameters p;
+    p.E1_Pa = 1e3 * std::pow(10.0, random.uniform());
+    p.E2_Pa = 1e3 * std::pow(10.0, random.uniform());
+    p.Eprime_Pa = 1e4 * random.uniform();
+    p.eta1_Pa_s = std::pow(10.0, 2.0 + 3.0 * random.uniform());
+    p.spacing_m = 0.005 + 0.03 * random.uniform();
+    const double scale = p.modulus_to_stiffness_m();
+    const double k_tension = scale * lambda1_Pa(p.Eprime_Pa, spec.reference, p.spacing_m);
+    const std::vector<double> values{scale * p.relaxed_modulus_Pa(),
+                                     scale * p.relaxing_modulus_Pa(),
+                                     p.relaxation_time_s(),
+                                     k_tension,
+                                     p.spacing_m,
+                                     0.0,
+                                     0.0};
+    const TpmVector vector = to_vector(p);
+    const Protocol ramp = ramp_and_hold(6e-3, 2e-3, 30.0);
+    const auto times = evenly(0.0, 33.0, 50);
+    const auto expected = element.respond(ramp, times, vector, Want::values).value;
+    const auto answer = law.respond(ramp, times, values, Want::values).value;
+    CHECK(largest_difference(answer, expected) < 1e-12 * expected.maxCoeff());
+
+    const Protocol load = creep(0.5, 100.0);
+    const std::vector<double> creep_times{0.0, 0.01, 0.1, 1.0, 10.0, 100.0};
+    const auto depth = element.respond(load, creep_times, vector, Want::values).value;
+    const auto crept = law.respond(load, creep_times, values, Want::values).value;
+    CHECK(largest_difference(crept, depth) < 2e-9 * depth.maxCoeff());
+  }
+}
+
+TEST_CASE("sensitivities of every law agree with differences", "[law]") {
+  Random random(11);
+  const Protocol push(Drive::displacement,
+                      {{0.0, 0.0}, {0.7, 2e-3}, {1.5, 1.8e-3}, {2.0, 3e-3}, {6.0, 3e-3}});
+  Protocol load(Drive::force, {{0.0, 0.0}, {0.5, 0.08}, {2.0, 0.08}, {3.0, 0.2}, {5.0, 0.15}});
+  for (const std::string& name : kLaws) {
+    const LawModel law(parse_law_name(name, "test"));
+    const auto values = random_parameters(law, random);
+    for (const Protocol* protocol : {&std::as_const(push), &std::as_const(load)}) {
+      const auto times = evenly(0.35, 4.9, 14);
+      const Response r = law.respond(*protocol, times, values, Want::values_and_sensitivity);
+      CHECK(largest_difference(r.value,
+                               law.respond(*protocol, times, values, Want::values).value) == 0.0);
+      for (std::size_t j = 0; j < values.size(); ++j) {
+        const double width = law.law_parameters()[j].name == "offset" ? 0.01 : std::abs(values[j]);
+        const double step = 1e-4 * width;
+        const auto at = [&](double factor) {
+          auto moved = values;
+          moved[j] += factor * step;
+          return law.respond(*protocol, times, moved, Want::values).value;
+        };
+        const Eigen::VectorXd difference =
+            (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step);
+        const double scale = r.value.cwiseAbs().maxCoeff() / width;
+        INFO(name << ", " << law.law_parameters()[j].name
+                  << (protocol->drive() == Drive::force ? ", force" : ", displacement"));
+        CHECK(largest_difference(r.sensitivity.col(static_cast<Eigen::Index>(j)), difference) <
+              2e-5 * scale);
+      }
+    }
+  }
+}
+
+TEST_CASE("a nonlinear kernel under a ramp agrees with quadrature", "[law]") {
+  const double rate = 2e-3;
+  const double ramp_s = 1.3;
+  const Protocol ramp = ramp_and_hold(rate * ramp_s, rate, 20.0);
+  for (const char* name : {"hertz-2", "power-2", "linear-2-relaxing"}) {
+    const LawSpec spec = parse_law_name(name, "test");
+    const LawModel law(spec);
+    std::vector<double> values(law.law_parameters().size(), 0.0);
+    const auto set = [&](const char* key, double value) { values[law.index(key)] = value; };
+    set("k_inf", 20.0);
+    set("k1", 30.0);
+    set("k2", 12.0);
+    set("tau1", 0.08);
+    set("tau2", 4.0);
+    double power = 1.5;
+    if (spec.kernel == Kernel::power) set("exponent", power = 2.3);
+    if (spec.tension == Tension::relaxing) {
+      set("tension_ratio", 0.7);
+      set("spacing", std::numeric_limits<double>::infinity());
+    }
+    const auto kernel_slope = [&](double u) {
+      if (spec.tension == Tension::relaxing) return 1.0 + 0.7 * 3.0 * u * u / 1e-6;
+      return power * std::pow(u / 1e-3, power - 1.0);
+    };
+    const std::vector<double> times{0.1, 0.6, 1.3, 1.35, 2.0, 9.0, 20.0};
+    const Response r = law.respond(ramp, times, values, Want::values);
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      const auto integrand = [&](double s) {
+        const double g =
+            20.0 + 30.0 * std::exp(-(times[i] - s) / 0.08) + 12.0 * std::exp(-(times[i] - s) / 4.0);
+        return g * kernel_slope(rate * s) * rate;
+      };
+      boost::math::quadrature::tanh_sinh<double> integrator;
+      double expected = 0.0;
+      const double end = std::min(times[i], ramp_s);
+      for (int part = 0; part < 20; ++part) {
+        expected += integrator.integrate(integrand, end * part / 20.0, end * (part + 1) / 20.0);
+      }
+      INFO(name << " at " << times[i]);
+      CHECK_THAT(r.value[static_cast<Eigen::Index>(i)], WithinRel(expected, 1e-8));
+    }
+  }
+}
+
+TEST_CASE("parallel and series form are one law", "[law]") {
+  Random random(5);
+  for (int trial = 0; trial < 200; ++trial) {
+    const int n = 1 + static_cast<int>(random.below(5));
+    Prony law;
+    law.k_inf = trial % 7 == 0 ? 0.0 : std::pow(10.0, -2.0 + 4.0 * random.uniform());
+    for (int i = 0; i < n; ++i) {
+      law.k.push_back(std::pow(10.0, -3.0 + 5.0 * random.uniform()));
+      law.tau_s.push_back(std::pow(10.0, -3.0 + 6.0 * random.uniform()));
+    }
+    const KelvinChain chain = to_series(law);
+    const Prony back = to_parallel(chain);
+    REQUIRE(back.k.size() == law.k.size());
+    // The operational stiffness s G(s) times the operational compliance is 1 at every s > 0.
+    for (double s = 1e-4; s < 1e5; s *= 10.0) {
+      const auto stiffness = [s](const Prony& p) {
+        double g = p.k_inf;
+        for (std::size_t i = 0; i < p.k.size(); ++i) {
+          g += p.k[i] * s * p.tau_s[i] / (1.0 + s * p.tau_s[i]);
+        }
+        return g;
+      };
+      double compliance = 1.0 / chain.k0 + (chain.eta > 0.0 ? 1.0 / (s * chain.eta) : 0.0);
+      for (std::size_t i = 0; i < chain.k.size(); ++i) {
+        compliance += 1.0 / chain.k[i] / (1.0 + s * chain.T_s[i]);
+      }
+      CHECK_THAT(stiffness(law) * compliance, WithinRel(1.0, 1e-11));
+      CHECK_THAT(stiffness(back), WithinRel(stiffness(law), 1e-11));
+    }
+    CHECK(std::is_sorted(chain.T_s.begin(), chain.T_s.end()));
+  }
+}
+
+TEST_CASE("degenerate chains: equal times, branches without stiffness, one dashpot", "[law]") {
+  const KelvinChain merged = to_series({5.0, {2.0, 3.0, 0.0}, {1.0, 1.0, 7.0}});
+  REQUIRE(merged.k.size() == 1);
+  CHECK_THAT(merged.k0, WithinRel(10.0, 1e-15));
+  CHECK_THAT(merged.T_s[0], WithinRel(2.0, 1e-14));  // tau k0/k_inf
+  CHECK_THAT(merged.k[0], WithinRel(10.0, 1e-14));   // 1/k_inf - 1/k0 = 1/10
+  const Prony maxwell = to_parallel({4.0, {}, {}, 8.0});
+  REQUIRE(maxwell.k.size() == 1);
+  CHECK(maxwell.k_inf == 0.0);
+  CHECK_THAT(maxwell.tau_s[0], WithinRel(2.0, 1e-15));
+  CHECK_THROWS_AS(to_series({0.0, {}, {}}), Error);
+  CHECK_THROWS_AS(to_series({-1.0, {1.0}, {1.0}}), Error);
+  CHECK_THROWS_AS(to_parallel({1.0, {0.0}, {1.0}}), Error);
+  CHECK_THROWS_AS(to_parallel({1.0, {1.0}, {0.0}}), Error);
+}
+
+TEST_CASE("creep under a step of load is the compliance of the chain", "[law]") {
+  const LawModel law(parse_law_name("linear-2-series", "test"));
+  const std::vector<double> values{40.0, 30.0, 15.0, 0.3, 6.0, 0.0, 0.0};
+  const std::vector<double> times{0.0, 0.1,  1.0,
+                                  5.0, 40.0, std::numeric_limits<double>::infinity()};
+  const auto depth = law.respond(creep(0.2, 1e9), {times.data(), 5}, values, Want::values).value;
+  for (Eigen::Index i = 0; i < depth.size(); ++i) {
+    const double t = times[static_cast<std::size_t>(i)];
+    const double expected =
+        0.2 * (1.0 / 40.0 + (1.0 - std::exp(-t / 0.3)) / 30.0 + (1.0 - std::exp(-t / 6.0)) / 15.0);
+    CHECK_THAT(depth[i], WithinRel(expected, 1e-9));
+  }
+  const auto forever =
+      law.respond(creep(0.2, times.back()), {times.data() + 5, 1}, values, Want::values).value;
+  CHECK_THAT(forever[0], WithinRel(0.2 * (1.0 / 40.0 + 1.0 / 30.0 + 1.0 / 15.0), 1e-12));
+}
+
+TEST_CASE("a probe that retracts leaves the tissue, which recovers and is met again", "[law]") {
+  for (const char* name : {"linear-1", "power-2", "linear-1-elastic"}) {
+    const LawModel law(parse_law_name(name, "test"));
+    Random random(8);
+    auto values = random_parameters(law, random);
+    values[law.index("contact")] = 0.0;
+    values[law.index("offset")] = 0.003;
+    const auto protocol = [](int pieces) {
+      // Down in 0.5 s, held, up in 0.2 s, waiting, down again; in `pieces` equal parts each.
+      const std::vector<Knot> corners{{0, 0},      {0.5, 3e-3}, {2.0, 3e-3},
+                                      {2.2, 1e-4}, {2.6, 1e-4}, {3.1, 3e-3}};
+      std::vector<Knot> knots{corners.front()};
+      for (std::size_t i = 1; i < corners.size(); ++i) {
+        for (int k = 1; k <= pieces; ++k) {
+          const double share = static_cast<double>(k) / pieces;
+          knots.push_back(
+              {corners[i - 1].time_s + share * (corners[i].time_s - corners[i - 1].time_s),
+               corners[i - 1].value + share * (corners[i].value - corners[i - 1].value)});
+        }
+      }
+      return Protocol(Drive::displacement, knots);
+    };
+    const std::vector<double> times{1.0, 2.3, 2.55, 2.9, 3.1};
+    const auto coarse = law.respond(protocol(200), times, values, Want::values_and_sensitivity);
+    const auto fine = law.respond(protocol(3200), times, values, Want::values);
+    INFO(name);
+    CHECK(coarse.value[1] == values[law.index("offset")]);  // away: nothing but the zero error
+    CHECK(coarse.value[4] > 0.5 * coarse.value[0]);
+    CHECK(largest_difference(coarse.value, fine.value) < 1e-4 * coarse.value.maxCoeff());
+    // Never tensile.
+    const auto all = law.respond(protocol(200), evenly(0.0, 3.1, 700), values, Want::values).value;
+    CHECK(all.minCoeff() >= values[law.index("offset")] - 1e-15);
+    for (const char* key : {"k_inf", "k1", "tau1"}) {
+      const std::size_t j = law.index(key);
+      const double step = 1e-5 * values[j];
+      auto up = values;
+      auto down = values;
+      up[j] += step;
+      down[j] -= step;
+      const Eigen::VectorXd slope = (law.respond(protocol(200), times, up, Want::values).value -
+                                     law.respond(protocol(200), times, down, Want::values).value) /
+                                    (2.0 * step);
+      const Eigen::VectorXd analytic = coarse.sensitivity.col(static_cast<Eigen::Index>(j));
+      CHECK(largest_difference(slope, analytic) < 1e-3 * coarse.value.maxCoeff() / values[j]);
+    }
+  }
+}
+
+TEST_CASE("a preloaded recording starts relaxed", "[law]") {
+  const LawModel law(parse_law_name("linear-1", "test"));
+  const std::vector<double> values{20.0, 30.0, 1.0, -1e-3, 0.0};
+  Protocol hold(Drive::displacement, {{0.0, 0.0}, {5.0, 0.0}});
+  hold.set_relaxed_at_start(true);
+  const auto relaxed = law.respond(hold, evenly(0.0, 5.0, 6), values, Want::values).value;
+  for (const double f : relaxed) CHECK_THAT(f, WithinRel(0.02, 1e-12));
+  hold.set_relaxed_at_start(false);
+  const auto jumped = law.respond(hold, evenly(0.0, 5.0, 6), values, Want::values).value;
+  CHECK_THAT(jumped[0], WithinRel(0.05, 1e-12));
+  Protocol load(Drive::force, {{0.0, 0.1}, {5.0, 0.1}});
+  load.set_relaxed_at_start(true);
+  const auto depth = law.respond(load, evenly(0.0, 5.0, 6), values, Want::values).value;
+  for (const double d : depth) CHECK_THAT(d, WithinRel(0.1 / 20.0 - 1e-3, 1e-9));
+}
+
+TEST_CASE("parameters out of range are refused by name", "[law]") {
+  const LawModel law(parse_law_name("power-1", "test"));
+  const Protocol ramp = ramp_and_hold(1e-3, 1e-3, 1.0);
+  const std::vector<double> times{0.5};
+  const std::vector<double> good{1.0, 1.0, 1.0, 1.5, 0.0, 0.0};
+  CHECK_NOTHROW(law.respond(ramp, times, good, Want::values));
+  const std::vector<std::pair<std::size_t, double>> wrong{
+      {0, -1.0}, {1, -1e-9}, {2, 0.0}, {3, 0.5}, {0, std::nan("")}, {4, std::nan("")}};
+  for (const auto& [place, value] : wrong) {
+    auto bad = good;
+    bad[place] = value;
+    CHECK_THROWS_WITH(law.respond(ramp, times, bad, Want::values),
+                      Catch::Contains(law.law_parameters()[place].name));
+  }
+  CHECK_THROWS_AS(law.respond(ramp, times, {good.data(), 3}, Want::values), Error);
+}
