@@ -176,7 +176,7 @@ TEST_CASE("NIST: 7 certified digits from both published starts") {
     for (const auto& start : problem.starts) {
       CAPTURE(problem.name, start.front());
       const FitResult fit =
-          fit_residuals(residuals, unbounded(start), 1, 0, estimated_scale(problem), false);
+          fit_residuals(residuals, unbounded(start), {start}, estimated_scale(problem), false);
       check_certified(problem, fit);
     }
   }
@@ -196,8 +196,9 @@ TEST_CASE("NIST: random starts find the certified answer where published starts 
     const Residuals residuals(problem);
     for (const std::uint64_t seed : {0U, 1U, 2U}) {
       CAPTURE(problem.name, seed);
-      check_certified(
-          problem, fit_residuals(residuals, parameters, 20, seed, estimated_scale(problem), false));
+      check_certified(problem, fit_residuals(residuals, parameters,
+                                             latin_hypercube_starts(parameters, 20, seed),
+                                             estimated_scale(problem), false));
     }
   }
 }
@@ -206,8 +207,8 @@ TEST_CASE("NIST: profile intervals of Misra1a agree with certified standard devi
   // The problem is nearly linear, so the F interval is close to +- t(0.975, 12) sd = 2.1788 sd.
   const Problem problem = problems().front();
   const Residuals residuals(problem);
-  const FitResult fit =
-      fit_residuals(residuals, unbounded(problem.starts[1]), 1, 0, estimated_scale(problem), true);
+  const FitResult fit = fit_residuals(residuals, unbounded(problem.starts[1]), {problem.starts[1]},
+                                      estimated_scale(problem), true);
   for (std::size_t i = 0; i < 2; ++i) {
     const ParameterResult& p = fit.parameters[i];
     REQUIRE(p.verdict == Verdict::identified);

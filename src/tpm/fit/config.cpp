@@ -8,6 +8,8 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/law/law_model.hpp"
+#include "tpm/material/tpm_element.hpp"
 
 namespace tpm {
 namespace {
@@ -30,30 +32,52 @@ double quantity(const Json& object, std::string_view key, Dimension dimension, c
                         place.key(key).where);
 }
 
-TpmIndex parse_target(std::string_view name, const Place& place) {
-  for (std::size_t i = 0; i < kTpmParameterTable.size(); ++i) {
-    if (kTpmParameterTable[i].name == name) return static_cast<TpmIndex>(i);
-  }
+std::size_t parse_target(std::string_view name, const Model& model, const Place& place) {
   std::vector<std::string_view> known;
-  known.reserve(kTpmParameterTable.size());
-  for (const auto& description : kTpmParameterTable) known.push_back(description.name);
+  known.reserve(model.parameters().size());
+  for (const ParameterDescription& p : model.parameters()) {
+    if (p.name == name) return known.size();
+    known.push_back(p.name);
+  }
   throw bad_input(place.where, fmt::format("no model parameter is called '{}'", printable(name)),
                   fmt::format("one of {}", fmt::join(known, ", ")));
 }
 
-EstimatedParameter parse_parameter(const std::string& name, const Json& j, const Place& place) {
+/// The places of the data sets named under "for".
+std::vector<std::size_t> parse_scope(const Json& j, const FitConfig& config, const Place& place) {
+  std::vector<std::size_t> scope;
+  if (!j.contains("for")) return scope;
+  for (const auto& name : j.at("for")) {
+    const auto dataset = name.get<std::string>();
+    bool found = false;
+    for (std::size_t i = 0; i < config.data.size(); ++i) {
+      if (config.data[i].dataset != dataset) continue;
+      scope.push_back(i);
+      found = true;
+    }
+    if (found) continue;
+    throw bad_input(place.key("for").where,
+                    fmt::format("'{}' is no data set of this fit", printable(dataset)),
+                    "a name that stands under /data");
+  }
+  return scope;
+}
+
+EstimatedParameter parse_parameter(const std::string& name, const Json& j, const Model& model,
+                                   const FitConfig& config, const Place& place) {
   EstimatedParameter parameter;
+  const std::vector<std::size_t> scope = parse_scope(j, config, place);
   if (j.contains("sets")) {
     for (const auto& target : j.at("sets")) {
-      parameter.sets.push_back(parse_target(target.get<std::string>(), place.key("sets")));
+      parameter.sets.push_back(
+          {parse_target(target.get<std::string>(), model, place.key("sets")), scope});
     }
   } else {
-    parameter.sets.push_back(parse_target(name, place));
+    parameter.sets.push_back({parse_target(name, model, place), scope});
   }
-  const Dimension dimension =
-      kTpmParameterTable[static_cast<std::size_t>(parameter.sets.front())].dimension;
-  for (const TpmIndex target : parameter.sets) {
-    if (kTpmParameterTable[static_cast<std::size_t>(target)].dimension == dimension) continue;
+  const Dimension dimension = model.parameters()[parameter.sets.front().parameter].dimension;
+  for (const Target& target : parameter.sets) {
+    if (model.parameters()[target.parameter].dimension == dimension) continue;
     throw bad_input(place.key("sets").where, "the parameters set have different dimensions",
                     "parameters of one dimension");
   }
@@ -69,8 +93,13 @@ EstimatedParameter parse_parameter(const std::string& name, const Json& j, const
   const Place scale_place = place.key("scale");
   fit.scale = parse_scale(j.value("scale", "log"), scale_place.where);
   require_valid(fit, place.where);
-  if (!(fit.lower >= 0.0)) {
-    throw bad_input(place.key("lower").where, "negative", "a bound of at least 0");
+  for (const Target& target : parameter.sets) {
+    const auto [low, high] = model.range(target.parameter);
+    if (fit.lower >= low && fit.upper <= high) continue;
+    throw bad_input(
+        place.key(fit.lower < low ? "lower" : "upper").where,
+        fmt::format("outside the range of {}", model.parameters()[target.parameter].name),
+        fmt::format("bounds from {} to {} (SI)", shortest(low), shortest(high)));
   }
   return parameter;
 }
@@ -154,6 +183,16 @@ DataChoice parse_data(const Json& j, const Place& place) {
   data.dataset = j.at("dataset").get<std::string>();
   data.protocol = parse_protocol(j.at("protocol"), place.key("protocol"));
   data.noise = parse_noise(j.at("noise"), place.key("noise"));
+  if (j.contains("from")) data.from_s = quantity(j, "from", Dimension::time, place);
+  if (j.contains("to")) data.to_s = quantity(j, "to", Dimension::time, place);
+  const bool recording = data.protocol.kind == Kind::measured;
+  if (!recording && (j.contains("from") || j.contains("to"))) {
+    throw bad_input(place.where, "'from' or 'to' without a recording",
+                    "them only with the protocol 'measured'");
+  }
+  if (!(data.from_s < data.to_s)) {
+    throw bad_input(place.key("to").where, "not after 'from'", "a later time");
+  }
   for (const auto& [key, list] :
        {std::pair{"exclude", &data.exclude}, {"hold_out", &data.hold_out}}) {
     if (!j.contains(key)) continue;
@@ -195,41 +234,70 @@ void parse_hypotheses(const Json& list, FitConfig& config, const Place& place) {
   }
 }
 
-void refuse_double_assignment(const FitConfig& config, const Json& document, const Place& place) {
-  std::array<std::string, kTpmParameterCount> setter;
-  const auto claim = [&](TpmIndex target, const std::string& by) {
-    std::string& owner = setter[static_cast<std::size_t>(target)];
-    if (!owner.empty()) {
-      throw bad_input(
-          place.where,
-          fmt::format("model parameter '{}' is set by '{}' and by '{}'",
-                      kTpmParameterTable[static_cast<std::size_t>(target)].name, owner, by),
-          "each model parameter set once");
+/// Fixed values of all model parameters; NaN where nobody gave one.
+std::vector<double> parse_fixed(const Json& document, const Model& model, const FitConfig& config,
+                                const Place& place) {
+  std::vector<double> values;
+  if (config.law) {
+    for (const LawParameter& p : law_parameters(*config.law)) {
+      values.push_back(p.preset.value_or(std::numeric_limits<double>::quiet_NaN()));
     }
-    owner = by;
-  };
-  for (const EstimatedParameter& p : config.parameters) {
-    for (const TpmIndex target : p.sets) claim(target, p.fit.name);
+  } else {
+    const TpmVector paper = to_vector(TpmParameters{});
+    values.assign(paper.begin(), paper.end());
   }
-  if (!document.contains("fixed")) return;
+  if (!document.contains("fixed")) return values;
   for (const auto& [name, value] : document.at("fixed").items()) {
-    claim(parse_target(name, place.key("fixed")), "fixed");
+    const std::size_t target = parse_target(name, model, place.key("fixed"));
+    values[target] = parse_quantity(value.get<std::string>(), model.parameters()[target].dimension,
+                                    place.key("fixed").key(name).where);
+  }
+  return values;
+}
+
+/// Each model parameter of each data set is set once: by one estimated parameter, or fixed.
+void require_each_set_once(const FitConfig& config, const Model& model, const Json& document,
+                           const Place& place) {
+  for (std::size_t choice = 0; choice < config.data.size(); ++choice) {
+    std::vector<std::string> setter(model.parameters().size());
+    const auto claim = [&](std::size_t target, const std::string& by) {
+      std::string& owner = setter[target];
+      if (!owner.empty()) {
+        throw bad_input(place.where,
+                        fmt::format("model parameter '{}' is set by '{}' and by '{}'",
+                                    model.parameters()[target].name, owner, by),
+                        "each model parameter set once");
+      }
+      owner = by;
+    };
+    for (const EstimatedParameter& p : config.parameters) {
+      for (const Target& target : p.sets) {
+        if (target.applies_to(choice)) claim(target.parameter, p.fit.name);
+      }
+    }
+    if (document.contains("fixed")) {
+      for (const auto& [name, value] : document.at("fixed").items()) {
+        claim(parse_target(name, model, place.key("fixed")), "fixed");
+      }
+    }
+    for (std::size_t i = 0; i < setter.size(); ++i) {
+      if (!setter[i].empty() || !std::isnan(config.fixed[i])) continue;
+      throw bad_input(place.where,
+                      fmt::format("model parameter '{}' has no value for '{}'",
+                                  model.parameters()[i].name, config.data[choice].dataset),
+                      "it under /parameters or /fixed");
+    }
   }
 }
 
-TpmParameters parse_fixed(const Json& document, const Place& place) {
-  TpmVector values = to_vector(TpmParameters{});
-  if (document.contains("fixed")) {
-    for (const auto& [name, value] : document.at("fixed").items()) {
-      const auto target = static_cast<std::size_t>(parse_target(name, place.key("fixed")));
-      values[target] =
-          parse_quantity(value.get<std::string>(), kTpmParameterTable[target].dimension,
-                         place.key("fixed").key(name).where);
-    }
-  }
-  const TpmParameters fixed = from_vector(values);
-  require_valid(fixed, place.key("fixed").where);
-  return fixed;
+LawSpec parse_law(const Json& j, const Place& place) {
+  LawSpec spec = parse_law_name(j.at("name").get<std::string>(), place.key("name").where);
+  const std::string drive = j.value("drive", std::string(quantity_name(spec.drive)));
+  spec.drive = parse_quantity_name(drive, place.key("drive").where);
+  if (spec.drive == Quantity::relative_length) spec.response = Quantity::stress;
+  spec.reference = quantity(j, "reference", quantity_dimension(spec.drive), place);
+  require_valid(spec, place.where);
+  return spec;
 }
 
 }  // namespace
@@ -257,6 +325,26 @@ bool Selector::matches(const Datum& datum) const {
   return !label || datum.label == *label;
 }
 
+bool Target::applies_to(std::size_t choice) const {
+  return data.empty() || std::find(data.begin(), data.end(), choice) != data.end();
+}
+
+std::unique_ptr<Model> make_model(const FitConfig& config) {
+  if (config.law) return std::make_unique<LawModel>(*config.law);
+  return make_model(config.model, {config.tension, 1e-10});
+}
+
+std::vector<double> model_parameters(const FitConfig& config, std::span<const double> natural,
+                                     std::size_t choice) {
+  std::vector<double> values = config.fixed;
+  for (std::size_t i = 0; i < config.parameters.size(); ++i) {
+    for (const Target& target : config.parameters[i].sets) {
+      if (target.applies_to(choice)) values[target.parameter] = natural[i];
+    }
+  }
+  return values;
+}
+
 FitConfig parse_fit_config(const Json& document, std::string_view where) {
   check_schema(document, "fit", where);
   const Place place{std::string(where)};
@@ -266,14 +354,28 @@ FitConfig parse_fit_config(const Json& document, std::string_view where) {
   if (document.value("tension", "exact") == "frozen_at_peak") {
     config.tension = TensionRule::frozen_at_peak();
   }
-  for (const auto& [name, j] : document.at("parameters").items()) {
-    config.parameters.push_back(parse_parameter(name, j, place.key("parameters").key(name)));
+  if (document.contains("law")) {
+    if (document.contains("model") || document.contains("tension")) {
+      throw bad_input(place.key("law").where, "beside 'model' or 'tension'",
+                      "either a law of the family or a formulation of the paper's element");
+    }
+    config.law = parse_law(document.at("law"), place.key("law"));
   }
-  config.fixed = parse_fixed(document, place);
-  refuse_double_assignment(config, document, place);
   std::size_t index = 0;
   for (const auto& j : document.at("data")) {
     config.data.push_back(parse_data(j, place.key("data").key(std::to_string(index++))));
+  }
+  const std::unique_ptr<Model> model = make_model(config);
+  for (const auto& [name, j] : document.at("parameters").items()) {
+    config.parameters.push_back(
+        parse_parameter(name, j, *model, config, place.key("parameters").key(name)));
+  }
+  config.fixed = parse_fixed(document, *model, config, place);
+  require_each_set_once(config, *model, document, place);
+  if (!config.law) {
+    TpmVector fixed{};
+    std::copy(config.fixed.begin(), config.fixed.end(), fixed.begin());
+    require_valid(from_vector(fixed), place.key("fixed").where);
   }
   if (document.contains("loss")) {
     const Json& loss = document.at("loss");

@@ -1,14 +1,17 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <limits>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "tpm/curve/curve.hpp"
 #include "tpm/fit/noise.hpp"
 #include "tpm/fit/parameter.hpp"
-#include "tpm/material/tpm_element.hpp"
+#include "tpm/law/law.hpp"
 #include "tpm/model/model.hpp"
 #include "tpm/store/json.hpp"
 
@@ -46,12 +49,23 @@ struct DataChoice {
   Noise noise;
   std::vector<Selector> exclude;   ///< not used at all
   std::vector<Selector> hold_out;  ///< not fitted, but predicted
+  /// Samples of a recording outside [from_s, to_s] are predicted, not fitted.
+  double from_s = -std::numeric_limits<double>::infinity();
+  double to_s = std::numeric_limits<double>::infinity();
+};
+
+/// A model parameter that takes the value of an estimated one.
+struct Target {
+  std::size_t parameter = 0;      ///< place in Model::parameters()
+  std::vector<std::size_t> data;  ///< places in FitConfig::data that it applies to; empty: all
+
+  [[nodiscard]] bool applies_to(std::size_t choice) const;
 };
 
 /// An estimated parameter and the model parameters that take its value.
 struct EstimatedParameter {
   FitParameter fit;
-  std::vector<TpmIndex> sets;
+  std::vector<Target> sets;
 };
 
 /// A claim about parameters, tested by holding them: "eta1 = 5 Pa s".
@@ -63,10 +77,11 @@ struct Hypothesis {
 /// Everything that decides the result of a fit (schemas/fit.schema.json).
 struct FitConfig {
   std::string title;
-  std::string model = "closed_form";
+  std::string model = "closed_form";  ///< formulation of the paper's element; not used with `law`
   TensionRule tension;
+  std::optional<LawSpec> law;  ///< a law of the family instead of the paper's element
   std::vector<EstimatedParameter> parameters;
-  TpmParameters fixed;  ///< what no estimated parameter sets
+  std::vector<double> fixed;  ///< every model parameter, SI; what no estimated parameter sets
   std::vector<DataChoice> data;
   RobustLoss loss;
   std::size_t starts = 50;
@@ -76,6 +91,14 @@ struct FitConfig {
   std::vector<Hypothesis> hypotheses;
   std::filesystem::path folder;  ///< where relative paths of data sets are looked up
 };
+
+/// The model that the configuration names.
+[[nodiscard]] std::unique_ptr<Model> make_model(const FitConfig& config);
+
+/// All model parameters for a data set, given the estimated ones.
+[[nodiscard]] std::vector<double> model_parameters(const FitConfig& config,
+                                                   std::span<const double> natural,
+                                                   std::size_t choice);
 
 /// Reads and checks a configuration. Throws Error(bad_input) with the file and the key.
 [[nodiscard]] FitConfig read_fit_config(const std::filesystem::path& path);

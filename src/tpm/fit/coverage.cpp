@@ -11,6 +11,7 @@
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/starts.hpp"
 
 namespace tpm {
 namespace {
@@ -84,7 +85,7 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
     progress.advance();
     try {
       const FitResult fit =
-          fit_residuals(function, parameters, config.starts, config.seed, threshold, true);
+          fit_residuals(function, parameters, fit_starts(function, parameters), threshold, true);
       for (std::size_t i = 0; i < parameters.size(); ++i) {
         const ParameterResult& p = fit.parameters[i];
         if (holds(p, truth[i])) ++result.parameters[i].covered;

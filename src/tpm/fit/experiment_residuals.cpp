@@ -75,6 +75,30 @@ void require_observable(const ProtocolChoice& choice, Observable observable,
                               : "data of contact force under an imposed depth");
 }
 
+/// A recording's drive must be the one that the model takes.
+void require_drive(const FitConfig& config, const Recording& recording, const std::string& name) {
+  const LawSpec spec = config.law.value_or(LawSpec{});
+  const bool has_drive = recording.drive.size() == recording.response.size() &&
+                         recording.time_s.size() == recording.response.size();
+  if (has_drive && recording.drive_quantity == spec.drive &&
+      recording.response_quantity == spec.response) {
+    return;
+  }
+  throw bad_input(fmt::format("recording '{}'", name),
+                  has_drive ? fmt::format("{} over {}", quantity_name(recording.response_quantity),
+                                          quantity_name(recording.drive_quantity))
+                            : std::string("no times or no drive"),
+                  fmt::format("{} over {}, with times", quantity_name(spec.response),
+                              quantity_name(spec.drive)));
+}
+
+double sample_sigma(const DataChoice& data, double value, std::optional<double> row_sd,
+                    std::size_t sample) {
+  if (data.noise.kind == NoiseKind::absolute) return data.noise.absolute;  // no text to format
+  return sigma_of(data.noise, value, row_sd,
+                  fmt::format("recording '{}', sample {}", data.dataset, sample + 1));
+}
+
 std::string data_path(const FitConfig& config, const std::string& dataset) {
   const bool is_file = dataset.ends_with(".csv") || dataset.ends_with(".json");
   if (!is_file || std::filesystem::path(dataset).is_absolute()) return dataset;
@@ -83,21 +107,32 @@ std::string data_path(const FitConfig& config, const std::string& dataset) {
 
 }  // namespace
 
-ExperimentResiduals::ExperimentResiduals(const FitConfig& config)
-    : config_(config), model_(make_model(config.model, {config.tension, 1e-10})) {
-  for (std::size_t i = 0; i < config_.data.size(); ++i) {
-    if (config_.data[i].protocol.kind == Kind::measured) {
-      add_recording(i);
+std::vector<DataSet> load_data(const FitConfig& config) {
+  std::vector<DataSet> data;
+  data.reserve(config.data.size());
+  for (const DataChoice& choice : config.data) {
+    const std::string path = data_path(config, choice.dataset);
+    if (choice.protocol.kind == Kind::measured) {
+      data.emplace_back(load_recording(path));
     } else {
-      add_points(i, load_points(data_path(config_, config_.data[i].dataset)));
+      data.emplace_back(load_points(path));
     }
   }
-  count_residuals();
+  return data;
 }
 
-ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vector<PointSet>& data)
-    : config_(config), model_(make_model(config.model, {config.tension, 1e-10})) {
-  for (std::size_t i = 0; i < config_.data.size(); ++i) add_points(i, data.at(i));
+ExperimentResiduals::ExperimentResiduals(const FitConfig& config)
+    : ExperimentResiduals(config, load_data(config)) {}
+
+ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vector<DataSet>& data)
+    : config_(config), model_(make_model(config)) {
+  for (std::size_t i = 0; i < config_.data.size(); ++i) {
+    if (const auto* recording = std::get_if<Recording>(&data.at(i))) {
+      add_recording(i, *recording);
+    } else {
+      add_points(i, std::get<PointSet>(data[i]));
+    }
+  }
   count_residuals();
 }
 
@@ -118,7 +153,7 @@ void ExperimentResiduals::add_points(std::size_t choice, const PointSet& points)
     for (const Datum* d : rows) {
       const std::string where = fmt::format("data set '{}', line {}", data.dataset, d->line);
       FitDatum datum;
-      datum.dataset = data.dataset;
+      datum.choice = choice;
       datum.label = condition_of(*d);
       datum.observable = points.observable;
       datum.time_s = time_in_protocol(data.protocol, *d, condition, where);
@@ -142,24 +177,27 @@ void ExperimentResiduals::add_points(std::size_t choice, const PointSet& points)
   }
 }
 
-void ExperimentResiduals::add_recording(std::size_t choice) {
+void ExperimentResiduals::add_recording(std::size_t choice, const Recording& recording) {
   const DataChoice& data = config_.data[choice];
-  const Recording recording = load_recording(data_path(config_, data.dataset));
-  const std::vector<double>& force = recording.force_N();
-  const std::vector<double>& sd = recording.force_sd_N();
-  Experiment experiment{
-      measured_history(Drive::displacement, recording.time_s, recording.depth_m()), {}, {}, choice};
-  for (std::size_t i = 0; i < force.size(); ++i) {
+  require_drive(config_, recording, data.dataset);
+  const std::vector<double>& sd = recording.response_sd;
+  Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
+  history.set_relaxed_at_start(true);
+  Experiment experiment{std::move(history), recording.time_s, {}, choice, true};
+  const std::size_t n = recording.response.size();
+  experiment.data.reserve(n);
+  data_.reserve(data_.size() + n);
+  for (std::size_t i = 0; i < n; ++i) {
     FitDatum datum;
-    datum.dataset = data.dataset;
-    datum.label = fmt::format("t = {:.6g} s", recording.time_s[i]);
+    datum.choice = choice;
     datum.time_s = recording.time_s[i];
-    datum.value = force[i];
-    datum.sigma =
-        sigma_of(data.noise, force[i], sd.empty() ? std::nullopt : std::optional<double>(sd[i]),
-                 fmt::format("recording '{}', sample {}", data.dataset, i + 1));
+    datum.value = recording.response[i];
+    datum.held_out = datum.time_s < data.from_s || datum.time_s > data.to_s;
     datum.provenance = recording.provenance;
-    experiment.times_s.push_back(datum.time_s);
+    const auto row_sd = sd.empty() ? std::nullopt : std::optional<double>(sd[i]);
+    if (!datum.held_out || row_sd) {
+      datum.sigma = sample_sigma(data, *datum.value, row_sd, i);
+    }
     experiment.data.push_back(data_.size());
     data_.push_back(std::move(datum));
   }
@@ -196,40 +234,42 @@ int ExperimentResiduals::band_count() const {
   }));
 }
 
-TpmVector ExperimentResiduals::model_parameters(std::span<const double> natural) const {
-  TpmVector values = to_vector(config_.fixed);
-  for (std::size_t i = 0; i < config_.parameters.size(); ++i) {
-    for (const TpmIndex target : config_.parameters[i].sets) {
-      values[static_cast<std::size_t>(target)] = natural[i];
-    }
-  }
-  return values;
-}
-
 Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
                                              RowMatrix* sensitivity) const {
-  const TpmVector values = model_parameters(natural);
   const Want want = sensitivity != nullptr ? Want::values_and_sensitivity : Want::values;
   Eigen::VectorXd answer(static_cast<Eigen::Index>(data_.size()));
   if (sensitivity != nullptr) {
     sensitivity->setZero(answer.size(), static_cast<Eigen::Index>(config_.parameters.size()));
   }
   for (const Experiment& experiment : experiments_) {
+    const std::vector<double> values = model_parameters(config_, natural, experiment.choice);
     const Response response =
         model_->respond(experiment.protocol, experiment.times_s, values, want);
+    const auto from_to = columns_for(experiment.choice);
     for (std::size_t k = 0; k < experiment.data.size(); ++k) {
       const auto row = static_cast<Eigen::Index>(experiment.data[k]);
       const auto from = static_cast<Eigen::Index>(k);
       answer[row] = response.value[from];
       if (sensitivity == nullptr) continue;
-      for (std::size_t j = 0; j < config_.parameters.size(); ++j) {
-        for (const TpmIndex target : config_.parameters[j].sets) {
-          (*sensitivity)(row, static_cast<Eigen::Index>(j)) += response.sensitivity(from, target);
-        }
+      for (const auto& [source, target] : from_to) {
+        (*sensitivity)(row, target) += response.sensitivity(from, source);
       }
     }
   }
   return answer;
+}
+
+std::vector<std::pair<Eigen::Index, Eigen::Index>> ExperimentResiduals::columns_for(
+    std::size_t choice) const {
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> columns;
+  for (std::size_t j = 0; j < config_.parameters.size(); ++j) {
+    for (const Target& target : config_.parameters[j].sets) {
+      if (!target.applies_to(choice)) continue;
+      columns.emplace_back(static_cast<Eigen::Index>(target.parameter),
+                           static_cast<Eigen::Index>(j));
+    }
+  }
+  return columns;
 }
 
 bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
@@ -276,13 +316,12 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
 
 void ExperimentResiduals::set_value(std::size_t datum, double value) {
   FitDatum& d = data_.at(datum);
-  for (const Experiment& experiment : experiments_) {
-    if (std::find(experiment.data.begin(), experiment.data.end(), datum) == experiment.data.end()) {
-      continue;
-    }
-    d.sigma = sigma_of(noise(experiment.choice), value, d.sigma, "simulated datum");
-  }
+  d.sigma = sigma_of(noise(d.choice), value, d.sigma, "simulated datum");
   d.value = value;
+}
+
+std::string datum_label(const FitDatum& datum) {
+  return datum.label.empty() ? fmt::format("t = {:.6g} s", datum.time_s) : datum.label;
 }
 
 }  // namespace tpm

@@ -9,7 +9,9 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/fit/starts.hpp"
 #include "tpm/fit/verdict.hpp"
+#include "tpm/material/tpm_element.hpp"
 
 namespace tpm {
 namespace {
@@ -41,11 +43,11 @@ void add_to_cluster(std::vector<DistinctMinimum>& minima, const Minimum& m) {
 }
 
 MultiStart run_starts(const ResidualFunction& function, std::span<const FitParameter> parameters,
-                      std::size_t count, std::uint64_t seed) {
+                      const std::vector<std::vector<double>>& starts) {
   MultiStart result;
   std::vector<Minimum> ends;
-  Progress progress("fitting from random starts", count);
-  for (const auto& start : latin_hypercube_starts(parameters, count, seed)) {
+  Progress progress("fitting from several starts", starts.size());
+  for (const auto& start : starts) {
     // Both first steps are tried from every start; the deeper end counts.
     Minimum m = minimise(function, parameters, start);
     const Minimum other = minimise(function, parameters, start, {}, FirstStep::cautious);
@@ -59,8 +61,9 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
     progress.advance();
   }
   if (ends.empty()) {
-    throw Error(ExitCode::numerical, "fit",
-                fmt::format("none of {} starts ended in a point that can be evaluated", count));
+    throw Error(
+        ExitCode::numerical, "fit",
+        fmt::format("none of {} starts ended in a point that can be evaluated", starts.size()));
   }
   std::stable_sort(ends.begin(), ends.end(),
                    [](const Minimum& a, const Minimum& b) { return a.deviance < b.deviance; });
@@ -130,11 +133,11 @@ void describe_parameters(FitResult& result, double level, bool profiles) {
 }  // namespace
 
 FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParameter> parameters,
-                        std::size_t starts, std::uint64_t seed, Threshold threshold,
+                        const std::vector<std::vector<double>>& starts, Threshold threshold,
                         bool profiles) {
   threshold.parameter_count = static_cast<int>(parameters.size());
   FitResult result;
-  MultiStart multi = run_starts(function, parameters, std::max<std::size_t>(starts, 1), seed);
+  MultiStart multi = run_starts(function, parameters, starts);
   result.starts_run = multi.run;
   result.starts_failed = multi.failed;
   result.starts_agreeing = multi.agreeing;
@@ -193,16 +196,59 @@ HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitR
 }
 
 /// Standardised as the noise model says; zero inside a band.
-double standardised_residual(const FitConfig& config, const ExperimentResiduals& function,
-                             std::size_t index, double predicted) {
+double standardised_residual(const ExperimentResiduals& function, std::size_t index,
+                             double predicted) {
   const FitDatum& d = function.data()[index];
   if (!d.value) return band_residual(d.sigma, *d.lower, *d.upper, predicted).r;
-  for (const Experiment& e : function.experiments()) {
-    if (std::find(e.data.begin(), e.data.end(), index) == e.data.end()) continue;
-    const auto r = value_residual(config.data[e.choice].noise, d.sigma, *d.value, predicted);
-    return r ? r->r : std::numeric_limits<double>::infinity();
+  const Noise& noise = function.config().data[d.choice].noise;
+  const auto r = value_residual(noise, d.sigma, *d.value, predicted);
+  return r ? r->r : std::numeric_limits<double>::infinity();
+}
+
+/// Standard deviation of a prediction from the parameters' covariance.
+double prediction_sd(const Eigen::Ref<const Eigen::RowVectorXd>& sensitivity,
+                     std::span<const FitParameter> parameters, const Covariance& c,
+                     std::span<const double> natural) {
+  Eigen::VectorXd g(c.theta_sd.size());
+  for (Eigen::Index k = 0; k < g.size(); ++k) {
+    const std::size_t j = c.free[static_cast<std::size_t>(k)];
+    const FitParameter& p = parameters[j];
+    g[k] = sensitivity[static_cast<Eigen::Index>(j)] * p.natural_slope(p.theta(natural[j])) *
+           c.theta_sd[k];
   }
-  return 0.0;
+  return std::sqrt(std::max(g.dot(c.correlation * g), 0.0));
+}
+
+RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment& experiment,
+                           const Eigen::VectorXd& predicted) {
+  RecordingFit fit;
+  fit.choice = experiment.choice;
+  const LawSpec spec = function.config().law.value_or(LawSpec{});
+  fit.drive_quantity = spec.drive;
+  fit.response_quantity = spec.response;
+  fit.time_s = experiment.times_s;
+  double inside = 0.0;
+  double outside = 0.0;
+  std::size_t fitted = 0;
+  const auto knots = experiment.protocol.knots();
+  for (std::size_t k = 0; k < experiment.data.size(); ++k) {
+    const FitDatum& d = function.data()[experiment.data[k]];
+    const double answer = predicted[static_cast<Eigen::Index>(experiment.data[k])];
+    fit.provenance = d.provenance;
+    fit.drive.push_back(knots[k].value);
+    fit.observed.push_back(*d.value);
+    fit.predicted.push_back(answer);
+    fit.fitted.push_back(!d.held_out);
+    const double off = answer - *d.value;
+    (d.held_out ? outside : inside) += off * off;
+    if (d.held_out) continue;
+    ++fitted;
+    fit.peak = std::max(fit.peak, std::abs(*d.value));
+  }
+  fit.rms_residual = std::sqrt(inside / static_cast<double>(std::max<std::size_t>(fitted, 1)));
+  const std::size_t rest = fit.time_s.size() - fitted;
+  if (rest > 0) fit.rms_outside = std::sqrt(outside / static_cast<double>(rest));
+  return fit;
 }
 
 void fill_data(FitResult& result, const ExperimentResiduals& function,
@@ -210,24 +256,22 @@ void fill_data(FitResult& result, const ExperimentResiduals& function,
   RowMatrix sensitivity;
   const Eigen::VectorXd predicted = function.predict(result.best.natural, &sensitivity);
   const Covariance& c = result.covariance;
-  for (std::size_t i = 0; i < function.data().size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    FittedDatum d;
-    d.datum = function.data()[i];
-    d.predicted = predicted[row];
-    d.standardised = standardised_residual(result.config, function, i, d.predicted);
-    if (c.full_rank) {
-      Eigen::VectorXd g(c.theta_sd.size());
-      for (Eigen::Index k = 0; k < g.size(); ++k) {
-        const std::size_t j = c.free[static_cast<std::size_t>(k)];
-        const FitParameter& p = parameters[j];
-        g[k] = sensitivity(row, static_cast<Eigen::Index>(j)) *
-               p.natural_slope(p.theta(result.best.natural[j])) * c.theta_sd[k];
-      }
-      d.predicted_sd = std::sqrt(std::max(g.dot(c.correlation * g), 0.0));
+  for (const Experiment& experiment : function.experiments()) {
+    if (experiment.is_recording) {
+      result.recordings.push_back(recording_fit(function, experiment, predicted));
     }
-    if (!d.datum.held_out) result.chi_square += d.standardised * d.standardised;
-    result.data.push_back(std::move(d));
+    for (const std::size_t i : experiment.data) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const FitDatum& datum = function.data()[i];
+      const double z = standardised_residual(function, i, predicted[row]);
+      if (!datum.held_out) result.chi_square += z * z;
+      if (experiment.is_recording) continue;
+      FittedDatum d{datum, predicted[row], std::nullopt, z};
+      if (c.full_rank) {
+        d.predicted_sd = prediction_sd(sensitivity.row(row), parameters, c, result.best.natural);
+      }
+      result.data.push_back(std::move(d));
+    }
   }
   const bool absolute_scale = threshold.scale_known && result.degrees_of_freedom > 0;
   if (absolute_scale && result.config.loss.kind == Loss::none) {
@@ -252,7 +296,6 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
         fmt::format("the {} loss has no exact likelihood: the intervals' level is only approximate",
                     loss_name(result.config.loss.kind)));
   }
-  const TpmParameters p = from_vector(function.model_parameters(result.best.natural));
   double deepest = 0.0;
   for (const Experiment& e : function.experiments()) {
     if (e.protocol.drive() == Drive::displacement) deepest = std::max(deepest, e.protocol.peak());
@@ -262,13 +305,27 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
       deepest = std::max(deepest, d.predicted);
     }
   }
-  for (std::string& flag : validity_flags(p, deepest)) result.flags.push_back(std::move(flag));
+  if (result.config.law) return;  // the limits are those of the paper's element
+  TpmVector vector{};
+  const auto values = model_parameters(result.config, result.best.natural, 0);
+  std::copy(values.begin(), values.end(), vector.begin());
+  for (std::string& flag : validity_flags(from_vector(vector), deepest)) {
+    result.flags.push_back(std::move(flag));
+  }
 }
 
 }  // namespace
 
 FitResult run_fit(const FitConfig& config) {
-  const ExperimentResiduals function(config);
+  return fit_experiments(ExperimentResiduals(config));
+}
+
+FitResult run_fit(const FitConfig& config, const std::vector<DataSet>& data) {
+  return fit_experiments(ExperimentResiduals(config, data));
+}
+
+FitResult fit_experiments(const ExperimentResiduals& function) {
+  const FitConfig& config = function.config();
   std::vector<FitParameter> parameters;
   for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
   Threshold threshold;
@@ -277,8 +334,8 @@ FitResult run_fit(const FitConfig& config) {
   threshold.data_count = function.value_count();
   threshold.parameter_count = static_cast<int>(parameters.size());
 
-  FitResult result =
-      fit_residuals(function, parameters, config.starts, config.seed, threshold, config.profiles);
+  FitResult result = fit_residuals(function, parameters, fit_starts(function, parameters),
+                                   threshold, config.profiles);
   result.config = config;
   result.value_count = function.value_count();
   result.band_count = function.band_count();

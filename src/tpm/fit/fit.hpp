@@ -58,6 +58,19 @@ struct FittedDatum {
   double standardised = 0.0;           ///< (predicted - value) / sigma after the noise model
 };
 
+/// One recording with the fitted model's answer.
+struct RecordingFit {
+  std::size_t choice = 0;  ///< place in FitConfig::data
+  Quantity drive_quantity = Quantity::indentation_depth;
+  Quantity response_quantity = Quantity::contact_force;
+  Provenance provenance = Provenance::measured;
+  std::vector<double> time_s, drive, observed, predicted;  ///< SI
+  std::vector<bool> fitted;                                ///< false: outside the window
+  double peak = 0.0;                                       ///< largest |observed| in the window
+  double rms_residual = 0.0;                               ///< in the window, SI
+  std::optional<double> rms_outside;  ///< of the samples outside, if there are any
+};
+
 struct FitResult {
   FitConfig config;
   Minimum best;
@@ -72,7 +85,8 @@ struct FitResult {
   int starts_run = 0, starts_failed = 0, starts_agreeing = 0;
   std::vector<DistinctMinimum> minima;  ///< rising deviance
   std::vector<HypothesisResult> hypotheses;
-  std::vector<FittedDatum> data;
+  std::vector<FittedDatum> data;  ///< separate readings
+  std::vector<RecordingFit> recordings;
   std::vector<std::string> flags;  ///< what a reader must know (text, one line each)
 };
 
@@ -81,11 +95,17 @@ struct FitResult {
 /// start ends in a usable point.
 [[nodiscard]] FitResult run_fit(const FitConfig& config);
 
+/// The same with data in memory, one for each of config.data.
+[[nodiscard]] FitResult run_fit(const FitConfig& config, const std::vector<DataSet>& data);
+
+[[nodiscard]] FitResult fit_experiments(const ExperimentResiduals& function);
+
 /// The same for any residuals: the part of run_fit that does not know what is fitted. Fills best,
 /// parameters, covariance, starts and minima.
 [[nodiscard]] FitResult fit_residuals(const ResidualFunction& function,
-                                      std::vector<FitParameter> parameters, std::size_t starts,
-                                      std::uint64_t seed, Threshold threshold, bool profiles);
+                                      std::vector<FitParameter> parameters,
+                                      const std::vector<std::vector<double>>& starts,
+                                      Threshold threshold, bool profiles);
 
 /// Machine-readable result, keys in docs/json.md, numbers rounded to 6 significant digits so that
 /// they agree between machines.

@@ -106,7 +106,7 @@ Json data_json(const FitResult& result) {
   for (const FittedDatum& d : result.data) {
     const bool force = d.datum.observable == Observable::contact_force;
     const std::string unit = force ? "_N" : "_m";
-    Json j{{"dataset", d.datum.dataset}, {"label", d.datum.label}};
+    Json j{{"dataset", result.config.data[d.datum.choice].dataset}, {"label", d.datum.label}};
     j["quantity"] = force ? "contact_force" : "indentation_depth";
     j["provenance"] = provenance_name(d.datum.provenance);
     j["role"] = d.datum.held_out ? "held_out" : "fitted";
@@ -158,7 +158,8 @@ Json assumptions_json(const FitConfig& config) {
 }  // namespace
 
 Json to_json(const FitResult& result) {
-  Json j{{"title", result.config.title}, {"model", result.config.model}};
+  Json j{{"title", result.config.title},
+         {"model", result.config.law ? law_name(*result.config.law) : result.config.model}};
   j["choices"] = assumptions_json(result.config);
   j["values_fitted"] = result.value_count;
   j["bands_fitted"] = result.band_count;

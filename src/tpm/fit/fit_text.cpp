@@ -39,8 +39,9 @@ std::string data_table(const FitResult& result) {
         d.datum.value ? fmt::format("{} {}", significant(*d.datum.value / unit, 4), symbol)
                       : fmt::format("{}-{} {}", significant(*d.datum.lower / unit, 3),
                                     significant(*d.datum.upper / unit, 3), symbol);
-    text += fmt::format("{:<18} {:<14} {:>18} {:>10} {:>8.2f}  {:<10} {}\n", d.datum.dataset,
-                        d.datum.label, observed, significant(d.predicted / unit, 4), d.standardised,
+    text += fmt::format("{:<18} {:<14} {:>18} {:>10} {:>8.2f}  {:<10} {}\n",
+                        result.config.data[d.datum.choice].dataset, d.datum.label, observed,
+                        significant(d.predicted / unit, 4), d.standardised,
                         provenance_name(d.datum.provenance), d.datum.held_out ? "held out" : "");
   }
   return text;

@@ -108,6 +108,10 @@ bool LawModel::linear_in(std::size_t parameter) const {
   return parameters_.at(parameter).linear;
 }
 
+std::pair<double, double> LawModel::range(std::size_t parameter) const {
+  return {parameters_.at(parameter).lower, parameters_.at(parameter).upper};
+}
+
 void LawModel::require_in_range(std::span<const double> values) const {
   if (values.size() != parameters_.size()) {
     throw bad_input(fmt::format("law {}", name_), fmt::format("{} parameters given", values.size()),

@@ -33,6 +33,7 @@ class LawModel final : public Model {
   /// Place of a parameter in the vector. Throws Error(bad_input) naming the known ones.
   [[nodiscard]] std::size_t index(std::string_view parameter) const;
   [[nodiscard]] bool linear_in(std::size_t parameter) const override;
+  [[nodiscard]] std::pair<double, double> range(std::size_t parameter) const override;
 
  private:
   struct Prepared;

@@ -1,10 +1,12 @@
 #pragma once
 #include <Eigen/Core>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tpm/material/tpm_element.hpp"
@@ -57,6 +59,11 @@ class Model {
   /// Throws Error(bad_input) for parameters out of range, Error(numerical) if a solver fails.
   [[nodiscard]] virtual Response respond(const Protocol& protocol, std::span<const double> times_s,
                                          std::span<const double> parameters, Want want) const = 0;
+
+  /// Physical range of a parameter, SI.
+  [[nodiscard]] virtual std::pair<double, double> range(std::size_t /*parameter*/) const {
+    return {0.0, std::numeric_limits<double>::infinity()};
+  }
 
   /// The response to an imposed displacement is linear in this parameter while the others are held:
   /// a search can solve for it.

@@ -100,13 +100,10 @@ const ParameterResult& parameter_of(const FitResult& fit, const std::string& nam
   throw bad_input(fit.config.title, fmt::format("does not estimate '{}'", name));
 }
 
-TpmParameters model_parameters(const FitResult& fit) {
-  TpmVector vector = to_vector(fit.config.fixed);
-  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
-    for (const TpmIndex index : fit.config.parameters[i].sets) {
-      vector[static_cast<std::size_t>(index)] = fit.best.natural[i];
-    }
-  }
+TpmParameters fitted_element(const FitResult& fit) {
+  const std::vector<double> values = model_parameters(fit.config, fit.best.natural, 0);
+  TpmVector vector{};
+  std::copy(values.begin(), values.end(), vector.begin());
   return from_vector(vector);
 }
 

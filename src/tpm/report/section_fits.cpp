@@ -127,7 +127,7 @@ Table readings_table(const FitResult& fit) {
       {{"data set"}, {"reading"}, {"provenance"}, {"observed", true}, {"model", true}, {"z", true}},
       {}};
   for (const FittedDatum& d : fit.data) {
-    table.rows.push_back({{d.datum.dataset},
+    table.rows.push_back({{fit.config.data[d.datum.choice].dataset},
                           {d.datum.label},
                           {std::string(provenance_name(d.datum.provenance))},
                           {observed(d.datum)},

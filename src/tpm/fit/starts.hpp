@@ -1,0 +1,30 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "tpm/fit/experiment_residuals.hpp"
+#include "tpm/fit/least_squares.hpp"
+
+namespace tpm {
+
+/// Minimum of |A x - b| with lower <= x <= upper, by coordinate descent on the normal equations:
+/// for a handful of columns. Columns of zeros leave x at the bound nearest to 0.
+[[nodiscard]] Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a,
+                                                    const Eigen::VectorXd& b,
+                                                    const Eigen::VectorXd& lower,
+                                                    const Eigen::VectorXd& upper);
+
+/// Starts with the parameters in which the residuals are linear solved for: `count` points of a
+/// Latin hypercube over the others, of which the `keep` of least deviance are returned after the
+/// nominal start. Points that cannot be evaluated are left out.
+/// @param linear one flag for each parameter
+[[nodiscard]] std::vector<std::vector<double>> projected_starts(
+    const ResidualFunction& function, std::span<const FitParameter> parameters,
+    const std::vector<bool>& linear, std::size_t count, std::size_t keep, std::uint64_t seed);
+
+/// The starts of a configuration: a Latin hypercube of all parameters, or, where the model is
+/// linear in some and the noise does not depend on it, projected starts.
+[[nodiscard]] std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
+                                                          std::span<const FitParameter> parameters);
+
+}  // namespace tpm
