@@ -14,16 +14,19 @@
 namespace tpm {
 namespace {
 
-constexpr std::array kSteps{1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7};
+/// Half decades: where truncation is of second order it falls tenfold from step to step.
+constexpr std::array kSteps{3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7};
+/// From this step down, what finite differences differ by is rounding or noise, not truncation.
+constexpr double kNoiseStep = 1e-4;
 /// A residual's derivative is judged against its own size plus this share of the column's largest,
 /// so that derivatives that pass through zero do not count as infinitely wrong.
 constexpr double kFloorOfColumn = 1e-3;
 /// Derivatives below this share of the largest residual drown in rounding.
 constexpr double kFloorOfResidual = 1e-9;
-/// Two steps whose differences are further apart than this know nothing.
+/// A derivative that the finite differences know no better than this is undecided.
 constexpr double kMostSpread = 0.05;
 /// A difference counts as real from this multiple of the spread on.
-constexpr double kSpreadFactor = 5.0;
+constexpr double kSpreadFactor = 3.0;
 
 /// Size of a parameter that steps are relative to.
 double typical_size(const FitParameter& p, double natural) {
@@ -86,53 +89,74 @@ class ColumnDifferences {
   const Eigen::VectorXd& residual_;
 };
 
-/// The largest relative difference of two columns and where it is.
-struct ColumnDifference {
-  double relative = 0.0;
-  Eigen::Index residual = 0;
+/// Finite differences of one residual by one parameter at falling steps.
+struct Differences {
+  std::vector<double> step, value;
 };
 
-ColumnDifference compare(const Eigen::VectorXd& a, const Eigen::VectorXd& b, double floor) {
-  ColumnDifference d;
-  if (a.size() == 0) return d;
-  const Eigen::VectorXd size = a.cwiseAbs().cwiseMax(b.cwiseAbs());
-  const double least = kFloorOfColumn * size.maxCoeff() + floor;
-  const Eigen::VectorXd relative =
-      (a - b).cwiseAbs().cwiseQuotient(Eigen::VectorXd(size.array() + least));
-  d.relative = relative.maxCoeff(&d.residual);
-  return d;
-}
+/// The finite difference that the vote of the steps prefers, with its error.
+struct Vote {
+  double value = 0.0, error = std::numeric_limits<double>::infinity(), step = 0.0;
+};
 
-GradientVerdict verdict_of(const ParameterGradient& g, double tolerance) {
-  if (g.difference <= tolerance) return GradientVerdict::agrees;
-  if (!(g.spread <= kMostSpread)) return GradientVerdict::undecided;
-  return g.difference > std::max(tolerance, kSpreadFactor * g.spread) ? GradientVerdict::wrong
-                                                                      : GradientVerdict::agrees;
-}
-
-ParameterGradient check_column(const ColumnDifferences& differences,
-                               const Eigen::VectorXd& analytic, double floor, double tolerance) {
-  ParameterGradient g;
-  g.difference = std::numeric_limits<double>::infinity();
-  g.spread = std::numeric_limits<double>::infinity();
-  std::optional<Eigen::VectorXd> previous;
-  for (const double step : kSteps) {
-    const std::optional<Eigen::VectorXd> finite = differences.at_step(step);
-    if (finite) {
-      const ColumnDifference d = compare(analytic, *finite, floor);
-      if (d.relative < g.difference) {
-        g.difference = d.relative;
-        g.residual = d.residual;
-        g.step = step;
-      }
-    }
-    if (finite && previous) {
-      g.spread = std::min(g.spread, compare(*previous, *finite, floor).relative);
-    }
-    previous = finite;
+/// The error at a step is what the differences still change by from the step before (truncation,
+/// of first order at least), plus noise / step; the noise is the largest seen at the small steps.
+Vote vote(const Differences& d, double rounding) {
+  Vote best;
+  double noise = rounding;
+  for (std::size_t i = 1; i < d.step.size(); ++i) {
+    if (d.step[i - 1] > kNoiseStep) continue;
+    noise = std::max(noise, std::abs(d.value[i] - d.value[i - 1]) * d.step[i]);
   }
-  g.verdict = verdict_of(g, tolerance);
+  for (std::size_t i = 1; i < d.step.size(); ++i) {
+    const double error = 0.5 * std::abs(d.value[i] - d.value[i - 1]) + noise / d.step[i];
+    if (error < best.error) best = {d.value[i], error, d.step[i]};
+  }
+  return best;
+}
+
+/// Judges every residual's derivative and keeps the one that differs most for what is known of it.
+ParameterGradient check_column(const std::vector<Differences>& differences,
+                               const Eigen::VectorXd& analytic, const Eigen::VectorXd& residual,
+                               double floor, double tolerance) {
+  ParameterGradient g;
+  const double largest = analytic.size() > 0 ? analytic.cwiseAbs().maxCoeff() : 0.0;
+  double worst = -1.0;
+  Eigen::Index unknown = 0;
+  for (Eigen::Index i = 0; i < analytic.size(); ++i) {
+    const double rounding = std::numeric_limits<double>::epsilon() * std::abs(residual[i]);
+    const Vote v = vote(differences[static_cast<std::size_t>(i)], rounding);
+    const double size =
+        std::max(std::abs(analytic[i]), std::abs(v.value)) + kFloorOfColumn * largest + floor;
+    const double difference = std::abs(analytic[i] - v.value) / size;
+    const double spread = v.error / size;
+    if (!(spread <= kMostSpread)) ++unknown;
+    const double ratio = difference / std::max(tolerance, kSpreadFactor * spread);
+    if (!(ratio > worst)) continue;
+    worst = ratio;
+    g.difference = difference;
+    g.spread = spread;
+    g.step = v.step;
+    g.residual = i;
+  }
+  g.verdict = worst > 1.0                     ? GradientVerdict::wrong
+              : 2 * unknown > analytic.size() ? GradientVerdict::undecided
+                                              : GradientVerdict::agrees;
   return g;
+}
+
+/// Finite differences of every residual; steps that cannot be evaluated are left out.
+std::vector<Differences> all_differences(const ColumnDifferences& column, Eigen::Index residuals) {
+  std::vector<Differences> all(static_cast<std::size_t>(residuals));
+  for (const double step : kSteps) {
+    const std::optional<Eigen::VectorXd> finite = column.at_step(step);
+    if (!finite) continue;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      all[i].step.push_back(step);
+      all[i].value.push_back((*finite)[static_cast<Eigen::Index>(i)]);
+    }
+  }
+  return all;
 }
 
 /// Empty if the point cannot be evaluated.
@@ -152,7 +176,8 @@ std::optional<GradientPoint> check_point(const ResidualFunction& function,
     const Eigen::VectorXd analytic =
         jacobian.col(static_cast<Eigen::Index>(i)) * typical_size(parameters[i], natural[i]);
     const ColumnDifferences differences(function, parameters[i], natural, i, residual);
-    ParameterGradient g = check_column(differences, analytic, least, tolerance);
+    ParameterGradient g = check_column(all_differences(differences, residual.size()), analytic,
+                                       residual, least, tolerance);
     g.name = parameters[i].name;
     point.parameters.push_back(std::move(g));
   }

@@ -11,20 +11,21 @@ namespace tpm {
 
 enum class GradientVerdict {
   agrees,     ///< with finite differences to the tolerance, or to the differences' own error
-  wrong,      ///< the finite differences agree with each other and not with the derivative
-  undecided,  ///< the finite differences do not agree with each other: kinks, noise
+  wrong,      ///< some residual's derivative is further from the finite difference than that
+  undecided,  ///< of most residuals the finite differences say too little: noise, kinks
 };
 
 [[nodiscard]] std::string_view gradient_verdict_name(GradientVerdict verdict) noexcept;
 
-/// The derivatives of all residuals by one parameter at one point. Differences are relative to the
-/// derivative of the residual in question plus a thousandth of the column's largest.
+/// The derivatives of all residuals by one parameter at one point; the numbers are those of the
+/// residual whose difference is largest for what is known of it. Differences are relative to the
+/// derivative plus a thousandth of the column's largest.
 struct ParameterGradient {
   std::string name;
-  double difference = 0.0;  ///< largest over the residuals, analytic from finite, at the best step
-  double step = 0.0;        ///< that step, relative to the parameter's size
-  double spread = 0.0;  ///< of the finite differences themselves: the best two neighbouring steps
-  Eigen::Index residual = 0;  ///< where the difference is largest
+  double difference = 0.0;    ///< of the analytic from the finite derivative at the best step
+  double step = 0.0;          ///< that step, relative to the parameter's size
+  double spread = 0.0;        ///< estimated error of the finite difference there
+  Eigen::Index residual = 0;  ///< which residual
   GradientVerdict verdict = GradientVerdict::undecided;
 };
 
@@ -49,10 +50,12 @@ struct GradientCheck {
   [[nodiscard]] bool passed() const;
 };
 
-/// Compares the Jacobian with finite differences at steps of 1e-2 to 1e-7 of each parameter
+/// Compares the Jacobian with finite differences at twelve steps of 3e-2 to 1e-7 of each parameter
 /// (central, or one-sided of second order where a bound is nearer than the step). As no step suits
-/// all, neighbouring steps vote: where two of them agree with each other better than with the
-/// Jacobian, the Jacobian is wrong. The random points are a Latin hypercube over the bounds.
+/// all, the steps vote, residual by residual: large steps show by how much differences still change
+/// (truncation), small ones by how much they scatter (noise), and the step with the least sum of
+/// both counts. A derivative is wrong if it differs by more than the tolerance and three times that
+/// sum. The random points are a Latin hypercube over the bounds.
 /// Throws Error(numerical) if the nominal point or too many random points cannot be evaluated.
 [[nodiscard]] GradientCheck check_gradient(const ResidualFunction& function,
                                            std::span<const FitParameter> parameters,
