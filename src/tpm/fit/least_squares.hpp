@@ -29,6 +29,16 @@ class ResidualFunction {
   [[nodiscard]] virtual bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                                       RowMatrix* jacobian) const = 0;
 
+  /// The matrix whose J^T J is the expected Fisher information, d / d natural. The residuals' own
+  /// Jacobian is right for normal noise of known or common scale; a function with other noise
+  /// (location_information, noise_information) overrides this.
+  /// @return false as for evaluate
+  [[nodiscard]] virtual bool information_root(std::span<const double> natural,
+                                              RowMatrix& root) const {
+    Eigen::VectorXd residual;
+    return evaluate(natural, residual, &root);
+  }
+
   /// Constant part of the sum of squares that is not deviance.
   [[nodiscard]] virtual double offset() const { return 0.0; }
 };

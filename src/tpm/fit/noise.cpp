@@ -65,6 +65,11 @@ Loss parse_loss(std::string_view text, std::string_view where) {
                   "none, huber or cauchy");
 }
 
+ErrorLaw error_law(const Noise& noise) {
+  return {noise.shape, noise.kind == NoiseKind::log ? ErrorScale::ln : ErrorScale::linear,
+          noise.degrees_of_freedom};
+}
+
 double sigma_of(const Noise& noise, double datum, std::optional<double> row_sd,
                 std::string_view where) {
   double sigma = 0.0;
@@ -145,6 +150,17 @@ DatumResidual band_residual(double sigma, double lower, double upper, double f) 
     residual.d_r = 1.0 / sigma;
   }
   return residual;
+}
+
+void apply_shape(const ErrorLaw& law, DatumResidual& residual) {
+  const ShapedResidual shaped = shaped_residual(law, residual.r);
+  residual.r = shaped.r;
+  residual.d_r *= shaped.slope;
+}
+
+double log_density(const Noise& noise, double sigma, double datum, double f) {
+  const double scale = noise.kind == NoiseKind::relative_to_model ? sigma * std::abs(f) : sigma;
+  return log_density(error_law(noise), datum, f, scale);
 }
 
 void apply_loss(const RobustLoss& loss, DatumResidual& residual) {

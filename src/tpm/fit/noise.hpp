@@ -2,6 +2,8 @@
 #include <optional>
 #include <string_view>
 
+#include "tpm/fit/error_law.hpp"
+
 namespace tpm {
 
 /// How a reading scatters about the truth. f is the model's answer, y the datum.
@@ -21,7 +23,13 @@ struct Noise {
   double absolute = 0.0;  ///< a, SI unit of the datum
   double relative = 0.1;  ///< b, dimensionless
   bool scale_known = true;
+  /// Where it is not normal, a, b and the column are the law's scale, see ErrorLaw.
+  ErrorShape shape = ErrorShape::normal;
+  double degrees_of_freedom = 4.0;  ///< of student_t, > 2
 };
+
+/// Shape of the noise and the scale on which it adds.
+[[nodiscard]] ErrorLaw error_law(const Noise& noise);
 
 [[nodiscard]] NoiseKind parse_noise_kind(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view noise_kind_name(NoiseKind kind) noexcept;
@@ -63,6 +71,13 @@ inline constexpr double kNormalisationOffset = 50.0;
 
 /// Residual of a band: zero inside, a one-sided normal tail of the given sigma outside.
 [[nodiscard]] DatumResidual band_residual(double sigma, double lower, double upper, double f);
+
+/// Applies the shape of the law to r and d_r, which stand for z; `normal` changes nothing.
+void apply_shape(const ErrorLaw& law, DatumResidual& residual);
+
+/// ln of the density of the datum, all constants included.
+/// @param sigma of sigma_of
+[[nodiscard]] double log_density(const Noise& noise, double sigma, double datum, double f);
 
 /// Applies the loss to r and d_r.
 void apply_loss(const RobustLoss& loss, DatumResidual& residual);

@@ -13,6 +13,10 @@
 
 namespace tpm {
 
+double Threshold::residual_degrees() const {
+  return std::max(data_count / inflation - parameter_count, 1.0);
+}
+
 double Threshold::variance_factor(double minimum_deviance) const {
   if (scale_known) return 1.0;
   if (data_count <= parameter_count) {
@@ -22,26 +26,30 @@ double Threshold::variance_factor(double minimum_deviance) const {
                                 data_count, parameter_count),
                     "more data than parameters, or a known scale");
   }
-  return minimum_deviance / (data_count - parameter_count);
+  return minimum_deviance / (inflation * residual_degrees());
 }
 
 double Threshold::rise(double minimum_deviance, int constrained) const {
   if (scale_known) {
-    return boost::math::quantile(boost::math::chi_squared(constrained), level);
+    return inflation * boost::math::quantile(boost::math::chi_squared(constrained), level);
   }
-  const double factor = variance_factor(minimum_deviance);
-  const boost::math::fisher_f f(constrained, data_count - parameter_count);
+  const double factor = inflation * variance_factor(minimum_deviance);
+  const boost::math::fisher_f f(constrained, residual_degrees());
   return factor * constrained * boost::math::quantile(f, level);
 }
 
 double Threshold::p_value(double rise, double minimum_deviance, int constrained) const {
-  rise = std::max(rise, 0.0);
+  rise = std::max(rise, 0.0) / inflation;
   if (scale_known) {
     return boost::math::cdf(boost::math::complement(boost::math::chi_squared(constrained), rise));
   }
-  const boost::math::fisher_f f(constrained, data_count - parameter_count);
+  const boost::math::fisher_f f(constrained, residual_degrees());
   return boost::math::cdf(
       boost::math::complement(f, rise / variance_factor(minimum_deviance) / constrained));
+}
+
+Eigen::MatrixXd Covariance::theta_covariance() const {
+  return theta_sd.asDiagonal() * correlation * theta_sd.asDiagonal();
 }
 
 Covariance linear_covariance(const ResidualFunction& function,
@@ -53,15 +61,16 @@ Covariance linear_covariance(const ResidualFunction& function,
     if (!parameters[i].at_lower(value) && !parameters[i].at_upper(value)) c.free.push_back(i);
   }
   const auto n = static_cast<Eigen::Index>(c.free.size());
-  Eigen::VectorXd r;
   RowMatrix jacobian;
-  if (n == 0 || !function.evaluate(minimum.natural, r, &jacobian)) return c;
-  Eigen::MatrixXd j(jacobian.rows(), n);
+  if (n == 0 || !function.information_root(minimum.natural, jacobian)) return c;
+  // Rows of zeros where there are fewer residuals than parameters: the unseen directions then have
+  // their singular value, 0.
+  Eigen::MatrixXd j = Eigen::MatrixXd::Zero(std::max(jacobian.rows(), n), n);
   Eigen::VectorXd length(n);
   for (Eigen::Index k = 0; k < n; ++k) {
     const std::size_t i = c.free[static_cast<std::size_t>(k)];
     const double slope = parameters[i].natural_slope(parameters[i].theta(minimum.natural[i]));
-    j.col(k) = jacobian.col(static_cast<Eigen::Index>(i)) * slope;
+    j.col(k).head(jacobian.rows()) = jacobian.col(static_cast<Eigen::Index>(i)) * slope;
     length[k] = j.col(k).norm();
     if (length[k] > 0.0) j.col(k) /= length[k];
   }
@@ -81,7 +90,9 @@ Covariance linear_covariance(const ResidualFunction& function,
   Eigen::MatrixXd covariance = root * root.transpose();
   covariance = length.cwiseInverse().asDiagonal() * covariance * length.cwiseInverse().asDiagonal();
   const bool estimable = threshold.scale_known || threshold.data_count > threshold.parameter_count;
-  if (estimable) covariance *= threshold.variance_factor(minimum.deviance);
+  if (estimable) {
+    covariance *= threshold.inflation * threshold.variance_factor(minimum.deviance);
+  }
   c.theta_sd = covariance.diagonal().cwiseSqrt();
   c.correlation =
       c.theta_sd.cwiseInverse().asDiagonal() * covariance * c.theta_sd.cwiseInverse().asDiagonal();

@@ -15,9 +15,16 @@ struct Threshold {
   bool scale_known = true;  ///< sigma known: chi-square; known up to a factor: F
   int data_count = 0;       ///< n, bands not counted
   int parameter_count = 0;  ///< k
+  /// Readings per independent reading, n / n_eff >= 1 (Correlation::inflation): the rise and the
+  /// covariance are multiplied by it, and the F has n / inflation - k degrees of freedom.
+  double inflation = 1.0;
 
-  /// Estimated variance factor: 1 if known, else deviance / (n - k). Throws Error(bad_input) if
-  /// it must be estimated and n <= k.
+  /// Degrees of freedom of an estimated variance: max(n / inflation - k, 1).
+  [[nodiscard]] double residual_degrees() const;
+  /// Variance of one reading in units of the declared one: 1 if known, else deviance /
+  /// (inflation residual_degrees()), which is deviance / (n - k) for independent readings: a smooth
+  /// curve takes up as much of correlated noise as `inflation` parameters of independent noise
+  /// would. Throws Error(bad_input) if it must be estimated and n <= k.
   [[nodiscard]] double variance_factor(double minimum_deviance) const;
   /// Rise of the deviance allowed for `constrained` (>= 1) parameters at once.
   [[nodiscard]] double rise(double minimum_deviance, int constrained = 1) const;
@@ -28,6 +35,9 @@ struct Threshold {
 /// Linearised uncertainty at a minimum, in theta, of the parameters that are neither fixed nor at
 /// a bound.
 struct Covariance {
+  /// The covariance matrix in theta; empty if not of full rank.
+  [[nodiscard]] Eigen::MatrixXd theta_covariance() const;
+
   std::vector<std::size_t> free;  ///< indices of those parameters
   Eigen::VectorXd theta_sd;       ///< standard errors in theta; empty if not of full rank
   Eigen::MatrixXd correlation;

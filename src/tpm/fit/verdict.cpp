@@ -90,28 +90,128 @@ std::string hypothesis_words(const HypothesisResult& result, double level) {
                      significant(result.rise, 4), significant(result.p_value, 2));
 }
 
+namespace {
+
+/// Components of a direction that differ by less than this share count as equal, or as a small
+/// whole number apart.
+constexpr double kEqual = 0.1;
+
+bool nearly(double a, double b) {
+  return std::abs(a - b) <= kEqual * std::max(std::abs(a), std::abs(b));
+}
+
+bool all_on_scale(std::span<const FitParameter> named, Scale scale) {
+  return std::all_of(named.begin(), named.end(),
+                     [scale](const FitParameter& p) { return p.scale == scale; });
+}
+
+bool all_equal(std::span<const double> steps) {
+  return std::all_of(steps.begin(), steps.end(), [&](double s) { return nearly(s, steps[0]); });
+}
+
+std::string power(const std::string& name, int exponent) {
+  return exponent == 1 ? name : fmt::format("{}^{}", name, exponent);
+}
+
+/// p^m q^n stays the same along steps of ln p and ln q with m dp + n dq = 0: the smallest whole
+/// numbers up to 3 that fit.
+std::string known_power(const FitParameter& p, const FitParameter& q, double dp, double dq) {
+  for (int m = 1; m <= 3; ++m) {
+    for (int n = 1; n <= 3; ++n) {
+      if (!nearly(m * std::abs(dp), n * std::abs(dq))) continue;
+      const bool opposite = dp * dq < 0.0;
+      const char* whose = m == 1 && n == 1 ? "their" : "the";
+      return fmt::format("{} {} {}{}{}", whose, opposite ? "product" : "ratio", power(p.name, m),
+                         opposite ? " " : " / ", power(q.name, n));
+    }
+  }
+  return {};
+}
+
+std::string known_sum(const FitParameter& p, const FitParameter& q, double dp, double dq) {
+  if (p.unit.dimension != q.unit.dimension || !nearly(std::abs(dp), std::abs(dq))) return {};
+  return dp * dq < 0.0 ? fmt::format("their sum {} + {}", p.name, q.name)
+                       : fmt::format("their difference {} - {}", p.name, q.name);
+}
+
+std::string joined(std::span<const FitParameter> named) {
+  std::string text;
+  for (std::size_t i = 0; i < named.size(); ++i) {
+    if (i > 0) text += i + 1 == named.size() ? " and " : ", ";
+    text += named[i].name;
+  }
+  return text;
+}
+
+/// The parameters that move along the weakest direction, with their steps.
+struct NamedDirection {
+  std::vector<FitParameter> parameters;
+  std::vector<double> steps;
+};
+
+NamedDirection named_direction(const FitResult& result) {
+  const Covariance& c = result.covariance;
+  const Eigen::VectorXd& v = c.weakest_direction;
+  // What moves by less than this share of the largest step is not worth a word.
+  const double least = 0.2 * v.cwiseAbs().maxCoeff();
+  NamedDirection named;
+  for (Eigen::Index k = 0; k < v.size(); ++k) {
+    if (std::abs(v[k]) < least) continue;
+    named.parameters.push_back(result.parameters[c.free[static_cast<std::size_t>(k)]].parameter);
+    named.steps.push_back(v[k]);
+  }
+  return named;
+}
+
+/// "E up and eta1 down", the first one up unless its theta runs against it.
+std::string movement_words(const NamedDirection& named) {
+  std::string parts;
+  const double sign = named.steps[0] < 0.0 ? -1.0 : 1.0;
+  for (std::size_t i = 0; i < named.steps.size(); ++i) {
+    const bool rises = (named.steps[i] * sign > 0.0) != named.parameters[i].reversed();
+    if (i > 0) parts += " and ";
+    parts += fmt::format("{} {}", named.parameters[i].name, rises ? "up" : "down");
+  }
+  return parts;
+}
+
+}  // namespace
+
+std::string known_combination(std::span<const FitParameter> named, std::span<const double> steps) {
+  if (named.size() < 2) return {};
+  const bool two = named.size() == 2;
+  if (all_on_scale(named, Scale::log)) {
+    if (two) return known_power(named[0], named[1], steps[0], steps[1]);
+    return all_equal(steps) ? "the ratios of " + joined(named) : std::string();
+  }
+  if (two && all_on_scale(named, Scale::linear)) {
+    return known_sum(named[0], named[1], steps[0], steps[1]);
+  }
+  return {};
+}
+
 std::string weakest_direction_words(const FitResult& result) {
   const Covariance& c = result.covariance;
-  if (c.free.size() < 2) return {};
-  const Eigen::VectorXd& v = c.weakest_direction;
-  const double largest = v.cwiseAbs().maxCoeff();
-  std::string parts;
-  int named = 0;
-  double sign = 0.0;
-  for (Eigen::Index k = 0; k < v.size(); ++k) {
-    if (std::abs(v[k]) < 0.2 * largest) continue;
-    if (sign == 0.0) sign = v[k] < 0.0 ? -1.0 : 1.0;
-    const FitParameter& p = result.parameters[c.free[static_cast<std::size_t>(k)]].parameter;
-    const bool rises = (v[k] * sign > 0.0) != p.reversed();
-    if (named++ > 0) parts += " and ";
-    parts += fmt::format("{} {}", p.name, rises ? "up" : "down");
+  if (c.free.size() < 2 || c.weakest_direction.size() == 0) return {};
+  const NamedDirection named = named_direction(result);
+  const double strongest = c.singular_values[0];
+  const double weakest = c.singular_values[c.singular_values.size() - 1];
+  const std::string strength = fmt::format("singular values {}:{} of the scaled Jacobian",
+                                           significant(strongest, 3), significant(weakest, 3));
+  const std::string known = known_combination(named.parameters, named.steps);
+  if (!known.empty() && !c.full_rank) {
+    return fmt::format("rank-deficient: {} trade off: only {} can be known ({})",
+                       joined(named.parameters), known, strength);
   }
-  const std::string strength = fmt::format(
-      "singular values {}:{} of the scaled Jacobian", significant(c.singular_values[0], 3),
-      significant(c.singular_values[c.singular_values.size() - 1], 3));
+  // A mild imbalance is no trade-off: both are known, one of them less well.
+  if (!known.empty() && weakest < 0.1 * strongest) {
+    return fmt::format("{} trade off: {} is known much better than they are ({})",
+                       joined(named.parameters), known, strength);
+  }
+  const std::string parts = movement_words(named);
   if (!c.full_rank)
     return fmt::format("rank-deficient: the data do not see {} ({})", parts, strength);
-  if (named == 1) return fmt::format("the data see least: {} ({})", parts, strength);
+  if (named.steps.size() == 1) return fmt::format("the data see least: {} ({})", parts, strength);
   return fmt::format("the data see least: {} together; they trade off ({})", parts, strength);
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <string>
 
 #include "tpm/fit/fit.hpp"
@@ -14,7 +15,17 @@ namespace tpm {
 /// "eta1 = 5 Pa s is excluded by these data (...)" or "cannot be told ...".
 [[nodiscard]] std::string hypothesis_words(const HypothesisResult& result, double level);
 
+/// What the data know of parameters that trade off along a direction, "their product E eta1",
+/// "their ratio E / eta1", "the product E eta1^2", "the ratios of E, eta1 and eta2", "their sum E1
+/// + E2"; empty if it is nothing that simple.
+/// @param named parameters that move along the direction, two or more
+/// @param steps their components in theta, parallel
+[[nodiscard]] std::string known_combination(std::span<const FitParameter> named,
+                                            std::span<const double> steps);
+
 /// Which combination of parameters the data see least; empty for fewer than two free parameters.
+/// Names what is known instead where a singular value is below a tenth of the largest, see
+/// known_combination.
 [[nodiscard]] std::string weakest_direction_words(const FitResult& result);
 
 }  // namespace tpm

@@ -1,0 +1,25 @@
+#pragma once
+#include <span>
+#include <string>
+#include <vector>
+
+namespace tpm {
+
+/// The ends of all starts in rising order: a stair with few broad steps means that the search finds
+/// the same minima again and again, a slope without steps that it gets stuck anywhere (Raue et al.,
+/// PLoS ONE 8 (2013) e74335).
+struct Waterfall {
+  std::vector<double> deviances;  ///< rising, of the starts that ended in a usable point
+  std::vector<int> clusters;      ///< parallel: 0 for the best minimum, 1 for the next, ...
+  double margin = 0.1;            ///< of the deviance
+  int near_best = 0;              ///< ends within `margin` of the best
+  int starts = 0;
+  int failed = 0;     ///< starts without a usable end
+  std::string words;  ///< "17 of 50 starts within 0.1 of the best; ..."
+};
+
+/// Two ends belong to one cluster if their deviances differ by less than 1e-5, relative above 1.
+/// @param deviances one per start in any order; not finite for a start that failed
+[[nodiscard]] Waterfall waterfall(std::span<const double> deviances, double margin = 0.1);
+
+}  // namespace tpm

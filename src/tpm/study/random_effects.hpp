@@ -1,0 +1,48 @@
+#pragma once
+#include <optional>
+#include <span>
+#include <string>
+
+namespace tpm {
+
+/// Estimate of one parameter from one specimen, in theta (ln E, say).
+struct SpecimenEstimate {
+  std::string name;
+  double estimate = 0.0;
+  double standard_error = 0.0;  ///< > 0
+};
+
+/// Limits in theta.
+struct EffectInterval {
+  double lower = 0.0, upper = 0.0;
+};
+
+/// The estimate over specimens that differ, y_i = mu + u_i + e_i with u_i ~ N(0, tau^2) and
+/// e_i ~ N(0, s_i^2). Everything in theta; for a log parameter exp(mu) is the typical specimen.
+struct RandomEffects {
+  std::size_t specimens = 0;           ///< k
+  double mean = 0.0;                   ///< mu
+  double standard_error = 0.0;         ///< of mu, Hartung-Knapp
+  EffectInterval interval;             ///< of mu
+  std::optional<double> tau_squared;   ///< between specimens, by REML; empty for k = 1
+  bool tau_at_zero = false;            ///< the boundary: no spread beyond the standard errors
+  std::optional<double> q, q_p_value;  ///< Cochran's Q and its p-value (chi-square, k - 1)
+  std::optional<double> i_squared;     ///< max(0, (Q - (k - 1)) / Q), 0 .. 1
+  std::optional<EffectInterval> new_specimen;  ///< prediction interval; empty for k < 3
+  std::string words;                           ///< one sentence
+};
+
+/// tau^2 maximises the restricted likelihood (Viechtbauer, J. Educ. Behav. Stat. 30 (2005) 261).
+/// The interval of mu is mu +- t_{k-1} SE with Hartung and Knapp's SE^2 = h / sum w, w = 1 / (s^2 +
+/// tau^2), h = max(1, sum w (y - mu)^2 / (k - 1)) (Statistics in Medicine 20 (2001) 3875; the lower
+/// limit of 1 keeps few specimens that agree by chance from giving no interval at all: Roever,
+/// Knapp and Friede, BMC Med. Res. Methodol. 15 (2015) 99). A new specimen: mu +- t_{k-1}
+/// sqrt(tau^2 + SE^2). One specimen answers with its own estimate and the normal interval of its
+/// standard error.
+/// @param level in (0, 1)
+/// Throws Error(bad_input) without specimens, or naming one whose numbers are not finite or whose
+/// standard error is not positive.
+[[nodiscard]] RandomEffects random_effects(std::span<const SpecimenEstimate> specimens,
+                                           double level = 0.95);
+
+}  // namespace tpm
