@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -52,5 +53,8 @@ struct Unit {
 /// One finite decimal number, all of the text, point as decimal sign, locale-independent.
 /// Throws Error(bad_input) (also for nan, inf and overflow such as 1e400).
 [[nodiscard]] double parse_number(std::string_view text, std::string_view where);
+
+/// As parse_number; none where that throws.
+[[nodiscard]] std::optional<double> find_number(std::string_view text) noexcept;
 
 }  // namespace tpm
