@@ -155,6 +155,13 @@ std::string_view si_symbol(Dimension dimension) noexcept {
   return "";
 }
 
+Unit shown_unit(Dimension dimension) {
+  std::string_view symbol = si_symbol(dimension);
+  if (dimension == Dimension::length) symbol = "mm";
+  if (dimension == Dimension::stress) symbol = "kPa";
+  return parse_unit(symbol, dimension, {});
+}
+
 Unit parse_unit(std::string_view text, std::string_view where) {
   const Spelling* s = find_spelling(trimmed(text));
   if (s == nullptr) {

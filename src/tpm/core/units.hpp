@@ -42,6 +42,9 @@ struct Unit {
 /// The SI unit symbol of a dimension ("" for dimensionless).
 [[nodiscard]] std::string_view si_symbol(Dimension dimension) noexcept;
 
+/// The unit in which people read such numbers of soft tissue: mm, N, kPa, s, Hz; else the SI unit.
+[[nodiscard]] Unit shown_unit(Dimension dimension);
+
 /// The name in words ("length", "viscosity").
 [[nodiscard]] std::string_view dimension_name(Dimension dimension) noexcept;
 

@@ -24,9 +24,8 @@ bool is_pair_row(const DelimitedRow& row) {
 
 double coordinate(const DelimitedTable& table, const DelimitedRow& row, std::size_t index,
                   const std::string& file) {
-  return parse_field_at(row.fields[index], table.decimal_comma, [&] {
-    return fmt::format("{}:{}: column {}", file, row.line, index + 1);
-  });
+  return parse_field_at(row.fields[index], table.decimal_comma,
+                        [&] { return fmt::format("{}:{}: column {}", file, row.line, index + 1); });
 }
 
 bool is_empty_at(const DelimitedRow& row, std::size_t index) {

@@ -192,7 +192,8 @@ void require_units(const std::vector<Use>& uses, const std::string& file) {
                            si_symbol(dimension));
   }
   if (missing == 0) return;
-  throw bad_input(fmt::format("{}: {}", file, labels), missing == 1 ? "has no unit" : "have no unit",
+  throw bad_input(fmt::format("{}: {}", file, labels),
+                  missing == 1 ? "has no unit" : "have no unit",
                   fmt::format("{} (or other units)", options));
 }
 

@@ -43,7 +43,8 @@ RecordingFile read_described(const fs::path& path, const ImportOptions& options)
     result.findings.push_back({what, std::move(value)});
   };
   found("format", "described");
-  if (!recording.drive.empty()) found("drive", std::string(quantity_name(recording.drive_quantity)));
+  if (!recording.drive.empty())
+    found("drive", std::string(quantity_name(recording.drive_quantity)));
   found("response", std::string(quantity_name(recording.response_quantity)));
   found("rows", std::to_string(recording.response.size()));
   found("provenance", std::string(provenance_name(recording.provenance)));

@@ -84,9 +84,8 @@ void require_text(std::string_view text, std::string_view where) {
     beyond_ascii |= u >= 0x80;
   }
   if (control) {
-    const auto binary = std::find_if(text.begin(), text.end(), [](char c) {
-      return is_control(static_cast<unsigned char>(c));
-    });
+    const auto binary = std::find_if(
+        text.begin(), text.end(), [](char c) { return is_control(static_cast<unsigned char>(c)); });
     const auto position = static_cast<std::size_t>(binary - text.begin());
     throw bad_input(at_line(where, line_of(text, position)),
                     fmt::format("byte 0x{:02X} is not text", static_cast<unsigned char>(*binary)),
@@ -153,10 +152,9 @@ char find_separator(std::string_view text) {
     if (!is_blank(line) && !line.starts_with('#')) sample.push_back(line);
   }
   for (const char candidate : {'\t', ';', ','}) {
-    const auto n =
-        std::count_if(sample.begin(), sample.end(), [candidate](std::string_view sampled) {
-          return holds_outside_quotes(sampled, candidate);
-        });
+    const auto n = std::count_if(
+        sample.begin(), sample.end(),
+        [candidate](std::string_view sampled) { return holds_outside_quotes(sampled, candidate); });
     if (n > 0 && 2 * static_cast<std::size_t>(n) >= sample.size()) return candidate;
   }
   return ',';

@@ -25,7 +25,8 @@ struct DelimitedOptions {
   std::size_t longest_line = std::size_t{1} << 20;  ///< bytes after conversion to UTF-8
 };
 
-/// One row of fields, with the line it starts on (from 1). The fields are views of the table's text.
+/// One row of fields, with the line it starts on (from 1). The fields are views of the table's
+/// text.
 struct DelimitedRow {
   int line = 0;
   std::span<const std::string_view> fields;
