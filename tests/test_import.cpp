@@ -137,8 +137,10 @@ TEST_CASE("UTF-16 exports and units in the names") {
 
 TEST_CASE("stress over relative length: what the file does not say has to be said") {
   ImportOptions options;
-  CHECK_THROWS_WITH(import_curves(fixture("strip_no_units.csv"), options),
-                    Catch::Contains("column 1 'Time': has no unit; expected --unit \"Time=s\""));
+  CHECK_THROWS_WITH(
+      import_curves(fixture("strip_no_units.csv"), options),
+      Catch::Contains("column 1 'Time', column 3 'F', column 4 'SD': have no unit; expected "
+                      "--unit \"Time=s\" --unit \"F=N\" --unit \"SD=N\""));
   options.units = {{"Time", "s"}, {"3", "kPa"}, {"SD", "kPa"}};
   options.drive_column = "L";
   options.drive_quantity = Quantity::relative_length;

@@ -13,31 +13,14 @@ namespace {
 
 using Table = std::vector<std::vector<std::string>>;
 
-struct Shown {
-  const char* unit;
-  double to_si;
-};
-
-/// The units people use for soft tissue.
-Shown shown_unit(Quantity quantity) {
-  switch (quantity_dimension(quantity)) {
-    case Dimension::length:
-      return {"mm", 1e-3};
-    case Dimension::force:
-      return {"N", 1.0};
-    case Dimension::stress:
-      return {"kPa", 1e3};
-    case Dimension::time:
-      return {"s", 1.0};
-    default:
-      return {"", 1.0};
-  }
+Unit shown_unit_of(Quantity quantity) {
+  return shown_unit(quantity_dimension(quantity));
 }
 
 std::string title(Quantity quantity, const std::string& extra = {}) {
-  const Shown shown = shown_unit(quantity);
+  const Unit shown = shown_unit_of(quantity);
   return fmt::format("{}{}{}{}", quantity_short_name(quantity), extra,
-                     *shown.unit == '\0' ? "" : " ", shown.unit);
+                     shown.symbol.empty() ? "" : " ", shown.symbol);
 }
 
 std::string cell(const std::optional<double>& si, double to_si) {
@@ -68,7 +51,7 @@ Table without_empty_columns(const Table& rows) {
 std::string points_text(const PointSet& points) {
   const Quantity observed = observable_quantity(points.observable);
   const bool force = points.observable == Observable::contact_force;
-  const double to_si = shown_unit(observed).to_si;
+  const double to_si = shown_unit_of(observed).to_si;
   const std::string band = " (or band)";
   Table table{{force ? title(Quantity::indentation_depth) : title(Quantity::load), "label",
                title(Quantity::time), title(observed, band), title(observed, " sd"), "provenance",
@@ -98,8 +81,8 @@ std::string recording_text(const Recording& recording, bool all_rows) {
   const auto at = [](const std::vector<double>& values, std::size_t i, double to_si) {
     return values.empty() ? std::string() : significant(values[i] / to_si, 6);
   };
-  const double drive_si = shown_unit(recording.drive_quantity).to_si;
-  const double response_si = shown_unit(recording.response_quantity).to_si;
+  const double drive_si = shown_unit_of(recording.drive_quantity).to_si;
+  const double response_si = shown_unit_of(recording.response_quantity).to_si;
   for (std::size_t i = 0; i < size; ++i) {
     if (!all_rows && size > 2 * kEnds && i == kEnds) {
       table.push_back({"", "", "", "", fmt::format("... {} more", size - 2 * kEnds)});

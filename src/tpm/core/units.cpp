@@ -76,7 +76,7 @@ constexpr auto kSpellings = std::to_array<Spelling>({
     {"kN/m", "N/mm", Dimension::stiffness, 1e3},
 });
 
-std::string_view trimmed(std::string_view text) {
+std::string_view trimmed(std::string_view text) noexcept {
   constexpr std::string_view kSpace = " \t\r\n";
   const auto first = text.find_first_not_of(kSpace);
   if (first == std::string_view::npos) return {};
@@ -155,6 +155,13 @@ std::string_view si_symbol(Dimension dimension) noexcept {
   return "";
 }
 
+Unit shown_unit(Dimension dimension) {
+  std::string_view symbol = si_symbol(dimension);
+  if (dimension == Dimension::length) symbol = "mm";
+  if (dimension == Dimension::stress) symbol = "kPa";
+  return parse_unit(symbol, dimension, {});
+}
+
 Unit parse_unit(std::string_view text, std::string_view where) {
   const Spelling* s = find_spelling(trimmed(text));
   if (s == nullptr) {
@@ -183,20 +190,24 @@ bool is_unit(std::string_view text) noexcept {
   return !t.empty() && find_spelling(t) != nullptr;
 }
 
-double parse_number(std::string_view text, std::string_view where) {
+std::optional<double> find_number(std::string_view text) noexcept {
   const std::string_view t = trimmed(text);
   double value = 0.0;
   const char* begin = t.data();
   const char* end = begin + t.size();
   if (begin != end && *begin == '+') ++begin;  // from_chars takes no plus sign
   const auto [stop, status] = std::from_chars(begin, end, value);
-  if (status != std::errc{} || stop != end || !std::isfinite(value)) {
-    throw bad_input(where,
-                    t.empty() ? std::string("empty where a number belongs")
-                              : fmt::format("'{}' is not a finite number", printable(t)),
-                    "a number such as 12.5 or 1.2e-3");
-  }
+  if (status != std::errc{} || stop != end || !std::isfinite(value)) return std::nullopt;
   return value;
+}
+
+double parse_number(std::string_view text, std::string_view where) {
+  if (const auto value = find_number(text)) return *value;
+  const std::string_view t = trimmed(text);
+  throw bad_input(where,
+                  t.empty() ? std::string("empty where a number belongs")
+                            : fmt::format("'{}' is not a finite number", printable(t)),
+                  "a number such as 12.5 or 1.2e-3");
 }
 
 double parse_quantity(std::string_view text, Dimension expected, std::string_view where) {

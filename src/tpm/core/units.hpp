@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -41,6 +42,9 @@ struct Unit {
 /// The SI unit symbol of a dimension ("" for dimensionless).
 [[nodiscard]] std::string_view si_symbol(Dimension dimension) noexcept;
 
+/// The unit in which people read such numbers of soft tissue: mm, N, kPa, s, Hz; else the SI unit.
+[[nodiscard]] Unit shown_unit(Dimension dimension);
+
 /// The name in words ("length", "viscosity").
 [[nodiscard]] std::string_view dimension_name(Dimension dimension) noexcept;
 
@@ -52,5 +56,8 @@ struct Unit {
 /// One finite decimal number, all of the text, point as decimal sign, locale-independent.
 /// Throws Error(bad_input) (also for nan, inf and overflow such as 1e400).
 [[nodiscard]] double parse_number(std::string_view text, std::string_view where);
+
+/// As parse_number; none where that throws.
+[[nodiscard]] std::optional<double> find_number(std::string_view text) noexcept;
 
 }  // namespace tpm

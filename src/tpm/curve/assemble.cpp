@@ -152,13 +152,48 @@ std::string csv_text(const ImportedSeries& series, std::string_view provenance) 
   return csv;
 }
 
-}  // namespace
-
-ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
-                             const ImportOptions& options, Provenance usual) {
+/// What every kind of curve has to fulfil, and what it measures.
+void check_and_measure(ImportedSeries& series, const std::string& file) {
   require_increasing(series, file);
   require_not_negative(series, file, observed(series).quantity, Bound::sd);
   add_measures(series);
+}
+
+std::vector<double> in_si(ImportedColumn& column) {
+  for (double& value : column.values) value *= column.unit.to_si;
+  return std::move(column.values);
+}
+
+}  // namespace
+
+RecordingFile assemble_recording(ImportedSeries series, const std::string& file,
+                                 const ImportOptions& options, Provenance usual) {
+  check_and_measure(series, file);
+  RecordingFile result;
+  Recording& recording = result.recording;
+  recording.header = options.header;
+  recording.provenance = options.provenance.value_or(usual);
+  recording.response_quantity = observed(series).quantity;
+  for (ImportedColumn& column : series.columns) {
+    if (column.bound == Bound::sd) {
+      recording.response_sd = in_si(column);
+    } else if (column.quantity == Quantity::time) {
+      recording.time_s = in_si(column);
+    } else if (column.quantity == recording.response_quantity) {
+      recording.response = in_si(column);
+    } else {
+      recording.drive_quantity = column.quantity;
+      recording.drive = in_si(column);
+    }
+  }
+  series.findings.push_back({"provenance", std::string(provenance_name(recording.provenance))});
+  result.findings = std::move(series.findings);
+  return result;
+}
+
+ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
+                             const ImportOptions& options, Provenance usual) {
+  check_and_measure(series, file);
   const Provenance provenance = options.provenance.value_or(usual);
 
   ImportedCurve curve;

@@ -11,4 +11,10 @@ namespace tpm {
 [[nodiscard]] ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
                                            const ImportOptions& options, Provenance usual);
 
+/// A series as a recording in SI: its last column is the response, any other besides time the
+/// drive. The same checks and findings as assemble_curve, without writing the numbers out and
+/// reading them back. header.sha256 stays empty.
+[[nodiscard]] RecordingFile assemble_recording(ImportedSeries series, const std::string& file,
+                                               const ImportOptions& options, Provenance usual);
+
 }  // namespace tpm

@@ -85,40 +85,42 @@ ImportedSeries digitized_series(DigitizedDataset dataset, const std::string& fil
   return series;
 }
 
-std::vector<ImportedCurve> assemble_datasets(std::vector<DigitizedDataset> datasets,
-                                             const std::string& file, const ImportOptions& options,
-                                             const std::vector<Finding>& findings) {
+std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datasets,
+                                            const std::string& file, const ImportOptions& options,
+                                            const std::vector<Finding>& findings) {
   std::string names;
-  std::vector<ImportedCurve> curves;
+  std::vector<ImportedSeries> all;
   for (DigitizedDataset& dataset : datasets) {
     names += fmt::format("{}'{}'", names.empty() ? "" : ", ", printable(dataset.name));
     if (!options.dataset.empty() && dataset.name != options.dataset) continue;
     if (dataset.x.empty() && options.dataset.empty()) continue;
     if (dataset.x.empty()) throw bad_input(file, "the dataset has no points", "a digitised curve");
-    curves.push_back(assemble_curve(digitized_series(std::move(dataset), file, options, findings),
-                                    file, options, Provenance::digitized));
+    all.push_back(digitized_series(std::move(dataset), file, options, findings));
   }
-  if (!curves.empty()) return curves;
+  if (!all.empty()) return all;
   if (options.dataset.empty()) throw bad_input(file, "no dataset has points", "a digitised curve");
   throw bad_input(file, fmt::format("no dataset '{}'", printable(options.dataset)), names);
 }
 
-std::vector<ImportedCurve> import_table(const DelimitedTable& table, const std::string& file,
-                                        const ImportOptions& options) {
+ImportedFile import_table(const DelimitedTable& table, const std::string& file,
+                          const ImportOptions& options) {
   ImportFormat format = options.format;
   if (format == ImportFormat::automatic) {
     format = recognize_digitizer(table).value_or(ImportFormat::machine);
   }
   std::vector<Finding> findings = text_findings(table, format);
-  if (format == ImportFormat::wpd_csv) {
-    return assemble_datasets(read_wpd_csv(table, file), file, options, findings);
+  ImportedFile imported;
+  if (format == ImportFormat::machine) {
+    ImportedSeries series = read_machine(table, file, options);
+    series.findings.insert(series.findings.begin(), findings.begin(), findings.end());
+    imported.series.push_back(std::move(series));
+    return imported;
   }
-  if (format == ImportFormat::engauge) {
-    return assemble_datasets(read_engauge(table, file), file, options, findings);
-  }
-  ImportedSeries series = read_machine(table, file, options);
-  series.findings.insert(series.findings.begin(), findings.begin(), findings.end());
-  return {assemble_curve(std::move(series), file, options, Provenance::measured)};
+  imported.usual = Provenance::digitized;
+  imported.series = datasets_series(
+      format == ImportFormat::wpd_csv ? read_wpd_csv(table, file) : read_engauge(table, file), file,
+      options, findings);
+  return imported;
 }
 
 }  // namespace
@@ -146,18 +148,34 @@ Axis parse_axis(std::string_view text, std::string_view where) {
   return axis;
 }
 
-std::vector<ImportedCurve> import_curves(const std::filesystem::path& path,
-                                         const ImportOptions& options) {
+ImportedFile import_series(const std::filesystem::path& path, const ImportOptions& options) {
   const std::string file = path.string();
   const std::string bytes = read_file(path);
   const bool json = options.format == ImportFormat::wpd_json ||
                     (options.format == ImportFormat::automatic && looks_like_json(bytes));
+  ImportedFile imported;
   if (json) {
-    return assemble_datasets(read_wpd_json(bytes, file), file, options, {{"format", "wpd-json"}});
+    imported.usual = Provenance::digitized;
+    imported.series =
+        datasets_series(read_wpd_json(bytes, file), file, options, {{"format", "wpd-json"}});
+  } else {
+    DelimitedOptions text = options.text;
+    text.ragged = true;  // headers and columns of unequal length; each reader checks its own rows
+    imported = import_table(parse_delimited(bytes, file, text), file, options);
   }
-  DelimitedOptions text = options.text;
-  text.ragged = true;  // headers and columns of unequal length; each reader checks its own rows
-  return import_table(parse_delimited(bytes, file, text), file, options);
+  imported.sha256 = sha256_hex(bytes);
+  return imported;
+}
+
+std::vector<ImportedCurve> import_curves(const std::filesystem::path& path,
+                                         const ImportOptions& options) {
+  ImportedFile imported = import_series(path, options);
+  std::vector<ImportedCurve> curves;
+  curves.reserve(imported.series.size());
+  for (ImportedSeries& series : imported.series) {
+    curves.push_back(assemble_curve(std::move(series), path.string(), options, imported.usual));
+  }
+  return curves;
 }
 
 }  // namespace tpm

@@ -98,6 +98,23 @@ struct ImportedCurve {
   std::vector<Finding> findings;
 };
 
+/// A recording read into memory, and what was understood of its file.
+struct RecordingFile {
+  Recording recording;
+  std::vector<Finding> findings;
+};
+
+/// The series of a foreign file, as they stood in it.
+struct ImportedFile {
+  std::vector<ImportedSeries> series;
+  Provenance usual = Provenance::measured;  ///< of such a file if the options give none
+  std::string sha256;                       ///< of its bytes
+};
+
+/// Takes a foreign file apart; see import_curves. `options.dataset` chooses among several series.
+[[nodiscard]] ImportedFile import_series(const std::filesystem::path& path,
+                                         const ImportOptions& options);
+
 /// Reads a foreign file. Throws Error(bad_input) with file, line and column. A digitised file may
 /// hold several curves; a machine export holds one.
 ///

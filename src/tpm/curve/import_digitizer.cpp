@@ -9,7 +9,7 @@
 namespace tpm {
 namespace {
 
-bool is_word(const std::string& field, char word) {
+bool is_word(std::string_view field, char word) {
   return field.size() == 1 && (field[0] == word || field[0] == word - 'a' + 'A');
 }
 
@@ -24,8 +24,8 @@ bool is_pair_row(const DelimitedRow& row) {
 
 double coordinate(const DelimitedTable& table, const DelimitedRow& row, std::size_t index,
                   const std::string& file) {
-  return parse_field(row.fields[index], table.decimal_comma,
-                     fmt::format("{}:{}: column {}", file, row.line, index + 1));
+  return parse_field_at(row.fields[index], table.decimal_comma,
+                        [&] { return fmt::format("{}:{}: column {}", file, row.line, index + 1); });
 }
 
 bool is_empty_at(const DelimitedRow& row, std::size_t index) {
@@ -82,7 +82,7 @@ std::vector<EngaugeColumn> begin_block(const DelimitedRow& titles, const std::st
                       "x,Curve1,...");
     } else if (!titles.fields[i].empty()) {
       columns.push_back({x, i, datasets.size()});
-      datasets.push_back({titles.fields[i], {}, {}});
+      datasets.push_back({std::string(titles.fields[i]), {}, {}});
     }
   }
   return columns;

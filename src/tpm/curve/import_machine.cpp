@@ -35,7 +35,7 @@ struct Header {
 bool holds_samples(const DelimitedRow& row, bool decimal_comma) {
   std::size_t filled = 0;
   std::size_t numbers = 0;
-  for (const std::string& field : row.fields) {
+  for (const std::string_view field : row.fields) {
     if (field.empty()) continue;
     ++filled;
     if (is_number(field, decimal_comma)) ++numbers;
@@ -60,7 +60,7 @@ std::size_t count_header_rows(const DelimitedTable& table, const std::string& fi
 
 bool is_unit_row(const DelimitedRow& row) {
   std::size_t units = 0;
-  for (const std::string& field : row.fields) {
+  for (const std::string_view field : row.fields) {
     if (field.empty() || field == "-") continue;
     if (!is_unit(without_brackets(field))) return false;
     ++units;
@@ -69,13 +69,13 @@ bool is_unit_row(const DelimitedRow& row) {
 }
 
 std::string field_or_empty(const DelimitedRow& row, std::size_t index) {
-  return index < row.fields.size() ? row.fields[index] : std::string();
+  return std::string(index < row.fields.size() ? row.fields[index] : std::string_view());
 }
 
 /// A row above the titles that repeats one text names the sheet.
 std::string sheet_name(const DelimitedRow& row) {
   std::string name;
-  for (const std::string& field : row.fields) {
+  for (const std::string_view field : row.fields) {
     if (field.empty()) continue;
     if (!name.empty() && field != name) return {};
     name = field;
@@ -165,14 +165,36 @@ const Column* find_column(const Header& header, ColumnRole role, const std::stri
 Unit unit_of(const Column& column, Quantity quantity, const std::string& file) {
   const Dimension dimension = quantity_dimension(quantity);
   const std::string where = fmt::format("{}: {}", file, column.label());
-  if (column.unit.empty() && dimension != Dimension::dimensionless) {
-    throw bad_input(
-        where, "has no unit",
-        fmt::format("--unit \"{}={}\" or another unit of {}",
-                    column.name.empty() ? std::to_string(column.index + 1) : printable(column.name),
-                    si_symbol(dimension), dimension_name(dimension)));
-  }
   return parse_unit(column.unit, dimension, where);
+}
+
+/// A column that is going to be read.
+struct Use {
+  const Column* column;
+  Quantity quantity;
+  Bound bound;
+  bool negate;
+};
+
+/// One message for all columns: what to add to the command line is said once.
+void require_units(const std::vector<Use>& uses, const std::string& file) {
+  std::string labels;
+  std::string options;
+  std::size_t missing = 0;
+  for (const Use& use : uses) {
+    const Dimension dimension = quantity_dimension(use.quantity);
+    if (!use.column->unit.empty() || dimension == Dimension::dimensionless) continue;
+    ++missing;
+    labels += fmt::format("{}{}", labels.empty() ? "" : ", ", use.column->label());
+    options += fmt::format("{}--unit \"{}={}\"", options.empty() ? "" : " ",
+                           use.column->name.empty() ? std::to_string(use.column->index + 1)
+                                                    : printable(use.column->name),
+                           si_symbol(dimension));
+  }
+  if (missing == 0) return;
+  throw bad_input(fmt::format("{}: {}", file, labels),
+                  missing == 1 ? "has no unit" : "have no unit",
+                  fmt::format("{} (or other units)", options));
 }
 
 /// A column titled "F" in kPa holds a stress: the unit says what the title cannot.
@@ -196,6 +218,7 @@ class SeriesReader {
  public:
   SeriesReader(const DelimitedTable& table, const Header& header, const std::string& file)
       : table_(table), header_(header), file_(file) {
+    series_.lines.reserve(table.rows.size() - header.rows);
     for (std::size_t i = header.rows; i < table.rows.size(); ++i) {
       if (table.rows[i].fields.size() != header.columns.size()) {
         throw bad_input(fmt::format("{}:{}", file, table.rows[i].line),
@@ -206,15 +229,19 @@ class SeriesReader {
     }
   }
 
-  void add(const Column& column, Quantity quantity, Bound bound, bool negate) {
+  void add(const Use& use) {
+    const auto& [used, quantity, bound, negate] = use;
+    const Column& column = *used;
     ImportedColumn imported;
     imported.quantity = quantity;
     imported.bound = bound;
     imported.unit = unit_of(column, quantity, file_);
+    imported.values.reserve(series_.lines.size());
     for (std::size_t i = header_.rows; i < table_.rows.size(); ++i) {
-      const double value =
-          parse_field(table_.rows[i].fields[column.index], table_.decimal_comma,
-                      fmt::format("{}:{}: {}", file_, table_.rows[i].line, column.label()));
+      const DelimitedRow& row = table_.rows[i];
+      const double value = parse_field_at(row.fields[column.index], table_.decimal_comma, [&] {
+        return fmt::format("{}:{}: {}", file_, row.line, column.label());
+      });
       imported.values.push_back(negate ? 0.0 - value : value);  // 0, not -0
     }
     series_.findings.push_back(
@@ -262,14 +289,16 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   }
 
   const Quantity observed = response_quantity(*response, options);
-  SeriesReader reader(table, header, file);
-  if (time != nullptr) reader.add(*time, Quantity::time, Bound::value, false);
+  std::vector<Use> uses;
+  if (time != nullptr) uses.push_back({time, Quantity::time, Bound::value, false});
   if (drive != nullptr) {
-    reader.add(*drive, drive_quantity(*drive, options), Bound::value, options.negate_drive);
+    uses.push_back({drive, drive_quantity(*drive, options), Bound::value, options.negate_drive});
   }
-  reader.add(*response, observed, Bound::value, options.negate_response);
-  if (sd != nullptr) reader.add(*sd, observed, Bound::sd, false);
-
+  uses.push_back({response, observed, Bound::value, options.negate_response});
+  if (sd != nullptr) uses.push_back({sd, observed, Bound::sd, false});
+  require_units(uses, file);
+  SeriesReader reader(table, header, file);
+  for (const Use& use : uses) reader.add(use);
   ImportedSeries series = reader.take();
   series.name = header.sheet;
   series.findings.insert(

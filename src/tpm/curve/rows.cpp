@@ -24,8 +24,8 @@ DelimitedTable read_rows(std::string_view bytes, const std::string& file) {
   options.decimal_comma = false;
   DelimitedTable table = parse_delimited(bytes, file, options);
   if (table.rows.size() < 2) throw bad_input(file, "has a header but no rows", "at least one row");
-  std::set<std::string> names;
-  for (const std::string& name : table.rows.front().fields) {
+  std::set<std::string_view> names;
+  for (const std::string_view name : table.rows.front().fields) {
     if (!names.insert(name).second) {
       throw bad_input(fmt::format("{}:{}", file, table.rows.front().line),
                       fmt::format("column '{}' stands twice", printable(name)), "each column once");
@@ -38,12 +38,12 @@ DelimitedTable read_rows(std::string_view bytes, const std::string& file) {
 
 CurveRows::CurveRows(std::string_view bytes, std::string file, const CurveDescription& description)
     : table_(read_rows(bytes, file)), file_(std::move(file)) {
-  const std::vector<std::string>& names = table_.rows.front().fields;
+  const auto names = table_.rows.front().fields;
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (std::find(kTextColumns.begin(), kTextColumns.end(), names[i]) != kTextColumns.end()) {
       texts_.emplace(names[i], i);
     } else {
-      describe(names[i], i, description);
+      describe(std::string(names[i]), i, description);
     }
   }
   for (const auto& [name, column] : description.columns) {
@@ -76,7 +76,7 @@ bool CurveRows::has(Quantity quantity, Bound bound) const {
   return numeric_.contains({quantity, bound});
 }
 
-const std::string& CurveRows::field(std::size_t row, std::size_t column) const {
+std::string_view CurveRows::field(std::size_t row, std::size_t column) const {
   return table_.rows[row + 1].fields[column];
 }
 
@@ -94,7 +94,8 @@ std::optional<double> CurveRows::number(std::size_t row, Quantity quantity, Boun
   if (found == numeric_.end()) return std::nullopt;
   const auto& [index, description] = found->second;
   if (field(row, index).empty()) return std::nullopt;
-  return parse_field(field(row, index), false, place(row, index)) * description.unit.to_si;
+  const auto where = [&, column = index] { return place(row, column); };
+  return parse_field_at(field(row, index), false, where) * description.unit.to_si;
 }
 
 std::optional<double> CurveRows::at_least(std::size_t row, Quantity quantity, Bound bound,
@@ -126,7 +127,7 @@ std::vector<double> CurveRows::full_column(Quantity quantity, Bound bound) const
 
 std::string CurveRows::text(std::size_t row, std::string_view column) const {
   const auto found = texts_.find(column);
-  return found == texts_.end() ? std::string() : field(row, found->second);
+  return found == texts_.end() ? std::string() : std::string(field(row, found->second));
 }
 
 Provenance CurveRows::provenance(std::size_t row) const {
@@ -145,9 +146,9 @@ class ValueRow {
  public:
   ValueRow(const DelimitedRow& row, const std::string& file) : row_(row), file_(file) {}
 
-  [[nodiscard]] const std::string& text(std::string_view column) const {
+  [[nodiscard]] std::string text(std::string_view column) const {
     const auto at = std::find(kValueColumns.begin(), kValueColumns.end(), column);
-    return row_.fields[static_cast<std::size_t>(at - kValueColumns.begin())];
+    return std::string(row_.fields[static_cast<std::size_t>(at - kValueColumns.begin())]);
   }
   [[nodiscard]] std::optional<double> number(std::string_view column, double to_si) const {
     if (text(column).empty()) return std::nullopt;

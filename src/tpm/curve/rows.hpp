@@ -47,7 +47,7 @@ class CurveRows {
   using Key = std::pair<Quantity, Bound>;
 
   void describe(const std::string& name, std::size_t index, const CurveDescription& description);
-  [[nodiscard]] const std::string& field(std::size_t row, std::size_t column) const;
+  [[nodiscard]] std::string_view field(std::size_t row, std::size_t column) const;
   [[nodiscard]] std::string place(std::size_t row, std::size_t column) const;
 
   DelimitedTable table_;

@@ -1,7 +1,9 @@
 #pragma once
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,19 +25,25 @@ struct DelimitedOptions {
   std::size_t longest_line = std::size_t{1} << 20;  ///< bytes after conversion to UTF-8
 };
 
-/// One row of fields, with the line it starts on (from 1).
+/// One row of fields, with the line it starts on (from 1). The fields are views of the table's
+/// text.
 struct DelimitedRow {
   int line = 0;
-  std::vector<std::string> fields;
+  std::span<const std::string_view> fields;
 };
 
-/// A delimited text file, taken apart but not interpreted.
+/// The characters that the fields of a table are views of.
+struct DelimitedText;
+
+/// A delimited text file, taken apart but not interpreted. Copies share one text, which lives as
+/// long as any of them; a row or a field that is kept longer has to be copied.
 struct DelimitedTable {
   Encoding encoding = Encoding::utf8;
   char separator = ',';
   bool decimal_comma = false;
   std::vector<DelimitedRow> rows;     ///< without comments and blank lines
   std::vector<std::string> comments;  ///< lines that start with '#', without it
+  std::shared_ptr<const DelimitedText> text;
 };
 
 /// Takes delimited text apart: UTF-8 with or without byte order mark or UTF-16 with one; fields may
@@ -56,6 +64,17 @@ struct DelimitedTable {
 /// A field as a finite number, with the table's decimal sign. Throws Error(bad_input).
 [[nodiscard]] double parse_field(std::string_view field, bool decimal_comma,
                                  std::string_view where);
+
+/// As parse_field; none where that throws.
+[[nodiscard]] std::optional<double> find_field_number(std::string_view field, bool decimal_comma);
+
+/// As parse_field, for the many fields of a column: `where` is a function that returns the place,
+/// called only if there is an error.
+template <typename Where>
+[[nodiscard]] double parse_field_at(std::string_view field, bool decimal_comma, Where&& where) {
+  if (const auto number = find_field_number(field, decimal_comma)) return *number;
+  return parse_field(field, decimal_comma, where());
+}
 
 /// True if parse_field would succeed.
 [[nodiscard]] bool is_number(std::string_view field, bool decimal_comma);

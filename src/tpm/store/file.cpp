@@ -65,7 +65,16 @@ std::string read_file(const fs::path& path) {
   if (fs::is_directory(status)) throw bad_input(path.string(), "is a folder", "a readable file");
   std::ifstream in(path, std::ios::binary);
   if (!in) throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
-  std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  std::string bytes;
+  // A pipe has no size, and a file may change: whatever comes is read in blocks.
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  bytes.reserve(fs::is_regular_file(status) ? fs::file_size(path, ec) + 1 : kBlock);
+  while (in) {
+    const std::size_t have = bytes.size();
+    bytes.resize(have + kBlock);
+    in.read(bytes.data() + have, static_cast<std::streamsize>(kBlock));
+    bytes.resize(have + static_cast<std::size_t>(in.gcount()));
+  }
   if (in.bad()) throw bad_input(path.string(), "reading stopped half-way", "a readable file");
   if (bytes.empty()) throw bad_input(path.string(), "the file is empty", "some content");
   return bytes;

@@ -1,0 +1,90 @@
+#include "tpm/curve/recording_file.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "tpm/core/error.hpp"
+#include "tpm/curve/assemble.hpp"
+#include "tpm/curve/load.hpp"
+
+namespace tpm {
+namespace fs = std::filesystem;
+namespace {
+
+fs::path with_ending(fs::path path, const char* ending) {
+  return path.replace_extension(ending);
+}
+
+/// A description and its rows stand side by side; an id has neither ending nor file.
+bool is_described(const fs::path& path) {
+  if (path.extension() == ".csv") return fs::exists(with_ending(path, ".json"));
+  if (path.extension() == ".json") return fs::exists(with_ending(path, ".csv"));
+  return !fs::exists(path) && !path.has_extension();
+}
+
+bool says_something_about_columns(const ImportOptions& options) {
+  return options.format != ImportFormat::automatic || options.header_rows ||
+         !options.time_column.empty() || !options.drive_column.empty() ||
+         !options.response_column.empty() || !options.sd_column.empty() || options.drive_quantity ||
+         options.response_quantity || !options.units.empty() || options.negate_drive ||
+         options.negate_response || options.contact_force_N || options.x || options.y ||
+         !options.dataset.empty() || options.depth_m || options.load_N;
+}
+
+RecordingFile read_described(const fs::path& path, const ImportOptions& options) {
+  if (says_something_about_columns(options)) {
+    throw bad_input(path.string(), "has a description beside it, which says what its columns are",
+                    "no import options, or a file without a description");
+  }
+  RecordingFile result{load_recording(path.string()), {}};
+  const Recording& recording = result.recording;
+  const auto found = [&result](const char* what, std::string value) {
+    result.findings.push_back({what, std::move(value)});
+  };
+  found("format", "described");
+  if (!recording.drive.empty())
+    found("drive", std::string(quantity_name(recording.drive_quantity)));
+  found("response", std::string(quantity_name(recording.response_quantity)));
+  found("rows", std::to_string(recording.response.size()));
+  found("provenance", std::string(provenance_name(recording.provenance)));
+  return result;
+}
+
+/// Which of several datasets is meant has to be said.
+void require_one(const ImportedFile& imported, const std::string& file) {
+  if (imported.series.size() == 1) return;
+  std::string names;
+  for (const ImportedSeries& series : imported.series) {
+    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", printable(series.name));
+  }
+  throw bad_input(file, fmt::format("holds {} curves", imported.series.size()),
+                  fmt::format("--dataset with one of {}", printable(names, 200)));
+}
+
+/// The importer would make readings of separate experiments out of such a curve.
+void require_no_imposed_value(const ImportOptions& options, const std::string& file) {
+  if (!options.depth_m && !options.load_N) return;
+  throw bad_input(file, "with an imposed depth or load its rows are readings, not a recording",
+                  "tpm data import, which writes points, or no --depth and --load");
+}
+
+}  // namespace
+
+RecordingFile read_recording_file(const fs::path& path, const ImportOptions& options) {
+  if (is_described(path)) return read_described(path, options);
+  const std::string file = path.string();
+  require_no_imposed_value(options, file);
+  ImportedFile imported = import_series(path, options);
+  require_one(imported, file);
+  ImportedSeries& series = imported.series.front();
+  const std::string name = printable(series.name, 200);
+  RecordingFile result = assemble_recording(std::move(series), file, options, imported.usual);
+  CurveHeader& header = result.recording.header;
+  header.id = path.stem().string();
+  if (header.title.empty()) header.title = name.empty() ? header.id : name;
+  header.sha256 = imported.sha256;
+  return result;
+}
+
+}  // namespace tpm

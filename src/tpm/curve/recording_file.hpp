@@ -1,0 +1,22 @@
+#pragma once
+#include <filesystem>
+
+#include "tpm/curve/import.hpp"
+
+namespace tpm {
+
+/// Any recording from one path, without a configuration:
+///
+/// - a CSV file with its JSON description beside it (or that description, or the id of a curve that
+///   comes with tpm) is read as load_recording does; import options are then refused, because the
+///   description says everything;
+/// - every other file goes through the importer, in memory (import_curves says what it
+/// understands).
+///
+/// header.id is the file's name without its ending, header.sha256 that of its bytes; header.title
+/// is the sheet or dataset if there is no other. Throws Error(bad_input) with file, line and
+/// column, or naming the option that says what the file does not.
+[[nodiscard]] RecordingFile read_recording_file(const std::filesystem::path& path,
+                                                const ImportOptions& options = {});
+
+}  // namespace tpm
