@@ -6,6 +6,7 @@
 #include <set>
 
 #include "command.hpp"
+#include "recording_options.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/units.hpp"
 #include "tpm/curve/import.hpp"
@@ -77,20 +78,6 @@ CurveHeader header_options(const ImportArguments& arguments, Provenance provenan
   }
   if (header.probe.diameter_m || !header.probe.shape.empty()) header.probe.provenance = provenance;
   return header;
-}
-
-std::map<std::string, std::string> unit_options(const std::vector<std::string>& pairs) {
-  std::map<std::string, std::string> units;
-  for (const std::string& pair : pairs) {
-    const auto equals = pair.rfind('=');
-    if (equals == std::string::npos || equals == 0) {
-      throw Error(ExitCode::usage, "--unit", fmt::format("'{}' has no '='", printable(pair)),
-                  "COLUMN=UNIT, such as \"Force=N\"");
-    }
-    static_cast<void>(parse_unit(pair.substr(equals + 1), "--unit"));
-    units[pair.substr(0, equals)] = pair.substr(equals + 1);
-  }
-  return units;
 }
 
 ImportOptions options_of(const ImportArguments& arguments) {

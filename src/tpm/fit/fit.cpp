@@ -259,13 +259,17 @@ void fill_data(FitResult& result, const ExperimentResiduals& function,
   for (const Experiment& experiment : function.experiments()) {
     if (experiment.is_recording) {
       result.recordings.push_back(recording_fit(function, experiment, predicted));
+      result.recordings.back().standardised.reserve(experiment.data.size());
     }
     for (const std::size_t i : experiment.data) {
       const auto row = static_cast<Eigen::Index>(i);
       const FitDatum& datum = function.data()[i];
       const double z = standardised_residual(function, i, predicted[row]);
       if (!datum.held_out) result.chi_square += z * z;
-      if (experiment.is_recording) continue;
+      if (experiment.is_recording) {
+        result.recordings.back().standardised.push_back(z);
+        continue;
+      }
       FittedDatum d{datum, predicted[row], std::nullopt, z};
       if (c.full_rank) {
         d.predicted_sd = prediction_sd(sensitivity.row(row), parameters, c, result.best.natural);

@@ -65,6 +65,7 @@ struct RecordingFit {
   Quantity response_quantity = Quantity::contact_force;
   Provenance provenance = Provenance::measured;
   std::vector<double> time_s, drive, observed, predicted;  ///< SI
+  std::vector<double> standardised;                        ///< residuals in standard deviations
   std::vector<bool> fitted;                                ///< false: outside the window
   double peak = 0.0;                                       ///< largest |observed| in the window
   double rms_residual = 0.0;                               ///< in the window, SI

@@ -1,0 +1,76 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "recording_options.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/study/selection.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct SelectOptions {
+  RecordingOptions recordings;
+  std::vector<std::string> laws;
+  std::string family = "classical";
+  std::string margin = "6";
+  std::string seed = "0";
+  std::string output;
+  bool no_held_out = false;
+};
+
+std::vector<LawSpec> chosen_laws(const SelectOptions& options) {
+  std::vector<LawSpec> laws;
+  for (const std::string& name : options.laws) laws.push_back(parse_law_name(name, "--laws"));
+  if (!laws.empty()) return laws;
+  if (options.family != "fractional") laws = classical_family();
+  if (options.family == "classical") return laws;
+  for (const LawSpec& law : fractional_family()) laws.push_back(law);
+  return laws;
+}
+
+int select(const SelectOptions& options, const Session& session) {
+  SelectionOptions selection;
+  selection.laws = chosen_laws(options);
+  selection.margin = parse_number(options.margin, "--margin");
+  selection.held_out = !options.no_held_out;
+  selection.setup.seed = parse_whole_number(options.seed, "--seed", 0);
+  const auto recordings = read_recordings(options.recordings);
+  const Selection result = select_law(recordings, selection);
+  std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
+  if (!session.json()) {
+    text += "\n" + to_terminal_text(result.candidates[result.recommended].fit);
+  }
+  deliver(text, options.output);
+  return 0;
+}
+
+}  // namespace
+
+void add_select_command(CLI::App& app, Session& session) {
+  CLI::App* command =
+      app.add_subcommand("select", "Find the least law that recordings support, with the evidence");
+  auto options = std::make_shared<SelectOptions>();
+  add_recording_options(*command, options->recordings);
+  command->add_option("--laws", options->laws, "Only these laws, e.g. linear-1-elastic,power-2")
+      ->delimiter(',');
+  command->add_option("--family", options->family, "classical, fractional or all")
+      ->check(CLI::IsMember({"classical", "fractional", "all"}))
+      ->capture_default_str();
+  command
+      ->add_option("--margin", options->margin, "BIC that a larger law must gain to be preferred")
+      ->capture_default_str();
+  command->add_option("--seed", options->seed, "Seed of the random starts")->capture_default_str();
+  command->add_flag("--no-held-out", options->no_held_out, "Leave out the held-out predictions");
+  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm select meat.csv\n"
+      "  tpm select slow.csv fast.csv --laws linear-1,linear-2,power-2 --format json");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return select(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,84 @@
+#include "recording_options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/error.hpp"
+#include "tpm/curve/recording_file.hpp"
+
+namespace tpm::app {
+
+std::map<std::string, std::string> unit_options(const std::vector<std::string>& pairs) {
+  std::map<std::string, std::string> units;
+  for (const std::string& pair : pairs) {
+    const auto equals = pair.rfind('=');
+    if (equals == std::string::npos || equals == 0) {
+      throw Error(ExitCode::usage, "--unit", fmt::format("'{}' has no '='", printable(pair)),
+                  "COLUMN=UNIT, such as \"Force=N\"");
+    }
+    static_cast<void>(parse_unit(pair.substr(equals + 1), "--unit"));
+    units[pair.substr(0, equals)] = pair.substr(equals + 1);
+  }
+  return units;
+}
+
+void add_recording_options(CLI::App& command, RecordingOptions& options) {
+  const auto add = [&](const char* name, std::string& target, const char* help) {
+    command.add_option(name, target, help)->group("What the files do not say");
+  };
+  command.add_option("FILE", options.files, "Recordings: machine exports or curves of tpm")
+      ->required();
+  add("--time", options.time, "Column of the times: name, or number from 1");
+  add("--drive", options.drive, "Column of the depth or relative length");
+  add("--response", options.response, "Column of the force or stress");
+  add("--sd", options.sd, "Column of the response's standard deviation");
+  add("--drive-quantity", options.drive_quantity, "indentation_depth or relative_length");
+  add("--response-quantity", options.response_quantity, "contact_force or stress");
+  command
+      .add_option("--unit", options.units, "Unit of a column, e.g. \"Force=N\" (may be repeated)")
+      ->group("What the files do not say");
+  add("--contact-force", options.contact_response,
+      "Contact begins where the force passes this, e.g. \"0.05 N\"; default: found");
+}
+
+ImportOptions import_options(const RecordingOptions& options) {
+  ImportOptions import;
+  import.time_column = options.time;
+  import.drive_column = options.drive;
+  import.response_column = options.response;
+  import.sd_column = options.sd;
+  if (!options.drive_quantity.empty()) {
+    import.drive_quantity = parse_quantity_name(options.drive_quantity, "--drive-quantity");
+  }
+  if (!options.response_quantity.empty()) {
+    import.response_quantity =
+        parse_quantity_name(options.response_quantity, "--response-quantity");
+  }
+  import.units = unit_options(options.units);
+  return import;
+}
+
+std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) {
+  PhaseOptions phases;
+  if (!options.contact_response.empty()) {
+    phases.contact_response =
+        parse_quantity(options.contact_response, Dimension::force, "--contact-force");
+  }
+  const ImportOptions import = import_options(options);
+  std::vector<PreparedRecording> recordings;
+  recordings.reserve(options.files.size());
+  for (const std::string& file : options.files) {
+    const bool twice = std::any_of(recordings.begin(), recordings.end(),
+                                   [&](const auto& r) { return r.name == file; });
+    if (twice) {
+      throw Error(ExitCode::usage, "FILE", fmt::format("'{}' is given twice", printable(file)),
+                  "each recording once");
+    }
+    recordings.push_back(
+        prepare_recording(file, read_recording_file(file, import).recording, phases));
+  }
+  return recordings;
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,33 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tpm/curve/import.hpp"
+#include "tpm/study/recording_setup.hpp"
+
+namespace tpm::app {
+
+/// What the user says about recordings that are read without a description.
+struct RecordingOptions {
+  std::vector<std::string> files;
+  std::string time, drive, response, sd;
+  std::string drive_quantity, response_quantity;
+  std::vector<std::string> units;
+  std::string contact_response;
+};
+
+/// "COLUMN=UNIT" pairs. Throws Error(usage).
+[[nodiscard]] std::map<std::string, std::string> unit_options(
+    const std::vector<std::string>& pairs);
+
+/// Adds FILE... and the options above.
+void add_recording_options(CLI::App& command, RecordingOptions& options);
+
+[[nodiscard]] ImportOptions import_options(const RecordingOptions& options);
+
+/// Reads and prepares every file.
+[[nodiscard]] std::vector<PreparedRecording> read_recordings(const RecordingOptions& options);
+
+}  // namespace tpm::app

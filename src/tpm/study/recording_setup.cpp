@@ -1,0 +1,346 @@
+#include "tpm/study/recording_setup.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/law/law_model.hpp"
+
+namespace tpm {
+namespace {
+
+bool is_after_the_test(PhaseKind kind) {
+  return kind == PhaseKind::unloading || kind == PhaseKind::detached || kind == PhaseKind::recovery;
+}
+
+/// Samples before contact that are kept, so that the zero of the response is seen.
+constexpr std::size_t kBaseline = 10;
+
+Unit display_unit(Dimension dimension) {
+  switch (dimension) {
+    case Dimension::length:
+      return parse_unit("mm", dimension, "display");
+    case Dimension::stress:
+      return parse_unit("kPa", dimension, "display");
+    default:
+      return parse_unit(si_symbol(dimension), dimension, "display");
+  }
+}
+
+/// What the recordings tell about the sizes of a law's parameters.
+struct Sizes {
+  double drive = 0.0;     ///< largest drive above contact
+  double response = 0.0;  ///< largest response above its floor
+  double shortest_s = 0.0;
+  double longest_s = 0.0;
+};
+
+double start_drive(const PreparedRecording& r) {
+  return r.phases.contact_found && !r.phases.preloaded ? r.phases.contact_drive
+                                                       : r.recording.drive.front();
+}
+
+double median_step(const std::vector<double>& time_s) {
+  std::vector<double> steps;
+  steps.reserve(time_s.size());
+  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+Sizes sizes_of(std::span<const PreparedRecording> recordings) {
+  Sizes sizes;
+  sizes.shortest_s = std::numeric_limits<double>::infinity();
+  for (const PreparedRecording& r : recordings) {
+    sizes.drive = std::max(sizes.drive, r.phases.peak_drive - start_drive(r));
+    sizes.response = std::max(sizes.response, r.phases.peak_response - r.phases.floor_response);
+    sizes.shortest_s = std::min(sizes.shortest_s, median_step(r.recording.time_s));
+    sizes.longest_s = std::max(sizes.longest_s, r.to_s - r.from_s);
+  }
+  if (sizes.drive > 0.0 && sizes.response > 0.0) return sizes;
+  throw bad_input(fmt::format("recording '{}'", recordings.front().name),
+                  sizes.drive > 0.0 ? "the response never rises above where it starts"
+                                    : "the drive never rises above where contact begins",
+                  "a ramp that is answered by a rising response");
+}
+
+FitParameter law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int branches) {
+  FitParameter fit;
+  fit.name = p.name;
+  fit.unit = display_unit(p.dimension);
+  const double stiffness = sizes.response / sizes.drive;
+  if (p.dimension == Dimension::time) {
+    fit.scale = Scale::log;
+    fit.lower = 0.5 * sizes.shortest_s;
+    fit.upper = 10.0 * sizes.longest_s;
+    fit.start = std::clamp(0.1 * sizes.longest_s, fit.lower, fit.upper);
+  } else if (p.name == "exponent") {
+    fit.scale = Scale::linear;
+    fit.lower = 1.0;
+    fit.upper = 6.0;
+    fit.start = 1.5;
+  } else if (p.name == "alpha") {
+    fit.scale = Scale::linear;
+    fit.lower = p.lower;
+    fit.upper = p.upper;
+    fit.start = 0.3;
+  } else if (p.name == "tension_ratio") {
+    fit.scale = Scale::linear;
+    fit.lower = 0.0;
+    fit.upper = 20.0;
+    fit.start = 0.5;
+  } else {
+    fit.scale = p.linear ? Scale::linear : Scale::log;
+    fit.lower = p.linear ? 0.0 : 1e-4 * stiffness;
+    fit.upper = 1e3 * stiffness;
+    fit.start = stiffness / (branches + 1);
+  }
+  return fit;
+}
+
+bool is_stretch(const LawSpec& law) {
+  return law.drive == Quantity::relative_length;
+}
+
+bool bends(const LawSpec& law) {
+  return law.kernel != Kernel::linear || law.tension != Tension::none;
+}
+
+/// Whether contact and offset can be told apart: by a bend of the kernel, or by samples on both
+/// sides of contact.
+bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
+  if (bends(law)) return true;
+  const double contact_s = r.recording.time_s[r.phases.contact_index];
+  return !r.phases.preloaded && r.phases.contact_found && r.phases.contact_index >= 3 &&
+         contact_s > r.from_s;
+}
+
+FitParameter contact_bounds(const LawSpec& law, std::span<const PreparedRecording> recordings,
+                            std::string name) {
+  FitParameter fit;
+  fit.name = std::move(name);
+  fit.scale = Scale::linear;
+  const bool stretch = is_stretch(law);
+  fit.unit = display_unit(stretch ? Dimension::dimensionless : Dimension::length);
+  const PreparedRecording& r = recordings.front();
+  const double begin = start_drive(r);
+  const double range = r.phases.peak_drive - begin;
+  const bool preloaded = r.phases.preloaded || !r.phases.contact_found;
+  fit.start = begin;
+  fit.lower = bends(law) || !stretch ? begin - (stretch ? 0.5 : 0.25) * range : begin;
+  fit.upper = begin + (stretch ? 0.6 : preloaded ? 0.0 : 0.1) * range;
+  if (preloaded && !stretch) fit.start = begin - 0.05 * range;
+  return fit;
+}
+
+FitParameter offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
+  FitParameter fit;
+  fit.name = std::move(name);
+  fit.scale = Scale::linear;
+  fit.unit = display_unit(is_stretch(law) ? Dimension::stress : Dimension::force);
+  const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
+  fit.start = 0.0;
+  fit.lower = -peak;
+  fit.upper = peak;
+  return fit;
+}
+
+Noise noise_of(const PreparedRecording& r) {
+  Noise noise;
+  noise.scale_known = false;
+  const std::vector<double>& sd = r.recording.response_sd;
+  if (!sd.empty() && std::all_of(sd.begin(), sd.end(), [](double s) { return s > 0.0; })) {
+    noise.kind = NoiseKind::per_row;
+    return noise;
+  }
+  noise.kind = NoiseKind::absolute;
+  noise.absolute =
+      0.01 * std::max(std::abs(r.phases.peak_response), std::numeric_limits<double>::min());
+  return noise;
+}
+
+void require_alike(std::span<const PreparedRecording> recordings) {
+  if (recordings.empty()) throw bad_input("fit", "no recording", "at least one");
+  const Recording& first = recordings.front().recording;
+  for (const PreparedRecording& r : recordings) {
+    if (r.recording.drive_quantity == first.drive_quantity &&
+        r.recording.response_quantity == first.response_quantity) {
+      continue;
+    }
+    throw bad_input(fmt::format("recording '{}'", r.name),
+                    fmt::format("{} over {}", quantity_name(r.recording.response_quantity),
+                                quantity_name(r.recording.drive_quantity)),
+                    fmt::format("{} over {}, as in '{}'", quantity_name(first.response_quantity),
+                                quantity_name(first.drive_quantity), recordings.front().name));
+  }
+}
+
+/// Adds the nuisance parameters of all recordings to a configuration.
+void add_nuisance(FitConfig& config, const LawModel& model,
+                  std::span<const PreparedRecording> recordings, Nuisance nuisance) {
+  if (nuisance == Nuisance::none) return;
+  const LawSpec& law = model.spec();
+  const bool several = recordings.size() > 1;
+  const auto named = [&](const char* what, const PreparedRecording& r) {
+    return several ? fmt::format("{} {}", what, r.name) : std::string(what);
+  };
+  const auto scope = [&](std::size_t i) {
+    return several ? std::vector<std::size_t>{i} : std::vector<std::size_t>{};
+  };
+  // The slack length belongs to the specimen; contact depth to each approach.
+  const bool shared_contact = is_stretch(law);
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const PreparedRecording& r = recordings[i];
+    config.parameters.push_back(
+        {offset_bounds(law, r, named("offset", r)), {{model.index("offset"), scope(i)}}});
+    if (nuisance == Nuisance::offset || (shared_contact && i > 0)) continue;
+    if (nuisance == Nuisance::automatic && !shared_contact && !contact_is_seen(law, r)) continue;
+    FitParameter contact =
+        contact_bounds(law, recordings.subspan(i, 1),
+                       shared_contact ? std::string("slack_length") : named("contact", r));
+    config.parameters.push_back(
+        {std::move(contact),
+         {{model.index("contact"), shared_contact ? std::vector<std::size_t>{} : scope(i)}}});
+  }
+}
+
+}  // namespace
+
+PreparedRecording prepare_recording(std::string name, Recording recording,
+                                    const PhaseOptions& options) {
+  PreparedRecording r{std::move(name), std::move(recording), {}, 0.0, 0.0};
+  r.phases = find_phases(r.recording, options);
+  const std::vector<double>& time = r.recording.time_s;
+  const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
+  r.from_s = time[contact > kBaseline ? contact - kBaseline : 0];
+  r.to_s = time.back();
+  bool pressed = false;
+  for (const Phase& phase : r.phases.phases) {
+    pressed = pressed || phase.kind == PhaseKind::loading || phase.kind == PhaseKind::hold;
+    if (!pressed || !is_after_the_test(phase.kind)) continue;
+    r.to_s = time[phase.first];
+    break;
+  }
+  if (r.to_s > r.from_s) return r;
+  throw bad_input(fmt::format("recording '{}'", r.name), "no ramp and hold before the unloading",
+                  "a recording that loads before it unloads");
+}
+
+double reference_drive(std::span<const PreparedRecording> recordings) {
+  return rounded(sizes_of(recordings).drive, 2);
+}
+
+FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recordings,
+                           const SetupOptions& options) {
+  require_alike(recordings);
+  law.drive = recordings.front().recording.drive_quantity;
+  law.response = recordings.front().recording.response_quantity;
+  const Sizes sizes = sizes_of(recordings);
+  law.reference = reference_drive(recordings);
+  const LawModel model(law);
+  FitConfig config;
+  config.law = law;
+  config.title = recordings.size() == 1 ? recordings.front().name
+                                        : fmt::format("{} recordings", recordings.size());
+  config.title += fmt::format(": {}", law_name(law));
+  config.starts = options.starts;
+  config.seed = options.seed;
+  config.level = options.level;
+  config.profiles = options.profiles;
+  for (const LawParameter& p : model.law_parameters()) {
+    config.fixed.push_back(p.preset.value_or(0.0));
+  }
+  for (std::size_t i = 0; i < model.law_parameters().size(); ++i) {
+    const LawParameter& p = model.law_parameters()[i];
+    if (p.nuisance || p.preset) continue;
+    config.parameters.push_back({law_parameter_bounds(p, sizes, law.branches), {{i, {}}}});
+  }
+  for (const PreparedRecording& r : recordings) {
+    DataChoice data;
+    data.dataset = r.name;
+    data.protocol.kind = ProtocolChoice::Kind::measured;
+    data.noise = noise_of(r);
+    data.from_s = r.from_s;
+    data.to_s = r.to_s;
+    config.data.push_back(std::move(data));
+  }
+  config.fixed[model.index("contact")] = start_drive(recordings.front());
+  add_nuisance(config, model, recordings, options.nuisance);
+  return config;
+}
+
+std::vector<DataSet> data_sets(std::span<const PreparedRecording> recordings) {
+  std::vector<DataSet> sets;
+  sets.reserve(recordings.size());
+  for (const PreparedRecording& r : recordings) sets.emplace_back(r.recording);
+  return sets;
+}
+
+Json config_json(const FitConfig& config) {
+  const std::unique_ptr<Model> model = make_model(config);
+  const auto text = [](double value, const Unit& unit) {
+    return fmt::format("{}{}{}", shortest(value / unit.to_si), unit.symbol.empty() ? "" : " ",
+                       unit.symbol);
+  };
+  Json j{{"title", config.title}};
+  if (config.law) {
+    const Dimension drive = quantity_dimension(config.law->drive);
+    j["law"] = {{"name", law_name(*config.law)},
+                {"drive", quantity_name(config.law->drive)},
+                {"reference", text(config.law->reference, display_unit(drive))}};
+  } else {
+    j["model"] = config.model;
+  }
+  Json parameters = Json::object();
+  std::vector<bool> estimated(model->parameters().size(), false);
+  for (const EstimatedParameter& p : config.parameters) {
+    Json entry{{"start", text(p.fit.start, p.fit.unit)},
+               {"lower", text(p.fit.lower, p.fit.unit)},
+               {"upper", text(p.fit.upper, p.fit.unit)},
+               {"scale", scale_name(p.fit.scale)}};
+    Json sets = Json::array();
+    for (const Target& target : p.sets) {
+      sets.push_back(model->parameters()[target.parameter].name);
+      estimated[target.parameter] = true;
+    }
+    entry["sets"] = std::move(sets);
+    if (!p.sets.front().data.empty()) {
+      Json scope = Json::array();
+      for (const std::size_t i : p.sets.front().data) scope.push_back(config.data[i].dataset);
+      entry["for"] = std::move(scope);
+    }
+    parameters[p.fit.name] = std::move(entry);
+  }
+  j["parameters"] = std::move(parameters);
+  Json fixed = Json::object();
+  for (std::size_t i = 0; i < estimated.size(); ++i) {
+    if (estimated[i] || !std::isfinite(config.fixed[i])) continue;
+    const ParameterDescription& p = model->parameters()[i];
+    fixed[std::string(p.name)] = text(config.fixed[i], display_unit(p.dimension));
+  }
+  if (!fixed.empty()) j["fixed"] = std::move(fixed);
+  Json data = Json::array();
+  for (const DataChoice& d : config.data) {
+    Json entry{{"dataset", d.dataset}};
+    entry["protocol"] = {{"kind", protocol_kind_name(d.protocol.kind)}};
+    entry["noise"] = {{"kind", noise_kind_name(d.noise.kind)}};
+    if (d.noise.kind == NoiseKind::absolute) {
+      const Dimension response = quantity_dimension(config.law->response);
+      entry["noise"]["absolute"] = text(d.noise.absolute, display_unit(response));
+    }
+    entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";
+    if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, display_unit(Dimension::time));
+    if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, display_unit(Dimension::time));
+    data.push_back(std::move(entry));
+  }
+  j["data"] = std::move(data);
+  j["starts"] = {{"count", config.starts}, {"seed", config.seed}};
+  j["profile"] = {{"level", config.level}, {"enabled", config.profiles}};
+  return j;
+}
+
+}  // namespace tpm

@@ -1,0 +1,59 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/curve/phases.hpp"
+#include "tpm/fit/config.hpp"
+#include "tpm/fit/experiment_residuals.hpp"
+
+namespace tpm {
+
+/// A recording ready to be fitted: what happened in it and which part is used.
+struct PreparedRecording {
+  std::string name;  ///< unique within a fit; a path where the configuration is to be rerun
+  Recording recording;
+  RecordingPhases phases;
+  double from_s = 0.0;  ///< window that is fitted: from the start
+  double to_s = 0.0;    ///< to the end of the first hold (before the drive first falls back)
+};
+
+/// Finds the phases and chooses the window. Throws Error(bad_input) if there is nothing to fit.
+[[nodiscard]] PreparedRecording prepare_recording(std::string name, Recording recording,
+                                                  const PhaseOptions& options = {});
+
+/// What belongs to a recording and not to the material.
+enum class Nuisance {
+  automatic,  ///< offset always; contact where the data can tell the two apart
+  none,
+  offset,
+  offset_and_contact,
+};
+
+/// Settings of an automatic configuration.
+struct SetupOptions {
+  Nuisance nuisance = Nuisance::automatic;
+  std::size_t starts = 40;
+  std::uint64_t seed = 0;
+  double level = 0.95;
+  bool profiles = true;
+};
+
+/// A reference depth for the kernels: the largest drive above contact among the recordings, to two
+/// digits.
+[[nodiscard]] double reference_drive(std::span<const PreparedRecording> recordings);
+
+/// The configuration that fits one law to the recordings together: bounds and starts from the
+/// recordings, an offset (and contact) of its own for each, normal noise of unknown size (or the
+/// recordings' own standard deviations up to one factor). All recordings must have the same drive
+/// and response; otherwise Error(bad_input).
+[[nodiscard]] FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recordings,
+                                         const SetupOptions& options);
+
+/// The recordings as the fit takes them.
+[[nodiscard]] std::vector<DataSet> data_sets(std::span<const PreparedRecording> recordings);
+
+/// The configuration file that tpm fit reads, with the same meaning.
+[[nodiscard]] Json config_json(const FitConfig& config);
+
+}  // namespace tpm

@@ -1,0 +1,377 @@
+#include "tpm/study/selection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+LawSpec law_of(Kernel kernel, int branches, Tension tension) {
+  LawSpec spec;
+  spec.kernel = kernel;
+  spec.branches = branches;
+  spec.tension = tension;
+  return spec;
+}
+
+/// Residuals of a fit, one run for each recording, in the order of time.
+std::vector<std::vector<double>> standardised_runs(const FitResult& fit) {
+  std::vector<std::vector<double>> runs;
+  for (const RecordingFit& r : fit.recordings) {
+    std::vector<double> run;
+    run.reserve(r.observed.size());
+    for (std::size_t i = 0; i < r.observed.size(); ++i) {
+      if (r.fitted[i]) run.push_back(r.standardised[i]);
+    }
+    runs.push_back(std::move(run));
+  }
+  return runs;
+}
+
+Correlation correlation_of(const FitResult& fit) {
+  const auto runs = standardised_runs(fit);
+  std::vector<std::span<const double>> views;
+  views.reserve(runs.size());
+  for (const auto& run : runs) views.emplace_back(run);
+  return residual_correlation(views);
+}
+
+double rms_over_peak(const FitResult& fit) {
+  double worst = 0.0;
+  for (const RecordingFit& r : fit.recordings) worst = std::max(worst, r.rms_residual / r.peak);
+  return worst;
+}
+
+const LawParameter* material_parameter(const std::vector<LawParameter>& table,
+                                       const std::string& name) {
+  for (const LawParameter& p : table) {
+    if (p.name == name && !p.nuisance) return &p;
+  }
+  return nullptr;
+}
+
+/// The first reason why a material parameter of the fit is not known, or nothing.
+std::string not_identified(const Candidate& candidate) {
+  constexpr double kLeastStandardErrors = 2.0;
+  const auto table = law_parameters(candidate.fit.config.law.value());
+  for (const ParameterResult& p : candidate.fit.parameters) {
+    const LawParameter* law = material_parameter(table, p.parameter.name);
+    if (law == nullptr) continue;
+    if (p.at_lower_bound || p.at_upper_bound) {
+      return fmt::format("{} ends at its {} bound", p.parameter.name,
+                         p.at_lower_bound ? "lower" : "upper");
+    }
+    if (!p.standard_error) return fmt::format("{} is not determined", p.parameter.name);
+    const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0;
+    if (from_zero && p.estimate < kLeastStandardErrors * *p.standard_error) {
+      return fmt::format("{} is not told from 0", p.parameter.name);
+    }
+    if (law->dimension == Dimension::time && *p.standard_error > p.estimate) {
+      return fmt::format("{} is known only to its order of magnitude", p.parameter.name);
+    }
+  }
+  return {};
+}
+
+Candidate fit_candidate(const LawSpec& law, std::span<const PreparedRecording> recordings,
+                        const std::vector<DataSet>& data, SetupOptions setup) {
+  Candidate candidate;
+  setup.profiles = false;
+  const FitConfig config = recording_config(law, recordings, setup);
+  candidate.law = config.law.value();
+  candidate.parameters = static_cast<int>(config.parameters.size()) + 1;  // and the noise's size
+  try {
+    candidate.fit = run_fit(config, data);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::numerical) throw;
+    candidate.failed = true;
+    candidate.identified = false;
+    candidate.reason = error.what();
+    return candidate;
+  }
+  candidate.rms_over_peak = rms_over_peak(candidate.fit);
+  candidate.reason = not_identified(candidate);
+  candidate.identified = candidate.reason.empty();
+  return candidate;
+}
+
+/// The smallest deviance that counts: residuals at rounding level are all the same to us.
+double floored_deviance(const Candidate& c, int samples) {
+  constexpr double kRoundingSigma = 1e-10;  // of the noise unit, a hundredth of the peak
+  return std::max(c.fit.best.deviance, kRoundingSigma * kRoundingSigma * samples);
+}
+
+void score(Candidate& c, int samples, double effective) {
+  const double k = c.parameters;
+  const double log_likelihood = effective * std::log(floored_deviance(c, samples) / samples);
+  const double spare = std::max(effective - k - 1.0, 1e-3);
+  c.aicc = log_likelihood + 2.0 * k + 2.0 * k * (k + 1.0) / spare;
+  c.bic = log_likelihood + k * std::log(effective);
+}
+
+std::size_t choose(const std::vector<Candidate>& candidates, double margin) {
+  std::optional<std::size_t> chosen;
+  for (const bool only_identified : {true, false}) {
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      const Candidate& c = candidates[i];
+      if (c.failed || c.delta_bic > margin || (only_identified && !c.identified)) continue;
+      if (!chosen || c.parameters < candidates[*chosen].parameters) chosen = i;
+    }
+    if (chosen) return *chosen;
+    // The best laws have a parameter that the data do not tell: look at the best that have none.
+    for (std::size_t i = 0; only_identified && i < candidates.size(); ++i) {
+      const Candidate& c = candidates[i];
+      if (!c.failed && c.identified) return i;
+    }
+  }
+  throw Error(ExitCode::numerical, "select", "no law could be fitted");
+}
+
+/// Fits the material to some recordings and predicts another, whose nuisance parameters alone are
+/// fitted to it.
+HeldOut predict_one(const Candidate& candidate, std::span<const PreparedRecording> recordings,
+                    std::size_t left_out, SetupOptions setup) {
+  std::vector<PreparedRecording> others;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    if (i != left_out) others.push_back(recordings[i]);
+  }
+  setup.profiles = false;
+  const FitResult fit = run_fit(recording_config(candidate.law, others, setup), data_sets(others));
+  FitConfig target = recording_config(candidate.law, recordings.subspan(left_out, 1), setup);
+  const auto values = model_parameters(fit.config, fit.best.natural, 0);
+  const auto table = law_parameters(candidate.law);
+  std::erase_if(target.parameters, [&](const EstimatedParameter& p) {
+    return p.fit.name != "offset" && p.fit.name != "contact";
+  });
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    // The slack length of a stretched specimen is its own and stays; offset and contact depth
+    // belong to the recording.
+    const bool of_recording = table[i].nuisance && target.law->drive != Quantity::relative_length;
+    if (!of_recording) target.fixed[i] = values[i];
+  }
+  HeldOut held;
+  held.what = recordings[left_out].name;
+  const FitResult prediction = run_fit(target, data_sets(recordings.subspan(left_out, 1)));
+  const RecordingFit& r = prediction.recordings.front();
+  held.rms = r.rms_residual;
+  held.rms_over_peak = r.rms_residual / r.peak;
+  held.rms_standardised = std::sqrt(prediction.chi_square / prediction.value_count);
+  held.rms_if_fitted = candidate.fit.recordings[left_out].rms_residual;
+  return held;
+}
+
+/// The second half of the hold, predicted from everything before.
+HeldOut predict_second_half(const Candidate& candidate, const PreparedRecording& recording,
+                            SetupOptions setup) {
+  PreparedRecording early = recording;
+  double hold_begin = recording.from_s;
+  for (const Phase& phase : recording.phases.phases) {
+    const double begin = recording.recording.time_s[phase.first];
+    if (phase.kind == PhaseKind::hold && begin < recording.to_s) hold_begin = begin;
+  }
+  early.to_s = 0.5 * (hold_begin + recording.to_s);
+  setup.profiles = false;
+  const std::span<const PreparedRecording> one(&early, 1);
+  const FitResult fit = run_fit(recording_config(candidate.law, one, setup), data_sets(one));
+  const RecordingFit& r = fit.recordings.front();
+  HeldOut held;
+  held.what = fmt::format("{}: the second half of the hold", recording.name);
+  double sum = 0.0;
+  double sum_fitted = 0.0;
+  int count = 0;
+  const RecordingFit& whole = candidate.fit.recordings.front();
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    if (r.time_s[i] <= early.to_s || r.time_s[i] > recording.to_s) continue;
+    sum += std::pow(r.predicted[i] - r.observed[i], 2);
+    sum_fitted += std::pow(whole.predicted[i] - whole.observed[i], 2);
+    ++count;
+  }
+  held.rms = std::sqrt(sum / std::max(count, 1));
+  held.rms_over_peak = held.rms / whole.peak;
+  held.rms_if_fitted = std::sqrt(sum_fitted / std::max(count, 1));
+  return held;
+}
+
+void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
+              const SelectionOptions& options) {
+  if (c.failed) return;
+  try {
+    if (recordings.size() == 1) {
+      c.held_out.push_back(predict_second_half(c, recordings.front(), options.setup));
+    } else {
+      for (std::size_t i = 0; i < recordings.size(); ++i) {
+        c.held_out.push_back(predict_one(c, recordings, i, options.setup));
+      }
+    }
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::numerical) throw;
+    c.held_out.push_back({fmt::format("failed: {}", error.what()),
+                          std::numeric_limits<double>::infinity(),
+                          std::numeric_limits<double>::infinity(),
+                          std::numeric_limits<double>::infinity(), 0.0, false});
+  }
+  for (HeldOut& h : c.held_out) {
+    h.predicts = h.rms <= options.prediction_factor * h.rms_if_fitted;
+  }
+}
+
+void describe(Selection& s) {
+  const Candidate& chosen = s.candidates[s.recommended];
+  const Candidate& best = s.candidates[s.best_bic];
+  s.words.push_back(
+      fmt::format("the least law that the data support is {} ({}): {} parameters, rms residual {} "
+                  "% of the peak",
+                  law_name(chosen.law), law_words(chosen.law), chosen.parameters - 1,
+                  significant(100.0 * chosen.rms_over_peak, 3)));
+  if (s.recommended != s.best_bic) {
+    s.words.push_back(fmt::format(
+        "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
+        best.identified ? fmt::format("less than the margin of {}", significant(s.margin, 3))
+                        : best.reason));
+  }
+  if (s.correlation.significant) {
+    s.words.push_back(fmt::format(
+        "residuals repeat each other: {} samples count as {} readings (lag-1 correlation {})",
+        s.samples, significant(s.effective_count, 3), significant(s.correlation.lag1, 2)));
+  }
+}
+
+}  // namespace
+
+std::vector<LawSpec> classical_family() {
+  std::vector<LawSpec> laws;
+  for (const Kernel kernel : {Kernel::linear, Kernel::hertz, Kernel::power}) {
+    for (int branches = 0; branches <= 3; ++branches) {
+      laws.push_back(law_of(kernel, branches, Tension::none));
+    }
+  }
+  for (int branches = 0; branches <= 3; ++branches) {
+    laws.push_back(law_of(Kernel::linear, branches, Tension::elastic));
+    if (branches > 0) laws.push_back(law_of(Kernel::linear, branches, Tension::relaxing));
+  }
+  return laws;
+}
+
+std::vector<LawSpec> fractional_family() {
+  std::vector<LawSpec> laws;
+  for (const Kernel kernel : {Kernel::linear, Kernel::hertz, Kernel::power}) {
+    for (const Fractional fractional : {Fractional::springpot, Fractional::maxwell,
+                                        Fractional::kelvin_voigt, Fractional::zener}) {
+      LawSpec spec = law_of(kernel, 0, Tension::none);
+      spec.fractional = fractional;
+      laws.push_back(spec);
+    }
+  }
+  return laws;
+}
+
+std::vector<std::string> protocol_warnings(const FitResult& fit,
+                                           std::span<const PreparedRecording> recordings) {
+  std::vector<std::string> warnings;
+  double ramp_s = std::numeric_limits<double>::infinity();
+  double hold_s = 0.0;
+  double step_s = std::numeric_limits<double>::infinity();
+  for (const PreparedRecording& r : recordings) {
+    const std::vector<double>& time = r.recording.time_s;
+    for (const Phase& phase : r.phases.phases) {
+      const double length = time[phase.last] - time[phase.first];
+      if (time[phase.first] >= r.to_s) break;
+      if (phase.kind == PhaseKind::loading) ramp_s = std::min(ramp_s, length);
+      if (phase.kind == PhaseKind::hold) hold_s = std::max(hold_s, length);
+      if (phase.last > phase.first) {
+        step_s = std::min(step_s, length / static_cast<double>(phase.last - phase.first));
+      }
+    }
+  }
+  if (hold_s == 0.0) {
+    warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");
+  }
+  for (const ParameterResult& p : fit.parameters) {
+    const bool time = p.parameter.unit.dimension == Dimension::time;
+    if (!time) continue;
+    if (p.estimate < ramp_s) {
+      warnings.push_back(fmt::format(
+          "{} = {} is shorter than the shortest ramp ({} s): what relaxed during the ramp is known "
+          "only through the ramp's shape; a faster ramp would show it",
+          p.parameter.name, in_unit(p.parameter, p.estimate), significant(ramp_s, 3)));
+    }
+    if (hold_s > 0.0 && p.estimate > hold_s / 3.0) {
+      warnings.push_back(fmt::format(
+          "{} = {} is long for the longest hold ({} s): no plateau is seen; hold for at least {} s",
+          p.parameter.name, in_unit(p.parameter, p.estimate), significant(hold_s, 3),
+          significant(3.0 * p.estimate, 2)));
+    }
+    if (p.estimate < 3.0 * step_s) {
+      warnings.push_back(fmt::format(
+          "{} = {} is sampled by fewer than 3 points ({} s apart): sampling cannot support it",
+          p.parameter.name, in_unit(p.parameter, p.estimate), significant(step_s, 3)));
+    }
+  }
+  return warnings;
+}
+
+Selection select_law(std::span<const PreparedRecording> recordings,
+                     const SelectionOptions& options) {
+  const std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
+  const std::vector<DataSet> data = data_sets(recordings);
+  Selection s;
+  s.margin = options.margin;
+  Progress progress("fitting laws", laws.size());
+  for (const LawSpec& law : laws) {
+    s.candidates.push_back(fit_candidate(law, recordings, data, options.setup));
+    progress.advance();
+  }
+  // The residuals of the closest law are the nearest to noise alone.
+  const Candidate* closest = nullptr;
+  for (const Candidate& c : s.candidates) {
+    if (c.failed) continue;
+    if (closest == nullptr || c.fit.best.deviance < closest->fit.best.deviance) closest = &c;
+  }
+  if (closest == nullptr) {
+    throw Error(ExitCode::numerical, "select",
+                fmt::format("none of {} laws could be fitted", laws.size()));
+  }
+  s.samples = closest->fit.value_count;
+  s.correlation = correlation_of(closest->fit);
+  s.effective_count = s.correlation.effective_count;
+  double best_aicc = std::numeric_limits<double>::infinity();
+  double best_bic = best_aicc;
+  for (Candidate& c : s.candidates) {
+    if (c.failed) continue;
+    score(c, s.samples, s.effective_count);
+    best_aicc = std::min(best_aicc, c.aicc);
+    best_bic = std::min(best_bic, c.bic);
+  }
+  for (Candidate& c : s.candidates) {
+    c.delta_aicc = c.aicc - best_aicc;
+    c.delta_bic = c.bic - best_bic;
+  }
+  std::stable_sort(s.candidates.begin(), s.candidates.end(),
+                   [](const Candidate& a, const Candidate& b) {
+                     if (a.failed != b.failed) return b.failed;
+                     return a.bic < b.bic;
+                   });
+  s.recommended = choose(s.candidates, options.margin);
+  if (options.held_out) {
+    Progress predicting("predicting what was held out", s.candidates.size());
+    for (Candidate& c : s.candidates) {
+      hold_out(c, recordings, options);
+      predicting.advance();
+    }
+  }
+  Candidate& chosen = s.candidates[s.recommended];
+  if (options.setup.profiles) {
+    chosen.fit = run_fit(recording_config(chosen.law, recordings, options.setup), data);
+  }
+  s.warnings = protocol_warnings(chosen.fit, recordings);
+  describe(s);
+  return s;
+}
+
+}  // namespace tpm

@@ -1,0 +1,84 @@
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/correlation.hpp"
+#include "tpm/fit/fit.hpp"
+#include "tpm/study/recording_setup.hpp"
+
+namespace tpm {
+
+/// How well a law that was fitted to some data predicts other data.
+struct HeldOut {
+  std::string what;  ///< "muscle_100s, fitted to the others", "second half of the hold"
+  double rms = 0.0;  ///< of the prediction error, SI
+  double rms_over_peak = 0.0;
+  double rms_standardised = 0.0;  ///< in standard deviations, where the data have their own
+  double rms_if_fitted = 0.0;     ///< of the residual where the law is fitted to these data, too
+  bool predicts = false;          ///< see SelectionOptions::prediction_factor
+};
+
+/// One law of the contest.
+struct Candidate {
+  LawSpec law;
+  FitResult fit;        ///< without profiles, except for the recommended law
+  bool failed = false;  ///< no start ended in a usable point
+  std::string reason;   ///< why it failed, or why it is not a law of its own
+  int parameters = 0;   ///< estimated, nuisance and noise size included
+  double rms_over_peak = 0.0;
+  double aicc = 0.0, bic = 0.0;              ///< with the effective number of readings
+  double delta_aicc = 0.0, delta_bic = 0.0;  ///< above the best
+  bool identified = true;  ///< no parameter at a bound, covariance of full rank, each stiffness
+                           ///< more than two standard errors above 0
+  std::vector<HeldOut> held_out;
+};
+
+struct SelectionOptions {
+  std::vector<LawSpec> laws;  ///< empty: the classical family
+  double margin = 6.0;        ///< how much of BIC a larger law must gain to be preferred
+  bool held_out = true;
+  double prediction_factor = 2.0;  ///< a law predicts if its error is at most this many times the
+                                   ///< residual it leaves where it is fitted
+  SetupOptions setup;
+};
+
+struct Selection {
+  std::vector<Candidate> candidates;  ///< rising BIC; failed ones last
+  std::size_t recommended = 0;        ///< place in candidates
+  std::size_t best_bic = 0;
+  double margin = 6.0;
+  int samples = 0;  ///< fitted
+  double effective_count = 0.0;
+  Correlation correlation;            ///< of the residuals that the law of least deviance leaves
+  std::vector<std::string> words;     ///< the recommendation and its reasons
+  std::vector<std::string> warnings;  ///< what the experiment cannot tell
+};
+
+/// linear, hertz and power kernels with 0 to 3 branches; linear also with elastic and relaxing
+/// tension.
+[[nodiscard]] std::vector<LawSpec> classical_family();
+/// The four fractional elements on the three kernels.
+[[nodiscard]] std::vector<LawSpec> fractional_family();
+
+/// Fits every law to the recordings together and recommends the least: of the laws whose BIC is
+/// within the margin of the best and whose parameters are identified, the one with the fewest
+/// parameters. AICc and BIC count the effective number of readings, because neighbouring residuals
+/// repeat each other; with n samples of n_eff effective ones, -2 ln L = n_eff ln(RSS/n).
+///
+/// Held-out error: with several recordings each in turn is predicted from the others (its own
+/// nuisance parameters refitted, the material held); with one the second half of its hold is
+/// predicted from the rest.
+[[nodiscard]] Selection select_law(std::span<const PreparedRecording> recordings,
+                                   const SelectionOptions& options);
+
+[[nodiscard]] Json to_json(const Selection& selection);
+[[nodiscard]] std::string to_terminal_text(const Selection& selection);
+
+/// What the protocol of a recording cannot tell about a fitted law: relaxation times shorter than
+/// the ramp or the sampling, or longer than the hold.
+[[nodiscard]] std::vector<std::string> protocol_warnings(
+    const FitResult& fit, std::span<const PreparedRecording> recordings);
+
+}  // namespace tpm

@@ -1,0 +1,88 @@
+#include <fmt/format.h>
+
+#include "tpm/core/text.hpp"
+#include "tpm/study/selection.hpp"
+
+namespace tpm {
+namespace {
+
+double number(double value) {
+  return rounded(value, 6);
+}
+
+Json held_out_json(const Candidate& c) {
+  Json list = Json::array();
+  for (const HeldOut& h : c.held_out) {
+    list.push_back({{"what", h.what},
+                    {"rms_SI", number(h.rms)},
+                    {"rms_over_peak", number(h.rms_over_peak)},
+                    {"rms_over_sd", number(h.rms_standardised)},
+                    {"rms_if_fitted_SI", number(h.rms_if_fitted)},
+                    {"predicts", h.predicts}});
+  }
+  return list;
+}
+
+Json candidate_json(const Candidate& c) {
+  Json j{{"law", law_name(c.law)}, {"words", law_words(c.law)}, {"failed", c.failed}};
+  if (c.failed) {
+    j["reason"] = c.reason;
+    return j;
+  }
+  j["parameters_estimated"] = c.parameters - 1;
+  j["rms_over_peak"] = number(c.rms_over_peak);
+  j["delta_bic"] = number(c.delta_bic);
+  j["delta_aicc"] = number(c.delta_aicc);
+  j["identified"] = c.identified;
+  j["reason"] = c.reason;
+  j["held_out"] = held_out_json(c);
+  return j;
+}
+
+std::string held_out_text(const Candidate& c) {
+  std::string text;
+  for (const HeldOut& h : c.held_out) {
+    text += fmt::format("{:>9}{}", significant(100.0 * h.rms_over_peak, 3) + " %",
+                        h.predicts ? "  " : " !");
+  }
+  return text;
+}
+
+}  // namespace
+
+Json to_json(const Selection& s) {
+  Json j{{"recommended", law_name(s.candidates[s.recommended].law)},
+         {"lowest_bic", law_name(s.candidates[s.best_bic].law)},
+         {"margin_bic", s.margin},
+         {"samples", s.samples},
+         {"effective_readings", number(s.effective_count)}};
+  Json laws = Json::array();
+  for (const Candidate& c : s.candidates) laws.push_back(candidate_json(c));
+  j["laws"] = std::move(laws);
+  j["words"] = s.words;
+  j["warnings"] = s.warnings;
+  j["fit"] = to_json(s.candidates[s.recommended].fit);
+  return j;
+}
+
+std::string to_terminal_text(const Selection& s) {
+  std::string text = fmt::format("{:<22} {:>6} {:>9} {:>9} {:>9}  {}\n", "law", "param.",
+                                 "rms/peak", "dBIC", "dAICc", "held-out rms/peak; note");
+  for (std::size_t i = 0; i < s.candidates.size(); ++i) {
+    const Candidate& c = s.candidates[i];
+    const char* mark = i == s.recommended ? "*" : " ";
+    if (c.failed) {
+      text += fmt::format("{}{:<21} failed: {}\n", mark, law_name(c.law), c.reason);
+      continue;
+    }
+    text += fmt::format("{}{:<21} {:>6} {:>9} {:>9} {:>9}{}  {}\n", mark, law_name(c.law),
+                        c.parameters - 1, significant(100.0 * c.rms_over_peak, 3) + " %",
+                        fixed(c.delta_bic, 1), fixed(c.delta_aicc, 1), held_out_text(c), c.reason);
+  }
+  text += "\n";
+  for (const std::string& line : s.words) text += fmt::format("{}\n", line);
+  for (const std::string& line : s.warnings) text += fmt::format("! {}\n", line);
+  return text;
+}
+
+}  // namespace tpm
