@@ -116,9 +116,10 @@ SpectralValue CardinalWeight::sum_from(long m, int direction) const {
   const double distance = direction * place(m);
   SpectralValue sum = spectrum_.sum_from(distance, h_);
   sum.d_x *= direction;
-  double size = pole_damping_ * std::exp(-spectrum_.alpha() * distance);
-  const double damping = std::exp(-spectrum_.alpha() * h_);
-  for (; size > kNegligible; size *= damping, m += direction) sum += residue(m);
+  // the residues fall off as exp(-alpha distance)
+  const double falls = std::log(pole_damping_ / kNegligible) - spectrum_.alpha() * distance;
+  const double count = std::ceil(falls / (spectrum_.alpha() * h_));
+  for (long j = 0; static_cast<double>(j) < count; ++j) sum += residue(m + j * direction);
   return sum;
 }
 

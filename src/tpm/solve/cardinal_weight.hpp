@@ -21,8 +21,8 @@ class CardinalWeight {
   [[nodiscard]] double place(long m) const { return h_ * (static_cast<double>(m) + phase_); }
   /// W at the node m, and its derivatives by alpha and by x (that is: by ln tau).
   [[nodiscard]] SpectralValue at(long m) const;
-  /// The sum of W over the nodes m, m + direction, m + 2 direction, ... with direction +1 or -1;
-  /// the peak at x = 0 has to be behind m by 3 at least, or have no sharp structure (alpha < 1/2).
+  /// The sum of W over the nodes m, m + direction, m + 2 direction, ... with direction +1 or -1, as
+  /// accurate as RelaxationSpectrum::sum_from: the peak at x = 0 should lie well behind m.
   [[nodiscard]] SpectralValue sum_from(long m, int direction) const;
 
  private:

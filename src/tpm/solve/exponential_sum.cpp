@@ -93,6 +93,30 @@ SpectralValue damped_sum(const CardinalWeight& weight, long m, int direction,
   return sum;
 }
 
+/// The weights of the nodes from `first` on, one for each rate. Returns their sum.
+SpectralValue fill(const CardinalWeight& weight, long first, FractionalWeights& out) {
+  SpectralValue sum;
+  for (Eigen::Index i = 0; i < out.weight.size(); ++i) {
+    const SpectralValue w = weight.at(first + i);
+    out.weight[i] = w.value;
+    out.d_weight_d_alpha[i] = w.d_alpha;
+    out.d_weight_d_log_tau[i] = w.d_x;
+    sum += w;
+  }
+  return sum;
+}
+
+/// The sum of all weights below the grid. As all weights add up to 1, only the end of the grid that
+/// is farther from the peak of the spectrum needs to be summed beyond.
+SpectralValue sum_below(const CardinalWeight& weight, long first, long last,
+                        const SpectralValue& inside) {
+  if (-weight.place(first) > weight.place(last)) return weight.sum_from(first - 1, -1);
+  SpectralValue rest{1.0, 0.0, 0.0};
+  rest += inside.times(-1.0);
+  rest += weight.sum_from(last + 1, 1).times(-1.0);
+  return rest;
+}
+
 }  // namespace
 
 // The tolerance is spent by halves: one on the step (error exp(-pi^2/(2h)), reached at alpha = 1),
@@ -133,23 +157,8 @@ void FractionalMemory::mittag_leffler(double alpha, double tau_s, FractionalWeig
   const long first = first_ + std::lround(whole);
   const long last = first + std::ssize(rates_) - 1;
 
-  SpectralValue inside;
-  for (long m = first; m <= last; ++m) {
-    const SpectralValue w = weight.at(m);
-    out.weight[m - first] = w.value;
-    out.d_weight_d_alpha[m - first] = w.d_alpha;
-    out.d_weight_d_log_tau[m - first] = w.d_x;
-    inside += w;
-  }
-  // All weights add up to 1; what lies beyond an end is summed at the end farther from the peak.
-  SpectralValue below;
-  if (-weight.place(first) > weight.place(last)) {
-    below = weight.sum_from(first - 1, -1);
-  } else {
-    const SpectralValue above = weight.sum_from(last + 1, 1);
-    below = {1.0 - inside.value - above.value, -inside.d_alpha - above.d_alpha,
-             -inside.d_x - above.d_x};
-  }
+  const SpectralValue inside = fill(weight, first, out);
+  const SpectralValue below = sum_below(weight, first, last, inside);
   const SpectralValue on_first = damped_sum(weight, first - 1, -1, damping_);
   out.weight[0] += on_first.value;
   out.d_weight_d_alpha[0] += on_first.d_alpha;
@@ -173,11 +182,11 @@ void FractionalMemory::springpot(double alpha, FractionalWeights& out) const {
   const double rest = 1.0 - alpha;
   const double sine = std::sin(pi * std::min(alpha, rest));  // exactly 0 at alpha = 1
   const double cosine = std::cos(pi * alpha);
-  for (std::size_t i = 0; i < rates_.size(); ++i) {
-    const double x = step_ * static_cast<double>(first_ + static_cast<long>(i));
+  for (Eigen::Index i = 0; i < out.weight.size(); ++i) {
+    const double x = step_ * static_cast<double>(first_ + i);
     const double power = step_ * std::exp(alpha * x);
-    out.weight[static_cast<Eigen::Index>(i)] = sine / pi * power;
-    out.d_weight_d_alpha[static_cast<Eigen::Index>(i)] = (cosine + sine / pi * x) * power;
+    out.weight[i] = sine / pi * power;
+    out.d_weight_d_alpha[i] = (cosine + sine / pi * x) * power;
   }
   const double first_x = step_ * static_cast<double>(first_);
   const double last_x = first_x + step_ * static_cast<double>(rates_.size() - 1);

@@ -35,11 +35,10 @@ struct FractionalWeights {
 ///
 /// How good it is: for every t in [t_min, t_max] and every 0 < alpha <= 1, any tau,
 ///
-///     |sum - G|(t) <= stated_error() g,   |integral over [0, t] of (sum - G)| <= stated_error() g
-///     t
+///     |sum - G|(t) <= e g,   |integral over [0, t] of (sum - G)| <= e g t
 ///
-/// with g = 1 for E_alpha and g = G(t_min) for the spring-pot. So a history whose knots are at
-/// least t_min apart is answered to stated_error() times the total variation of u, at its knots.
+/// with e = stated_error(), g = 1 for E_alpha and g = G(t_min) for the spring-pot. So a history
+/// whose knots are at least t_min apart is answered at its knots to e g times its total variation.
 /// Not for t < t_min: just after a jump G is 1 (E_alpha) or infinite (spring-pot), and the sum is
 /// less. If u is curved between the knots, dashpot_s du/dt is off by dashpot_s u''/r_max.
 ///

@@ -36,7 +36,9 @@ class RelaxationSpectrum {
   /// The integral of w from x to infinity.
   [[nodiscard]] SpectralValue beyond(double x) const;
   /// The sum of h w(x + k h) over k = 0, 1, ... : the integral from x - h/2 on, and Gauss's central
-  /// differences. To rounding for h <= 0.3 if x is at least 3 away from the poles.
+  /// differences up to the seventh. For h <= 0.25 and x >= 6 the error is below 1e-10 of the sum
+  /// and below 1e-13; it grows with (alpha h)^9 and towards the peak, unless the peak is wide
+  /// (small alpha), where any x will do.
   [[nodiscard]] SpectralValue sum_from(double x, double h) const;
 
   [[nodiscard]] double alpha() const { return alpha_; }
