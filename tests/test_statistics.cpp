@@ -15,6 +15,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/fit/correlation.hpp"
 #include "tpm/fit/estimated_sigma.hpp"
+#include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/fit/gradient_check.hpp"
 #include "tpm/fit/noise.hpp"
 #include "tpm/fit/prediction.hpp"
@@ -824,6 +825,18 @@ TEST_CASE("the gradient check works at bounds, without influence, and says what 
   CHECK_THROWS_WITH(check_gradient(narrow, narrow_decay()), Contains("random points"));
 }
 
+TEST_CASE("the derivatives of the liver relaxation fit pass the gradient check") {
+  const FitConfig config =
+      read_fit_config(std::string(TPM_TEST_SOURCE_DIR) + "/configs/liver_relaxation.json");
+  const ExperimentResiduals function(config);
+  std::vector<FitParameter> parameters;
+  for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
+  const GradientCheck check = check_gradient(function, parameters, {5, 1, 3e-4});
+  INFO(to_terminal_text(check));
+  CHECK(check.passed());
+  CHECK(check.undecided == 0);
+}
+
 // --- specimens -----------------------------------------------------------------------------------
 
 TEST_CASE("random effects of the BCG vaccine trials are metafor's") {
@@ -871,6 +884,7 @@ TEST_CASE("equal standard errors have REML in closed form, and its boundary") {
   // tau^2 = max(0, sample variance - s^2)
   const std::vector<double> y{1.0, 1.5, 3.0, 2.2};
   std::vector<SpecimenEstimate> specimens;
+  specimens.reserve(y.size());
   for (const double value : y) specimens.push_back({"", value, 0.4});
   const double mean = 7.7 / 4.0;
   double variance = 0.0;
