@@ -349,6 +349,26 @@ TEST_CASE("an estimated sigma of normal data is the root mean square, from far s
   CHECK_THAT(std::sqrt(covariance(1, 1)) / m.natural[1], WithinRel(1.0 / std::sqrt(120.0), 1e-9));
 }
 
+TEST_CASE("an estimated Laplace scale is the mean absolute deviation from the median") {
+  Random random(12);
+  std::vector<double> y(101);
+  for (double& value : y) value = 50.0 + 3.0 * draw_error(kLaplace, random);
+  std::vector<double> sorted = y;
+  std::sort(sorted.begin(), sorted.end());
+  double deviation = 0.0;
+  for (const double value : y) deviation += std::abs(value - sorted[50]) / 101.0;
+  const EstimatedNoise function(y, std::vector<double>(101, 1.0), {{}, 0.0, 50.0}, kLaplace);
+  const std::vector<FitParameter> parameters{parameter("median", Scale::linear, 0.0, -1e5, 1e5),
+                                             parameter("a", Scale::log, 1.0, 1e-6, 1e9),
+                                             parameter("b", Scale::linear, 0.0, -1.0, 1.0)};
+  const Minimum m = minimise(function, parameters, std::vector<double>{45.0, 1.0, 0.0},
+                             FixedMask{false, false, true});
+  CAPTURE(m.iterations, m.message);
+  CHECK(m.converged);
+  CHECK_THAT(m.natural[0], WithinAbs(sorted[50], 0.01 * deviation));
+  CHECK_THAT(m.natural[1], WithinRel(deviation, 1e-3));
+}
+
 TEST_CASE("both parts of sigma = a + b |f| are found") {
   Random random(5);
   std::vector<double> y;
