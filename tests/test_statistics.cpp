@@ -15,6 +15,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/fit/correlation.hpp"
 #include "tpm/fit/estimated_sigma.hpp"
+#include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/fit/gradient_check.hpp"
 #include "tpm/fit/noise.hpp"
 #include "tpm/fit/prediction.hpp"
@@ -346,6 +347,26 @@ TEST_CASE("an estimated sigma of normal data is the root mean square, from far s
   const Eigen::Matrix2d covariance = information.inverse();
   CHECK_THAT(std::sqrt(covariance(0, 0)), WithinRel(m.natural[1] / std::sqrt(60.0), 1e-9));
   CHECK_THAT(std::sqrt(covariance(1, 1)) / m.natural[1], WithinRel(1.0 / std::sqrt(120.0), 1e-9));
+}
+
+TEST_CASE("an estimated Laplace scale is the mean absolute deviation from the median") {
+  Random random(12);
+  std::vector<double> y(101);
+  for (double& value : y) value = 50.0 + 3.0 * draw_error(kLaplace, random);
+  std::vector<double> sorted = y;
+  std::sort(sorted.begin(), sorted.end());
+  double deviation = 0.0;
+  for (const double value : y) deviation += std::abs(value - sorted[50]) / 101.0;
+  const EstimatedNoise function(y, std::vector<double>(101, 1.0), {{}, 0.0, 50.0}, kLaplace);
+  const std::vector<FitParameter> parameters{parameter("median", Scale::linear, 0.0, -1e5, 1e5),
+                                             parameter("a", Scale::log, 1.0, 1e-6, 1e9),
+                                             parameter("b", Scale::linear, 0.0, -1.0, 1.0)};
+  const Minimum m = minimise(function, parameters, std::vector<double>{45.0, 1.0, 0.0},
+                             FixedMask{false, false, true});
+  CAPTURE(m.iterations, m.message);
+  CHECK(m.converged);
+  CHECK_THAT(m.natural[0], WithinAbs(sorted[50], 0.01 * deviation));
+  CHECK_THAT(m.natural[1], WithinRel(deviation, 1e-3));
 }
 
 TEST_CASE("both parts of sigma = a + b |f| are found") {
@@ -824,6 +845,18 @@ TEST_CASE("the gradient check works at bounds, without influence, and says what 
   CHECK_THROWS_WITH(check_gradient(narrow, narrow_decay()), Contains("random points"));
 }
 
+TEST_CASE("the derivatives of the liver relaxation fit pass the gradient check") {
+  const FitConfig config =
+      read_fit_config(std::string(TPM_TEST_SOURCE_DIR) + "/configs/liver_relaxation.json");
+  const ExperimentResiduals function(config);
+  std::vector<FitParameter> parameters;
+  for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
+  const GradientCheck check = check_gradient(function, parameters, {5, 1, 3e-4});
+  INFO(to_terminal_text(check));
+  CHECK(check.passed());
+  CHECK(check.undecided == 0);
+}
+
 // --- specimens -----------------------------------------------------------------------------------
 
 TEST_CASE("random effects of the BCG vaccine trials are metafor's") {
@@ -871,6 +904,7 @@ TEST_CASE("equal standard errors have REML in closed form, and its boundary") {
   // tau^2 = max(0, sample variance - s^2)
   const std::vector<double> y{1.0, 1.5, 3.0, 2.2};
   std::vector<SpecimenEstimate> specimens;
+  specimens.reserve(y.size());
   for (const double value : y) specimens.push_back({"", value, 0.4});
   const double mean = 7.7 / 4.0;
   double variance = 0.0;

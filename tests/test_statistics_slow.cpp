@@ -142,9 +142,8 @@ TEST_CASE("the block bootstrap sees correlation that the residual bootstrap does
     options.resampling = Resampling::blocks;
     blocks += bootstrap(refit, line_parameters(), m, options).parameters[1].standard_error;
   }
-  SUCCEED(
-      fmt::format("standard error of the slope: simulated {:.4f}, blocks {:.4f}, residuals {:.4f}",
-                  truth, blocks / kBootstraps, single / kBootstraps));
+  SUCCEED(fmt::format("SE of slope: simulated {:.4f}, blocks {:.4f}, residuals {:.4f}", truth,
+                      blocks / kBootstraps, single / kBootstraps));
   CHECK_THAT(blocks / kBootstraps, WithinRel(truth, 0.2));
   CHECK(single / kBootstraps < 0.6 * truth);
 }

@@ -136,8 +136,8 @@ std::size_t block_length(double integrated_time, std::size_t n) {
   const double tau = std::max(integrated_time, 1.0);
   const double length =
       std::cbrt(1.5 * static_cast<double>(n)) * std::pow(0.5 * (tau - 1.0 / tau), 2.0 / 3.0);
-  const double longest = std::max(static_cast<double>(n / 2), 1.0);
-  return static_cast<std::size_t>(std::clamp(std::ceil(length), 1.0, longest));
+  const std::size_t longest = std::max<std::size_t>(n / 2, 1);
+  return static_cast<std::size_t>(std::clamp(std::ceil(length), 1.0, static_cast<double>(longest)));
 }
 
 }  // namespace tpm
