@@ -163,7 +163,7 @@ TEST_CASE("each fault of a description is told with its key") {
   };
   CHECK_THAT(fault(with("/kind", "curve")),
              Catch::StartsWith("c.json: key /kind: is none of the known words; expected one of "
-                               "points, recording, values"));
+                               "points, recording, spectrum, values"));
   CHECK_THAT(fault(with("/colums", 1)),
              Catch::StartsWith("c.json: key /colums: unknown key; expected one of id, title"));
   CHECK_THAT(fault(with("/columns/depth_mm/unti", "mm")),

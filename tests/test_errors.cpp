@@ -52,6 +52,12 @@ std::string long_line() {
   return std::string(kLongLine, '1') + "\n";
 }
 
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
+  return text.replace(at, from.size(), to);
+}
+
 const std::string kPointsJson = R"({"id": "c", "title": "t", "kind": "points",
 "observable": "contact_force",
 "columns": {"depth_mm": {"quantity": "indentation_depth", "unit": "mm"},
@@ -146,6 +152,45 @@ std::vector<ErrorCase> machine_cases() {
   };
 }
 
+const std::string kSpectrumJson = R"({"id": "c", "title": "t", "kind": "spectrum",
+"provenance": "measured",
+"columns": {"frequency_Hz": {"quantity": "frequency", "unit": "Hz"},
+            "storage_Pa": {"quantity": "storage_modulus", "unit": "Pa"},
+            "loss_Pa": {"quantity": "loss_modulus", "unit": "Pa"}}})";
+
+std::vector<ErrorCase> spectrum_cases() {
+  const std::string type = "spectrum";
+  const std::string show = "data show {}/c.csv";
+  const std::string import = "data import {}/m.csv -o {}/out";
+  const std::string head = "frequency_Hz,storage_Pa,loss_Pa\n";
+  const auto rows = [&head](const std::string& text) {
+    return files({{"c.json", kSpectrumJson}, {"c.csv", head + text}});
+  };
+  const auto described = [&head](const std::string& from, const std::string& to) {
+    return files({{"c.json", replaced(kSpectrumJson, from, to)}, {"c.csv", head + "1,1,1\n"}});
+  };
+  const auto machine = [](std::string text) { return files({{"m.csv", std::move(text)}}); };
+  return {
+      {type, "frequency of 0", show, rows("0,1,1\n")},
+      {type, "frequency twice", show, rows("1,1,1\n1,2,2\n")},
+      {type, "negative storage", show, rows("1,-1,1\n")},
+      {type, "negative loss", show, rows("1,1,-1\n")},
+      {type, "no number", show, rows("1,1,\n")},
+      {type, "observable", show, described("\"kind\"", "\"observable\": \"stress\", \"kind\"")},
+      {type, "missing provenance", show, described("\"provenance\": \"measured\",", "")},
+      {type, "another quantity", show,
+       described("\"loss_modulus\", \"unit\": \"Pa\"", "\"stress\", \"unit\": \"Pa\"")},
+      {type, "export without loss", import, machine("Frequency (Hz),G' (Pa)\n1,1\n2,2\n")},
+      {type, "export without units", import, machine("Frequency,G',G''\n1,1,1\n2,2,2\n")},
+      {type, "export with a frequency twice", import,
+       machine("Frequency (Hz),G' (Pa),G'' (Pa)\n1,1,1\n1,2,2\n")},
+      {type, "modulus beside stiffness", import,
+       machine("Frequency (Hz),G' (Pa),G'' (N/m)\n1,1,1\n2,2,2\n")},
+      {type, "digitised storage alone", import + " --x frequency:Hz --y storage_modulus:Pa",
+       machine("1,1\n2,2\n")},
+  };
+}
+
 std::vector<ErrorCase> digitizer_cases() {
   const std::string type = "WebPlotDigitizer project";
   const std::string import = "data import {}/w.json -o {}/out --x time:s --y contact_force:N";
@@ -194,12 +239,6 @@ std::vector<ErrorCase> hdf5_cases() {
       {type, "curve twice", "data pack evren_static evren_static -o {}/out.h5", files({})},
       {type, "unknown curve", "data pack evren_static nobody -o {}/out.h5", files({})},
   };
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const auto at = text.find(from);
-  if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
-  return text.replace(at, from.size(), to);
 }
 
 const std::string kFitConfig = R"({
@@ -297,8 +336,9 @@ std::vector<ErrorCase> claims_cases() {
 
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
-  for (const auto& cases : {curve_csv_cases(), curve_json_cases(), machine_cases(),
-                            digitizer_cases(), hdf5_cases(), fit_config_cases(), claims_cases()}) {
+  for (const auto& cases :
+       {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
+        hdf5_cases(), fit_config_cases(), claims_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -102,7 +102,7 @@ void add_list(CLI::App& data, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm data list\n"
-      "JSON: a list of objects with id, kind (points, recording, values), rows, title");
+      "JSON: a list of objects with id, kind (points, recording, spectrum, values), rows, title");
   command->callback([&session] { session.run = [&session] { return list(session); }; });
 }
 
@@ -119,6 +119,8 @@ void add_show(CLI::App& data, Session& session) {
       "  points: observable, time_origin, time_provenance, data with label, depth_m, load_N,\n"
       "          time_s, force_N or depth_m (band: force_lower_N, force_upper_N), provenance\n"
       "  recording: provenance, samples with time_s, depth_m, force_N, force_sd_N as lists\n"
+      "  spectrum: provenance, readings with frequency_Hz, storage_Pa, loss_Pa (or storage_N/m,\n"
+      "          loss_N/m; storage_sd_Pa, loss_sd_Pa) as lists\n"
       "  values: values with name, quantity, unit_SI, value, lower, upper, provenance\n"
       "An .h5 file gives a list of such objects.");
   command->callback([&session, argument, all_rows] {

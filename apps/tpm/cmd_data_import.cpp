@@ -28,6 +28,7 @@ struct ImportArguments {
   std::string encoding = "auto";
   std::string header_rows;
   std::string time, drive, response, sd;
+  std::string frequency, storage, loss;
   std::string drive_quantity, response_quantity;
   std::vector<std::string> units;
   std::string negate = "none";
@@ -91,6 +92,9 @@ ImportOptions options_of(const ImportArguments& arguments) {
   options.drive_column = arguments.drive;
   options.response_column = arguments.response;
   options.sd_column = arguments.sd;
+  options.frequency_column = arguments.frequency;
+  options.storage_column = arguments.storage;
+  options.loss_column = arguments.loss;
   if (!arguments.drive_quantity.empty()) {
     options.drive_quantity = parse_quantity_name(arguments.drive_quantity, "--drive-quantity");
   }
@@ -261,6 +265,9 @@ void add_machine_options(CLI::App& command, ImportArguments& a) {
   add("--drive", a.drive, "Column of what was imposed (displacement)");
   add("--response", a.response, "Column of what was observed (force)");
   add("--sd", a.sd, "Column of the standard deviation of the response");
+  add("--frequency", a.frequency, "Frequency column of a spectrum");
+  add("--storage", a.storage, "Column of its storage modulus or stiffness");
+  add("--loss", a.loss, "Column of its loss modulus or stiffness");
   add("--drive-quantity", a.drive_quantity, "indentation_depth, relative_length or abscissa");
   add("--response-quantity", a.response_quantity, "contact_force, stress or ordinate");
   command.add_option("--unit", a.units, "COLUMN=UNIT where the file does not say, repeatable")

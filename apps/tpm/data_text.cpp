@@ -96,6 +96,23 @@ std::string recording_text(const Recording& recording, bool all_rows) {
   return aligned(without_empty_columns(table));
 }
 
+std::string spectrum_text(const Spectrum& spectrum) {
+  const SpectrumQuantities quantities = spectrum_quantities(spectrum.dimension);
+  const double to_si = shown_unit(spectrum.dimension).to_si;
+  Table table{{title(Quantity::frequency), title(quantities.storage),
+               title(quantities.storage, " sd"), title(quantities.loss),
+               title(quantities.loss, " sd"), "provenance"}};
+  const auto at = [to_si](const std::vector<double>& values, std::size_t i) {
+    return values.empty() ? std::string() : significant(values[i] / to_si, 6);
+  };
+  for (std::size_t i = 0; i < spectrum.frequency_Hz.size(); ++i) {
+    table.push_back({significant(spectrum.frequency_Hz[i], 6), at(spectrum.storage, i),
+                     at(spectrum.storage_sd, i), at(spectrum.loss, i), at(spectrum.loss_sd, i),
+                     std::string(provenance_name(spectrum.provenance))});
+  }
+  return aligned(without_empty_columns(table));
+}
+
 std::string values_text(const ValueSet& set) {
   Table table{{"name", "quantity", "value", "unit", "provenance", "where", "formula", "note"}};
   for (const NamedValue& value : set.values) {
@@ -189,6 +206,19 @@ void add_json(Json& json, const Recording& recording) {
   json["samples"] = std::move(samples);
 }
 
+void add_json(Json& json, const Spectrum& spectrum) {
+  const SpectrumQuantities quantities = spectrum_quantities(spectrum.dimension);
+  json["provenance"] = provenance_name(spectrum.provenance);
+  Json readings{{si_key(Quantity::frequency), spectrum.frequency_Hz},
+                {si_key(quantities.storage), spectrum.storage},
+                {si_key(quantities.loss), spectrum.loss}};
+  if (!spectrum.storage_sd.empty()) {
+    readings[si_key(quantities.storage, "sd")] = spectrum.storage_sd;
+  }
+  if (!spectrum.loss_sd.empty()) readings[si_key(quantities.loss, "sd")] = spectrum.loss_sd;
+  json["readings"] = std::move(readings);
+}
+
 void add_json(Json& json, const ValueSet& set) {
   json["values"] = Json::array();
   for (const NamedValue& value : set.values) {
@@ -236,6 +266,7 @@ std::string curve_text(const Curve& curve, bool all_rows) {
   if (const auto* recording = std::get_if<Recording>(&curve)) {
     return text + recording_text(*recording, all_rows);
   }
+  if (const auto* spectrum = std::get_if<Spectrum>(&curve)) return text + spectrum_text(*spectrum);
   return text + values_text(std::get<ValueSet>(curve));
 }
 

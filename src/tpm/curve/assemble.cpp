@@ -92,6 +92,44 @@ void add_time_findings(const ImportedColumn& time, std::vector<Finding>& finding
                                       with_unit(longest_step, time.unit))});
 }
 
+bool is_spectrum(const ImportedSeries& series) {
+  return find(series, Quantity::frequency) != nullptr;
+}
+
+/// Storage or loss, whatever their dimension.
+const ImportedColumn* find_part(const ImportedSeries& series, Quantity SpectrumQuantities::*part) {
+  for (const Dimension dimension : {Dimension::stress, Dimension::stiffness}) {
+    const auto* column = find(series, spectrum_quantities(dimension).*part);
+    if (column != nullptr) return column;
+  }
+  return nullptr;
+}
+
+void require_spectrum(const ImportedSeries& series, const std::string& file) {
+  const ImportedColumn& frequency = *find(series, Quantity::frequency);
+  const ImportedColumn* storage = find_part(series, &SpectrumQuantities::storage);
+  const ImportedColumn* loss = find_part(series, &SpectrumQuantities::loss);
+  if (storage == nullptr || loss == nullptr) {
+    throw bad_input(file, "a frequency without both storage and loss",
+                    "one table with the columns of all three");
+  }
+  if (storage->unit.dimension != loss->unit.dimension) {
+    throw bad_input(file, "a modulus beside a stiffness", "storage and loss of one kind");
+  }
+  if (const auto fault = find_spectrum_fault(frequency.values, storage->values, loss->values)) {
+    throw bad_input(place(series, file, fault->row), fault->what, fault->expected);
+  }
+}
+
+void add_spectrum_measures(ImportedSeries& series) {
+  const ImportedColumn& frequency = *find(series, Quantity::frequency);
+  const auto [low, high] = std::minmax_element(frequency.values.begin(), frequency.values.end());
+  series.findings.push_back({"rows", std::to_string(frequency.values.size())});
+  series.findings.push_back(
+      {"frequency range",
+       fmt::format("{} to {}", with_unit(*low, frequency.unit), with_unit(*high, frequency.unit))});
+}
+
 void add_measures(ImportedSeries& series) {
   const ImportedColumn& response = observed(series);
   const ImportedColumn* time = find(series, Quantity::time);
@@ -154,6 +192,11 @@ std::string csv_text(const ImportedSeries& series, std::string_view provenance) 
 
 /// What every kind of curve has to fulfil, and what it measures.
 void check_and_measure(ImportedSeries& series, const std::string& file) {
+  if (is_spectrum(series)) {
+    require_spectrum(series, file);
+    add_spectrum_measures(series);
+    return;
+  }
   require_increasing(series, file);
   require_not_negative(series, file, observed(series).quantity, Bound::sd);
   add_measures(series);
@@ -169,6 +212,9 @@ std::vector<double> in_si(ImportedColumn& column) {
 RecordingFile assemble_recording(ImportedSeries series, const std::string& file,
                                  const ImportOptions& options, Provenance usual) {
   check_and_measure(series, file);
+  if (is_spectrum(series)) {
+    throw bad_input(file, "holds a spectrum (storage and loss over frequency)", "a recording");
+  }
   RecordingFile result;
   Recording& recording = result.recording;
   recording.header = options.header;
@@ -199,7 +245,7 @@ ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
   ImportedCurve curve;
   curve.name = series.name;
   curve.description.header = options.header;
-  curve.description.observable = observed(series).quantity;
+  if (!is_spectrum(series)) curve.description.observable = observed(series).quantity;
   if (becomes_points(series, options)) {
     curve.description.kind = "points";
     const bool timed = find(series, Quantity::time) != nullptr;
@@ -210,7 +256,7 @@ ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
     add_imposed(series, file, options);
     curve.csv = csv_text(series, provenance_name(provenance));
   } else {
-    curve.description.kind = "recording";
+    curve.description.kind = is_spectrum(series) ? "spectrum" : "recording";
     curve.description.provenance = provenance;
     curve.csv = csv_text(series, {});
   }

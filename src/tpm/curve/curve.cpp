@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
+#include <utility>
 
 #include "tpm/core/error.hpp"
 
@@ -46,6 +48,11 @@ constexpr auto kQuantities = std::to_array<QuantityWords>({
     {Quantity::load, "load", "load", Dimension::force},
     {Quantity::relative_length, "relative_length", "relative_length", Dimension::dimensionless},
     {Quantity::stress, "stress", "stress", Dimension::stress},
+    {Quantity::frequency, "frequency", "frequency", Dimension::frequency},
+    {Quantity::storage_modulus, "storage_modulus", "storage", Dimension::stress},
+    {Quantity::loss_modulus, "loss_modulus", "loss", Dimension::stress},
+    {Quantity::storage_stiffness, "storage_stiffness", "storage", Dimension::stiffness},
+    {Quantity::loss_stiffness, "loss_stiffness", "loss", Dimension::stiffness},
     {Quantity::abscissa, "abscissa", "x", Dimension::dimensionless},
     {Quantity::ordinate, "ordinate", "y", Dimension::dimensionless},
 });
@@ -137,6 +144,32 @@ const std::vector<double>& Recording::force_N() const {
 const std::vector<double>& Recording::force_sd_N() const {
   require_quantity(header, response_quantity, Quantity::contact_force);
   return response_sd;
+}
+
+SpectrumQuantities spectrum_quantities(Dimension dimension) noexcept {
+  if (dimension == Dimension::stress) return {Quantity::storage_modulus, Quantity::loss_modulus};
+  return {Quantity::storage_stiffness, Quantity::loss_stiffness};
+}
+
+std::optional<SpectrumFault> find_spectrum_fault(const std::vector<double>& frequency,
+                                                 const std::vector<double>& storage,
+                                                 const std::vector<double>& loss) {
+  std::set<double> seen;
+  for (std::size_t i = 0; i < frequency.size(); ++i) {
+    if (frequency[i] <= 0.0) {
+      return SpectrumFault{i, fmt::format("frequency {} is not positive", frequency[i]), "above 0"};
+    }
+    if (!seen.insert(frequency[i]).second) {
+      return SpectrumFault{i, fmt::format("frequency {} stands twice", frequency[i]),
+                           "each frequency once"};
+    }
+    for (const auto& [name, value] :
+         {std::pair{"storage", storage[i]}, std::pair{"loss", loss[i]}}) {
+      if (value < 0.0)
+        return SpectrumFault{i, fmt::format("{} {} is negative", name, value), "at least 0"};
+    }
+  }
+  return std::nullopt;
 }
 
 const NamedValue& ValueSet::at(std::string_view name) const {

@@ -25,6 +25,11 @@ enum class Quantity {
   load,               ///< N, imposed
   relative_length,    ///< length over reference length, dimensionless
   stress,             ///< Pa
+  frequency,          ///< Hz (cycles per second; rad/s is converted)
+  storage_modulus,    ///< Pa, in phase with the strain
+  loss_modulus,       ///< Pa, a quarter of a cycle ahead of it
+  storage_stiffness,  ///< N/m, the same for force over displacement
+  loss_stiffness,     ///< N/m
   abscissa,           ///< x of a problem without physical meaning, a plain number
   ordinate,           ///< its y
 };
@@ -128,6 +133,38 @@ struct Recording {
   /// Its standard deviation, empty if the file has none. Throws as force_N().
   [[nodiscard]] const std::vector<double>& force_sd_N() const;
 };
+
+/// Oscillatory data: storage and loss over frequency, as moduli (Pa) or as dynamic stiffnesses
+/// (N/m). All non-empty vectors have the length of `frequency_Hz`; the order is the file's.
+struct Spectrum {
+  CurveHeader header;
+  Provenance provenance = Provenance::measured;
+  Dimension dimension = Dimension::stress;  ///< or stiffness
+  std::vector<double> frequency_Hz;         ///< above 0, each once; never empty
+  std::vector<double> storage;              ///< SI, at least 0
+  std::vector<double> loss;                 ///< SI, at least 0
+  std::vector<double> storage_sd;           ///< SI, at least 0; empty if the file has none
+  std::vector<double> loss_sd;
+};
+
+/// What the columns of a spectrum of that dimension hold.
+struct SpectrumQuantities {
+  Quantity storage;
+  Quantity loss;
+};
+[[nodiscard]] SpectrumQuantities spectrum_quantities(Dimension dimension) noexcept;
+
+/// The first row of a spectrum that cannot be, and why.
+struct SpectrumFault {
+  std::size_t row;
+  std::string what;
+  std::string expected;
+};
+
+/// In any unit: every frequency above 0 and once, storage and loss at least 0.
+[[nodiscard]] std::optional<SpectrumFault> find_spectrum_fault(const std::vector<double>& frequency,
+                                                               const std::vector<double>& storage,
+                                                               const std::vector<double>& loss);
 
 /// A single value of the literature that belongs to no curve: a modulus, a time constant.
 struct NamedValue {

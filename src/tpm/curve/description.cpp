@@ -65,23 +65,24 @@ Probe read_probe(const Json& json, const std::string& file) {
 }
 
 void require_keys_of_kind(const CurveDescription& description, const std::string& file) {
-  const bool is_values = description.kind == "values";
-  if (is_values != description.columns.empty()) {
-    throw bad_input(file + ": key /columns",
-                    is_values ? "stands in a file of kind values" : "is missing",
-                    is_values ? "no columns: the columns of values are fixed"
-                              : "a description of each numeric column");
+  const std::string& kind = description.kind;
+  const bool fixed_columns = kind == "values";
+  const std::string in_file = fmt::format("stands in a file of kind {}", kind);
+  if (fixed_columns != description.columns.empty()) {
+    throw bad_input(file + ": key /columns", fixed_columns ? in_file : "is missing",
+                    fixed_columns ? "no columns: the columns of values are fixed"
+                                  : "a description of each numeric column");
   }
-  if (is_values == description.observable.has_value()) {
-    throw bad_input(file + ": key /observable",
-                    is_values ? "stands in a file of kind values" : "is missing",
-                    is_values ? "no observable" : "the quantity that was observed");
+  const bool observes = kind == "points" || kind == "recording";
+  if (observes != description.observable.has_value()) {
+    throw bad_input(file + ": key /observable", observes ? "is missing" : in_file,
+                    observes ? "the quantity that was observed" : "no observable");
   }
-  if ((description.kind == "recording") != description.provenance.has_value()) {
-    throw bad_input(file + ": key /provenance",
-                    description.kind == "recording" ? "is missing" : "stands at the top",
-                    description.kind == "recording" ? "where the recording comes from"
-                                                    : "a provenance in each row");
+  const bool whole = kind == "recording" || kind == "spectrum";
+  if (whole != description.provenance.has_value()) {
+    throw bad_input(
+        file + ": key /provenance", whole ? "is missing" : "stands at the top",
+        whole ? fmt::format("where the {} comes from", kind) : "a provenance in each row");
   }
 }
 

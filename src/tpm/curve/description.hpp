@@ -28,10 +28,10 @@ struct ColumnDescription {
 /// The JSON file beside a CSV file.
 struct CurveDescription {
   CurveHeader header;
-  std::string kind;                    ///< "points", "recording" or "values"
+  std::string kind;                    ///< "points", "recording", "spectrum" or "values"
   std::optional<Quantity> observable;  ///< points and recordings
   TimeOrigin time_origin = TimeOrigin::none;
-  std::optional<Provenance> provenance;  ///< of a whole recording
+  std::optional<Provenance> provenance;  ///< of a whole recording or spectrum
   std::map<std::string, ColumnDescription> columns;
 };
 

@@ -70,6 +70,10 @@ constexpr Recognized kCrosshead{ColumnRole::drive, Quantity::indentation_depth, 
 constexpr Recognized kStretch{ColumnRole::drive, Quantity::relative_length, 4};
 constexpr Recognized kSd{ColumnRole::sd, Quantity::contact_force, 0};
 
+constexpr Recognized kFrequency{ColumnRole::frequency, Quantity::frequency, 0};
+constexpr Recognized kStorage{ColumnRole::storage, Quantity::storage_modulus, 0};
+constexpr Recognized kLoss{ColumnRole::loss, Quantity::loss_modulus, 0};
+
 constexpr auto kWords = std::to_array<TitleWord>({
     {"time", kTime},
     {"temps", kTime},
@@ -115,12 +119,50 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"traversenweg", kCrosshead},
     {"position", kCrosshead},
     {"stretch", kStretch},
+    {"frequency", kFrequency},
+    {"freq", kFrequency},
+    {"frequenz", kFrequency},
+    {"kreisfrequenz", kFrequency},
+    {"frequence", kFrequency},
+    {"frecuencia", kFrequency},
+    {"frequenza", kFrequency},
+    {"storage", kStorage},
+    {"speichermodul", kStorage},
+    {"conservation", kStorage},
+    {"almacenamiento", kStorage},
+    {"conservativo", kStorage},
+    {"loss", kLoss},
+    {"verlustmodul", kLoss},
+    {"perte", kLoss},
+    {"perdida", kLoss},
+    {"dissipativo", kLoss},
     {"sd", kSd},
     {"stdev", kSd},
     {"stddev", kSd},
     {"x", {ColumnRole::drive, Quantity::abscissa, 9}},
     {"y", {ColumnRole::response, Quantity::ordinate, 9}},
 });
+
+/// G', G'', E', E" and the like, with straight or typographic primes: a letter and one or two of
+/// them.
+std::optional<Recognized> recognize_primes(std::string_view name) {
+  const std::u32string text = utf8::utf8to32(std::string(trimmed(name)));
+  if (text.size() < 2 || std::u32string_view(U"GEKgek").find(text[0]) == std::u32string::npos) {
+    return std::nullopt;
+  }
+  int primes = 0;
+  for (const char32_t c : std::u32string_view(text).substr(1)) {
+    if (c == U'\'' || c == U'\u2032' || c == U'\u2019') {
+      primes += 1;
+    } else if (c == U'"' || c == U'\u2033' || c == U'\u201D') {
+      primes += 2;
+    } else {
+      return std::nullopt;
+    }
+  }
+  if (primes == 1) return kStorage;
+  return primes == 2 ? std::optional(kLoss) : std::nullopt;
+}
 
 /// The text before and after the last separator, if a unit stands after it.
 std::optional<ColumnTitle> split_at(std::string_view title, std::string_view separator) {
@@ -154,6 +196,7 @@ ColumnTitle split_title(std::string_view title) {
 }
 
 std::optional<Recognized> recognize_title(std::string_view name) {
+  if (const auto primes = recognize_primes(name)) return primes;
   std::optional<Recognized> found;
   for (const std::string& word : words_of(name)) {
     const auto known = std::find_if(kWords.begin(), kWords.end(),

@@ -20,9 +20,9 @@ struct ColumnTitle {
 [[nodiscard]] std::string_view without_brackets(std::string_view cell) noexcept;
 
 /// What a column of a testing machine may be used for.
-enum class ColumnRole { time, drive, response, sd };
+enum class ColumnRole { time, drive, response, sd, frequency, storage, loss };
 
-/// What a title says in English, French, German, Spanish or Italian.
+/// What a title says in English, French, German, Spanish or Italian, or as G', G", E' and E".
 struct Recognized {
   ColumnRole role;
   Quantity quantity;

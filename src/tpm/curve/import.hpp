@@ -50,6 +50,9 @@ struct ImportOptions {
   std::string drive_column;
   std::string response_column;
   std::string sd_column;
+  std::string frequency_column;  ///< of a spectrum, as storage_column and loss_column
+  std::string storage_column;
+  std::string loss_column;
   std::optional<Quantity> drive_quantity;
   std::optional<Quantity> response_quantity;
   std::map<std::string, std::string> units;  ///< column name or number -> unit
@@ -120,7 +123,7 @@ struct ImportedFile {
 ///
 /// Digitised curves become points where the imposed quantity is known: force over depth, force over
 /// time with `depth_m` and `time_origin`, depth over time with `load_N` and `time_origin`. All
-/// others become recordings.
+/// others become recordings, and a table with frequency, storage and loss a spectrum.
 [[nodiscard]] std::vector<ImportedCurve> import_curves(const std::filesystem::path& path,
                                                        const ImportOptions& options);
 

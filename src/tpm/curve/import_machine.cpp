@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <tuple>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -207,6 +208,14 @@ Quantity response_quantity(const Column& column, const ImportOptions& options) {
                                                                         : Quantity::contact_force;
 }
 
+/// Storage and loss in N/m are dynamic stiffnesses, else moduli.
+Quantity spectrum_quantity(const Column& column, bool loss) {
+  const bool stiffness = is_unit(column.unit) &&
+                         parse_unit(column.unit, column.name).dimension == Dimension::stiffness;
+  const auto known = spectrum_quantities(stiffness ? Dimension::stiffness : Dimension::stress);
+  return loss ? known.loss : known.storage;
+}
+
 Quantity drive_quantity(const Column& column, const ImportOptions& options) {
   if (options.drive_quantity) return *options.drive_quantity;
   return column.meaning && column.meaning->role == ColumnRole::drive ? column.meaning->quantity
@@ -270,11 +279,34 @@ class SeriesReader {
   std::vector<std::size_t> used_;
 };
 
-}  // namespace
+/// The columns of a spectrum, nothing if the file holds something else: a frequency alone may be
+/// that of the sampling, and a column that is named as time, drive or response says what is meant.
+std::vector<Use> spectrum_uses(const Header& header, const std::string& file,
+                               const ImportOptions& options) {
+  const bool chosen = !options.frequency_column.empty() || !options.storage_column.empty() ||
+                      !options.loss_column.empty();
+  const bool recording = !options.time_column.empty() || !options.drive_column.empty() ||
+                         !options.response_column.empty();
+  if (recording && !chosen) return {};
+  const Column* frequency =
+      find_column(header, ColumnRole::frequency, options.frequency_column, file);
+  const Column* storage = find_column(header, ColumnRole::storage, options.storage_column, file);
+  const Column* loss = find_column(header, ColumnRole::loss, options.loss_column, file);
+  if (!chosen && (frequency == nullptr || (storage == nullptr && loss == nullptr))) return {};
+  for (const auto& [column, words, option] : {std::tuple{frequency, "a frequency", "--frequency"},
+                                              std::tuple{storage, "a storage modulus", "--storage"},
+                                              std::tuple{loss, "a loss modulus", "--loss"}}) {
+    if (column != nullptr) continue;
+    throw bad_input(file, fmt::format("no column is recognised as {}", words),
+                    fmt::format("{} with one of {}", option, column_list(header)));
+  }
+  return {{frequency, Quantity::frequency, Bound::value, false},
+          {storage, spectrum_quantity(*storage, false), Bound::value, false},
+          {loss, spectrum_quantity(*loss, true), Bound::value, false}};
+}
 
-ImportedSeries read_machine(const DelimitedTable& table, const std::string& file,
-                            const ImportOptions& options) {
-  const Header header = read_header(table, file, options);
+std::vector<Use> recording_uses(const Header& header, const std::string& file,
+                                const ImportOptions& options) {
   const Column* time = find_column(header, ColumnRole::time, options.time_column, file);
   const Column* drive = find_column(header, ColumnRole::drive, options.drive_column, file);
   const Column* response = find_column(header, ColumnRole::response, options.response_column, file);
@@ -296,6 +328,17 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   }
   uses.push_back({response, observed, Bound::value, options.negate_response});
   if (sd != nullptr) uses.push_back({sd, observed, Bound::sd, false});
+  return uses;
+}
+
+}  // namespace
+
+ImportedSeries read_machine(const DelimitedTable& table, const std::string& file,
+                            const ImportOptions& options) {
+  const Header header = read_header(table, file, options);
+  std::vector<Use> uses = spectrum_uses(header, file, options);
+  const bool spectrum = !uses.empty();
+  if (!spectrum) uses = recording_uses(header, file, options);
   require_units(uses, file);
   SeriesReader reader(table, header, file);
   for (const Use& use : uses) reader.add(use);
@@ -305,7 +348,7 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
       series.findings.begin(),
       {"header rows", fmt::format("{}{}{}", header.rows, header.sheet.empty() ? "" : ", sheet ",
                                   printable(header.sheet))});
-  start_at_contact(series, file, options);
+  if (!spectrum) start_at_contact(series, file, options);
   return series;
 }
 

@@ -167,6 +167,14 @@ void require_increasing(const CurveRows& rows, const std::vector<double>& time_s
   }
 }
 
+std::vector<double> optional_sd(const CurveRows& rows, Quantity quantity) {
+  if (!rows.has(quantity, Bound::sd)) return {};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    static_cast<void>(rows.at_least(i, quantity, Bound::sd, 0.0));
+  }
+  return rows.full_column(quantity, Bound::sd);
+}
+
 Recording read_recording(const CurveDescription& description, const CurveRows& rows,
                          const std::string& description_file) {
   Recording recording;
@@ -182,34 +190,73 @@ Recording read_recording(const CurveDescription& description, const CurveRows& r
     recording.drive_quantity = *drive;
     recording.drive = rows.full_column(*drive, Bound::value);
   }
-  if (rows.has(recording.response_quantity, Bound::sd)) {
-    recording.response_sd = rows.full_column(recording.response_quantity, Bound::sd);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      static_cast<void>(rows.at_least(i, recording.response_quantity, Bound::sd, 0.0));
-    }
-  }
+  recording.response_sd = optional_sd(rows, recording.response_quantity);
   if (recording.time_s.empty() && recording.drive.empty()) {
     throw bad_input(rows.file(), "holds neither time nor an imposed quantity", "one of the two");
   }
   return recording;
 }
 
+/// Moduli or stiffnesses: the columns say which.
+Dimension spectrum_dimension(const CurveDescription& description, const std::string& file) {
+  std::set<Dimension> dimensions;
+  for (const auto& [name, column] : description.columns) {
+    const Dimension dimension = quantity_dimension(column.quantity);
+    const SpectrumQuantities known = spectrum_quantities(dimension);
+    if (column.quantity == known.storage || column.quantity == known.loss) {
+      dimensions.insert(dimension);
+    } else if (column.quantity != Quantity::frequency) {
+      throw bad_input(
+          fmt::format("{}: key /columns/{}", file, name),
+          fmt::format("'{}' in a file of kind spectrum", quantity_name(column.quantity)),
+          "frequency, and storage and loss modulus or stiffness");
+    }
+  }
+  if (dimensions.size() == 1) return *dimensions.begin();
+  throw bad_input(file + ": key /columns",
+                  dimensions.empty() ? "neither a storage nor a loss" : "moduli beside stiffnesses",
+                  "storage and loss, both moduli or both stiffnesses");
+}
+
+Spectrum read_spectrum(const CurveDescription& description, const CurveRows& rows,
+                       const std::string& description_file) {
+  Spectrum spectrum;
+  spectrum.header = description.header;
+  spectrum.provenance = description.provenance.value();
+  spectrum.dimension = spectrum_dimension(description, description_file);
+  const SpectrumQuantities quantities = spectrum_quantities(spectrum.dimension);
+  spectrum.frequency_Hz = rows.full_column(Quantity::frequency, Bound::value);
+  spectrum.storage = rows.full_column(quantities.storage, Bound::value);
+  spectrum.loss = rows.full_column(quantities.loss, Bound::value);
+  spectrum.storage_sd = optional_sd(rows, quantities.storage);
+  spectrum.loss_sd = optional_sd(rows, quantities.loss);
+  const auto fault = find_spectrum_fault(spectrum.frequency_Hz, spectrum.storage, spectrum.loss);
+  if (fault) {
+    throw bad_input(fmt::format("{}:{}", rows.file(), rows.line(fault->row)), fault->what,
+                    fault->expected);
+  }
+  return spectrum;
+}
+
 }  // namespace
 
 std::string_view curve_kind(const Curve& curve) noexcept {
   if (std::holds_alternative<PointSet>(curve)) return "points";
-  return std::holds_alternative<Recording>(curve) ? "recording" : "values";
+  if (std::holds_alternative<Recording>(curve)) return "recording";
+  return std::holds_alternative<Spectrum>(curve) ? "spectrum" : "values";
 }
 
 const CurveHeader& curve_header(const Curve& curve) noexcept {
   if (const auto* points = std::get_if<PointSet>(&curve)) return points->header;
   if (const auto* recording = std::get_if<Recording>(&curve)) return recording->header;
+  if (const auto* spectrum = std::get_if<Spectrum>(&curve)) return spectrum->header;
   return std::get_if<ValueSet>(&curve)->header;
 }
 
 std::size_t curve_size(const Curve& curve) noexcept {
   if (const auto* points = std::get_if<PointSet>(&curve)) return points->data.size();
   if (const auto* recording = std::get_if<Recording>(&curve)) return recording->response.size();
+  if (const auto* spectrum = std::get_if<Spectrum>(&curve)) return spectrum->frequency_Hz.size();
   return std::get_if<ValueSet>(&curve)->values.size();
 }
 
@@ -224,6 +271,7 @@ Curve load_curve(const std::string& path_or_id) {
   const CurveRows rows(bytes, files.rows.string(), description);
   const std::string description_file = files.description.string();
   if (description.kind == "points") return read_points(description, rows, description_file);
+  if (description.kind == "spectrum") return read_spectrum(description, rows, description_file);
   return read_recording(description, rows, description_file);
 }
 
@@ -249,6 +297,10 @@ Recording load_recording(const std::string& path_or_id) {
 
 ValueSet load_values(const std::string& path_or_id) {
   return load_kind<ValueSet>(path_or_id, "values");
+}
+
+Spectrum load_spectrum(const std::string& path_or_id) {
+  return load_kind<Spectrum>(path_or_id, "spectrum");
 }
 
 std::vector<CurveSummary> list_curves() {

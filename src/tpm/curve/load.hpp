@@ -9,15 +9,15 @@
 
 namespace tpm {
 
-/// Any of the three kinds of curve file.
-using Curve = std::variant<PointSet, Recording, ValueSet>;
+/// Any of the four kinds of curve file.
+using Curve = std::variant<PointSet, Recording, ValueSet, Spectrum>;
 
-/// The word for the kind: "points", "recording" or "values".
+/// The word for the kind: "points", "recording", "values" or "spectrum".
 [[nodiscard]] std::string_view curve_kind(const Curve& curve) noexcept;
 
 [[nodiscard]] const CurveHeader& curve_header(const Curve& curve) noexcept;
 
-/// Number of data, samples or values.
+/// Number of data, samples, values or frequencies.
 [[nodiscard]] std::size_t curve_size(const Curve& curve) noexcept;
 
 /// Reads a curve: a CSV file and the JSON description of the same name beside it
@@ -30,6 +30,7 @@ using Curve = std::variant<PointSet, Recording, ValueSet>;
 [[nodiscard]] PointSet load_points(const std::string& path_or_id);
 [[nodiscard]] Recording load_recording(const std::string& path_or_id);
 [[nodiscard]] ValueSet load_values(const std::string& path_or_id);
+[[nodiscard]] Spectrum load_spectrum(const std::string& path_or_id);
 
 /// One line of a table of contents.
 struct CurveSummary {

@@ -118,6 +118,19 @@ void write(Hdf5Writer& file, const Recording& recording) {
   }
 }
 
+void write(Hdf5Writer& file, const Spectrum& spectrum) {
+  GroupWriter group(file, spectrum.header, "spectrum");
+  const SpectrumQuantities quantities = spectrum_quantities(spectrum.dimension);
+  group.attribute("provenance", provenance_name(spectrum.provenance));
+  group.numbers("frequency", Quantity::frequency, spectrum.frequency_Hz);
+  group.numbers("storage", quantities.storage, spectrum.storage);
+  group.numbers("loss", quantities.loss, spectrum.loss);
+  if (!spectrum.storage_sd.empty()) {
+    group.numbers("storage_sd", quantities.storage, spectrum.storage_sd);
+  }
+  if (!spectrum.loss_sd.empty()) group.numbers("loss_sd", quantities.loss, spectrum.loss_sd);
+}
+
 void write(Hdf5Writer& file, const ValueSet& set) {
   GroupWriter group(file, set.header, "values");
   group.texts("name", set.values, &NamedValue::name);
@@ -261,6 +274,19 @@ Recording read_recording(GroupReader& group, CurveHeader header) {
   return recording;
 }
 
+Spectrum read_spectrum(GroupReader& group, CurveHeader header) {
+  Spectrum spectrum;
+  spectrum.header = std::move(header);
+  spectrum.provenance = parse_provenance(group.attribute("provenance"), group.where());
+  spectrum.dimension = quantity_dimension(group.quantity("storage"));
+  spectrum.frequency_Hz = group.numbers("frequency");
+  spectrum.storage = group.numbers("storage");
+  spectrum.loss = group.numbers("loss");
+  if (group.has("storage_sd")) spectrum.storage_sd = group.numbers("storage_sd");
+  if (group.has("loss_sd")) spectrum.loss_sd = group.numbers("loss_sd");
+  return spectrum;
+}
+
 ValueSet read_values(GroupReader& group, CurveHeader header) {
   ValueSet set;
   set.header = std::move(header);
@@ -316,11 +342,13 @@ std::vector<Curve> unpack_curves(const std::filesystem::path& path) {
       curves.emplace_back(read_points(group, std::move(header)));
     } else if (kind == "recording") {
       curves.emplace_back(read_recording(group, std::move(header)));
+    } else if (kind == "spectrum") {
+      curves.emplace_back(read_spectrum(group, std::move(header)));
     } else if (kind == "values") {
       curves.emplace_back(read_values(group, std::move(header)));
     } else {
       throw bad_input(group.where(), fmt::format("unknown kind '{}'", printable(kind)),
-                      "points, recording or values");
+                      "points, recording, spectrum or values");
     }
   }
   return curves;
