@@ -1,6 +1,7 @@
 #include "tpm/law/contact_history.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -104,32 +105,35 @@ Slopes ContactHistory::drive_slopes() const {
   return slopes;
 }
 
-void ContactHistory::update_weights(double h, double time_scale, bool parabola) {
+void ContactHistory::update_weights(double h, double time_scale, bool curved) {
   // Evenly sampled times differ by their rounding; the weights of one step length serve them all.
   const double same = 4.0 * std::numeric_limits<double>::epsilon() * time_scale;
-  if (weights_parabola_ == parabola && std::abs(h - weights_h_) <= same) return;
+  if (weights_curved_ == curved && std::abs(h - weights_h_) <= same) return;
   for (std::size_t j = 0; j < weights_.size(); ++j) {
     const double z = h * law_.memory.rate_per_s[static_cast<Eigen::Index>(j)];
-    weights_[j] = parabola ? parabola_weights(z) : line_weights(z);
+    weights_[j] = curved ? quartic_weights(z) : line_weights(z);
   }
   weights_h_ = h;
-  weights_parabola_ = parabola;
+  weights_curved_ = curved;
 }
 
-void ContactHistory::step_branches(const Point& begin, const Point* middle, const Point& end) {
+void ContactHistory::step_branches(const Point& begin, std::span<const Point> middle,
+                                   const Point& end) {
   const Memory& m = law_.memory;
   for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const ParabolaWeights& k = weights_[static_cast<std::size_t>(j)];
-    const double v_middle = middle != nullptr ? middle->v : 0.0;
-    w_next_[j] = k.r * w_[j] + k.b0 * begin.v + k.bm * v_middle + k.b1 * end.v;
+    const QuadratureWeights& k = weights_[static_cast<std::size_t>(j)];
+    double next = k.r * w_[j] + k.b.front() * begin.v + k.b.back() * end.v;
+    for (std::size_t i = 0; i < middle.size(); ++i) next += k.b[i + 1] * middle[i].v;
+    w_next_[j] = next;
     if (!want_slopes_) continue;
     auto by = w_by_next_.col(j);
-    by = k.r * w_by_.col(j) + k.b0 * begin.v_by + k.b1 * end.v_by;
-    if (middle != nullptr) by += k.bm * middle->v_by;
+    by = k.r * w_by_.col(j) + k.b.front() * begin.v_by + k.b.back() * end.v_by;
+    for (std::size_t i = 0; i < middle.size(); ++i) by += k.b[i + 1] * middle[i].v_by;
     const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
     if (tau < 0) continue;
-    by[tau] +=
-        m.rate_per_s[j] * (k.d_r * w_[j] + k.d_b0 * begin.v + k.d_bm * v_middle + k.d_b1 * end.v);
+    double d = k.d_r * w_[j] + k.d_b.front() * begin.v + k.d_b.back() * end.v;
+    for (std::size_t i = 0; i < middle.size(); ++i) d += k.d_b[i + 1] * middle[i].v;
+    by[tau] += m.rate_per_s[j] * d;
   }
 }
 
@@ -167,21 +171,21 @@ ContactHistory::Balance ContactHistory::balance_over_step(double h) const {
   Balance b{m.constant + m.dashpot / h, m.dashpot / h * begin.v, zero_slopes(), zero_slopes()};
   if (want_slopes_) b.r_by += m.dashpot / h * begin.v_by;
   for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const ParabolaWeights& k = weights_[static_cast<std::size_t>(j)];
-    const double kept = k.r * w_[j] + k.b0 * begin.v;
-    b.a += m.stiffness[j] * (1.0 - k.b1);
+    const QuadratureWeights& k = weights_[static_cast<std::size_t>(j)];
+    const double kept = k.r * w_[j] + k.b.front() * begin.v;
+    b.a += m.stiffness[j] * (1.0 - k.b.back());
     b.r += m.stiffness[j] * kept;
     if (!want_slopes_) continue;
-    b.r_by += m.stiffness[j] * (k.r * w_by_.col(j) + k.b0 * begin.v_by);
+    b.r_by += m.stiffness[j] * (k.r * w_by_.col(j) + k.b.front() * begin.v_by);
     const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
     if (tau >= 0) {
       const double scale = m.stiffness[j] * m.rate_per_s[j];
-      b.a_by[tau] -= scale * k.d_b1;
-      b.r_by[tau] += scale * (k.d_r * w_[j] + k.d_b0 * begin.v);
+      b.a_by[tau] -= scale * k.d_b.back();
+      b.r_by[tau] += scale * (k.d_r * w_[j] + k.d_b.front() * begin.v);
     }
     for (std::size_t q = 0; q < m.by.size(); ++q) {
       const double d = m.d_stiffness(j, static_cast<Eigen::Index>(q));
-      b.a_by[m.by[q]] += d * (1.0 - k.b1);
+      b.a_by[m.by[q]] += d * (1.0 - k.b.back());
       b.r_by[m.by[q]] += d * kept;
     }
   }
@@ -280,7 +284,7 @@ void ContactHistory::move_one(double from, double to, double h, double time_scal
   const bool touching = std::max(from, to) > law_.contact;
   if (touching && !free_ && now_.u == 0.0) now_ = imposed(from, true);
   if (law_.kernel.is_linear() || free_) {
-    move_straight(from, to, h, time_scale, false);
+    move_piece(from, to, h, time_scale, false);
   } else {
     move_smooth(from, to, h, time_scale, 0);
   }
@@ -289,15 +293,23 @@ void ContactHistory::move_one(double from, double to, double h, double time_scal
 void ContactHistory::move_smooth(double from, double to, double h, double time_scale, int level) {
   const double a = std::max(from - law_.contact, 0.0);
   const double b = std::max(to - law_.contact, 0.0);
-  // Over a thousandth of the depth every kernel is a parabola to 1e-10.
-  if (std::abs(b - a) > 1e-3 * std::min(a, b) && level < kMostHalvings) {
-    const double v0 = law_.kernel.value(a);
-    const double vm = law_.kernel.value(0.5 * (a + b));
-    const double v1 = law_.kernel.value(b);
-    const double early = law_.kernel.value(0.75 * a + 0.25 * b);
-    const double late = law_.kernel.value(0.25 * a + 0.75 * b);
-    const double off = std::max(std::abs(0.375 * v0 + 0.75 * vm - 0.125 * v1 - early),
-                                std::abs(-0.125 * v0 + 0.75 * vm + 0.375 * v1 - late));
+  // Kernels are powers of the depth: over a small part of it a straight line, or a polynomial of
+  // fourth degree, holds to 1e-10.
+  constexpr double kStraight = 3e-6;
+  constexpr double kQuartic = 0.05;
+  const double part = std::abs(b - a) / std::min(a, b);
+  if (part > kQuartic && level < kMostHalvings) {
+    const KernelShape& v = law_.kernel;
+    const double v0 = v.value(a);
+    const double v1 = v.value(0.75 * a + 0.25 * b);
+    const double v2 = v.value(0.5 * (a + b));
+    const double v3 = v.value(0.25 * a + 0.75 * b);
+    const double v4 = v.value(b);
+    // The polynomial at 1/8 and 7/8, where its error is largest.
+    const double early = (35.0 * v0 + 140.0 * v1 - 70.0 * v2 + 28.0 * v3 - 5.0 * v4) / 128.0;
+    const double late = (-5.0 * v0 + 28.0 * v1 - 70.0 * v2 + 140.0 * v3 + 35.0 * v4) / 128.0;
+    const double off = std::max(std::abs(early - v.value(0.875 * a + 0.125 * b)),
+                                std::abs(late - v.value(0.125 * a + 0.875 * b)));
     if (off > v_tolerance_) {
       const double middle = 0.5 * (from + to);
       move_smooth(from, middle, 0.5 * h, time_scale, level + 1);
@@ -305,19 +317,20 @@ void ContactHistory::move_smooth(double from, double to, double h, double time_s
       return;
     }
   }
-  move_straight(from, to, h, time_scale, !free_);
+  move_piece(from, to, h, time_scale, !free_ && part > kStraight);
 }
 
-void ContactHistory::move_straight(double from, double to, double h, double time_scale,
-                                   bool parabola) {
+void ContactHistory::move_piece(double from, double to, double h, double time_scale, bool curved) {
   const bool touching = std::max(from, to) > law_.contact;
   const Point end = imposed(to, touching);
-  update_weights(h, time_scale, parabola);
-  if (parabola) {
-    const Point middle = imposed(0.5 * (from + to), touching);
-    step_branches(now_, &middle, end);
+  update_weights(h, time_scale, curved);
+  if (curved) {
+    const std::array<Point, 3> middle{imposed(0.75 * from + 0.25 * to, touching),
+                                      imposed(0.5 * (from + to), touching),
+                                      imposed(0.25 * from + 0.75 * to, touching)};
+    step_branches(now_, middle, end);
   } else {
-    step_branches(now_, nullptr, end);
+    step_branches(now_, {}, end);
   }
   if (elastic_force(end.v, end.u, w_next_, (end.v - now_.v) / h) >= 0.0) {
     free_ = false;
@@ -327,7 +340,7 @@ void ContactHistory::move_straight(double from, double to, double h, double time
   free_ = true;
   update_weights(h, time_scale, false);
   const Point surface = surface_under(0.0, balance_over_step(h), false);
-  step_branches(now_, nullptr, surface);
+  step_branches(now_, {}, surface);
   accept(now_, surface, h);
 }
 
@@ -352,7 +365,7 @@ void ContactHistory::jump_to_load(double load) {
 void ContactHistory::load_step(double load, double h, double time_scale) {
   update_weights(h, time_scale, false);
   const Point end = surface_under(load - law_.offset, balance_over_step(h), true);
-  step_branches(now_, nullptr, end);
+  step_branches(now_, {}, end);
   accept(now_, end, h);
 }
 

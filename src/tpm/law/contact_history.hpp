@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "tpm/law/kernel.hpp"
@@ -99,12 +100,13 @@ class ContactHistory {
   [[nodiscard]] Point imposed(double drive, bool touching) const;
   [[nodiscard]] double elastic_force(double v, double u, const Eigen::ArrayXd& w,
                                      double v_rate) const;
-  void update_weights(double h, double time_scale, bool parabola);
-  void step_branches(const Point& begin, const Point* middle, const Point& end);
+  void update_weights(double h, double time_scale, bool curved);
+  /// @param middle the three points within a curved step; empty for a straight one
+  void step_branches(const Point& begin, std::span<const Point> middle, const Point& end);
   void accept(const Point& begin, const Point& end, double h);
   void move_one(double from, double to, double h, double time_scale);
   void move_smooth(double from, double to, double h, double time_scale, int level);
-  void move_straight(double from, double to, double h, double time_scale, bool parabola);
+  void move_piece(double from, double to, double h, double time_scale, bool curved);
   [[nodiscard]] Balance balance_at_once() const;
   [[nodiscard]] Balance balance_over_step(double h) const;
   [[nodiscard]] Point surface_under(double load, const Balance& balance, bool loaded) const;
@@ -121,8 +123,8 @@ class ContactHistory {
   double v_rate_ = 0.0;  ///< dV/dt over the last step, for a dashpot
   Slopes v_rate_by_;
   double weights_h_ = -1.0;
-  bool weights_parabola_ = false;
-  std::vector<ParabolaWeights> weights_;
+  bool weights_curved_ = false;
+  std::vector<QuadratureWeights> weights_;
 };
 
 }  // namespace tpm

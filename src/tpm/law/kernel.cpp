@@ -9,6 +9,10 @@ TensionShape::Values TensionShape::at(double u) const {
   // With y = 1/x, root = sqrt(1 + u^2 y^2) and q = root (root + 1), phi = u^2 y^2 / q: no
   // cancellation, and regular at y = 0.
   const double y = 1.0 / spacing;
+  if (y == 0.0) {
+    const double ratio2 = (u / reference) * (u / reference);
+    return {u * ratio2, 3.0 * ratio2, 0.0};
+  }
   const auto root = [y](double v) { return std::sqrt(1.0 + v * v * y * y); };
   const double root_u = root(u);
   const double root_r = root(reference);

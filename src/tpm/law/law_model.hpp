@@ -12,10 +12,10 @@ namespace tpm {
 /// A law of the family, behind the interface that tables, fits and plans ask.
 ///
 /// Displacement-driven: exact in time for a drive that is linear between knots (exponential
-/// quadrature of V(u(s)), refined until a quadratic holds to 1e-10 of the peak), in O(n) for each
-/// branch. After detachment (the force would become tensile) the surface recovers freely and the
-/// response is the offset until the probe meets it again. Force-driven: adaptive implicit steps.
-/// Times at infinity are answered by full relaxation.
+/// quadrature of V(u(s)), refined until a polynomial of fourth degree holds to 1e-10 of the peak),
+/// in O(n) for each branch. After detachment (the force would become tensile) the surface recovers
+/// freely and the response is the offset until the probe meets it again. Force-driven: adaptive
+/// implicit steps. Times at infinity are answered by full relaxation.
 class LawModel final : public Model {
  public:
   /// Throws Error(bad_input) as require_valid(spec).
