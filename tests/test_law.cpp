@@ -33,8 +33,8 @@ std::vector<double> random_parameters(const LawModel& law, Random& random) {
       values.push_back(0.05 * std::pow(100.0, u));
     } else if (p.name == "exponent") {
       values.push_back(1.2 + u);
-    } else if (p.name == "tension_ratio") {
-      values.push_back(0.2 + u);
+    } else if (p.name == "tension_share") {
+      values.push_back(0.1 + 0.8 * u);
     } else if (p.name == "spacing") {
       values.push_back(0.01 + 0.02 * u);
     } else if (p.name == "contact") {
@@ -158,11 +158,11 @@ TEST_CASE("a nonlinear kernel under a ramp agrees with quadrature", "[law]") {
     double power = 1.5;
     if (spec.kernel == Kernel::power) set("exponent", power = 2.3);
     if (spec.tension == Tension::relaxing) {
-      set("tension_ratio", 0.7);
+      set("tension_share", 0.7);
       set("spacing", std::numeric_limits<double>::infinity());
     }
     const auto kernel_slope = [&](double u) {
-      if (spec.tension == Tension::relaxing) return 1.0 + 0.7 * 3.0 * u * u / 1e-6;
+      if (spec.tension == Tension::relaxing) return 0.3 + 0.7 * 3.0 * u * u / 1e-6;
       return power * std::pow(u / 1e-3, power - 1.0);
     };
     const std::vector<double> times{0.1, 0.6, 1.3, 1.35, 2.0, 9.0, 20.0};

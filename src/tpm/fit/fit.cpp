@@ -42,16 +42,24 @@ void add_to_cluster(std::vector<DistinctMinimum>& minima, const Minimum& m) {
   minima.push_back({m, 1, m.natural, m.natural});
 }
 
+/// Both first steps are tried; the deeper end counts.
+Minimum minimise_both_ways(const ResidualFunction& function,
+                           std::span<const FitParameter> parameters,
+                           std::span<const double> start) {
+  const Minimum bold = minimise(function, parameters, start);
+  const Minimum cautious = minimise(function, parameters, start, {}, FirstStep::cautious);
+  const bool deeper = cautious.usable && (!bold.usable || cautious.deviance < bold.deviance);
+  return deeper ? cautious : bold;
+}
+
 MultiStart run_starts(const ResidualFunction& function, std::span<const FitParameter> parameters,
-                      const std::vector<std::vector<double>>& starts) {
+                      const std::vector<std::vector<double>>& starts, StartKind kind) {
   MultiStart result;
   std::vector<Minimum> ends;
   Progress progress("fitting from several starts", starts.size());
   for (const auto& start : starts) {
-    // Both first steps are tried from every start; the deeper end counts.
-    Minimum m = minimise(function, parameters, start);
-    const Minimum other = minimise(function, parameters, start, {}, FirstStep::cautious);
-    if (other.usable && (!m.usable || other.deviance < m.deviance)) m = other;
+    const Minimum m = kind == StartKind::solved ? minimise_near(function, parameters, start)
+                                                : minimise_both_ways(function, parameters, start);
     ++result.run;
     if (m.usable) {
       ends.push_back(m);
@@ -134,10 +142,10 @@ void describe_parameters(FitResult& result, double level, bool profiles) {
 
 FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParameter> parameters,
                         const std::vector<std::vector<double>>& starts, Threshold threshold,
-                        bool profiles) {
+                        bool profiles, StartKind kind) {
   threshold.parameter_count = static_cast<int>(parameters.size());
   FitResult result;
-  MultiStart multi = run_starts(function, parameters, starts);
+  MultiStart multi = run_starts(function, parameters, starts, kind);
   result.starts_run = multi.run;
   result.starts_failed = multi.failed;
   result.starts_agreeing = multi.agreeing;
@@ -339,7 +347,7 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
   threshold.parameter_count = static_cast<int>(parameters.size());
 
   FitResult result = fit_residuals(function, parameters, fit_starts(function, parameters),
-                                   threshold, config.profiles);
+                                   threshold, config.profiles, start_kind(function));
   result.config = config;
   result.value_count = function.value_count();
   result.band_count = function.band_count();

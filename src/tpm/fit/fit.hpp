@@ -6,6 +6,7 @@
 #include "tpm/fit/config.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/fit/least_squares.hpp"
+#include "tpm/fit/starts.hpp"
 #include "tpm/fit/uncertainty.hpp"
 #include "tpm/store/json.hpp"
 
@@ -106,7 +107,8 @@ struct FitResult {
 [[nodiscard]] FitResult fit_residuals(const ResidualFunction& function,
                                       std::vector<FitParameter> parameters,
                                       const std::vector<std::vector<double>>& starts,
-                                      Threshold threshold, bool profiles);
+                                      Threshold threshold, bool profiles,
+                                      StartKind kind = StartKind::anywhere);
 
 /// Machine-readable result, keys in docs/json.md, numbers rounded to 6 significant digits so that
 /// they agree between machines.

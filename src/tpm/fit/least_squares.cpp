@@ -230,6 +230,128 @@ Minimum minimise(const ResidualFunction& function, std::span<const FitParameter>
   return minimum;
 }
 
+namespace {
+
+/// Residuals and their derivatives by theta at a point of the projected search.
+struct ThetaPoint {
+  std::vector<double> natural;
+  Eigen::VectorXd theta;
+  Eigen::VectorXd r;
+  RowMatrix jacobian;
+  double cost = 0.0;
+};
+
+bool evaluate_theta(const ResidualFunction& function, std::span<const FitParameter> parameters,
+                    ThetaPoint& point) {
+  if (!function.evaluate(point.natural, point.r, &point.jacobian)) return false;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    point.jacobian.col(column) *= parameters[i].natural_slope(point.theta[column]);
+  }
+  point.cost = point.r.squaredNorm();
+  return std::isfinite(point.cost) && point.jacobian.allFinite();
+}
+
+/// The parameters that may move: neither fixed nor pressed against a bound.
+std::vector<Eigen::Index> movable(std::span<const FitParameter> parameters, const FixedMask& fixed,
+                                  const ThetaPoint& point, const Eigen::VectorXd& gradient) {
+  std::vector<Eigen::Index> free;
+  free.reserve(parameters.size());
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (!fixed.empty() && fixed[i]) continue;
+    const auto k = static_cast<Eigen::Index>(i);
+    const bool outward = (point.theta[k] <= parameters[i].theta_lower() && gradient[k] > 0.0) ||
+                         (point.theta[k] >= parameters[i].theta_upper() && gradient[k] < 0.0);
+    if (!outward) free.push_back(k);
+  }
+  return free;
+}
+
+/// One damped step over the free parameters, cut at the bounds. Returns its length in units of the
+/// residuals.
+double damped_step(std::span<const FitParameter> parameters, const std::vector<Eigen::Index>& free,
+                   const Eigen::MatrixXd& gram, const Eigen::VectorXd& gradient, double damping,
+                   const ThetaPoint& from, ThetaPoint& to) {
+  const auto n = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd a(n, n);
+  Eigen::VectorXd b(n);
+  Eigen::VectorXd scale(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Index p = free[static_cast<std::size_t>(i)];
+    scale[i] = gram(p, p) > 0.0 ? 1.0 / std::sqrt(gram(p, p)) : 0.0;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Index p = free[static_cast<std::size_t>(i)];
+    b[i] = -gradient[p] * scale[i];
+    for (Eigen::Index j = 0; j < n; ++j) {
+      a(i, j) = gram(p, free[static_cast<std::size_t>(j)]) * scale[i] * scale[j];
+    }
+    a(i, i) = 1.0 + damping;
+  }
+  const Eigen::VectorXd step = a.ldlt().solve(b);
+  to.theta = from.theta;
+  to.natural = from.natural;
+  double length = 0.0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Index p = free[static_cast<std::size_t>(i)];
+    const FitParameter& parameter = parameters[static_cast<std::size_t>(p)];
+    to.theta[p] = std::clamp(from.theta[p] + step[i] * scale[i], parameter.theta_lower(),
+                             parameter.theta_upper());
+    to.natural[static_cast<std::size_t>(p)] =
+        std::clamp(parameter.natural(to.theta[p]), parameter.lower, parameter.upper);
+    if (scale[i] > 0.0) length += std::pow((to.theta[p] - from.theta[p]) / scale[i], 2);
+  }
+  return std::sqrt(length);
+}
+
+}  // namespace
+
+Minimum minimise_near(const ResidualFunction& function, std::span<const FitParameter> parameters,
+                      std::span<const double> start, const FixedMask& fixed) {
+  constexpr int kMostIterations = 80;
+  constexpr double kMostDamping = 1e8;
+  constexpr double kLeastDamping = 1e-12;
+  constexpr double kSmallStep = 1e-4;  // of a standard error: 1e-8 of the deviance's natural unit
+  ThetaPoint here;
+  here.natural.assign(start.begin(), start.end());
+  here.theta.resize(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const FitParameter& p = parameters[i];
+    if (fixed.empty() || !fixed[i]) here.natural[i] = std::clamp(start[i], p.lower, p.upper);
+    here.theta[static_cast<Eigen::Index>(i)] = p.theta(here.natural[i]);
+  }
+  Minimum minimum;
+  bool usable = evaluate_theta(function, parameters, here);
+  double damping = 1e-4;
+  ThetaPoint next;
+  while (usable && !minimum.converged && minimum.iterations < kMostIterations &&
+         damping < kMostDamping) {
+    const Eigen::VectorXd gradient = here.jacobian.transpose() * here.r;
+    const Eigen::MatrixXd gram = here.jacobian.transpose() * here.jacobian;
+    const auto free = movable(parameters, fixed, here, gradient);
+    for (bool accepted = false; !accepted && damping < kMostDamping; ++minimum.iterations) {
+      const double length = damped_step(parameters, free, gram, gradient, damping, here, next);
+      const double sigma = std::sqrt(here.cost / static_cast<double>(here.r.size()));
+      const bool small = length <= kSmallStep * sigma;
+      const bool evaluated = evaluate_theta(function, parameters, next);
+      accepted = evaluated && next.cost <= here.cost;
+      if (small && damping < 1e-2) minimum.converged = true;
+      if (!accepted && minimum.converged) break;
+      damping = accepted ? std::max(damping * 0.1, kLeastDamping) : damping * 8.0;
+      if (accepted) std::swap(here, next);
+    }
+  }
+  if (!usable) return minimise(function, parameters, start, fixed);
+  // However short the step, the sum of squares no longer falls: rounding has the last word.
+  minimum.converged = minimum.converged || damping >= kMostDamping;
+  if (!minimum.converged) return minimise(function, parameters, here.natural, fixed);
+  minimum.natural = here.natural;
+  minimum.deviance = here.cost - function.offset();
+  minimum.usable = true;
+  minimum.message = "projected Levenberg-Marquardt: no step above 1e-4 of a standard error";
+  return minimum;
+}
+
 std::vector<std::vector<double>> latin_hypercube_starts(std::span<const FitParameter> parameters,
                                                         std::size_t count, std::uint64_t seed) {
   std::vector<std::vector<double>> starts(count, std::vector<double>(parameters.size()));

@@ -68,6 +68,14 @@ enum class FirstStep { bold, cautious };
                                std::span<const double> start, const FixedMask& fixed = {},
                                FirstStep first_step = FirstStep::bold);
 
+/// The same from a start that is already close (a neighbouring point of a profile, a start whose
+/// linear parameters were solved for): projected Levenberg-Marquardt with an active set of bounds,
+/// a few evaluations where the general search needs dozens. Ends when a step moves no parameter by
+/// more than 1e-4 of its standard error; where it does not converge, minimise() takes over.
+[[nodiscard]] Minimum minimise_near(const ResidualFunction& function,
+                                    std::span<const FitParameter> parameters,
+                                    std::span<const double> start, const FixedMask& fixed = {});
+
 /// Deviance at a point; NaN if it cannot be evaluated.
 [[nodiscard]] double deviance_at(const ResidualFunction& function, std::span<const double> natural);
 

@@ -1,7 +1,10 @@
 #include "tpm/fit/starts.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace tpm {
 namespace {
@@ -88,10 +91,11 @@ std::vector<std::vector<double>> projected_starts(const ResidualFunction& functi
   return starts;
 }
 
-std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
-                                            std::span<const FitParameter> parameters) {
+namespace {
+
+/// Which estimated parameters the residuals are linear in.
+std::vector<bool> linear_parameters(const ExperimentResiduals& function) {
   const FitConfig& config = function.config();
-  const std::size_t count = std::max<std::size_t>(config.starts, 1);
   std::vector<bool> linear;
   linear.reserve(config.parameters.size());
   for (const EstimatedParameter& p : config.parameters) {
@@ -100,14 +104,61 @@ std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
                        return function.model().linear_in(target.parameter);
                      }));
   }
+  return linear;
+}
+
+/// Branches can change places without changing the law: starts have them in the order of their
+/// times, so that equal laws are seen to be equal.
+void sort_branches(const FitConfig& config, std::vector<double>& start) {
+  const auto place = [&](const std::string& name) -> std::optional<std::size_t> {
+    for (std::size_t i = 0; i < config.parameters.size(); ++i) {
+      if (config.parameters[i].fit.name == name) return i;
+    }
+    return std::nullopt;
+  };
+  const bool series = config.law->form == BranchForm::series;
+  std::vector<std::pair<double, double>> branches;  // time, stiffness
+  std::vector<std::pair<std::size_t, std::size_t>> places;
+  for (int i = 1; i <= config.law->branches; ++i) {
+    const auto time = place(fmt::format("{}{}", series ? "T" : "tau", i));
+    const auto stiffness = place(fmt::format("{}{}", series ? "kc" : "k", i));
+    if (!time || !stiffness) return;  // some are fixed: they keep their names
+    places.emplace_back(*time, *stiffness);
+    branches.emplace_back(start[*time], start[*stiffness]);
+  }
+  std::sort(branches.begin(), branches.end());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    start[places[i].first] = branches[i].first;
+    start[places[i].second] = branches[i].second;
+  }
+}
+
+}  // namespace
+
+StartKind start_kind(const ExperimentResiduals& function) {
+  const FitConfig& config = function.config();
   const bool linear_noise = std::all_of(config.data.begin(), config.data.end(), [](const auto& d) {
     return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model;
   });
+  const std::vector<bool> linear = linear_parameters(function);
   const bool any = std::find(linear.begin(), linear.end(), true) != linear.end();
-  if (!any || !linear_noise || config.loss.kind != Loss::none) {
+  return any && linear_noise && config.loss.kind == Loss::none ? StartKind::solved
+                                                               : StartKind::anywhere;
+}
+
+std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
+                                            std::span<const FitParameter> parameters) {
+  const FitConfig& config = function.config();
+  const std::size_t count = std::max<std::size_t>(config.starts, 1);
+  if (start_kind(function) == StartKind::anywhere) {
     return latin_hypercube_starts(parameters, count, config.seed);
   }
-  return projected_starts(function, parameters, linear, count, kFollowed, config.seed);
+  auto starts = projected_starts(function, parameters, linear_parameters(function), count,
+                                 kFollowed, config.seed);
+  if (config.law) {
+    for (auto& start : starts) sort_branches(config, start);
+  }
+  return starts;
 }
 
 }  // namespace tpm

@@ -7,6 +7,12 @@
 
 namespace tpm {
 
+/// Where starts come from, which decides how they are followed.
+enum class StartKind {
+  anywhere,  ///< spread over the bounds: the general search, with a bold and a cautious first step
+  solved,    ///< their linear parameters were solved for: the search from nearby
+};
+
 /// Minimum of |A x - b| with lower <= x <= upper, by coordinate descent on the normal equations:
 /// for a handful of columns. Columns of zeros leave x at the bound nearest to 0.
 [[nodiscard]] Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a,
@@ -21,6 +27,9 @@ namespace tpm {
 [[nodiscard]] std::vector<std::vector<double>> projected_starts(
     const ResidualFunction& function, std::span<const FitParameter> parameters,
     const std::vector<bool>& linear, std::size_t count, std::size_t keep, std::uint64_t seed);
+
+/// Whether fit_starts() gives projected starts.
+[[nodiscard]] StartKind start_kind(const ExperimentResiduals& function);
 
 /// The starts of a configuration: a Latin hypercube of all parameters, or, where the model is
 /// linear in some and the noise does not depend on it, projected starts.

@@ -165,11 +165,11 @@ class ProfileWalk {
     const double value = std::clamp(p.natural(theta), p.lower, p.upper);
     std::vector<double> start = warm_;
     start[index_] = value;
-    Minimum m = minimise(function_, parameters_, start, fixed_);
+    Minimum m = minimise_near(function_, parameters_, start, fixed_);
     if (!m.usable || m.deviance > best_deviance_ + rise_) {
       start = minimum_.natural;
       start[index_] = value;
-      const Minimum other = minimise(function_, parameters_, start, fixed_);
+      const Minimum other = minimise_near(function_, parameters_, start, fixed_);
       if (other.usable && (!m.usable || other.deviance < m.deviance)) m = other;
     }
     return m;

@@ -47,8 +47,8 @@ ContactHistory::Point ContactHistory::imposed(double drive, bool touching) const
   point.v = k.value;
   const KernelPlaces& p = law_.place;
   if (p.exponent >= 0) point.v_by[p.exponent] = k.d_exponent;
-  if (p.tension_ratio >= 0) {
-    point.v_by[p.tension_ratio] = k.d_ratio;
+  if (p.tension_share >= 0) {
+    point.v_by[p.tension_share] = k.d_share;
     point.v_by[p.spacing] = k.d_spacing;
   }
   if (point.u > 0.0 || touching) {
@@ -233,8 +233,8 @@ ContactHistory::Point ContactHistory::surface_under(double load, const Balance& 
   if (!want_slopes_) return point;
   const KernelPlaces& p = law_.place;
   if (p.exponent >= 0) point.v_by[p.exponent] = k.d_exponent;
-  if (p.tension_ratio >= 0) {
-    point.v_by[p.tension_ratio] = k.d_ratio;
+  if (p.tension_share >= 0) {
+    point.v_by[p.tension_share] = k.d_share;
     point.v_by[p.spacing] = k.d_spacing;
   }
   Slopes excess_by = balance.a_by * k.value + balance.a * point.v_by - balance.r_by;

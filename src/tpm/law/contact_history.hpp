@@ -13,7 +13,7 @@ namespace tpm {
 /// Where the parameters that shape the kernel stand in the parameter vector; -1 if there is none.
 struct KernelPlaces {
   int exponent = -1;
-  int tension_ratio = -1;
+  int tension_share = -1;
   int k_tension = -1;
   int spacing = -1;
   int contact = -1;

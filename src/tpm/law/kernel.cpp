@@ -25,14 +25,14 @@ TensionShape::Values TensionShape::at(double u) const {
   return {value, value * (3.0 / u - u * y * y * stretch_u), -y * y * value * d_log_y};
 }
 
-KernelShape::KernelShape(Kernel kernel, double reference, double exponent, double tension_ratio,
+KernelShape::KernelShape(Kernel kernel, double reference, double exponent, double tension_share,
                          double spacing)
     : kernel_(kernel),
       reference_(reference),
       exponent_(kernel == Kernel::linear  ? 1.0
                 : kernel == Kernel::hertz ? 1.5
                                           : exponent),
-      ratio_(tension_ratio),
+      share_(tension_share),
       tension_{reference, spacing} {}
 
 double KernelShape::value(double u) const {
@@ -40,11 +40,11 @@ double KernelShape::value(double u) const {
   double w = u;
   if (kernel_ == Kernel::hertz) w = u * std::sqrt(u / reference_);
   if (kernel_ == Kernel::power) w = reference_ * std::exp(exponent_ * std::log(u / reference_));
-  return ratio_ == 0.0 ? w : w + ratio_ * tension_.at(u).value;
+  return share_ == 0.0 ? w : w + share_ * (tension_.at(u).value - w);
 }
 
 KernelShape::Values KernelShape::at(double u) const {
-  if (u <= 0.0) return {0.0, kernel_ == Kernel::linear ? 1.0 : 0.0, 0.0, 0.0, 0.0};
+  if (u <= 0.0) return {0.0, kernel_ == Kernel::linear ? 1.0 - share_ : 0.0, 0.0, 0.0, 0.0};
   Values k{u, 1.0, 0.0, 0.0, 0.0};
   if (kernel_ == Kernel::hertz) {
     const double root = std::sqrt(u / reference_);
@@ -57,20 +57,30 @@ KernelShape::Values KernelShape::at(double u) const {
     k.d_exponent = k.value * log_u;
   }
   const TensionShape::Values t = tension_.at(u);
-  k.d_ratio = t.value;
-  if (ratio_ != 0.0) {
-    k.value += ratio_ * t.value;
-    k.slope += ratio_ * t.slope;
-    k.d_spacing = ratio_ * t.d_spacing;
+  k.d_share = t.value - k.value;
+  if (share_ != 0.0) {
+    k.value += share_ * (t.value - k.value);
+    k.slope += share_ * (t.slope - k.slope);
+    k.d_spacing = share_ * t.d_spacing;
+    k.d_exponent *= 1.0 - share_;
   }
   return k;
 }
 
 double KernelShape::inverse(double v) const {
   if (v <= 0.0) return 0.0;
-  double u = kernel_ == Kernel::linear ? v : reference_ * std::pow(v / reference_, 1.0 / exponent_);
-  if (ratio_ == 0.0) return u;
-  // V is convex and the start is not below the root: Newton falls monotonically onto it.
+  const auto of_kernel = [this](double w) {
+    return kernel_ == Kernel::linear ? w : reference_ * std::pow(w / reference_, 1.0 / exponent_);
+  };
+  if (share_ == 0.0) return of_kernel(v);
+  // V is convex and the start is at least as deep as the root: Newton falls monotonically
+  // onto it. V >= (1 - share) W gives such a start, unless nearly everything is tension.
+  double u = reference_;
+  if (share_ < 0.999) {
+    u = of_kernel(v / (1.0 - share_));
+  } else {
+    while (value(u) < v) u *= 2.0;
+  }
   for (int i = 0; i < 200; ++i) {
     const Values k = at(u);
     const double next = u - (k.value - v) / k.slope;

@@ -16,29 +16,30 @@ struct TensionShape {
   [[nodiscard]] Values at(double u) const;
 };
 
-/// V(u) = W(u) + ratio T(u) for u >= 0: what the relaxation acts on. V(0) = 0 and V rises strictly.
+/// V(u) = (1 - share) W(u) + share T(u) for u >= 0: what the relaxation acts on. V(0) = 0, V rises
+/// strictly, and V(u_ref) = u_ref.
 class KernelShape {
  public:
   /// @param exponent used by Kernel::power
-  /// @param tension_ratio 0 without relaxing tension
-  KernelShape(Kernel kernel, double reference, double exponent, double tension_ratio,
+  /// @param tension_share 0 without relaxing tension
+  KernelShape(Kernel kernel, double reference, double exponent, double tension_share,
               double spacing);
 
   struct Values {
-    double value, slope, d_exponent, d_ratio, d_spacing;
+    double value, slope, d_exponent, d_share, d_spacing;
   };
   [[nodiscard]] Values at(double u) const;
   [[nodiscard]] double value(double u) const;
   /// u with value(u) = v; v >= 0
   [[nodiscard]] double inverse(double v) const;
   /// V is a straight line: histories need no refinement.
-  [[nodiscard]] bool is_linear() const { return kernel_ == Kernel::linear && ratio_ == 0.0; }
+  [[nodiscard]] bool is_linear() const { return kernel_ == Kernel::linear && share_ == 0.0; }
 
  private:
   Kernel kernel_;
   double reference_;
   double exponent_;
-  double ratio_;
+  double share_;
   TensionShape tension_;
 };
 

@@ -230,9 +230,9 @@ std::vector<LawParameter> law_parameters(const LawSpec& spec) {
     add_stiffness("k_tension", "secant stiffness of the tension at the reference depth", true);
   }
   if (spec.tension == Tension::relaxing) {
-    p.push_back({"tension_ratio", Dimension::dimensionless,
-                 "tension over the rest of the kernel at the reference depth", false, false,
-                 std::nullopt, 0.0, kInfinity});
+    p.push_back({"tension_share", Dimension::dimensionless,
+                 "part of the kernel at the reference depth that is tension", false, false,
+                 std::nullopt, 0.0, 1.0});
   }
   if (spec.tension != Tension::none) {
     p.push_back({"spacing", drive, "distance x of lateral neighbours", false, false, kInfinity, 0.0,

@@ -30,7 +30,7 @@ enum class BranchForm {
 enum class Tension {
   none,
   elastic,   ///< F += k_tension T(u), at once and for ever (the paper)
-  relaxing,  ///< the kernel is W + tension_ratio T, and relaxes with the rest
+  relaxing,  ///< the kernel is (1 - tension_share) W + tension_share T, and relaxes as one
 };
 
 /// Relaxation by a spring-pot instead of by branches.
@@ -95,7 +95,7 @@ struct LawParameter {
 };
 
 /// In the order of the parameter vector: k_inf (or k0), k_i (kc_i), tau_i (T_i), alpha, exponent,
-/// k_tension or tension_ratio, spacing, then the nuisance parameters contact and offset, always.
+/// k_tension or tension_share, spacing, then the nuisance parameters contact and offset, always.
 [[nodiscard]] std::vector<LawParameter> law_parameters(const LawSpec& spec);
 
 /// Stiffness at once, in the end and between: the law's relaxation function in parallel form.

@@ -144,7 +144,7 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values) const {
   };
   KernelPlaces place;
   const double exponent = get("exponent", 1.0, place.exponent);
-  const double ratio = get("tension_ratio", 0.0, place.tension_ratio);
+  const double ratio = get("tension_share", 0.0, place.tension_share);
   const double k_tension = get("k_tension", 0.0, place.k_tension);
   const double spacing = get("spacing", std::numeric_limits<double>::infinity(), place.spacing);
   const double contact = get("contact", 0.0, place.contact);

@@ -88,10 +88,10 @@ FitParameter law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int
     fit.lower = p.lower;
     fit.upper = p.upper;
     fit.start = 0.3;
-  } else if (p.name == "tension_ratio") {
+  } else if (p.name == "tension_share") {
     fit.scale = Scale::linear;
     fit.lower = 0.0;
-    fit.upper = 20.0;
+    fit.upper = 1.0;
     fit.start = 0.5;
   } else {
     fit.scale = p.linear ? Scale::linear : Scale::log;
@@ -132,7 +132,7 @@ FitParameter contact_bounds(const LawSpec& law, std::span<const PreparedRecordin
   const bool preloaded = r.phases.preloaded || !r.phases.contact_found;
   fit.start = begin;
   fit.lower = bends(law) || !stretch ? begin - (stretch ? 0.5 : 0.25) * range : begin;
-  fit.upper = begin + (stretch ? 0.6 : preloaded ? 0.0 : 0.1) * range;
+  fit.upper = begin + (stretch ? 0.6 : 0.1) * range;
   if (preloaded && !stretch) fit.start = begin - 0.05 * range;
   return fit;
 }
