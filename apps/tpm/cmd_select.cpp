@@ -18,6 +18,7 @@ struct SelectOptions {
   std::string seed = "0";
   std::string output;
   bool no_held_out = false;
+  bool no_profiles = false;
 };
 
 std::vector<LawSpec> chosen_laws(const SelectOptions& options) {
@@ -35,6 +36,7 @@ int select(const SelectOptions& options, const Session& session) {
   selection.laws = chosen_laws(options);
   selection.margin = parse_number(options.margin, "--margin");
   selection.held_out = !options.no_held_out;
+  selection.setup.profiles = !options.no_profiles;
   selection.setup.seed = parse_whole_number(options.seed, "--seed", 0);
   const auto recordings = read_recordings(options.recordings);
   const Selection result = select_law(recordings, selection);
@@ -63,6 +65,8 @@ void add_select_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of the random starts")->capture_default_str();
   command->add_flag("--no-held-out", options->no_held_out, "Leave out the held-out predictions");
+  command->add_flag("--no-profiles", options->no_profiles,
+                    "Leave out the intervals of the recommended law");
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
   add_format_option(*command, session);
   command->footer(

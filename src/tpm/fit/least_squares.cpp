@@ -267,8 +267,8 @@ std::vector<Eigen::Index> movable(std::span<const FitParameter> parameters, cons
   return free;
 }
 
-/// One damped step over the free parameters, cut at the bounds. Returns its length in units of the
-/// residuals.
+/// One damped step over the free parameters, cut at the bounds. Returns the length of the change
+/// that it makes to the residuals: a step along a direction that the data do not see is short.
 double damped_step(std::span<const FitParameter> parameters, const std::vector<Eigen::Index>& free,
                    const Eigen::MatrixXd& gram, const Eigen::VectorXd& gradient, double damping,
                    const ThetaPoint& from, ThetaPoint& to) {
@@ -291,7 +291,6 @@ double damped_step(std::span<const FitParameter> parameters, const std::vector<E
   const Eigen::VectorXd step = a.ldlt().solve(b);
   to.theta = from.theta;
   to.natural = from.natural;
-  double length = 0.0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Index p = free[static_cast<std::size_t>(i)];
     const FitParameter& parameter = parameters[static_cast<std::size_t>(p)];
@@ -299,19 +298,19 @@ double damped_step(std::span<const FitParameter> parameters, const std::vector<E
                              parameter.theta_upper());
     to.natural[static_cast<std::size_t>(p)] =
         std::clamp(parameter.natural(to.theta[p]), parameter.lower, parameter.upper);
-    if (scale[i] > 0.0) length += std::pow((to.theta[p] - from.theta[p]) / scale[i], 2);
   }
-  return std::sqrt(length);
+  const Eigen::VectorXd moved = to.theta - from.theta;
+  return std::sqrt(std::max(moved.dot(gram * moved), 0.0));
 }
 
 }  // namespace
 
 Minimum minimise_near(const ResidualFunction& function, std::span<const FitParameter> parameters,
                       std::span<const double> start, const FixedMask& fixed) {
-  constexpr int kMostIterations = 80;
+  constexpr int kMostIterations = 200;
   constexpr double kMostDamping = 1e8;
   constexpr double kLeastDamping = 1e-12;
-  constexpr double kSmallStep = 1e-4;  // of a standard error: 1e-8 of the deviance's natural unit
+  constexpr double kSmallStep = 1e-4;  // of sigma: 1e-8 of the deviance's natural unit
   ThetaPoint here;
   here.natural.assign(start.begin(), start.end());
   here.theta.resize(static_cast<Eigen::Index>(parameters.size()));
@@ -344,11 +343,13 @@ Minimum minimise_near(const ResidualFunction& function, std::span<const FitParam
   if (!usable) return minimise(function, parameters, start, fixed);
   // However short the step, the sum of squares no longer falls: rounding has the last word.
   minimum.converged = minimum.converged || damping >= kMostDamping;
-  if (!minimum.converged) return minimise(function, parameters, here.natural, fixed);
   minimum.natural = here.natural;
   minimum.deviance = here.cost - function.offset();
   minimum.usable = true;
-  minimum.message = "projected Levenberg-Marquardt: no step above 1e-4 of a standard error";
+  minimum.message =
+      minimum.converged
+          ? "projected Levenberg-Marquardt: no step changes the residuals by 1e-4 sigma"
+          : "projected Levenberg-Marquardt: out of iterations in a flat valley";
   return minimum;
 }
 

@@ -70,8 +70,8 @@ enum class FirstStep { bold, cautious };
 
 /// The same from a start that is already close (a neighbouring point of a profile, a start whose
 /// linear parameters were solved for): projected Levenberg-Marquardt with an active set of bounds,
-/// a few evaluations where the general search needs dozens. Ends when a step moves no parameter by
-/// more than 1e-4 of its standard error; where it does not converge, minimise() takes over.
+/// a few evaluations where the general search needs dozens. Ends when a step changes the residuals
+/// by less than 1e-4 standard deviations in all, or after 200 steps (then not `converged`).
 [[nodiscard]] Minimum minimise_near(const ResidualFunction& function,
                                     std::span<const FitParameter> parameters,
                                     std::span<const double> start, const FixedMask& fixed = {});
