@@ -1,17 +1,25 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <memory>
 
 #include "command.hpp"
+#include "recording_options.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/report/recording_report.hpp"
 #include "tpm/store/json.hpp"
+#include "tpm/study/specimens.hpp"
 
 namespace tpm::app {
 namespace {
 
 struct FitOptions {
-  std::string config;
+  RecordingOptions recordings;  ///< its files may also be one configuration, or one folder
+  std::string law;
+  std::string folder;
+  bool no_draw = false;
   std::string output;
   std::string rate;
   std::string hold_out_depth;
@@ -20,7 +28,7 @@ struct FitOptions {
 };
 
 FitConfig configured(const FitOptions& options) {
-  FitConfig config = read_fit_config(options.config);
+  FitConfig config = read_fit_config(options.recordings.files.front());
   if (!options.starts.empty()) config.starts = parse_whole_number(options.starts, "--starts", 1);
   if (!options.seed.empty()) config.seed = parse_whole_number(options.seed, "--seed", 0);
   for (DataChoice& data : config.data) {
@@ -37,11 +45,97 @@ FitConfig configured(const FitOptions& options) {
   return config;
 }
 
-int fit(const FitOptions& options, const Session& session) {
+/// A configuration says what is estimated; any other JSON file describes a recording.
+bool is_configuration(const std::vector<std::string>& files) {
+  return files.size() == 1 && files.front().ends_with(".json") &&
+         read_json(files.front()).contains("parameters");
+}
+
+SelectionOptions selection_options(const FitOptions& options) {
+  SelectionOptions selection;
+  if (!options.law.empty()) selection.laws = {parse_law_name(options.law, "--law")};
+  if (!options.starts.empty()) {
+    selection.setup.starts = parse_whole_number(options.starts, "--starts", 1);
+  }
+  if (!options.seed.empty()) selection.setup.seed = parse_whole_number(options.seed, "--seed", 0);
+  return selection;
+}
+
+/// Recordings in a folder, in alphabetical order.
+std::vector<std::string> recordings_in(const std::filesystem::path& folder) {
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string ending = entry.path().extension().string();
+    if (entry.is_regular_file() && (ending == ".csv" || ending == ".txt" || ending == ".tsv")) {
+      files.push_back(entry.path().string());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  if (files.empty()) {
+    throw bad_input(folder.string(), "no recording", "files that end in .csv, .txt or .tsv");
+  }
+  return files;
+}
+
+int fit_configuration(const FitOptions& options, const Session& session) {
   const FitResult result = run_fit(configured(options));
-  const std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
+  deliver(session.json() ? to_text(to_json(result)) : to_terminal_text(result), options.output);
+  return 0;
+}
+
+int fit_folder(const FitOptions& options, const Session& session) {
+  RecordingOptions input = options.recordings;
+  input.files = recordings_in(options.recordings.files.front());
+  const SelectionOptions selection = selection_options(options);
+  const std::optional<LawSpec> law =
+      selection.laws.empty() ? std::nullopt : std::optional<LawSpec>(selection.laws.front());
+  const SpecimenStudy study = study_specimens(read_recordings(input), law, selection);
+  deliver(session.json() ? to_text(to_json(study)) : to_terminal_text(study), options.output);
+  return 0;
+}
+
+int fit_recordings(const FitOptions& options, const Session& session) {
+  const auto recordings = read_recordings(options.recordings);
+  const Selection selection = select_law(recordings, selection_options(options));
+  const FitResult& best = selection.candidates[selection.recommended].fit;
+  std::string text;
+  if (session.json()) {
+    text = to_text(to_json(selection));
+  } else {
+    for (const PreparedRecording& r : recordings) {
+      for (const std::string& words : r.phases.words) text += fmt::format("{}\n", words);
+    }
+    text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
+    for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);
+  }
+  if (!options.no_draw) {
+    const std::string stem = std::filesystem::path(recordings.front().name).stem().string();
+    const std::string folder = options.folder.empty() ? stem + "_fit" : options.folder;
+    const auto files = write_recording_report(folder, selection);
+    if (!session.json()) {
+      text += fmt::format("\nwritten to {}: {}\n", folder, fmt::join(files, ", "));
+    }
+  }
+  if (!session.json()) {
+    text += fmt::format("\nthe configuration (edit it and run: tpm fit {}):\n{}",
+                        options.no_draw ? "CONFIG.json" : "config.json",
+                        to_text(config_json(best.config)));
+  }
   deliver(text, options.output);
   return 0;
+}
+
+int fit(const FitOptions& options, const Session& session) {
+  const std::vector<std::string>& files = options.recordings.files;
+  if (is_configuration(files)) return fit_configuration(options, session);
+  if (!options.rate.empty() || !options.hold_out_depth.empty()) {
+    throw Error(ExitCode::usage, "--rate, --hold-out", "without a configuration",
+                "them only with a CONFIG.json");
+  }
+  if (files.size() == 1 && std::filesystem::is_directory(files.front())) {
+    return fit_folder(options, session);
+  }
+  return fit_recordings(options, session);
 }
 
 }  // namespace
@@ -50,8 +144,19 @@ void add_fit_command(CLI::App& app, Session& session) {
   CLI::App* command =
       app.add_subcommand("fit", "Fit model parameters to curves, with intervals and verdicts");
   auto options = std::make_shared<FitOptions>();
-  command->add_option("CONFIG", options->config, "JSON configuration (schemas/fit.schema.json)")
+  command
+      ->add_option(
+          "FILE", options->recordings.files,
+          "A configuration (schemas/fit.schema.json), recordings to be fitted together, or "
+          "a folder of recordings to be fitted one by one and pooled")
       ->required();
+  command->add_option(
+      "--law", options->law,
+      "Recordings: fit this law, e.g. power-2 (default: the least that they support)");
+  command->add_option("--folder", options->folder,
+                      "Recordings: where figures and config.json go (default: NAME_fit)");
+  command->add_flag("--no-draw", options->no_draw, "Recordings: write no figures and files");
+  add_recording_options(*command, options->recordings);
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
   command->add_option("--rate", options->rate, "Assume this ramp rate instead, e.g. \"2 mm/s\"");
   command->add_option("--hold-out", options->hold_out_depth,
@@ -61,6 +166,7 @@ void add_fit_command(CLI::App& app, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm fit configs/liver_relaxation.json\n"
+      "  tpm fit meat.csv\n  tpm fit folder_of_recordings --law power-2\n"
       "  tpm fit configs/liver_relaxation.json --hold-out \"8 mm\" --format json -o fit.json");
   command->callback([options, &session] {
     session.run = [options, &session] { return fit(*options, session); };

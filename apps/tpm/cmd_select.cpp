@@ -54,6 +54,10 @@ void add_select_command(CLI::App& app, Session& session) {
   CLI::App* command =
       app.add_subcommand("select", "Find the least law that recordings support, with the evidence");
   auto options = std::make_shared<SelectOptions>();
+  command
+      ->add_option("FILE", options->recordings.files,
+                   "Recordings: machine exports or curves of tpm")
+      ->required();
   add_recording_options(*command, options->recordings);
   command->add_option("--laws", options->laws, "Only these laws, e.g. linear-1-elastic,power-2")
       ->delimiter(',');

@@ -27,8 +27,6 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
   const auto add = [&](const char* name, std::string& target, const char* help) {
     command.add_option(name, target, help)->group("What the files do not say");
   };
-  command.add_option("FILE", options.files, "Recordings: machine exports or curves of tpm")
-      ->required();
   add("--time", options.time, "Column of the times: name, or number from 1");
   add("--drive", options.drive, "Column of the depth or relative length");
   add("--response", options.response, "Column of the force or stress");

@@ -22,7 +22,7 @@ struct RecordingOptions {
 [[nodiscard]] std::map<std::string, std::string> unit_options(
     const std::vector<std::string>& pairs);
 
-/// Adds FILE... and the options above.
+/// Adds the options above; `files` is the command's own.
 void add_recording_options(CLI::App& command, RecordingOptions& options);
 
 [[nodiscard]] ImportOptions import_options(const RecordingOptions& options);

@@ -41,7 +41,7 @@ std::vector<Finding> text_findings(const DelimitedTable& table, ImportFormat for
           {"decimal sign", table.decimal_comma ? "comma" : "point"}};
 }
 
-const Axis& required_axis(const std::optional<Axis>& axis, char name, const std::string& file) {
+const DigitizedAxis& required_axis(const std::optional<DigitizedAxis>& axis, char name, const std::string& file) {
   if (axis) return *axis;
   throw bad_input(file, fmt::format("a digitised file does not say what its {} axis shows", name),
                   fmt::format("--{} QUANTITY:UNIT, such as --{} {}", name, name,
@@ -68,8 +68,8 @@ void sort_along(std::vector<double>& x, std::vector<double>& y, std::vector<Find
 
 ImportedSeries digitized_series(DigitizedDataset dataset, const std::string& file,
                                 const ImportOptions& options, std::vector<Finding> findings) {
-  const Axis& x = required_axis(options.x, 'x', file);
-  const Axis& y = required_axis(options.y, 'y', file);
+  const DigitizedAxis& x = required_axis(options.x, 'x', file);
+  const DigitizedAxis& y = required_axis(options.y, 'y', file);
   ImportedSeries series;
   series.name = dataset.name;
   series.findings = std::move(findings);
@@ -139,9 +139,9 @@ ImportFormat parse_import_format(std::string_view text, std::string_view where) 
                   "auto, machine, wpd-csv, wpd-json or engauge");
 }
 
-Axis parse_axis(std::string_view text, std::string_view where) {
+DigitizedAxis parse_axis(std::string_view text, std::string_view where) {
   const auto colon = text.find(':');
-  Axis axis;
+  DigitizedAxis axis;
   axis.quantity = parse_quantity_name(text.substr(0, colon), where);
   const std::string_view unit = colon == std::string_view::npos ? "" : text.substr(colon + 1);
   axis.unit = parse_unit(unit, quantity_dimension(axis.quantity), where);

@@ -28,13 +28,13 @@ enum class ImportFormat {
 [[nodiscard]] ImportFormat parse_import_format(std::string_view text, std::string_view where);
 
 /// What one axis of a digitised figure shows.
-struct Axis {
+struct DigitizedAxis {
   Quantity quantity = Quantity::time;
   Unit unit;
 };
 
 /// "contact_force:N" or "abscissa". Throws Error(bad_input).
-[[nodiscard]] Axis parse_axis(std::string_view text, std::string_view where);
+[[nodiscard]] DigitizedAxis parse_axis(std::string_view text, std::string_view where);
 
 /// What the user says about a file; everything left out is found in the file or is an error that
 /// names the option. Nothing is guessed: a column without a unit is not imported.
@@ -62,8 +62,8 @@ struct ImportOptions {
   int contact_samples = 3;                ///< how many samples in a row must reach it, from 1
 
   // Digitised figures.
-  std::optional<Axis> x;
-  std::optional<Axis> y;
+  std::optional<DigitizedAxis> x;
+  std::optional<DigitizedAxis> y;
   std::string dataset;            ///< only the dataset of this name
   std::optional<double> depth_m;  ///< imposed depth of a digitised relaxation curve
   std::optional<double> load_N;   ///< imposed load of a digitised creep curve

@@ -19,17 +19,6 @@ bool is_after_the_test(PhaseKind kind) {
 /// Samples before contact that are kept, so that the zero of the response is seen.
 constexpr std::size_t kBaseline = 10;
 
-Unit display_unit(Dimension dimension) {
-  switch (dimension) {
-    case Dimension::length:
-      return parse_unit("mm", dimension, "display");
-    case Dimension::stress:
-      return parse_unit("kPa", dimension, "display");
-    default:
-      return parse_unit(si_symbol(dimension), dimension, "display");
-  }
-}
-
 /// What the recordings tell about the sizes of a law's parameters.
 struct Sizes {
   double drive = 0.0;     ///< largest drive above contact
@@ -71,7 +60,7 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
 FitParameter law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int branches) {
   FitParameter fit;
   fit.name = p.name;
-  fit.unit = display_unit(p.dimension);
+  fit.unit = shown_unit(p.dimension);
   const double stiffness = sizes.response / sizes.drive;
   if (p.dimension == Dimension::time) {
     fit.scale = Scale::log;
@@ -125,7 +114,7 @@ FitParameter contact_bounds(const LawSpec& law, std::span<const PreparedRecordin
   fit.name = std::move(name);
   fit.scale = Scale::linear;
   const bool stretch = is_stretch(law);
-  fit.unit = display_unit(stretch ? Dimension::dimensionless : Dimension::length);
+  fit.unit = shown_unit(stretch ? Dimension::dimensionless : Dimension::length);
   const PreparedRecording& r = recordings.front();
   const double begin = start_drive(r);
   const double range = r.phases.peak_drive - begin;
@@ -141,7 +130,7 @@ FitParameter offset_bounds(const LawSpec& law, const PreparedRecording& r, std::
   FitParameter fit;
   fit.name = std::move(name);
   fit.scale = Scale::linear;
-  fit.unit = display_unit(is_stretch(law) ? Dimension::stress : Dimension::force);
+  fit.unit = shown_unit(is_stretch(law) ? Dimension::stress : Dimension::force);
   const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
   fit.start = 0.0;
   fit.lower = -peak;
@@ -291,7 +280,7 @@ Json config_json(const FitConfig& config) {
     const Dimension drive = quantity_dimension(config.law->drive);
     j["law"] = {{"name", law_name(*config.law)},
                 {"drive", quantity_name(config.law->drive)},
-                {"reference", text(config.law->reference, display_unit(drive))}};
+                {"reference", text(config.law->reference, shown_unit(drive))}};
   } else {
     j["model"] = config.model;
   }
@@ -320,7 +309,7 @@ Json config_json(const FitConfig& config) {
   for (std::size_t i = 0; i < estimated.size(); ++i) {
     if (estimated[i] || !std::isfinite(config.fixed[i])) continue;
     const ParameterDescription& p = model->parameters()[i];
-    fixed[std::string(p.name)] = text(config.fixed[i], display_unit(p.dimension));
+    fixed[std::string(p.name)] = text(config.fixed[i], shown_unit(p.dimension));
   }
   if (!fixed.empty()) j["fixed"] = std::move(fixed);
   Json data = Json::array();
@@ -330,11 +319,11 @@ Json config_json(const FitConfig& config) {
     entry["noise"] = {{"kind", noise_kind_name(d.noise.kind)}};
     if (d.noise.kind == NoiseKind::absolute) {
       const Dimension response = quantity_dimension(config.law->response);
-      entry["noise"]["absolute"] = text(d.noise.absolute, display_unit(response));
+      entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(response));
     }
     entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";
-    if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, display_unit(Dimension::time));
-    if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, display_unit(Dimension::time));
+    if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));
+    if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, shown_unit(Dimension::time));
     data.push_back(std::move(entry));
   }
   j["data"] = std::move(data);

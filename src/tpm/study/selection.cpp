@@ -271,6 +271,35 @@ std::vector<LawSpec> fractional_family() {
   return laws;
 }
 
+std::vector<std::string> outside_words(const FitResult& fit) {
+  constexpr double kDescribes = 3.0;  // times the residual inside the window
+  std::vector<std::string> words;
+  for (const RecordingFit& r : fit.recordings) {
+    double sum = 0.0;
+    double observed_left = 0.0;
+    std::size_t count = 0;
+    double last_s = 0.0;
+    for (std::size_t i = 0; i < r.time_s.size(); ++i) last_s = r.fitted[i] ? r.time_s[i] : last_s;
+    for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+      if (r.time_s[i] <= last_s) continue;
+      sum += std::pow(r.predicted[i] - r.observed[i], 2);
+      observed_left = r.drive[i];
+      ++count;
+    }
+    if (count == 0) continue;
+    const double rms = std::sqrt(sum / static_cast<double>(count));
+    const bool describes = rms <= kDescribes * r.rms_residual;
+    words.push_back(
+        fmt::format("{}: after the fitted part (from {} s, {} samples, to a drive of {}) the "
+                    "prediction is off by "
+                    "{} % of the peak (rms){}",
+                    fit.config.data[r.choice].dataset, significant(last_s, 4), count,
+                    significant(observed_left, 3), significant(100.0 * rms / r.peak, 3),
+                    describes ? "" : ": the law does not describe the unloading and what follows"));
+  }
+  return words;
+}
+
 std::vector<std::string> protocol_warnings(const FitResult& fit,
                                            std::span<const PreparedRecording> recordings) {
   std::vector<std::string> warnings;

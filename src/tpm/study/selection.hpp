@@ -76,6 +76,10 @@ struct Selection {
 [[nodiscard]] Json to_json(const Selection& selection);
 [[nodiscard]] std::string to_terminal_text(const Selection& selection);
 
+/// What the fitted law does with the samples outside the window: "unloading and after: rms 12 % of
+/// the peak; the law does not describe it". Empty if there are none.
+[[nodiscard]] std::vector<std::string> outside_words(const FitResult& fit);
+
 /// What the protocol of a recording cannot tell about a fitted law: relaxation times shorter than
 /// the ramp or the sampling, or longer than the hold.
 [[nodiscard]] std::vector<std::string> protocol_warnings(

@@ -1,0 +1,181 @@
+#include "tpm/report/recording_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+/// More points than this only make the file heavy.
+constexpr std::size_t kMostDrawn = 4000;
+
+struct Units {
+  Unit drive, response;
+};
+
+Units units_of(const RecordingFit& r) {
+  const bool stretch = r.drive_quantity == Quantity::relative_length;
+  return {shown_unit(stretch ? Dimension::dimensionless : Dimension::length),
+          shown_unit(stretch ? Dimension::stress : Dimension::force)};
+}
+
+std::string words_of(Quantity quantity) {
+  std::string words(quantity_name(quantity));
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
+}
+
+std::string file_stem(const std::string& path) {
+  return std::filesystem::path(path).stem().string();
+}
+
+/// Takes every k-th sample for which `wanted` holds.
+template <class Wanted>
+Series sampled(Series series, const RecordingFit& r, const std::vector<double>& x, double x_unit,
+               const std::vector<double>& y, double y_unit, const Wanted& wanted) {
+  const std::size_t stride = 1 + r.time_s.size() / kMostDrawn;
+  for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
+    if (!wanted(i)) continue;
+    series.x.push_back(x[i] / x_unit);
+    series.y.push_back(y[i] / y_unit);
+  }
+  return series;
+}
+
+Series measured(const char* label, const RecordingFit& r) {
+  Series s;
+  s.kind = Series::Kind::points;
+  s.label = label;
+  s.provenance = provenance_name(r.provenance);
+  return s;
+}
+
+void add_if_any(Panel& panel, Series series) {
+  if (!series.x.empty()) panel.series.push_back(std::move(series));
+}
+
+Panel response_panel(const RecordingFit& r, bool over_time) {
+  const Units units = units_of(r);
+  Panel panel;
+  const std::vector<double>& x = over_time ? r.time_s : r.drive;
+  const double x_unit = over_time ? 1.0 : units.drive.to_si;
+  panel.x = {over_time ? "time" : words_of(r.drive_quantity),
+             over_time ? "s" : units.drive.symbol,
+             false,
+             {},
+             {}};
+  panel.y = {words_of(r.response_quantity), units.response.symbol, false, {}, {}};
+  const double y_unit = units.response.to_si;
+  const auto inside = [&](std::size_t i) { return r.fitted[i]; };
+  const auto outside = [&](std::size_t i) { return !r.fitted[i]; };
+  add_if_any(panel,
+             sampled(measured("measured, fitted", r), r, x, x_unit, r.observed, y_unit, inside));
+  add_if_any(panel, sampled(measured("measured, not fitted", r), r, x, x_unit, r.observed, y_unit,
+                            outside));
+  add_if_any(panel, sampled(line("law", {}, {}), r, x, x_unit, r.predicted, y_unit, inside));
+  if (over_time) {
+    add_if_any(panel,
+               sampled(line("law, predicted", {}, {}), r, x, x_unit, r.predicted, y_unit, outside));
+  }
+  return panel;
+}
+
+Panel residual_panel(const RecordingFit& r) {
+  Panel panel;
+  panel.x = {"time", "s", false, {}, {}};
+  panel.y = {"residual over peak", "%", false, {}, {}};
+  std::vector<double> residual(r.observed.size());
+  for (std::size_t i = 0; i < residual.size(); ++i) residual[i] = r.predicted[i] - r.observed[i];
+  Series s;
+  s.kind = Series::Kind::points;
+  s.label = "law less measured";
+  s.provenance = "derived";
+  add_if_any(panel, sampled(std::move(s), r, r.time_s, 1.0, residual, 0.01 * r.peak,
+                            [&](std::size_t i) { return r.fitted[i]; }));
+  return panel;
+}
+
+Series laws_at(const Selection& s, bool bic, bool recommended) {
+  Series series;
+  series.kind = Series::Kind::points;
+  series.label = recommended ? "recommended" : "law";
+  series.provenance = "derived";
+  for (std::size_t i = 0; i < s.candidates.size(); ++i) {
+    const Candidate& c = s.candidates[i];
+    if (c.failed || (i == s.recommended) != recommended) continue;
+    series.x.push_back(c.parameters - 1);
+    series.y.push_back(bic ? c.delta_bic : 100.0 * c.rms_over_peak);
+  }
+  return series;
+}
+
+}  // namespace
+
+Figure recording_figure(const FitResult& fit, std::size_t recording) {
+  const RecordingFit& r = fit.recordings.at(recording);
+  const std::string name = file_stem(fit.config.data[r.choice].dataset);
+  const std::string law = fit.config.law ? law_name(*fit.config.law) : fit.config.model;
+  Figure figure;
+  figure.id = fmt::format("fit_{}", name);
+  figure.title = fmt::format("{}: {}", name, law);
+  figure.caption = fmt::format(
+      "{} and the law {}, driven by the measured {}; rms residual {} % of the peak where fitted.",
+      words_of(r.response_quantity), law, words_of(r.drive_quantity),
+      significant(100.0 * r.rms_residual / r.peak, 3));
+  figure.panels = {response_panel(r, true), response_panel(r, false), residual_panel(r)};
+  return figure;
+}
+
+Figure selection_figure(const Selection& selection) {
+  Figure figure;
+  figure.id = "selection";
+  figure.title = "Which law";
+  figure.caption = fmt::format(
+      "Every law that was fitted: residual, and BIC above the best with {} effective readings, "
+      "over "
+      "the number of estimated parameters. The recommended law is {}.",
+      significant(selection.effective_count, 3),
+      law_name(selection.candidates[selection.recommended].law));
+  Panel residual;
+  residual.x = {"estimated parameters", "", false, {}, {}};
+  residual.y = {"rms residual over peak", "%", true, {}, {}};
+  Panel bic;
+  bic.x = residual.x;
+  bic.y = {"BIC above the best", "", false, {}, {}};
+  for (const bool recommended : {false, true}) {
+    add_if_any(residual, laws_at(selection, false, recommended));
+    add_if_any(bic, laws_at(selection, true, recommended));
+  }
+  figure.panels = {std::move(residual), std::move(bic)};
+  return figure;
+}
+
+std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
+                                                const Selection& selection) {
+  const FitResult& fit = selection.candidates[selection.recommended].fit;
+  std::vector<Figure> figures;
+  for (std::size_t i = 0; i < fit.recordings.size(); ++i) {
+    figures.push_back(recording_figure(fit, i));
+    figures.back().id =
+        fmt::format("{}{}", i == 0 ? "fit" : "fit_", i == 0 ? "" : fmt::format("{}", i + 1));
+  }
+  figures.push_back(selection_figure(selection));
+  std::vector<std::string> files{"config.json", "selection.json", "figures.json"};
+  write_file(folder / files[0], to_text(config_json(fit.config)));
+  write_file(folder / files[1], to_text(to_json(selection)));
+  write_file(folder / files[2], to_text(to_json(figures)));
+  draw_figures(find_drawing_python(), folder / files[2], folder, Drawings::svg_and_png);
+  for (const Figure& figure : figures) {
+    files.push_back(fmt::format("{}.svg", figure.id));
+    files.push_back(fmt::format("{}.png", figure.id));
+  }
+  return files;
+}
+
+}  // namespace tpm

@@ -1,0 +1,25 @@
+#pragma once
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tpm/report/figure.hpp"
+#include "tpm/study/selection.hpp"
+
+namespace tpm {
+
+/// Response over time with the fitted law, the residuals below it, and response over drive; samples
+/// outside the window are drawn apart.
+[[nodiscard]] Figure recording_figure(const FitResult& fit, std::size_t recording);
+
+/// Each law's residual and BIC over its number of parameters, the recommended one marked.
+[[nodiscard]] Figure selection_figure(const Selection& selection);
+
+/// Writes config.json (rerun it with tpm fit), selection.json, figures.json and the figures as SVG
+/// and PNG into `folder`. Returns the names of the files. Throws Error(environment) if drawing is
+/// not possible; the other files are then already there.
+[[nodiscard]] std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
+                                                              const Selection& selection);
+
+}  // namespace tpm

@@ -1,0 +1,221 @@
+#include "tpm/study/specimens.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+/// Evidence for a law over all recordings.
+struct Tally {
+  LawSpec law;
+  double bic = 0.0;
+  int parameters = 0;
+  int identified = 0;
+  bool failed = false;
+};
+
+std::vector<Tally> tally_laws(std::span<const PreparedRecording> recordings,
+                              SelectionOptions options) {
+  options.held_out = false;
+  options.setup.profiles = false;
+  std::vector<Tally> tallies;
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    const Selection selection = select_law(recordings.subspan(i, 1), options);
+    for (const Candidate& c : selection.candidates) {
+      const auto found = std::find_if(tallies.begin(), tallies.end(), [&](const Tally& t) {
+        return law_name(t.law) == law_name(c.law);
+      });
+      Tally& tally =
+          found == tallies.end() ? tallies.emplace_back(Tally{c.law, 0, 0, 0, false}) : *found;
+      tally.bic += c.delta_bic;
+      tally.parameters += c.parameters;
+      tally.identified += c.identified ? 1 : 0;
+      tally.failed = tally.failed || c.failed;
+    }
+  }
+  return tallies;
+}
+
+std::pair<LawSpec, std::string> common_law(std::span<const PreparedRecording> recordings,
+                                           const SelectionOptions& options) {
+  const std::vector<Tally> tallies = tally_laws(recordings, options);
+  double best = std::numeric_limits<double>::infinity();
+  for (const Tally& t : tallies) {
+    if (!t.failed) best = std::min(best, t.bic);
+  }
+  const double margin = options.margin * static_cast<double>(recordings.size());
+  const Tally* chosen = nullptr;
+  for (const Tally& t : tallies) {
+    if (t.failed || t.bic - best > margin) continue;
+    if (chosen == nullptr || t.parameters < chosen->parameters) chosen = &t;
+  }
+  if (chosen == nullptr) {
+    throw Error(ExitCode::numerical, "fit", "no law could be fitted to every recording");
+  }
+  return {chosen->law,
+          fmt::format("{} is the least law within {} of the least sum of BIC over {} recordings; "
+                      "all its parameters are identified in {} of them",
+                      law_name(chosen->law), significant(margin, 3), recordings.size(),
+                      chosen->identified)};
+}
+
+SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> one,
+                         const SetupOptions& setup) {
+  SpecimenRow row;
+  row.name = one.front().name;
+  try {
+    row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::numerical) throw;
+    row.reason = error.what();
+  }
+  return row;
+}
+
+bool is_nuisance(const std::string& name) {
+  return name.starts_with("offset") || name.starts_with("contact");
+}
+
+std::vector<PooledParameter> pool(const std::vector<SpecimenRow>& rows, double level) {
+  std::vector<PooledParameter> pooled;
+  const auto first = std::find_if(rows.begin(), rows.end(), [](const auto& r) { return !!r.fit; });
+  if (first == rows.end()) return pooled;
+  for (std::size_t i = 0; i < first->fit->parameters.size(); ++i) {
+    PooledParameter p;
+    p.parameter = first->fit->parameters[i].parameter;
+    if (is_nuisance(p.parameter.name)) continue;
+    // A stiffness varies between specimens by factors, not by differences.
+    p.parameter.scale = p.parameter.lower < 0.0 ? Scale::linear : Scale::log;
+    std::vector<SpecimenEstimate> estimates;
+    for (const SpecimenRow& row : rows) {
+      if (!row.fit) continue;
+      const ParameterResult& r = row.fit->parameters[i];
+      const bool usable = r.standard_error && !r.at_lower_bound && !r.at_upper_bound &&
+                          (p.parameter.scale == Scale::linear || r.estimate > 0.0);
+      if (!usable) {
+        ++p.left_out;
+        continue;
+      }
+      const double slope = p.parameter.scale == Scale::log ? r.estimate : 1.0;
+      estimates.push_back({row.name, p.parameter.theta(r.estimate), *r.standard_error / slope});
+    }
+    if (estimates.empty()) continue;
+    p.effects = random_effects(estimates, level);
+    pooled.push_back(std::move(p));
+  }
+  return pooled;
+}
+
+}  // namespace
+
+SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
+                              const std::optional<LawSpec>& law, const SelectionOptions& options) {
+  SpecimenStudy study;
+  if (law) {
+    study.law = *law;
+    study.why = fmt::format("{} was asked for", law_name(*law));
+  } else {
+    std::tie(study.law, study.why) = common_law(recordings, options);
+  }
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    study.rows.push_back(fit_specimen(study.law, recordings.subspan(i, 1), options.setup));
+  }
+  study.pooled = pool(study.rows, options.setup.level);
+  return study;
+}
+
+Json to_json(const SpecimenStudy& study) {
+  Json j{{"law", law_name(study.law)}, {"why", study.why}};
+  Json rows = Json::array();
+  for (const SpecimenRow& row : study.rows) {
+    Json entry{{"recording", row.name}, {"fitted", row.fit.has_value()}};
+    if (row.fit) {
+      entry["fit"] = to_json(*row.fit);
+    } else {
+      entry["reason"] = row.reason;
+    }
+    rows.push_back(std::move(entry));
+  }
+  j["recordings"] = std::move(rows);
+  Json pooled = Json::array();
+  for (const PooledParameter& p : study.pooled) {
+    const RandomEffects& e = p.effects;
+    Json entry{{"name", p.parameter.name},
+               {"unit", si_symbol(p.parameter.unit.dimension)},
+               {"typical_SI", rounded(p.parameter.natural(e.mean), 6)},
+               {"interval_SI",
+                {rounded(p.parameter.natural(e.interval.lower), 6),
+                 rounded(p.parameter.natural(e.interval.upper), 6)}},
+               {"specimens", e.specimens},
+               {"left_out", p.left_out},
+               {"words", e.words}};
+    if (e.tau_squared) entry["between_specimens_sd_of_log"] = rounded(std::sqrt(*e.tau_squared), 6);
+    if (e.i_squared) entry["i_squared"] = rounded(*e.i_squared, 6);
+    if (e.new_specimen) {
+      entry["new_specimen_SI"] = {rounded(p.parameter.natural(e.new_specimen->lower), 6),
+                                  rounded(p.parameter.natural(e.new_specimen->upper), 6)};
+    }
+    pooled.push_back(std::move(entry));
+  }
+  j["pooled"] = std::move(pooled);
+  return j;
+}
+
+std::string to_terminal_text(const SpecimenStudy& study) {
+  std::string text = fmt::format("{}\n\n{:<32} {:>9}", study.why, "recording", "rms/peak");
+  const auto first = std::find_if(study.rows.begin(), study.rows.end(),
+                                  [](const auto& r) { return r.fit.has_value(); });
+  if (first == study.rows.end()) {
+    text += "\n";
+  } else {
+    for (const ParameterResult& p : first->fit->parameters) {
+      const std::string& unit = p.parameter.unit.symbol;
+      text += fmt::format(" {:>22}", unit.empty() ? p.parameter.name
+                                                  : fmt::format("{}, {}", p.parameter.name, unit));
+    }
+    text += "\n";
+  }
+  for (const SpecimenRow& row : study.rows) {
+    if (!row.fit) {
+      text += fmt::format("{:<32} {}\n", row.name, row.reason);
+      continue;
+    }
+    const RecordingFit& r = row.fit->recordings.front();
+    text += fmt::format("{:<32} {:>9}", row.name,
+                        significant(100.0 * r.rms_residual / r.peak, 3) + " %");
+    for (const ParameterResult& p : row.fit->parameters) {
+      const double unit = p.parameter.unit.to_si;
+      text += fmt::format(
+          " {:>22}", p.standard_error ? fmt::format("{} +- {}", significant(p.estimate / unit, 4),
+                                                    significant(*p.standard_error / unit, 2))
+                                      : significant(p.estimate / unit, 4));
+    }
+    text += "\n";
+  }
+  text += "\npooled (random effects: a typical specimen, its interval, a new specimen)\n";
+  for (const PooledParameter& p : study.pooled) {
+    const double unit = p.parameter.unit.to_si;
+    const auto shown = [&](double theta) {
+      return significant(p.parameter.natural(theta) / unit, 4);
+    };
+    text += fmt::format("{:<14} {} {} ({} .. {})", p.parameter.name, shown(p.effects.mean),
+                        p.parameter.unit.symbol, shown(p.effects.interval.lower),
+                        shown(p.effects.interval.upper));
+    if (p.effects.new_specimen) {
+      text += fmt::format(", new: {} .. {}", shown(p.effects.new_specimen->lower),
+                          shown(p.effects.new_specimen->upper));
+    }
+    if (p.left_out > 0) text += fmt::format(", left out: {}", p.left_out);
+    text += fmt::format("\n  {}\n", p.effects.words);
+  }
+  return text;
+}
+
+}  // namespace tpm
