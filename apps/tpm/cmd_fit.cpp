@@ -4,6 +4,7 @@
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/store/json.hpp"
 
@@ -17,12 +18,34 @@ struct FitOptions {
   std::string hold_out_depth;
   std::string starts;
   std::string seed;
+  std::string bootstrap;
+  std::string resample;
 };
+
+/// --bootstrap and --resample, over what the configuration says.
+void configure_bootstrap(const FitOptions& options, FitConfig& config) {
+  if (!options.bootstrap.empty()) {
+    if (!config.bootstrap) {
+      config.bootstrap = BootstrapOptions{};
+      config.bootstrap->seed = config.seed;
+      config.bootstrap->level = config.level;
+    }
+    constexpr std::uint64_t kFewest = 20;
+    config.bootstrap->replicates =
+        static_cast<int>(parse_whole_number(options.bootstrap, "--bootstrap", kFewest));
+  }
+  if (options.resample.empty()) return;
+  if (!config.bootstrap) {
+    throw Error(ExitCode::usage, "--resample", "without a bootstrap", "--bootstrap N");
+  }
+  config.bootstrap->resampling = parse_resampling(options.resample, "--resample");
+}
 
 FitConfig configured(const FitOptions& options) {
   FitConfig config = read_fit_config(options.config);
   if (!options.starts.empty()) config.starts = parse_whole_number(options.starts, "--starts", 1);
   if (!options.seed.empty()) config.seed = parse_whole_number(options.seed, "--seed", 0);
+  configure_bootstrap(options, config);
   for (DataChoice& data : config.data) {
     if (!options.rate.empty() && data.protocol.kind == ProtocolChoice::Kind::ramp_hold) {
       data.protocol.rate_m_per_s = parse_quantity(options.rate, Dimension::speed, "--rate");
@@ -58,6 +81,10 @@ void add_fit_command(CLI::App& app, Session& session) {
                       "Predict this depth instead of fitting it, e.g. \"8 mm\"");
   command->add_option("--starts", options->starts, "Number of starts");
   command->add_option("--seed", options->seed, "Seed of the random starts, 0 or more");
+  command->add_option("--bootstrap", options->bootstrap,
+                      "Refit this many resampled data sets, 20 or more");
+  command->add_option("--resample", options->resample,
+                      "What is drawn: residuals, blocks or recordings");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm fit configs/liver_relaxation.json\n"

@@ -101,7 +101,8 @@ std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
                      }));
   }
   const bool linear_noise = std::all_of(config.data.begin(), config.data.end(), [](const auto& d) {
-    return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model;
+    return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model &&
+           d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
   });
   const bool any = std::find(linear.begin(), linear.end(), true) != linear.end();
   if (!any || !linear_noise || config.loss.kind != Loss::none) {
