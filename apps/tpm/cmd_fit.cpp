@@ -6,6 +6,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/tables.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm::app {
@@ -41,8 +42,9 @@ void configure_bootstrap(const FitOptions& options, FitConfig& config) {
   config.bootstrap->resampling = parse_resampling(options.resample, "--resample");
 }
 
-FitConfig configured(const FitOptions& options) {
-  FitConfig config = read_fit_config(options.config);
+FitProblem configured(const FitOptions& options) {
+  FitProblem problem = read_fit_problem(options.config);
+  FitConfig& config = problem.config;
   if (!options.starts.empty()) config.starts = parse_whole_number(options.starts, "--starts", 1);
   if (!options.seed.empty()) config.seed = parse_whole_number(options.seed, "--seed", 0);
   configure_bootstrap(options, config);
@@ -57,7 +59,7 @@ FitConfig configured(const FitOptions& options) {
       data.hold_out.push_back(selector);
     }
   }
-  return config;
+  return problem;
 }
 
 int fit(const FitOptions& options, const Session& session) {
@@ -73,7 +75,10 @@ void add_fit_command(CLI::App& app, Session& session) {
   CLI::App* command =
       app.add_subcommand("fit", "Fit model parameters to curves, with intervals and verdicts");
   auto options = std::make_shared<FitOptions>();
-  command->add_option("CONFIG", options->config, "JSON configuration (schemas/fit.schema.json)")
+  command
+      ->add_option("CONFIG", options->config,
+                   "JSON configuration (schemas/fit.schema.json), or a problem of tables "
+                   "(schemas/fit_tables.schema.json)")
       ->required();
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
   command->add_option("--rate", options->rate, "Assume this ramp rate instead, e.g. \"2 mm/s\"");
