@@ -155,7 +155,8 @@ double absolute_sigma(const Json& j, const Place& place) {
 }
 
 constexpr std::string_view kEstimated = "estimated";
-constexpr std::string_view kDefaultName = "sigma";  // replaced when all data sets are known
+// Replaced when all data sets are known; nobody calls a parameter that.
+constexpr std::string_view kDefaultName = "\n";
 
 /// The name of the noise parameter if "estimated" or "estimated NAME" stands under the key; empty
 /// if it holds a number.

@@ -109,7 +109,7 @@ const Row& find_row(const std::map<std::string, const Row*>& rows, const Row& as
 }
 
 std::string scale_of(const Row& row) {
-  const std::string scale = row.required("parameterScale");
+  std::string scale = row.required("parameterScale");
   if (scale == "lin") return "linear";
   if (scale == "log10" || scale == "log") return "log";  // one search: they differ by a factor
   if (scale == "inverse_square") return scale;
