@@ -288,12 +288,73 @@ std::vector<ErrorCase> fit_config_cases() {
       {type, "negative standard deviation", fit, with("0.1", "-0.1")},
       {type, "unknown model parameter", fit, with("\"E2\"", "\"E3\"")},
       {type, "unknown noise", fit, with("relative_to_datum", "gaussian")},
+      {type, "unknown noise distribution", fit,
+       with("\"relative\": 0.1", "\"relative\": 0.1, \"distribution\": \"cauchy\"")},
+      {type, "log-normal beside another kind", fit,
+       with("\"relative\": 0.1", "\"relative\": 0.1, \"distribution\": \"log_normal\"")},
+      {type, "degrees of freedom without Student's t", fit,
+       with("\"relative\": 0.1", "\"relative\": 0.1, \"degrees_of_freedom\": 4")},
+      {type, "noise relative to the datum estimated", fit,
+       with("\"relative\": 0.1", "\"relative\": \"estimated\"")},
+      {type, "noise factor and sigma estimated", fit,
+       with("\"relative_to_datum\", \"relative\": 0.1",
+            "\"relative_to_model\", \"relative\": \"estimated\", \"scale\": \"estimated\"")},
+      {type, "robust loss beside a distribution", fit,
+       with("\"relative\": 0.1}}]",
+            "\"relative\": 0.1, \"distribution\": \"laplace\"}}], \"loss\": {\"kind\": "
+            "\"huber\"}")},
+      {type, "few bootstrap replicates", fit,
+       with("\"title\"", "\"bootstrap\": {\"replicates\": 3}, \"title\"")},
+      {type, "unknown resampling", "fit {}/f.json --bootstrap 20 --resample jackknife -o {}/out",
+       config(kFitConfig)},
+      {type, "resampling without a bootstrap", "fit {}/f.json --resample blocks -o {}/out",
+       config(kFitConfig)},
+      {type, "one data set drawn as a whole",
+       "fit {}/f.json --bootstrap 20 --resample recordings -o {}/out", config(kFitConfig)},
       {type, "unknown data set", fit, with("c.csv", "livre")},
       {type, "data set is missing", fit, with("c.csv", "d.csv")},
       {type, "datum without a depth", fit, data("2,0,0.32", ",0,0.32")},
       {type, "datum of 0 under relative noise", fit, data("0.32", "0")},
       {type, "wrong option value", "fit {}/f.json --rate '4 mm' -o {}/out", config(kFitConfig)},
       {type, "output cannot be written", "fit {}/f.json -o /proc/none/out", config(kFitConfig)},
+  };
+}
+
+const std::string kProblem = R"({"title": "t", "parameter_file": "p.csv",
+"observable_file": "o.csv", "condition_file": "c.csv", "measurement_file": "m.csv"})";
+
+std::vector<ErrorCase> fit_tables_cases() {
+  const std::string type = "fit tables";
+  const std::string fit = "fit {}/f.json -o {}/out";
+  const Files sound{
+      {"f.json", kProblem},
+      {"p.csv",
+       "parameterId,parameterScale,lowerBound,upperBound,nominalValue,estimate,unit,sets\n"
+       "E,log,1,100,12,1,kPa,E1 E2\n"},
+      {"o.csv", "observableId,observableFormula,unit,noiseFormula\nF,contact_force,N,0.02\n"},
+      {"c.csv", "conditionId,protocol,depth,rate\nc2,ramp_hold,2 mm,4 mm/s\n"},
+      {"m.csv", "observableId,simulationConditionId,time,measurement\nF,c2,0,0.32\n"}};
+  const auto with = [&](const char* file, const std::string& from, const std::string& to) {
+    Files list = sound;
+    for (auto& [name, bytes] : list) {
+      if (name == file) bytes = replaced(bytes, from, to);
+    }
+    return files(std::move(list));
+  };
+  return {
+      {type, "table is missing", fit, with("f.json", "m.csv", "n.csv")},
+      {type, "missing key", fit, with("f.json", "\"condition_file\": \"c.csv\",", "")},
+      {type, "missing column", fit, with("m.csv", "time", "datasetId")},
+      {type, "preequilibration", fit, with("m.csv", "time", "preequilibrationConditionId")},
+      {type, "prior", fit, with("p.csv", "sets", "objectivePriorType")},
+      {type, "scale", fit, with("p.csv", "log", "logit")},
+      {type, "estimate neither 0 nor 1", fit, with("p.csv", "12,1", "12,2")},
+      {type, "bound without a number", fit, with("p.csv", "100", "inf")},
+      {type, "formula", fit, with("o.csv", "contact_force", "2 * contact_force")},
+      {type, "noise formula", fit, with("o.csv", "0.02", "0.1 * depth")},
+      {type, "unit", fit, with("o.csv", "N,0.02", "mm,0.02")},
+      {type, "unknown condition", fit, with("m.csv", "c2", "c3")},
+      {type, "measurement without a number", fit, with("m.csv", "0.32", "high")},
   };
 }
 
@@ -338,7 +399,7 @@ std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
   for (const auto& cases :
        {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
-        hdf5_cases(), fit_config_cases(), claims_cases()}) {
+        hdf5_cases(), fit_config_cases(), fit_tables_cases(), claims_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -7,7 +7,9 @@
 #include "command.hpp"
 #include "recording_options.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/tables.hpp"
 #include "tpm/report/recording_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/specimens.hpp"
@@ -25,12 +27,35 @@ struct FitOptions {
   std::string hold_out_depth;
   std::string starts;
   std::string seed;
+  std::string bootstrap;
+  std::string resample;
 };
 
-FitConfig configured(const FitOptions& options) {
-  FitConfig config = read_fit_config(options.recordings.files.front());
+/// --bootstrap and --resample, over what the configuration says.
+void configure_bootstrap(const FitOptions& options, FitConfig& config) {
+  if (!options.bootstrap.empty()) {
+    if (!config.bootstrap) {
+      config.bootstrap = BootstrapOptions{};
+      config.bootstrap->seed = config.seed;
+      config.bootstrap->level = config.level;
+    }
+    constexpr std::uint64_t kFewest = 20;
+    config.bootstrap->replicates =
+        static_cast<int>(parse_whole_number(options.bootstrap, "--bootstrap", kFewest));
+  }
+  if (options.resample.empty()) return;
+  if (!config.bootstrap) {
+    throw Error(ExitCode::usage, "--resample", "without a bootstrap", "--bootstrap N");
+  }
+  config.bootstrap->resampling = parse_resampling(options.resample, "--resample");
+}
+
+FitProblem configured(const FitOptions& options) {
+  FitProblem problem = read_fit_problem(options.recordings.files.front());
+  FitConfig& config = problem.config;
   if (!options.starts.empty()) config.starts = parse_whole_number(options.starts, "--starts", 1);
   if (!options.seed.empty()) config.seed = parse_whole_number(options.seed, "--seed", 0);
+  configure_bootstrap(options, config);
   for (DataChoice& data : config.data) {
     if (!options.rate.empty() && data.protocol.kind == ProtocolChoice::Kind::ramp_hold) {
       data.protocol.rate_m_per_s = parse_quantity(options.rate, Dimension::speed, "--rate");
@@ -42,13 +67,13 @@ FitConfig configured(const FitOptions& options) {
       data.hold_out.push_back(selector);
     }
   }
-  return config;
+  return problem;
 }
 
-/// A configuration says what is estimated; any other JSON file describes a recording.
+/// The JSON description of a curve says what kind it is; any other JSON file is a configuration.
 bool is_configuration(const std::vector<std::string>& files) {
   return files.size() == 1 && files.front().ends_with(".json") &&
-         read_json(files.front()).contains("parameters");
+         !read_json(files.front()).contains("kind");
 }
 
 SelectionOptions selection_options(const FitOptions& options) {
@@ -145,10 +170,10 @@ void add_fit_command(CLI::App& app, Session& session) {
       app.add_subcommand("fit", "Fit model parameters to curves, with intervals and verdicts");
   auto options = std::make_shared<FitOptions>();
   command
-      ->add_option(
-          "FILE", options->recordings.files,
-          "A configuration (schemas/fit.schema.json), recordings to be fitted together, or "
-          "a folder of recordings to be fitted one by one and pooled")
+      ->add_option("FILE", options->recordings.files,
+                   "A configuration (schemas/fit.schema.json), a problem of tables "
+                   "(schemas/fit_tables.schema.json), recordings to be fitted together, or "
+                   "a folder of recordings to be fitted one by one and pooled")
       ->required();
   command->add_option(
       "--law", options->law,
@@ -163,6 +188,10 @@ void add_fit_command(CLI::App& app, Session& session) {
                       "Predict this depth instead of fitting it, e.g. \"8 mm\"");
   command->add_option("--starts", options->starts, "Number of starts");
   command->add_option("--seed", options->seed, "Seed of the random starts, 0 or more");
+  command->add_option("--bootstrap", options->bootstrap,
+                      "Refit this many resampled data sets, 20 or more");
+  command->add_option("--resample", options->resample,
+                      "What is drawn: residuals, blocks or recordings");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm fit configs/liver_relaxation.json\n"

@@ -8,6 +8,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/fit/experiment_refit.hpp"
 #include "tpm/law/law_model.hpp"
 #include "tpm/material/tpm_element.hpp"
 
@@ -63,6 +64,24 @@ std::vector<std::size_t> parse_scope(const Json& j, const FitConfig& config, con
   return scope;
 }
 
+/// Name, start, bounds and scale of an estimated parameter.
+FitParameter parse_search(const std::string& name, const Json& j, Dimension dimension,
+                          const Place& place) {
+  const auto start = j.at("start").get<std::string>();
+  const auto unit_begin = start.find_first_of(" \t", start.find_first_not_of(" \t"));
+  FitParameter fit;
+  fit.name = name;
+  fit.start = quantity(j, "start", dimension, place);
+  fit.unit = parse_unit(unit_begin == std::string::npos ? std::string{} : start.substr(unit_begin),
+                        dimension, place.key("start").where);
+  fit.lower = quantity(j, "lower", dimension, place);
+  fit.upper = quantity(j, "upper", dimension, place);
+  const Place scale_place = place.key("scale");
+  fit.scale = parse_scale(j.value("scale", "log"), scale_place.where);
+  require_valid(fit, place.where);
+  return fit;
+}
+
 EstimatedParameter parse_parameter(const std::string& name, const Json& j, const Model& model,
                                    const FitConfig& config, const Place& place) {
   EstimatedParameter parameter;
@@ -81,18 +100,8 @@ EstimatedParameter parse_parameter(const std::string& name, const Json& j, const
     throw bad_input(place.key("sets").where, "the parameters set have different dimensions",
                     "parameters of one dimension");
   }
-  const auto start = j.at("start").get<std::string>();
-  const auto unit_begin = start.find_first_of(" \t", start.find_first_not_of(" \t"));
-  FitParameter& fit = parameter.fit;
-  fit.name = name;
-  fit.start = quantity(j, "start", dimension, place);
-  fit.unit = parse_unit(unit_begin == std::string::npos ? std::string{} : start.substr(unit_begin),
-                        dimension, place.key("start").where);
-  fit.lower = quantity(j, "lower", dimension, place);
-  fit.upper = quantity(j, "upper", dimension, place);
-  const Place scale_place = place.key("scale");
-  fit.scale = parse_scale(j.value("scale", "log"), scale_place.where);
-  require_valid(fit, place.where);
+  parameter.fit = parse_search(name, j, dimension, place);
+  const FitParameter& fit = parameter.fit;
   for (const Target& target : parameter.sets) {
     const auto [low, high] = model.range(target.parameter);
     if (fit.lower >= low && fit.upper <= high) continue;
@@ -145,14 +154,77 @@ double absolute_sigma(const Json& j, const Place& place) {
   return quantity(j, "absolute", dimension, place);
 }
 
-Noise parse_noise(const Json& j, const Place& place) {
-  Noise noise;
-  noise.kind = parse_noise_kind(j.at("kind").get<std::string>(), place.key("kind").where);
-  const bool needs_relative = noise.kind == NoiseKind::relative_to_datum ||
-                              noise.kind == NoiseKind::combined || noise.kind == NoiseKind::log ||
-                              noise.kind == NoiseKind::relative_to_model;
-  const bool needs_absolute =
-      noise.kind == NoiseKind::absolute || noise.kind == NoiseKind::combined;
+constexpr std::string_view kEstimated = "estimated";
+// Replaced when all data sets are known; nobody calls a parameter that.
+constexpr std::string_view kDefaultName = "\n";
+
+/// The name of the noise parameter if "estimated" or "estimated NAME" stands under the key; empty
+/// if it holds a number.
+std::string estimated_name(const Json& j, std::string_view key) {
+  const auto at = j.find(std::string(key));
+  if (at == j.end() || !at->is_string()) return {};
+  const auto text = at->get<std::string>();
+  if (text == kEstimated) return std::string(kDefaultName);
+  const std::string before = std::string(kEstimated) + " ";
+  return text.starts_with(before) ? text.substr(before.size()) : std::string{};
+}
+
+/// `kind`, `distribution` and `degrees_of_freedom`: the law of the noise.
+void parse_noise_law(const Json& j, Noise& noise, const Place& place) {
+  const std::string distribution = j.value("distribution", "");
+  if (distribution == "log_normal") {
+    if (j.value("kind", "log") != "log") {
+      throw bad_input(place.key("distribution").where, "'log_normal' beside another kind",
+                      "no kind, or the kind 'log'");
+    }
+    noise.kind = NoiseKind::log;
+  } else {
+    if (!j.contains("kind")) {
+      throw bad_input(place.key("kind").where, "is missing",
+                      "a noise kind, or the distribution 'log_normal'");
+    }
+    noise.kind = parse_noise_kind(j.at("kind").get<std::string>(), place.key("kind").where);
+    if (!distribution.empty()) {
+      noise.shape = parse_error_shape(distribution, place.key("distribution").where);
+    }
+    if (distribution == "normal" && noise.kind == NoiseKind::log) {
+      throw bad_input(place.key("distribution").where, "'normal' beside the kind 'log'",
+                      "log_normal");
+    }
+  }
+  if (!j.contains("degrees_of_freedom")) return;
+  const Place here = place.key("degrees_of_freedom");
+  if (noise.shape != ErrorShape::student_t) {
+    throw bad_input(here.where, "without Student's t", "it only with distribution 'student_t'");
+  }
+  noise.degrees_of_freedom = j.at("degrees_of_freedom").get<double>();
+  require_valid(error_law(noise), here.where);
+}
+
+/// Throws where sigma cannot be estimated along with the other parameters.
+void require_estimable_sigma(const DataChoice& data, const Place& place) {
+  if (!data.noise.scale_known && data.noise.shape != ErrorShape::normal) {
+    throw bad_input(
+        place.key("scale").where,
+        fmt::format("estimated under distribution '{}'", error_shape_name(data.noise.shape)),
+        "an estimated standard deviation (\"absolute\": \"estimated\") instead");
+  }
+  if (!data.estimates_sigma()) return;
+  if (data.noise.kind == NoiseKind::relative_to_datum) {
+    throw bad_input(place.key("relative").where, "estimated under 'relative_to_datum'",
+                    "the kind 'relative_to_model' (sigma = b |model|) or 'combined'");
+  }
+  if (!data.noise.scale_known) {
+    throw bad_input(place.key("scale").where, "a common factor and sigma, both estimated",
+                    "one of them");
+  }
+}
+
+void parse_noise(const Json& j, DataChoice& data, const Place& place) {
+  Noise& noise = data.noise;
+  parse_noise_law(j, noise, place);
+  const bool needs_relative = uses_relative(noise.kind);
+  const bool needs_absolute = uses_absolute(noise.kind);
   for (const auto& [key, needed] : {std::pair<std::string_view, bool>{"relative", needs_relative},
                                     {"absolute", needs_absolute}}) {
     if (j.contains(std::string(key)) == needed) continue;
@@ -161,13 +233,22 @@ Noise parse_noise(const Json& j, const Place& place) {
                                 needed ? "needs" : "does not use", key),
                     needed ? "that key" : "only keys that this kind uses");
   }
-  if (needs_relative) noise.relative = j.at("relative").get<double>();
-  if (needs_absolute) noise.absolute = absolute_sigma(j, place);
-  if ((needs_relative && !(noise.relative > 0.0)) || (needs_absolute && !(noise.absolute > 0.0))) {
+  data.sigma_a = estimated_name(j, "absolute");
+  data.sigma_b = estimated_name(j, "relative");
+  const bool number_relative = needs_relative && data.sigma_b.empty();
+  const bool number_absolute = needs_absolute && data.sigma_a.empty();
+  if (number_relative && !j.at("relative").is_number()) {
+    throw bad_input(place.key("relative").where, "neither a number nor 'estimated'",
+                    "a number, \"estimated\" or \"estimated NAME\"");
+  }
+  if (number_relative) noise.relative = j.at("relative").get<double>();
+  if (number_absolute) noise.absolute = absolute_sigma(j, place);
+  if ((number_relative && !(noise.relative > 0.0)) ||
+      (number_absolute && !(noise.absolute > 0.0))) {
     throw bad_input(place.where, "a standard deviation that is not above 0", "a positive one");
   }
   noise.scale_known = j.value("scale", "known") == "known";
-  return noise;
+  require_estimable_sigma(data, place);
 }
 
 Selector parse_selector(const Json& j, const Place& place) {
@@ -182,7 +263,7 @@ DataChoice parse_data(const Json& j, const Place& place) {
   DataChoice data;
   data.dataset = j.at("dataset").get<std::string>();
   data.protocol = parse_protocol(j.at("protocol"), place.key("protocol"));
-  data.noise = parse_noise(j.at("noise"), place.key("noise"));
+  parse_noise(j.at("noise"), data, place.key("noise"));
   if (j.contains("from")) data.from_s = quantity(j, "from", Dimension::time, place);
   if (j.contains("to")) data.to_s = quantity(j, "to", Dimension::time, place);
   const bool recording = data.protocol.kind == Kind::measured;
@@ -290,6 +371,111 @@ void require_each_set_once(const FitConfig& config, const Model& model, const Js
   }
 }
 
+/// Gives the noise parameters without a name of their own one: "sigma_a", "sigma_b", and the data
+/// set's name if there are several of them.
+void name_noise_parameters(FitConfig& config) {
+  const auto several = std::count_if(config.data.begin(), config.data.end(),
+                                     [](const DataChoice& d) { return d.estimates_sigma(); }) > 1;
+  for (DataChoice& data : config.data) {
+    const std::string after = several ? " " + data.dataset : std::string{};
+    if (data.sigma_a == kDefaultName) data.sigma_a = "sigma_a" + after;
+    if (data.sigma_b == kDefaultName) data.sigma_b = "sigma_b" + after;
+  }
+}
+
+/// The dimension of a in sigma = a + b |model|.
+Dimension absolute_dimension(const FitConfig& config, const DataChoice& data) {
+  if (data.protocol.kind == Kind::creep) return Dimension::length;
+  return config.law ? quantity_dimension(config.law->response) : Dimension::force;
+}
+
+/// The noise parameters that the data sets name, with their dimensions, each once. Throws
+/// Error(bad_input) for a name that stands for two dimensions.
+std::vector<std::pair<std::string, Dimension>> noise_parameters(const FitConfig& config,
+                                                                const Place& place) {
+  std::vector<std::pair<std::string, Dimension>> list;
+  const auto add = [&](const std::string& name, Dimension dimension) {
+    const auto same = [&](const auto& entry) { return entry.first == name; };
+    const auto found = std::find_if(list.begin(), list.end(), same);
+    if (name.empty()) return;
+    if (found == list.end()) {
+      list.emplace_back(name, dimension);
+    } else if (found->second != dimension) {
+      throw bad_input(place.key("data").where,
+                      fmt::format("noise parameter '{}' is {} and {}", printable(name),
+                                  dimension_name(found->second), dimension_name(dimension)),
+                      "one noise parameter for each dimension");
+    }
+  };
+  for (const DataChoice& data : config.data) {
+    add(data.sigma_a, absolute_dimension(config, data));
+    add(data.sigma_b, Dimension::dimensionless);
+  }
+  return list;
+}
+
+/// A noise parameter: as it stands under /parameters, or for the data to decide.
+EstimatedParameter parse_noise_parameter(const std::string& name, Dimension dimension,
+                                         const Json& parameters, const Place& place) {
+  EstimatedParameter parameter;
+  if (!parameters.contains(name)) {
+    parameter.fit.name = name;
+    parameter.fit.unit = shown_unit(dimension);
+    parameter.from_data = true;
+    return parameter;
+  }
+  const Json& j = parameters.at(name);
+  if (j.contains("sets") || j.contains("for")) {
+    throw bad_input(place.key(name).where, "'sets' or 'for' of a parameter of the noise",
+                    "data sets that name it under /noise");
+  }
+  parameter.fit = parse_search(name, j, dimension, place.key(name));
+  if (parameter.fit.lower > 0.0) return parameter;
+  throw bad_input(place.key(name).key("lower").where, "not above 0", "a positive lower bound");
+}
+
+/// What is estimated: of the model in the order of the file, then of the noise.
+void parse_parameters(const Json& document, const Model& model, FitConfig& config,
+                      const Place& place) {
+  const auto of_noise = noise_parameters(config, place);
+  const Json& parameters = document.at("parameters");
+  for (const auto& [name, j] : parameters.items()) {
+    const bool is_noise = std::any_of(of_noise.begin(), of_noise.end(),
+                                      [&n = name](const auto& entry) { return entry.first == n; });
+    if (is_noise) continue;
+    config.parameters.push_back(
+        parse_parameter(name, j, model, config, place.key("parameters").key(name)));
+  }
+  for (const auto& [name, dimension] : of_noise) {
+    config.parameters.push_back(
+        parse_noise_parameter(name, dimension, parameters, place.key("parameters")));
+  }
+}
+
+/// A robust loss stands for a likelihood that nobody wrote down: nothing that needs one goes with
+/// it.
+void require_plain_noise_under_loss(const FitConfig& config, const Place& place) {
+  if (config.loss.kind == Loss::none) return;
+  for (const DataChoice& data : config.data) {
+    if (data.noise.shape == ErrorShape::normal && !data.estimates_sigma()) continue;
+    throw bad_input(place.key("loss").where,
+                    "beside a noise distribution or an estimated standard deviation",
+                    "either a loss, or a likelihood such as 'student_t'");
+  }
+}
+
+BootstrapOptions parse_bootstrap(const Json& j, const FitConfig& config, const Place& place) {
+  BootstrapOptions options;
+  options.replicates = j.value("replicates", options.replicates);
+  options.seed = j.value("seed", config.seed);
+  options.level = config.level;
+  options.block_length = j.value("block_length", options.block_length);
+  options.resampling =
+      parse_resampling(j.value("resample", std::string(resampling_name(options.resampling))),
+                       place.key("resample").where);
+  return options;
+}
+
 LawSpec parse_law(const Json& j, const Place& place) {
   LawSpec spec = parse_law_name(j.at("name").get<std::string>(), place.key("name").where);
   const std::string drive = j.value("drive", std::string(quantity_name(spec.drive)));
@@ -365,11 +551,9 @@ FitConfig parse_fit_config(const Json& document, std::string_view where) {
   for (const auto& j : document.at("data")) {
     config.data.push_back(parse_data(j, place.key("data").key(std::to_string(index++))));
   }
+  name_noise_parameters(config);
   const std::unique_ptr<Model> model = make_model(config);
-  for (const auto& [name, j] : document.at("parameters").items()) {
-    config.parameters.push_back(
-        parse_parameter(name, j, *model, config, place.key("parameters").key(name)));
-  }
+  parse_parameters(document, *model, config, place);
   config.fixed = parse_fixed(document, *model, config, place);
   require_each_set_once(config, *model, document, place);
   if (!config.law) {
@@ -381,7 +565,9 @@ FitConfig parse_fit_config(const Json& document, std::string_view where) {
     const Json& loss = document.at("loss");
     config.loss.kind = parse_loss(loss.at("kind").get<std::string>(), place.key("loss").where);
     config.loss.width = loss.value("width", config.loss.width);
+    require_plain_noise_under_loss(config, place);
   }
+  config.adjust_correlation = document.value("correlation", "adjust") == "adjust";
   if (document.contains("starts")) {
     config.starts = document.at("starts").value("count", config.starts);
     config.seed = document.at("starts").value("seed", config.seed);
@@ -389,6 +575,9 @@ FitConfig parse_fit_config(const Json& document, std::string_view where) {
   if (document.contains("profile")) {
     config.level = document.at("profile").value("level", config.level);
     config.profiles = document.at("profile").value("enabled", true);
+  }
+  if (document.contains("bootstrap")) {
+    config.bootstrap = parse_bootstrap(document.at("bootstrap"), config, place.key("bootstrap"));
   }
   if (document.contains("hypotheses")) {
     parse_hypotheses(document.at("hypotheses"), config, place.key("hypotheses"));

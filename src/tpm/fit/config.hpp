@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tpm/curve/curve.hpp"
+#include "tpm/fit/bootstrap.hpp"
 #include "tpm/fit/noise.hpp"
 #include "tpm/fit/parameter.hpp"
 #include "tpm/law/law.hpp"
@@ -52,6 +53,12 @@ struct DataChoice {
   /// Samples of a recording outside [from_s, to_s] are predicted, not fitted.
   double from_s = -std::numeric_limits<double>::infinity();
   double to_s = std::numeric_limits<double>::infinity();
+  /// Names of the estimated parameters that are a and b of sigma = a + b |model|; empty where the
+  /// number of `noise` holds. Data sets that name the same parameter share it.
+  std::string sigma_a, sigma_b;
+
+  /// The size of the noise is estimated along with the model's parameters.
+  [[nodiscard]] bool estimates_sigma() const { return !sigma_a.empty() || !sigma_b.empty(); }
 };
 
 /// A model parameter that takes the value of an estimated one.
@@ -65,7 +72,9 @@ struct Target {
 /// An estimated parameter and the model parameters that take its value.
 struct EstimatedParameter {
   FitParameter fit;
-  std::vector<Target> sets;
+  std::vector<Target> sets;  ///< empty for a parameter of the noise
+  /// A noise parameter whose start and bounds follow from the size of the data.
+  bool from_data = false;
 };
 
 /// A claim about parameters, tested by holding them: "eta1 = 5 Pa s".
@@ -84,10 +93,13 @@ struct FitConfig {
   std::vector<double> fixed;  ///< every model parameter, SI; what no estimated parameter sets
   std::vector<DataChoice> data;
   RobustLoss loss;
+  /// Intervals count correlated neighbours of a recording as fewer readings.
+  bool adjust_correlation = true;
   std::size_t starts = 50;
   std::uint64_t seed = 0;
   double level = 0.95;
   bool profiles = true;
+  std::optional<BootstrapOptions> bootstrap;
   std::vector<Hypothesis> hypotheses;
   std::filesystem::path folder;  ///< where relative paths of data sets are looked up
 };

@@ -27,13 +27,12 @@ void refuse_what_cannot_be_simulated(const FitConfig& config, const ExperimentRe
 }
 
 /// A datum as the declared noise would scatter it about the truth.
-double simulated(const Noise& noise, const FitDatum& datum, double truth, Random& random) {
-  const double z = random.normal();
-  if (noise.kind == NoiseKind::log) return truth * std::exp(noise.relative * z);
-  const bool absolute = noise.kind == NoiseKind::per_row || noise.kind == NoiseKind::absolute;
-  return truth + z * (absolute ? datum.sigma
-                               : sigma_of(noise, truth, {}, "coverage") *
-                                     (noise.kind == NoiseKind::relative_to_model ? truth : 1.0));
+double simulated(const ExperimentResiduals& function, std::size_t datum, double truth,
+                 std::span<const double> natural, Random& random) {
+  const std::size_t choice = function.data()[datum].choice;
+  const ErrorLaw law = error_law(function.config().data[choice].noise);
+  const double scale = function.new_noise_scale(datum, truth, natural);
+  return scattered(law, truth, scale, draw_error(law, random));
 }
 
 bool holds(const ParameterResult& p, double truth) {
@@ -59,7 +58,7 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
   std::vector<FitParameter> parameters;
   std::vector<double> truth;
   CoverageResult result;
-  for (const EstimatedParameter& p : config.parameters) {
+  for (const EstimatedParameter& p : function.config().parameters) {
     parameters.push_back(p.fit);
     truth.push_back(p.fit.start);
     result.parameters.push_back({p.fit.name, 0, 0, 1.0});
@@ -77,15 +76,15 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
   for (int set = 0; set < sets; ++set) {
     for (const Experiment& experiment : function.experiments()) {
       for (const std::size_t i : experiment.data) {
-        function.set_value(i, simulated(config.data[experiment.choice].noise, function.data()[i],
-                                        expected[static_cast<Eigen::Index>(i)], random));
+        function.set_value(
+            i, simulated(function, i, expected[static_cast<Eigen::Index>(i)], truth, random));
       }
     }
     ++result.sets;
     progress.advance();
     try {
-      const FitResult fit =
-          fit_residuals(function, parameters, fit_starts(function, parameters), threshold, true);
+      const FitResult fit = fit_residuals(function, parameters, fit_starts(function, parameters),
+                                          threshold, true, start_kind(function));
       for (std::size_t i = 0; i < parameters.size(); ++i) {
         const ParameterResult& p = fit.parameters[i];
         if (holds(p, truth[i])) ++result.parameters[i].covered;

@@ -92,11 +92,35 @@ void require_drive(const FitConfig& config, const Recording& recording, const st
                               quantity_name(spec.drive)));
 }
 
+/// Scale of the noise of a value; 0 where it is among the estimated parameters.
+double value_sigma(const DataChoice& data, double value, std::optional<double> row_sd,
+                   const std::string& where) {
+  const double sigma =
+      data.estimates_sigma() && data.noise.kind != NoiseKind::log
+          ? 0.0
+          : sigma_of(data.noise, value, row_sd, where);  // also refuses what has no logarithm
+  return data.estimates_sigma() ? 0.0 : sigma;
+}
+
+/// Scale of the tail outside a band, relative to the band's middle whatever the convention for
+/// values.
+double band_sigma(const DataChoice& data, double middle, std::optional<double> row_sd,
+                  const std::string& where) {
+  if (data.estimates_sigma()) {
+    throw bad_input(where, "a band, and the noise is to be estimated",
+                    "values, or a stated standard deviation");
+  }
+  const double sigma = sigma_of(data.noise, middle, row_sd, where);
+  if (data.noise.kind == NoiseKind::absolute || data.noise.kind == NoiseKind::per_row) return sigma;
+  return data.noise.absolute + data.noise.relative * middle;
+}
+
 double sample_sigma(const DataChoice& data, double value, std::optional<double> row_sd,
                     std::size_t sample) {
+  if (data.estimates_sigma() && data.noise.kind != NoiseKind::log) return 0.0;
   if (data.noise.kind == NoiseKind::absolute) return data.noise.absolute;  // no text to format
-  return sigma_of(data.noise, value, row_sd,
-                  fmt::format("recording '{}', sample {}", data.dataset, sample + 1));
+  return value_sigma(data, value, row_sd,
+                     fmt::format("recording '{}', sample {}", data.dataset, sample + 1));
 }
 
 std::string data_path(const FitConfig& config, const std::string& dataset) {
@@ -133,6 +157,7 @@ ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vec
       add_points(i, std::get<PointSet>(data[i]));
     }
   }
+  resolve_noise_parameters();
   count_residuals();
 }
 
@@ -160,13 +185,8 @@ void ExperimentResiduals::add_points(std::size_t choice, const PointSet& points)
       datum.value = d->value;
       datum.lower = d->lower;
       datum.upper = d->upper;
-      const double size = d->value ? *d->value : 0.5 * (*d->lower + *d->upper);
-      datum.sigma = sigma_of(data.noise, size, d->sd, where);
-      if (!d->value && data.noise.kind != NoiseKind::absolute &&
-          data.noise.kind != NoiseKind::per_row) {
-        // A band's tail is relative to the band's middle whatever the convention for values.
-        datum.sigma = data.noise.absolute + data.noise.relative * size;
-      }
+      datum.sigma = d->value ? value_sigma(data, *d->value, d->sd, where)
+                             : band_sigma(data, 0.5 * (*d->lower + *d->upper), d->sd, where);
       datum.provenance = d->provenance;
       datum.held_out = matches_any(data.hold_out, *d);
       experiment.times_s.push_back(datum.time_s);
@@ -204,6 +224,79 @@ void ExperimentResiduals::add_recording(std::size_t choice, const Recording& rec
   experiments_.push_back(std::move(experiment));
 }
 
+std::optional<std::size_t> ExperimentResiduals::parameter_place(const std::string& name) const {
+  for (std::size_t i = 0; i < config_.parameters.size() && !name.empty(); ++i) {
+    if (config_.parameters[i].fit.name == name) return i;
+  }
+  return std::nullopt;
+}
+
+double ExperimentResiduals::MovingSigma::value_a(std::span<const double> natural) const {
+  return a ? natural[*a] : sigma.fixed_a.value_or(0.0);
+}
+
+double ExperimentResiduals::MovingSigma::value_b(std::span<const double> natural) const {
+  return b ? natural[*b] : sigma.fixed_b.value_or(0.0);
+}
+
+bool ExperimentResiduals::has_normalisation(std::size_t choice) const {
+  return moving_sigma_[choice] || noise(choice).kind == NoiseKind::relative_to_model;
+}
+
+void ExperimentResiduals::resolve_noise_parameters() {
+  moving_sigma_.assign(config_.data.size(), std::nullopt);
+  for (std::size_t i = 0; i < config_.data.size(); ++i) {
+    const DataChoice& data = config_.data[i];
+    const bool shaped_model =
+        data.noise.kind == NoiseKind::relative_to_model && data.noise.shape != ErrorShape::normal;
+    if (!data.estimates_sigma() && !shaped_model) continue;
+    MovingSigma moving;
+    if (data.noise.kind == NoiseKind::log) {
+      // On the logarithm's scale the one standard deviation is a, whatever its name.
+      moving.sigma = {std::nullopt, 0.0, 1.0};
+      moving.a = parameter_place(data.sigma_b);
+    } else {
+      moving.a = parameter_place(data.sigma_a);
+      moving.b = parameter_place(data.sigma_b);
+      const bool has_a = uses_absolute(data.noise.kind);
+      const bool has_b = uses_relative(data.noise.kind);
+      if (!moving.a) moving.sigma.fixed_a = has_a ? data.noise.absolute : 0.0;
+      if (!moving.b) moving.sigma.fixed_b = has_b ? data.noise.relative : 0.0;
+      moving.sigma.reference = data_size(i);
+    }
+    moving_sigma_[i] = moving;
+  }
+  for (EstimatedParameter& parameter : config_.parameters) {
+    if (parameter.from_data) resolve_noise_parameter(parameter);
+  }
+}
+
+double ExperimentResiduals::data_size(std::size_t choice) const {
+  double size = 0.0;
+  for (const FitDatum& d : data_) {
+    if (d.choice == choice && d.value && !d.held_out) size = std::max(size, std::abs(*d.value));
+  }
+  if (size > 0.0) return size;
+  throw bad_input(fmt::format("data set '{}'", config_.data[choice].dataset),
+                  "no value other than 0, and the noise follows from their size",
+                  "a noise of kind 'absolute' with a stated standard deviation");
+}
+
+void ExperimentResiduals::resolve_noise_parameter(EstimatedParameter& parameter) {
+  FitParameter& fit = parameter.fit;
+  double size = 1.0;  // of a relative or logarithmic standard deviation
+  if (fit.unit.dimension != Dimension::dimensionless) {
+    size = 0.0;
+    for (std::size_t i = 0; i < config_.data.size(); ++i) {
+      if (config_.data[i].sigma_a == fit.name) size = std::max(size, data_size(i));
+    }
+  }
+  // From what a machine's rounding leaves to noise that drowns the data.
+  fit.start = 0.05 * size;
+  fit.lower = 1e-6 * size;
+  fit.upper = 10.0 * size;
+}
+
 void ExperimentResiduals::count_residuals() {
   residual_count_ = 0;
   offset_ = 0.0;
@@ -211,9 +304,9 @@ void ExperimentResiduals::count_residuals() {
     for (const std::size_t i : experiment.data) {
       if (data_[i].held_out) continue;
       ++residual_count_;
-      if (data_[i].value && noise(experiment.choice).kind == NoiseKind::relative_to_model) {
+      if (data_[i].value && has_normalisation(experiment.choice)) {
         ++residual_count_;
-        offset_ += kNormalisationOffset;
+        offset_ += weight(i) * weight(i) * kNormalisationOffset;
       }
     }
   }
@@ -287,9 +380,17 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
   residual.resize(residual_count_);
   if (jacobian != nullptr) jacobian->resize(residual_count_, sensitivity.cols());
   Eigen::Index row = 0;
+  double w = 1.0;
   const auto put = [&](double r, double d_r, Eigen::Index datum) {
-    residual[row] = r;
-    if (jacobian != nullptr) jacobian->row(row) = d_r * sensitivity.row(datum);
+    residual[row] = w * r;
+    if (jacobian != nullptr) jacobian->row(row) = w * d_r * sensitivity.row(datum);
+    ++row;
+  };
+  const auto put_term = [&](const NoiseTerm& term, const MovingSigma& moving, Eigen::Index datum) {
+    residual[row] = w * term.value;
+    if (jacobian != nullptr) {
+      write_row(term, moving, w, sensitivity.row(datum), jacobian->row(row));
+    }
     ++row;
   };
   for (const Experiment& experiment : experiments_) {
@@ -297,16 +398,27 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
       const FitDatum& d = data_[i];
       if (d.held_out) continue;
       const auto index = static_cast<Eigen::Index>(i);
+      w = weight(i);
       if (!d.value) {
         const DatumResidual r = band_residual(d.sigma, *d.lower, *d.upper, answer[index]);
         put(r.r, r.d_r, index);
         continue;
       }
-      auto r = value_residual(noise(experiment.choice), d.sigma, *d.value, answer[index]);
+      const Noise& law = noise(experiment.choice);
+      if (const auto& moving = moving_sigma_[experiment.choice]) {
+        const auto terms = noise_residual(error_law(law), moving->sigma, *d.value, answer[index],
+                                          moving->value_a(natural), moving->value_b(natural));
+        if (!terms) return false;
+        put_term(terms->residual, *moving, index);
+        put_term(terms->normalisation, *moving, index);
+        continue;
+      }
+      auto r = value_residual(law, d.sigma, *d.value, answer[index]);
       if (!r) return false;
+      apply_shape(error_law(law), *r);
       apply_loss(config_.loss, *r);
       put(r->r, r->d_r, index);
-      if (noise(experiment.choice).kind == NoiseKind::relative_to_model) {
+      if (law.kind == NoiseKind::relative_to_model) {
         put(r->normalisation, r->d_normalisation, index);
       }
     }
@@ -314,10 +426,131 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
   return residual.allFinite();
 }
 
+void ExperimentResiduals::write_row(const NoiseTerm& term, const MovingSigma& moving, double factor,
+                                    const Eigen::Ref<const Eigen::RowVectorXd>& sensitivity,
+                                    Eigen::Ref<Eigen::RowVectorXd> row) {
+  row = factor * term.by_f * sensitivity;
+  if (moving.a) row[static_cast<Eigen::Index>(*moving.a)] += factor * term.by_a;
+  if (moving.b) row[static_cast<Eigen::Index>(*moving.b)] += factor * term.by_b;
+}
+
+bool ExperimentResiduals::information_root(std::span<const double> natural, RowMatrix& root) const {
+  if (!is_normal_of_stated_size()) return expected_information_root(natural, root);
+  return ResidualFunction::information_root(natural, root);
+}
+
+bool ExperimentResiduals::is_normal_of_stated_size() const {
+  for (std::size_t i = 0; i < config_.data.size(); ++i) {
+    if (moving_sigma_[i] || noise(i).shape != ErrorShape::normal) return false;
+  }
+  return true;
+}
+
+bool ExperimentResiduals::expected_information_root(std::span<const double> natural,
+                                                    RowMatrix& root) const {
+  Eigen::VectorXd residual;
+  if (!evaluate(natural, residual, &root)) return false;
+  RowMatrix sensitivity;
+  const Eigen::VectorXd answer = predict(natural, &sensitivity);
+  // The residuals' Jacobian is right for normal noise of stated size and for bands; the rows of the
+  // other values are replaced.
+  Eigen::Index row = 0;
+  for (const Experiment& experiment : experiments_) {
+    const ErrorLaw law = error_law(noise(experiment.choice));
+    const auto& moving = moving_sigma_[experiment.choice];
+    for (const std::size_t i : experiment.data) {
+      const FitDatum& d = data_[i];
+      if (d.held_out) continue;
+      const auto index = static_cast<Eigen::Index>(i);
+      if (d.value && moving) {
+        const auto terms = noise_information(law, moving->sigma, answer[index],
+                                             moving->value_a(natural), moving->value_b(natural));
+        if (!terms) return false;
+        write_row(terms->residual, *moving, weight(i), sensitivity.row(index), root.row(row));
+        write_row(terms->normalisation, *moving, weight(i), sensitivity.row(index),
+                  root.row(row + 1));
+      } else if (d.value && law.shape != ErrorShape::normal) {
+        const double slope = transformed_slope(law.scale, answer[index]) / d.sigma;
+        root.row(row) =
+            weight(i) * std::sqrt(location_information(law)) * slope * sensitivity.row(index);
+      }
+      row += d.value && has_normalisation(experiment.choice) ? 2 : 1;
+    }
+  }
+  return true;
+}
+
+double ExperimentResiduals::noise_scale(std::size_t datum, double answer,
+                                        std::span<const double> natural) const {
+  const FitDatum& d = data_.at(datum);
+  if (const auto& moving = moving_sigma_[d.choice]) {
+    return moving->value_a(natural) + moving->value_b(natural) * std::abs(answer);
+  }
+  return noise(d.choice).kind == NoiseKind::relative_to_model ? d.sigma * std::abs(answer)
+                                                              : d.sigma;
+}
+
+double ExperimentResiduals::new_noise_scale(std::size_t datum, double answer,
+                                            std::span<const double> natural) const {
+  const Noise& n = noise(data_.at(datum).choice);
+  if (moving_sigma_[data_[datum].choice]) return noise_scale(datum, answer, natural);
+  switch (n.kind) {
+    case NoiseKind::absolute:
+      return n.absolute;
+    case NoiseKind::log:
+      return n.relative;
+    case NoiseKind::relative_to_datum:
+    case NoiseKind::combined:
+    case NoiseKind::relative_to_model:
+      return (uses_absolute(n.kind) ? n.absolute : 0.0) + n.relative * std::abs(answer);
+    case NoiseKind::per_row:
+      break;
+  }
+  return data_[datum].sigma;
+}
+
+double ExperimentResiduals::standardised(std::size_t datum, double answer,
+                                         std::span<const double> natural) const {
+  const FitDatum& d = data_.at(datum);
+  if (!d.value) return band_residual(d.sigma, *d.lower, *d.upper, answer).r;
+  const ErrorScale scale = error_law(noise(d.choice)).scale;
+  if (moving_sigma_[d.choice]) {
+    const double sigma = noise_scale(datum, answer, natural);
+    const bool possible = scale == ErrorScale::linear || answer > 0.0;
+    return possible ? (transformed(scale, answer) - transformed(scale, *d.value)) / sigma
+                    : std::numeric_limits<double>::infinity();
+  }
+  const auto r = value_residual(noise(d.choice), d.sigma, *d.value, answer);
+  return r ? r->r : std::numeric_limits<double>::infinity();
+}
+
 void ExperimentResiduals::set_value(std::size_t datum, double value) {
   FitDatum& d = data_.at(datum);
-  d.sigma = sigma_of(noise(d.choice), value, d.sigma, "simulated datum");
+  d.sigma = value_sigma(config_.data[d.choice], value, d.sigma, "simulated datum");
   d.value = value;
+}
+
+double ExperimentResiduals::weight(std::size_t datum) const {
+  return counts_.empty() ? 1.0 : std::sqrt(static_cast<double>(counts_[datum]));
+}
+
+void ExperimentResiduals::set_counts(std::vector<int> counts) {
+  counts_ = std::move(counts);
+  count_residuals();
+}
+
+std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
+  // make_unique cannot reach the private constructor.
+  std::unique_ptr<ExperimentResiduals> other(new ExperimentResiduals());
+  other->config_ = config_;
+  other->model_ = model_;
+  other->data_ = data_;
+  other->experiments_ = experiments_;
+  other->moving_sigma_ = moving_sigma_;
+  other->counts_ = counts_;
+  other->residual_count_ = residual_count_;
+  other->offset_ = offset_;
+  return other;
 }
 
 std::string datum_label(const FitDatum& datum) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/fit/config.hpp"
+#include "tpm/fit/estimated_sigma.hpp"
 #include "tpm/fit/least_squares.hpp"
 
 namespace tpm {
@@ -16,7 +17,7 @@ struct FitDatum {
   Observable observable = Observable::contact_force;
   double time_s = 0.0;  ///< in the protocol's own time; infinite for a static reading
   std::optional<double> value, lower, upper;  ///< SI
-  double sigma = 0.0;                         ///< after the noise model
+  double sigma = 0.0;                         ///< after the noise model; 0 where it is estimated
   Provenance provenance = Provenance::assumed;
   bool held_out = false;
 };
@@ -48,6 +49,8 @@ class ExperimentResiduals final : public ResidualFunction {
   [[nodiscard]] Eigen::Index residual_count() const override { return residual_count_; }
   [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                               RowMatrix* jacobian) const override;
+  [[nodiscard]] bool information_root(std::span<const double> natural,
+                                      RowMatrix& root) const override;
   [[nodiscard]] double offset() const override { return offset_; }
 
   [[nodiscard]] const std::vector<FitDatum>& data() const { return data_; }
@@ -65,22 +68,68 @@ class ExperimentResiduals final : public ResidualFunction {
   /// Replaces the value of a fitted datum and its standard deviation (simulation studies).
   void set_value(std::size_t datum, double value);
 
+  /// How often each datum counts, in the order of data(); 0 leaves it out.
+  void set_counts(std::vector<int> counts);
+
+  /// The same experiments, with data that can be replaced apart from these.
+  [[nodiscard]] std::unique_ptr<ExperimentResiduals> copy() const;
+
+  /// Scale of the noise law of a value, given the model's answer to it.
+  [[nodiscard]] double noise_scale(std::size_t datum, double answer,
+                                   std::span<const double> natural) const;
+  /// The same for a new reading at the model's answer, which no datum is known of.
+  [[nodiscard]] double new_noise_scale(std::size_t datum, double answer,
+                                       std::span<const double> natural) const;
+  /// (T(answer) - T(value)) / scale; of a band the distance to it. Infinite where the answer has no
+  /// likelihood.
+  [[nodiscard]] double standardised(std::size_t datum, double answer,
+                                    std::span<const double> natural) const;
+
+  /// With the start and bounds of noise parameters that follow from the data.
   [[nodiscard]] const FitConfig& config() const { return config_; }
   [[nodiscard]] const Model& model() const { return *model_; }
 
  private:
+  /// sigma = a + b |model| of a data set, and where a and b stand among the parameters.
+  struct MovingSigma {
+    EstimatedSigma sigma;
+    std::optional<std::size_t> a, b;
+
+    [[nodiscard]] double value_a(std::span<const double> natural) const;
+    [[nodiscard]] double value_b(std::span<const double> natural) const;
+  };
+
+  ExperimentResiduals() = default;
+  /// Factor of a datum's residuals.
+  [[nodiscard]] double weight(std::size_t datum) const;
   void add_points(std::size_t choice, const PointSet& points);
   void add_recording(std::size_t choice, const Recording& recording);
+  /// Largest value that is fitted of a data set, SI. Throws Error(bad_input) if all are 0.
+  [[nodiscard]] double data_size(std::size_t choice) const;
+  void resolve_noise_parameters();
+  void resolve_noise_parameter(EstimatedParameter& parameter);
+  [[nodiscard]] bool is_normal_of_stated_size() const;
+  [[nodiscard]] bool expected_information_root(std::span<const double> natural,
+                                               RowMatrix& root) const;
+  /// A residual's derivative, times a factor, by the estimated parameters.
+  static void write_row(const NoiseTerm& term, const MovingSigma& moving, double factor,
+                        const Eigen::Ref<const Eigen::RowVectorXd>& sensitivity,
+                        Eigen::Ref<Eigen::RowVectorXd> row);
   void count_residuals();
+  [[nodiscard]] std::optional<std::size_t> parameter_place(const std::string& name) const;
   /// Columns of a response's sensitivity and the estimated parameters that they belong to.
   [[nodiscard]] std::vector<std::pair<Eigen::Index, Eigen::Index>> columns_for(
       std::size_t choice) const;
   [[nodiscard]] const Noise& noise(std::size_t choice) const { return config_.data[choice].noise; }
+  /// Two residuals stand for each value: sigma moves with the parameters.
+  [[nodiscard]] bool has_normalisation(std::size_t choice) const;
 
   FitConfig config_;
-  std::unique_ptr<Model> model_;
+  std::shared_ptr<const Model> model_;
   std::vector<FitDatum> data_;
   std::vector<Experiment> experiments_;
+  std::vector<std::optional<MovingSigma>> moving_sigma_;  ///< of each data set
+  std::vector<int> counts_;                               ///< empty: every datum counts once
   Eigen::Index residual_count_ = 0;
   double offset_ = 0.0;
 };

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <limits>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/fit/experiment_refit.hpp"
+#include "tpm/fit/prediction.hpp"
 #include "tpm/fit/starts.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpm/material/tpm_element.hpp"
@@ -27,6 +30,7 @@ bool same_deviance(double a, double b) {
 struct MultiStart {
   std::vector<DistinctMinimum> minima;
   int run = 0, failed = 0, agreeing = 0;
+  std::vector<double> end_deviances;  ///< of every start; NaN where it failed
 };
 
 void add_to_cluster(std::vector<DistinctMinimum>& minima, const Minimum& m) {
@@ -61,6 +65,8 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
     const Minimum m = kind == StartKind::solved ? minimise_near(function, parameters, start)
                                                 : minimise_both_ways(function, parameters, start);
     ++result.run;
+    result.end_deviances.push_back(m.usable ? m.deviance
+                                            : std::numeric_limits<double>::quiet_NaN());
     if (m.usable) {
       ends.push_back(m);
     } else {
@@ -142,15 +148,18 @@ void describe_parameters(FitResult& result, double level, bool profiles) {
 
 FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParameter> parameters,
                         const std::vector<std::vector<double>>& starts, Threshold threshold,
-                        bool profiles, StartKind kind) {
+                        bool profiles, StartKind kind, const InflationRule& inflation) {
   threshold.parameter_count = static_cast<int>(parameters.size());
   FitResult result;
   MultiStart multi = run_starts(function, parameters, starts, kind);
   result.starts_run = multi.run;
   result.starts_failed = multi.failed;
   result.starts_agreeing = multi.agreeing;
+  result.waterfall = waterfall(multi.end_deviances);
   result.minima = std::move(multi.minima);
   result.best = result.minima.front().minimum;
+  if (inflation) threshold.inflation = inflation(result.best.natural);
+  result.inflation = threshold.inflation;
   result.covariance = linear_covariance(function, parameters, result.best, threshold);
   for (const FitParameter& p : parameters) {
     ParameterResult r;
@@ -203,28 +212,67 @@ HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitR
   return result;
 }
 
-/// Standardised as the noise model says; zero inside a band.
-double standardised_residual(const ExperimentResiduals& function, std::size_t index,
-                             double predicted) {
-  const FitDatum& d = function.data()[index];
-  if (!d.value) return band_residual(d.sigma, *d.lower, *d.upper, predicted).r;
-  const Noise& noise = function.config().data[d.choice].noise;
-  const auto r = value_residual(noise, d.sigma, *d.value, predicted);
-  return r ? r->r : std::numeric_limits<double>::infinity();
+/// Standard deviation of a new reading about the model's answer, on the scale of the data.
+double reading_sd(const ExperimentResiduals& function, std::size_t datum, double answer,
+                  std::span<const double> natural) {
+  const FitDatum& d = function.data()[datum];
+  const ErrorLaw law = error_law(function.config().data[d.choice].noise);
+  const double sd = standard_deviation(law, function.new_noise_scale(datum, answer, natural));
+  return sd / transformed_slope(law.scale, answer);
 }
 
-/// Standard deviation of a prediction from the parameters' covariance.
-double prediction_sd(const Eigen::Ref<const Eigen::RowVectorXd>& sensitivity,
-                     std::span<const FitParameter> parameters, const Covariance& c,
-                     std::span<const double> natural) {
-  Eigen::VectorXd g(c.theta_sd.size());
-  for (Eigen::Index k = 0; k < g.size(); ++k) {
-    const std::size_t j = c.free[static_cast<std::size_t>(k)];
-    const FitParameter& p = parameters[j];
-    g[k] = sensitivity[static_cast<Eigen::Index>(j)] * p.natural_slope(p.theta(natural[j])) *
-           c.theta_sd[k];
+/// Bands about the answers to all data; empty if the data do not determine them.
+std::optional<PredictionBands> bands_of(const FitResult& result,
+                                        const ExperimentResiduals& function,
+                                        std::span<const FitParameter> parameters,
+                                        const Threshold& threshold,
+                                        const Eigen::VectorXd& predicted,
+                                        const RowMatrix& sensitivity) {
+  const bool estimable = threshold.scale_known || threshold.data_count > threshold.parameter_count;
+  if (!result.covariance.full_rank || !estimable) return std::nullopt;
+  Eigen::VectorXd sd(predicted.size());
+  for (Eigen::Index i = 0; i < sd.size(); ++i) {
+    sd[i] = reading_sd(function, static_cast<std::size_t>(i), predicted[i], result.best.natural);
   }
-  return std::sqrt(std::max(g.dot(c.correlation * g), 0.0));
+  return prediction_bands(predicted, sensitivity, parameters, result.best, result.covariance,
+                          threshold, sd);
+}
+
+/// Residuals of the fitted samples of each recording, in the order of measurement.
+std::vector<std::vector<double>> recording_residuals(const ExperimentResiduals& function,
+                                                     std::span<const double> natural) {
+  const Eigen::VectorXd answer = function.predict(natural, nullptr);
+  std::vector<std::vector<double>> residuals;
+  for (const Experiment& experiment : function.experiments()) {
+    if (!experiment.is_recording) continue;
+    std::vector<double>& list = residuals.emplace_back();
+    for (const std::size_t i : experiment.data) {
+      if (function.data()[i].held_out) continue;
+      list.push_back(function.standardised(i, answer[static_cast<Eigen::Index>(i)], natural));
+    }
+  }
+  return residuals;
+}
+
+/// Over all recordings; readings of tables are independent and not in it.
+std::optional<Correlation> correlation_at(const ExperimentResiduals& function,
+                                          std::span<const double> natural) {
+  const bool any = std::any_of(function.experiments().begin(), function.experiments().end(),
+                               [](const Experiment& e) { return e.is_recording; });
+  if (!any) return std::nullopt;
+  const auto residuals = recording_residuals(function, natural);
+  const std::vector<std::span<const double>> parts(residuals.begin(), residuals.end());
+  return residual_correlation(parts);
+}
+
+/// Fitted values over the independent readings among them: those of the recordings and every
+/// reading of a table.
+double inflation_at(const ExperimentResiduals& function, std::span<const double> natural) {
+  if (!function.config().adjust_correlation) return 1.0;
+  const std::optional<Correlation> c = correlation_at(function, natural);
+  if (!c || !c->significant) return 1.0;
+  const double n = function.value_count();
+  return n / (n - static_cast<double>(c->count) + c->effective_count);
 }
 
 RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment& experiment,
@@ -259,11 +307,39 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
   return fit;
 }
 
+/// The band of the samples of a recording and how many of the fitted ones lie in it.
+void add_band(RecordingFit& fit, const Experiment& experiment, const PredictionBands& bands) {
+  int fitted = 0;
+  int inside = 0;
+  for (std::size_t k = 0; k < experiment.data.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(experiment.data[k]);
+    fit.lower.push_back(bands.reading_lower[row]);
+    fit.upper.push_back(bands.reading_upper[row]);
+    if (!fit.fitted[k]) continue;
+    ++fitted;
+    if (fit.observed[k] >= fit.lower.back() && fit.observed[k] <= fit.upper.back()) ++inside;
+  }
+  if (fitted > 0) fit.share_inside = static_cast<double>(inside) / fitted;
+}
+
+/// What is said of one recording beside its curve.
+void describe_recording(RecordingFit& fit, const Experiment& experiment,
+                        const std::optional<PredictionBands>& bands) {
+  if (bands) add_band(fit, experiment, *bands);
+  std::vector<double> residuals;
+  for (std::size_t k = 0; k < fit.standardised.size(); ++k) {
+    if (fit.fitted[k]) residuals.push_back(fit.standardised[k]);
+  }
+  if (!residuals.empty()) fit.correlation = residual_correlation(residuals);
+}
+
 void fill_data(FitResult& result, const ExperimentResiduals& function,
                std::span<const FitParameter> parameters, const Threshold& threshold) {
   RowMatrix sensitivity;
   const Eigen::VectorXd predicted = function.predict(result.best.natural, &sensitivity);
-  const Covariance& c = result.covariance;
+  const auto bands = bands_of(result, function, parameters, threshold, predicted, sensitivity);
+  const Eigen::VectorXd sd =
+      prediction_standard_errors(sensitivity, parameters, result.best.natural, result.covariance);
   for (const Experiment& experiment : function.experiments()) {
     if (experiment.is_recording) {
       result.recordings.push_back(recording_fit(function, experiment, predicted));
@@ -271,28 +347,84 @@ void fill_data(FitResult& result, const ExperimentResiduals& function,
     }
     for (const std::size_t i : experiment.data) {
       const auto row = static_cast<Eigen::Index>(i);
-      const FitDatum& datum = function.data()[i];
-      const double z = standardised_residual(function, i, predicted[row]);
+      FitDatum datum = function.data()[i];
+      const double z = function.standardised(i, predicted[row], result.best.natural);
       if (!datum.held_out) result.chi_square += z * z;
       if (experiment.is_recording) {
         result.recordings.back().standardised.push_back(z);
         continue;
       }
-      FittedDatum d{datum, predicted[row], std::nullopt, z};
-      if (c.full_rank) {
-        d.predicted_sd = prediction_sd(sensitivity.row(row), parameters, c, result.best.natural);
+      if (result.config.data[datum.choice].estimates_sigma()) {
+        datum.sigma = function.noise_scale(i, predicted[row], result.best.natural);
+      }
+      FittedDatum d{std::move(datum), predicted[row], std::nullopt, z, {}, {}};
+      if (sd.size() > 0) d.predicted_sd = sd[row];
+      if (bands) {
+        d.confidence = {bands->lower[row], bands->upper[row]};
+        d.prediction = {bands->reading_lower[row], bands->reading_upper[row]};
       }
       result.data.push_back(std::move(d));
     }
+    if (experiment.is_recording) describe_recording(result.recordings.back(), experiment, bands);
   }
-  const bool absolute_scale = threshold.scale_known && result.degrees_of_freedom > 0;
-  if (absolute_scale && result.config.loss.kind == Loss::none) {
+  const bool known_normal =
+      threshold.scale_known &&
+      std::all_of(result.config.data.begin(), result.config.data.end(), [](const DataChoice& d) {
+        return d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
+      });
+  if (known_normal && result.degrees_of_freedom > 0 && result.config.loss.kind == Loss::none) {
     result.chi_square_p = boost::math::cdf(boost::math::complement(
         boost::math::chi_squared(result.degrees_of_freedom), result.chi_square));
   }
 }
 
+/// Fitted values further from the model than noise goes, in standard deviations.
+constexpr double kFarOff = 8.0;
+
+void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
+  const double unit = std::sqrt(result.variance_factor);
+  const Eigen::VectorXd answer = function.predict(result.best.natural, nullptr);
+  int count = 0;
+  std::string worst;
+  double worst_z = kFarOff * unit;
+  for (std::size_t i = 0; i < function.data().size(); ++i) {
+    const FitDatum& d = function.data()[i];
+    if (!d.value || d.held_out) continue;
+    const double z = std::abs(
+        function.standardised(i, answer[static_cast<Eigen::Index>(i)], result.best.natural));
+    if (!(z > kFarOff * unit) || !(unit > 0.0)) continue;
+    ++count;
+    if (z < worst_z) continue;
+    worst_z = z;
+    worst = fmt::format("{} of '{}'", datum_label(d), result.config.data[d.choice].dataset);
+  }
+  if (count == 0) return;
+  result.flags.push_back(fmt::format(
+      "{} of {} values {} more than {} standard deviations from the model, the furthest "
+      "{} ({} standard deviations): errors in the data, or noise with wider tails "
+      "(distribution 'student_t')",
+      count, result.value_count, count == 1 ? "lies" : "lie", kFarOff, worst,
+      significant(worst_z / unit, 3)));
+}
+
+void flag_noise(FitResult& result) {
+  const bool estimated = std::any_of(result.config.data.begin(), result.config.data.end(),
+                                     [](const DataChoice& d) { return d.estimates_sigma(); });
+  if (estimated) {
+    result.flags.push_back(
+        fmt::format("the size of the noise is estimated from {} values: intervals are those of "
+                    "many values, and too short for few",
+                    result.value_count));
+  }
+  if (result.inflation > 1.0) {
+    result.flags.push_back(
+        fmt::format("{}; the intervals count them so", result.correlation.value().words));
+  }
+}
+
 void add_flags(FitResult& result, const ExperimentResiduals& function) {
+  flag_outliers(result, function);
+  flag_noise(result);
   for (const DataChoice& data : result.config.data) {
     if (data.protocol.rate_provenance == Provenance::assumed) {
       result.flags.push_back(fmt::format("the ramp rate of {:.4g} mm/s is assumed for '{}'",
@@ -346,15 +478,23 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
   threshold.data_count = function.value_count();
   threshold.parameter_count = static_cast<int>(parameters.size());
 
-  FitResult result = fit_residuals(function, parameters, fit_starts(function, parameters),
-                                   threshold, config.profiles, start_kind(function));
+  FitResult result =
+      fit_residuals(function, parameters, fit_starts(function, parameters), threshold,
+                    config.profiles, start_kind(function),
+                    [&](std::span<const double> best) { return inflation_at(function, best); });
+  threshold.inflation = result.inflation;
   result.config = config;
   result.value_count = function.value_count();
   result.band_count = function.band_count();
+  result.likelihood = likelihood_at(function, result.best.natural);
+  result.correlation = correlation_at(function, result.best.natural);
   fill_data(result, function, parameters, threshold);
   for (const Hypothesis& hypothesis : config.hypotheses) {
     result.hypotheses.push_back(
         test_hypothesis(function, result, parameters, hypothesis, threshold));
+  }
+  if (config.bootstrap) {
+    result.bootstrap = bootstrap_experiments(function, parameters, result.best, *config.bootstrap);
   }
   add_flags(result, function);
   return result;

@@ -1,13 +1,18 @@
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "tpm/fit/bootstrap.hpp"
 #include "tpm/fit/config.hpp"
+#include "tpm/fit/correlation.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/fit/least_squares.hpp"
+#include "tpm/fit/likelihood.hpp"
 #include "tpm/fit/starts.hpp"
 #include "tpm/fit/uncertainty.hpp"
+#include "tpm/fit/waterfall.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm {
@@ -51,12 +56,19 @@ struct HypothesisResult {
   std::string words;
 };
 
+/// Symmetric limits, SI.
+struct Limits {
+  double lower = 0.0, upper = 0.0;
+};
+
 /// One reading with the fitted model's answer.
 struct FittedDatum {
   FitDatum datum;
   double predicted = 0.0;              ///< SI
   std::optional<double> predicted_sd;  ///< from the parameters' covariance
   double standardised = 0.0;           ///< (predicted - value) / sigma after the noise model
+  std::optional<Limits> confidence;    ///< pointwise band of the curve, at the fit's level
+  std::optional<Limits> prediction;    ///< where one new reading falls
 };
 
 /// One recording with the fitted model's answer.
@@ -71,6 +83,10 @@ struct RecordingFit {
   double peak = 0.0;                                       ///< largest |observed| in the window
   double rms_residual = 0.0;                               ///< in the window, SI
   std::optional<double> rms_outside;  ///< of the samples outside, if there are any
+  /// Prediction band, where one new sample falls, SI; empty if the covariance is not of full rank.
+  std::vector<double> lower, upper;
+  std::optional<double> share_inside;      ///< of the fitted samples, within that band
+  std::optional<Correlation> correlation;  ///< of the fitted samples' residuals
 };
 
 struct FitResult {
@@ -81,12 +97,17 @@ struct FitResult {
   int degrees_of_freedom = 0;          ///< values less estimated parameters
   std::optional<double> chi_square_p;  ///< only for a known noise scale and dof > 0
   double variance_factor = 1.0;
+  std::optional<Likelihood> likelihood;    ///< none where there is none, see likelihood_at
+  std::optional<Correlation> correlation;  ///< over all recordings, if there are any
+  double inflation = 1.0;                  ///< Threshold::inflation of the intervals
   std::vector<ParameterResult> parameters;
   Covariance covariance;
   std::string weakest_words;
   int starts_run = 0, starts_failed = 0, starts_agreeing = 0;
+  Waterfall waterfall;
   std::vector<DistinctMinimum> minima;  ///< rising deviance
   std::vector<HypothesisResult> hypotheses;
+  std::optional<BootstrapResult> bootstrap;
   std::vector<FittedDatum> data;  ///< separate readings
   std::vector<RecordingFit> recordings;
   std::vector<std::string> flags;  ///< what a reader must know (text, one line each)
@@ -102,13 +123,18 @@ struct FitResult {
 
 [[nodiscard]] FitResult fit_experiments(const ExperimentResiduals& function);
 
+/// Readings per independent reading at a minimum (SI values), >= 1.
+using InflationRule = std::function<double(std::span<const double>)>;
+
 /// The same for any residuals: the part of run_fit that does not know what is fitted. Fills best,
 /// parameters, covariance, starts and minima.
+/// @param inflation sets Threshold::inflation once the minimum is known
 [[nodiscard]] FitResult fit_residuals(const ResidualFunction& function,
                                       std::vector<FitParameter> parameters,
                                       const std::vector<std::vector<double>>& starts,
                                       Threshold threshold, bool profiles,
-                                      StartKind kind = StartKind::anywhere);
+                                      StartKind kind = StartKind::anywhere,
+                                      const InflationRule& inflation = {});
 
 /// Machine-readable result, keys in docs/json.md, numbers rounded to 6 significant digits so that
 /// they agree between machines.

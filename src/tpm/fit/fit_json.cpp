@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
 
 namespace tpm {
@@ -44,6 +46,34 @@ Json parameter_values(const FitResult& result, const std::vector<double>& natura
   return values;
 }
 
+Json pair_json(double lower, double upper) {
+  return {number(lower), number(upper)};
+}
+
+Json bootstrap_json(const BootstrapParameter& b) {
+  Json j{{"standard_error_SI", number(b.standard_error)}, {"bias_SI", number(b.bias)}};
+  j["percentile_interval_SI"] = pair_json(b.percentile.lower, b.percentile.upper);
+  j["bca_interval_SI"] = b.bca ? pair_json(b.bca->lower, b.bca->upper) : Json(nullptr);
+  return j;
+}
+
+Json bootstrap_json(const BootstrapResult& b) {
+  return {{"replicates", b.options.replicates},
+          {"resample", resampling_name(b.options.resampling)},
+          {"block_length", b.block_length},
+          {"seed", b.options.seed},
+          {"failed", b.failed},
+          {"words", b.words}};
+}
+
+Json correlation_json(const Correlation& c) {
+  return {{"lag_1", number(c.lag1)},
+          {"samples", c.count},
+          {"effective_samples", number(c.effective_count)},
+          {"significant", c.significant},
+          {"words", c.words}};
+}
+
 Json parameter_json(const ParameterResult& p) {
   const Dimension dimension = p.parameter.unit.dimension;
   Json j{{"name", p.parameter.name}, {"SI_unit", si_symbol(dimension)}};
@@ -78,7 +108,7 @@ Json minima_json(const FitResult& result) {
   return list;
 }
 
-Json correlation_json(const FitResult& result) {
+Json linearised_json(const FitResult& result) {
   const Covariance& c = result.covariance;
   Json j{{"full_rank", c.full_rank}};
   Json names = Json::array();
@@ -114,7 +144,35 @@ Json data_json(const FitResult& result) {
     if (d.datum.lower) j["band" + unit] = {number(*d.datum.lower), number(*d.datum.upper)};
     j["predicted" + unit] = number(d.predicted);
     if (d.predicted_sd) j["predicted_sd" + unit] = number(*d.predicted_sd);
+    if (d.confidence) {
+      j["confidence_band" + unit] = pair_json(d.confidence->lower, d.confidence->upper);
+    }
+    if (d.prediction) {
+      j["prediction_band" + unit] = pair_json(d.prediction->lower, d.prediction->upper);
+    }
     j["standardised_residual"] = number(d.standardised);
+    list.push_back(std::move(j));
+  }
+  return list;
+}
+
+/// Numbers about each recording; its samples are in the data.
+Json recordings_json(const FitResult& result) {
+  Json list = Json::array();
+  for (const RecordingFit& r : result.recordings) {
+    const auto fitted = std::count(r.fitted.begin(), r.fitted.end(), true);
+    Json j{{"dataset", result.config.data[r.choice].dataset}};
+    j["quantity"] = quantity_name(r.response_quantity);
+    j["provenance"] = provenance_name(r.provenance);
+    j["samples"] = r.time_s.size();
+    j["samples_fitted"] = fitted;
+    j[tpm::si_key(r.response_quantity, "peak")] = number(r.peak);
+    j[tpm::si_key(r.response_quantity, "rms_residual")] = number(r.rms_residual);
+    if (r.rms_outside) {
+      j[tpm::si_key(r.response_quantity, "rms_residual_outside")] = number(*r.rms_outside);
+    }
+    j["share_inside_prediction_band"] = optional_number(r.share_inside);
+    if (r.correlation) j["correlation"] = correlation_json(*r.correlation);
     list.push_back(std::move(j));
   }
   return list;
@@ -145,14 +203,42 @@ Json assumptions_json(const FitConfig& config) {
       }
     }
     j["noise"] = noise_kind_name(d.noise.kind);
-    if (d.noise.kind != NoiseKind::absolute && d.noise.kind != NoiseKind::per_row) {
+    if (d.noise.shape != ErrorShape::normal) {
+      j["noise_distribution"] = error_shape_name(d.noise.shape);
+    }
+    if (d.noise.shape == ErrorShape::student_t) {
+      j["noise_degrees_of_freedom"] = number(d.noise.degrees_of_freedom);
+    }
+    if (!d.sigma_b.empty()) {
+      j["noise_relative_parameter"] = d.sigma_b;
+    } else if (uses_relative(d.noise.kind)) {
       j["noise_relative"] = number(d.noise.relative);
     }
-    if (d.noise.absolute > 0.0) j["noise_absolute_SI"] = number(d.noise.absolute);
+    if (!d.sigma_a.empty()) {
+      j["noise_absolute_parameter"] = d.sigma_a;
+    } else if (d.noise.absolute > 0.0) {
+      j["noise_absolute_SI"] = number(d.noise.absolute);
+    }
     j["noise_scale"] = d.noise.scale_known ? "known" : "estimated";
     list.push_back(std::move(j));
   }
   return list;
+}
+
+}  // namespace
+
+namespace {
+
+/// -2 ln L and the criteria; null where there is no likelihood.
+void add_likelihood(Json& j, const std::optional<Likelihood>& likelihood) {
+  const auto value = [&](double Likelihood::*member) {
+    return likelihood ? number((*likelihood).*member) : Json(nullptr);
+  };
+  j["minus_two_log_likelihood"] = value(&Likelihood::minus_two_log);
+  j["AIC"] = value(&Likelihood::aic);
+  j["AICc"] = likelihood ? optional_number(likelihood->aicc) : Json(nullptr);
+  j["BIC"] = value(&Likelihood::bic);
+  if (likelihood) j["parameters_counted"] = likelihood->parameters;
 }
 
 }  // namespace
@@ -168,18 +254,34 @@ Json to_json(const FitResult& result) {
   j["degrees_of_freedom"] = result.degrees_of_freedom;
   j["chi_square_p_value"] = optional_number(result.chi_square_p);
   j["variance_factor"] = number(result.variance_factor);
+  add_likelihood(j, result.likelihood);
+  if (result.correlation) {
+    j["residual_correlation"] = correlation_json(*result.correlation);
+    j["residual_correlation"]["inflation"] = number(result.inflation);
+  }
   j["confidence_level"] = result.config.level;
   Json parameters = Json::array();
-  for (const ParameterResult& p : result.parameters) parameters.push_back(parameter_json(p));
+  for (std::size_t i = 0; i < result.parameters.size(); ++i) {
+    parameters.push_back(parameter_json(result.parameters[i]));
+    if (result.bootstrap) {
+      parameters.back()["bootstrap"] = bootstrap_json(result.bootstrap->parameters[i]);
+    }
+  }
   j["parameters"] = std::move(parameters);
-  j["linearised"] = correlation_json(result);
+  j["linearised"] = linearised_json(result);
   j["starts"] = {{"run", result.starts_run},
                  {"failed", result.starts_failed},
                  {"agreeing_to_5_digits", result.starts_agreeing},
-                 {"seed", result.config.seed}};
+                 {"seed", result.config.seed},
+                 {"words", result.waterfall.words}};
+  Json ends = Json::array();
+  for (const double d : result.waterfall.deviances) ends.push_back(number(d));
+  j["starts"]["end_deviances"] = std::move(ends);
+  if (result.bootstrap) j["bootstrap"] = bootstrap_json(*result.bootstrap);
   j["minima"] = minima_json(result);
   j["hypotheses"] = hypotheses_json(result);
   j["data"] = data_json(result);
+  j["recordings"] = recordings_json(result);
   j["flags"] = result.flags;
   return j;
 }

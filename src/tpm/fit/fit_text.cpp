@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fit.hpp"
 
@@ -64,7 +66,52 @@ std::string minima_table(const FitResult& result) {
       text += i + 1 < m.low.size() ? "," : "\n";
     }
   }
-  return text;
+  return text + result.waterfall.words + "\n";
+}
+
+/// "liver.csv: 500 of 600 samples fitted, rms residual 1.2 mN (0.4 % of the peak), ..."
+std::string recording_line(const FitResult& result, const RecordingFit& r) {
+  const Unit unit = shown_unit(quantity_dimension(r.response_quantity));
+  const auto shown = [&](double si) {
+    return fmt::format("{}{}{}", significant(si / unit.to_si, 3), unit.symbol.empty() ? "" : " ",
+                       unit.symbol);
+  };
+  std::string text = fmt::format(
+      "{}: {} of {} samples fitted, rms residual {}", result.config.data[r.choice].dataset,
+      std::count(r.fitted.begin(), r.fitted.end(), true), r.time_s.size(), shown(r.rms_residual));
+  if (r.peak > 0.0) {
+    text += fmt::format(" ({} % of the peak)", significant(100.0 * r.rms_residual / r.peak, 3));
+  }
+  if (r.rms_outside) text += fmt::format(", {} outside the window", shown(*r.rms_outside));
+  if (r.share_inside) {
+    text += fmt::format(", {} % within the {:.4g} % prediction band",
+                        significant(100.0 * *r.share_inside, 3), 100.0 * result.config.level);
+  }
+  if (r.correlation) text += "; " + r.correlation->words;
+  return text + "\n";
+}
+
+std::string likelihood_line(const Likelihood& l) {
+  return fmt::format("-2 ln L {}, AIC {}, AICc {}, BIC {} with {} parameters\n",
+                     significant(l.minus_two_log, 6), significant(l.aic, 6),
+                     l.aicc ? significant(*l.aicc, 6) : "-", significant(l.bic, 6), l.parameters);
+}
+
+std::string bootstrap_table(const FitResult& result) {
+  const BootstrapResult& b = result.bootstrap.value();
+  std::string text = b.words + "\n";
+  for (std::size_t i = 0; i < b.parameters.size(); ++i) {
+    const Unit& unit = result.parameters[i].parameter.unit;
+    const BootstrapParameter& p = b.parameters[i];
+    const auto interval = [&](const BootstrapInterval& limits) {
+      return fmt::format("{} .. {}", significant(limits.lower / unit.to_si, 4),
+                         significant(limits.upper / unit.to_si, 4));
+    };
+    text += fmt::format("  {:<10} std. error {}, percentile {}, BCa {} {}\n", p.name,
+                        significant(p.standard_error / unit.to_si, 3), interval(p.percentile),
+                        p.bca ? interval(*p.bca) : "-", unit.symbol);
+  }
+  return text + "\n";
 }
 
 /// Recordings have hundreds of readings; a terminal wants a sentence.
@@ -78,12 +125,18 @@ std::string to_terminal_text(const FitResult& result) {
                       significant(result.chi_square, 6), result.value_count, result.band_count,
                       result.degrees_of_freedom);
   if (result.chi_square_p) text += fmt::format(", p = {}", significant(*result.chi_square_p, 2));
-  text += "\n\n";
+  text += "\n";
+  if (result.likelihood) text += likelihood_line(*result.likelihood);
+  text += "\n";
   for (const ParameterResult& p : result.parameters) text += "- " + p.words + "\n";
   for (const HypothesisResult& h : result.hypotheses) text += "- " + h.words + "\n";
   if (!result.weakest_words.empty()) text += "- " + result.weakest_words + "\n";
   text += "\n" + minima_table(result) + "\n";
-  if (result.data.size() <= kMostRows) {
+  if (result.bootstrap) text += bootstrap_table(result);
+  for (const RecordingFit& r : result.recordings) text += recording_line(result, r);
+  if (result.data.empty()) {
+    // the recordings' lines say it all
+  } else if (result.data.size() <= kMostRows) {
     text += data_table(result);
   } else {
     text += fmt::format("{} readings; --format json lists them\n", result.data.size());

@@ -45,6 +45,15 @@ NoiseKind parse_noise_kind(std::string_view text, std::string_view where) {
                   "relative_to_datum, absolute, combined, per_row, log or relative_to_model");
 }
 
+bool uses_relative(NoiseKind kind) {
+  return kind == NoiseKind::relative_to_datum || kind == NoiseKind::combined ||
+         kind == NoiseKind::log || kind == NoiseKind::relative_to_model;
+}
+
+bool uses_absolute(NoiseKind kind) {
+  return kind == NoiseKind::absolute || kind == NoiseKind::combined;
+}
+
 std::string_view loss_name(Loss loss) noexcept {
   switch (loss) {
     case Loss::none:

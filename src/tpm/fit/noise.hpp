@@ -34,6 +34,10 @@ struct Noise {
 [[nodiscard]] NoiseKind parse_noise_kind(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view noise_kind_name(NoiseKind kind) noexcept;
 
+/// Whether b and a are part of the standard deviation.
+[[nodiscard]] bool uses_relative(NoiseKind kind);
+[[nodiscard]] bool uses_absolute(NoiseKind kind);
+
 /// Down-weighting of outliers, applied to each standardised residual r as sign(r) sqrt(rho(r^2)).
 enum class Loss {
   none,

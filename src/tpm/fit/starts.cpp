@@ -99,7 +99,7 @@ std::vector<bool> linear_parameters(const ExperimentResiduals& function) {
   std::vector<bool> linear;
   linear.reserve(config.parameters.size());
   for (const EstimatedParameter& p : config.parameters) {
-    linear.push_back(p.fit.scale == Scale::linear &&
+    linear.push_back(p.fit.scale == Scale::linear && !p.sets.empty() &&
                      std::all_of(p.sets.begin(), p.sets.end(), [&](const Target& target) {
                        return function.model().linear_in(target.parameter);
                      }));
@@ -138,7 +138,8 @@ void sort_branches(const FitConfig& config, std::vector<double>& start) {
 StartKind start_kind(const ExperimentResiduals& function) {
   const FitConfig& config = function.config();
   const bool linear_noise = std::all_of(config.data.begin(), config.data.end(), [](const auto& d) {
-    return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model;
+    return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model &&
+           d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
   });
   const std::vector<bool> linear = linear_parameters(function);
   const bool any = std::find(linear.begin(), linear.end(), true) != linear.end();

@@ -26,7 +26,7 @@ bool scale_known(const FitConfig& config) {
 /// Rise of the deviance at the limits of the confidence interval of one parameter.
 double interval_rise(const FitResult& fit) {
   const Threshold threshold{fit.config.level, scale_known(fit.config), fit.value_count,
-                            static_cast<int>(fit.parameters.size())};
+                            static_cast<int>(fit.parameters.size()), fit.inflation};
   return threshold.rise(fit.best.deviance);
 }
 

@@ -1,0 +1,57 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/fit/experiment_residuals.hpp"
+#include "tpm/fit/gradient_check.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct GradientOptions {
+  std::string config;
+  std::string points = "3";
+  std::string seed = "0";
+};
+
+int check(const GradientOptions& options, const Session& session) {
+  GradientCheckOptions wanted;
+  constexpr std::uint64_t kMostPoints = 1000;
+  const std::uint64_t points = parse_whole_number(options.points, "--points", 0);
+  if (points > kMostPoints) {
+    throw Error(ExitCode::usage, "--points", fmt::format("{}", points),
+                fmt::format("at most {}", kMostPoints));
+  }
+  wanted.random_points = static_cast<int>(points);
+  wanted.seed = parse_whole_number(options.seed, "--seed", 0);
+  const ExperimentResiduals function(read_fit_config(options.config));
+  std::vector<FitParameter> parameters;
+  for (const EstimatedParameter& p : function.config().parameters) parameters.push_back(p.fit);
+  const GradientCheck result = check_gradient(function, parameters, wanted);
+  fmt::print("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
+  return result.passed() ? 0 : static_cast<int>(ExitCode::answer_is_no);
+}
+
+}  // namespace
+
+void add_check_gradient_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "check-gradient", "Compare the derivatives of a fit with finite differences");
+  auto options = std::make_shared<GradientOptions>();
+  command->add_option("CONFIG", options->config, "Configuration of tpm fit")->required();
+  command->add_option("--points", options->points, "Random points besides the start, 0 to 1000")
+      ->capture_default_str();
+  command->add_option("--seed", options->seed, "Seed of the random points, 0 or more")
+      ->capture_default_str();
+  add_format_option(*command, session);
+  command->footer(
+      "Exit code 1 if a derivative is wrong, or more than half of them cannot be told.\n"
+      "Example:\n  tpm check-gradient configs/liver_relaxation.json");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return check(*options, session); };
+  });
+}
+
+}  // namespace tpm::app
