@@ -75,23 +75,35 @@ std::size_t values_along(const DesignResult& result, const Direction& d) {
   return values.size();
 }
 
+Figure empty_figure(const DesignResult& result, const Direction& d, std::size_t sheet) {
+  return {sheet == 1 ? d.id : fmt::format("{}_{}", d.id, sheet),
+          fmt::format("What the {} decides", d.quantity),
+          fmt::format("Expected standard errors from the Fisher information; otherwise as in the "
+                      "best candidate: {}.",
+                      experiment_words(result.ranked.front().experiment)),
+          {}};
+}
+
 }  // namespace
 
 std::vector<Figure> design_figures(const DesignResult& result) {
+  // Beside more panels the numbers of the axes run into each other.
+  constexpr std::size_t kPanels = 3;
   std::vector<Figure> figures;
   for (const Direction& d : directions()) {
     if (values_along(result, d) < 2) continue;
-    Figure figure{d.id,
-                  fmt::format("What the {} decides", d.quantity),
-                  fmt::format("Expected standard errors from the Fisher information; otherwise as "
-                              "in the best candidate: {}.",
-                              experiment_words(result.ranked.front().experiment)),
-                  {}};
+    std::size_t sheet = 0;
+    std::size_t free = 0;
     for (std::size_t i = 0; i < result.problem.config.parameters.size(); ++i) {
       Panel panel = parameter_panel(result, d, i);
-      if (!panel.series.empty()) figure.panels.push_back(std::move(panel));
+      if (panel.series.empty()) continue;
+      if (free == 0) {
+        figures.push_back(empty_figure(result, d, ++sheet));
+        free = kPanels;
+      }
+      figures.back().panels.push_back(std::move(panel));
+      --free;
     }
-    if (!figure.panels.empty()) figures.push_back(std::move(figure));
   }
   return figures;
 }

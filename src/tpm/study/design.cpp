@@ -176,9 +176,9 @@ std::string broken_limit(const MachineLimits& limits, const PlannedExperiment& e
   return {};
 }
 
-bool same_recording(const PlannedExperiment& a, const PlannedExperiment& b) {
-  return a.kind == b.kind && a.depth_m == b.depth_m && a.rate_m_per_s == b.rate_m_per_s &&
-         a.load_N == b.load_N && a.hold_s == b.hold_s && a.interval_s == b.interval_s;
+bool same_recording(const PlannedExperiment& a, PlannedExperiment b) {
+  b.repeats = a.repeats;
+  return a == b;
 }
 
 void evaluate_candidates(DesignResult& result, const Knowledge& before) {

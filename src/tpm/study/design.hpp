@@ -34,6 +34,8 @@ struct PlannedExperiment {
   [[nodiscard]] double total_s() const;     ///< of all repeats
   /// Samples of one recording; huge counts are still exact (a double).
   [[nodiscard]] double samples() const;
+
+  bool operator==(const PlannedExperiment&) const = default;
 };
 
 /// "8 mm at 10 mm/s, held 100 s, every 0.1 s, 3 times"

@@ -99,8 +99,9 @@ std::string candidate_rows(const DesignResult& result, std::size_t top) {
 }
 
 std::string pair_words(const DesignResult& result) {
+  const bool same = result.pair.first == result.pair.second;
   std::string text = fmt::format("best pair: {}; then {}\n", experiment_words(result.pair.first),
-                                 experiment_words(result.pair.second));
+                                 same ? "the same again" : experiment_words(result.pair.second));
   for (std::size_t i = 0; i < result.pair.expected.parameters.size(); ++i) {
     const ExpectedParameter& p = result.pair.expected.parameters[i];
     text += fmt::format("  {}: {}, {}\n", p.name, interval_words(result.problem.parameter(i), p),
