@@ -192,6 +192,7 @@ TEST_CASE("the expected standard errors are those of a fit to such data") {
     const bool series = std::string(law) == "linear-1-series";
     document["parameters"][series ? "k0" : "k_inf"] = like_k;
     document["parameters"][series ? "kc1" : "k1"] = like_k;
+    document["parameters"][series ? "kc1" : "k1"]["start"] = "150 N/m";
     document["parameters"][series ? "T1" : "tau1"] = like_tau;
     if (std::string(law) == "power-1") {
       document["parameters"]["exponent"] = {{"start", "1.5"}, {"lower", "1"}, {"upper", "4"}};

@@ -67,7 +67,8 @@ std::vector<double> starts_of(const FitConfig& config) {
 const PlannedNoise& noise_for(const DesignProblem& problem, const PlannedExperiment& experiment) {
   if (experiment.kind == Kind::ramp_hold) return problem.force_noise;
   if (problem.depth_noise) return *problem.depth_noise;
-  throw bad_input("design", "creep without the noise of a depth", "it under /noise/depth");
+  throw bad_input(fmt::format("design '{}'", printable(problem.config.title)),
+                  "creep without the noise of a depth", "it under /noise/depth");
 }
 
 Eigen::VectorXd sigmas(const PlannedNoise& noise, const Eigen::VectorXd& expected) {
@@ -77,7 +78,7 @@ Eigen::VectorXd sigmas(const PlannedNoise& noise, const Eigen::VectorXd& expecte
 /// The part of the columns that no combination of the nuisance columns imitates.
 Eigen::MatrixXd without_nuisance(const Eigen::MatrixXd& jacobian, Eigen::Index material) {
   const Eigen::MatrixXd nuisance = jacobian.rightCols(jacobian.cols() - material);
-  const Eigen::MatrixXd columns = jacobian.leftCols(material);
+  Eigen::MatrixXd columns = jacobian.leftCols(material);
   if (nuisance.cols() == 0) return columns;
   return columns - nuisance * nuisance.completeOrthogonalDecomposition().solve(columns);
 }
@@ -211,9 +212,9 @@ void evaluate_candidates(DesignResult& result, const Knowledge& before) {
   }
   if (!result.ranked.empty()) return;
   throw bad_input(
-      "design",
+      fmt::format("design '{}'", printable(problem.config.title)),
       fmt::format("no candidate is within the limits ({})", fmt::join(result.left_out, "; ")),
-      "at least one");
+      "at least one of /candidates within /limits");
 }
 
 void rank(DesignResult& result) {

@@ -115,7 +115,7 @@ std::vector<double> neighbour_correlations(const DesignProblem& problem,
 DesignCheck check_design(const DesignProblem& problem, const PlannedExperiment& experiment,
                          int sets, std::uint64_t seed) {
   if (sets < kFewestSets) {
-    throw bad_input("design", fmt::format("{} simulated data sets", sets),
+    throw bad_input("--check", fmt::format("{} simulated data sets", sets),
                     fmt::format("{} or more", kFewestSets));
   }
   std::vector<PlannedExperiment> experiments = problem.previous;
