@@ -395,11 +395,42 @@ std::vector<ErrorCase> claims_cases() {
   };
 }
 
+const std::string kDesign = R"({"title": "t", "law": {"name": "linear-1", "reference": "1 mm"},
+"parameters": {
+  "k_inf": {"start": "100 N/m", "lower": "1 N/m", "upper": "1000 N/m"},
+  "k1": {"start": "100 N/m", "lower": "1 N/m", "upper": "1000 N/m"},
+  "tau1": {"start": "2 s", "lower": "0.1 s", "upper": "100 s"}},
+"noise": {"force": {"absolute": "0.01 N"}},
+"candidates": [{"kind": "ramp_hold", "rate": ["4 mm/s"], "depth": ["8 mm"], "hold": ["9 s"],
+  "interval": ["1 s"]}]})";
+
+std::vector<ErrorCase> design_cases() {
+  const std::string type = "design";
+  const std::string run_design = "design {}/d.json --check 0 -o {}/out";
+  const auto design = [](std::string text) { return files({{"d.json", std::move(text)}}); };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return design(replaced(kDesign, from, to));
+  };
+  return {
+      {type, "missing", run_design, files({})},
+      {type, "missing key", run_design, with("\"title\": \"t\",", "")},
+      {type, "wrong unit", run_design, with("2 s", "2 mm")},
+      {type, "rate of 0", run_design, with("4 mm/s", "0 mm/s")},
+      {type, "no depth", run_design, with("\"depth\": [\"8 mm\"],", "")},
+      {type, "creep with a rate", run_design, with("ramp_hold", "creep")},
+      {type, "deeper than the limit", run_design, with("8 mm", "13 mm")},
+      {type, "unknown goal", run_design, with("\"title\"", "\"goal\": \"tau2\", \"title\"")},
+      {type, "unknown nuisance", run_design,
+       with("\"title\"", "\"nuisance\": [\"offset\"], \"title\"")},
+      {type, "too few simulations", "design {}/d.json --check 3 -o {}/out", design(kDesign)},
+  };
+}
+
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
   for (const auto& cases :
        {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
-        hdf5_cases(), fit_config_cases(), fit_tables_cases(), claims_cases()}) {
+        hdf5_cases(), fit_config_cases(), fit_tables_cases(), design_cases(), claims_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

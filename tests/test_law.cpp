@@ -224,6 +224,9 @@ TEST_CASE("degenerate chains: equal times, branches without stiffness, one dashp
   CHECK_THAT(merged.k0, WithinRel(10.0, 1e-15));
   CHECK_THAT(merged.T_s[0], WithinRel(2.0, 1e-14));  // tau k0/k_inf
   CHECK_THAT(merged.k[0], WithinRel(10.0, 1e-14));   // 1/k_inf - 1/k0 = 1/10
+  const Prony equal = to_parallel({100.0, {100.0}, {0.7}});  // the root is the middle of its gap
+  CHECK_THAT(equal.k_inf, WithinRel(50.0, 1e-14));
+  CHECK_THAT(equal.tau_s.at(0), WithinRel(0.35, 1e-14));
   const Prony maxwell = to_parallel({4.0, {}, {}, 8.0});
   REQUIRE(maxwell.k.size() == 1);
   CHECK(maxwell.k_inf == 0.0);

@@ -31,6 +31,7 @@ void add_version_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
 void add_select_command(CLI::App& app, Session& session);
 void add_check_gradient_command(CLI::App& app, Session& session);
+void add_design_command(CLI::App& app, Session& session);
 void add_coverage_command(CLI::App& app, Session& session);
 void add_tables_command(CLI::App& app, Session& session);
 void add_audit_command(CLI::App& app, Session& session);

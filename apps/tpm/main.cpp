@@ -49,6 +49,7 @@ int run(int argc, char** argv) {
   add_fit_command(app, session);
   add_select_command(app, session);
   add_check_gradient_command(app, session);
+  add_design_command(app, session);
   add_coverage_command(app, session);
   add_tables_command(app, session);
   add_audit_command(app, session);

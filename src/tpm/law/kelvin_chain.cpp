@@ -84,6 +84,8 @@ Root root_between(const PoleFunction<double>& f, double low, double high) {
   double inner = std::log(reach) - 1.0;
   while (at(inner) > 0.0 && inner > -700.0) inner -= 8.0;
   if (at(inner) >= 0.0) return {origin, 0.0};  // a branch without weight: the root is the pole
+  // The root may be the very middle of the gap, where rounding decides the sign.
+  if (at(std::log(reach)) <= 0.0) return {origin, sign * reach};
   std::uintmax_t iterations = 200;
   const auto bracket = boost::math::tools::toms748_solve(
       at, inner, std::log(reach), boost::math::tools::eps_tolerance<double>(53), iterations);

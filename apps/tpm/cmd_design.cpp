@@ -1,0 +1,74 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/report/design_figures.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/study/design.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct DesignOptions {
+  std::string design;
+  std::string check = "100";
+  std::string seed = "0";
+  std::string top = "10";
+  std::string folder;
+  std::string output;
+};
+
+void draw(const DesignResult& result, const std::filesystem::path& folder) {
+  const std::string python = find_drawing_python();
+  write_file(folder / "figures.json", to_text(to_json(design_figures(result))));
+  draw_figures(python, folder / "figures.json", folder);
+}
+
+int design(const DesignOptions& options, const Session& session) {
+  const auto sets = static_cast<int>(parse_whole_number(options.check, "--check", 0));
+  const std::uint64_t seed = parse_whole_number(options.seed, "--seed", 0);
+  const auto top = static_cast<std::size_t>(parse_whole_number(options.top, "--top", 1));
+  const DesignResult result = plan(read_design(options.design));
+  std::optional<DesignCheck> check;
+  if (sets > 0) {
+    check = check_design(result.problem, result.ranked.front().experiment, sets, seed);
+  }
+  const DesignCheck* checked = check ? &*check : nullptr;
+  if (!options.folder.empty()) draw(result, options.folder);
+  deliver(session.json() ? to_text(to_json(result, checked, top))
+                         : to_terminal_text(result, checked, top),
+          options.output);
+  return 0;
+}
+
+}  // namespace
+
+void add_design_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "design", "Which experiment would identify the parameters? Expected intervals beforehand");
+  auto options = std::make_shared<DesignOptions>();
+  command->add_option("DESIGN", options->design, "JSON design (schemas/design.schema.json)")
+      ->required();
+  command
+      ->add_option("--check", options->check,
+                   "Simulate and fit the best candidate this many times; 0: not at all, else 10 "
+                   "or more")
+      ->capture_default_str();
+  command->add_option("--seed", options->seed, "Seed of the simulations")->capture_default_str();
+  command->add_option("--top", options->top, "How many candidates to list")->capture_default_str();
+  command->add_option("--draw", options->folder, "Write figures into this folder");
+  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm design configs/design_liver.json --draw out/design\n"
+      "  tpm design configs/design_meat.json --check 0 --format json");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return design(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,243 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/study/design.hpp"
+
+namespace tpm {
+namespace {
+
+using Kind = PlannedExperiment::Kind;
+
+/// More candidates than this are a mistake of the file.
+constexpr std::size_t kMostCandidates = 20000;
+
+std::string key_of(std::string_view where, std::string_view key) {
+  return where.find(": key ") == std::string_view::npos ? fmt::format("{}: key /{}", where, key)
+                                                        : fmt::format("{}/{}", where, key);
+}
+
+/// A quantity above `least` (or equal to it, if that is allowed).
+double quantity(const Json& value, Dimension dimension, const std::string& where,
+                bool zero_allowed = false) {
+  const auto text = value.get<std::string>();
+  const double si = parse_quantity(text, dimension, where);
+  if (si > 0.0 || (zero_allowed && si == 0.0)) return si;
+  throw bad_input(where, fmt::format("'{}'", printable(text)),
+                  zero_allowed ? "0 or more" : "more than 0");
+}
+
+std::vector<double> quantities(const Json& grid, std::string_view key, Dimension dimension,
+                               const std::string& where, bool zero_allowed = false) {
+  const std::string place = key_of(where, key);
+  if (!grid.contains(key)) {
+    throw bad_input(where, fmt::format("no '{}'", key), "a list of quantities under that key");
+  }
+  std::vector<double> values;
+  for (const auto& value : grid.at(std::string(key))) {
+    values.push_back(quantity(value, dimension, place, zero_allowed));
+  }
+  return values;
+}
+
+std::vector<int> repeats_of(const Json& grid) {
+  return grid.value("repeats", std::vector<int>{1});
+}
+
+void refuse_keys(const Json& grid, std::initializer_list<const char*> keys,
+                 const std::string& where, std::string_view kind) {
+  for (const char* key : keys) {
+    if (!grid.contains(key)) continue;
+    throw bad_input(key_of(where, key), fmt::format("{} has none", kind),
+                    "only keys of that kind of experiment");
+  }
+}
+
+/// All combinations; those that differ only in their repeats stand side by side.
+void add_grid(const Json& grid, const std::string& where, std::vector<PlannedExperiment>& list) {
+  const auto kind = grid.at("kind").get<std::string>();
+  const bool creep = kind == "creep";
+  if (creep) {
+    refuse_keys(grid, {"rate", "depth"}, where, kind);
+  } else {
+    refuse_keys(grid, {"load"}, where, kind);
+  }
+  const auto sizes = creep ? quantities(grid, "load", Dimension::force, where)
+                           : quantities(grid, "depth", Dimension::length, where);
+  const auto rates =
+      creep ? std::vector<double>{0.0} : quantities(grid, "rate", Dimension::speed, where);
+  const auto holds = quantities(grid, "hold", Dimension::time, where, !creep);
+  const auto intervals = quantities(grid, "interval", Dimension::time, where);
+  const auto repeats = repeats_of(grid);
+  const std::size_t count =
+      sizes.size() * rates.size() * holds.size() * intervals.size() * repeats.size();
+  if (list.size() + count > kMostCandidates) {
+    throw bad_input(where, fmt::format("{} experiments", list.size() + count),
+                    fmt::format("at most {}", kMostCandidates));
+  }
+  for (const double size : sizes) {
+    for (const double rate : rates) {
+      for (const double hold : holds) {
+        for (const double interval : intervals) {
+          for (const int repeat : repeats) {
+            list.push_back({creep ? Kind::creep : Kind::ramp_hold, creep ? 0.0 : size, rate,
+                            creep ? size : 0.0, hold, interval, repeat});
+          }
+        }
+      }
+    }
+  }
+}
+
+std::vector<PlannedExperiment> parse_grids(const Json& document, const char* key,
+                                           std::string_view where) {
+  std::vector<PlannedExperiment> list;
+  if (!document.contains(key)) return list;
+  std::size_t index = 0;
+  for (const auto& grid : document.at(key)) {
+    add_grid(grid, key_of(key_of(where, key), std::to_string(index++)), list);
+  }
+  return list;
+}
+
+PlannedNoise parse_noise(const Json& j, Dimension dimension, const std::string& where) {
+  return {quantity(j.at("absolute"), dimension, key_of(where, "absolute")),
+          j.value("relative", 0.0)};
+}
+
+void parse_noises(const Json& j, DesignProblem& problem, const std::string& where) {
+  problem.force_noise = parse_noise(j.at("force"), Dimension::force, key_of(where, "force"));
+  if (j.contains("depth")) {
+    problem.depth_noise = parse_noise(j.at("depth"), Dimension::length, key_of(where, "depth"));
+  }
+  problem.scale_known = j.value("scale", "known") == "known";
+  if (j.contains("correlation_time")) {
+    problem.correlation_time_s = quantity(j.at("correlation_time"), Dimension::time,
+                                          key_of(where, "correlation_time"), true);
+  }
+}
+
+void parse_limits(const Json& j, MachineLimits& limits, const std::string& where) {
+  const auto set = [&](const char* key, Dimension dimension, double& limit) {
+    if (j.contains(key)) limit = quantity(j.at(key), dimension, key_of(where, key));
+  };
+  set("rate", Dimension::speed, limits.rate_m_per_s);
+  set("depth", Dimension::length, limits.depth_m);
+  set("load", Dimension::force, limits.load_N);
+  set("duration", Dimension::time, limits.duration_s);
+  set("total_time", Dimension::time, limits.total_s);
+  limits.samples = j.value("samples", limits.samples);
+}
+
+/// The fit that the design prepares, through the reader of fit configurations.
+FitConfig parse_model(const Json& document, std::string_view where) {
+  Json fit{{"title", document.at("title")}};
+  for (const char* key : {"model", "law", "tension", "parameters", "fixed"}) {
+    if (document.contains(key)) fit[key] = document.at(key);
+  }
+  fit["data"] = Json::array({{{"dataset", "planned"},
+                              {"protocol", {{"kind", "measured"}}},
+                              {"noise", {{"kind", "per_row"}}}}});
+  FitConfig config = parse_fit_config(fit, where);
+  if (config.law && config.law->drive != Quantity::indentation_depth) {
+    throw bad_input(key_of(where, "law/drive"), "a stretched strip", "indentation_depth");
+  }
+  // The search of a simulated fit begins at the truth.
+  config.starts = 1;
+  config.profiles = false;
+  return config;
+}
+
+std::size_t parameter_place(const FitConfig& config, const std::string& name,
+                            const std::string& where, std::string_view besides) {
+  std::vector<std::string> known;
+  for (const EstimatedParameter& p : config.parameters) {
+    if (p.fit.name == name) return known.size();
+    known.push_back(p.fit.name);
+  }
+  throw bad_input(where, fmt::format("no parameter is called '{}'", printable(name)),
+                  fmt::format("{}{}", besides, fmt::join(known, ", ")));
+}
+
+void separate_nuisance(const Json& document, DesignProblem& problem, std::string_view where) {
+  if (!document.contains("nuisance")) return;
+  auto& list = problem.config.parameters;
+  for (const auto& name : document.at("nuisance")) {
+    const std::size_t i = parameter_place(problem.config, name.get<std::string>(),
+                                          key_of(where, "nuisance"), "one of ");
+    problem.nuisance.push_back(list[i]);
+    list.erase(list.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  if (!list.empty()) return;
+  throw bad_input(key_of(where, "nuisance"), "every parameter is a nuisance",
+                  "at least one that is not");
+}
+
+void require_sizes(const DesignProblem& problem, std::string_view where) {
+  for (const EstimatedParameter& p : problem.config.parameters) {
+    if (p.fit.start != 0.0) continue;
+    throw bad_input(key_of(where, fmt::format("parameters/{}/start", p.fit.name)),
+                    "0 has no relative error", "another value, or the parameter under /nuisance");
+  }
+}
+
+void parse_known(const Json& document, DesignProblem& problem, std::string_view where) {
+  problem.known.assign(problem.config.parameters.size(), std::numeric_limits<double>::infinity());
+  if (!document.contains("known")) return;
+  const std::string place = key_of(where, "known");
+  for (const auto& [name, error] : document.at("known").items()) {
+    problem.known[parameter_place(problem.config, name, place, "one of ")] = error.get<double>();
+  }
+}
+
+void parse_goal(const Json& document, DesignProblem& problem, std::string_view where) {
+  const std::string goal = document.value("goal", "worst");
+  if (goal == "all" || goal == "worst") {
+    problem.goal = goal == "all" ? Goal::all : Goal::worst;
+    return;
+  }
+  problem.goal = Goal::parameter;
+  problem.goal_parameter =
+      parameter_place(problem.config, goal, key_of(where, "goal"), "all, worst, ");
+}
+
+void require_creep_noise(const DesignProblem& problem, std::string_view where) {
+  if (problem.depth_noise) return;
+  const auto is_creep = [](const PlannedExperiment& e) { return e.kind == Kind::creep; };
+  if (std::none_of(problem.candidates.begin(), problem.candidates.end(), is_creep) &&
+      std::none_of(problem.previous.begin(), problem.previous.end(), is_creep)) {
+    return;
+  }
+  throw bad_input(key_of(where, "noise"), "creep without the noise of a depth",
+                  "it under /noise/depth");
+}
+
+}  // namespace
+
+DesignProblem parse_design(const Json& document, std::string_view where) {
+  check_schema(document, "design", where);
+  DesignProblem problem;
+  problem.config = parse_model(document, where);
+  separate_nuisance(document, problem, where);
+  require_sizes(problem, where);
+  parse_known(document, problem, where);
+  parse_noises(document.at("noise"), problem, key_of(where, "noise"));
+  if (document.contains("limits")) {
+    parse_limits(document.at("limits"), problem.limits, key_of(where, "limits"));
+  }
+  problem.candidates = parse_grids(document, "candidates", where);
+  problem.previous = parse_grids(document, "previous", where);
+  require_creep_noise(problem, where);
+  parse_goal(document, problem, where);
+  problem.factor = document.value("identified_factor", problem.factor);
+  problem.config.level = document.value("level", problem.config.level);
+  return problem;
+}
+
+DesignProblem read_design(const std::filesystem::path& path) {
+  return parse_design(read_json(path), path.string());
+}
+
+}  // namespace tpm
