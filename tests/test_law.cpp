@@ -33,6 +33,8 @@ std::vector<double> random_parameters(const LawModel& law, Random& random) {
       values.push_back(0.05 * std::pow(100.0, u));
     } else if (p.name == "exponent") {
       values.push_back(1.2 + u);
+    } else if (p.name == "alpha") {
+      values.push_back(0.3 + 0.6 * u);
     } else if (p.name == "tension_ratio") {
       values.push_back(0.2 + u);
     } else if (p.name == "spacing") {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "tpm/core/error.hpp"
 
@@ -22,14 +23,55 @@ ContactHistory::ContactHistory(const LawAtParameters& law, double peak_depth, Wa
   const Eigen::Index branches = law.memory.stiffness.size();
   w_.setZero(branches);
   w_next_ = w_;
-  if (want_slopes_) {
-    w_by_.setZero(law.parameter_count, branches);
-    w_by_next_ = w_by_;
-  }
   now_.u_by = zero_slopes();
   now_.v_by = zero_slopes();
   v_rate_by_ = zero_slopes();
-  weights_.resize(static_cast<std::size_t>(branches));
+  weights_.each.resize(static_cast<std::size_t>(branches));
+  for (auto* weight : {&weights_.r, &weights_.b0, &weights_.bm, &weights_.b1}) {
+    weight->setZero(branches);
+  }
+  if (!want_slopes_) return;
+  const KernelPlaces& p = law.place;
+  for (int i = 0; i < law.parameter_count; ++i) {
+    const auto& rates = law.memory.rate_parameter;
+    const bool of_kernel =
+        i == p.exponent || i == p.tension_ratio || i == p.spacing || i == p.contact;
+    if (of_kernel || std::find(rates.begin(), rates.end(), i) != rates.end()) carried_.push_back(i);
+  }
+  w_by_.setZero(branches, std::ssize(carried_));
+  w_by_next_ = w_by_;
+}
+
+/// From here on the depth of the surface, and so the states, depend on every parameter.
+void ContactHistory::carry_all_slopes() {
+  if (!want_slopes_ || std::ssize(carried_) == law_.parameter_count) return;
+  Eigen::ArrayXXd all = Eigen::ArrayXXd::Zero(w_.size(), law_.parameter_count);
+  for (std::size_t c = 0; c < carried_.size(); ++c) {
+    all.col(carried_[c]) = w_by_.col(static_cast<Eigen::Index>(c));
+  }
+  w_by_ = std::move(all);
+  w_by_next_ = w_by_;
+  carried_.resize(static_cast<std::size_t>(law_.parameter_count));
+  std::iota(carried_.begin(), carried_.end(), 0);
+}
+
+/// All branches have relaxed under the depth of now.
+void ContactHistory::relax_fully() {
+  w_.setConstant(now_.v);
+  for (Eigen::Index c = 0; c < w_by_.cols(); ++c) {
+    w_by_.col(c).setConstant(now_.v_by[carried_[static_cast<std::size_t>(c)]]);
+  }
+  v_rate_ = 0.0;
+  v_rate_by_.setZero();
+}
+
+/// The sum of weight_j times the derivatives of the state of branch j.
+Slopes ContactHistory::weighted_slopes(const Eigen::ArrayXd& weight) const {
+  Slopes slopes = zero_slopes();
+  for (Eigen::Index c = 0; c < w_by_.cols(); ++c) {
+    slopes[carried_[static_cast<std::size_t>(c)]] = (weight * w_by_.col(c)).sum();
+  }
+  return slopes;
 }
 
 Slopes ContactHistory::zero_slopes() const {
@@ -60,7 +102,7 @@ ContactHistory::Point ContactHistory::imposed(double drive, bool touching) const
 double ContactHistory::elastic_force(double v, double u, const Eigen::ArrayXd& w,
                                      double v_rate) const {
   double force = law_.memory.constant * v + law_.memory.dashpot * v_rate;
-  for (Eigen::Index j = 0; j < w.size(); ++j) force += law_.memory.stiffness[j] * (v - w[j]);
+  force += (law_.memory.stiffness.array() * (v - w)).sum();
   if (law_.k_tension != 0.0) force += law_.k_tension * law_.tension.at(u).value;
   return force;
 }
@@ -75,19 +117,11 @@ Slopes ContactHistory::force_slopes() const {
   slopes[law_.place.offset] = 1.0;
   if (free_) return slopes;
   const Memory& m = law_.memory;
-  double instant = m.constant;
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    instant += m.stiffness[j];
-    slopes -= m.stiffness[j] * w_by_.col(j);
-  }
-  slopes += instant * now_.v_by + m.dashpot * v_rate_by_;
+  slopes += m.instant() * now_.v_by + m.dashpot * v_rate_by_ - weighted_slopes(m.stiffness.array());
   for (std::size_t q = 0; q < m.by.size(); ++q) {
     const auto column = static_cast<Eigen::Index>(q);
-    double direct = m.d_constant[column] * now_.v + m.d_dashpot[column] * v_rate_;
-    for (Eigen::Index j = 0; j < w_.size(); ++j) {
-      direct += m.d_stiffness(j, column) * (now_.v - w_[j]);
-    }
-    slopes[m.by[q]] += direct;
+    slopes[m.by[q]] += m.d_constant[column] * now_.v + m.d_dashpot[column] * v_rate_ +
+                       (m.d_stiffness.col(column).array() * (now_.v - w_)).sum();
   }
   if (law_.place.k_tension >= 0) {
     const TensionShape::Values t = law_.tension.at(now_.u);
@@ -107,35 +141,44 @@ Slopes ContactHistory::drive_slopes() const {
 void ContactHistory::update_weights(double h, double time_scale, bool parabola) {
   // Evenly sampled times differ by their rounding; the weights of one step length serve them all.
   const double same = 4.0 * std::numeric_limits<double>::epsilon() * time_scale;
-  if (weights_parabola_ == parabola && std::abs(h - weights_h_) <= same) return;
-  for (std::size_t j = 0; j < weights_.size(); ++j) {
-    const double z = h * law_.memory.rate_per_s[static_cast<Eigen::Index>(j)];
-    weights_[j] = parabola ? parabola_weights(z) : line_weights(z);
+  StepWeights& k = weights_;
+  if (k.parabola == parabola && std::abs(h - k.h) <= same) return;
+  for (Eigen::Index j = 0; j < w_.size(); ++j) {
+    const double z = h * law_.memory.rate_per_s[j];
+    const ParabolaWeights one = parabola ? parabola_weights(z) : line_weights(z);
+    k.r[j] = one.r;
+    k.b0[j] = one.b0;
+    k.bm[j] = one.bm;
+    k.b1[j] = one.b1;
+    k.each[static_cast<std::size_t>(j)] = one;
   }
-  weights_h_ = h;
-  weights_parabola_ = parabola;
+  k.h = h;
+  k.parabola = parabola;
 }
 
 void ContactHistory::step_branches(const Point& begin, const Point* middle, const Point& end) {
-  const Memory& m = law_.memory;
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const ParabolaWeights& k = weights_[static_cast<std::size_t>(j)];
-    const double v_middle = middle != nullptr ? middle->v : 0.0;
-    w_next_[j] = k.r * w_[j] + k.b0 * begin.v + k.bm * v_middle + k.b1 * end.v;
-    if (!want_slopes_) continue;
-    auto by = w_by_next_.col(j);
-    by = k.r * w_by_.col(j) + k.b0 * begin.v_by + k.b1 * end.v_by;
-    if (middle != nullptr) by += k.bm * middle->v_by;
-    const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
-    if (tau < 0) continue;
-    by[tau] +=
-        m.rate_per_s[j] * (k.d_r * w_[j] + k.d_b0 * begin.v + k.d_bm * v_middle + k.d_b1 * end.v);
+  const StepWeights& k = weights_;
+  const double v_middle = middle != nullptr ? middle->v : 0.0;
+  w_next_ = k.r * w_ + k.b0 * begin.v + k.bm * v_middle + k.b1 * end.v;
+  const std::vector<int>& rates = law_.memory.rate_parameter;
+  for (Eigen::Index c = 0; c < w_by_.cols(); ++c) {
+    const int p = carried_[static_cast<std::size_t>(c)];
+    const double by_middle = middle != nullptr ? middle->v_by[p] : 0.0;
+    auto next = w_by_next_.col(c);
+    next = k.r * w_by_.col(c) + k.b0 * begin.v_by[p] + k.bm * by_middle + k.b1 * end.v_by[p];
+    for (std::size_t j = 0; j < rates.size(); ++j) {
+      if (rates[j] != p) continue;
+      const auto row = static_cast<Eigen::Index>(j);
+      const ParabolaWeights& d = k.each[j];
+      next[row] += law_.memory.rate_per_s[row] *
+                   (d.d_r * w_[row] + d.d_b0 * begin.v + d.d_bm * v_middle + d.d_b1 * end.v);
+    }
   }
 }
 
-void ContactHistory::accept(const Point& begin, const Point& end, double h) {
-  v_rate_ = (end.v - begin.v) / h;
-  if (want_slopes_) v_rate_by_ = (end.v_by - begin.v_by) / h;
+void ContactHistory::accept(const Point& end, double v_rate, const Slopes& v_rate_by) {
+  v_rate_ = v_rate;
+  v_rate_by_ = v_rate_by;
   w_.swap(w_next_);
   w_by_.swap(w_by_next_);
   now_ = end;
@@ -143,53 +186,41 @@ void ContactHistory::accept(const Point& begin, const Point& end, double h) {
 
 ContactHistory::Balance ContactHistory::balance_at_once() const {
   const Memory& m = law_.memory;
-  Balance b{m.constant, 0.0, zero_slopes(), zero_slopes()};
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    b.a += m.stiffness[j];
-    b.r += m.stiffness[j] * w_[j];
-    if (want_slopes_) b.r_by += m.stiffness[j] * w_by_.col(j);
-  }
+  Balance b{m.instant(), (m.stiffness.array() * w_).sum(), zero_slopes(), zero_slopes()};
   if (!want_slopes_) return b;
+  b.r_by = weighted_slopes(m.stiffness.array());
   for (std::size_t q = 0; q < m.by.size(); ++q) {
-    const auto column = static_cast<Eigen::Index>(q);
-    b.a_by[m.by[q]] += m.d_constant[column];
-    for (Eigen::Index j = 0; j < w_.size(); ++j) {
-      b.a_by[m.by[q]] += m.d_stiffness(j, column);
-      b.r_by[m.by[q]] += m.d_stiffness(j, column) * w_[j];
-    }
+    const auto d = m.d_stiffness.col(static_cast<Eigen::Index>(q)).array();
+    b.a_by[m.by[q]] += m.d_constant[static_cast<Eigen::Index>(q)] + d.sum();
+    b.r_by[m.by[q]] += (d * w_).sum();
   }
   return b;
 }
 
 ContactHistory::Balance ContactHistory::balance_over_step(double h) const {
   const Memory& m = law_.memory;
+  const StepWeights& k = weights_;
   const Point& begin = now_;
-  Balance b{m.constant + m.dashpot / h, m.dashpot / h * begin.v, zero_slopes(), zero_slopes()};
-  if (want_slopes_) b.r_by += m.dashpot / h * begin.v_by;
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const ParabolaWeights& k = weights_[static_cast<std::size_t>(j)];
-    const double kept = k.r * w_[j] + k.b0 * begin.v;
-    b.a += m.stiffness[j] * (1.0 - k.b1);
-    b.r += m.stiffness[j] * kept;
-    if (!want_slopes_) continue;
-    b.r_by += m.stiffness[j] * (k.r * w_by_.col(j) + k.b0 * begin.v_by);
-    const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
-    if (tau >= 0) {
-      const double scale = m.stiffness[j] * m.rate_per_s[j];
-      b.a_by[tau] -= scale * k.d_b1;
-      b.r_by[tau] += scale * (k.d_r * w_[j] + k.d_b0 * begin.v);
-    }
-    for (std::size_t q = 0; q < m.by.size(); ++q) {
-      const double d = m.d_stiffness(j, static_cast<Eigen::Index>(q));
-      b.a_by[m.by[q]] += d * (1.0 - k.b1);
-      b.r_by[m.by[q]] += d * kept;
-    }
-  }
+  const Eigen::ArrayXd kept = k.r * w_ + k.b0 * begin.v;
+  const auto stiffness = m.stiffness.array();
+  Balance b{m.constant + m.dashpot / h + (stiffness * (1.0 - k.b1)).sum(),
+            m.dashpot / h * begin.v + (stiffness * kept).sum(), zero_slopes(), zero_slopes()};
   if (!want_slopes_) return b;
+  b.r_by =
+      weighted_slopes(stiffness * k.r) + ((stiffness * k.b0).sum() + m.dashpot / h) * begin.v_by;
+  for (std::size_t j = 0; j < m.rate_parameter.size(); ++j) {
+    const int tau = m.rate_parameter[j];
+    if (tau < 0) continue;
+    const auto row = static_cast<Eigen::Index>(j);
+    const double scale = m.stiffness[row] * m.rate_per_s[row];
+    b.a_by[tau] -= scale * k.each[j].d_b1;
+    b.r_by[tau] += scale * (k.each[j].d_r * w_[row] + k.each[j].d_b0 * begin.v);
+  }
   for (std::size_t q = 0; q < m.by.size(); ++q) {
     const auto column = static_cast<Eigen::Index>(q);
-    b.a_by[m.by[q]] += m.d_constant[column] + m.d_dashpot[column] / h;
-    b.r_by[m.by[q]] += m.d_dashpot[column] / h * begin.v;
+    const auto d = m.d_stiffness.col(column).array();
+    b.a_by[m.by[q]] += m.d_constant[column] + m.d_dashpot[column] / h + (d * (1.0 - k.b1)).sum();
+    b.r_by[m.by[q]] += m.d_dashpot[column] / h * begin.v + (d * kept).sum();
   }
   return b;
 }
@@ -247,10 +278,7 @@ ContactHistory::Point ContactHistory::surface_under(double load, const Balance& 
 
 void ContactHistory::rest_at_drive(double drive) {
   now_ = imposed(drive, false);
-  w_.setConstant(now_.v);
-  for (Eigen::Index j = 0; j < w_by_.cols(); ++j) w_by_.col(j) = now_.v_by;
-  v_rate_ = 0.0;
-  v_rate_by_.setZero();
+  relax_fully();
   free_ = false;
 }
 
@@ -259,7 +287,9 @@ void ContactHistory::jump_to_drive(double drive) {
   v_rate_ = 0.0;
   v_rate_by_.setZero();
   free_ = elastic_force(now_.v, now_.u, w_, 0.0) < 0.0;
-  if (free_) now_ = surface_under(0.0, balance_at_once(), false);
+  if (!free_) return;
+  carry_all_slopes();
+  now_ = surface_under(0.0, balance_at_once(), false);
 }
 
 void ContactHistory::move_drive(double from, double to, double h, double time_scale) {
@@ -313,22 +343,32 @@ void ContactHistory::move_straight(double from, double to, double h, double time
   const bool touching = std::max(from, to) > law_.contact;
   const Point end = imposed(to, touching);
   update_weights(h, time_scale, parabola);
+  // dV/dt at the end of the step, for a dashpot.
+  double v_rate = (end.v - now_.v) / h;
+  Slopes v_rate_by = (end.v_by - now_.v_by) / h;
   if (parabola) {
     const Point middle = imposed(0.5 * (from + to), touching);
     step_branches(now_, &middle, end);
+    v_rate = (now_.v - 4.0 * middle.v + 3.0 * end.v) / h;
+    v_rate_by = (now_.v_by - 4.0 * middle.v_by + 3.0 * end.v_by) / h;
   } else {
     step_branches(now_, nullptr, end);
   }
-  if (elastic_force(end.v, end.u, w_next_, (end.v - now_.v) / h) >= 0.0) {
+  if (elastic_force(end.v, end.u, w_next_, v_rate) >= 0.0) {
     free_ = false;
-    accept(now_, end, h);
+    accept(end, v_rate, v_rate_by);
     return;
   }
   free_ = true;
+  carry_all_slopes();
   update_weights(h, time_scale, false);
-  const Point surface = surface_under(0.0, balance_over_step(h), false);
+  move_to_surface(surface_under(0.0, balance_over_step(h), false), h);
+}
+
+/// The surface moved within h to where its balance puts it.
+void ContactHistory::move_to_surface(const Point& surface, double h) {
   step_branches(now_, nullptr, surface);
-  accept(now_, surface, h);
+  accept(surface, (surface.v - now_.v) / h, (surface.v_by - now_.v_by) / h);
 }
 
 void ContactHistory::rest_at_load(double load) {
@@ -338,12 +378,15 @@ void ContactHistory::rest_at_load(double load) {
       b.a_by[law_.memory.by[q]] += law_.memory.d_constant[static_cast<Eigen::Index>(q)];
     }
   }
+  carry_all_slopes();
   now_ = surface_under(load - law_.offset, b, true);
-  w_.setConstant(now_.v);
-  for (Eigen::Index j = 0; j < w_by_.cols(); ++j) w_by_.col(j) = now_.v_by;
+  relax_fully();
 }
 
 void ContactHistory::jump_to_load(double load) {
+  carry_all_slopes();
+  // A dashpot does not give way at once.
+  if (law_.memory.dashpot > 0.0) return;
   now_ = surface_under(load - law_.offset, balance_at_once(), true);
   v_rate_ = 0.0;
   v_rate_by_.setZero();
@@ -351,9 +394,7 @@ void ContactHistory::jump_to_load(double load) {
 
 void ContactHistory::load_step(double load, double h, double time_scale) {
   update_weights(h, time_scale, false);
-  const Point end = surface_under(load - law_.offset, balance_over_step(h), true);
-  step_branches(now_, nullptr, end);
-  accept(now_, end, h);
+  move_to_surface(surface_under(load - law_.offset, balance_over_step(h), true), h);
 }
 
 void ContactHistory::move_load(double from, double to, double h, double time_scale) {
@@ -366,6 +407,11 @@ void ContactHistory::move_load(double from, double to, double h, double time_sca
 
 void ContactHistory::move_load_adaptive(double from, double to, double h, double time_scale,
                                         int level) {
+  // The branches make the step one of second order, a dashpot (its speed is the mean over the step)
+  // of first order; after the extrapolation the latter may start from a larger difference.
+  const bool first_order = law_.memory.dashpot > 0.0;
+  const double gain = first_order ? 1.0 : 1.0 / 3.0;
+  const double tolerance = first_order ? 1e3 : 30.0;
   const Eigen::ArrayXd w = w_;
   const Eigen::ArrayXXd w_by = w_by_;
   const Point begin = now_;
@@ -381,7 +427,7 @@ void ContactHistory::move_load_adaptive(double from, double to, double h, double
   load_step(to, 0.5 * h, time_scale);
   const double off =
       std::max(std::abs(now_.v - whole.v), w_.size() > 0 ? (w_ - w_whole).abs().maxCoeff() : 0.0);
-  if (off > 30.0 * v_tolerance_ && level < kMostHalvings) {
+  if (off > tolerance * v_tolerance_ && level < kMostHalvings) {
     w_ = w;
     w_by_ = w_by;
     now_ = begin;
@@ -389,13 +435,13 @@ void ContactHistory::move_load_adaptive(double from, double to, double h, double
     move_load_adaptive(middle, to, 0.5 * h, time_scale, level + 1);
     return;
   }
-  // The step is of second order: one extrapolation takes the leading error away.
-  const auto better = [](const auto& fine, const auto& coarse) {
-    return ((4.0 * fine - coarse) / 3.0).eval();
+  // One extrapolation takes the leading error away.
+  const auto better = [gain](const auto& fine, const auto& coarse) {
+    return (fine + gain * (fine - coarse)).eval();
   };
   w_ = better(w_, w_whole);
   w_by_ = better(w_by_, w_by_whole);
-  now_.v = (4.0 * now_.v - whole.v) / 3.0;
+  now_.v += gain * (now_.v - whole.v);
   now_.u = law_.kernel.inverse(now_.v);
   now_.u_by = better(now_.u_by, whole.u_by);
   now_.v_by = better(now_.v_by, whole.v_by);
