@@ -43,9 +43,9 @@ std::vector<double> values_of(const Element& element, double alpha) {
 /// The integral of G from 0 to t.
 double stiffness_integral(const Element& element, double alpha, double t) {
   if (t <= 0.0) return 0.0;
-  const double relaxing =
-      element.relaxes ? t * mittag_leffler(alpha, 2.0, std::pow(t / kTau, alpha))
-                      : std::pow(t, 1.0 - alpha) / std::tgamma(2.0 - alpha);
+  const double relaxing = element.relaxes
+                              ? t * mittag_leffler(alpha, 2.0, std::pow(t / kTau, alpha))
+                              : std::pow(t, 1.0 - alpha) / std::tgamma(2.0 - alpha);
   return (element.solid ? kInf * t : 0.0) + kOne * relaxing;
 }
 

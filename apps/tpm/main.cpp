@@ -48,6 +48,9 @@ int run(int argc, char** argv) {
   add_version_command(app, session);
   add_fit_command(app, session);
   add_select_command(app, session);
+  add_laws_command(app, session);
+  add_spectrum_command(app, session);
+  add_export_command(app, session);
   add_coverage_command(app, session);
   add_tables_command(app, session);
   add_audit_command(app, session);

@@ -38,6 +38,9 @@ class LawModel final : public Model {
   [[nodiscard]] const std::vector<LawParameter>& law_parameters() const { return parameters_; }
   /// Place of a parameter in the vector. Throws Error(bad_input) naming the known ones.
   [[nodiscard]] std::size_t index(std::string_view parameter) const;
+  /// Throws Error(bad_input) naming the first parameter out of its range, or if their number is
+  /// wrong.
+  void require_in_range(std::span<const double> values) const;
   [[nodiscard]] bool linear_in(std::size_t parameter) const override;
   [[nodiscard]] std::pair<double, double> range(std::size_t parameter) const override;
 
@@ -47,7 +50,6 @@ class LawModel final : public Model {
   [[nodiscard]] Prepared prepare(std::span<const double> values,
                                  const FractionalMemory* rates) const;
   void require_no_jump(const Protocol& protocol, double contact) const;
-  void require_in_range(std::span<const double> values) const;
 
   LawSpec spec_;
   std::string name_;
