@@ -42,12 +42,12 @@ void require_frequencies(std::span<const double> frequency_Hz) {
 Sloped branch_stiffness(bool solid, int branches, std::span<const double> parallel, double omega,
                         Eigen::Index parameter_count) {
   Sloped g{0.0, ComplexRow::Zero(parameter_count)};
-  const int first = solid ? 1 : 0;
+  const Eigen::Index first = solid ? 1 : 0;
   if (solid) {
     g.value = parallel[0];
     g.by[0] = 1.0;
   }
-  for (int j = 0; j < branches; ++j) {
+  for (Eigen::Index j = 0; j < branches; ++j) {
     const double k = parallel[static_cast<std::size_t>(first + j)];
     const double tau = parallel[static_cast<std::size_t>(first + branches + j)];
     const Complex relaxed = 1.0 / (1.0 + Complex(0.0, omega * tau));

@@ -101,6 +101,7 @@ std::vector<std::string> remarks_of(const LawFile& law, const PronyTable& table,
   return lines;
 }
 
+/// @param before what opens a comment; no line holds "--", which XML forbids inside of one
 std::string commented(const std::vector<std::string>& lines, std::string_view before,
                       std::string_view after = {}) {
   std::string text;
@@ -197,6 +198,7 @@ ExportTarget parse_export_target(std::string_view text, std::string_view where) 
 
 std::vector<std::string> export_target_names() {
   std::vector<std::string> names;
+  names.reserve(kTargets.size());
   for (const TargetWord& word : kTargets) names.emplace_back(word.text);
   return names;
 }
