@@ -143,6 +143,13 @@ void ContactHistory::update_weights(double h, double time_scale, bool parabola) 
   const double same = 4.0 * std::numeric_limits<double>::epsilon() * time_scale;
   StepWeights& k = weights_;
   if (k.parabola == parabola && std::abs(h - k.h) <= same) return;
+  k.h = h;
+  k.parabola = parabola;
+  const bool fixed_rates = !weights_.each.empty() && law_.memory.rate_parameter.front() < 0;
+  if (fixed_rates && !parabola && std::isfinite(h)) {
+    set_line_weights(h);
+    return;
+  }
   for (Eigen::Index j = 0; j < w_.size(); ++j) {
     const double z = h * law_.memory.rate_per_s[j];
     const ParabolaWeights one = parabola ? parabola_weights(z) : line_weights(z);
@@ -152,8 +159,20 @@ void ContactHistory::update_weights(double h, double time_scale, bool parabola) 
     k.b1[j] = one.b1;
     k.each[static_cast<std::size_t>(j)] = one;
   }
-  k.h = h;
-  k.parabola = parabola;
+}
+
+/// line_weights of all branches at once, without derivatives: the many rates of a fractional law.
+void ContactHistory::set_line_weights(double h) {
+  StepWeights& k = weights_;
+  const Eigen::ArrayXd z = h * law_.memory.rate_per_s.array();
+  // What is below rounding becomes 0: products with denormal numbers are slow.
+  k.r = (z < 60.0).select((-z).exp(), 0.0);
+  // 1 - (1 - r)/z, below 0.1 as z/2! - z^2/3! + ..., where it would cancel
+  Eigen::ArrayXd series = Eigen::ArrayXd::Zero(z.size());
+  for (int n = 11; n >= 1; --n) series = (1.0 - series) * z / (n + 1);
+  k.b1 = (z < 0.1).select(series, 1.0 - (1.0 - k.r) / z);
+  k.b0 = (z < 0.1).select(z * (1.0 - k.b1), 1.0 - k.r) - k.b1;
+  k.bm.setZero();
 }
 
 void ContactHistory::step_branches(const Point& begin, const Point* middle, const Point& end) {

@@ -102,6 +102,7 @@ class ContactHistory {
   [[nodiscard]] double elastic_force(double v, double u, const Eigen::ArrayXd& w,
                                      double v_rate) const;
   void update_weights(double h, double time_scale, bool parabola);
+  void set_line_weights(double h);
   void step_branches(const Point& begin, const Point* middle, const Point& end);
   void accept(const Point& end, double v_rate, const Slopes& v_rate_by);
   void move_to_surface(const Point& surface, double h);
