@@ -78,7 +78,7 @@ Memory fractional_memory(Fractional law, std::span<const double> values,
   }
   const auto grid = rates.rates_per_s();
   const double beyond = grid.back() * std::exp(rates.log_step());
-  const FastPair pair{beyond, 1e6 * beyond};
+  const FastPair pair{beyond, 1e2 * beyond};
   /// `total` is what the coefficients add up to at time 0
   const auto column = [&](double slow, const Eigen::VectorXd& weight, double total,
                           double viscosity) {
