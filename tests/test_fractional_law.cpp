@@ -191,7 +191,7 @@ TEST_CASE("creep under a step of load is the exact compliance", "[fractional]") 
         worst = std::max(worst, exact > 0.0 ? off / exact : off);
       }
       INFO(element.name << ", alpha " << alpha << ": " << worst << " in " << spent << " s");
-      CHECK(worst < (element.relaxes ? 1e-6 : 5e-5));
+      CHECK(worst < (element.relaxes ? 1e-9 : 5e-6));
     }
   }
 }

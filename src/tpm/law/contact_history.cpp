@@ -426,11 +426,10 @@ void ContactHistory::move_load(double from, double to, double h, double time_sca
 
 void ContactHistory::move_load_adaptive(double from, double to, double h, double time_scale,
                                         int level) {
-  // The branches make the step one of second order, a dashpot (its speed is the mean over the step)
-  // of first order; after the extrapolation the latter may start from a larger difference.
+  // The branches make the step one of second order, a dashpot, whose speed is the mean over the
+  // step, one of first order.
   const bool first_order = law_.memory.dashpot > 0.0;
   const double gain = first_order ? 1.0 : 1.0 / 3.0;
-  const double tolerance = first_order ? 1e3 : 30.0;
   const Eigen::ArrayXd w = w_;
   const Eigen::ArrayXXd w_by = w_by_;
   const Point begin = now_;
@@ -446,7 +445,7 @@ void ContactHistory::move_load_adaptive(double from, double to, double h, double
   load_step(to, 0.5 * h, time_scale);
   const double off =
       std::max(std::abs(now_.v - whole.v), w_.size() > 0 ? (w_ - w_whole).abs().maxCoeff() : 0.0);
-  if (off > tolerance * v_tolerance_ && level < kMostHalvings) {
+  if (off > 30.0 * v_tolerance_ && level < kMostHalvings) {
     w_ = w;
     w_by_ = w_by;
     now_ = begin;
