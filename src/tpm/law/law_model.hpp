@@ -19,9 +19,9 @@ class FractionalMemory;
 /// Times at infinity are answered by full relaxation.
 ///
 /// Fractional laws are answered at the knots and asked times to 1e-10 of G at their smallest
-/// spacing times the total variation of the drive (docs/fractional.md), and creep to about 1e-7 of
-/// the depth. A spring-pot cannot jump: Error(bad_input) if the drive does; under a jump of the
-/// load it stays where it is and then gives way.
+/// spacing times the total variation of the drive (docs/fractional.md), and creep to 1e-9
+/// (spring-pots 5e-6) of the depth. A spring-pot cannot jump: Error(bad_input) if the drive does;
+/// under a jump of the load it stays where it is and then gives way.
 class LawModel final : public Model {
  public:
   /// Throws Error(bad_input) as require_valid(spec).
