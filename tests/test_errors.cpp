@@ -426,11 +426,49 @@ std::vector<ErrorCase> design_cases() {
   };
 }
 
+const std::string kLaw = R"({"law": "linear-1", "drive": "indentation_depth",
+"response": "contact_force", "reference_m": 0.001, "provenance": "assumed",
+"parameters": {"k_inf_N_per_m": 20.0, "k1_N_per_m": 30.0, "tau1_s": 1.5}})";
+
+std::vector<ErrorCase> law_cases() {
+  const std::string type = "law file";
+  const std::string spectrum = "spectrum {}/l.json -o {}/out";
+  const auto law = [](std::string text) { return files({{"l.json", std::move(text)}}); };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return law(replaced(kLaw, from, to));
+  };
+  const std::string to_febio = "export {}/l.json --to febio -o {}/out";
+  const std::string bar = R"("k1_N_per_m": 30.0, "tau1_s": 1.5)";
+  return {
+      {type, "missing", spectrum, files({})},
+      {type, "empty", spectrum, law("")},
+      {type, "truncated", spectrum, law(kLaw.substr(0, 90))},
+      {type, "binary garbage", spectrum, law(kGarbage)},
+      {type, "missing key", spectrum, with("\"reference_m\": 0.001, ", "")},
+      {type, "unknown key", spectrum, with("\"provenance\"", "\"x\": 1, \"provenance\"")},
+      {type, "unknown law", spectrum, with("linear-1", "cubic-1")},
+      {type, "missing parameter", spectrum, with(", \"tau1_s\": 1.5", "")},
+      {type, "unknown parameter", spectrum, with("tau1_s", "tau1_ms")},
+      {type, "negative time", spectrum, with("1.5", "-1.5")},
+      {type, "strip in m", spectrum, with("contact_force", "stress")},
+      {type, "frequency 0", "spectrum {}/l.json --from \"0 Hz\" -o {}/out", law(kLaw)},
+      {type, "unknown program", "export {}/l.json --to nastran -o {}/out", law(kLaw)},
+      {type, "tension in FEBio", to_febio,
+       law(replaced(replaced(kLaw, "linear-1", "linear-1-elastic"), bar,
+                    bar + ", \"k_tension_N_per_m\": 2.0"))},
+      {type, "fluid in FEBio", to_febio,
+       law(replaced(replaced(kLaw, "linear-1", "linear-1-fluid"), "\"k_inf_N_per_m\": 20.0, ",
+                    ""))},
+      {type, "area without length", "export {}/l.json --to ansys --area \"3 mm^2\" -o {}/out",
+       law(kLaw)},
+  };
+}
+
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
-  for (const auto& cases :
-       {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
-        hdf5_cases(), fit_config_cases(), fit_tables_cases(), design_cases(), claims_cases()}) {
+  for (const auto& cases : {curve_csv_cases(), curve_json_cases(), machine_cases(),
+                            spectrum_cases(), digitizer_cases(), hdf5_cases(), fit_config_cases(),
+                            fit_tables_cases(), design_cases(), claims_cases(), law_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -33,6 +33,8 @@ std::vector<double> random_parameters(const LawModel& law, Random& random) {
       values.push_back(0.05 * std::pow(100.0, u));
     } else if (p.name == "exponent") {
       values.push_back(1.2 + u);
+    } else if (p.name == "alpha") {
+      values.push_back(0.3 + 0.6 * u);
     } else if (p.name == "tension_share") {
       values.push_back(0.1 + 0.8 * u);
     } else if (p.name == "spacing") {

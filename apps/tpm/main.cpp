@@ -50,6 +50,9 @@ int run(int argc, char** argv) {
   add_select_command(app, session);
   add_check_gradient_command(app, session);
   add_design_command(app, session);
+  add_laws_command(app, session);
+  add_spectrum_command(app, session);
+  add_export_command(app, session);
   add_coverage_command(app, session);
   add_tables_command(app, session);
   add_audit_command(app, session);

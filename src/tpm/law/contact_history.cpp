@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "tpm/core/error.hpp"
 
@@ -23,14 +24,56 @@ ContactHistory::ContactHistory(const LawAtParameters& law, double peak_depth, Wa
   const Eigen::Index branches = law.memory.stiffness.size();
   w_.setZero(branches);
   w_next_ = w_;
-  if (want_slopes_) {
-    w_by_.setZero(law.parameter_count, branches);
-    w_by_next_ = w_by_;
-  }
   now_.u_by = zero_slopes();
   now_.v_by = zero_slopes();
   v_rate_by_ = zero_slopes();
-  weights_.resize(static_cast<std::size_t>(branches));
+  weights_.each.resize(static_cast<std::size_t>(branches));
+  for (auto* weight : {&weights_.r, &weights_.b[0], &weights_.b[1], &weights_.b[2], &weights_.b[3],
+                       &weights_.b[4]}) {
+    weight->setZero(branches);
+  }
+  if (!want_slopes_) return;
+  const KernelPlaces& p = law.place;
+  for (int i = 0; i < law.parameter_count; ++i) {
+    const auto& rates = law.memory.rate_parameter;
+    const bool of_kernel =
+        i == p.exponent || i == p.tension_share || i == p.spacing || i == p.contact;
+    if (of_kernel || std::find(rates.begin(), rates.end(), i) != rates.end()) carried_.push_back(i);
+  }
+  w_by_.setZero(branches, std::ssize(carried_));
+  w_by_next_ = w_by_;
+}
+
+/// From here on the depth of the surface, and so the states, depend on every parameter.
+void ContactHistory::carry_all_slopes() {
+  if (!want_slopes_ || std::ssize(carried_) == law_.parameter_count) return;
+  Eigen::ArrayXXd all = Eigen::ArrayXXd::Zero(w_.size(), law_.parameter_count);
+  for (std::size_t c = 0; c < carried_.size(); ++c) {
+    all.col(carried_[c]) = w_by_.col(static_cast<Eigen::Index>(c));
+  }
+  w_by_ = std::move(all);
+  w_by_next_ = w_by_;
+  carried_.resize(static_cast<std::size_t>(law_.parameter_count));
+  std::iota(carried_.begin(), carried_.end(), 0);
+}
+
+/// All branches have relaxed under the depth of now.
+void ContactHistory::relax_fully() {
+  w_.setConstant(now_.v);
+  for (Eigen::Index c = 0; c < w_by_.cols(); ++c) {
+    w_by_.col(c).setConstant(now_.v_by[carried_[static_cast<std::size_t>(c)]]);
+  }
+  v_rate_ = 0.0;
+  v_rate_by_.setZero();
+}
+
+/// The sum of weight_j times the derivatives of the state of branch j.
+Slopes ContactHistory::weighted_slopes(const Eigen::ArrayXd& weight) const {
+  Slopes slopes = zero_slopes();
+  for (Eigen::Index c = 0; c < w_by_.cols(); ++c) {
+    slopes[carried_[static_cast<std::size_t>(c)]] = (weight * w_by_.col(c)).sum();
+  }
+  return slopes;
 }
 
 Slopes ContactHistory::zero_slopes() const {
@@ -61,7 +104,7 @@ ContactHistory::Point ContactHistory::imposed(double drive, bool touching) const
 double ContactHistory::elastic_force(double v, double u, const Eigen::ArrayXd& w,
                                      double v_rate) const {
   double force = law_.memory.constant * v + law_.memory.dashpot * v_rate;
-  for (Eigen::Index j = 0; j < w.size(); ++j) force += law_.memory.stiffness[j] * (v - w[j]);
+  force += (law_.memory.stiffness.array() * (v - w)).sum();
   if (law_.k_tension != 0.0) force += law_.k_tension * law_.tension.at(u).value;
   return force;
 }
@@ -76,19 +119,11 @@ Slopes ContactHistory::force_slopes() const {
   slopes[law_.place.offset] = 1.0;
   if (free_) return slopes;
   const Memory& m = law_.memory;
-  double instant = m.constant;
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    instant += m.stiffness[j];
-    slopes -= m.stiffness[j] * w_by_.col(j);
-  }
-  slopes += instant * now_.v_by + m.dashpot * v_rate_by_;
+  slopes += m.instant() * now_.v_by + m.dashpot * v_rate_by_ - weighted_slopes(m.stiffness.array());
   for (std::size_t q = 0; q < m.by.size(); ++q) {
     const auto column = static_cast<Eigen::Index>(q);
-    double direct = m.d_constant[column] * now_.v + m.d_dashpot[column] * v_rate_;
-    for (Eigen::Index j = 0; j < w_.size(); ++j) {
-      direct += m.d_stiffness(j, column) * (now_.v - w_[j]);
-    }
-    slopes[m.by[q]] += direct;
+    slopes[m.by[q]] += m.d_constant[column] * now_.v + m.d_dashpot[column] * v_rate_ +
+                       (m.d_stiffness.col(column).array() * (now_.v - w_)).sum();
   }
   if (law_.place.k_tension >= 0) {
     const TensionShape::Values t = law_.tension.at(now_.u);
@@ -108,38 +143,63 @@ Slopes ContactHistory::drive_slopes() const {
 void ContactHistory::update_weights(double h, double time_scale, bool curved) {
   // Evenly sampled times differ by their rounding; the weights of one step length serve them all.
   const double same = 4.0 * std::numeric_limits<double>::epsilon() * time_scale;
-  if (weights_curved_ == curved && std::abs(h - weights_h_) <= same) return;
-  for (std::size_t j = 0; j < weights_.size(); ++j) {
-    const double z = h * law_.memory.rate_per_s[static_cast<Eigen::Index>(j)];
-    weights_[j] = curved ? quartic_weights(z) : line_weights(z);
+  StepWeights& k = weights_;
+  if (k.curved == curved && std::abs(h - k.h) <= same) return;
+  k.h = h;
+  k.curved = curved;
+  const bool fixed_rates = !weights_.each.empty() && law_.memory.rate_parameter.front() < 0;
+  if (fixed_rates && !curved && std::isfinite(h)) {
+    set_line_weights(h);
+    return;
   }
-  weights_h_ = h;
-  weights_curved_ = curved;
+  for (Eigen::Index j = 0; j < w_.size(); ++j) {
+    const double z = h * law_.memory.rate_per_s[j];
+    const QuadratureWeights one = curved ? quartic_weights(z) : line_weights(z);
+    k.r[j] = one.r;
+    for (std::size_t i = 0; i < one.b.size(); ++i) k.b[i][j] = one.b[i];
+    k.each[static_cast<std::size_t>(j)] = one;
+  }
+}
+
+/// line_weights of all branches at once, without derivatives: the many rates of a fractional law.
+void ContactHistory::set_line_weights(double h) {
+  StepWeights& k = weights_;
+  const Eigen::ArrayXd z = h * law_.memory.rate_per_s.array();
+  // What is below rounding becomes 0: products with denormal numbers are slow.
+  k.r = (z < 60.0).select((-z).exp(), 0.0);
+  // 1 - (1 - r)/z, below 0.1 as z/2! - z^2/3! + ..., where it would cancel
+  Eigen::ArrayXd series = Eigen::ArrayXd::Zero(z.size());
+  for (int n = 11; n >= 1; --n) series = (1.0 - series) * z / (n + 1);
+  k.b[4] = (z < 0.1).select(series, 1.0 - (1.0 - k.r) / z);
+  k.b[0] = (z < 0.1).select(z * (1.0 - k.b[4]), 1.0 - k.r) - k.b[4];
+  for (const std::size_t i : {1U, 2U, 3U}) k.b[i].setZero();
 }
 
 void ContactHistory::step_branches(const Point& begin, std::span<const Point> middle,
                                    const Point& end) {
-  const Memory& m = law_.memory;
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const QuadratureWeights& k = weights_[static_cast<std::size_t>(j)];
-    double next = k.r * w_[j] + k.b.front() * begin.v + k.b.back() * end.v;
-    for (std::size_t i = 0; i < middle.size(); ++i) next += k.b[i + 1] * middle[i].v;
-    w_next_[j] = next;
-    if (!want_slopes_) continue;
-    auto by = w_by_next_.col(j);
-    by = k.r * w_by_.col(j) + k.b.front() * begin.v_by + k.b.back() * end.v_by;
-    for (std::size_t i = 0; i < middle.size(); ++i) by += k.b[i + 1] * middle[i].v_by;
-    const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
-    if (tau < 0) continue;
-    double d = k.d_r * w_[j] + k.d_b.front() * begin.v + k.d_b.back() * end.v;
-    for (std::size_t i = 0; i < middle.size(); ++i) d += k.d_b[i + 1] * middle[i].v;
-    by[tau] += m.rate_per_s[j] * d;
+  const StepWeights& k = weights_;
+  w_next_ = k.r * w_ + k.b.front() * begin.v + k.b.back() * end.v;
+  for (std::size_t i = 0; i < middle.size(); ++i) w_next_ += k.b[i + 1] * middle[i].v;
+  const std::vector<int>& rates = law_.memory.rate_parameter;
+  for (Eigen::Index c = 0; c < w_by_.cols(); ++c) {
+    const int p = carried_[static_cast<std::size_t>(c)];
+    auto next = w_by_next_.col(c);
+    next = k.r * w_by_.col(c) + k.b.front() * begin.v_by[p] + k.b.back() * end.v_by[p];
+    for (std::size_t i = 0; i < middle.size(); ++i) next += k.b[i + 1] * middle[i].v_by[p];
+    for (std::size_t j = 0; j < rates.size(); ++j) {
+      if (rates[j] != p) continue;
+      const auto row = static_cast<Eigen::Index>(j);
+      const QuadratureWeights& d = k.each[j];
+      double slope = d.d_r * w_[row] + d.d_b.front() * begin.v + d.d_b.back() * end.v;
+      for (std::size_t i = 0; i < middle.size(); ++i) slope += d.d_b[i + 1] * middle[i].v;
+      next[row] += law_.memory.rate_per_s[row] * slope;
+    }
   }
 }
 
-void ContactHistory::accept(const Point& begin, const Point& end, double h) {
-  v_rate_ = (end.v - begin.v) / h;
-  if (want_slopes_) v_rate_by_ = (end.v_by - begin.v_by) / h;
+void ContactHistory::accept(const Point& end, double v_rate, const Slopes& v_rate_by) {
+  v_rate_ = v_rate;
+  v_rate_by_ = v_rate_by;
   w_.swap(w_next_);
   w_by_.swap(w_by_next_);
   now_ = end;
@@ -147,53 +207,42 @@ void ContactHistory::accept(const Point& begin, const Point& end, double h) {
 
 ContactHistory::Balance ContactHistory::balance_at_once() const {
   const Memory& m = law_.memory;
-  Balance b{m.constant, 0.0, zero_slopes(), zero_slopes()};
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    b.a += m.stiffness[j];
-    b.r += m.stiffness[j] * w_[j];
-    if (want_slopes_) b.r_by += m.stiffness[j] * w_by_.col(j);
-  }
+  Balance b{m.instant(), (m.stiffness.array() * w_).sum(), zero_slopes(), zero_slopes()};
   if (!want_slopes_) return b;
+  b.r_by = weighted_slopes(m.stiffness.array());
   for (std::size_t q = 0; q < m.by.size(); ++q) {
-    const auto column = static_cast<Eigen::Index>(q);
-    b.a_by[m.by[q]] += m.d_constant[column];
-    for (Eigen::Index j = 0; j < w_.size(); ++j) {
-      b.a_by[m.by[q]] += m.d_stiffness(j, column);
-      b.r_by[m.by[q]] += m.d_stiffness(j, column) * w_[j];
-    }
+    const auto d = m.d_stiffness.col(static_cast<Eigen::Index>(q)).array();
+    b.a_by[m.by[q]] += m.d_constant[static_cast<Eigen::Index>(q)] + d.sum();
+    b.r_by[m.by[q]] += (d * w_).sum();
   }
   return b;
 }
 
 ContactHistory::Balance ContactHistory::balance_over_step(double h) const {
   const Memory& m = law_.memory;
+  const StepWeights& k = weights_;
   const Point& begin = now_;
-  Balance b{m.constant + m.dashpot / h, m.dashpot / h * begin.v, zero_slopes(), zero_slopes()};
-  if (want_slopes_) b.r_by += m.dashpot / h * begin.v_by;
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const QuadratureWeights& k = weights_[static_cast<std::size_t>(j)];
-    const double kept = k.r * w_[j] + k.b.front() * begin.v;
-    b.a += m.stiffness[j] * (1.0 - k.b.back());
-    b.r += m.stiffness[j] * kept;
-    if (!want_slopes_) continue;
-    b.r_by += m.stiffness[j] * (k.r * w_by_.col(j) + k.b.front() * begin.v_by);
-    const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
-    if (tau >= 0) {
-      const double scale = m.stiffness[j] * m.rate_per_s[j];
-      b.a_by[tau] -= scale * k.d_b.back();
-      b.r_by[tau] += scale * (k.d_r * w_[j] + k.d_b.front() * begin.v);
-    }
-    for (std::size_t q = 0; q < m.by.size(); ++q) {
-      const double d = m.d_stiffness(j, static_cast<Eigen::Index>(q));
-      b.a_by[m.by[q]] += d * (1.0 - k.b.back());
-      b.r_by[m.by[q]] += d * kept;
-    }
-  }
+  const Eigen::ArrayXd kept = k.r * w_ + k.b.front() * begin.v;
+  const auto stiffness = m.stiffness.array();
+  Balance b{m.constant + m.dashpot / h + (stiffness * (1.0 - k.b.back())).sum(),
+            m.dashpot / h * begin.v + (stiffness * kept).sum(), zero_slopes(), zero_slopes()};
   if (!want_slopes_) return b;
+  b.r_by = weighted_slopes(stiffness * k.r) +
+           ((stiffness * k.b.front()).sum() + m.dashpot / h) * begin.v_by;
+  for (std::size_t j = 0; j < m.rate_parameter.size(); ++j) {
+    const int tau = m.rate_parameter[j];
+    if (tau < 0) continue;
+    const auto row = static_cast<Eigen::Index>(j);
+    const double scale = m.stiffness[row] * m.rate_per_s[row];
+    b.a_by[tau] -= scale * k.each[j].d_b.back();
+    b.r_by[tau] += scale * (k.each[j].d_r * w_[row] + k.each[j].d_b.front() * begin.v);
+  }
   for (std::size_t q = 0; q < m.by.size(); ++q) {
     const auto column = static_cast<Eigen::Index>(q);
-    b.a_by[m.by[q]] += m.d_constant[column] + m.d_dashpot[column] / h;
-    b.r_by[m.by[q]] += m.d_dashpot[column] / h * begin.v;
+    const auto d = m.d_stiffness.col(column).array();
+    b.a_by[m.by[q]] +=
+        m.d_constant[column] + m.d_dashpot[column] / h + (d * (1.0 - k.b.back())).sum();
+    b.r_by[m.by[q]] += m.d_dashpot[column] / h * begin.v + (d * kept).sum();
   }
   return b;
 }
@@ -251,10 +300,7 @@ ContactHistory::Point ContactHistory::surface_under(double load, const Balance& 
 
 void ContactHistory::rest_at_drive(double drive) {
   now_ = imposed(drive, false);
-  w_.setConstant(now_.v);
-  for (Eigen::Index j = 0; j < w_by_.cols(); ++j) w_by_.col(j) = now_.v_by;
-  v_rate_ = 0.0;
-  v_rate_by_.setZero();
+  relax_fully();
   free_ = false;
 }
 
@@ -263,7 +309,9 @@ void ContactHistory::jump_to_drive(double drive) {
   v_rate_ = 0.0;
   v_rate_by_.setZero();
   free_ = elastic_force(now_.v, now_.u, w_, 0.0) < 0.0;
-  if (free_) now_ = surface_under(0.0, balance_at_once(), false);
+  if (!free_) return;
+  carry_all_slopes();
+  now_ = surface_under(0.0, balance_at_once(), false);
 }
 
 void ContactHistory::move_drive(double from, double to, double h, double time_scale) {
@@ -324,24 +372,39 @@ void ContactHistory::move_piece(double from, double to, double h, double time_sc
   const bool touching = std::max(from, to) > law_.contact;
   const Point end = imposed(to, touching);
   update_weights(h, time_scale, curved);
+  // dV/dt at the end of the step, for a dashpot.
+  double v_rate = (end.v - now_.v) / h;
+  Slopes v_rate_by = (end.v_by - now_.v_by) / h;
   if (curved) {
     const std::array<Point, 3> middle{imposed(0.75 * from + 0.25 * to, touching),
                                       imposed(0.5 * (from + to), touching),
                                       imposed(0.25 * from + 0.75 * to, touching)};
     step_branches(now_, middle, end);
+    // Five-point backward difference.
+    v_rate = (3.0 * now_.v - 16.0 * middle[0].v + 36.0 * middle[1].v - 48.0 * middle[2].v +
+              25.0 * end.v) /
+             (3.0 * h);
+    v_rate_by = (3.0 * now_.v_by - 16.0 * middle[0].v_by + 36.0 * middle[1].v_by -
+                 48.0 * middle[2].v_by + 25.0 * end.v_by) /
+                (3.0 * h);
   } else {
     step_branches(now_, {}, end);
   }
-  if (elastic_force(end.v, end.u, w_next_, (end.v - now_.v) / h) >= 0.0) {
+  if (elastic_force(end.v, end.u, w_next_, v_rate) >= 0.0) {
     free_ = false;
-    accept(now_, end, h);
+    accept(end, v_rate, v_rate_by);
     return;
   }
   free_ = true;
+  carry_all_slopes();
   update_weights(h, time_scale, false);
-  const Point surface = surface_under(0.0, balance_over_step(h), false);
+  move_to_surface(surface_under(0.0, balance_over_step(h), false), h);
+}
+
+/// The surface moved within h to where its balance puts it.
+void ContactHistory::move_to_surface(const Point& surface, double h) {
   step_branches(now_, {}, surface);
-  accept(now_, surface, h);
+  accept(surface, (surface.v - now_.v) / h, (surface.v_by - now_.v_by) / h);
 }
 
 void ContactHistory::rest_at_load(double load) {
@@ -351,12 +414,15 @@ void ContactHistory::rest_at_load(double load) {
       b.a_by[law_.memory.by[q]] += law_.memory.d_constant[static_cast<Eigen::Index>(q)];
     }
   }
+  carry_all_slopes();
   now_ = surface_under(load - law_.offset, b, true);
-  w_.setConstant(now_.v);
-  for (Eigen::Index j = 0; j < w_by_.cols(); ++j) w_by_.col(j) = now_.v_by;
+  relax_fully();
 }
 
 void ContactHistory::jump_to_load(double load) {
+  carry_all_slopes();
+  // A dashpot does not give way at once.
+  if (law_.memory.dashpot > 0.0) return;
   now_ = surface_under(load - law_.offset, balance_at_once(), true);
   v_rate_ = 0.0;
   v_rate_by_.setZero();
@@ -364,9 +430,7 @@ void ContactHistory::jump_to_load(double load) {
 
 void ContactHistory::load_step(double load, double h, double time_scale) {
   update_weights(h, time_scale, false);
-  const Point end = surface_under(load - law_.offset, balance_over_step(h), true);
-  step_branches(now_, {}, end);
-  accept(now_, end, h);
+  move_to_surface(surface_under(load - law_.offset, balance_over_step(h), true), h);
 }
 
 void ContactHistory::move_load(double from, double to, double h, double time_scale) {
@@ -379,6 +443,10 @@ void ContactHistory::move_load(double from, double to, double h, double time_sca
 
 void ContactHistory::move_load_adaptive(double from, double to, double h, double time_scale,
                                         int level) {
+  // The branches make the step one of second order, a dashpot, whose speed is the mean over the
+  // step, one of first order.
+  const bool first_order = law_.memory.dashpot > 0.0;
+  const double gain = first_order ? 1.0 : 1.0 / 3.0;
   const Eigen::ArrayXd w = w_;
   const Eigen::ArrayXXd w_by = w_by_;
   const Point begin = now_;
@@ -402,13 +470,13 @@ void ContactHistory::move_load_adaptive(double from, double to, double h, double
     move_load_adaptive(middle, to, 0.5 * h, time_scale, level + 1);
     return;
   }
-  // The step is of second order: one extrapolation takes the leading error away.
-  const auto better = [](const auto& fine, const auto& coarse) {
-    return ((4.0 * fine - coarse) / 3.0).eval();
+  // One extrapolation takes the leading error away.
+  const auto better = [gain](const auto& fine, const auto& coarse) {
+    return (fine + gain * (fine - coarse)).eval();
   };
   w_ = better(w_, w_whole);
   w_by_ = better(w_by_, w_by_whole);
-  now_.v = (4.0 * now_.v - whole.v) / 3.0;
+  now_.v += gain * (now_.v - whole.v);
   now_.u = law_.kernel.inverse(now_.v);
   now_.u_by = better(now_.u_by, whole.u_by);
   now_.v_by = better(now_.v_by, whole.v_by);

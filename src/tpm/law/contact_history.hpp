@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -87,23 +88,29 @@ class ContactHistory {
     Slopes a_by;
     Slopes r_by;
   };
-  struct State {
-    Eigen::ArrayXd w;
-    Eigen::ArrayXXd w_by;  ///< parameters x branches
-    Point now;
-    double v_rate = 0.0;
-    Slopes v_rate_by;
+  /// QuadratureWeights of all branches for one length of step.
+  struct StepWeights {
+    double h = -1.0;
+    bool curved = false;
+    Eigen::ArrayXd r;
+    std::array<Eigen::ArrayXd, 5> b;
+    std::vector<QuadratureWeights> each;
   };
 
   [[nodiscard]] Slopes zero_slopes() const;
+  void carry_all_slopes();
+  void relax_fully();
   /// @param touching at u = 0 the slope just inside the contact is meant, not just outside
   [[nodiscard]] Point imposed(double drive, bool touching) const;
   [[nodiscard]] double elastic_force(double v, double u, const Eigen::ArrayXd& w,
                                      double v_rate) const;
   void update_weights(double h, double time_scale, bool curved);
+  void set_line_weights(double h);
   /// @param middle the three points within a curved step; empty for a straight one
   void step_branches(const Point& begin, std::span<const Point> middle, const Point& end);
-  void accept(const Point& begin, const Point& end, double h);
+  void accept(const Point& end, double v_rate, const Slopes& v_rate_by);
+  void move_to_surface(const Point& surface, double h);
+  [[nodiscard]] Slopes weighted_slopes(const Eigen::ArrayXd& weight) const;
   void move_one(double from, double to, double h, double time_scale);
   void move_smooth(double from, double to, double h, double time_scale, int level);
   void move_piece(double from, double to, double h, double time_scale, bool curved);
@@ -117,14 +124,15 @@ class ContactHistory {
   bool want_slopes_;
   double v_tolerance_;
   Eigen::ArrayXd w_, w_next_;
-  Eigen::ArrayXXd w_by_, w_by_next_;
+  Eigen::ArrayXXd w_by_, w_by_next_;  ///< branches x carried_.size()
+  /// The parameters that the states depend on: those of the kernel and the rates while the depth is
+  /// imposed, all of them as soon as the surface finds its own depth.
+  std::vector<int> carried_;
   Point now_;
   bool free_ = false;
   double v_rate_ = 0.0;  ///< dV/dt over the last step, for a dashpot
   Slopes v_rate_by_;
-  double weights_h_ = -1.0;
-  bool weights_curved_ = false;
-  std::vector<QuadratureWeights> weights_;
+  StepWeights weights_;
 };
 
 }  // namespace tpm

@@ -25,6 +25,19 @@ TensionShape::Values TensionShape::at(double u) const {
   return {value, value * (3.0 / u - u * y * y * stretch_u), -y * y * value * d_log_y};
 }
 
+TensionShape::Tangent TensionShape::tangent(double u) const {
+  if (u <= 0.0) return {0.0, 0.0};
+  // T' = T (3/u - u y^2 S) with S = (2 root + 1)/(root^2 (root + 1)), y = 1/x
+  const double y = 1.0 / spacing;
+  const Values t = at(u);
+  const double root = std::sqrt(1.0 + u * u * y * y);
+  const double below = root * root * (root + 1.0);
+  const double s = (2.0 * root + 1.0) / below;
+  const double ds_droot = (2.0 - s * (3.0 * root * root + 2.0 * root)) / below;
+  const double d_factor_dy = -u * y * (2.0 * s + y * ds_droot * u * u * y / root);
+  return {t.slope, t.d_spacing * (3.0 / u - u * y * y * s) - y * y * t.value * d_factor_dy};
+}
+
 KernelShape::KernelShape(Kernel kernel, double reference, double exponent, double tension_share,
                          double spacing)
     : kernel_(kernel),
@@ -65,6 +78,22 @@ KernelShape::Values KernelShape::at(double u) const {
     k.d_exponent *= 1.0 - share_;
   }
   return k;
+}
+
+KernelShape::Tangent KernelShape::tangent(double u) const {
+  const TensionShape::Tangent t = tension_.tangent(u);
+  double of_kernel = 1.0;
+  double by_exponent = 0.0;
+  if (kernel_ != Kernel::linear) {
+    const double power =
+        u > 0.0 ? std::pow(u / reference_, exponent_ - 1.0) : (exponent_ == 1.0 ? 1.0 : 0.0);
+    of_kernel = exponent_ * power;
+    if (kernel_ == Kernel::power && u > 0.0) {
+      by_exponent = power * (1.0 + exponent_ * std::log(u / reference_));
+    }
+  }
+  return {(1.0 - share_) * of_kernel + share_ * t.slope, (1.0 - share_) * by_exponent,
+          t.slope - of_kernel, share_ * t.d_spacing};
 }
 
 double KernelShape::inverse(double v) const {

@@ -14,6 +14,12 @@ struct TensionShape {
   };
   /// u >= 0
   [[nodiscard]] Values at(double u) const;
+
+  /// T'(u) and its derivative by the spacing.
+  struct Tangent {
+    double slope, d_spacing;
+  };
+  [[nodiscard]] Tangent tangent(double u) const;
 };
 
 /// V(u) = (1 - share) W(u) + share T(u) for u >= 0: what the relaxation acts on. V(0) = 0, V rises
@@ -30,6 +36,11 @@ class KernelShape {
   };
   [[nodiscard]] Values at(double u) const;
   [[nodiscard]] double value(double u) const;
+  /// V'(u) for u >= 0, just inside the contact at 0, and its derivatives.
+  struct Tangent {
+    double slope, d_exponent, d_share, d_spacing;
+  };
+  [[nodiscard]] Tangent tangent(double u) const;
   /// u with value(u) = v; v >= 0
   [[nodiscard]] double inverse(double v) const;
   /// V is a straight line: histories need no refinement.

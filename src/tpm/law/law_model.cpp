@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/kelvin_chain.hpp"
+#include "tpm/solve/exponential_sum.hpp"
 
 namespace tpm {
 namespace {
@@ -27,6 +29,41 @@ std::vector<std::size_t> rising_order(std::span<const double> times_s) {
 double between(const Knot& from, const Knot& to, double time) {
   const double h = to.time_s - from.time_s;
   return h > 0.0 ? from.value + (to.value - from.value) * ((time - from.time_s) / h) : from.value;
+}
+
+/// The smallest step between knots and asked times, and the span of all of them.
+struct TimeWindow {
+  double shortest_s;
+  double longest_s;
+};
+
+TimeWindow window_of(const Protocol& protocol, std::span<const double> times_s) {
+  std::vector<double> all;
+  for (const Knot& k : protocol.knots()) all.push_back(k.time_s);
+  for (const double t : times_s) {
+    if (std::isfinite(t)) all.push_back(t);
+  }
+  std::sort(all.begin(), all.end());
+  const double span = all.back() - all.front();
+  if (!(span > 0.0)) return {1.0, 1.0};
+  double shortest = span;
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    const double gap = all[i] - all[i - 1];
+    if (gap > 1e-9 * span) shortest = std::min(shortest, gap);  // else the times are meant equal
+  }
+  return {shortest, span};
+}
+
+/// The rates of a fractional law for a question. Where the depth is curved within a step (a kernel
+/// that is no straight line, creep under a load that jumps) the window begins earlier.
+FractionalMemory rates_for(const LawSpec& spec, const Protocol& protocol,
+                           std::span<const double> times_s) {
+  constexpr double kTolerance = 1e-10;
+  const TimeWindow window = window_of(protocol, times_s);
+  double earlier = 1.0;
+  if (spec.kernel != Kernel::linear || spec.tension == Tension::relaxing) earlier = 1e-2;
+  if (protocol.drive() == Drive::force) earlier = 1e-4;
+  return {earlier * window.shortest_s, window.longest_s, kTolerance};
 }
 
 /// Walks a contact through a protocol, stopping at each asked time.
@@ -125,15 +162,38 @@ void LawModel::require_in_range(std::span<const double> values) const {
     const bool above = time_like || in_series ? values[i] > p.lower : values[i] >= p.lower;
     const bool finite = std::isfinite(values[i]) || p.name == "spacing";
     if (above && values[i] <= p.upper && finite) continue;
+    const std::string expected =
+        std::isfinite(p.upper)
+            ? fmt::format("a value from {} to {}", shortest(p.lower), shortest(p.upper))
+            : fmt::format("a value {} {}", time_like || in_series ? "above" : "of at least",
+                          shortest(p.lower));
     throw bad_input(fmt::format("law {}", name_),
-                    fmt::format("{} = {}", p.name, shortest(values[i])),
-                    fmt::format("a value {} {}", time_like || in_series ? "above" : "of at least",
-                                shortest(p.lower)));
+                    fmt::format("{} = {}", p.name, shortest(values[i])), expected);
   }
 }
 
-LawModel::Prepared LawModel::prepare(std::span<const double> values) const {
-  require_in_range(values);
+void LawModel::require_no_jump(const Protocol& protocol, double contact) const {
+  const auto knots = protocol.knots();
+  double before = protocol.relaxed_at_start() ? knots.front().value : 0.0;
+  double time = knots.front().time_s;
+  for (const Knot& k : knots) {
+    const bool at_once = k.time_s == time && &k != knots.data();
+    const bool first = &k == knots.data();
+    const double depth = std::max(k.value - contact, 0.0);
+    if ((at_once || first) && depth != std::max(before - contact, 0.0)) {
+      throw bad_input(fmt::format("law {}", name_),
+                      fmt::format("the drive jumps at {} s, which a spring-pot answers with an "
+                                  "infinite force",
+                                  shortest(k.time_s)),
+                      "a ramp");
+    }
+    before = k.value;
+    time = k.time_s;
+  }
+}
+
+LawModel::Prepared LawModel::prepare(std::span<const double> values,
+                                     const FractionalMemory* rates) const {
   const auto get = [&](std::string_view name, double otherwise, int& place) {
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
       if (parameters_[i].name != name) continue;
@@ -171,6 +231,8 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values) const {
     flat.resize(2 * n + 1);
     prepared.law.memory = branch_memory(true, spec_.branches, flat);
     prepared.chain_slopes = std::move(parallel.slopes);
+  } else if (spec_.fractional != Fractional::none) {
+    prepared.law.memory = fractional_memory(spec_.fractional, values, *rates);
   } else {
     prepared.law.memory = branch_memory(spec_.solid, spec_.branches, values);
   }
@@ -180,9 +242,13 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values) const {
 Response LawModel::respond(const Protocol& protocol, std::span<const double> times_s,
                            std::span<const double> parameters, Want want) const {
   require_times_within(protocol, times_s);
-  const Prepared prepared = prepare(parameters);
+  require_in_range(parameters);
+  std::optional<FractionalMemory> rates;
+  if (spec_.fractional != Fractional::none) rates = rates_for(spec_, protocol, times_s);
+  const Prepared prepared = prepare(parameters, rates ? &*rates : nullptr);
   const LawAtParameters& law = prepared.law;
   const bool displacement = protocol.drive() == Drive::displacement;
+  if (displacement && law.memory.dashpot > 0.0) require_no_jump(protocol, law.contact);
   const double peak = displacement ? protocol.peak() - law.contact : spec_.reference;
   ContactHistory contact(law, peak, want);
   Response response;

@@ -1,5 +1,4 @@
 #pragma once
-#include <complex>
 #include <memory>
 #include <string>
 #include <vector>
@@ -9,6 +8,8 @@
 
 namespace tpm {
 
+class FractionalMemory;
+
 /// A law of the family, behind the interface that tables, fits and plans ask.
 ///
 /// Displacement-driven: exact in time for a drive that is linear between knots (exponential
@@ -16,6 +17,11 @@ namespace tpm {
 /// in O(n) for each branch. After detachment (the force would become tensile) the surface recovers
 /// freely and the response is the offset until the probe meets it again. Force-driven: adaptive
 /// implicit steps. Times at infinity are answered by full relaxation.
+///
+/// Fractional laws are answered at the knots and asked times to 1e-10 of G at their smallest
+/// spacing times the total variation of the drive (docs/fractional.md), and creep to 1e-9
+/// (spring-pots 5e-6) of the depth. A spring-pot cannot jump: Error(bad_input) if the drive does;
+/// under a jump of the load it stays where it is and then gives way.
 class LawModel final : public Model {
  public:
   /// Throws Error(bad_input) as require_valid(spec).
@@ -32,13 +38,18 @@ class LawModel final : public Model {
   [[nodiscard]] const std::vector<LawParameter>& law_parameters() const { return parameters_; }
   /// Place of a parameter in the vector. Throws Error(bad_input) naming the known ones.
   [[nodiscard]] std::size_t index(std::string_view parameter) const;
+  /// Throws Error(bad_input) naming the first parameter out of its range, or if their number is
+  /// wrong.
+  void require_in_range(std::span<const double> values) const;
   [[nodiscard]] bool linear_in(std::size_t parameter) const override;
   [[nodiscard]] std::pair<double, double> range(std::size_t parameter) const override;
 
  private:
   struct Prepared;
-  [[nodiscard]] Prepared prepare(std::span<const double> values) const;
-  void require_in_range(std::span<const double> values) const;
+  /// @param rates of a fractional law, else unused
+  [[nodiscard]] Prepared prepare(std::span<const double> values,
+                                 const FractionalMemory* rates) const;
+  void require_no_jump(const Protocol& protocol, double contact) const;
 
   LawSpec spec_;
   std::string name_;

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "tpm/core/error.hpp"
+#include "tpm/law/frequency_response.hpp"
 #include "tpm/model/model.hpp"
 
 namespace tpm {
@@ -203,12 +205,72 @@ Figure rates_figure(const PaperFigureData& data) {
           {panel("(a) η₁ = 5 Pa s, as stated", data.paper), panel("(b) fitted", data.fitted)}};
 }
 
+namespace {
+
+/// A viscosity of elastography: a range, a value with what is printed after its sign, or one value.
+Series elastography(const ValueSet& values, std::string_view name, std::string label,
+                    double frequency_Hz) {
+  const NamedValue& v = values.at(name);
+  Series s;
+  s.label = std::move(label);
+  s.provenance = provenance_name(v.provenance);
+  s.assumed = "frequency";
+  s.x = {frequency_Hz};
+  if (v.value && !v.plus_minus) {
+    s.kind = Series::Kind::points;
+    s.y = {*v.value};
+    return s;
+  }
+  s.kind = Series::Kind::bracket;
+  s.lower = {v.value ? *v.value - *v.plus_minus : v.lower.value_or(0.0)};
+  s.upper = {v.value ? *v.value + *v.plus_minus : v.upper.value_or(0.0)};
+  return s;
+}
+
+}  // namespace
+
+Figure spectrum_figure(const PaperFigureData& data) {
+  const std::vector<double> frequency_Hz = evenly_in_log(1e-3, 1e3, 180);
+  const Axis x{"frequency", "Hz", true, 1e-3, 1e3};
+  Panel moduli{"(a) storage and loss modulus", x, {"modulus", "kPa", true, 1e-6, 100.0}, {}};
+  Panel viscosity{"(b) complex viscosity", x, {"viscosity", "Pa s", true, 0.5, 5e6}, {}};
+  const auto draw = [&](const TpmParameters& p, const std::string& label) {
+    const SpectrumResponse r = element_spectrum(p, frequency_Hz, Want::values);
+    moduli.series.push_back(line("storage, " + label, frequency_Hz, scaled(r.storage, 1e-3)));
+    moduli.series.push_back(line("loss, " + label, frequency_Hz, scaled(r.loss, 1e-3)));
+    viscosity.series.push_back(
+        line("|η*|, " + label, frequency_Hz, scaled(r.complex_viscosity(frequency_Hz), 1.0)));
+  };
+  draw(data.paper, "η₁ = 5 Pa s");
+  draw(data.fitted, "fitted");
+  viscosity.series.push_back(
+      elastography(data.literature, "klatt_viscosity", "Klatt [17], η", 25.0));
+  viscosity.series.push_back(
+      elastography(data.literature, "mohammad_viscosity", "Mohammad [18], η", 35.0));
+  viscosity.series.push_back(elastography(data.literature, "asbach_viscosity_as_printed",
+                                          "Asbach [19] as cited, η", 50.0));
+  viscosity.series.push_back(
+      elastography(data.literature, "asbach_viscosity_abstract", "Asbach, own abstract, η", 70.0));
+  return {"figure_spectrum",
+          "Over frequency: elastography and relaxation",
+          fmt::format(
+              "The element about its undeformed state, with the paper's 5 Pa s (loss at its peak "
+              "near {:.2g} Hz) and fitted to relaxation over 30 s ({}; peak near {:.2g} Hz). The "
+              "viscosities that the paper cites are from elastography at tens of Hz; the frequency "
+              "of each is assumed, and they are parameters η of the authors' models, not |η*|. "
+              "Neither dashpot speaks of the other's frequencies.",
+              1.0 / (2.0 * std::numbers::pi * data.paper.relaxation_time_s()), data.fitted_as,
+              1.0 / (2.0 * std::numbers::pi * data.fitted.relaxation_time_s())),
+          {std::move(moduli), std::move(viscosity)}};
+}
+
 std::vector<Figure> paper_figures(const PaperFigureData& data) {
   std::vector<Figure> figures{static_force_figure(data), relaxation_figure(data)};
   for (const PrintedCreep& printed : data.printed_creep) {
     figures.push_back(creep_figure(data, printed));
   }
   figures.push_back(rates_figure(data));
+  figures.push_back(spectrum_figure(data));
   return figures;
 }
 

@@ -25,6 +25,7 @@ struct PaperFigureData {
   PointSet relaxation;
   PointSet creep;
   std::vector<PrintedCreep> printed_creep;
+  ValueSet literature;  ///< single values, viscosities among them
 };
 
 /// Fig. 6: force against depth, 0-8 mm, with the range over three pigs.
@@ -40,7 +41,10 @@ struct PaperFigureData {
 /// Fig. 10: 4 mm reached at 4, 2 and 1 mm/s, with the paper's dashpot and with the fitted one.
 [[nodiscard]] Figure rates_figure(const PaperFigureData& data);
 
-/// All five, in the paper's order.
+/// Not in the paper: both dashpots over frequency, with the viscosities of elastography.
+[[nodiscard]] Figure spectrum_figure(const PaperFigureData& data);
+
+/// The paper's five in its order, and the spectrum.
 [[nodiscard]] std::vector<Figure> paper_figures(const PaperFigureData& data);
 
 }  // namespace tpm

@@ -52,6 +52,7 @@ PaperFigureData figure_data(const FitResult& fit, const ClaimSet& claims) {
   data.relaxation = load_points("evren_relaxation");
   data.creep = load_points("amy_creep");
   data.printed_creep = printed_creep(claims);
+  data.literature = load_values("literature_values");
   return data;
 }
 

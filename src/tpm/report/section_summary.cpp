@@ -92,7 +92,7 @@ void add_summary(Document& document, const PaperReport& report) {
 }
 
 void add_paper_figures(Document& document, const PaperReport& report) {
-  document.heading(2, "Figures 6 to 10");
+  document.heading(2, "Figures 6 to 10 and the spectrum");
   document.paragraph(
       "Redrawn as model against data. Lines are computed; filled marks and bars are printed or "
       "measured; open, hatched and dashed ones carry an assumption, which the legend names. The "

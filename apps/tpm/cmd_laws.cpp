@@ -1,0 +1,111 @@
+// tpm laws: the family of laws, and the parameters of one.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/law/law_file.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm::app {
+namespace {
+
+/// One of each kind; the rest are their combinations.
+constexpr std::array<const char*, 13> kExamples{"linear",
+                                                "linear-1",
+                                                "linear-2",
+                                                "linear-2-fluid",
+                                                "linear-2-series",
+                                                "hertz-1",
+                                                "power-1",
+                                                "linear-1-elastic",
+                                                "linear-1-relaxing",
+                                                "linear-fspringpot",
+                                                "linear-fmaxwell",
+                                                "linear-fkelvin_voigt",
+                                                "linear-fzener"};
+
+constexpr const char* kGrammar =
+    "KERNEL[-BRANCHES][-TENSION][-fluid][-series]: kernel linear, hertz or power; branches 1 to 8 "
+    "or "
+    "fspringpot, fmaxwell, fkelvin_voigt, fzener; tension elastic or relaxing";
+
+Json limit(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json parameter_json(const LawParameter& p) {
+  Json json{{"name", p.name},       {"key", law_key(p)},       {"unit", si_symbol(p.dimension)},
+            {"meaning", p.meaning}, {"lower", limit(p.lower)}, {"upper", limit(p.upper)},
+            {"linear", p.linear},   {"nuisance", p.nuisance}};
+  if (p.preset) json["preset"] = std::isfinite(*p.preset) ? Json(*p.preset) : Json("infinite");
+  return json;
+}
+
+Json law_json(const LawSpec& spec, bool with_parameters) {
+  Json json{{"law", law_name(spec)}, {"words", law_words(spec)}};
+  if (!with_parameters) return json;
+  json["parameters"] = Json::array();
+  for (const LawParameter& p : law_parameters(spec)) {
+    json["parameters"].push_back(parameter_json(p));
+  }
+  return json;
+}
+
+std::string range_words(const LawParameter& p) {
+  if (std::isfinite(p.upper)) return fmt::format("{} to {}", shortest(p.lower), shortest(p.upper));
+  return std::isfinite(p.lower) ? fmt::format("from {}", shortest(p.lower)) : "any";
+}
+
+std::string one_law_text(const LawSpec& spec) {
+  std::string text = fmt::format("{}: {}\n\n{:<15} {:<5} {:<11} {}\n", law_name(spec),
+                                 law_words(spec), "parameter", "unit", "range", "meaning");
+  for (const LawParameter& p : law_parameters(spec)) {
+    std::string meaning = p.meaning;
+    if (p.preset) meaning += fmt::format(" ({} unless set)", shortest(*p.preset));
+    text += fmt::format("{:<15} {:<5} {:<11} {}\n", p.name, si_symbol(p.dimension), range_words(p),
+                        meaning);
+  }
+  return text;
+}
+
+std::string family_text() {
+  std::string text = fmt::format("{}\n\n", kGrammar);
+  for (const char* name : kExamples) {
+    text += fmt::format("{:<22} {}\n", name, law_words(parse_law_name(name, "laws")));
+  }
+  return text + "\nParameters of one: tpm laws NAME\n";
+}
+
+std::string answer(const std::string& name, const Session& session) {
+  if (!name.empty()) {
+    const LawSpec spec = parse_law_name(name, "laws");
+    return session.json() ? to_text(law_json(spec, true)) : one_law_text(spec);
+  }
+  if (!session.json()) return family_text();
+  Json json{{"names", kGrammar}, {"laws", Json::array()}};
+  for (const char* example : kExamples) {
+    json["laws"].push_back(law_json(parse_law_name(example, "laws"), false));
+  }
+  return to_text(json);
+}
+
+}  // namespace
+
+void add_laws_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand("laws", "The family of laws, and the parameters of one");
+  const auto name = std::make_shared<std::string>();
+  command->add_option("name", *name, "A law, e.g. linear-2-elastic");
+  add_format_option(*command, session);
+  command->footer("Example:\n  tpm laws hertz-fzener");
+  command->callback([name, &session] {
+    session.run = [name, &session] {
+      deliver(answer(*name, session), "");
+      return 0;
+    };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,115 @@
+// tpm spectrum: storage and loss of a law over frequency.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/law/frequency_response.hpp"
+#include "tpm/law/law_file.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct SpectrumTexts {
+  std::string law;
+  std::string from = "0.001 Hz";
+  std::string to = "100 Hz";
+  std::string points = "16";
+  std::string depth;
+  std::string output;
+};
+
+std::vector<double> frequencies(const SpectrumTexts& texts) {
+  const double from = parse_quantity(texts.from, Dimension::frequency, "--from");
+  const double to = parse_quantity(texts.to, Dimension::frequency, "--to");
+  const auto points = parse_whole_number(texts.points, "--points", 2);
+  if (!(from > 0.0 && to > from) || points > 100000) {
+    throw Error(ExitCode::usage, "spectrum", "no range of frequencies",
+                "--from above 0 Hz and below --to, and at most 100000 points");
+  }
+  std::vector<double> result;
+  for (std::uint64_t i = 0; i < points; ++i) {
+    const double share = static_cast<double>(i) / static_cast<double>(points - 1);
+    result.push_back(from * std::pow(to / from, share));
+  }
+  return result;
+}
+
+std::optional<double> operating_depth(const SpectrumTexts& texts, const LawSpec& spec) {
+  if (texts.depth.empty()) return std::nullopt;
+  const bool strip = spec.drive == Quantity::relative_length;
+  return parse_quantity(texts.depth, strip ? Dimension::dimensionless : Dimension::length,
+                        "--depth");
+}
+
+std::string text_of(const LawFile& law, const std::vector<double>& frequency_Hz,
+                    const SpectrumResponse& r) {
+  const bool strip = law.spec.response == Quantity::stress;
+  const std::string unit = strip ? "Pa" : "N/m";
+  std::string text = fmt::format("{}: {}\n\n{:>12} {:>14} {:>14} {:>16} {:>10}\n",
+                                 law_name(law.spec), law_words(law.spec), "f [Hz]",
+                                 fmt::format("storage [{}]", unit), fmt::format("loss [{}]", unit),
+                                 strip ? "|eta*| [Pa s]" : "|eta*| [N s/m]", "tan delta");
+  const Eigen::VectorXd viscosity = r.complex_viscosity(frequency_Hz);
+  const Eigen::VectorXd tangent = r.loss_tangent();
+  for (std::size_t i = 0; i < frequency_Hz.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    text += fmt::format("{:>12} {:>14} {:>14} {:>16} {:>10}\n", significant(frequency_Hz[i], 4),
+                        significant(r.storage[row], 5), significant(r.loss[row], 5),
+                        significant(viscosity[row], 5), significant(tangent[row], 4));
+  }
+  return text;
+}
+
+Json json_of(const LawFile& law, const std::vector<double>& frequency_Hz,
+             const SpectrumResponse& r) {
+  constexpr int kDigits = 10;
+  const bool strip = law.spec.response == Quantity::stress;
+  const auto list = [&](const auto& values) {
+    Json json = Json::array();
+    for (const double v : values) json.push_back(rounded(v, kDigits));
+    return json;
+  };
+  Json json{{"law", to_json(law)}, {"frequency_Hz", list(frequency_Hz)}};
+  json[strip ? "storage_Pa" : "storage_N_per_m"] = list(r.storage);
+  json[strip ? "loss_Pa" : "loss_N_per_m"] = list(r.loss);
+  json[strip ? "complex_viscosity_Pa_s" : "complex_viscosity_N_s_per_m"] =
+      list(r.complex_viscosity(frequency_Hz));
+  return json;
+}
+
+int spectrum(const SpectrumTexts& texts, const Session& session) {
+  const LawFile law = read_law(texts.law);
+  const std::vector<double> frequency_Hz = frequencies(texts);
+  const SpectrumResponse r = respond_spectrum(law.spec, law.values, frequency_Hz,
+                                              operating_depth(texts, law.spec), Want::values);
+  deliver(session.json() ? to_text(json_of(law, frequency_Hz, r)) : text_of(law, frequency_Hz, r),
+          texts.output);
+  return 0;
+}
+
+}  // namespace
+
+void add_spectrum_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "spectrum", "Storage and loss of a law over frequency, small oscillations");
+  const auto texts = std::make_shared<SpectrumTexts>();
+  command->add_option("law", texts->law, "Law file (docs/laws.md)")->required();
+  command->add_option("--from", texts->from, "Lowest frequency")->capture_default_str();
+  command->add_option("--to", texts->to, "Highest frequency")->capture_default_str();
+  command->add_option("--points", texts->points, "Frequencies, evenly spaced in the logarithm")
+      ->capture_default_str();
+  command->add_option("--depth", texts->depth,
+                      "Depth about which the tissue oscillates; the law's reference unless set");
+  command->add_option("-o,--output", texts->output, "Write here instead of to the terminal");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm spectrum law.json --from \"0.01 Hz\" --to \"1000 Hz\" --points 31");
+  command->callback(
+      [texts, &session] { session.run = [texts, &session] { return spectrum(*texts, session); }; });
+}
+
+}  // namespace tpm::app

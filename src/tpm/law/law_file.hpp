@@ -1,0 +1,33 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/curve/curve.hpp"
+#include "tpm/law/law.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// A law with its parameters, as fits write it and simulations read it (docs/laws.md).
+struct LawFile {
+  LawSpec spec;
+  std::vector<double> values;  ///< in the order of law_parameters(spec), SI
+  Provenance provenance = Provenance::assumed;
+  std::string note;
+};
+
+/// The key of a parameter in files: name and SI unit, "k_inf_N_per_m", "tau1_s", "alpha".
+[[nodiscard]] std::string law_key(const LawParameter& parameter);
+
+/// Throws Error(bad_input) for anything that schemas/law.schema.json or the law does not allow: an
+/// unknown law or key, a missing parameter without a preset, a value out of range.
+[[nodiscard]] LawFile law_from_json(const Json& json, std::string_view where);
+/// An infinite spacing, which is its preset, is left out: JSON has no infinity.
+[[nodiscard]] Json to_json(const LawFile& law);
+
+[[nodiscard]] LawFile read_law(const std::filesystem::path& path);
+/// Throws Error(environment) if the file cannot be written.
+void write_law(const std::filesystem::path& path, const LawFile& law);
+
+}  // namespace tpm

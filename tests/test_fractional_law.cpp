@@ -1,0 +1,226 @@
+// Fractional laws through the law model: ramps, random histories, integer orders, creep, jumps.
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/law/law_model.hpp"
+#include "tpm/solve/mittag_leffler.hpp"
+
+using namespace tpm;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+constexpr double kInf = 20.0;  // N/m
+constexpr double kOne = 30.0;  // N/m
+constexpr double kTau = 0.7;   // s
+
+struct Element {
+  const char* name;
+  bool solid;
+  bool relaxes;
+};
+constexpr std::array<Element, 4> kElements{{{"linear-fspringpot", false, false},
+                                            {"linear-fmaxwell", false, true},
+                                            {"linear-fkelvin_voigt", true, false},
+                                            {"linear-fzener", true, true}}};
+
+std::vector<double> values_of(const Element& element, double alpha) {
+  std::vector<double> values;
+  if (element.solid) values.push_back(kInf);
+  values.push_back(kOne);
+  if (element.relaxes) values.push_back(kTau);
+  values.insert(values.end(), {alpha, 0.0, 0.0});
+  return values;
+}
+
+/// The integral of G from 0 to t.
+double stiffness_integral(const Element& element, double alpha, double t) {
+  if (t <= 0.0) return 0.0;
+  const double relaxing = element.relaxes
+                              ? t * mittag_leffler(alpha, 2.0, std::pow(t / kTau, alpha))
+                              : std::pow(t, 1.0 - alpha) / std::tgamma(2.0 - alpha);
+  return (element.solid ? kInf * t : 0.0) + kOne * relaxing;
+}
+
+/// J(t), the depth under a unit load from t = 0 on.
+double compliance(const Element& element, double alpha, double t) {
+  const auto creeping = [&](double tau) {
+    return 1.0 - mittag_leffler(alpha, 1.0, std::pow(t / tau, alpha));
+  };
+  const double power = std::pow(t, alpha) / std::tgamma(1.0 + alpha);
+  if (element.solid && element.relaxes) {
+    const double glassy = kInf + kOne;
+    const double tau = kTau * std::pow(glassy / kInf, 1.0 / alpha);
+    return 1.0 / glassy + (1.0 / kInf - 1.0 / glassy) * creeping(tau);
+  }
+  if (element.solid) return creeping(std::pow(kOne / kInf, 1.0 / alpha)) / kInf;
+  if (element.relaxes) return 1.0 / kOne + power / (kOne * std::pow(kTau, alpha));
+  return power / kOne;
+}
+
+double largest(const Eigen::VectorXd& values) {
+  return values.cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+TEST_CASE("a ramp and hold is answered as by E_{alpha,2}", "[fractional]") {
+  const double rate = 2e-3;
+  const double ramp_s = 1.5;
+  std::vector<double> times;
+  for (int i = 1; i <= 300; ++i) times.push_back(0.1 * i);
+  const Protocol ramp = ramp_and_hold(rate * ramp_s, rate, 30.0);
+  for (const Element& element : kElements) {
+    const LawModel law(parse_law_name(element.name, "test"));
+    for (const double alpha : {0.05, 0.3, 0.6, 0.9, 0.99, 1.0}) {
+      const auto force = law.respond(ramp, times, values_of(element, alpha), Want::values).value;
+      double worst = 0.0;
+      for (std::size_t i = 0; i < times.size(); ++i) {
+        const double exact = rate * (stiffness_integral(element, alpha, times[i]) -
+                                     stiffness_integral(element, alpha, times[i] - ramp_s));
+        if (alpha == 1.0 && times[i] == 1.5) continue;  // a dashpot's force jumps here
+        worst = std::max(worst, std::abs(force[static_cast<Eigen::Index>(i)] - exact));
+      }
+      INFO(element.name << ", alpha " << alpha);
+      CHECK(worst < 1e-9 * largest(force));
+    }
+  }
+}
+
+TEST_CASE("a random history is the sum of its ramps", "[fractional]") {
+  Random random(4);
+  std::vector<Knot> knots{{0.0, 5e-3}};
+  for (int i = 1; i <= 120; ++i) {
+    knots.push_back({knots.back().time_s + 0.01 * std::pow(100.0, random.uniform()),
+                     5e-3 + 1e-3 * random.normal()});
+  }
+  Protocol history(Drive::displacement, knots);
+  history.set_relaxed_at_start(true);
+  std::vector<double> times;
+  for (const Knot& k : knots) times.push_back(k.time_s);
+  for (const Element& element : kElements) {
+    const LawModel law(parse_law_name(element.name, "test"));
+    for (const double alpha : {0.2, 0.7, 0.97}) {
+      auto values = values_of(element, alpha);
+      values.back() = 10.0;  // far from detachment: then the forces would be cut off
+      if (!element.solid) values[values.size() - 2] = 0.0;
+      const auto force = law.respond(history, times, values, Want::values).value;
+      std::vector<double> exact;
+      bool touching = true;
+      for (std::size_t i = 0; i < knots.size(); ++i) {
+        double sum = element.solid ? kInf * knots.front().value : 0.0;
+        for (std::size_t k = 1; k <= i; ++k) {
+          const double slope = (knots[k].value - knots[k - 1].value) / (times[k] - times[k - 1]);
+          sum += slope * (stiffness_integral(element, alpha, times[i] - times[k - 1]) -
+                          stiffness_integral(element, alpha, times[i] - times[k]));
+        }
+        touching = touching && sum > 0.0;
+        if (!touching) break;  // the law lets go of the surface, the plain sum does not
+        exact.push_back(sum);
+      }
+      INFO(element.name << ", alpha " << alpha << ", " << exact.size() << " samples");
+      if (element.solid && alpha < 0.5) CHECK(exact.size() > 10);
+      for (std::size_t i = 0; i < exact.size(); ++i) {
+        CHECK_THAT(force[static_cast<Eigen::Index>(i)] - 10.0, WithinAbs(exact[i], 1e-8));
+      }
+    }
+  }
+}
+
+TEST_CASE("order 1 is the classical law", "[fractional]") {
+  const Protocol push(Drive::displacement,
+                      {{0.0, 0.0}, {0.7, 2e-3}, {1.5, 1.8e-3}, {2.0, 3e-3}, {6.0, 3e-3}});
+  std::vector<double> times;
+  for (int i = 1; i < 200; ++i) times.push_back(0.03 * i);
+  const auto ask = [&](const char* name, const std::vector<double>& values) {
+    return LawModel(parse_law_name(name, "test")).respond(push, times, values, Want::values).value;
+  };
+  const Eigen::VectorXd zener = ask("power-1", {kInf, kOne, kTau, 1.4, 0.0, 0.0});
+  CHECK(largest(ask("power-fzener", {kInf, kOne, kTau, 1.0, 1.4, 0.0, 0.0}) - zener) <
+        1e-9 * largest(zener));
+  const Eigen::VectorXd maxwell = ask("linear-1-fluid", {kOne, kTau, 0.0, 0.0});
+  CHECK(largest(ask("linear-fmaxwell", {kOne, kTau, 1.0, 0.0, 0.0}) - maxwell) <
+        1e-9 * largest(maxwell));
+}
+
+TEST_CASE("a jump of the depth: exact stiffness at once, or refused", "[fractional]") {
+  const Protocol step = step_and_hold(2e-3, std::numeric_limits<double>::infinity());
+  const std::vector<double> times{0.0, 0.01, 0.5, 20.0, std::numeric_limits<double>::infinity()};
+  for (const Element& element : kElements) {
+    const LawModel law(parse_law_name(element.name, "test"));
+    const auto values = values_of(element, 0.6);
+    if (!element.relaxes) {
+      CHECK_THROWS_WITH(law.respond(step, times, values, Want::values),
+                        Catch::Contains("jumps at 0 s") && Catch::Contains("expected a ramp"));
+      continue;
+    }
+    const auto force = law.respond(step, times, values, Want::values).value;
+    const double end = element.solid ? kInf : 0.0;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      const double relaxing =
+          std::isinf(times[i]) ? 0.0 : mittag_leffler(0.6, 1.0, std::pow(times[i] / kTau, 0.6));
+      CHECK_THAT(force[static_cast<Eigen::Index>(i)],
+                 WithinAbs(2e-3 * (end + kOne * relaxing), 1e-11));
+    }
+  }
+}
+
+TEST_CASE("creep under a step of load is the exact compliance", "[fractional]") {
+  const std::vector<double> times{0.0, 0.05, 0.2, 1.0, 5.0, 40.0};
+  for (const Element& element : kElements) {
+    LawSpec spec = parse_law_name(element.name, "test");
+    spec.reference = 0.01;
+    const LawModel law(spec);
+    for (const double alpha : {0.2, 0.5, 0.8, 0.95, 1.0}) {
+      const auto start = std::chrono::steady_clock::now();
+      const auto depth =
+          law.respond(creep(0.2, 40.0), times, values_of(element, alpha), Want::values).value;
+      const double spent =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      double worst = 0.0;
+      for (std::size_t i = 0; i < times.size(); ++i) {
+        const double exact = 0.2 * compliance(element, alpha, times[i]);
+        const double off = std::abs(depth[static_cast<Eigen::Index>(i)] - exact);
+        worst = std::max(worst, exact > 0.0 ? off / exact : off);
+      }
+      INFO(element.name << ", alpha " << alpha << ": " << worst << " in " << spent << " s");
+      CHECK(worst < (element.relaxes ? 1e-9 : 5e-6));
+    }
+  }
+}
+
+// Prints the numbers of docs/laws.md: build/ci/tests/test_fractional_law "[measure]"
+TEST_CASE("time of a fractional response with sensitivities", "[.][measure]") {
+  for (const char* name : {"linear-fspringpot", "linear-fzener", "power-fzener"}) {
+    const LawModel law(parse_law_name(name, "test"));
+    std::vector<double> values;
+    for (const LawParameter& p : law.law_parameters()) {
+      values.push_back(p.preset.value_or(p.name == "alpha" ? 0.4 : 1.5));
+    }
+    for (const bool even : {true, false}) {
+      Random random(1);
+      std::vector<double> times;
+      std::vector<double> depth;
+      for (int i = 0; i < 500; ++i) {
+        times.push_back(0.06 * (i + (even ? 0.0 : 0.5 * random.uniform())));
+        depth.push_back(4e-3 * std::min(1.0, i / 50.0));
+      }
+      const Protocol protocol = measured_history(Drive::displacement, times, depth);
+      for (const Want want : {Want::values, Want::values_and_sensitivity}) {
+        const auto start = std::chrono::steady_clock::now();
+        for (int k = 0; k < 20; ++k) (void)law.respond(protocol, times, values, want);
+        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+        fmt::print("{} {} {}: {:.3f} ms\n", name, even ? "even" : "uneven",
+                   want == Want::values ? "values" : "with sensitivities",
+                   1e3 * spent.count() / 20.0);
+      }
+    }
+  }
+}
