@@ -174,7 +174,8 @@ void ExperimentResiduals::add_points(std::size_t choice, const PointSet& points)
   for (const auto& [condition, rows] : by_condition) {
     double longest_s = 0.0;
     for (const Datum* d : rows) longest_s = std::max(longest_s, d->time_s.value_or(0.0));
-    Experiment experiment{protocol_for(data.protocol, condition, longest_s), {}, {}, choice};
+    Experiment experiment{
+        protocol_for(data.protocol, condition, longest_s), {}, {}, choice, false, {}, {}};
     for (const Datum* d : rows) {
       const std::string where = fmt::format("data set '{}', line {}", data.dataset, d->line);
       FitDatum datum;
@@ -203,7 +204,7 @@ void ExperimentResiduals::add_recording(std::size_t choice, const Recording& rec
   const std::vector<double>& sd = recording.response_sd;
   Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
   history.set_relaxed_at_start(true);
-  Experiment experiment{std::move(history), recording.time_s, {}, choice, true};
+  Experiment experiment{std::move(history), recording.time_s, {}, choice, true, {}, {}};
   const std::size_t n = recording.response.size();
   experiment.data.reserve(n);
   data_.reserve(data_.size() + n);
@@ -300,6 +301,15 @@ void ExperimentResiduals::resolve_noise_parameter(EstimatedParameter& parameter)
 void ExperimentResiduals::count_residuals() {
   residual_count_ = 0;
   offset_ = 0.0;
+  for (Experiment& experiment : experiments_) {
+    experiment.fitted_times_s.clear();
+    experiment.fitted_data.clear();
+    for (std::size_t k = 0; k < experiment.data.size(); ++k) {
+      if (data_[experiment.data[k]].held_out) continue;
+      experiment.fitted_times_s.push_back(experiment.times_s[k]);
+      experiment.fitted_data.push_back(experiment.data[k]);
+    }
+  }
   for (const Experiment& experiment : experiments_) {
     for (const std::size_t i : experiment.data) {
       if (data_[i].held_out) continue;
@@ -329,6 +339,13 @@ int ExperimentResiduals::band_count() const {
 
 Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
                                              RowMatrix* sensitivity) const {
+  return predict(natural, sensitivity, &Experiment::times_s, &Experiment::data);
+}
+
+Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
+                                             RowMatrix* sensitivity,
+                                             std::vector<double> Experiment::*times_of,
+                                             std::vector<std::size_t> Experiment::*data_of) const {
   const Want want = sensitivity != nullptr ? Want::values_and_sensitivity : Want::values;
   Eigen::VectorXd answer(static_cast<Eigen::Index>(data_.size()));
   if (sensitivity != nullptr) {
@@ -337,10 +354,11 @@ Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
   for (const Experiment& experiment : experiments_) {
     const std::vector<double> values = model_parameters(config_, natural, experiment.choice);
     const Response response =
-        model_->respond(experiment.protocol, experiment.times_s, values, want);
+        model_->respond(experiment.protocol, experiment.*times_of, values, want);
     const auto from_to = columns_for(experiment.choice);
-    for (std::size_t k = 0; k < experiment.data.size(); ++k) {
-      const auto row = static_cast<Eigen::Index>(experiment.data[k]);
+    const std::vector<std::size_t>& data = experiment.*data_of;
+    for (std::size_t k = 0; k < data.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(data[k]);
       const auto from = static_cast<Eigen::Index>(k);
       answer[row] = response.value[from];
       if (sensitivity == nullptr) continue;
@@ -370,7 +388,8 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
   RowMatrix sensitivity;
   Eigen::VectorXd answer;
   try {
-    answer = predict(natural, jacobian != nullptr ? &sensitivity : nullptr);
+    answer = predict(natural, jacobian != nullptr ? &sensitivity : nullptr,
+                     &Experiment::fitted_times_s, &Experiment::fitted_data);
   } catch (const Error& error) {
     // A solver that gives up at some trial parameters is for the optimiser to back away from; bad
     // input is not.

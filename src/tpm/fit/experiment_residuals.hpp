@@ -32,6 +32,8 @@ struct Experiment {
   std::vector<std::size_t> data;  ///< index into FitProblem::data, one per time
   std::size_t choice = 0;         ///< place in FitConfig::data
   bool is_recording = false;
+  std::vector<double> fitted_times_s;    ///< those of `times_s` that are not held out
+  std::vector<std::size_t> fitted_data;  ///< and their data
 };
 
 /// Data in memory: separate readings, or a recording.
@@ -117,6 +119,9 @@ class ExperimentResiduals final : public ResidualFunction {
                         Eigen::Ref<Eigen::RowVectorXd> row);
   void count_residuals();
   [[nodiscard]] std::optional<std::size_t> parameter_place(const std::string& name) const;
+  [[nodiscard]] Eigen::VectorXd predict(std::span<const double> natural, RowMatrix* sensitivity,
+                                        std::vector<double> Experiment::*times_of,
+                                        std::vector<std::size_t> Experiment::*data_of) const;
   /// Columns of a response's sensitivity and the estimated parameters that they belong to.
   [[nodiscard]] std::vector<std::pair<Eigen::Index, Eigen::Index>> columns_for(
       std::size_t choice) const;

@@ -103,7 +103,7 @@ void walk(const Protocol& protocol, std::span<const double> times_s, ContactHist
       report(order[next]);
       ++next;
     }
-    if (last) break;
+    if (last || next == order.size()) break;  // what comes after the last asked time is not needed
     if (to.time_s > knots[i].time_s) {
       move(at.value, to.value, to.time_s - at.time_s);
     } else {
