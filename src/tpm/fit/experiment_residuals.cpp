@@ -558,6 +558,31 @@ void ExperimentResiduals::set_counts(std::vector<int> counts) {
   count_residuals();
 }
 
+std::unique_ptr<ExperimentResiduals> ExperimentResiduals::thinned(std::size_t most) const {
+  auto few = copy();
+  for (Experiment& experiment : few->experiments_) {
+    const std::size_t n = experiment.data.size();
+    if (!experiment.is_recording || n <= most) continue;
+    const std::size_t stride = (n + most - 1) / most;
+    std::vector<Knot> knots;
+    std::vector<double> times_s;
+    std::vector<std::size_t> data;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i % stride != 0 && i + 1 != n) continue;
+      knots.push_back(experiment.protocol.knots()[i]);
+      times_s.push_back(experiment.times_s[i]);
+      data.push_back(experiment.data[i]);
+    }
+    Protocol protocol(experiment.protocol.drive(), std::move(knots), experiment.protocol.name());
+    protocol.set_relaxed_at_start(experiment.protocol.relaxed_at_start());
+    experiment.protocol = std::move(protocol);
+    experiment.times_s = std::move(times_s);
+    experiment.data = std::move(data);
+  }
+  few->count_residuals();
+  return few;
+}
+
 std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   // make_unique cannot reach the private constructor.
   std::unique_ptr<ExperimentResiduals> other(new ExperimentResiduals());

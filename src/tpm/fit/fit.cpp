@@ -19,6 +19,10 @@
 namespace tpm {
 namespace {
 
+constexpr Eigen::Index kMostSearched = 20'000;   // residuals that many starts are followed with
+constexpr std::size_t kThinnedTo = 2'000;        // samples that stand for a longer recording
+constexpr Eigen::Index kMostProfiled = 20'000;   // residuals that profiles are walked with
+
 constexpr double kSameDeviance = 1e-5;   // relative: one minimum
 constexpr double kSameParameter = 1e-5;  // relative: five digits
 
@@ -132,6 +136,27 @@ void profile_all(const ResidualFunction& function, FitResult& result,
   throw Error(ExitCode::numerical, "profiles", "a deeper minimum was met again and again");
 }
 
+/// Limits from the covariance alone.
+void linear_intervals(FitResult& result, std::span<const FitParameter> parameters,
+                      const Threshold& threshold) {
+  const double wide =
+      std::sqrt(threshold.rise(result.best.deviance) /
+                (threshold.inflation * threshold.variance_factor(result.best.deviance)));
+  const Covariance& c = result.covariance;
+  for (std::size_t k = 0; c.full_rank && k < c.free.size(); ++k) {
+    const std::size_t i = c.free[k];
+    const FitParameter& p = parameters[i];
+    const double theta = p.theta(result.best.natural[i]);
+    const double half = wide * c.theta_sd[static_cast<Eigen::Index>(k)];
+    const double a = p.natural(std::max(theta - half, p.theta_lower()));
+    const double b = p.natural(std::min(theta + half, p.theta_upper()));
+    if (theta - half > p.theta_lower())
+      (p.reversed() ? result.parameters[i].upper : result.parameters[i].lower) = a;
+    if (theta + half < p.theta_upper())
+      (p.reversed() ? result.parameters[i].lower : result.parameters[i].upper) = b;
+  }
+}
+
 void describe_parameters(FitResult& result, double level, bool profiles) {
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterResult& p = result.parameters[i];
@@ -166,7 +191,15 @@ FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParamet
     r.parameter = p;
     result.parameters.push_back(std::move(r));
   }
-  if (profiles) profile_all(function, result, parameters, threshold);
+  if (profiles && function.residual_count() <= kMostProfiled) {
+    profile_all(function, result, parameters, threshold);
+  } else if (profiles) {
+    // With so many readings the likelihood is a parabola as far as the interval reaches.
+    linear_intervals(result, parameters, threshold);
+    result.flags.push_back(
+        fmt::format("{} readings: the intervals come from the covariance, not from profiles",
+                    function.residual_count()));
+  }
   result.degrees_of_freedom = threshold.data_count - threshold.parameter_count;
   result.variance_factor = threshold.scale_known || result.degrees_of_freedom > 0
                                ? threshold.variance_factor(result.best.deviance)
@@ -468,6 +501,33 @@ FitResult run_fit(const FitConfig& config, const std::vector<DataSet>& data) {
   return fit_experiments(ExperimentResiduals(config, data));
 }
 
+namespace {
+
+/// Where the search begins and how it goes on from there.
+struct Approach {
+  std::vector<std::vector<double>> starts;
+  StartKind kind;
+};
+
+/// Long recordings are approached through a few of their samples; the minimum is then found with
+/// all of them.
+Approach approach_to(const ExperimentResiduals& function,
+                     std::span<const FitParameter> parameters) {
+  if (function.residual_count() <= kMostSearched) {
+    return {fit_starts(function, parameters), start_kind(function)};
+  }
+  const auto few = function.thinned(kThinnedTo);
+  Threshold threshold;
+  threshold.scale_known = function.config().data.front().noise.scale_known;
+  threshold.data_count = static_cast<int>(few->residual_count());
+  const FitResult found =
+      fit_residuals(*few, std::vector<FitParameter>(parameters.begin(), parameters.end()),
+                    fit_starts(*few, parameters), threshold, false, start_kind(*few));
+  return {{found.best.natural}, StartKind::solved};
+}
+
+}  // namespace
+
 FitResult fit_experiments(const ExperimentResiduals& function) {
   const FitConfig& config = function.config();
   std::vector<FitParameter> parameters;
@@ -478,10 +538,10 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
   threshold.data_count = function.value_count();
   threshold.parameter_count = static_cast<int>(parameters.size());
 
-  FitResult result =
-      fit_residuals(function, parameters, fit_starts(function, parameters), threshold,
-                    config.profiles, start_kind(function),
-                    [&](std::span<const double> best) { return inflation_at(function, best); });
+  const Approach approach = approach_to(function, parameters);
+  FitResult result = fit_residuals(
+      function, parameters, approach.starts, threshold, config.profiles, approach.kind,
+      [&](std::span<const double> best) { return inflation_at(function, best); });
   threshold.inflation = result.inflation;
   result.config = config;
   result.value_count = function.value_count();
