@@ -108,8 +108,10 @@ def draw_line(axes, series, look):
 
 def draw_points(axes, series, look):
     face = "white" if is_assumed(series) else look["color"]
-    style = dict(marker=look["marker"], markersize=5, markerfacecolor=face, markeredgecolor=look["color"], linestyle="none")
-    axes.errorbar(series["x"], series["y"], yerr=series.get("sd"), ecolor=look["color"], elinewidth=1, capsize=2.5, zorder=5, clip_on=False, **style)
+    # A dense recording is drawn small and below the model's line.
+    dense = len(series["x"]) > 100
+    style = dict(marker=look["marker"], markersize=2 if dense else 5, markerfacecolor=face, markeredgecolor=look["color"], linestyle="none")
+    axes.errorbar(series["x"], series["y"], yerr=series.get("sd"), ecolor=look["color"], elinewidth=1, capsize=2.5, zorder=2 if dense else 5, clip_on=False, **style)
     return Line2D([], [], **style)
 
 

@@ -79,6 +79,7 @@ bool is_configuration(const std::vector<std::string>& files) {
 SelectionOptions selection_options(const FitOptions& options) {
   SelectionOptions selection;
   if (!options.law.empty()) selection.laws = {parse_law_name(options.law, "--law")};
+  selection.only_listed = !options.law.empty();
   if (!options.starts.empty()) {
     selection.setup.starts = parse_whole_number(options.starts, "--starts", 1);
   }

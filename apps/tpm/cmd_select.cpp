@@ -34,6 +34,7 @@ std::vector<LawSpec> chosen_laws(const SelectOptions& options) {
 int select(const SelectOptions& options, const Session& session) {
   SelectionOptions selection;
   selection.laws = chosen_laws(options);
+  selection.only_listed = !options.laws.empty();
   selection.margin = parse_number(options.margin, "--margin");
   selection.held_out = !options.no_held_out;
   selection.setup.profiles = !options.no_profiles;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/law/law_file.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
 
@@ -156,6 +157,20 @@ Figure selection_figure(const Selection& selection) {
   return figure;
 }
 
+LawFile fitted_law(const FitResult& fit) {
+  LawFile law;
+  law.spec = fit.config.law.value();
+  law.values = model_parameters(fit.config, fit.best.natural, 0);
+  law.provenance = Provenance::derived;
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    // Contact and offset belong to the recording, not to the tissue.
+    if (parameters[i].nuisance) law.values[i] = 0.0;
+  }
+  law.note = fmt::format("fitted: {}", fit.config.title);
+  return law;
+}
+
 std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
                                                 const Selection& selection) {
   const FitResult& fit = selection.candidates[selection.recommended].fit;
@@ -166,10 +181,11 @@ std::vector<std::string> write_recording_report(const std::filesystem::path& fol
         fmt::format("{}{}", i == 0 ? "fit" : "fit_", i == 0 ? "" : fmt::format("{}", i + 1));
   }
   figures.push_back(selection_figure(selection));
-  std::vector<std::string> files{"config.json", "selection.json", "figures.json"};
+  std::vector<std::string> files{"config.json", "selection.json", "figures.json", "law.json"};
   write_file(folder / files[0], to_text(config_json(fit.config)));
   write_file(folder / files[1], to_text(to_json(selection)));
   write_file(folder / files[2], to_text(to_json(figures)));
+  write_law(folder / files[3], fitted_law(fit));
   draw_figures(find_drawing_python(), folder / files[2], folder, Drawings::svg_and_png);
   for (const Figure& figure : figures) {
     files.push_back(fmt::format("{}.svg", figure.id));

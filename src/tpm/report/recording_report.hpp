@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/law/law_file.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/study/selection.hpp"
 
@@ -16,9 +17,12 @@ namespace tpm {
 /// Each law's residual and BIC over its number of parameters, the recommended one marked.
 [[nodiscard]] Figure selection_figure(const Selection& selection);
 
-/// Writes config.json (rerun it with tpm fit), selection.json, figures.json and the figures as SVG
-/// and PNG into `folder`. Returns the names of the files. Throws Error(environment) if drawing is
-/// not possible; the other files are then already there.
+/// The fitted law without what belongs to the recording, for law files (tpm spectrum, tpm export).
+[[nodiscard]] LawFile fitted_law(const FitResult& fit);
+
+/// Writes config.json (rerun it with tpm fit), law.json, selection.json, figures.json and the
+/// figures as SVG and PNG into `folder`. Returns the names of the files. Throws Error(environment)
+/// if drawing is not possible; the other files are then already there.
 [[nodiscard]] std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
                                                               const Selection& selection);
 

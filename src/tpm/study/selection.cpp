@@ -115,6 +115,21 @@ void score(Candidate& c, int samples, double effective) {
   c.bic = log_likelihood + k * std::log(effective);
 }
 
+/// Where the lasting stiffness is not told from 0, the law without it is a lesser one.
+void add_laws_without_plateau(Selection& s, std::span<const PreparedRecording> recordings,
+                              const std::vector<DataSet>& data, const SelectionOptions& options) {
+  if (options.only_listed) return;
+  const std::size_t fitted = s.candidates.size();
+  for (std::size_t i = 0; i < fitted; ++i) {
+    const Candidate& c = s.candidates[i];
+    LawSpec fluid = c.law;
+    fluid.solid = false;
+    const bool possible = !c.failed && c.law.branches > 0 && c.law.form == BranchForm::parallel &&
+                          c.law.fractional == Fractional::none && c.reason.starts_with("k_inf ");
+    if (possible) s.candidates.push_back(fit_candidate(fluid, recordings, data, options.setup));
+  }
+}
+
 std::size_t choose(const std::vector<Candidate>& candidates, double margin) {
   std::optional<std::size_t> chosen;
   for (const bool only_identified : {true, false}) {
@@ -216,8 +231,19 @@ void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
                           std::numeric_limits<double>::infinity(),
                           std::numeric_limits<double>::infinity(), 0.0, false});
   }
-  for (HeldOut& h : c.held_out) {
-    h.predicts = h.rms <= options.prediction_factor * h.rms_if_fitted;
+}
+
+/// A law predicts what it has not seen if it comes as near as the nearest law does that has.
+void judge_predictions(Selection& s, double factor) {
+  const std::size_t predictions = s.candidates.front().held_out.size();
+  for (std::size_t i = 0; i < predictions; ++i) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Candidate& c : s.candidates) {
+      if (!c.failed && i < c.held_out.size()) least = std::min(least, c.held_out[i].rms_if_fitted);
+    }
+    for (Candidate& c : s.candidates) {
+      if (i < c.held_out.size()) c.held_out[i].predicts = c.held_out[i].rms <= factor * least;
+    }
   }
 }
 
@@ -234,6 +260,29 @@ void describe(Selection& s) {
         "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
         best.identified ? fmt::format("less than the margin of {}", significant(s.margin, 3))
                         : best.reason));
+  }
+  if (s.candidates.front().held_out.size() > 1) {
+    std::vector<std::string> able;
+    std::vector<std::string> unable;
+    for (const Candidate& c : s.candidates) {
+      if (c.failed || c.held_out.empty()) continue;
+      double worst = 0.0;
+      bool predicts = true;
+      for (const HeldOut& h : c.held_out) {
+        worst = std::max(worst, h.rms_over_peak);
+        predicts = predicts && h.predicts;
+      }
+      (predicts ? able : unable)
+          .push_back(fmt::format("{} ({} %)", law_name(c.law), significant(100.0 * worst, 3)));
+    }
+    const auto listed = [](const std::vector<std::string>& laws) {
+      return laws.empty() ? std::string("none") : fmt::format("{}", fmt::join(laws, ", "));
+    };
+    s.words.push_back(fmt::format(
+        "laws that predict each recording from the others, to {} times the least residual that any "
+        "law leaves when fitted to it (worst rms over peak): {}",
+        significant(s.prediction_factor, 2), listed(able)));
+    s.words.push_back(fmt::format("laws that do not: {}", listed(unable)));
   }
   if (s.correlation.significant) {
     s.words.push_back(fmt::format(
@@ -351,11 +400,13 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   const std::vector<DataSet> data = data_sets(recordings);
   Selection s;
   s.margin = options.margin;
+  s.prediction_factor = options.prediction_factor;
   Progress progress("fitting laws", laws.size());
   for (const LawSpec& law : laws) {
     s.candidates.push_back(fit_candidate(law, recordings, data, options.setup));
     progress.advance();
   }
+  add_laws_without_plateau(s, recordings, data, options);
   // The residuals of the closest law are the nearest to noise alone.
   const Candidate* closest = nullptr;
   for (const Candidate& c : s.candidates) {
@@ -393,6 +444,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
       hold_out(c, recordings, options);
       predicting.advance();
     }
+    judge_predictions(s, options.prediction_factor);
   }
   Candidate& chosen = s.candidates[s.recommended];
   if (options.setup.profiles) {

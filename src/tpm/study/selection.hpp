@@ -37,10 +37,11 @@ struct Candidate {
 
 struct SelectionOptions {
   std::vector<LawSpec> laws;  ///< empty: the classical family
+  bool only_listed = false;   ///< do not try laws without plateau besides
   double margin = 6.0;        ///< how much of BIC a larger law must gain to be preferred
   bool held_out = true;
   double prediction_factor = 2.0;  ///< a law predicts if its error is at most this many times the
-                                   ///< residual it leaves where it is fitted
+                                   ///< least residual that any law leaves where it is fitted
   SetupOptions setup;
 };
 
@@ -49,6 +50,7 @@ struct Selection {
   std::size_t recommended = 0;        ///< place in candidates
   std::size_t best_bic = 0;
   double margin = 6.0;
+  double prediction_factor = 2.0;
   int samples = 0;  ///< fitted
   double effective_count = 0.0;
   Correlation correlation;            ///< of the residuals that the law of least deviance leaves
@@ -62,6 +64,9 @@ struct Selection {
 /// The four fractional elements on the three kernels.
 [[nodiscard]] std::vector<LawSpec> fractional_family();
 
+/// Where the lasting stiffness of a law of the family is not told from 0, the law without it
+/// (NAME-fluid) is fitted, too.
+///
 /// Fits every law to the recordings together and recommends the least: of the laws whose BIC is
 /// within the margin of the best and whose parameters are identified, the one with the fewest
 /// parameters. AICc and BIC count the effective number of readings, because neighbouring residuals
