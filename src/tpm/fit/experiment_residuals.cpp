@@ -15,6 +15,7 @@ namespace tpm {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
+using Part = Oscillation::Part;
 
 bool matches_any(const std::vector<Selector>& selectors, const Datum& datum) {
   return std::any_of(selectors.begin(), selectors.end(),
@@ -52,6 +53,7 @@ Protocol protocol_for(const ProtocolChoice& choice, double condition, double lon
       return creep(condition, std::numeric_limits<double>::infinity());
     case Kind::static_:
     case Kind::measured:
+    case Kind::oscillation:
       break;
   }
   return step_and_hold(condition, std::numeric_limits<double>::infinity());
@@ -138,6 +140,8 @@ std::vector<DataSet> load_data(const FitConfig& config) {
     const std::string path = data_path(config, choice.dataset);
     if (choice.protocol.kind == Kind::measured) {
       data.emplace_back(load_recording(path));
+    } else if (choice.protocol.kind == Kind::oscillation) {
+      data.emplace_back(load_spectrum(path));
     } else {
       data.emplace_back(load_points(path));
     }
@@ -153,6 +157,8 @@ ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vec
   for (std::size_t i = 0; i < config_.data.size(); ++i) {
     if (const auto* recording = std::get_if<Recording>(&data.at(i))) {
       add_recording(i, *recording);
+    } else if (const auto* spectrum = std::get_if<Spectrum>(&data[i])) {
+      add_spectrum(i, *spectrum);
     } else {
       add_points(i, std::get<PointSet>(data[i]));
     }
@@ -174,13 +180,14 @@ void ExperimentResiduals::add_points(std::size_t choice, const PointSet& points)
   for (const auto& [condition, rows] : by_condition) {
     double longest_s = 0.0;
     for (const Datum* d : rows) longest_s = std::max(longest_s, d->time_s.value_or(0.0));
-    Experiment experiment{protocol_for(data.protocol, condition, longest_s), {}, {}, choice};
+    TimeCourse course{protocol_for(data.protocol, condition, longest_s), {}};
+    std::vector<std::size_t> places;
     for (const Datum* d : rows) {
       const std::string where = fmt::format("data set '{}', line {}", data.dataset, d->line);
       FitDatum datum;
       datum.choice = choice;
       datum.label = condition_of(*d);
-      datum.observable = points.observable;
+      datum.quantity = observable_quantity(points.observable);
       datum.time_s = time_in_protocol(data.protocol, *d, condition, where);
       datum.value = d->value;
       datum.lower = d->lower;
@@ -189,11 +196,11 @@ void ExperimentResiduals::add_points(std::size_t choice, const PointSet& points)
                              : band_sigma(data, 0.5 * (*d->lower + *d->upper), d->sd, where);
       datum.provenance = d->provenance;
       datum.held_out = matches_any(data.hold_out, *d);
-      experiment.times_s.push_back(datum.time_s);
-      experiment.data.push_back(data_.size());
+      course.times_s.push_back(datum.time_s);
+      places.push_back(data_.size());
       data_.push_back(std::move(datum));
     }
-    experiments_.push_back(std::move(experiment));
+    experiments_.push_back({std::move(course), std::move(places), choice});
   }
 }
 
@@ -203,13 +210,14 @@ void ExperimentResiduals::add_recording(std::size_t choice, const Recording& rec
   const std::vector<double>& sd = recording.response_sd;
   Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
   history.set_relaxed_at_start(true);
-  Experiment experiment{std::move(history), recording.time_s, {}, choice, true};
+  Experiment experiment{TimeCourse{std::move(history), recording.time_s}, {}, choice, true};
   const std::size_t n = recording.response.size();
   experiment.data.reserve(n);
   data_.reserve(data_.size() + n);
   for (std::size_t i = 0; i < n; ++i) {
     FitDatum datum;
     datum.choice = choice;
+    datum.quantity = recording.response_quantity;
     datum.time_s = recording.time_s[i];
     datum.value = recording.response[i];
     datum.held_out = datum.time_s < data.from_s || datum.time_s > data.to_s;
@@ -222,6 +230,39 @@ void ExperimentResiduals::add_recording(std::size_t choice, const Recording& rec
     data_.push_back(std::move(datum));
   }
   experiments_.push_back(std::move(experiment));
+}
+
+void ExperimentResiduals::add_spectrum(std::size_t choice, const Spectrum& spectrum) {
+  const DataChoice& data = config_.data[choice];
+  const SpectrumQuantities quantities = spectrum_quantities(spectrum.dimension);
+  Oscillation oscillation = oscillation_of(config_, data, spectrum);
+  std::vector<std::size_t> places;
+  const auto add = [&](std::size_t row, Part part, Quantity quantity,
+                       const std::vector<double>& values, const std::vector<double>& sds) {
+    const double frequency = spectrum.frequency_Hz[row];
+    Datum reading;  // what selectors see
+    reading.label = oscillation_label(quantity, frequency);
+    if (matches_any(data.exclude, reading)) return;
+    FitDatum datum;
+    datum.choice = choice;
+    datum.label = reading.label;
+    datum.quantity = quantity;
+    datum.frequency_Hz = frequency;
+    datum.value = values[row];
+    datum.sigma =
+        value_sigma(data, values[row], sds.empty() ? std::nullopt : std::optional(sds[row]),
+                    fmt::format("spectrum '{}', {}", data.dataset, datum.label));
+    datum.provenance = spectrum.provenance;
+    datum.held_out = matches_any(data.hold_out, reading);
+    oscillation.readings.push_back({row, part});
+    places.push_back(data_.size());
+    data_.push_back(std::move(datum));
+  };
+  for (std::size_t i = 0; i < spectrum.frequency_Hz.size(); ++i) {
+    add(i, Part::storage, quantities.storage, spectrum.storage, spectrum.storage_sd);
+    add(i, Part::loss, quantities.loss, spectrum.loss, spectrum.loss_sd);
+  }
+  experiments_.push_back({std::move(oscillation), std::move(places), choice});
 }
 
 std::optional<std::size_t> ExperimentResiduals::parameter_place(const std::string& name) const {
@@ -327,6 +368,15 @@ int ExperimentResiduals::band_count() const {
   }));
 }
 
+Response ExperimentResiduals::respond_to(const Experiment& experiment,
+                                         std::span<const double> parameters, Want want) const {
+  if (const auto* oscillation = std::get_if<Oscillation>(&experiment.imposed)) {
+    return respond(*oscillation, parameters, want);
+  }
+  const auto& course = std::get<TimeCourse>(experiment.imposed);
+  return model_->respond(course.protocol, course.times_s, parameters, want);
+}
+
 Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
                                              RowMatrix* sensitivity) const {
   const Want want = sensitivity != nullptr ? Want::values_and_sensitivity : Want::values;
@@ -336,8 +386,7 @@ Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
   }
   for (const Experiment& experiment : experiments_) {
     const std::vector<double> values = model_parameters(config_, natural, experiment.choice);
-    const Response response =
-        model_->respond(experiment.protocol, experiment.times_s, values, want);
+    const Response response = respond_to(experiment, values, want);
     const auto from_to = columns_for(experiment.choice);
     for (std::size_t k = 0; k < experiment.data.size(); ++k) {
       const auto row = static_cast<Eigen::Index>(experiment.data[k]);
