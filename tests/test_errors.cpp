@@ -320,6 +320,47 @@ std::vector<ErrorCase> fit_config_cases() {
   };
 }
 
+const std::string kOscillationConfig = R"({
+  "title": "t", "law": {"name": "linear-1", "reference": "2 mm"},
+  "parameters": {"k1": {"start": "12 N/m", "lower": "1 N/m", "upper": "100 N/m"}},
+  "fixed": {"k_inf": "10 N/m", "tau1": "1 s"},
+  "data": [{"dataset": "c.csv", "stiffness_per_modulus": "12.56 mm",
+            "protocol": {"kind": "oscillation", "operating_depth": "2 mm"},
+            "noise": {"kind": "relative_to_datum", "relative": 0.1}}]
+})";
+
+std::vector<ErrorCase> oscillation_cases() {
+  const std::string type = "fit of a spectrum";
+  const std::string fit = "fit {}/f.json --format json -o {}/out";
+  const auto fitted = [](std::string config, const std::string& rows) {
+    return files({{"c.json", kSpectrumJson},
+                  {"c.csv", "frequency_Hz,storage_Pa,loss_Pa\n" + rows},
+                  {"f.json", std::move(config)}});
+  };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return fitted(replaced(kOscillationConfig, from, to), "1,1000,100\n");
+  };
+  const std::string length = "\"stiffness_per_modulus\": \"12.56 mm\",";
+  return {
+      {type, "the paper's element", fit,
+       with("\"law\": {\"name\": \"linear-1\", \"reference\": \"2 mm\"},", "")},
+      {type, "moduli against an indentation", fit, with(length, "")},
+      {type, "stiffness over modulus of 0", fit, with("12.56 mm", "0 mm")},
+      {type, "stiffness over modulus of another dimension", fit, with("12.56 mm", "12.56 mm^2")},
+      {type, "unknown operating depth unit", fit,
+       with("\"operating_depth\": \"2 mm\"", "\"operating_depth\": \"2 furlong\"")},
+      {type, "negative operating depth", fit,
+       with("\"operating_depth\": \"2 mm\"", "\"operating_depth\": \"-2 mm\"")},
+      {type, "noise of another dimension", fit,
+       with("\"relative_to_datum\", \"relative\": 0.1", "\"absolute\", \"absolute\": \"1 N/m\"")},
+      {type, "operating depth of a recording", fit, with("oscillation", "measured")},
+      {type, "a window of time", fit, with("\"stiffness_per", "\"to\": \"3 s\", \"stiffness_per")},
+      {type, "loss of 0 under relative noise", fit, fitted(kOscillationConfig, "1,1000,0\n")},
+      {type, "a spectrum of a relaxation", fit,
+       with("\"oscillation\", \"operating_depth\": \"2 mm\"", "\"step_hold\"")},
+  };
+}
+
 const std::string kProblem = R"({"title": "t", "parameter_file": "p.csv",
 "observable_file": "o.csv", "condition_file": "c.csv", "measurement_file": "m.csv"})";
 
@@ -466,9 +507,10 @@ std::vector<ErrorCase> law_cases() {
 
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
-  for (const auto& cases : {curve_csv_cases(), curve_json_cases(), machine_cases(),
-                            spectrum_cases(), digitizer_cases(), hdf5_cases(), fit_config_cases(),
-                            fit_tables_cases(), design_cases(), claims_cases(), law_cases()}) {
+  for (const auto& cases :
+       {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
+        hdf5_cases(), fit_config_cases(), oscillation_cases(), fit_tables_cases(), design_cases(),
+        claims_cases(), law_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -16,8 +16,8 @@ namespace tpm {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
-constexpr std::array kProtocolKinds{Kind::ramp_hold, Kind::step_hold, Kind::static_, Kind::creep,
-                                    Kind::measured};
+constexpr std::array kProtocolKinds{Kind::ramp_hold, Kind::step_hold, Kind::static_,
+                                    Kind::creep,     Kind::measured,  Kind::oscillation};
 
 /// A place in the document, for messages.
 struct Place {
@@ -113,14 +113,36 @@ EstimatedParameter parse_parameter(const std::string& name, const Json& j, const
   return parameter;
 }
 
-ProtocolChoice parse_protocol(const Json& j, const Place& place) {
+/// What only oscillations have.
+void parse_oscillation(const Json& j, const std::optional<LawSpec>& law, ProtocolChoice& protocol,
+                       const Place& place) {
+  const Place depth = place.key("operating_depth");
+  if (protocol.kind != Kind::oscillation) {
+    if (!j.contains("operating_depth")) return;
+    throw bad_input(
+        depth.where,
+        fmt::format("protocol '{}' has no operating depth", protocol_kind_name(protocol.kind)),
+        "an operating depth only with oscillation");
+  }
+  if (!law) {
+    throw bad_input(place.key("kind").where, "'oscillation' with the paper's element",
+                    "a law of the family under /law");
+  }
+  if (!j.contains("operating_depth")) return;
+  protocol.operating_depth = quantity(j, "operating_depth", quantity_dimension(law->drive), place);
+  if (*protocol.operating_depth >= 0.0) return;
+  throw bad_input(depth.where, "below 0", "a depth of the tissue such as \"2 mm\"");
+}
+
+ProtocolChoice parse_protocol(const Json& j, const std::optional<LawSpec>& law,
+                              const Place& place) {
   ProtocolChoice protocol;
   const auto name = j.at("kind").get<std::string>();
   const auto* kind = std::find_if(kProtocolKinds.begin(), kProtocolKinds.end(),
                                   [&](Kind k) { return protocol_kind_name(k) == name; });
   if (kind == kProtocolKinds.end()) {
     throw bad_input(place.key("kind").where, fmt::format("unknown protocol '{}'", printable(name)),
-                    "ramp_hold, step_hold, static, creep or measured");
+                    "ramp_hold, step_hold, static, creep, measured or oscillation");
   }
   protocol.kind = *kind;
   if (protocol.kind == Kind::ramp_hold) {
@@ -137,21 +159,18 @@ ProtocolChoice parse_protocol(const Json& j, const Place& place) {
     throw bad_input(place.key("rate").where, fmt::format("protocol '{}' has no rate", name),
                     "a rate only with ramp_hold");
   }
+  parse_oscillation(j, law, protocol, place);
   return protocol;
 }
 
-/// "0.01 N" or "0.1 mm": an absolute standard deviation, of the dimension of the datum.
-double absolute_sigma(const Json& j, const Place& place) {
-  const auto text = j.at("absolute").get<std::string>();
-  const auto unit_begin = text.find_first_of(" \t");
-  const std::string unit =
-      unit_begin == std::string::npos ? std::string{} : text.substr(unit_begin);
-  const Dimension dimension = parse_unit(unit, place.key("absolute").where).dimension;
-  if (dimension != Dimension::force && dimension != Dimension::length) {
-    throw bad_input(place.key("absolute").where, fmt::format("'{}'", printable(text)),
-                    "a force or a length");
-  }
-  return quantity(j, "absolute", dimension, place);
+/// The dimension of the readings of a data set, and so of a in sigma = a + b |model|.
+Dimension reading_dimension(const FitConfig& config, const DataChoice& data) {
+  if (data.protocol.kind == Kind::creep) return Dimension::length;
+  const Dimension response =
+      config.law ? quantity_dimension(config.law->response) : Dimension::force;
+  if (data.protocol.kind != Kind::oscillation) return response;
+  const bool modulus = response == Dimension::stress || data.stiffness_per_modulus_m.has_value();
+  return modulus ? Dimension::stress : Dimension::stiffness;
 }
 
 constexpr std::string_view kEstimated = "estimated";
@@ -220,7 +239,8 @@ void require_estimable_sigma(const DataChoice& data, const Place& place) {
   }
 }
 
-void parse_noise(const Json& j, DataChoice& data, const Place& place) {
+/// @param readings dimension of the data
+void parse_noise(const Json& j, DataChoice& data, Dimension readings, const Place& place) {
   Noise& noise = data.noise;
   parse_noise_law(j, noise, place);
   const bool needs_relative = uses_relative(noise.kind);
@@ -242,7 +262,7 @@ void parse_noise(const Json& j, DataChoice& data, const Place& place) {
                     "a number, \"estimated\" or \"estimated NAME\"");
   }
   if (number_relative) noise.relative = j.at("relative").get<double>();
-  if (number_absolute) noise.absolute = absolute_sigma(j, place);
+  if (number_absolute) noise.absolute = quantity(j, "absolute", readings, place);
   if ((number_relative && !(noise.relative > 0.0)) ||
       (number_absolute && !(noise.absolute > 0.0))) {
     throw bad_input(place.where, "a standard deviation that is not above 0", "a positive one");
@@ -259,11 +279,30 @@ Selector parse_selector(const Json& j, const Place& place) {
   return s;
 }
 
-DataChoice parse_data(const Json& j, const Place& place) {
+/// A0/l0 of a spectrum of moduli under a contact.
+void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataChoice& data,
+                                 const Place& place) {
+  if (!j.contains("stiffness_per_modulus")) return;
+  const Place here = place.key("stiffness_per_modulus");
+  const bool strip = config.law && config.law->drive == Quantity::relative_length;
+  if (data.protocol.kind != Kind::oscillation || strip) {
+    throw bad_input(
+        here.where,
+        strip ? "beside a law of stress over relative length"
+              : fmt::format("beside protocol '{}'", protocol_kind_name(data.protocol.kind)),
+        "it only with oscillation and a law of contact force over indentation depth");
+  }
+  data.stiffness_per_modulus_m = quantity(j, "stiffness_per_modulus", Dimension::length, place);
+  if (*data.stiffness_per_modulus_m > 0.0) return;
+  throw bad_input(here.where, "not above 0", "A0/l0 such as \"12.56 mm\"");
+}
+
+DataChoice parse_data(const Json& j, const FitConfig& config, const Place& place) {
   DataChoice data;
   data.dataset = j.at("dataset").get<std::string>();
-  data.protocol = parse_protocol(j.at("protocol"), place.key("protocol"));
-  parse_noise(j.at("noise"), data, place.key("noise"));
+  data.protocol = parse_protocol(j.at("protocol"), config.law, place.key("protocol"));
+  parse_stiffness_per_modulus(j, config, data, place);
+  parse_noise(j.at("noise"), data, reading_dimension(config, data), place.key("noise"));
   if (j.contains("from")) data.from_s = quantity(j, "from", Dimension::time, place);
   if (j.contains("to")) data.to_s = quantity(j, "to", Dimension::time, place);
   const bool recording = data.protocol.kind == Kind::measured;
@@ -383,12 +422,6 @@ void name_noise_parameters(FitConfig& config) {
   }
 }
 
-/// The dimension of a in sigma = a + b |model|.
-Dimension absolute_dimension(const FitConfig& config, const DataChoice& data) {
-  if (data.protocol.kind == Kind::creep) return Dimension::length;
-  return config.law ? quantity_dimension(config.law->response) : Dimension::force;
-}
-
 /// The noise parameters that the data sets name, with their dimensions, each once. Throws
 /// Error(bad_input) for a name that stands for two dimensions.
 std::vector<std::pair<std::string, Dimension>> noise_parameters(const FitConfig& config,
@@ -408,7 +441,7 @@ std::vector<std::pair<std::string, Dimension>> noise_parameters(const FitConfig&
     }
   };
   for (const DataChoice& data : config.data) {
-    add(data.sigma_a, absolute_dimension(config, data));
+    add(data.sigma_a, reading_dimension(config, data));
     add(data.sigma_b, Dimension::dimensionless);
   }
   return list;
@@ -500,6 +533,8 @@ std::string_view protocol_kind_name(Kind kind) noexcept {
       return "creep";
     case Kind::measured:
       return "measured";
+    case Kind::oscillation:
+      return "oscillation";
   }
   return "";
 }
@@ -549,7 +584,7 @@ FitConfig parse_fit_config(const Json& document, std::string_view where) {
   }
   std::size_t index = 0;
   for (const auto& j : document.at("data")) {
-    config.data.push_back(parse_data(j, place.key("data").key(std::to_string(index++))));
+    config.data.push_back(parse_data(j, config, place.key("data").key(std::to_string(index++))));
   }
   name_noise_parameters(config);
   const std::unique_ptr<Model> model = make_model(config);

@@ -21,15 +21,18 @@ namespace tpm {
 /// How the readings of a data set were imposed.
 struct ProtocolChoice {
   enum class Kind {
-    ramp_hold,  ///< to each datum's depth at `rate`, then held; times count from the ramp's end
-    step_hold,  ///< at once to each datum's depth, then held; times count from the step
-    static_,    ///< infinitely slow: the equilibrium force at each depth
-    creep,      ///< each datum's load applied at once and held; times count from then
-    measured,   ///< the recording's own displacement history
+    ramp_hold,    ///< to each datum's depth at `rate`, then held; times count from the ramp's end
+    step_hold,    ///< at once to each datum's depth, then held; times count from the step
+    static_,      ///< infinitely slow: the equilibrium force at each depth
+    creep,        ///< each datum's load applied at once and held; times count from then
+    measured,     ///< the recording's own displacement history
+    oscillation,  ///< small oscillations of the spectrum's frequencies, about `operating_depth`
   };
   Kind kind = Kind::ramp_hold;
   double rate_m_per_s = 0.0;                  ///< ramp_hold
   std::optional<Provenance> rate_provenance;  ///< how well the rate is known
+  /// oscillation: m or relative length, >= 0; none: the law's reference
+  std::optional<double> operating_depth;
 };
 
 [[nodiscard]] std::string_view protocol_kind_name(ProtocolChoice::Kind kind) noexcept;
@@ -53,6 +56,8 @@ struct DataChoice {
   /// Samples of a recording outside [from_s, to_s] are predicted, not fitted.
   double from_s = -std::numeric_limits<double>::infinity();
   double to_s = std::numeric_limits<double>::infinity();
+  /// A0/l0 of a contact, m, > 0: its stiffness over the modulus that a spectrum states.
+  std::optional<double> stiffness_per_modulus_m;
   /// Names of the estimated parameters that are a and b of sigma = a + b |model|; empty where the
   /// number of `noise` holds. Data sets that name the same parameter share it.
   std::string sigma_a, sigma_b;

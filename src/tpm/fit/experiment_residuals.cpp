@@ -15,6 +15,7 @@ namespace tpm {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
+using Part = Oscillation::Part;
 
 bool matches_any(const std::vector<Selector>& selectors, const Datum& datum) {
   return std::any_of(selectors.begin(), selectors.end(),
@@ -52,6 +53,7 @@ Protocol protocol_for(const ProtocolChoice& choice, double condition, double lon
       return creep(condition, std::numeric_limits<double>::infinity());
     case Kind::static_:
     case Kind::measured:
+    case Kind::oscillation:
       break;
   }
   return step_and_hold(condition, std::numeric_limits<double>::infinity());
@@ -138,6 +140,8 @@ std::vector<DataSet> load_data(const FitConfig& config) {
     const std::string path = data_path(config, choice.dataset);
     if (choice.protocol.kind == Kind::measured) {
       data.emplace_back(load_recording(path));
+    } else if (choice.protocol.kind == Kind::oscillation) {
+      data.emplace_back(load_spectrum(path));
     } else {
       data.emplace_back(load_points(path));
     }
@@ -153,6 +157,8 @@ ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vec
   for (std::size_t i = 0; i < config_.data.size(); ++i) {
     if (const auto* recording = std::get_if<Recording>(&data.at(i))) {
       add_recording(i, *recording);
+    } else if (const auto* spectrum = std::get_if<Spectrum>(&data[i])) {
+      add_spectrum(i, *spectrum);
     } else {
       add_points(i, std::get<PointSet>(data[i]));
     }
@@ -174,14 +180,14 @@ void ExperimentResiduals::add_points(std::size_t choice, const PointSet& points)
   for (const auto& [condition, rows] : by_condition) {
     double longest_s = 0.0;
     for (const Datum* d : rows) longest_s = std::max(longest_s, d->time_s.value_or(0.0));
-    Experiment experiment{
-        protocol_for(data.protocol, condition, longest_s), {}, {}, choice, false, {}, {}};
+    TimeCourse course{protocol_for(data.protocol, condition, longest_s), {}};
+    std::vector<std::size_t> places;
     for (const Datum* d : rows) {
       const std::string where = fmt::format("data set '{}', line {}", data.dataset, d->line);
       FitDatum datum;
       datum.choice = choice;
       datum.label = condition_of(*d);
-      datum.observable = points.observable;
+      datum.quantity = observable_quantity(points.observable);
       datum.time_s = time_in_protocol(data.protocol, *d, condition, where);
       datum.value = d->value;
       datum.lower = d->lower;
@@ -190,11 +196,11 @@ void ExperimentResiduals::add_points(std::size_t choice, const PointSet& points)
                              : band_sigma(data, 0.5 * (*d->lower + *d->upper), d->sd, where);
       datum.provenance = d->provenance;
       datum.held_out = matches_any(data.hold_out, *d);
-      experiment.times_s.push_back(datum.time_s);
-      experiment.data.push_back(data_.size());
+      course.times_s.push_back(datum.time_s);
+      places.push_back(data_.size());
       data_.push_back(std::move(datum));
     }
-    experiments_.push_back(std::move(experiment));
+    experiments_.push_back({std::move(course), std::move(places), choice});
   }
 }
 
@@ -204,13 +210,14 @@ void ExperimentResiduals::add_recording(std::size_t choice, const Recording& rec
   const std::vector<double>& sd = recording.response_sd;
   Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
   history.set_relaxed_at_start(true);
-  Experiment experiment{std::move(history), recording.time_s, {}, choice, true, {}, {}};
+  Experiment experiment{TimeCourse{std::move(history), recording.time_s}, {}, choice, true};
   const std::size_t n = recording.response.size();
   experiment.data.reserve(n);
   data_.reserve(data_.size() + n);
   for (std::size_t i = 0; i < n; ++i) {
     FitDatum datum;
     datum.choice = choice;
+    datum.quantity = recording.response_quantity;
     datum.time_s = recording.time_s[i];
     datum.value = recording.response[i];
     datum.held_out = datum.time_s < data.from_s || datum.time_s > data.to_s;
@@ -223,6 +230,39 @@ void ExperimentResiduals::add_recording(std::size_t choice, const Recording& rec
     data_.push_back(std::move(datum));
   }
   experiments_.push_back(std::move(experiment));
+}
+
+void ExperimentResiduals::add_spectrum(std::size_t choice, const Spectrum& spectrum) {
+  const DataChoice& data = config_.data[choice];
+  const SpectrumQuantities quantities = spectrum_quantities(spectrum.dimension);
+  Oscillation oscillation = oscillation_of(config_, data, spectrum);
+  std::vector<std::size_t> places;
+  const auto add = [&](std::size_t row, Part part, Quantity quantity,
+                       const std::vector<double>& values, const std::vector<double>& sds) {
+    const double frequency = spectrum.frequency_Hz[row];
+    Datum reading;  // what selectors see
+    reading.label = oscillation_label(quantity, frequency);
+    if (matches_any(data.exclude, reading)) return;
+    FitDatum datum;
+    datum.choice = choice;
+    datum.label = reading.label;
+    datum.quantity = quantity;
+    datum.frequency_Hz = frequency;
+    datum.value = values[row];
+    datum.sigma =
+        value_sigma(data, values[row], sds.empty() ? std::nullopt : std::optional(sds[row]),
+                    fmt::format("spectrum '{}', {}", data.dataset, datum.label));
+    datum.provenance = spectrum.provenance;
+    datum.held_out = matches_any(data.hold_out, reading);
+    oscillation.readings.push_back({row, part});
+    places.push_back(data_.size());
+    data_.push_back(std::move(datum));
+  };
+  for (std::size_t i = 0; i < spectrum.frequency_Hz.size(); ++i) {
+    add(i, Part::storage, quantities.storage, spectrum.storage, spectrum.storage_sd);
+    add(i, Part::loss, quantities.loss, spectrum.loss, spectrum.loss_sd);
+  }
+  experiments_.push_back({std::move(oscillation), std::move(places), choice});
 }
 
 std::optional<std::size_t> ExperimentResiduals::parameter_place(const std::string& name) const {
@@ -298,18 +338,31 @@ void ExperimentResiduals::resolve_noise_parameter(EstimatedParameter& parameter)
   fit.upper = 10.0 * size;
 }
 
+void ExperimentResiduals::leave_out_held_out() {
+  fitted_.clear();
+  const bool any =
+      std::any_of(data_.begin(), data_.end(), [](const auto& d) { return d.held_out; });
+  if (!any) return;
+  fitted_ = experiments_;
+  for (Experiment& experiment : fitted_) {
+    auto* course = std::get_if<TimeCourse>(&experiment.imposed);
+    if (course == nullptr) continue;  // an oscillation is answered at once
+    std::vector<double> times_s;
+    std::vector<std::size_t> data;
+    for (std::size_t k = 0; k < experiment.data.size(); ++k) {
+      if (data_[experiment.data[k]].held_out) continue;
+      times_s.push_back(course->times_s[k]);
+      data.push_back(experiment.data[k]);
+    }
+    course->times_s = std::move(times_s);
+    experiment.data = std::move(data);
+  }
+}
+
 void ExperimentResiduals::count_residuals() {
   residual_count_ = 0;
   offset_ = 0.0;
-  for (Experiment& experiment : experiments_) {
-    experiment.fitted_times_s.clear();
-    experiment.fitted_data.clear();
-    for (std::size_t k = 0; k < experiment.data.size(); ++k) {
-      if (data_[experiment.data[k]].held_out) continue;
-      experiment.fitted_times_s.push_back(experiment.times_s[k]);
-      experiment.fitted_data.push_back(experiment.data[k]);
-    }
-  }
+  leave_out_held_out();
   for (const Experiment& experiment : experiments_) {
     for (const std::size_t i : experiment.data) {
       if (data_[i].held_out) continue;
@@ -337,28 +390,34 @@ int ExperimentResiduals::band_count() const {
   }));
 }
 
-Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
-                                             RowMatrix* sensitivity) const {
-  return predict(natural, sensitivity, &Experiment::times_s, &Experiment::data);
+Response ExperimentResiduals::respond_to(const Experiment& experiment,
+                                         std::span<const double> parameters, Want want) const {
+  if (const auto* oscillation = std::get_if<Oscillation>(&experiment.imposed)) {
+    return respond(*oscillation, parameters, want);
+  }
+  const auto& course = std::get<TimeCourse>(experiment.imposed);
+  return model_->respond(course.protocol, course.times_s, parameters, want);
 }
 
 Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
-                                             RowMatrix* sensitivity,
-                                             std::vector<double> Experiment::*times_of,
-                                             std::vector<std::size_t> Experiment::*data_of) const {
+                                             RowMatrix* sensitivity) const {
+  return answers(experiments_, natural, sensitivity);
+}
+
+Eigen::VectorXd ExperimentResiduals::answers(const std::vector<Experiment>& experiments,
+                                             std::span<const double> natural,
+                                             RowMatrix* sensitivity) const {
   const Want want = sensitivity != nullptr ? Want::values_and_sensitivity : Want::values;
   Eigen::VectorXd answer(static_cast<Eigen::Index>(data_.size()));
   if (sensitivity != nullptr) {
     sensitivity->setZero(answer.size(), static_cast<Eigen::Index>(config_.parameters.size()));
   }
-  for (const Experiment& experiment : experiments_) {
+  for (const Experiment& experiment : experiments) {
     const std::vector<double> values = model_parameters(config_, natural, experiment.choice);
-    const Response response =
-        model_->respond(experiment.protocol, experiment.*times_of, values, want);
+    const Response response = respond_to(experiment, values, want);
     const auto from_to = columns_for(experiment.choice);
-    const std::vector<std::size_t>& data = experiment.*data_of;
-    for (std::size_t k = 0; k < data.size(); ++k) {
-      const auto row = static_cast<Eigen::Index>(data[k]);
+    for (std::size_t k = 0; k < experiment.data.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(experiment.data[k]);
       const auto from = static_cast<Eigen::Index>(k);
       answer[row] = response.value[from];
       if (sensitivity == nullptr) continue;
@@ -388,8 +447,8 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
   RowMatrix sensitivity;
   Eigen::VectorXd answer;
   try {
-    answer = predict(natural, jacobian != nullptr ? &sensitivity : nullptr,
-                     &Experiment::fitted_times_s, &Experiment::fitted_data);
+    answer = answers(fitted_.empty() ? experiments_ : fitted_, natural,
+                     jacobian != nullptr ? &sensitivity : nullptr);
   } catch (const Error& error) {
     // A solver that gives up at some trial parameters is for the optimiser to back away from; bad
     // input is not.
@@ -563,20 +622,20 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::thinned(std::size_t mo
   for (Experiment& experiment : few->experiments_) {
     const std::size_t n = experiment.data.size();
     if (!experiment.is_recording || n <= most) continue;
+    auto& course = std::get<TimeCourse>(experiment.imposed);
     const std::size_t stride = (n + most - 1) / most;
     std::vector<Knot> knots;
     std::vector<double> times_s;
     std::vector<std::size_t> data;
     for (std::size_t i = 0; i < n; ++i) {
       if (i % stride != 0 && i + 1 != n) continue;
-      knots.push_back(experiment.protocol.knots()[i]);
-      times_s.push_back(experiment.times_s[i]);
+      knots.push_back(course.protocol.knots()[i]);
+      times_s.push_back(course.times_s[i]);
       data.push_back(experiment.data[i]);
     }
-    Protocol protocol(experiment.protocol.drive(), std::move(knots), experiment.protocol.name());
-    protocol.set_relaxed_at_start(experiment.protocol.relaxed_at_start());
-    experiment.protocol = std::move(protocol);
-    experiment.times_s = std::move(times_s);
+    Protocol protocol(course.protocol.drive(), std::move(knots), course.protocol.name());
+    protocol.set_relaxed_at_start(course.protocol.relaxed_at_start());
+    course = {std::move(protocol), std::move(times_s)};
     experiment.data = std::move(data);
   }
   few->count_residuals();
@@ -590,6 +649,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->model_ = model_;
   other->data_ = data_;
   other->experiments_ = experiments_;
+  other->fitted_ = fitted_;
   other->moving_sigma_ = moving_sigma_;
   other->counts_ = counts_;
   other->residual_count_ = residual_count_;

@@ -7,15 +7,17 @@
 #include "tpm/fit/config.hpp"
 #include "tpm/fit/estimated_sigma.hpp"
 #include "tpm/fit/least_squares.hpp"
+#include "tpm/fit/oscillation.hpp"
 
 namespace tpm {
 
 /// One reading as the fit sees it.
 struct FitDatum {
-  std::size_t choice = 0;  ///< place in FitConfig::data
-  std::string label;       ///< "2 mm, peak"; empty for a sample of a recording
-  Observable observable = Observable::contact_force;
+  std::size_t choice = 0;                       ///< place in FitConfig::data
+  std::string label;                            ///< "2 mm, peak"; empty for a sample of a recording
+  Quantity quantity = Quantity::contact_force;  ///< what was read
   double time_s = 0.0;  ///< in the protocol's own time; infinite for a static reading
+  std::optional<double> frequency_Hz;         ///< of an oscillation, which has no time
   std::optional<double> value, lower, upper;  ///< SI
   double sigma = 0.0;                         ///< after the noise model; 0 where it is estimated
   Provenance provenance = Provenance::assumed;
@@ -25,19 +27,23 @@ struct FitDatum {
 /// "2 mm, peak", or the time of a sample.
 [[nodiscard]] std::string datum_label(const FitDatum& datum);
 
-/// A protocol and the readings taken along it.
-struct Experiment {
+/// A history and the times of the readings along it.
+struct TimeCourse {
   Protocol protocol;
   std::vector<double> times_s;
-  std::vector<std::size_t> data;  ///< index into FitProblem::data, one per time
-  std::size_t choice = 0;         ///< place in FitConfig::data
-  bool is_recording = false;
-  std::vector<double> fitted_times_s;    ///< those of `times_s` that are not held out
-  std::vector<std::size_t> fitted_data;  ///< and their data
 };
 
-/// Data in memory: separate readings, or a recording.
-using DataSet = std::variant<PointSet, Recording>;
+/// What was imposed, and the readings taken.
+struct Experiment {
+  std::variant<TimeCourse, Oscillation> imposed;
+  /// Index into ExperimentResiduals::data(), one per time or reading of an oscillation.
+  std::vector<std::size_t> data;
+  std::size_t choice = 0;  ///< place in FitConfig::data
+  bool is_recording = false;
+};
+
+/// Data in memory: separate readings, a recording, or storage and loss over frequency.
+using DataSet = std::variant<PointSet, Recording, Spectrum>;
 
 /// The residuals of a configuration: experiments asked of the model, compared with data.
 class ExperimentResiduals final : public ResidualFunction {
@@ -109,6 +115,10 @@ class ExperimentResiduals final : public ResidualFunction {
   [[nodiscard]] double weight(std::size_t datum) const;
   void add_points(std::size_t choice, const PointSet& points);
   void add_recording(std::size_t choice, const Recording& recording);
+  void add_spectrum(std::size_t choice, const Spectrum& spectrum);
+  /// The model's answer to an experiment, one value per reading.
+  [[nodiscard]] Response respond_to(const Experiment& experiment,
+                                    std::span<const double> parameters, Want want) const;
   /// Largest value that is fitted of a data set, SI. Throws Error(bad_input) if all are 0.
   [[nodiscard]] double data_size(std::size_t choice) const;
   void resolve_noise_parameters();
@@ -122,9 +132,11 @@ class ExperimentResiduals final : public ResidualFunction {
                         Eigen::Ref<Eigen::RowVectorXd> row);
   void count_residuals();
   [[nodiscard]] std::optional<std::size_t> parameter_place(const std::string& name) const;
-  [[nodiscard]] Eigen::VectorXd predict(std::span<const double> natural, RowMatrix* sensitivity,
-                                        std::vector<double> Experiment::*times_of,
-                                        std::vector<std::size_t> Experiment::*data_of) const;
+  [[nodiscard]] Eigen::VectorXd answers(const std::vector<Experiment>& experiments,
+                                        std::span<const double> natural,
+                                        RowMatrix* sensitivity) const;
+  /// Fills fitted_.
+  void leave_out_held_out();
   /// Columns of a response's sensitivity and the estimated parameters that they belong to.
   [[nodiscard]] std::vector<std::pair<Eigen::Index, Eigen::Index>> columns_for(
       std::size_t choice) const;
@@ -136,6 +148,7 @@ class ExperimentResiduals final : public ResidualFunction {
   std::shared_ptr<const Model> model_;
   std::vector<FitDatum> data_;
   std::vector<Experiment> experiments_;
+  std::vector<Experiment> fitted_;  ///< without what is held out; empty if nothing is
   std::vector<std::optional<MovingSigma>> moving_sigma_;  ///< of each data set
   std::vector<int> counts_;                               ///< empty: every datum counts once
   Eigen::Index residual_count_ = 0;

@@ -315,11 +315,12 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
   const LawSpec spec = function.config().law.value_or(LawSpec{});
   fit.drive_quantity = spec.drive;
   fit.response_quantity = spec.response;
-  fit.time_s = experiment.times_s;
+  const auto& course = std::get<TimeCourse>(experiment.imposed);
+  fit.time_s = course.times_s;
   double inside = 0.0;
   double outside = 0.0;
   std::size_t fitted = 0;
-  const auto knots = experiment.protocol.knots();
+  const auto knots = course.protocol.knots();
   for (std::size_t k = 0; k < experiment.data.size(); ++k) {
     const FitDatum& d = function.data()[experiment.data[k]];
     const double answer = predicted[static_cast<Eigen::Index>(experiment.data[k])];
@@ -475,10 +476,12 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
   }
   double deepest = 0.0;
   for (const Experiment& e : function.experiments()) {
-    if (e.protocol.drive() == Drive::displacement) deepest = std::max(deepest, e.protocol.peak());
+    const auto* course = std::get_if<TimeCourse>(&e.imposed);
+    if (course == nullptr || course->protocol.drive() == Drive::force) continue;
+    deepest = std::max(deepest, course->protocol.peak());
   }
   for (const FittedDatum& d : result.data) {
-    if (d.datum.observable == Observable::indentation_depth) {
+    if (d.datum.quantity == Quantity::indentation_depth) {
       deepest = std::max(deepest, d.predicted);
     }
   }

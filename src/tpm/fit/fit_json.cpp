@@ -134,21 +134,23 @@ Json linearised_json(const FitResult& result) {
 Json data_json(const FitResult& result) {
   Json list = Json::array();
   for (const FittedDatum& d : result.data) {
-    const bool force = d.datum.observable == Observable::contact_force;
-    const std::string unit = force ? "_N" : "_m";
+    const auto key = [&](std::string_view what) {
+      return si_key(what, quantity_dimension(d.datum.quantity));
+    };
     Json j{{"dataset", result.config.data[d.datum.choice].dataset}, {"label", d.datum.label}};
-    j["quantity"] = force ? "contact_force" : "indentation_depth";
+    j["quantity"] = quantity_name(d.datum.quantity);
+    if (d.datum.frequency_Hz) j["frequency_Hz"] = number(*d.datum.frequency_Hz);
     j["provenance"] = provenance_name(d.datum.provenance);
     j["role"] = d.datum.held_out ? "held_out" : "fitted";
-    if (d.datum.value) j["observed" + unit] = number(*d.datum.value);
-    if (d.datum.lower) j["band" + unit] = {number(*d.datum.lower), number(*d.datum.upper)};
-    j["predicted" + unit] = number(d.predicted);
-    if (d.predicted_sd) j["predicted_sd" + unit] = number(*d.predicted_sd);
+    if (d.datum.value) j[key("observed")] = number(*d.datum.value);
+    if (d.datum.lower) j[key("band")] = {number(*d.datum.lower), number(*d.datum.upper)};
+    j[key("predicted")] = number(d.predicted);
+    if (d.predicted_sd) j[key("predicted_sd")] = number(*d.predicted_sd);
     if (d.confidence) {
-      j["confidence_band" + unit] = pair_json(d.confidence->lower, d.confidence->upper);
+      j[key("confidence_band")] = pair_json(d.confidence->lower, d.confidence->upper);
     }
     if (d.prediction) {
-      j["prediction_band" + unit] = pair_json(d.prediction->lower, d.prediction->upper);
+      j[key("prediction_band")] = pair_json(d.prediction->lower, d.prediction->upper);
     }
     j["standardised_residual"] = number(d.standardised);
     list.push_back(std::move(j));
@@ -201,6 +203,13 @@ Json assumptions_json(const FitConfig& config) {
       if (d.protocol.rate_provenance) {
         j["rate_provenance"] = provenance_name(*d.protocol.rate_provenance);
       }
+    }
+    if (d.protocol.operating_depth) {
+      const Dimension depth = quantity_dimension(config.law.value().drive);
+      j[si_key("operating_depth", depth)] = number(*d.protocol.operating_depth);
+    }
+    if (d.stiffness_per_modulus_m) {
+      j["stiffness_per_modulus_m"] = number(*d.stiffness_per_modulus_m);
     }
     j["noise"] = noise_kind_name(d.noise.kind);
     if (d.noise.shape != ErrorShape::normal) {

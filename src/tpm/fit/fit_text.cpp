@@ -31,18 +31,18 @@ std::string parameter_table(const FitResult& result) {
 }
 
 std::string data_table(const FitResult& result) {
-  std::string text = fmt::format("{:<18} {:<14} {:>18} {:>10} {:>8}  {:<10} {}\n", "data set",
-                                 "reading", "observed", "model", "z", "provenance", "");
+  std::size_t width = 14;
+  for (const FittedDatum& d : result.data) width = std::max(width, d.datum.label.size());
+  std::string text = fmt::format("{:<18} {:<{}} {:>18} {:>10} {:>8}  {:<10} {}\n", "data set",
+                                 "reading", width, "observed", "model", "z", "provenance", "");
   for (const FittedDatum& d : result.data) {
-    const bool force = d.datum.observable == Observable::contact_force;
-    const double unit = force ? 1.0 : 1e-3;
-    const std::string symbol = force ? "N" : "mm";
+    const auto& [symbol, dimension, unit] = shown_unit(quantity_dimension(d.datum.quantity));
     const std::string observed =
         d.datum.value ? fmt::format("{} {}", significant(*d.datum.value / unit, 4), symbol)
                       : fmt::format("{}-{} {}", significant(*d.datum.lower / unit, 3),
                                     significant(*d.datum.upper / unit, 3), symbol);
-    text += fmt::format("{:<18} {:<14} {:>18} {:>10} {:>8.2f}  {:<10} {}\n",
-                        result.config.data[d.datum.choice].dataset, d.datum.label, observed,
+    text += fmt::format("{:<18} {:<{}} {:>18} {:>10} {:>8.2f}  {:<10} {}\n",
+                        result.config.data[d.datum.choice].dataset, d.datum.label, width, observed,
                         significant(d.predicted / unit, 4), d.standardised,
                         provenance_name(d.datum.provenance), d.datum.held_out ? "held out" : "");
   }

@@ -102,18 +102,14 @@ Table minima_table(const FitResult& fit) {
 }
 
 std::string observed(const FitDatum& d) {
-  const bool force = d.observable == Observable::contact_force;
-  const double unit = force ? 1.0 : 1e-3;
-  const std::string_view symbol = force ? "N" : "mm";
+  const auto& [symbol, dimension, unit] = shown_unit(quantity_dimension(d.quantity));
   if (d.value) return fmt::format("{} {}", significant(*d.value / unit, 4), symbol);
   return fmt::format("{} to {} {}", significant(*d.lower / unit, 3),
                      significant(*d.upper / unit, 3), symbol);
 }
 
 std::string predicted(const FittedDatum& d, bool with_sd) {
-  const bool force = d.datum.observable == Observable::contact_force;
-  const double unit = force ? 1.0 : 1e-3;
-  const std::string_view symbol = force ? "N" : "mm";
+  const auto& [symbol, dimension, unit] = shown_unit(quantity_dimension(d.datum.quantity));
   if (with_sd && d.predicted_sd) {
     return fmt::format("{} ± {} {}", significant(d.predicted / unit, 4),
                        significant(*d.predicted_sd / unit, 2), symbol);
