@@ -322,6 +322,10 @@ TEST_CASE("spectra that the configuration cannot answer are refused") {
                     Contains("spectrum 'a': moduli") && Contains("stiffness_per_modulus"));
   CHECK_THROWS_WITH(run_fit(with(R"(, "stiffness_per_modulus": "10 mm")"), {DataSet(stiff)}),
                     Contains("spectrum 'a': stiffnesses"));
+  CHECK_THROWS_WITH(
+      run_fit(config_of("linear-1", kOneBranch, entry("a", R"({"kind": "measured"})", noise)),
+              {DataSet(stiff)}),
+      Contains("under another protocol"));
   const auto refused = [&](const std::string& protocol, const std::string& sigma,
                            const std::string& more, const std::string& words) {
     CHECK_THROWS_WITH(

@@ -34,7 +34,11 @@ double law_per_reading(const LawSpec& law, const DataChoice& data, Dimension rea
 
 Oscillation oscillation_of(const FitConfig& config, const DataChoice& data,
                            const Spectrum& spectrum) {
-  const LawSpec& law = config.law.value();
+  if (!config.law || data.protocol.kind != ProtocolChoice::Kind::oscillation) {
+    throw bad_input(fmt::format("spectrum '{}'", data.dataset),
+                    "without a law or under another protocol", "a law, and protocol 'oscillation'");
+  }
+  const LawSpec& law = *config.law;
   return {law,
           spectrum.frequency_Hz,
           data.protocol.operating_depth,

@@ -30,8 +30,8 @@ struct Oscillation {
 /// What a spectrum asks of the law of its configuration, no reading chosen yet. A law of an
 /// indentation answers a dynamic stiffness, and a modulus only with
 /// DataChoice::stiffness_per_modulus_m; a law of a strip answers a modulus.
-/// @param config with a law
-/// Throws Error(bad_input) naming the data set if the law does not answer such readings.
+/// Throws Error(bad_input) naming the data set if there is no law, the protocol is no oscillation
+/// or the law does not answer such readings.
 [[nodiscard]] Oscillation oscillation_of(const FitConfig& config, const DataChoice& data,
                                          const Spectrum& spectrum);
 
