@@ -65,6 +65,13 @@ bool predicts_the_truth(const FitResult& fit, const Trials& trials) {
       [&](double fitted, double truth) { return std::abs(fitted - truth) < trials.sigma; });
 }
 
+/// Why a candidate was not recommended: what is not identified in it, or its BIC.
+std::string reason_against(const Candidate& candidate, double margin) {
+  if (candidate.failed || !candidate.identified) return candidate.reason;
+  return candidate.delta_bic > margin ? "another law has a lower BIC by more than the margin"
+                                      : "a law with fewer parameters is within the margin of BIC";
+}
+
 void count_choice(const Selection& selection, const Trials& trials, RecoveryResult& result) {
   const Candidate& chosen = selection.candidates[selection.recommended];
   const std::string truth = law_name(trials.law);
@@ -78,9 +85,9 @@ void count_choice(const Selection& selection, const Trials& trials, RecoveryResu
   } else if (predicts_the_truth(chosen.fit, trials)) {
     ++result.equivalent;
   }
-  if (generating != selection.candidates.end() && chosen.parameters > generating->parameters) {
-    ++result.larger;
-  }
+  if (generating == selection.candidates.end()) return;
+  if (chosen.parameters > generating->parameters) ++result.larger;
+  if (name != truth) ++result.reasons[reason_against(*generating, selection.margin)];
 }
 
 /// Half the width of an interval in standard errors.
@@ -100,6 +107,19 @@ FitResult fit_generating_law(const PreparedRecording& recording, const Trials& t
   FitConfig config = recording_config(trials.law, one, setup);
   config.law->reference = trials.law.reference;
   return run_fit(config, data_sets(one));
+}
+
+/// Whether the truth lies deeper than where the fit ended.
+bool missed_the_minimum(const FitResult& fit, const Trials& trials) {
+  const RecordingFit& r = fit.recordings.front();
+  double at_truth = 0.0;
+  double at_fit = 0.0;
+  for (std::size_t i = 0; i < r.observed.size(); ++i) {
+    if (!r.fitted[i]) continue;
+    at_truth += std::pow(r.observed[i] - trials.clean.response[i], 2);
+    at_fit += std::pow(r.observed[i] - r.predicted[i], 2);
+  }
+  return at_fit > at_truth;
 }
 
 void count_intervals(const FitResult& fit, const Trials& trials, RecoveryResult& result) {
@@ -129,7 +149,9 @@ void run_trial(const Trials& trials, const SelectionOptions& options, Random& ra
   ++result.trials;
   try {
     const PreparedRecording recording = prepare_recording("simulated", std::move(simulated));
-    count_intervals(fit_generating_law(recording, trials, options.setup), trials, result);
+    const FitResult fit = fit_generating_law(recording, trials, options.setup);
+    if (missed_the_minimum(fit, trials)) ++result.missed;
+    count_intervals(fit, trials, result);
     count_choice(select_law(std::span(&recording, 1), options), trials, result);
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
@@ -228,7 +250,7 @@ Json to_json(const RecoveryResult& r) {
   Json j{{"law", law_name(r.law)},     {"noise_over_peak", r.noise}, {"seed", r.seed},
          {"trials", r.trials},         {"failed", r.failed},         {"returned", r.returned},
          {"equivalent", r.equivalent}, {"larger", r.larger},         {"fulfilled", r.fulfilled()},
-         {"chosen", r.chosen}};
+         {"missed_minimum", r.missed}, {"chosen", r.chosen},         {"reasons", r.reasons}};
   Json list = Json::array();
   const LawModel model(r.law);
   for (const ParameterCoverage& p : r.parameters) {

@@ -17,7 +17,7 @@ struct SimulatedTest {
   double rate_m_per_s = 5e-3;
   double approach_m = 0.5e-3;     ///< above the surface at the first sample
   double hold_s = 20.0;           ///< after the ramp
-  double ramp_interval_s = 0.02;  ///< between samples until the ramp ends
+  double ramp_interval_s = 0.01;  ///< between samples until the ramp ends
   double hold_interval_s = 0.1;   ///< and afterwards
 };
 
@@ -50,7 +50,9 @@ struct RecoveryResult {
   int returned = 0;    ///< the generating law
   int equivalent = 0;  ///< another whose prediction is within one sigma of the truth everywhere
   int larger = 0;      ///< one with more estimated parameters than the generating law
+  int missed = 0;      ///< the generating law's fit ended above the deviance of the truth
   std::map<std::string, int> chosen;          ///< how often each law was returned
+  std::map<std::string, int> reasons;         ///< why the generating law was not
   std::vector<ParameterCoverage> parameters;  ///< of the material, 95 % intervals
 
   [[nodiscard]] int right() const { return returned + equivalent; }
