@@ -98,5 +98,5 @@ TEST_CASE("the simulated recording is the law's answer to a ramp from above the 
   CHECK(r.time_s.back() == Approx(21.0));
   CHECK(r.response.front() == 0.0);
   CHECK(r.response.back() == Approx(1.0).epsilon(1e-9));
-  CHECK(r.response.size() == 1 + 110 + 200);
+  CHECK(r.response.size() == 1 + 110 + 400);
 }

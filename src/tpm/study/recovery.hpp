@@ -18,7 +18,7 @@ struct SimulatedTest {
   double approach_m = 0.5e-3;     ///< above the surface at the first sample
   double hold_s = 20.0;           ///< after the ramp
   double ramp_interval_s = 0.01;  ///< between samples until the ramp ends
-  double hold_interval_s = 0.1;   ///< and afterwards
+  double hold_interval_s = 0.05;  ///< and afterwards
 };
 
 /// The recording without noise of a law on a test.
