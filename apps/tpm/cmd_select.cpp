@@ -21,19 +21,9 @@ struct SelectOptions {
   bool no_profiles = false;
 };
 
-std::vector<LawSpec> chosen_laws(const SelectOptions& options) {
-  std::vector<LawSpec> laws;
-  for (const std::string& name : options.laws) laws.push_back(parse_law_name(name, "--laws"));
-  if (!laws.empty()) return laws;
-  if (options.family != "fractional") laws = classical_family();
-  if (options.family == "classical") return laws;
-  for (const LawSpec& law : fractional_family()) laws.push_back(law);
-  return laws;
-}
-
 int select(const SelectOptions& options, const Session& session) {
   SelectionOptions selection;
-  selection.laws = chosen_laws(options);
+  selection.laws = chosen_laws(options.laws, options.family);
   selection.only_listed = !options.laws.empty();
   selection.margin = parse_number(options.margin, "--margin");
   selection.held_out = !options.no_held_out;
@@ -62,9 +52,7 @@ void add_select_command(CLI::App& app, Session& session) {
   add_recording_options(*command, options->recordings);
   command->add_option("--laws", options->laws, "Only these laws, e.g. linear-1-elastic,power-2")
       ->delimiter(',');
-  command->add_option("--family", options->family, "classical, fractional or all")
-      ->check(CLI::IsMember({"classical", "fractional", "all"}))
-      ->capture_default_str();
+  add_family_option(*command, options->family);
   command
       ->add_option("--margin", options->margin, "BIC that a larger law must gain to be preferred")
       ->capture_default_str();

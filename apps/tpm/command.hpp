@@ -30,6 +30,7 @@ void deliver(const std::string& text, const std::string& file);
 void add_version_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
 void add_select_command(CLI::App& app, Session& session);
+void add_recovery_command(CLI::App& app, Session& session);
 void add_check_gradient_command(CLI::App& app, Session& session);
 void add_design_command(CLI::App& app, Session& session);
 void add_laws_command(CLI::App& app, Session& session);

@@ -48,6 +48,7 @@ int run(int argc, char** argv) {
   add_version_command(app, session);
   add_fit_command(app, session);
   add_select_command(app, session);
+  add_recovery_command(app, session);
   add_check_gradient_command(app, session);
   add_design_command(app, session);
   add_laws_command(app, session);

@@ -6,6 +6,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/curve/recording_file.hpp"
+#include "tpm/study/selection.hpp"
 
 namespace tpm::app {
 
@@ -77,6 +78,22 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
         prepare_recording(file, read_recording_file(file, import).recording, phases));
   }
   return recordings;
+}
+
+void add_family_option(CLI::App& command, std::string& family) {
+  command.add_option("--family", family, "classical, fractional or all")
+      ->check(CLI::IsMember({"classical", "fractional", "all"}))
+      ->capture_default_str();
+}
+
+std::vector<LawSpec> chosen_laws(const std::vector<std::string>& names, const std::string& family) {
+  std::vector<LawSpec> laws;
+  for (const std::string& name : names) laws.push_back(parse_law_name(name, "--laws"));
+  if (!laws.empty()) return laws;
+  if (family != "fractional") laws = classical_family();
+  if (family == "classical") return laws;
+  for (const LawSpec& law : fractional_family()) laws.push_back(law);
+  return laws;
 }
 
 }  // namespace tpm::app

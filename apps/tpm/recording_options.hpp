@@ -30,4 +30,11 @@ void add_recording_options(CLI::App& command, RecordingOptions& options);
 /// Reads and prepares every file.
 [[nodiscard]] std::vector<PreparedRecording> read_recordings(const RecordingOptions& options);
 
+/// --family classical|fractional|all.
+void add_family_option(CLI::App& command, std::string& family);
+
+/// The laws that --laws names, or those of --family if it names none. Throws Error(bad_input).
+[[nodiscard]] std::vector<LawSpec> chosen_laws(const std::vector<std::string>& names,
+                                               const std::string& family);
+
 }  // namespace tpm::app

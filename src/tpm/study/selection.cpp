@@ -56,6 +56,12 @@ const LawParameter* material_parameter(const std::vector<LawParameter>& table,
   return nullptr;
 }
 
+/// A material may relax to nothing: without a plateau the law stays what it is (a branch without
+/// its stiffness has a time that means nothing).
+bool may_vanish(const LawSpec& law, const std::string& parameter) {
+  return parameter == "k_inf" && (law.branches > 0 || law.fractional != Fractional::none);
+}
+
 /// The first reason why a material parameter of the fit is not known, or nothing.
 std::string not_identified(const Candidate& candidate) {
   constexpr double kLeastStandardErrors = 2.0;
@@ -63,12 +69,14 @@ std::string not_identified(const Candidate& candidate) {
   for (const ParameterResult& p : candidate.fit.parameters) {
     const LawParameter* law = material_parameter(table, p.parameter.name);
     if (law == nullptr) continue;
+    if (p.at_lower_bound && may_vanish(candidate.law, law->name)) continue;
     if (p.at_lower_bound || p.at_upper_bound) {
       return fmt::format("{} ends at its {} bound", p.parameter.name,
                          p.at_lower_bound ? "lower" : "upper");
     }
     if (!p.standard_error) return fmt::format("{} is not determined", p.parameter.name);
-    const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0;
+    const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0 &&
+                           !may_vanish(candidate.law, law->name);
     if (from_zero && p.estimate < kLeastStandardErrors * *p.standard_error) {
       return fmt::format("{} is not told from 0", p.parameter.name);
     }

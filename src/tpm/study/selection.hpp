@@ -30,8 +30,9 @@ struct Candidate {
   double rms_over_peak = 0.0;
   double aicc = 0.0, bic = 0.0;              ///< with the effective number of readings
   double delta_aicc = 0.0, delta_bic = 0.0;  ///< above the best
-  bool identified = true;  ///< no parameter at a bound, covariance of full rank, each stiffness
-                           ///< more than two standard errors above 0
+  bool identified =
+      true;  ///< no parameter at a bound, covariance of full rank, each stiffness
+             ///< more than two standard errors above 0 (k_inf beside branches may be 0)
   std::vector<HeldOut> held_out;
 };
 

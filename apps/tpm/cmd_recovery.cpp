@@ -1,0 +1,83 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "command.hpp"
+#include "recording_options.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/study/recovery.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct RecoveryCommandOptions {
+  std::vector<std::string> laws;
+  std::string family = "classical";
+  std::string trials = "200";
+  std::string noise = "0.01";
+  std::string seed = "0";
+  std::string output;
+};
+
+double parse_noise(const std::string& text) {
+  const double noise = parse_number(text, "--noise");
+  if (noise > 0.0 && noise < 1.0) return noise;
+  throw Error(ExitCode::usage, "--noise", fmt::format("'{}'", printable(text)),
+              "a part of the peak above 0 and below 1");
+}
+
+Json to_json(const std::vector<RecoveryResult>& results) {
+  Json list = Json::array();
+  for (const RecoveryResult& result : results) list.push_back(tpm::to_json(result));
+  return Json{{"laws", std::move(list)}};
+}
+
+int recovery(const RecoveryCommandOptions& options, const Session& session) {
+  RecoveryOptions study;
+  study.noise = parse_noise(options.noise);
+  study.trials = static_cast<int>(parse_whole_number(options.trials, "--trials", 1));
+  study.seed = parse_whole_number(options.seed, "--seed", 0);
+  study.selection.laws = chosen_laws({}, options.family);
+  std::vector<RecoveryResult> results;
+  for (const LawSpec& law : chosen_laws(options.laws, options.family)) {
+    results.push_back(recover(law, visible_parameters(law), study));
+  }
+  deliver(session.json() ? to_text(to_json(results)) : to_terminal_text(results), options.output);
+  const bool all = std::all_of(results.begin(), results.end(),
+                               [](const RecoveryResult& r) { return r.fulfilled(); });
+  return static_cast<int>(all ? ExitCode::success : ExitCode::answer_is_no);
+}
+
+}  // namespace
+
+void add_recovery_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "recovery",
+      "Check the selection of a law by simulation: does it return the law behind the "
+      "data, and do the intervals hold the truth?");
+  auto options = std::make_shared<RecoveryCommandOptions>();
+  command
+      ->add_option("--laws", options->laws,
+                   "Only these laws generate data; all of the family compete")
+      ->delimiter(',');
+  add_family_option(*command, options->family);
+  command->add_option("--trials", options->trials, "Simulated recordings of each law")
+      ->capture_default_str();
+  command->add_option("--noise", options->noise, "Standard deviation of the force over its peak")
+      ->capture_default_str();
+  command->add_option("--seed", options->seed, "Seed of the noise")->capture_default_str();
+  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  add_format_option(*command, session);
+  command->footer(
+      "A ramp to 5 mm at 5 mm/s, held 20 s, contact and offset unknown.\n"
+      "Exit code 1 if a law is not returned (nor one within one sigma of it) in 95 % of the "
+      "trials,\n"
+      "or a law with more parameters in over 5 %.\n"
+      "Example:\n  tpm recovery --laws linear-1,power-2 --trials 20");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return recovery(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

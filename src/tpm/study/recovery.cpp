@@ -1,0 +1,283 @@
+#include "tpm/study/recovery.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/law/law_model.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kRequired = 0.95;  // of the trials: the right law, and none that is larger
+constexpr double kLevel = 0.95;     // of the intervals
+
+/// Appends moments from `from_s` (left out) to `to_s`, which is always one of them.
+void append_times(std::vector<double>& times, double from_s, double to_s, double interval_s) {
+  const auto steps = static_cast<int>(std::ceil((to_s - from_s) / interval_s - 1e-9));
+  for (int i = 1; i <= steps; ++i) times.push_back(std::min(from_s + i * interval_s, to_s));
+}
+
+double largest(const std::vector<double>& values) {
+  return *std::max_element(values.begin(), values.end());
+}
+
+double visible_value(const LawParameter& p, int branches) {
+  constexpr double kStiffness = 200.0;  // N/m: about a newton at 5 mm
+  static const std::vector<std::vector<double>> times_s = {{}, {2.0}, {0.5, 5.0}, {0.3, 2.0, 12.0}};
+  if (p.preset) return *p.preset;
+  if (p.name == "alpha") return 0.4;
+  if (p.name == "exponent") return 2.2;
+  if (p.name == "tension_share") return 0.5;
+  if (p.dimension != Dimension::time) return kStiffness;
+  if (branches == 0) return 2.0;
+  const auto place = static_cast<std::size_t>(p.name.back() - '1');
+  const auto count = static_cast<std::size_t>(branches);
+  if (count < times_s.size()) return times_s[count][place];
+  return 0.2 * std::pow(60.0, static_cast<double>(place) / (branches - 1));
+}
+
+/// What the trials of one law share.
+struct Trials {
+  LawSpec law;
+  std::vector<double> truth;
+  Recording clean;
+  double sigma = 0.0;
+};
+
+Recording scattered(const Trials& trials, Random& random) {
+  Recording recording = trials.clean;
+  for (double& force : recording.response) force += trials.sigma * random.normal();
+  return recording;
+}
+
+/// Whether the fitted curve stays within one sigma of the truth over the whole record.
+bool predicts_the_truth(const FitResult& fit, const Trials& trials) {
+  const std::vector<double>& predicted = fit.recordings.front().predicted;
+  return std::equal(
+      predicted.begin(), predicted.end(), trials.clean.response.begin(),
+      [&](double fitted, double truth) { return std::abs(fitted - truth) < trials.sigma; });
+}
+
+/// Why a candidate was not recommended: what is not identified in it, or its BIC.
+std::string reason_against(const Candidate& candidate, double margin) {
+  if (candidate.failed || !candidate.identified) return candidate.reason;
+  return candidate.delta_bic > margin ? "another law has a lower BIC by more than the margin"
+                                      : "a law with fewer parameters is within the margin of BIC";
+}
+
+void count_choice(const Selection& selection, const Trials& trials, RecoveryResult& result) {
+  const Candidate& chosen = selection.candidates[selection.recommended];
+  const std::string truth = law_name(trials.law);
+  const std::string name = law_name(chosen.law);
+  ++result.chosen[name];
+  const auto generating =
+      std::find_if(selection.candidates.begin(), selection.candidates.end(),
+                   [&](const Candidate& c) { return law_name(c.law) == truth; });
+  if (name == truth) {
+    ++result.returned;
+  } else if (predicts_the_truth(chosen.fit, trials)) {
+    ++result.equivalent;
+  }
+  if (generating == selection.candidates.end()) return;
+  if (chosen.parameters > generating->parameters) ++result.larger;
+  if (name != truth) ++result.reasons[reason_against(*generating, selection.margin)];
+}
+
+/// Half the width of an interval in standard errors.
+double reach(const FitResult& fit) {
+  const double degrees =
+      fit.value_count / fit.inflation - static_cast<double>(fit.parameters.size());
+  const boost::math::students_t distribution(std::max(degrees, 1.0));
+  return boost::math::quantile(distribution, 0.5 * (1.0 + kLevel));
+}
+
+/// The fit of the generating law, with the reference depth of the truth so that its parameters
+/// mean the same.
+FitResult fit_generating_law(const PreparedRecording& recording, const Trials& trials,
+                             SetupOptions setup) {
+  setup.profiles = false;
+  const std::span<const PreparedRecording> one(&recording, 1);
+  FitConfig config = recording_config(trials.law, one, setup);
+  config.law->reference = trials.law.reference;
+  return run_fit(config, data_sets(one));
+}
+
+/// Whether the truth lies deeper than where the fit ended.
+bool missed_the_minimum(const FitResult& fit, const Trials& trials) {
+  const RecordingFit& r = fit.recordings.front();
+  double at_truth = 0.0;
+  double at_fit = 0.0;
+  for (std::size_t i = 0; i < r.observed.size(); ++i) {
+    if (!r.fitted[i]) continue;
+    at_truth += std::pow(r.observed[i] - trials.clean.response[i], 2);
+    at_fit += std::pow(r.observed[i] - r.predicted[i], 2);
+  }
+  return at_fit > at_truth;
+}
+
+void count_intervals(const FitResult& fit, const Trials& trials, RecoveryResult& result) {
+  const LawModel model(trials.law);
+  const double half_width = reach(fit);
+  for (ParameterCoverage& coverage : result.parameters) {
+    const auto p = std::find_if(fit.parameters.begin(), fit.parameters.end(),
+                                [&](const auto& q) { return q.parameter.name == coverage.name; });
+    const auto index = static_cast<std::size_t>(p - fit.parameters.begin());
+    const std::vector<std::size_t>& free = fit.covariance.free;
+    const auto place = std::find(free.begin(), free.end(), index);
+    if (!fit.covariance.full_rank || place == free.end()) {
+      ++coverage.one_sided;
+      continue;
+    }
+    const double truth = trials.truth[model.index(coverage.name)];
+    const double error = p->parameter.theta(p->estimate) - p->parameter.theta(truth);
+    if (std::abs(error) <= half_width * fit.covariance.theta_sd[place - free.begin()]) {
+      ++coverage.covered;
+    }
+  }
+}
+
+void run_trial(const Trials& trials, const SelectionOptions& options, Random& random,
+               RecoveryResult& result) {
+  Recording simulated = scattered(trials, random);
+  ++result.trials;
+  try {
+    const PreparedRecording recording = prepare_recording("simulated", std::move(simulated));
+    const FitResult fit = fit_generating_law(recording, trials, options.setup);
+    if (missed_the_minimum(fit, trials)) ++result.missed;
+    count_intervals(fit, trials, result);
+    count_choice(select_law(std::span(&recording, 1), options), trials, result);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
+    ++result.failed;
+  }
+}
+
+std::string coverage_text(const std::vector<ParameterCoverage>& parameters, int trials) {
+  std::string text;
+  for (const ParameterCoverage& p : parameters) {
+    text += fmt::format("{}{} {:.1f}{}", text.empty() ? "" : ", ", p.name,
+                        100.0 * p.covered / trials, p.p_value < 0.001 ? "!" : "");
+  }
+  return text;
+}
+
+/// The laws that were returned instead, most frequent first.
+std::string others_text(const RecoveryResult& r) {
+  std::vector<std::pair<int, std::string>> others;
+  for (const auto& [name, count] : r.chosen) {
+    if (name != law_name(r.law)) others.emplace_back(-count, name);
+  }
+  std::sort(others.begin(), others.end());
+  std::string text;
+  for (const auto& [count, name] : others) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", -count, name);
+  }
+  return text;
+}
+
+}  // namespace
+
+Recording simulated_recording(const LawSpec& law, std::span<const double> parameters,
+                              const SimulatedTest& test) {
+  const double start_s = -test.approach_m / test.rate_m_per_s;
+  const double ramp_s = test.depth_m / test.rate_m_per_s;
+  Recording recording;
+  recording.header.id = law_name(law);
+  recording.time_s = {start_s};
+  append_times(recording.time_s, start_s, ramp_s, test.ramp_interval_s);
+  append_times(recording.time_s, ramp_s, ramp_s + test.hold_s, test.hold_interval_s);
+  for (const double t : recording.time_s) {
+    recording.drive.push_back(std::min(t * test.rate_m_per_s, test.depth_m));
+  }
+  Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
+  history.set_relaxed_at_start(true);
+  const Response response =
+      LawModel(law).respond(history, recording.time_s, parameters, Want::values);
+  recording.response.assign(response.value.begin(), response.value.end());
+  return recording;
+}
+
+std::vector<double> visible_parameters(const LawSpec& law) {
+  std::vector<double> values;
+  for (const LawParameter& p : law_parameters(law)) {
+    values.push_back(visible_value(p, law.branches));
+  }
+  return values;
+}
+
+bool RecoveryResult::fulfilled() const {
+  return right() >= kRequired * trials && larger <= (1.0 - kRequired) * trials;
+}
+
+RecoveryResult recover(const LawSpec& law, std::span<const double> truth,
+                       const RecoveryOptions& options) {
+  Trials trials{law, {truth.begin(), truth.end()}, {}, 0.0};
+  trials.law.reference = options.test.depth_m;
+  trials.clean = simulated_recording(trials.law, truth, options.test);
+  trials.sigma = options.noise * largest(trials.clean.response);
+  SelectionOptions selection = options.selection;
+  selection.held_out = false;
+  selection.setup.profiles = false;
+
+  RecoveryResult result;
+  result.law = trials.law;
+  result.truth = trials.truth;
+  result.noise = options.noise;
+  result.seed = options.seed;
+  for (const LawParameter& p : law_parameters(law)) {
+    if (!p.nuisance && !p.preset) result.parameters.push_back({p.name, 0, 0, 1.0});
+  }
+  Random random(options.seed);
+  Progress progress(law_name(law), static_cast<std::size_t>(options.trials));
+  for (int i = 0; i < options.trials; ++i) {
+    run_trial(trials, selection, random, result);
+    progress.advance();
+  }
+  for (ParameterCoverage& p : result.parameters) {
+    p.p_value = binomial_test(p.covered, result.trials, kLevel);
+  }
+  return result;
+}
+
+Json to_json(const RecoveryResult& r) {
+  Json j{{"law", law_name(r.law)},     {"noise_over_peak", r.noise}, {"seed", r.seed},
+         {"trials", r.trials},         {"failed", r.failed},         {"returned", r.returned},
+         {"equivalent", r.equivalent}, {"larger", r.larger},         {"fulfilled", r.fulfilled()},
+         {"missed_minimum", r.missed}, {"chosen", r.chosen},         {"reasons", r.reasons}};
+  Json list = Json::array();
+  const LawModel model(r.law);
+  for (const ParameterCoverage& p : r.parameters) {
+    list.push_back({{"name", p.name},
+                    {"truth_SI", r.truth[model.index(p.name)]},
+                    {"covered", p.covered},
+                    {"open_intervals", p.one_sided},
+                    {"binomial_p_value", rounded(p.p_value, 6)}});
+  }
+  j["parameters"] = std::move(list);
+  return j;
+}
+
+std::string to_terminal_text(std::span<const RecoveryResult> results) {
+  std::string text = fmt::format("{:<20} {:>6} {:>8} {:>6} {:>6} {:>6}  {}\n", "law", "trials",
+                                 "returned", "equiv.", "larger", "failed",
+                                 "95 % intervals that hold the truth, % | returned instead");
+  for (const RecoveryResult& r : results) {
+    text +=
+        fmt::format("{:<20} {:>6} {:>8} {:>6} {:>6} {:>6}{} {} | {}\n", law_name(r.law), r.trials,
+                    r.returned, r.equivalent, r.larger, r.failed, r.fulfilled() ? " " : "!",
+                    coverage_text(r.parameters, r.trials), others_text(r));
+  }
+  text +=
+      "!  below 95 % right (returned or equivalent), above 5 % larger, or a coverage that\n"
+      "   differs from 95 % at the 0.1 % level (exact binomial test)\n";
+  return text;
+}
+
+}  // namespace tpm

@@ -1,0 +1,72 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/coverage.hpp"
+#include "tpm/store/json.hpp"
+#include "tpm/study/selection.hpp"
+
+namespace tpm {
+
+/// A ramp and hold as a machine records it: the probe approaches from above the surface (depth 0)
+/// at the speed of the ramp.
+struct SimulatedTest {
+  double depth_m = 5e-3;
+  double rate_m_per_s = 5e-3;
+  double approach_m = 0.5e-3;     ///< above the surface at the first sample
+  double hold_s = 20.0;           ///< after the ramp
+  double ramp_interval_s = 0.01;  ///< between samples until the ramp ends
+  double hold_interval_s = 0.05;  ///< and afterwards
+};
+
+/// The recording without noise of a law on a test.
+/// @param parameters SI, in the order of law_parameters()
+[[nodiscard]] Recording simulated_recording(const LawSpec& law, std::span<const double> parameters,
+                                            const SimulatedTest& test);
+
+/// Parameters with which every part of the law shows on the default test, SI: relaxation times a
+/// factor of about 10 apart within the record, stiffnesses of similar size.
+[[nodiscard]] std::vector<double> visible_parameters(const LawSpec& law);
+
+struct RecoveryOptions {
+  SimulatedTest test;
+  double noise = 0.01;  ///< standard deviation of the force over its peak, > 0
+  int trials = 200;     ///< >= 1
+  std::uint64_t seed = 0;
+  SelectionOptions selection;  ///< held-out predictions and profiles are left out
+};
+
+/// How often select_law returned the law that generated the data, and how often the intervals of
+/// that law's own fit held the truth.
+struct RecoveryResult {
+  LawSpec law;
+  std::vector<double> truth;  ///< SI, in the order of law_parameters()
+  double noise = 0.0;
+  std::uint64_t seed = 0;
+  int trials = 0;
+  int failed = 0;      ///< neither fitted nor selected: counts as wrong
+  int returned = 0;    ///< the generating law
+  int equivalent = 0;  ///< another whose prediction is within one sigma of the truth everywhere
+  int larger = 0;      ///< one with more estimated parameters than the generating law
+  int missed = 0;      ///< the generating law's fit ended above the deviance of the truth
+  std::map<std::string, int> chosen;          ///< how often each law was returned
+  std::map<std::string, int> reasons;         ///< why the generating law was not
+  std::vector<ParameterCoverage> parameters;  ///< of the material, 95 % intervals
+
+  [[nodiscard]] int right() const { return returned + equivalent; }
+  /// At least 95 % right and at most 5 % larger.
+  [[nodiscard]] bool fulfilled() const;
+};
+
+/// Simulates recordings with independent normal noise, selects, and counts. The intervals are those
+/// of the covariance, in the coordinate in which each parameter is searched.
+[[nodiscard]] RecoveryResult recover(const LawSpec& law, std::span<const double> truth,
+                                     const RecoveryOptions& options);
+
+[[nodiscard]] Json to_json(const RecoveryResult& result);
+/// One row for each law.
+[[nodiscard]] std::string to_terminal_text(std::span<const RecoveryResult> results);
+
+}  // namespace tpm
