@@ -69,7 +69,7 @@ bool predicts_the_truth(const FitResult& fit, const Trials& trials) {
 std::string reason_against(const Candidate& candidate, double margin) {
   if (candidate.failed || !candidate.identified) return candidate.reason;
   return candidate.delta_bic > margin ? "another law has a lower BIC by more than the margin"
-                                      : "a law with fewer parameters is within the margin of BIC";
+                                      : "a law with no more parameters is within the margin of BIC";
 }
 
 void count_choice(const Selection& selection, const Trials& trials, RecoveryResult& result) {
