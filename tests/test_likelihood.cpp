@@ -129,7 +129,7 @@ const std::string kKnown = R"({"kind": "absolute", "absolute": "1 mN"})";
 
 // --- likelihood ----------------------------------------------------------------------------------
 
-TEST_CASE("-2 ln L and the criteria equal hand computations") {
+TEST_CASE("the likelihood and the criteria equal hand computations") {
   const FitResult fit = run_fit(relaxation());
   // normal with sigma = 0.1 y: deviance + sum of ln(2 pi sigma^2), by hand from the data
   double constants = 0.0;

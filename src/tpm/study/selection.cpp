@@ -123,6 +123,14 @@ void score(Candidate& c, int samples, double effective) {
   c.bic = log_likelihood + k * std::log(effective);
 }
 
+bool plateau_is_not_told(const FitResult& fit) {
+  for (const ParameterResult& p : fit.parameters) {
+    if (p.parameter.name != "k_inf") continue;
+    return p.at_lower_bound || (p.standard_error && p.estimate < 2.0 * *p.standard_error);
+  }
+  return false;
+}
+
 /// Where the lasting stiffness is not told from 0, the law without it is a lesser one.
 void add_laws_without_plateau(Selection& s, std::span<const PreparedRecording> recordings,
                               const std::vector<DataSet>& data, const SelectionOptions& options) {
@@ -133,7 +141,7 @@ void add_laws_without_plateau(Selection& s, std::span<const PreparedRecording> r
     LawSpec fluid = c.law;
     fluid.solid = false;
     const bool possible = !c.failed && c.law.branches > 0 && c.law.form == BranchForm::parallel &&
-                          c.law.fractional == Fractional::none && c.reason.starts_with("k_inf ");
+                          c.law.fractional == Fractional::none && plateau_is_not_told(c.fit);
     if (possible) s.candidates.push_back(fit_candidate(fluid, recordings, data, options.setup));
   }
 }
@@ -147,11 +155,6 @@ std::size_t choose(const std::vector<Candidate>& candidates, double margin) {
       if (!chosen || c.parameters < candidates[*chosen].parameters) chosen = i;
     }
     if (chosen) return *chosen;
-    // The best laws have a parameter that the data do not tell: look at the best that have none.
-    for (std::size_t i = 0; only_identified && i < candidates.size(); ++i) {
-      const Candidate& c = candidates[i];
-      if (!c.failed && c.identified) return i;
-    }
   }
   throw Error(ExitCode::numerical, "select", "no law could be fitted");
 }
@@ -255,6 +258,28 @@ void judge_predictions(Selection& s, double factor) {
   }
 }
 
+/// Which laws predict recording i from the others, and which do not.
+void describe_prediction(Selection& s, std::size_t i) {
+  std::vector<std::string> able;
+  std::vector<std::string> unable;
+  for (const Candidate& c : s.candidates) {
+    if (c.failed || i >= c.held_out.size()) continue;
+    const HeldOut& h = c.held_out[i];
+    (h.predicts ? able : unable)
+        .push_back(
+            fmt::format("{} ({} %)", law_name(c.law), significant(100.0 * h.rms_over_peak, 3)));
+  }
+  const auto listed = [](const std::vector<std::string>& laws) {
+    return laws.empty() ? std::string("none") : fmt::format("{}", fmt::join(laws, ", "));
+  };
+  s.words.push_back(
+      fmt::format("{} is predicted from the others, to {} times the least residual of any law "
+                  "fitted to it (rms "
+                  "over peak): by {}; not by {}",
+                  s.candidates.front().held_out[i].what, significant(s.prediction_factor, 2),
+                  listed(able), listed(unable)));
+}
+
 void describe(Selection& s) {
   const Candidate& chosen = s.candidates[s.recommended];
   const Candidate& best = s.candidates[s.best_bic];
@@ -269,28 +294,8 @@ void describe(Selection& s) {
         best.identified ? fmt::format("less than the margin of {}", significant(s.margin, 3))
                         : best.reason));
   }
-  if (s.candidates.front().held_out.size() > 1) {
-    std::vector<std::string> able;
-    std::vector<std::string> unable;
-    for (const Candidate& c : s.candidates) {
-      if (c.failed || c.held_out.empty()) continue;
-      double worst = 0.0;
-      bool predicts = true;
-      for (const HeldOut& h : c.held_out) {
-        worst = std::max(worst, h.rms_over_peak);
-        predicts = predicts && h.predicts;
-      }
-      (predicts ? able : unable)
-          .push_back(fmt::format("{} ({} %)", law_name(c.law), significant(100.0 * worst, 3)));
-    }
-    const auto listed = [](const std::vector<std::string>& laws) {
-      return laws.empty() ? std::string("none") : fmt::format("{}", fmt::join(laws, ", "));
-    };
-    s.words.push_back(fmt::format(
-        "laws that predict each recording from the others, to {} times the least residual that any "
-        "law leaves when fitted to it (worst rms over peak): {}",
-        significant(s.prediction_factor, 2), listed(able)));
-    s.words.push_back(fmt::format("laws that do not: {}", listed(unable)));
+  for (std::size_t i = 0; i < best.held_out.size() && best.held_out.size() > 1; ++i) {
+    describe_prediction(s, i);
   }
   if (s.correlation.significant) {
     s.words.push_back(fmt::format(

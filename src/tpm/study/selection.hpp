@@ -69,9 +69,10 @@ struct Selection {
 /// (NAME-fluid) is fitted, too.
 ///
 /// Fits every law to the recordings together and recommends the least: of the laws whose BIC is
-/// within the margin of the best and whose parameters are identified, the one with the fewest
-/// parameters. AICc and BIC count the effective number of readings, because neighbouring residuals
-/// repeat each other; with n samples of n_eff effective ones, -2 ln L = n_eff ln(RSS/n).
+/// within the margin of the best and whose parameters are identified (or, if none of them is, of
+/// all within the margin), the one with the fewest parameters. AICc and BIC count the effective
+/// number of readings, because neighbouring residuals repeat each other; with n samples of n_eff
+/// effective ones, -2 ln L = n_eff ln(RSS/n).
 ///
 /// Held-out error: with several recordings each in turn is predicted from the others (its own
 /// nuisance parameters refitted, the material held); with one the second half of its hold is

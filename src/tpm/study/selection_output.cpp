@@ -66,16 +66,16 @@ Json to_json(const Selection& s) {
 }
 
 std::string to_terminal_text(const Selection& s) {
-  std::string text = fmt::format("{:<22} {:>6} {:>9} {:>9} {:>9}  {}\n", "law", "param.",
+  std::string text = fmt::format("{:<26} {:>6} {:>9} {:>9} {:>9}  {}\n", "law", "param.",
                                  "rms/peak", "dBIC", "dAICc", "held-out rms/peak; note");
   for (std::size_t i = 0; i < s.candidates.size(); ++i) {
     const Candidate& c = s.candidates[i];
     const char* mark = i == s.recommended ? "*" : " ";
     if (c.failed) {
-      text += fmt::format("{}{:<21} failed: {}\n", mark, law_name(c.law), c.reason);
+      text += fmt::format("{}{:<25} failed: {}\n", mark, law_name(c.law), c.reason);
       continue;
     }
-    text += fmt::format("{}{:<21} {:>6} {:>9} {:>9} {:>9}{}  {}\n", mark, law_name(c.law),
+    text += fmt::format("{}{:<25} {:>6} {:>9} {:>9} {:>9}{}  {}\n", mark, law_name(c.law),
                         c.parameters - 1, significant(100.0 * c.rms_over_peak, 3) + " %",
                         fixed(c.delta_bic, 1), fixed(c.delta_aicc, 1), held_out_text(c), c.reason);
   }
