@@ -224,8 +224,8 @@ TEST_CASE("degenerate chains: equal times, branches without stiffness, one dashp
   const KelvinChain merged = to_series({5.0, {2.0, 3.0, 0.0}, {1.0, 1.0, 7.0}});
   REQUIRE(merged.k.size() == 1);
   CHECK_THAT(merged.k0, WithinRel(10.0, 1e-15));
-  CHECK_THAT(merged.T_s[0], WithinRel(2.0, 1e-14));  // tau k0/k_inf
-  CHECK_THAT(merged.k[0], WithinRel(10.0, 1e-14));   // 1/k_inf - 1/k0 = 1/10
+  CHECK_THAT(merged.T_s[0], WithinRel(2.0, 1e-14));          // tau k0/k_inf
+  CHECK_THAT(merged.k[0], WithinRel(10.0, 1e-14));           // 1/k_inf - 1/k0 = 1/10
   const Prony equal = to_parallel({100.0, {100.0}, {0.7}});  // the root is the middle of its gap
   CHECK_THAT(equal.k_inf, WithinRel(50.0, 1e-14));
   CHECK_THAT(equal.tau_s.at(0), WithinRel(0.35, 1e-14));

@@ -41,7 +41,8 @@ std::vector<Finding> text_findings(const DelimitedTable& table, ImportFormat for
           {"decimal sign", table.decimal_comma ? "comma" : "point"}};
 }
 
-const DigitizedAxis& required_axis(const std::optional<DigitizedAxis>& axis, char name, const std::string& file) {
+const DigitizedAxis& required_axis(const std::optional<DigitizedAxis>& axis, char name,
+                                   const std::string& file) {
   if (axis) return *axis;
   throw bad_input(file, fmt::format("a digitised file does not say what its {} axis shows", name),
                   fmt::format("--{} QUANTITY:UNIT, such as --{} {}", name, name,

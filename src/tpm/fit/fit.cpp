@@ -19,9 +19,9 @@
 namespace tpm {
 namespace {
 
-constexpr Eigen::Index kMostSearched = 20'000;   // residuals that many starts are followed with
-constexpr std::size_t kThinnedTo = 2'000;        // samples that stand for a longer recording
-constexpr Eigen::Index kMostProfiled = 20'000;   // residuals that profiles are walked with
+constexpr Eigen::Index kMostSearched = 20'000;  // residuals that many starts are followed with
+constexpr std::size_t kThinnedTo = 2'000;       // samples that stand for a longer recording
+constexpr Eigen::Index kMostProfiled = 20'000;  // residuals that profiles are walked with
 
 constexpr double kSameDeviance = 1e-5;   // relative: one minimum
 constexpr double kSameParameter = 1e-5;  // relative: five digits
