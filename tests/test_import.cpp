@@ -35,7 +35,7 @@ Recording import_recording(const std::string& path, const ImportOptions& options
 }
 
 std::string finding(const ImportedCurve& curve, const std::string& what) {
-  for (const Finding& found : curve.findings) {
+  for (const ImportFinding& found : curve.findings) {
     if (found.what == what) return found.value;
   }
   return "(none)";

@@ -339,5 +339,5 @@ TEST_CASE("spectra that the configuration cannot answer are refused") {
   refused(R"({"kind": "measured"})", "1 mN", R"(, "stiffness_per_modulus": "1 mm")", "measured");
   refused(kOscillation, "1 kPa", R"(, "stiffness_per_modulus": "0 mm")", "not above 0");
   refused(kOscillation, "1 kPa", "", "/data/0/noise/absolute");
-  refused(kOscillation, "1 N/m", R"(, "from": "1 s")", "'from' or 'to'");
+  refused(kOscillation, "1 N/m", R"(, "from": "1 s")", "without a recording");
 }

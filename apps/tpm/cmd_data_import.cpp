@@ -206,7 +206,7 @@ void print_text(const std::vector<Target>& targets, bool written) {
   for (const Target& target : targets) {
     fmt::print("{} -> {}\n", target.source,
                written ? target.csv.string() : "nothing written: no --output");
-    for (const Finding& finding : target.curve.findings) {
+    for (const ImportFinding& finding : target.curve.findings) {
       fmt::print("  {}: {}\n", finding.what, finding.value);
     }
   }
@@ -216,7 +216,8 @@ void print_json(const std::vector<Target>& targets, bool written) {
   Json report = Json::array();
   for (const Target& target : targets) {
     Json understood = Json::object();
-    for (const Finding& finding : target.curve.findings) understood[finding.what] = finding.value;
+    for (const ImportFinding& finding : target.curve.findings)
+      understood[finding.what] = finding.value;
     report.push_back({{"source", target.source},
                       {"csv", written ? Json(target.csv.string()) : Json(nullptr)},
                       {"id", target.curve.description.header.id},

@@ -76,6 +76,7 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
     }
     recordings.push_back(
         prepare_recording(file, read_recording_file(file, import).recording, phases));
+    recordings.back().import = import;
   }
   return recordings;
 }

@@ -72,7 +72,7 @@ void require_not_negative(const ImportedSeries& series, const std::string& file,
                   "at least 0");
 }
 
-void add_time_findings(const ImportedColumn& time, std::vector<Finding>& findings) {
+void add_time_findings(const ImportedColumn& time, std::vector<ImportFinding>& findings) {
   findings.push_back(
       {"time range", fmt::format("{} to {}", with_unit(time.values.front(), time.unit),
                                  with_unit(time.values.back(), time.unit))});

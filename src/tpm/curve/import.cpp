@@ -34,7 +34,7 @@ bool looks_like_json(std::string_view bytes) {
   return first != std::string_view::npos && bytes[first] == '{';
 }
 
-std::vector<Finding> text_findings(const DelimitedTable& table, ImportFormat format) {
+std::vector<ImportFinding> text_findings(const DelimitedTable& table, ImportFormat format) {
   return {{"format", std::string(import_format_name(format))},
           {"encoding", std::string(encoding_name(table.encoding))},
           {"separator", std::string(separator_name(table.separator))},
@@ -50,7 +50,8 @@ const DigitizedAxis& required_axis(const std::optional<DigitizedAxis>& axis, cha
 }
 
 /// Digitised points come in the order of the clicks; a curve over time is read along time.
-void sort_along(std::vector<double>& x, std::vector<double>& y, std::vector<Finding>& findings) {
+void sort_along(std::vector<double>& x, std::vector<double>& y,
+                std::vector<ImportFinding>& findings) {
   if (std::is_sorted(x.begin(), x.end())) return;
   std::vector<std::size_t> order(x.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -68,7 +69,7 @@ void sort_along(std::vector<double>& x, std::vector<double>& y, std::vector<Find
 }
 
 ImportedSeries digitized_series(DigitizedDataset dataset, const std::string& file,
-                                const ImportOptions& options, std::vector<Finding> findings) {
+                                const ImportOptions& options, std::vector<ImportFinding> findings) {
   const DigitizedAxis& x = required_axis(options.x, 'x', file);
   const DigitizedAxis& y = required_axis(options.y, 'y', file);
   ImportedSeries series;
@@ -88,7 +89,7 @@ ImportedSeries digitized_series(DigitizedDataset dataset, const std::string& fil
 
 std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datasets,
                                             const std::string& file, const ImportOptions& options,
-                                            const std::vector<Finding>& findings) {
+                                            const std::vector<ImportFinding>& findings) {
   std::string names;
   std::vector<ImportedSeries> all;
   for (DigitizedDataset& dataset : datasets) {
@@ -109,7 +110,7 @@ ImportedFile import_table(const DelimitedTable& table, const std::string& file,
   if (format == ImportFormat::automatic) {
     format = recognize_digitizer(table).value_or(ImportFormat::machine);
   }
-  std::vector<Finding> findings = text_findings(table, format);
+  std::vector<ImportFinding> findings = text_findings(table, format);
   ImportedFile imported;
   if (format == ImportFormat::machine) {
     ImportedSeries series = read_machine(table, file, options);

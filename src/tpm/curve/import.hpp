@@ -71,7 +71,7 @@ struct ImportOptions {
 };
 
 /// One thing that was understood, in words ("separator", "comma").
-struct Finding {
+struct ImportFinding {
   std::string what;
   std::string value;
 };
@@ -90,7 +90,7 @@ struct ImportedSeries {
   std::string name;                     ///< dataset or sheet; may be empty
   std::vector<ImportedColumn> columns;  ///< all of one length
   std::vector<int> lines;               ///< of the samples in the file; empty if they have none
-  std::vector<Finding> findings;
+  std::vector<ImportFinding> findings;
 };
 
 /// A curve in the project's own form: `csv` and `description` are what the two files hold.
@@ -98,13 +98,13 @@ struct ImportedCurve {
   std::string name;
   CurveDescription description;
   std::string csv;
-  std::vector<Finding> findings;
+  std::vector<ImportFinding> findings;
 };
 
 /// A recording read into memory, and what was understood of its file.
 struct RecordingFile {
   Recording recording;
-  std::vector<Finding> findings;
+  std::vector<ImportFinding> findings;
 };
 
 /// The series of a foreign file, as they stood in it.

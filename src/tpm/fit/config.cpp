@@ -297,17 +297,42 @@ void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataCho
   throw bad_input(here.where, "not above 0", "A0/l0 such as \"12.56 mm\"");
 }
 
+/// The columns and units of a recording that has no description.
+ImportOptions parse_import(const Json& j, const Place& place) {
+  ImportOptions import;
+  import.time_column = j.value("time", "");
+  import.drive_column = j.value("drive", "");
+  import.response_column = j.value("response", "");
+  import.sd_column = j.value("sd", "");
+  if (j.contains("drive_quantity")) {
+    import.drive_quantity = parse_quantity_name(j.at("drive_quantity").get<std::string>(),
+                                                place.key("drive_quantity").where);
+  }
+  if (j.contains("response_quantity")) {
+    import.response_quantity = parse_quantity_name(j.at("response_quantity").get<std::string>(),
+                                                   place.key("response_quantity").where);
+  }
+  if (j.contains("units")) {
+    for (const auto& [column, unit] : j.at("units").items()) {
+      import.units[column] = unit.get<std::string>();
+      static_cast<void>(parse_unit(import.units[column], place.key("units").key(column).where));
+    }
+  }
+  return import;
+}
+
 DataChoice parse_data(const Json& j, const FitConfig& config, const Place& place) {
   DataChoice data;
   data.dataset = j.at("dataset").get<std::string>();
   data.protocol = parse_protocol(j.at("protocol"), config.law, place.key("protocol"));
   parse_stiffness_per_modulus(j, config, data, place);
   parse_noise(j.at("noise"), data, reading_dimension(config, data), place.key("noise"));
+  if (j.contains("import")) data.import = parse_import(j.at("import"), place.key("import"));
   if (j.contains("from")) data.from_s = quantity(j, "from", Dimension::time, place);
   if (j.contains("to")) data.to_s = quantity(j, "to", Dimension::time, place);
   const bool recording = data.protocol.kind == Kind::measured;
-  if (!recording && (j.contains("from") || j.contains("to"))) {
-    throw bad_input(place.where, "'from' or 'to' without a recording",
+  if (!recording && (j.contains("from") || j.contains("to") || j.contains("import"))) {
+    throw bad_input(place.where, "'from', 'to' or 'import' without a recording",
                     "them only with the protocol 'measured'");
   }
   if (!(data.from_s < data.to_s)) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tpm/curve/curve.hpp"
+#include "tpm/curve/import.hpp"
 #include "tpm/fit/bootstrap.hpp"
 #include "tpm/fit/noise.hpp"
 #include "tpm/fit/parameter.hpp"
@@ -53,6 +54,7 @@ struct DataChoice {
   Noise noise;
   std::vector<Selector> exclude;   ///< not used at all
   std::vector<Selector> hold_out;  ///< not fitted, but predicted
+  ImportOptions import;            ///< what a recording without a description does not say itself
   /// Samples of a recording outside [from_s, to_s] are predicted, not fitted.
   double from_s = -std::numeric_limits<double>::infinity();
   double to_s = std::numeric_limits<double>::infinity();

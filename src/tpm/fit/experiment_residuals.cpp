@@ -10,6 +10,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/load.hpp"
+#include "tpm/curve/recording_file.hpp"
 
 namespace tpm {
 namespace {
@@ -139,7 +140,7 @@ std::vector<DataSet> load_data(const FitConfig& config) {
   for (const DataChoice& choice : config.data) {
     const std::string path = data_path(config, choice.dataset);
     if (choice.protocol.kind == Kind::measured) {
-      data.emplace_back(load_recording(path));
+      data.emplace_back(read_recording_file(path, choice.import).recording);
     } else if (choice.protocol.kind == Kind::oscillation) {
       data.emplace_back(load_spectrum(path));
     } else {

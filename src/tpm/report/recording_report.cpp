@@ -61,6 +61,23 @@ void add_if_any(Panel& panel, Series series) {
   if (!series.x.empty()) panel.series.push_back(std::move(series));
 }
 
+/// Where 95 % (or the fit's level) of new readings would fall.
+void add_band(Panel& panel, const RecordingFit& r, double y_unit) {
+  if (r.lower.size() != r.time_s.size()) return;
+  Series band;
+  band.kind = Series::Kind::band;
+  band.label = "prediction band";
+  band.provenance = "model";
+  const std::size_t stride = 1 + r.time_s.size() / kMostDrawn;
+  for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
+    if (!r.fitted[i] || !std::isfinite(r.lower[i]) || !std::isfinite(r.upper[i])) continue;
+    band.x.push_back(r.time_s[i]);
+    band.lower.push_back(r.lower[i] / y_unit);
+    band.upper.push_back(r.upper[i] / y_unit);
+  }
+  if (!band.x.empty()) panel.series.push_back(std::move(band));
+}
+
 Panel response_panel(const RecordingFit& r, bool over_time) {
   const Units units = units_of(r);
   Panel panel;
@@ -79,6 +96,7 @@ Panel response_panel(const RecordingFit& r, bool over_time) {
              sampled(measured("measured, fitted", r), r, x, x_unit, r.observed, y_unit, inside));
   add_if_any(panel, sampled(measured("measured, not fitted", r), r, x, x_unit, r.observed, y_unit,
                             outside));
+  if (over_time) add_band(panel, r, y_unit);
   add_if_any(panel, sampled(line("law", {}, {}), r, x, x_unit, r.predicted, y_unit, inside));
   if (over_time) {
     add_if_any(panel,
@@ -157,6 +175,28 @@ Figure selection_figure(const Selection& selection) {
   return figure;
 }
 
+Figure waterfall_figure(const FitResult& fit) {
+  Figure figure;
+  figure.id = "waterfall";
+  figure.title = "Where the starts ended";
+  figure.caption = fmt::format("Deviance of the end of each start that was followed, sorted: {}.",
+                               fit.waterfall.words);
+  Panel panel;
+  panel.x = {"start, sorted", "", false, {}, {}};
+  panel.y = {"deviance above the best", "", false, {}, {}};
+  Series ends;
+  ends.kind = Series::Kind::points;
+  ends.label = "end of a start";
+  ends.provenance = "model";
+  for (std::size_t i = 0; i < fit.waterfall.deviances.size(); ++i) {
+    ends.x.push_back(static_cast<double>(i + 1));
+    ends.y.push_back(fit.waterfall.deviances[i] - fit.waterfall.deviances.front());
+  }
+  add_if_any(panel, std::move(ends));
+  figure.panels = {std::move(panel)};
+  return figure;
+}
+
 LawFile fitted_law(const FitResult& fit) {
   LawFile law;
   law.spec = fit.config.law.value();
@@ -171,6 +211,19 @@ LawFile fitted_law(const FitResult& fit) {
   return law;
 }
 
+/// The configuration with its data sets as a file in the folder finds them.
+FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
+  for (DataChoice& data : config.data) {
+    const std::filesystem::path path(data.dataset);
+    if (path.has_extension() && path.is_relative()) {
+      data.dataset = std::filesystem::absolute(path)
+                         .lexically_relative(std::filesystem::absolute(folder))
+                         .generic_string();
+    }
+  }
+  return config;
+}
+
 std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
                                                 const Selection& selection) {
   const FitResult& fit = selection.candidates[selection.recommended].fit;
@@ -181,8 +234,9 @@ std::vector<std::string> write_recording_report(const std::filesystem::path& fol
         fmt::format("{}{}", i == 0 ? "fit" : "fit_", i == 0 ? "" : fmt::format("{}", i + 1));
   }
   figures.push_back(selection_figure(selection));
+  figures.push_back(waterfall_figure(fit));
   std::vector<std::string> files{"config.json", "selection.json", "figures.json", "law.json"};
-  write_file(folder / files[0], to_text(config_json(fit.config)));
+  write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
   write_file(folder / files[1], to_text(to_json(selection)));
   write_file(folder / files[2], to_text(to_json(figures)));
   write_law(folder / files[3], fitted_law(fit));

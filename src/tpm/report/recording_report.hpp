@@ -17,6 +17,9 @@ namespace tpm {
 /// Each law's residual and BIC over its number of parameters, the recommended one marked.
 [[nodiscard]] Figure selection_figure(const Selection& selection);
 
+/// Deviances in which the starts ended, sorted.
+[[nodiscard]] Figure waterfall_figure(const FitResult& fit);
+
 /// The fitted law without what belongs to the recording, for law files (tpm spectrum, tpm export).
 [[nodiscard]] LawFile fitted_law(const FitResult& fit);
 

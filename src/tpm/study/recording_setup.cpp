@@ -57,6 +57,15 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
                   "a ramp that is answered by a rising response");
 }
 
+/// Bounds and starts need no more digits than people read.
+FitParameter readable(FitParameter fit) {
+  constexpr int kDigits = 4;
+  fit.lower = rounded(fit.lower, kDigits);
+  fit.upper = rounded(fit.upper, kDigits);
+  fit.start = std::clamp(rounded(fit.start, kDigits), fit.lower, fit.upper);
+  return fit;
+}
+
 FitParameter law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int branches) {
   FitParameter fit;
   fit.name = p.name;
@@ -88,7 +97,7 @@ FitParameter law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int
     fit.upper = 1e3 * stiffness;
     fit.start = stiffness / (branches + 1);
   }
-  return fit;
+  return readable(std::move(fit));
 }
 
 bool is_stretch(const LawSpec& law) {
@@ -123,7 +132,10 @@ FitParameter contact_bounds(const LawSpec& law, std::span<const PreparedRecordin
   fit.lower = bends(law) || !stretch ? begin - (stretch ? 0.5 : 0.25) * range : begin;
   fit.upper = begin + (stretch ? 0.6 : 0.1) * range;
   if (preloaded && !stretch) fit.start = begin - 0.05 * range;
-  return fit;
+  // Under a straight kernel that was in contact from the start, depth and offset say the same.
+  if (!bends(law)) fit.lower = std::max(fit.lower, r.recording.drive.front());
+  fit.start = std::max(fit.start, fit.lower);
+  return readable(std::move(fit));
 }
 
 FitParameter offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
@@ -135,7 +147,7 @@ FitParameter offset_bounds(const LawSpec& law, const PreparedRecording& r, std::
   fit.start = 0.0;
   fit.lower = -peak;
   fit.upper = peak;
-  return fit;
+  return readable(std::move(fit));
 }
 
 Noise noise_of(const PreparedRecording& r) {
@@ -201,7 +213,7 @@ void add_nuisance(FitConfig& config, const LawModel& model,
 
 PreparedRecording prepare_recording(std::string name, Recording recording,
                                     const PhaseOptions& options) {
-  PreparedRecording r{std::move(name), std::move(recording), {}, 0.0, 0.0};
+  PreparedRecording r{std::move(name), std::move(recording), {}, 0.0, 0.0, {}};
   r.phases = find_phases(r.recording, options);
   const std::vector<double>& time = r.recording.time_s;
   const std::size_t contact = r.phases.contact_found ? r.phases.contact_index : 0;
@@ -255,6 +267,7 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
     data.noise = noise_of(r);
     data.from_s = r.from_s;
     data.to_s = r.to_s;
+    data.import = r.import;
     config.data.push_back(std::move(data));
   }
   config.fixed[model.index("contact")] = start_drive(recordings.front());
@@ -268,6 +281,25 @@ std::vector<DataSet> data_sets(std::span<const PreparedRecording> recordings) {
   for (const PreparedRecording& r : recordings) sets.emplace_back(r.recording);
   return sets;
 }
+
+namespace {
+
+Json import_json(const ImportOptions& import) {
+  Json j = Json::object();
+  const auto put = [&](const char* key, const std::string& value) {
+    if (!value.empty()) j[key] = value;
+  };
+  put("time", import.time_column);
+  put("drive", import.drive_column);
+  put("response", import.response_column);
+  put("sd", import.sd_column);
+  if (import.drive_quantity) j["drive_quantity"] = quantity_name(*import.drive_quantity);
+  if (import.response_quantity) j["response_quantity"] = quantity_name(*import.response_quantity);
+  if (!import.units.empty()) j["units"] = import.units;
+  return j;
+}
+
+}  // namespace
 
 Json config_json(const FitConfig& config) {
   const std::unique_ptr<Model> model = make_model(config);
@@ -322,6 +354,7 @@ Json config_json(const FitConfig& config) {
       entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(response));
     }
     entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";
+    if (const Json import = import_json(d.import); !import.empty()) entry["import"] = import;
     if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));
     if (std::isfinite(d.to_s)) entry["to"] = text(d.to_s, shown_unit(Dimension::time));
     data.push_back(std::move(entry));

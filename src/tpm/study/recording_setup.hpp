@@ -14,8 +14,9 @@ struct PreparedRecording {
   std::string name;  ///< unique within a fit; a path where the configuration is to be rerun
   Recording recording;
   RecordingPhases phases;
-  double from_s = 0.0;  ///< window that is fitted: from the start
-  double to_s = 0.0;    ///< to the end of the first hold (before the drive first falls back)
+  double from_s = 0.0;   ///< window that is fitted: from the start
+  double to_s = 0.0;     ///< to the end of the first hold (before the drive first falls back)
+  ImportOptions import;  ///< with which it was read, for the configuration
 };
 
 /// Finds the phases and chooses the window. Throws Error(bad_input) if there is nothing to fit.

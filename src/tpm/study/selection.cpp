@@ -349,6 +349,14 @@ std::vector<std::string> outside_words(const FitResult& fit) {
       ++count;
     }
     if (count == 0) continue;
+    if (fit.config.law && fit.config.law->kernel == Kernel::hertz) {
+      words.push_back(
+          fmt::format("{}: Lee and Radok's solution ends where the contact shrinks: after {} s the "
+                      "Hertz kernel "
+                      "predicts nothing",
+                      fit.config.data[r.choice].dataset, significant(last_s, 4)));
+      continue;
+    }
     const double rms = std::sqrt(sum / static_cast<double>(count));
     const bool describes = rms <= kDescribes * r.rms_residual;
     words.push_back(

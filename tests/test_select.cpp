@@ -1,0 +1,104 @@
+// From a recording to the least law, its configuration and its figures' data.
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "temp_folder.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/law/law_model.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/study/selection.hpp"
+#include "tpm/study/specimens.hpp"
+
+using namespace tpm;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+/// Ramp and hold of a law with 0.5 % noise, a few samples before contact.
+Recording simulated(const std::string& law, const std::vector<double>& values, std::uint64_t seed) {
+  Recording r;
+  for (int i = 0; i < 240; ++i) {
+    const double t = 0.1 * i;
+    r.time_s.push_back(t);
+    r.drive.push_back(std::min(5e-3, std::max(0.0, 2e-3 * (t - 1.0))));
+  }
+  const LawModel model(parse_law_name(law, "test"));
+  const Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
+  const Eigen::VectorXd f = model.respond(history, r.time_s, values, Want::values).value;
+  Random random(seed);
+  for (const double force : f) r.response.push_back(force + 0.005 * f.maxCoeff() * random.normal());
+  return r;
+}
+
+SelectionOptions few_laws() {
+  SelectionOptions options;
+  for (const char* name : {"linear", "linear-1", "linear-2", "power", "power-1", "power-2"}) {
+    options.laws.push_back(parse_law_name(name, "test"));
+  }
+  options.only_listed = true;
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE("select returns the law behind a recording and says what the protocol hides",
+          "[select]") {
+  const std::vector<PreparedRecording> one{prepare_recording(
+      "one.csv", simulated("linear-2", {100.0, 120.0, 80.0, 0.4, 6.0, 0.0, 0.0}, 4))};
+  const Selection s = select_law(one, few_laws());
+  const Candidate& chosen = s.candidates[s.recommended];
+  CHECK(law_name(chosen.law) == "linear-2");
+  CHECK(chosen.identified);
+  CHECK(chosen.rms_over_peak < 0.006);
+  for (const ParameterResult& p : chosen.fit.parameters) {
+    if (p.parameter.name == "k_inf") CHECK((*p.lower < 100.0 && 100.0 < *p.upper));
+    if (p.parameter.name == "tau2") CHECK((*p.lower < 6.0 && 6.0 < *p.upper));
+  }
+  bool hidden = false;
+  for (const std::string& w : s.warnings) hidden = hidden || w.find("shorter than") != w.npos;
+  CHECK(hidden);  // 0.4 s under a ramp of 2.5 s
+}
+
+TEST_CASE("the printed configuration gives the same fit again", "[select]") {
+  const test::TempFolder folder;
+  Recording r = simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 7);
+  std::string csv = "time [s],depth [mm],force [N]\n";
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    csv += fmt::format("{},{},{}\n", r.time_s[i], 1e3 * r.drive[i], r.response[i]);
+  }
+  const std::string path = (folder.path() / "r.csv").string();
+  write_file(path, csv);
+  const std::vector<PreparedRecording> one{prepare_recording(path, r)};
+  const FitConfig config = recording_config(parse_law_name("linear-1", "test"), one, {});
+  const FitResult direct = run_fit(config, data_sets(one));
+  const FitResult again = run_fit(parse_fit_config(config_json(config), "config"));
+  REQUIRE(again.best.natural.size() == direct.best.natural.size());
+  for (std::size_t i = 0; i < direct.best.natural.size(); ++i) {
+    CHECK(std::abs(again.best.natural[i] - direct.best.natural[i]) <=
+          1e-5 * std::abs(direct.best.natural[i]) + 1e-9);
+  }
+}
+
+TEST_CASE("one specimen's recording is told from the spread between specimens", "[select]") {
+  std::vector<PreparedRecording> specimens;
+  for (const double stiffness : {80.0, 100.0, 125.0, 110.0}) {
+    specimens.push_back(
+        prepare_recording(fmt::format("{}.csv", stiffness),
+                          simulated("linear-1", {stiffness, 1.2 * stiffness, 3.0, 0.0, 0.0},
+                                    static_cast<std::uint64_t>(stiffness))));
+  }
+  SetupOptions setup;
+  setup.profiles = false;
+  SelectionOptions options;
+  options.setup = setup;
+  const SpecimenStudy study =
+      study_specimens(specimens, parse_law_name("linear-1", "test"), options);
+  REQUIRE(study.pooled.size() == 3);
+  const RandomEffects& k_inf = study.pooled[0].effects;
+  CHECK(k_inf.specimens == 4);
+  CHECK_THAT(std::exp(k_inf.mean), WithinRel(102.4, 0.03));   // geometric mean
+  CHECK(std::sqrt(*k_inf.tau_squared) > 0.1);                 // they do differ
+  CHECK(study.pooled[2].effects.tau_squared.value() < 0.01);  // the time is one
+}
