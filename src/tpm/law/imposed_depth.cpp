@@ -31,6 +31,7 @@ struct Run {
 };
 
 /// Steps that differ by less have weights of first order in the difference: off by its square.
+/// Their derivatives by the times are those of the step they differ from.
 constexpr double kNearlyEqual = 3e-6;
 
 /// All pieces of a path at one contact depth, sorted into runs.
@@ -255,7 +256,11 @@ void KernelTables::fill(const Pieces& pieces, double start) {
   for (Eigen::Index k = 0; k < pieces.count(); ++k) {
     const Piece& piece = pieces[k];
     const bool touching = std::max(piece.from, piece.to) > 0.0;
-    const KernelShape::Jet to = law_.kernel.jet(std::max(piece.to, 0.0));
+    const bool cubic = piece.course == Course::cubic ||
+                       (k + 1 < pieces.count() && pieces[k + 1].course == Course::cubic);
+    const double depth = std::max(piece.to, 0.0);
+    const KernelShape::Jet to =
+        cubic ? law_.kernel.jet(depth) : KernelShape::Jet{law_.kernel.at(depth), {}};
     begin.row(k) = row_of(from.values, touching);
     end.row(k + 1) = row_of(to.values, touching);
     if (piece.course != Course::straight) fill_middle(k, piece, from, to);
