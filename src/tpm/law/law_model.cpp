@@ -256,8 +256,10 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values,
     const auto n = static_cast<std::size_t>(spec_.branches);
     KelvinChain chain;
     chain.k0 = values[0];
-    chain.k.assign(values.begin() + 1, values.begin() + 1 + spec_.branches);
-    chain.T_s.assign(values.begin() + 1 + spec_.branches, values.begin() + 1 + 2 * spec_.branches);
+    const auto k = values.subspan(1, n);
+    const auto times_s = values.subspan(1 + n, n);
+    chain.k.assign(k.begin(), k.end());
+    chain.T_s.assign(times_s.begin(), times_s.end());
     ParallelWithSlopes parallel = to_parallel_with_slopes(chain);
     std::vector<double> flat{parallel.law.k_inf};
     flat.insert(flat.end(), parallel.law.k.begin(), parallel.law.k.end());
