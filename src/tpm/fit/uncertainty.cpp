@@ -146,6 +146,7 @@ class ProfileWalk {
         continue;
       }
       profile.points.push_back({m.natural[index_], m.deviance});
+      if (risen_next < rise_) profile.inside.push_back(m);
       const double gained = risen_next - last_.risen;
       before_ = std::exchange(last_, {next, risen_next, m.natural});
       if (risen_next >= rise_) return limit_between(before_, last_);

@@ -64,6 +64,7 @@ struct Profile {
   std::optional<double> upper;
   bool connected = true;          ///< false: the values between the limits do not all belong
   std::optional<Minimum> better;  ///< a deeper minimum met on the way; the profile is then void
+  std::vector<Minimum> inside;    ///< ends of the constrained fits below the threshold
   int failures = 0;               ///< constrained fits that could not be evaluated
 };
 
