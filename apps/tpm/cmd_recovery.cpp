@@ -17,6 +17,7 @@ struct RecoveryCommandOptions {
   std::string trials = "200";
   std::string noise = "0.01";
   std::string seed = "0";
+  std::vector<std::string> margins;
   std::string output;
 };
 
@@ -38,6 +39,9 @@ int recovery(const RecoveryCommandOptions& options, const Session& session) {
   study.noise = parse_noise(options.noise);
   study.trials = static_cast<int>(parse_whole_number(options.trials, "--trials", 1));
   study.seed = parse_whole_number(options.seed, "--seed", 0);
+  for (const std::string& margin : options.margins) {
+    study.margins.push_back(parse_number(margin, "--margin"));
+  }
   study.selection.laws = chosen_laws({}, options.family);
   std::vector<RecoveryResult> results;
   for (const LawSpec& law : chosen_laws(options.laws, options.family)) {
@@ -68,8 +72,13 @@ void add_recovery_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of the noise")->capture_default_str();
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command
+      ->add_option("--margin", options->margins,
+                   "Margins of BIC, each judging the same fits (default: that of tpm select)")
+      ->delimiter(',');
   add_format_option(*command, session);
   command->footer(
+      "Intervals are those of the profile likelihood, as in tpm fit.\n"
       "A ramp to 5 mm at 5 mm/s, held 20 s, contact and offset unknown.\n"
       "Exit code 1 if a law is not returned (nor one within one sigma of it) in 95 % of the "
       "trials,\n"

@@ -146,19 +146,6 @@ void add_laws_without_plateau(Selection& s, std::span<const PreparedRecording> r
   }
 }
 
-std::size_t choose(const std::vector<Candidate>& candidates, double margin) {
-  std::optional<std::size_t> chosen;
-  for (const bool only_identified : {true, false}) {
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      const Candidate& c = candidates[i];
-      if (c.failed || c.delta_bic > margin || (only_identified && !c.identified)) continue;
-      if (!chosen || c.parameters < candidates[*chosen].parameters) chosen = i;
-    }
-    if (chosen) return *chosen;
-  }
-  throw Error(ExitCode::numerical, "select", "no law could be fitted");
-}
-
 /// Fits the material to some recordings and predicts another, whose nuisance parameters alone are
 /// fitted to it.
 HeldOut predict_one(const Candidate& candidate, std::span<const PreparedRecording> recordings,
@@ -333,6 +320,19 @@ std::vector<LawSpec> fractional_family() {
   return laws;
 }
 
+std::size_t least_within(const std::vector<Candidate>& candidates, double margin) {
+  std::optional<std::size_t> chosen;
+  for (const bool only_identified : {true, false}) {
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      const Candidate& c = candidates[i];
+      if (c.failed || c.delta_bic > margin || (only_identified && !c.identified)) continue;
+      if (!chosen || c.parameters < candidates[*chosen].parameters) chosen = i;
+    }
+    if (chosen) return *chosen;
+  }
+  throw Error(ExitCode::numerical, "select", "no law could be fitted");
+}
+
 std::vector<std::string> outside_words(const FitResult& fit) {
   constexpr double kDescribes = 3.0;  // times the residual inside the window
   std::vector<std::string> words;
@@ -458,7 +458,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
                      if (a.failed != b.failed) return b.failed;
                      return a.bic < b.bic;
                    });
-  s.recommended = choose(s.candidates, options.margin);
+  s.recommended = least_within(s.candidates, options.margin);
   if (options.held_out) {
     Progress predicting("predicting what was held out", s.candidates.size());
     for (Candidate& c : s.candidates) {

@@ -83,6 +83,11 @@ struct Selection {
 [[nodiscard]] Json to_json(const Selection& selection);
 [[nodiscard]] std::string to_terminal_text(const Selection& selection);
 
+/// The law that select_law recommends with a given margin of BIC.
+/// @param candidates in any order, with their scores
+/// @return place in candidates. Throws Error(numerical) if no law could be fitted.
+[[nodiscard]] std::size_t least_within(const std::vector<Candidate>& candidates, double margin);
+
 /// What the fitted law does with the samples outside the window: "unloading and after: rms 12 % of
 /// the peak; the law does not describe it". Empty if there are none.
 [[nodiscard]] std::vector<std::string> outside_words(const FitResult& fit);
