@@ -1,49 +1,13 @@
 #pragma once
 #include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
-#include "tpm/fit/config.hpp"
 #include "tpm/fit/estimated_sigma.hpp"
+#include "tpm/fit/experiment.hpp"
 #include "tpm/fit/least_squares.hpp"
-#include "tpm/fit/oscillation.hpp"
 
 namespace tpm {
-
-/// One reading as the fit sees it.
-struct FitDatum {
-  std::size_t choice = 0;                       ///< place in FitConfig::data
-  std::string label;                            ///< "2 mm, peak"; empty for a sample of a recording
-  Quantity quantity = Quantity::contact_force;  ///< what was read
-  double time_s = 0.0;  ///< in the protocol's own time; infinite for a static reading
-  std::optional<double> frequency_Hz;         ///< of an oscillation, which has no time
-  std::optional<double> value, lower, upper;  ///< SI
-  double sigma = 0.0;                         ///< after the noise model; 0 where it is estimated
-  Provenance provenance = Provenance::assumed;
-  bool held_out = false;
-};
-
-/// "2 mm, peak", or the time of a sample.
-[[nodiscard]] std::string datum_label(const FitDatum& datum);
-
-/// A history and the times of the readings along it.
-struct TimeCourse {
-  Protocol protocol;
-  std::vector<double> times_s;
-};
-
-/// What was imposed, and the readings taken.
-struct Experiment {
-  std::variant<TimeCourse, Oscillation> imposed;
-  /// Index into ExperimentResiduals::data(), one per time or reading of an oscillation.
-  std::vector<std::size_t> data;
-  std::size_t choice = 0;  ///< place in FitConfig::data
-  bool is_recording = false;
-};
-
-/// Data in memory: separate readings, a recording, or storage and loss over frequency.
-using DataSet = std::variant<PointSet, Recording, Spectrum>;
 
 /// The residuals of a configuration: experiments asked of the model, compared with data.
 class ExperimentResiduals final : public ResidualFunction {
@@ -113,9 +77,6 @@ class ExperimentResiduals final : public ResidualFunction {
   ExperimentResiduals() = default;
   /// Factor of a datum's residuals.
   [[nodiscard]] double weight(std::size_t datum) const;
-  void add_points(std::size_t choice, const PointSet& points);
-  void add_recording(std::size_t choice, const Recording& recording);
-  void add_spectrum(std::size_t choice, const Spectrum& spectrum);
   /// The model's answer to an experiment, one value per reading.
   [[nodiscard]] Response respond_to(const Experiment& experiment,
                                     std::span<const double> parameters, Want want) const;

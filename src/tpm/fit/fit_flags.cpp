@@ -1,0 +1,98 @@
+#include "tpm/fit/fit_flags.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/material/tpm_element.hpp"
+
+namespace tpm {
+namespace {
+
+/// Fitted values further from the model than noise goes, in standard deviations.
+constexpr double kFarOff = 8.0;
+
+void flag_outliers(FitResult& result, const ExperimentResiduals& function) {
+  const double unit = std::sqrt(result.variance_factor);
+  const Eigen::VectorXd answer = function.predict(result.best.natural, nullptr);
+  int count = 0;
+  std::string worst;
+  double worst_z = kFarOff * unit;
+  for (std::size_t i = 0; i < function.data().size(); ++i) {
+    const FitDatum& d = function.data()[i];
+    if (!d.value || d.held_out) continue;
+    const double z = std::abs(
+        function.standardised(i, answer[static_cast<Eigen::Index>(i)], result.best.natural));
+    if (!(z > kFarOff * unit) || !(unit > 0.0)) continue;
+    ++count;
+    if (z < worst_z) continue;
+    worst_z = z;
+    worst = fmt::format("{} of '{}'", datum_label(d), result.config.data[d.choice].dataset);
+  }
+  if (count == 0) return;
+  result.flags.push_back(fmt::format(
+      "{} of {} values {} more than {} standard deviations from the model, the furthest "
+      "{} ({} standard deviations): errors in the data, or noise with wider tails "
+      "(distribution 'student_t')",
+      count, result.value_count, count == 1 ? "lies" : "lie", kFarOff, worst,
+      significant(worst_z / unit, 3)));
+}
+
+void flag_noise(FitResult& result) {
+  const bool estimated = std::any_of(result.config.data.begin(), result.config.data.end(),
+                                     [](const DataChoice& d) { return d.estimates_sigma(); });
+  if (estimated) {
+    result.flags.push_back(
+        fmt::format("the size of the noise is estimated from {} values: intervals are those of "
+                    "many values, and too short for few",
+                    result.value_count));
+  }
+  if (result.inflation > 1.0) {
+    result.flags.push_back(
+        fmt::format("{}; the intervals count them so", result.correlation.value().words));
+  }
+}
+
+}  // namespace
+
+void add_flags(FitResult& result, const ExperimentResiduals& function) {
+  flag_outliers(result, function);
+  flag_noise(result);
+  for (const DataChoice& data : result.config.data) {
+    if (data.protocol.rate_provenance == Provenance::assumed) {
+      result.flags.push_back(fmt::format("the ramp rate of {:.4g} mm/s is assumed for '{}'",
+                                         data.protocol.rate_m_per_s * 1e3, data.dataset));
+    }
+  }
+  if (result.band_count > 0) {
+    result.flags.push_back(fmt::format(
+        "{} bands are penalised only outside and are not counted as data", result.band_count));
+  }
+  if (result.config.loss.kind != Loss::none) {
+    result.flags.push_back(
+        fmt::format("the {} loss has no exact likelihood: the intervals' level is only approximate",
+                    loss_name(result.config.loss.kind)));
+  }
+  double deepest = 0.0;
+  for (const Experiment& e : function.experiments()) {
+    const auto* course = std::get_if<TimeCourse>(&e.imposed);
+    if (course == nullptr || course->protocol.drive() == Drive::force) continue;
+    deepest = std::max(deepest, course->protocol.peak());
+  }
+  for (const FittedDatum& d : result.data) {
+    if (d.datum.quantity == Quantity::indentation_depth) {
+      deepest = std::max(deepest, d.predicted);
+    }
+  }
+  if (result.config.law) return;  // the limits are those of the paper's element
+  TpmVector vector{};
+  const auto values = model_parameters(result.config, result.best.natural, 0);
+  std::copy(values.begin(), values.end(), vector.begin());
+  for (std::string& flag : validity_flags(from_vector(vector), deepest)) {
+    result.flags.push_back(std::move(flag));
+  }
+}
+
+}  // namespace tpm

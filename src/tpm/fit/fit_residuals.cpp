@@ -1,0 +1,203 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/fit/fit.hpp"
+#include "tpm/fit/verdict.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr Eigen::Index kMostProfiled = 20'000;  // residuals that profiles are walked with
+
+constexpr double kSameDeviance = 1e-5;   // relative: one minimum
+constexpr double kSameParameter = 1e-5;  // relative: five digits
+
+bool same_deviance(double a, double b) {
+  return std::abs(a - b) <= kSameDeviance * std::max(1.0, std::abs(b));
+}
+
+/// All starts, each followed to its end, sorted into distinct minima.
+struct MultiStart {
+  std::vector<DistinctMinimum> minima;
+  int run = 0, failed = 0, agreeing = 0;
+  std::vector<double> end_deviances;  ///< of every start; NaN where it failed
+};
+
+void add_to_cluster(std::vector<DistinctMinimum>& minima, const Minimum& m) {
+  for (DistinctMinimum& cluster : minima) {
+    if (!same_deviance(m.deviance, cluster.minimum.deviance)) continue;
+    ++cluster.starts;
+    for (std::size_t i = 0; i < m.natural.size(); ++i) {
+      cluster.low[i] = std::min(cluster.low[i], m.natural[i]);
+      cluster.high[i] = std::max(cluster.high[i], m.natural[i]);
+    }
+    return;
+  }
+  minima.push_back({m, 1, m.natural, m.natural});
+}
+
+/// Both first steps are tried; the deeper end counts.
+Minimum minimise_both_ways(const ResidualFunction& function,
+                           std::span<const FitParameter> parameters,
+                           std::span<const double> start) {
+  const Minimum bold = minimise(function, parameters, start);
+  const Minimum cautious = minimise(function, parameters, start, {}, FirstStep::cautious);
+  const bool deeper = cautious.usable && (!bold.usable || cautious.deviance < bold.deviance);
+  return deeper ? cautious : bold;
+}
+
+MultiStart run_starts(const ResidualFunction& function, std::span<const FitParameter> parameters,
+                      const std::vector<std::vector<double>>& starts, StartKind kind) {
+  MultiStart result;
+  std::vector<Minimum> ends;
+  Progress progress("fitting from several starts", starts.size());
+  for (const auto& start : starts) {
+    const Minimum m = kind == StartKind::solved ? minimise_near(function, parameters, start)
+                                                : minimise_both_ways(function, parameters, start);
+    ++result.run;
+    result.end_deviances.push_back(m.usable ? m.deviance
+                                            : std::numeric_limits<double>::quiet_NaN());
+    if (m.usable) {
+      ends.push_back(m);
+    } else {
+      ++result.failed;
+    }
+    progress.advance();
+  }
+  if (ends.empty()) {
+    throw Error(
+        ExitCode::numerical, "fit",
+        fmt::format("none of {} starts ended in a point that can be evaluated", starts.size()));
+  }
+  std::stable_sort(ends.begin(), ends.end(),
+                   [](const Minimum& a, const Minimum& b) { return a.deviance < b.deviance; });
+  for (const Minimum& m : ends) add_to_cluster(result.minima, m);
+  const Minimum& best = ends.front();
+  for (const Minimum& m : ends) {
+    bool agrees = same_deviance(m.deviance, best.deviance);
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      agrees = agrees && std::abs(m.natural[i] - best.natural[i]) <=
+                             kSameParameter * std::abs(best.natural[i]);
+    }
+    if (agrees) ++result.agreeing;
+  }
+  return result;
+}
+
+std::optional<double> natural_standard_error(const FitResult& result, std::size_t index) {
+  const Covariance& c = result.covariance;
+  const auto place = std::find(c.free.begin(), c.free.end(), index);
+  if (!c.full_rank || place == c.free.end()) return std::nullopt;
+  const FitParameter& p = result.parameters[index].parameter;
+  return c.theta_sd[place - c.free.begin()] *
+         std::abs(p.natural_slope(p.theta(result.best.natural[index])));
+}
+
+/// Profiles of every parameter; on meeting a deeper minimum descends into it and starts again.
+void profile_all(const ResidualFunction& function, FitResult& result,
+                 std::span<const FitParameter> parameters, const Threshold& threshold) {
+  Progress progress("profiling", parameters.size());
+  for (int restart = 0; restart < 10; ++restart) {
+    bool deeper = false;
+    std::vector<Minimum> candidates{result.best};
+    for (const DistinctMinimum& m : result.minima) {
+      if (!same_deviance(m.minimum.deviance, result.best.deviance)) candidates.push_back(m.minimum);
+    }
+    for (std::size_t i = 0; i < parameters.size() && !deeper; ++i) {
+      Profile profile =
+          profile_likelihood(function, parameters, candidates, i, result.covariance, threshold);
+      if (profile.better) {
+        result.best = minimise(function, parameters, profile.better->natural);
+        result.covariance = linear_covariance(function, parameters, result.best, threshold);
+        deeper = true;
+        continue;
+      }
+      result.parameters[i].lower = profile.lower;
+      result.parameters[i].upper = profile.upper;
+      result.parameters[i].profile = std::move(profile);
+      progress.advance();
+    }
+    if (!deeper) return;
+  }
+  throw Error(ExitCode::numerical, "profiles", "a deeper minimum was met again and again");
+}
+
+/// Limits from the covariance alone.
+void linear_intervals(FitResult& result, std::span<const FitParameter> parameters,
+                      const Threshold& threshold) {
+  const double wide =
+      std::sqrt(threshold.rise(result.best.deviance) /
+                (threshold.inflation * threshold.variance_factor(result.best.deviance)));
+  const Covariance& c = result.covariance;
+  for (std::size_t k = 0; c.full_rank && k < c.free.size(); ++k) {
+    const std::size_t i = c.free[k];
+    const FitParameter& p = parameters[i];
+    const double theta = p.theta(result.best.natural[i]);
+    const double half = wide * c.theta_sd[static_cast<Eigen::Index>(k)];
+    const double a = p.natural(std::max(theta - half, p.theta_lower()));
+    const double b = p.natural(std::min(theta + half, p.theta_upper()));
+    if (theta - half > p.theta_lower())
+      (p.reversed() ? result.parameters[i].upper : result.parameters[i].lower) = a;
+    if (theta + half < p.theta_upper())
+      (p.reversed() ? result.parameters[i].lower : result.parameters[i].upper) = b;
+  }
+}
+
+void describe_parameters(FitResult& result, double level, bool profiles) {
+  for (std::size_t i = 0; i < result.parameters.size(); ++i) {
+    ParameterResult& p = result.parameters[i];
+    p.estimate = result.best.natural[i];
+    p.at_lower_bound = p.parameter.at_lower(p.estimate);
+    p.at_upper_bound = p.parameter.at_upper(p.estimate);
+    p.standard_error = natural_standard_error(result, i);
+    p.verdict = profiles ? verdict_of(p) : Verdict::not_profiled;
+    p.words = parameter_words(p, level);
+  }
+}
+
+}  // namespace
+
+FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParameter> parameters,
+                        const std::vector<std::vector<double>>& starts, Threshold threshold,
+                        bool profiles, StartKind kind, const InflationRule& inflation) {
+  threshold.parameter_count = static_cast<int>(parameters.size());
+  FitResult result;
+  MultiStart multi = run_starts(function, parameters, starts, kind);
+  result.starts_run = multi.run;
+  result.starts_failed = multi.failed;
+  result.starts_agreeing = multi.agreeing;
+  result.waterfall = waterfall(multi.end_deviances);
+  result.minima = std::move(multi.minima);
+  result.best = result.minima.front().minimum;
+  if (inflation) threshold.inflation = inflation(result.best.natural);
+  result.inflation = threshold.inflation;
+  result.covariance = linear_covariance(function, parameters, result.best, threshold);
+  for (const FitParameter& p : parameters) {
+    ParameterResult r;
+    r.parameter = p;
+    result.parameters.push_back(std::move(r));
+  }
+  if (profiles && function.residual_count() <= kMostProfiled) {
+    profile_all(function, result, parameters, threshold);
+  } else if (profiles) {
+    // With so many readings the likelihood is a parabola as far as the interval reaches.
+    linear_intervals(result, parameters, threshold);
+    result.flags.push_back(
+        fmt::format("{} readings: the intervals come from the covariance, not from profiles",
+                    function.residual_count()));
+  }
+  result.degrees_of_freedom = threshold.data_count - threshold.parameter_count;
+  result.variance_factor = threshold.scale_known || result.degrees_of_freedom > 0
+                               ? threshold.variance_factor(result.best.deviance)
+                               : 1.0;
+  describe_parameters(result, threshold.level, profiles);
+  result.weakest_words = weakest_direction_words(result);
+  return result;
+}
+
+}  // namespace tpm

@@ -1,0 +1,46 @@
+#include "tpm/fit/hypothesis_test.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/error.hpp"
+#include "tpm/fit/verdict.hpp"
+
+namespace tpm {
+
+HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitResult& fit,
+                                 std::span<const FitParameter> parameters,
+                                 const Hypothesis& hypothesis, const Threshold& threshold) {
+  HypothesisResult result;
+  result.hypothesis = hypothesis;
+  FixedMask fixed(parameters.size(), false);
+  std::vector<std::vector<double>> starts{fit.best.natural};
+  for (auto& start : latin_hypercube_starts(parameters, 10, fit.config.seed)) {
+    starts.push_back(std::move(start));
+  }
+  for (const auto& [name, value] : hypothesis.values) {
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      if (parameters[i].name != name) continue;
+      fixed[i] = true;
+      for (auto& start : starts) start[i] = value;
+    }
+  }
+  for (const auto& start : starts) {
+    const Minimum m = minimise(function, parameters, start, fixed);
+    const bool deeper = !result.minimum.usable || m.deviance < result.minimum.deviance;
+    if (m.usable && deeper) result.minimum = m;
+  }
+  if (!result.minimum.usable) {
+    throw Error(ExitCode::numerical, fmt::format("hypothesis '{}'", hypothesis.name),
+                "the model cannot be evaluated there");
+  }
+  const int constrained = static_cast<int>(hypothesis.values.size());
+  result.rise = std::max(result.minimum.deviance - fit.best.deviance, 0.0);
+  result.p_value = threshold.p_value(result.rise, fit.best.deviance, constrained);
+  result.excluded = result.p_value < 1.0 - threshold.level;
+  result.words = hypothesis_words(result, threshold.level);
+  return result;
+}
+
+}  // namespace tpm

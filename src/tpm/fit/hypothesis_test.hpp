@@ -1,0 +1,17 @@
+#pragma once
+#include <span>
+
+#include "tpm/fit/fit.hpp"
+
+namespace tpm {
+
+/// Fits again with the hypothesis' parameters held, from the best fit and ten other starts, and
+/// asks whether the rise of the deviance excludes it. Throws Error(numerical) if the model cannot
+/// be evaluated there.
+[[nodiscard]] HypothesisResult test_hypothesis(const ExperimentResiduals& function,
+                                               const FitResult& fit,
+                                               std::span<const FitParameter> parameters,
+                                               const Hypothesis& hypothesis,
+                                               const Threshold& threshold);
+
+}  // namespace tpm
