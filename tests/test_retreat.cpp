@@ -7,6 +7,8 @@
 #include "tpm/core/random.hpp"
 #include "tpm/law/contact_retreat.hpp"
 #include "tpm/law/law_model.hpp"
+#include "tpm/report/recording_report.hpp"
+#include "tpm/study/selection.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;
@@ -327,4 +329,56 @@ TEST_CASE("the jitter of a measured depth does not end the prediction", "[retrea
       law.respond(path.protocol(), times, branches.values(), Want::values).value;
   REQUIRE(noisy.allFinite());
   CHECK((noisy - clean).cwiseAbs().maxCoeff() < 0.01 * clean.maxCoeff());
+}
+
+TEST_CASE("a fit predicts the unloading of a Hertz contact, and says where it predicts nothing",
+          "[retreat]") {
+  const TwoBranches branches;
+  const LawModel law(parse_law_name("hertz-2", "test"));
+  // Down, held, up and, beyond the law, down again.
+  const std::vector<Knot> corners{{0.0, -2e-4}, {1.0, 3e-3},   {8.0, 3e-3},
+                                  {9.5, -2e-4}, {10.0, -2e-4}, {11.0, 3e-3}};
+  Recording recording;
+  std::size_t corner = 0;
+  for (int i = 0; i <= 550; ++i) {
+    const double t = std::min(0.02 * i, corners.back().time_s);
+    while (corner + 2 < corners.size() && t > corners[corner + 1].time_s) ++corner;
+    const Knot& a = corners[corner];
+    const Knot& b = corners[corner + 1];
+    recording.time_s.push_back(t);
+    recording.drive.push_back(a.value +
+                              (b.value - a.value) * (t - a.time_s) / (b.time_s - a.time_s));
+  }
+  Protocol once = measured_history(Drive::displacement, recording.time_s, recording.drive);
+  once.set_relaxed_at_start(true);
+  const Response r = law.respond(once, recording.time_s, branches.values(), Want::values);
+  Random random(9);
+  const double sigma = 0.005 * r.value[50];
+  std::size_t unknown = 0;
+  for (const double f : r.value) {
+    unknown += std::isfinite(f) ? 0 : 1;
+    recording.response.push_back((std::isfinite(f) ? f : 0.1) + sigma * random.normal());
+  }
+  REQUIRE(unknown > 30);
+  REQUIRE(unknown < 60);
+  const std::vector<PreparedRecording> one{prepare_recording("cycle", recording)};
+  SetupOptions setup;
+  setup.profiles = false;
+  const FitResult fit =
+      run_fit(recording_config(parse_law_name("hertz-2", "test"), one, setup), data_sets(one));
+  const RecordingFit& fitted = fit.recordings.front();
+  CHECK(fitted.not_predicted > 30);
+  REQUIRE(fitted.rms_outside);
+  CHECK(*fitted.rms_outside < 1.3 * sigma);  // the unloading is predicted to the noise
+  CHECK(to_json(fit)["recordings"][0]["samples_not_predicted"] == fitted.not_predicted);
+  CHECK(to_json(fit)["flags"].dump().find("not predicted") != std::string::npos);
+  const auto words = outside_words(fit);
+  REQUIRE(words.size() == 2);
+  CHECK_THAT(words[0], Catch::Contains("the prediction is off") && !Catch::Contains("describe"));
+  CHECK_THAT(words[1], Catch::Contains("are not predicted"));
+  const Figure figure = recording_figure(fit, 0);
+  CHECK_NOTHROW(to_json(std::vector<Figure>{figure}));
+  for (const Series& s : figure.panels.front().series) {
+    if (s.label == "law, predicted") CHECK(s.x.back() < 11.0);
+  }
 }

@@ -321,7 +321,8 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values,
     KelvinChain chain;
     chain.k0 = values[0];
     chain.k.assign(values.begin() + 1, values.begin() + 1 + spec_.branches);
-    chain.T_s.assign(values.begin() + 1 + spec_.branches, values.begin() + 1 + 2 * spec_.branches);
+    const auto times = values.subspan(1 + n, n);
+    chain.T_s.assign(times.begin(), times.end());
     ParallelWithSlopes parallel = to_parallel_with_slopes(chain);
     std::vector<double> flat{parallel.law.k_inf};
     flat.insert(flat.end(), parallel.law.k.begin(), parallel.law.k.end());
