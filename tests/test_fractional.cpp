@@ -1,16 +1,14 @@
 // Fractional memory: the Mittag-Leffler function against a table in 25 digits, the exponential sums
 // against it, weights against high-precision arithmetic, histories against exact superposition.
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <catch2/catch.hpp>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
 #include <sstream>
 
+#include "fractional_reference.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/solve/cardinal_weight.hpp"
@@ -24,55 +22,6 @@ using Catch::Matchers::WithinRel;
 using Quad = boost::multiprecision::cpp_bin_float_100;
 
 namespace {
-
-constexpr double kAlphas[] = {0.01, 0.05, 0.1,  0.25, 0.4999, 0.5,      0.5001,    0.66, 0.7,
-                              0.9,  0.96, 0.97, 0.99, 0.999,  0.999999, 1 - 1e-12, 1.0};
-
-/// E_alpha(-(t/tau)^alpha), and t E_{alpha,2}, its integral from 0 to t.
-double relaxation(double alpha, double tau, double t) {
-  return mittag_leffler(alpha, 1.0, std::pow(t / tau, alpha));
-}
-double relaxation_integral(double alpha, double tau, double t) {
-  return t > 0.0 ? t * mittag_leffler(alpha, 2.0, std::pow(t / tau, alpha)) : 0.0;
-}
-
-/// d E_alpha(-(t/tau)^alpha) / d ln tau = z E_{alpha,alpha}(-z) with z = (t/tau)^alpha.
-double relaxation_by_log_tau(double alpha, double tau, double t) {
-  const double z = std::pow(t / tau, alpha);
-  return z * mittag_leffler(alpha, alpha, z);
-}
-
-double springpot(double alpha, double t) {
-  return alpha < 1.0 ? std::pow(t, -alpha) / std::tgamma(1.0 - alpha) : 0.0;
-}
-double springpot_integral(double alpha, double t) {
-  return t > 0.0 ? std::pow(t, 1.0 - alpha) / std::tgamma(2.0 - alpha) : 0.0;
-}
-
-/// n numbers from `low` to `high`, evenly on a logarithmic axis.
-std::vector<double> decades(double low, double high, int n) {
-  std::vector<double> x(static_cast<std::size_t>(n));
-  for (int i = 0; i < n; ++i) {
-    x[static_cast<std::size_t>(i)] = low * std::pow(high / low, i / (n - 1.0));
-  }
-  return x;
-}
-
-/// The derivatives of the weights, as weights.
-FractionalWeights by_alpha(const FractionalWeights& w) {
-  FractionalWeights d;
-  d.weight = w.d_weight_d_alpha;
-  d.constant = w.d_constant_d_alpha;
-  d.dashpot_s = w.d_dashpot_d_alpha_s;
-  return d;
-}
-FractionalWeights by_log_tau(const FractionalWeights& w) {
-  FractionalWeights d;
-  d.weight = w.d_weight_d_log_tau;
-  d.constant = w.d_constant_d_log_tau;
-  d.dashpot_s = w.d_dashpot_d_log_tau_s;
-  return d;
-}
 
 /// (a - b)/h for every part.
 FractionalWeights difference(const FractionalWeights& a, const FractionalWeights& b, double h) {
@@ -475,51 +424,6 @@ TEST_CASE("weights of the Mittag-Leffler relaxation are positive where they can 
     memory.mittag_leffler(1.0, tau, w);
     CHECK(w.weight.minCoeff() > -0.25);
     CHECK(w.weight.cwiseAbs().sum() < 4.0);
-  }
-}
-
-// Prints the numbers of docs/fractional.md: build/ci/tests/test_fractional "[measure]"
-TEST_CASE("measured errors, rates and times of the exponential sums", "[.][measure]") {
-  fmt::print(
-      "window tolerance rates   worst M   worst mean of M   worst P/P(t_min)   "
-      "worst dM/d(ln tau)   us/call\n");
-  for (const double span : {1e2, 1e4, 1e8}) {
-    for (const double tolerance : {1e-6, 1e-9, 1e-11}) {
-      const FractionalMemory memory(1.0, span, tolerance);
-      FractionalWeights w;
-      double worst = 0.0;
-      double worst_integral = 0.0;
-      double worst_springpot = 0.0;
-      double worst_slope = 0.0;
-      double spent = 0.0;
-      int calls = 0;
-      for (const double alpha : kAlphas) {
-        for (const double tau : decades(1e-3, 1e3 * span, 53)) {
-          const auto start = std::chrono::steady_clock::now();
-          memory.mittag_leffler(alpha, tau, w);
-          spent += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-          ++calls;
-          for (const double t : decades(1.0, span, 31)) {
-            worst = std::max(worst, std::abs(memory.at(w, t) - relaxation(alpha, tau, t)));
-            const double slope = relaxation_by_log_tau(alpha, tau, t);
-            worst_slope = std::max(worst_slope, std::abs(memory.at(by_log_tau(w), t) - slope));
-            worst_integral = std::max(
-                worst_integral,
-                std::abs(memory.integral_s(w, t) - relaxation_integral(alpha, tau, t)) / t);
-          }
-        }
-        memory.springpot(alpha, w);
-        for (const double t : decades(1.0, span, 31)) {
-          if (alpha == 1.0) continue;
-          worst_springpot =
-              std::max(worst_springpot,
-                       std::abs(memory.at(w, t) - springpot(alpha, t)) / springpot(alpha, 1.0));
-        }
-      }
-      fmt::print("{:6.0e} {:9.0e} {:5} {:9.1e} {:17.1e} {:18.1e} {:20.1e} {:9.1f}\n", span,
-                 tolerance, memory.rates_per_s().size(), worst, worst_integral, worst_springpot,
-                 worst_slope, 1e6 * spent / calls);
-    }
   }
 }
 

@@ -1,8 +1,5 @@
 // Fractional laws through the law model: ramps, random histories, integer orders, creep, jumps.
-#include <fmt/format.h>
-
 #include <catch2/catch.hpp>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -179,48 +176,16 @@ TEST_CASE("creep under a step of load is the exact compliance", "[fractional]") 
     spec.reference = 0.01;
     const LawModel law(spec);
     for (const double alpha : {0.2, 0.5, 0.8, 0.95, 1.0}) {
-      const auto start = std::chrono::steady_clock::now();
       const auto depth =
           law.respond(creep(0.2, 40.0), times, values_of(element, alpha), Want::values).value;
-      const double spent =
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       double worst = 0.0;
       for (std::size_t i = 0; i < times.size(); ++i) {
         const double exact = 0.2 * compliance(element, alpha, times[i]);
         const double off = std::abs(depth[static_cast<Eigen::Index>(i)] - exact);
         worst = std::max(worst, exact > 0.0 ? off / exact : off);
       }
-      INFO(element.name << ", alpha " << alpha << ": " << worst << " in " << spent << " s");
+      INFO(element.name << ", alpha " << alpha << ": " << worst);
       CHECK(worst < (element.relaxes ? 1e-9 : 5e-6));
-    }
-  }
-}
-
-// Prints the numbers of docs/laws.md: build/ci/tests/test_fractional_law "[measure]"
-TEST_CASE("time of a fractional response with sensitivities", "[.][measure]") {
-  for (const char* name : {"linear-fspringpot", "linear-fzener", "power-fzener"}) {
-    const LawModel law(parse_law_name(name, "test"));
-    std::vector<double> values;
-    for (const LawParameter& p : law.law_parameters()) {
-      values.push_back(p.preset.value_or(p.name == "alpha" ? 0.4 : 1.5));
-    }
-    for (const bool even : {true, false}) {
-      Random random(1);
-      std::vector<double> times;
-      std::vector<double> depth;
-      for (int i = 0; i < 500; ++i) {
-        times.push_back(0.06 * (i + (even ? 0.0 : 0.5 * random.uniform())));
-        depth.push_back(4e-3 * std::min(1.0, i / 50.0));
-      }
-      const Protocol protocol = measured_history(Drive::displacement, times, depth);
-      for (const Want want : {Want::values, Want::values_and_sensitivity}) {
-        const auto start = std::chrono::steady_clock::now();
-        for (int k = 0; k < 20; ++k) (void)law.respond(protocol, times, values, want);
-        const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-        fmt::print("{} {} {}: {:.3f} ms\n", name, even ? "even" : "uneven",
-                   want == Want::values ? "values" : "with sensitivities",
-                   1e3 * spent.count() / 20.0);
-      }
     }
   }
 }

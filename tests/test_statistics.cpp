@@ -219,8 +219,8 @@ TEST_CASE("an error law is read and refused by name") {
     CHECK(parse_error_shape(error_shape_name(shape), "x") == shape);
   }
   CHECK_THROWS_WITH(parse_error_shape("cauchy", "fit.json"),
-                    "fit.json: unknown noise distribution 'cauchy'; expected normal, laplace or "
-                    "student_t");
+                    "fit.json: unknown noise distribution 'cauchy'; expected one of normal, "
+                    "laplace, student_t");
   CHECK_THROWS_WITH(require_valid({ErrorShape::student_t, ErrorScale::linear, 2.0}, "fit.json"),
                     Contains("expected a number above 2"));
   CHECK_NOTHROW(require_valid({ErrorShape::laplace, ErrorScale::linear, 0.0}, "fit.json"));

@@ -8,15 +8,10 @@
 #include <utility>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/word_table.hpp"
 
 namespace tpm {
 namespace {
-
-template <typename Enum>
-struct Word {
-  Enum meaning;
-  std::string_view text;
-};
 
 constexpr auto kProvenances = std::to_array<Word<Provenance>>({
     {Provenance::table, "table"},
@@ -56,24 +51,6 @@ constexpr auto kQuantities = std::to_array<QuantityWords>({
     {Quantity::abscissa, "abscissa", "x", Dimension::dimensionless},
     {Quantity::ordinate, "ordinate", "y", Dimension::dimensionless},
 });
-
-template <typename Words, typename Enum>
-const auto& entry_of(const Words& words, Enum meaning) noexcept {
-  return *std::find_if(words.begin(), words.end(),
-                       [meaning](const auto& word) { return word.meaning == meaning; });
-}
-
-template <typename Words>
-auto parse_word(const Words& words, std::string_view kind, std::string_view text,
-                std::string_view where) {
-  std::string known;
-  for (const auto& word : words) {
-    if (word.text == text) return word.meaning;
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", word.text);
-  }
-  throw bad_input(where, fmt::format("unknown {} '{}'", kind, printable(text)),
-                  fmt::format("one of {}", known));
-}
 
 void require_quantity(const CurveHeader& header, Quantity found, Quantity wanted) {
   if (found == wanted) return;

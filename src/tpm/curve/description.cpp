@@ -6,11 +6,13 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr std::array<Bound, 4> kBounds = {Bound::value, Bound::lower, Bound::upper, Bound::sd};
+constexpr auto kBounds = std::to_array<Word<Bound>>(
+    {{Bound::value, "value"}, {Bound::lower, "lower"}, {Bound::upper, "upper"}, {Bound::sd, "sd"}});
 
 std::string text_of(const Json& object, const char* key) {
   return object.contains(key) ? object.at(key).get<std::string>() : std::string();
@@ -19,14 +21,6 @@ std::string text_of(const Json& object, const char* key) {
 std::optional<Provenance> provenance_of(const Json& object, const std::string& where) {
   if (!object.contains("provenance")) return std::nullopt;
   return parse_provenance(object.at("provenance").get<std::string>(), where + "/provenance");
-}
-
-Bound parse_bound(const std::string& text, const std::string& where) {
-  for (const Bound bound : kBounds) {
-    if (bound_name(bound) == text) return bound;
-  }
-  throw bad_input(where, fmt::format("unknown bound '{}'", printable(text)),
-                  "one of value, lower, upper, sd");
 }
 
 /// A header such as force_mN must not be described as newtons.
@@ -46,7 +40,8 @@ ColumnDescription read_column(const std::string& name, const Json& json, const s
   column.quantity = parse_quantity_name(json.at("quantity").get<std::string>(), where);
   column.unit = parse_unit(text_of(json, "unit"), quantity_dimension(column.quantity), where);
   require_unit_of_name(name, column.unit, where);
-  if (json.contains("bound")) column.bound = parse_bound(text_of(json, "bound"), where);
+  if (json.contains("bound"))
+    column.bound = parse_word(kBounds, "bound", text_of(json, "bound"), where);
   column.provenance = provenance_of(json, where);
   column.note = text_of(json, "note");
   return column;
@@ -113,17 +108,7 @@ Json column_json(const ColumnDescription& column) {
 }  // namespace
 
 std::string_view bound_name(Bound bound) noexcept {
-  switch (bound) {
-    case Bound::value:
-      return "value";
-    case Bound::lower:
-      return "lower";
-    case Bound::upper:
-      return "upper";
-    case Bound::sd:
-      return "sd";
-  }
-  return "";
+  return entry_of(kBounds, bound).text;
 }
 
 CurveDescription read_description(const std::filesystem::path& path) {

@@ -8,6 +8,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 #include "tpm/curve/assemble.hpp"
 #include "tpm/curve/import_digitizer.hpp"
 #include "tpm/curve/import_machine.hpp"
@@ -16,12 +17,7 @@
 namespace tpm {
 namespace {
 
-struct FormatWord {
-  ImportFormat format;
-  std::string_view text;
-};
-
-constexpr auto kFormats = std::to_array<FormatWord>({
+constexpr auto kFormats = std::to_array<Word<ImportFormat>>({
     {ImportFormat::automatic, "auto"},
     {ImportFormat::machine, "machine"},
     {ImportFormat::wpd_csv, "wpd-csv"},
@@ -128,17 +124,11 @@ ImportedFile import_table(const DelimitedTable& table, const std::string& file,
 }  // namespace
 
 std::string_view import_format_name(ImportFormat format) noexcept {
-  return std::find_if(kFormats.begin(), kFormats.end(),
-                      [format](const FormatWord& word) { return word.format == format; })
-      ->text;
+  return entry_of(kFormats, format).text;
 }
 
 ImportFormat parse_import_format(std::string_view text, std::string_view where) {
-  for (const FormatWord& word : kFormats) {
-    if (word.text == text) return word.format;
-  }
-  throw bad_input(where, fmt::format("unknown format '{}'", printable(text)),
-                  "auto, machine, wpd-csv, wpd-json or engauge");
+  return parse_word(kFormats, "format", text, where);
 }
 
 DigitizedAxis parse_axis(std::string_view text, std::string_view where) {

@@ -5,14 +5,19 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 #include "tpm/fit/config_parts.hpp"
 
 namespace tpm {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
-constexpr std::array kProtocolKinds{Kind::ramp_hold, Kind::step_hold, Kind::static_,
-                                    Kind::creep,     Kind::measured,  Kind::oscillation};
+constexpr auto kProtocolKinds = std::to_array<Word<Kind>>({{Kind::ramp_hold, "ramp_hold"},
+                                                           {Kind::step_hold, "step_hold"},
+                                                           {Kind::static_, "static"},
+                                                           {Kind::creep, "creep"},
+                                                           {Kind::measured, "measured"},
+                                                           {Kind::oscillation, "oscillation"}});
 
 /// What only oscillations have.
 void parse_oscillation(const Json& j, const std::optional<LawSpec>& law, ProtocolChoice& protocol,
@@ -40,13 +45,7 @@ ProtocolChoice parse_protocol(const Json& j, const std::optional<LawSpec>& law,
                               const DocumentPlace& place) {
   ProtocolChoice protocol;
   const auto name = j.at("kind").get<std::string>();
-  const auto* kind = std::find_if(kProtocolKinds.begin(), kProtocolKinds.end(),
-                                  [&](Kind k) { return protocol_kind_name(k) == name; });
-  if (kind == kProtocolKinds.end()) {
-    throw bad_input(place.key("kind").where, fmt::format("unknown protocol '{}'", printable(name)),
-                    "ramp_hold, step_hold, static, creep, measured or oscillation");
-  }
-  protocol.kind = *kind;
+  protocol.kind = parse_word(kProtocolKinds, "protocol", name, place.key("kind").where);
   if (protocol.kind == Kind::ramp_hold) {
     if (!j.contains("rate")) throw bad_input(place.where, "no rate", "a rate such as \"4 mm/s\"");
     protocol.rate_m_per_s = quantity_at(j, "rate", Dimension::speed, place);
@@ -145,21 +144,7 @@ DataChoice parse_data(const Json& j, const FitConfig& config, const DocumentPlac
 }
 
 std::string_view protocol_kind_name(Kind kind) noexcept {
-  switch (kind) {
-    case Kind::ramp_hold:
-      return "ramp_hold";
-    case Kind::step_hold:
-      return "step_hold";
-    case Kind::static_:
-      return "static";
-    case Kind::creep:
-      return "creep";
-    case Kind::measured:
-      return "measured";
-    case Kind::oscillation:
-      return "oscillation";
-  }
-  return "";
+  return entry_of(kProtocolKinds, kind).text;
 }
 
 bool Selector::matches(const Datum& datum) const {

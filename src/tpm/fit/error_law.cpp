@@ -11,11 +11,14 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr std::array kShapes{ErrorShape::normal, ErrorShape::laplace, ErrorShape::student_t};
+constexpr auto kShapes = std::to_array<Word<ErrorShape>>({{ErrorShape::normal, "normal"},
+                                                          {ErrorShape::laplace, "laplace"},
+                                                          {ErrorShape::student_t, "student_t"}});
 
 /// ln p(z) of the standardised error.
 double standard_log_density(const ErrorLaw& law, double z) {
@@ -35,23 +38,11 @@ double standard_log_density(const ErrorLaw& law, double z) {
 }  // namespace
 
 std::string_view error_shape_name(ErrorShape shape) noexcept {
-  switch (shape) {
-    case ErrorShape::normal:
-      return "normal";
-    case ErrorShape::laplace:
-      return "laplace";
-    case ErrorShape::student_t:
-      return "student_t";
-  }
-  return "";
+  return entry_of(kShapes, shape).text;
 }
 
 ErrorShape parse_error_shape(std::string_view text, std::string_view where) {
-  for (const ErrorShape shape : kShapes) {
-    if (text == error_shape_name(shape)) return shape;
-  }
-  throw bad_input(where, fmt::format("unknown noise distribution '{}'", printable(text)),
-                  "normal, laplace or student_t");
+  return parse_word(kShapes, "noise distribution", text, where);
 }
 
 void require_valid(const ErrorLaw& law, std::string_view where) {

@@ -7,12 +7,15 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr std::array kResamplings{Resampling::residuals, Resampling::blocks,
-                                  Resampling::recordings};
+constexpr auto kResamplings =
+    std::to_array<Word<Resampling>>({{Resampling::residuals, "residuals"},
+                                     {Resampling::blocks, "blocks"},
+                                     {Resampling::recordings, "recordings"}});
 
 /// A parameter of some data sets only goes unseen in draws that leave them out.
 void require_shared_parameters(const FitConfig& config) {
@@ -35,23 +38,11 @@ void require_shared_parameters(const FitConfig& config) {
 }  // namespace
 
 std::string_view resampling_name(Resampling resampling) noexcept {
-  switch (resampling) {
-    case Resampling::residuals:
-      return "residuals";
-    case Resampling::blocks:
-      return "blocks";
-    case Resampling::recordings:
-      return "recordings";
-  }
-  return "";
+  return entry_of(kResamplings, resampling).text;
 }
 
 Resampling parse_resampling(std::string_view text, std::string_view where) {
-  for (const Resampling resampling : kResamplings) {
-    if (text == resampling_name(resampling)) return resampling;
-  }
-  throw bad_input(where, fmt::format("unknown resampling '{}'", printable(text)),
-                  "residuals, blocks or recordings");
+  return parse_word(kResamplings, "resampling", text, where);
 }
 
 ExperimentRefit::ExperimentRefit(const ExperimentResiduals& function) : function_(function) {

@@ -8,41 +8,31 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr std::array kNoiseKinds{
-    NoiseKind::relative_to_datum, NoiseKind::absolute, NoiseKind::combined,
-    NoiseKind::per_row,           NoiseKind::log,      NoiseKind::relative_to_model};
-constexpr std::array kLosses{Loss::none, Loss::huber, Loss::cauchy};
+constexpr auto kNoiseKinds = std::to_array<Word<NoiseKind>>({
+    {NoiseKind::relative_to_datum, "relative_to_datum"},
+    {NoiseKind::absolute, "absolute"},
+    {NoiseKind::combined, "combined"},
+    {NoiseKind::per_row, "per_row"},
+    {NoiseKind::log, "log"},
+    {NoiseKind::relative_to_model, "relative_to_model"},
+});
+
+constexpr auto kLosses = std::to_array<Word<Loss>>(
+    {{Loss::none, "none"}, {Loss::huber, "huber"}, {Loss::cauchy, "cauchy"}});
 
 }  // namespace
 
 std::string_view noise_kind_name(NoiseKind kind) noexcept {
-  switch (kind) {
-    case NoiseKind::relative_to_datum:
-      return "relative_to_datum";
-    case NoiseKind::absolute:
-      return "absolute";
-    case NoiseKind::combined:
-      return "combined";
-    case NoiseKind::per_row:
-      return "per_row";
-    case NoiseKind::log:
-      return "log";
-    case NoiseKind::relative_to_model:
-      return "relative_to_model";
-  }
-  return "";
+  return entry_of(kNoiseKinds, kind).text;
 }
 
 NoiseKind parse_noise_kind(std::string_view text, std::string_view where) {
-  for (const NoiseKind kind : kNoiseKinds) {
-    if (text == noise_kind_name(kind)) return kind;
-  }
-  throw bad_input(where, fmt::format("unknown noise kind '{}'", printable(text)),
-                  "relative_to_datum, absolute, combined, per_row, log or relative_to_model");
+  return parse_word(kNoiseKinds, "noise kind", text, where);
 }
 
 bool uses_relative(NoiseKind kind) {
@@ -55,23 +45,11 @@ bool uses_absolute(NoiseKind kind) {
 }
 
 std::string_view loss_name(Loss loss) noexcept {
-  switch (loss) {
-    case Loss::none:
-      return "none";
-    case Loss::huber:
-      return "huber";
-    case Loss::cauchy:
-      return "cauchy";
-  }
-  return "";
+  return entry_of(kLosses, loss).text;
 }
 
 Loss parse_loss(std::string_view text, std::string_view where) {
-  for (const Loss loss : kLosses) {
-    if (text == loss_name(loss)) return loss;
-  }
-  throw bad_input(where, fmt::format("unknown loss '{}'", printable(text)),
-                  "none, huber or cauchy");
+  return parse_word(kLosses, "loss", text, where);
 }
 
 ErrorLaw error_law(const Noise& noise) {

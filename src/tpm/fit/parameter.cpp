@@ -3,31 +3,27 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 
 namespace tpm {
+namespace {
+
+constexpr auto kScales = std::to_array<Word<Scale>>(
+    {{Scale::log, "log"}, {Scale::linear, "linear"}, {Scale::inverse_square, "inverse_square"}});
+
+}  // namespace
 
 Scale parse_scale(std::string_view text, std::string_view where) {
-  for (const Scale scale : {Scale::log, Scale::linear, Scale::inverse_square}) {
-    if (text == scale_name(scale)) return scale;
-  }
-  throw bad_input(where, fmt::format("unknown scale '{}'", printable(text)),
-                  "log, linear or inverse_square");
+  return parse_word(kScales, "scale", text, where);
 }
 
 std::string_view scale_name(Scale scale) noexcept {
-  switch (scale) {
-    case Scale::log:
-      return "log";
-    case Scale::linear:
-      return "linear";
-    case Scale::inverse_square:
-      return "inverse_square";
-  }
-  return "";
+  return entry_of(kScales, scale).text;
 }
 
 double FitParameter::theta(double p) const {

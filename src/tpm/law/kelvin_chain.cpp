@@ -300,6 +300,24 @@ Prony to_parallel(const KelvinChain& chain) {
   return {c.first, c.k, c.time};
 }
 
+namespace {
+
+/// The values of converted coefficients and, from row 1 on, the slopes of the k's, then the times'.
+void take_units(const Coefficients<SlopeJet>& c, std::vector<double>& k,
+                std::vector<double>& time_s, Eigen::MatrixXd& slopes) {
+  const auto n = static_cast<Eigen::Index>(c.k.size());
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const SlopeJet& stiffness = c.k[static_cast<std::size_t>(i)];
+    const SlopeJet& time = c.time[static_cast<std::size_t>(i)];
+    k.push_back(stiffness.a);
+    time_s.push_back(time.a);
+    put_row(slopes, 1 + i, stiffness);
+    put_row(slopes, 1 + n + i, time);
+  }
+}
+
+}  // namespace
+
 ParallelWithSlopes to_parallel_with_slopes(const KelvinChain& chain) {
   require_coefficients(chain.k0, chain.k, chain.T_s, "Kelvin chain");
   const Coefficients<SlopeJet> c = parallel_of(as_jets(chain.k0, chain.k, chain.T_s));
@@ -308,12 +326,7 @@ ParallelWithSlopes to_parallel_with_slopes(const KelvinChain& chain) {
   result.slopes.resize(2 * n + 1, 2 * n + 1);
   result.law.k_inf = c.first.a;
   put_row(result.slopes, 0, c.first);
-  for (std::size_t i = 0; i < c.k.size(); ++i) {
-    result.law.k.push_back(c.k[i].a);
-    result.law.tau_s.push_back(c.time[i].a);
-    put_row(result.slopes, 1 + static_cast<Eigen::Index>(i), c.k[i]);
-    put_row(result.slopes, 1 + n + static_cast<Eigen::Index>(i), c.time[i]);
-  }
+  take_units(c, result.law.k, result.law.tau_s, result.slopes);
   return result;
 }
 
@@ -326,12 +339,7 @@ SeriesWithSlopes to_series_with_slopes(const Prony& law) {
                        2 * static_cast<Eigen::Index>(law.k.size()) + 1);
   result.chain.k0 = c.first.a;
   put_row(result.slopes, 0, c.first);
-  for (std::size_t i = 0; i < c.k.size(); ++i) {
-    result.chain.k.push_back(c.k[i].a);
-    result.chain.T_s.push_back(c.time[i].a);
-    put_row(result.slopes, 1 + static_cast<Eigen::Index>(i), c.k[i]);
-    put_row(result.slopes, 1 + units + static_cast<Eigen::Index>(i), c.time[i]);
-  }
+  take_units(c, result.chain.k, result.chain.T_s, result.slopes);
   if (c.fluid) {
     result.chain.eta = c.eta.a;
     put_row(result.slopes, 2 * units + 1, c.eta);

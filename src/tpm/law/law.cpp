@@ -9,42 +9,21 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 
 namespace tpm {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-struct Word {
-  std::string_view text;
-  int value;
-};
+constexpr auto kKernelWords = std::to_array<Word<Kernel>>(
+    {{Kernel::linear, "linear"}, {Kernel::hertz, "hertz"}, {Kernel::power, "power"}});
 
-constexpr std::array<Word, 3> kKernelWords{{{"linear", static_cast<int>(Kernel::linear)},
-                                            {"hertz", static_cast<int>(Kernel::hertz)},
-                                            {"power", static_cast<int>(Kernel::power)}}};
-
-constexpr std::array<Word, 4> kFractionalWords{
-    {{"fspringpot", static_cast<int>(Fractional::springpot)},
-     {"fmaxwell", static_cast<int>(Fractional::maxwell)},
-     {"fkelvin_voigt", static_cast<int>(Fractional::kelvin_voigt)},
-     {"fzener", static_cast<int>(Fractional::zener)}}};
-
-template <std::size_t N>
-const Word* find_word(const std::array<Word, N>& words, std::string_view text) {
-  for (const Word& word : words) {
-    if (word.text == text) return &word;
-  }
-  return nullptr;
-}
-
-template <std::size_t N>
-std::string_view word_of(const std::array<Word, N>& words, int value) {
-  for (const Word& word : words) {
-    if (word.value == value) return word.text;
-  }
-  return "";
-}
+constexpr auto kFractionalWords =
+    std::to_array<Word<Fractional>>({{Fractional::springpot, "fspringpot"},
+                                     {Fractional::maxwell, "fmaxwell"},
+                                     {Fractional::kelvin_voigt, "fkelvin_voigt"},
+                                     {Fractional::zener, "fzener"}});
 
 Error unknown_law(std::string_view text, std::string_view where) {
   return bad_input(
@@ -60,10 +39,10 @@ bool is_stretch(const LawSpec& spec) {
 }  // namespace
 
 std::string law_name(const LawSpec& spec) {
-  std::string name(word_of(kKernelWords, static_cast<int>(spec.kernel)));
+  std::string name(entry_of(kKernelWords, spec.kernel).text);
   if (spec.fractional != Fractional::none) {
     name += '-';
-    name += word_of(kFractionalWords, static_cast<int>(spec.fractional));
+    name += entry_of(kFractionalWords, spec.fractional).text;
   } else if (spec.branches > 0) {
     name += fmt::format("-{}", spec.branches);
   }
@@ -83,11 +62,11 @@ LawSpec parse_law_name(std::string_view text, std::string_view where) {
     const std::string_view word = text.substr(begin, end - begin);
     begin = end + 1;
     if (part == 0) {
-      const Word* kernel = find_word(kKernelWords, word);
+      const auto* kernel = find_entry(kKernelWords, word);
       if (kernel == nullptr) throw unknown_law(text, where);
-      spec.kernel = static_cast<Kernel>(kernel->value);
-    } else if (const Word* fractional = find_word(kFractionalWords, word)) {
-      spec.fractional = static_cast<Fractional>(fractional->value);
+      spec.kernel = kernel->meaning;
+    } else if (const auto* fractional = find_entry(kFractionalWords, word)) {
+      spec.fractional = fractional->meaning;
     } else if (word == "elastic") {
       spec.tension = Tension::elastic;
     } else if (word == "relaxing") {

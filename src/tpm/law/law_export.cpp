@@ -7,6 +7,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 
 namespace tpm {
 namespace {
@@ -15,22 +16,15 @@ namespace {
 constexpr int kDigits = 10;
 
 struct TargetWord {
+  ExportTarget meaning;
   std::string_view text;
-  ExportTarget target;
   std::size_t most_terms;
 };
 // FEBio reads g1 to g6; ANSYS TB,PRONY and Abaqus take more than any law has.
-constexpr std::array<TargetWord, 4> kTargets{{{"abaqus", ExportTarget::abaqus, 50},
-                                              {"ansys", ExportTarget::ansys, 50},
-                                              {"febio", ExportTarget::febio, 6},
-                                              {"json", ExportTarget::json, 50}}};
-
-const TargetWord& word_of(ExportTarget target) {
-  for (const TargetWord& word : kTargets) {
-    if (word.target == target) return word;
-  }
-  return kTargets.front();
-}
+constexpr auto kTargets = std::to_array<TargetWord>({{ExportTarget::abaqus, "abaqus", 50},
+                                                     {ExportTarget::ansys, "ansys", 50},
+                                                     {ExportTarget::febio, "febio", 6},
+                                                     {ExportTarget::json, "json", 50}});
 
 std::string digits(double value) {
   return significant(value, kDigits);
@@ -48,7 +42,7 @@ struct Exported {
 void require_sayable(const LawFile& law, const ExportOptions& options) {
   if (options.relaxation_only) return;
   const auto refuse = [&](std::string_view what) {
-    throw bad_input(fmt::format("export to {}", word_of(options.target).text),
+    throw bad_input(fmt::format("export to {}", entry_of(kTargets, options.target).text),
                     fmt::format("the {} of {} cannot be said there", what, law_name(law.spec)),
                     "a linear or Hertz kernel without tension, or --relaxation-only");
   };
@@ -57,7 +51,7 @@ void require_sayable(const LawFile& law, const ExportOptions& options) {
 }
 
 void require_terms(const PronyTable& table, ExportTarget target) {
-  const TargetWord& word = word_of(target);
+  const TargetWord& word = entry_of(kTargets, target);
   const std::string where = fmt::format("export to {}", word.text);
   if (table.g.size() > word.most_terms) {
     throw bad_input(where, fmt::format("{} terms", table.g.size()),
@@ -189,11 +183,7 @@ std::string json_text(const Exported& e, const LawFile& law) {
 }  // namespace
 
 ExportTarget parse_export_target(std::string_view text, std::string_view where) {
-  for (const TargetWord& word : kTargets) {
-    if (word.text == text) return word.target;
-  }
-  throw bad_input(where, fmt::format("unknown program '{}'", printable(text)),
-                  fmt::format("one of {}", fmt::join(export_target_names(), ", ")));
+  return parse_word(kTargets, "program", text, where);
 }
 
 std::vector<std::string> export_target_names() {
