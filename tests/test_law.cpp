@@ -50,6 +50,7 @@ std::vector<double> random_parameters(const LawModel& law, Random& random) {
 
 std::vector<double> evenly(double from, double to, int count) {
   std::vector<double> times;
+  times.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) times.push_back(from + (to - from) * i / (count - 1));
   return times;
 }
@@ -207,7 +208,8 @@ TEST_CASE("parallel and series form are one law", "[law]") {
     const Prony back = to_parallel(chain);
     REQUIRE(back.k.size() == law.k.size());
     // The operational stiffness s G(s) times the operational compliance is 1 at every s > 0.
-    for (double s = 1e-4; s < 1e5; s *= 10.0) {
+    for (int decade = -4; decade < 5; ++decade) {
+      const double s = std::pow(10.0, decade);
       const auto stiffness = [s](const Prony& p) {
         double g = p.k_inf;
         for (std::size_t i = 0; i < p.k.size(); ++i) {

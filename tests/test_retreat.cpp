@@ -20,6 +20,7 @@ constexpr double kReference = 1e-3;
 
 std::vector<double> evenly(double from, double to, int count) {
   std::vector<double> times;
+  times.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) times.push_back(from + (to - from) * i / (count - 1));
   return times;
 }
