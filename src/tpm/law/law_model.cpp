@@ -11,6 +11,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/contact_retreat.hpp"
+#include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/kelvin_chain.hpp"
 #include "tpm/solve/exponential_sum.hpp"
 
@@ -138,7 +139,7 @@ Stops stops_for(const LawSpec& spec, const LawAtParameters& law, const Protocol&
                 std::span<const double> times_s, Want want) {
   Stops stops{{times_s.begin(), times_s.end()}, {}, {}};
   stops.edge_of.assign(times_s.size(), -1);
-  if (!depends_on_growth(spec)) return stops;
+  if (protocol.drive() == Drive::force || !depends_on_growth(spec)) return stops;
   const auto turn = find_turn(protocol, law.contact);
   if (!turn) return stops;
   std::vector<double> later;
@@ -209,6 +210,43 @@ class ShrinkWatch {
   double deepest_ = 0.0;
   bool shrunk_ = false;
 };
+
+/// The general way: any drive, with contact lost and found again.
+Response respond_by_steps(const LawSpec& spec, const LawAtParameters& law, const Protocol& protocol,
+                          const Stops& stops, Want want) {
+  const bool displacement = protocol.drive() == Drive::displacement;
+  const bool want_slopes = want == Want::values_and_sensitivity;
+  const double peak = displacement ? protocol.peak() - law.contact : law.tension.reference;
+  ContactHistory contact(law, peak, want);
+  Response response;
+  response.value.resize(std::ssize(stops.time_s));
+  if (want_slopes) response.sensitivity.resize(response.value.size(), law.parameter_count);
+  ShrinkWatch watch(!displacement && depends_on_growth(spec));
+  const auto watch_depth = [&] { watch.see(contact.drive() - law.contact); };
+  const auto answer = [&](std::size_t i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    watch_depth();
+    const std::ptrdiff_t place = stops.edge_of[i];
+    const ContactEdge* edge = place < 0 ? nullptr : &stops.edges[static_cast<std::size_t>(place)];
+    const Answer a = watch.shrunk() ? not_predicted(law.parameter_count)
+                                    : answer_of(contact, edge, law, displacement, want_slopes);
+    response.value[row] = a.value;
+    if (want_slopes) response.sensitivity.row(row) = a.slopes.matrix().transpose();
+  };
+  walk(protocol, stops.time_s, contact, answer, watch_depth);
+  return response;
+}
+
+/// A depth without jumps that the surface follows all the way, which is what recordings are fitted
+/// with; nothing where it is otherwise.
+std::optional<Response> respond_quickly(const LawAtParameters& law, const Protocol& protocol,
+                                        std::span<const double> times_s, Want want) {
+  const auto& rates = law.memory.rate_parameter;
+  const bool fixed_rates = std::find(rates.begin(), rates.end(), -1) != rates.end();
+  if (protocol.drive() != Drive::displacement || fixed_rates) return std::nullopt;
+  const auto path = drive_path(protocol, times_s);
+  return path ? respond_in_contact(law, *path, want) : std::nullopt;
+}
 
 }  // namespace
 
@@ -307,22 +345,25 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values,
   const double spacing = get("spacing", std::numeric_limits<double>::infinity(), place.spacing);
   const double contact = get("contact", 0.0, place.contact);
   const double offset = get("offset", 0.0, place.offset);
-  Prepared prepared{{{},
-                     KernelShape(spec_.kernel, spec_.reference, exponent, ratio, spacing),
-                     TensionShape{spec_.reference, spacing},
-                     k_tension,
-                     contact,
-                     offset,
-                     place,
-                     static_cast<int>(parameters_.size())},
-                    {}};
+  Prepared prepared{
+      {{},
+       KernelShape(spec_.kernel, spec_.reference, exponent,
+                   place.tension_share < 0 ? std::nullopt : std::optional(ratio), spacing),
+       TensionShape{spec_.reference, spacing},
+       k_tension,
+       contact,
+       offset,
+       place,
+       static_cast<int>(parameters_.size())},
+      {}};
   if (spec_.form == BranchForm::series) {
     const auto n = static_cast<std::size_t>(spec_.branches);
     KelvinChain chain;
     chain.k0 = values[0];
-    chain.k.assign(values.begin() + 1, values.begin() + 1 + spec_.branches);
-    const auto times = values.subspan(1 + n, n);
-    chain.T_s.assign(times.begin(), times.end());
+    const auto k = values.subspan(1, n);
+    const auto times_s = values.subspan(1 + n, n);
+    chain.k.assign(k.begin(), k.end());
+    chain.T_s.assign(times_s.begin(), times_s.end());
     ParallelWithSlopes parallel = to_parallel_with_slopes(chain);
     std::vector<double> flat{parallel.law.k_inf};
     flat.insert(flat.end(), parallel.law.k.begin(), parallel.law.k.end());
@@ -348,31 +389,12 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
   const LawAtParameters& law = prepared.law;
   const bool displacement = protocol.drive() == Drive::displacement;
   if (displacement && law.memory.dashpot > 0.0) require_no_jump(protocol, law.contact);
-  const double peak = displacement ? protocol.peak() - law.contact : spec_.reference;
-  ContactHistory contact(law, peak, want);
-  Response response;
-  response.value.resize(static_cast<Eigen::Index>(times_s.size()));
   const bool want_slopes = want == Want::values_and_sensitivity;
-  if (want_slopes) {
-    response.sensitivity.resize(response.value.size(), law.parameter_count);
-  }
-  const Stops stops = displacement ? stops_for(spec_, law, protocol, times_s, want)
-                                   : Stops{{times_s.begin(), times_s.end()},
-                                           {},
-                                           std::vector<std::ptrdiff_t>(times_s.size(), -1)};
-  ShrinkWatch watch(!displacement && depends_on_growth(spec_));
-  const auto watch_depth = [&] { watch.see(contact.drive() - law.contact); };
-  const auto answer = [&](std::size_t i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    watch_depth();
-    const std::ptrdiff_t place = stops.edge_of[i];
-    const ContactEdge* edge = place < 0 ? nullptr : &stops.edges[static_cast<std::size_t>(place)];
-    const Answer a = watch.shrunk() ? not_predicted(law.parameter_count)
-                                    : answer_of(contact, edge, law, displacement, want_slopes);
-    response.value[row] = a.value;
-    if (want_slopes) response.sensitivity.row(row) = a.slopes.matrix().transpose();
-  };
-  walk(protocol, stops.time_s, contact, answer, watch_depth);
+  Response response;
+  const Stops stops = stops_for(spec_, law, protocol, times_s, want);
+  const auto in_contact = stops.edges.empty() ? respond_quickly(law, protocol, times_s, want)
+                                              : std::optional<Response>();
+  response = in_contact ? *in_contact : respond_by_steps(spec_, law, protocol, stops, want);
   if (want_slopes && prepared.chain_slopes.size() > 0) {
     const Eigen::Index n = prepared.chain_slopes.rows();
     response.sensitivity.leftCols(n) =
