@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <vector>
@@ -11,6 +12,22 @@ namespace tpm {
 /// A depth that falls, or a contact that grows again, by less than this part of the largest depth
 /// is taken for the jitter of a measured drive. The force is off by a term of second order in it.
 inline constexpr double kContactJitter = 0.01;
+
+/// Notices when a contact under a load has begun to shrink.
+class ShrinkWatch {
+ public:
+  explicit ShrinkWatch(bool active) : active_(active) {}
+  void see(double depth) {
+    deepest_ = std::max(deepest_, depth);
+    shrunk_ = shrunk_ || (active_ && depth < (1.0 - kContactJitter) * deepest_);
+  }
+  [[nodiscard]] bool shrunk() const { return shrunk_; }
+
+ private:
+  bool active_;
+  double deepest_ = 0.0;
+  bool shrunk_ = false;
+};
 
 /// Where an imposed depth turns back for the first time, by more than the jitter.
 struct Turn {

@@ -195,22 +195,6 @@ Answer answer_of(const ContactHistory& contact, const ContactEdge* edge, const L
   return not_predicted(law.parameter_count);
 }
 
-/// Notices when a contact under a load has begun to shrink.
-class ShrinkWatch {
- public:
-  explicit ShrinkWatch(bool active) : active_(active) {}
-  void see(double depth) {
-    deepest_ = std::max(deepest_, depth);
-    shrunk_ = shrunk_ || (active_ && depth < (1.0 - kContactJitter) * deepest_);
-  }
-  [[nodiscard]] bool shrunk() const { return shrunk_; }
-
- private:
-  bool active_;
-  double deepest_ = 0.0;
-  bool shrunk_ = false;
-};
-
 /// The general way: any drive, with contact lost and found again.
 Response respond_by_steps(const LawSpec& spec, const LawAtParameters& law, const Protocol& protocol,
                           const Stops& stops, Want want) {
