@@ -17,6 +17,7 @@ struct RecoveryCommandOptions {
   std::string trials = "200";
   std::string noise = "0.01";
   std::string seed = "0";
+  std::string order = "0.4";
   std::vector<std::string> margins;
   std::string output;
 };
@@ -26,6 +27,13 @@ double parse_noise(const std::string& text) {
   if (noise > 0.0 && noise < 1.0) return noise;
   throw Error(ExitCode::usage, "--noise", fmt::format("'{}'", printable(text)),
               "a part of the peak above 0 and below 1");
+}
+
+double parse_order(const std::string& text) {
+  const double order = parse_number(text, "--order");
+  if (order > 0.0 && order < 1.0) return order;
+  throw Error(ExitCode::usage, "--order", fmt::format("'{}'", printable(text)),
+              "an order of a fractional element above 0 and below 1");
 }
 
 Json to_json(const std::vector<RecoveryResult>& results) {
@@ -43,9 +51,10 @@ int recovery(const RecoveryCommandOptions& options, const Session& session) {
     study.margins.push_back(parse_number(margin, "--margin"));
   }
   study.selection.laws = chosen_laws({}, options.family);
+  const double order = parse_order(options.order);
   std::vector<RecoveryResult> results;
   for (const LawSpec& law : chosen_laws(options.laws, options.family)) {
-    results.push_back(recover(law, visible_parameters(law), study));
+    results.push_back(recover(law, visible_parameters(law, order), study));
   }
   deliver(session.json() ? to_text(to_json(results)) : to_terminal_text(results), options.output);
   const bool all = std::all_of(results.begin(), results.end(),
@@ -71,6 +80,8 @@ void add_recovery_command(CLI::App& app, Session& session) {
   command->add_option("--noise", options->noise, "Standard deviation of the force over its peak")
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of the noise")->capture_default_str();
+  command->add_option("--order", options->order, "Order of the fractional elements that generate")
+      ->capture_default_str();
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
   command
       ->add_option("--margin", options->margins,

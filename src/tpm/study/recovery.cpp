@@ -27,11 +27,11 @@ double largest(const std::vector<double>& values) {
   return *std::max_element(values.begin(), values.end());
 }
 
-double visible_value(const LawParameter& p, int branches) {
+double visible_value(const LawParameter& p, int branches, double order) {
   constexpr double kStiffness = 200.0;  // N/m: about a newton at 5 mm
   static const std::vector<std::vector<double>> times_s = {{}, {2.0}, {0.5, 5.0}, {0.3, 2.0, 12.0}};
   if (p.preset) return *p.preset;
-  if (p.name == "alpha") return 0.4;
+  if (p.name == "alpha") return order;
   if (p.name == "exponent") return 2.2;
   if (p.name == "tension_share") return 0.5;
   if (p.dimension != Dimension::time) return kStiffness;
@@ -203,10 +203,10 @@ Recording simulated_recording(const LawSpec& law, std::span<const double> parame
   return recording;
 }
 
-std::vector<double> visible_parameters(const LawSpec& law) {
+std::vector<double> visible_parameters(const LawSpec& law, double order) {
   std::vector<double> values;
   for (const LawParameter& p : law_parameters(law)) {
-    values.push_back(visible_value(p, law.branches));
+    values.push_back(visible_value(p, law.branches, order));
   }
   return values;
 }

@@ -28,7 +28,8 @@ struct SimulatedTest {
 
 /// Parameters with which every part of the law shows on the default test, SI: relaxation times a
 /// factor of about 10 apart within the record, stiffnesses of similar size.
-[[nodiscard]] std::vector<double> visible_parameters(const LawSpec& law);
+/// @param order alpha of a fractional element, 0 to 1
+[[nodiscard]] std::vector<double> visible_parameters(const LawSpec& law, double order = 0.4);
 
 struct RecoveryOptions {
   SimulatedTest test;
