@@ -6,9 +6,11 @@
 A synthetic ramp-and-hold recording of 500 samples (law linear-1: k_inf, k1, tau1 and an offset;
 1 % noise, fixed seed) is fitted with profile likelihoods by both. The scipy script uses the same
 exact update of the relaxing branch (as a digital filter, which is the fast way in Python), the
-same number of starts and the same profile thresholds. Process time is user + system of the whole
-process; the interpreter's start and imports are also reported apart, and left out of the second
-ratio. --large adds a recording of 1,000,000 samples (tpm only). Medians and spreads of the repeats.
+same number of starts and the same profile thresholds; its derivatives are those that least_squares
+takes unless told otherwise, finite differences, where tpm has exact ones. Process time is user +
+system of the whole process; the interpreter's start and imports are also reported apart, and left
+out of the second ratio. --large adds a recording of 1,000,000 samples (tpm only). Medians and
+spreads of the repeats.
 """
 import argparse
 import json

@@ -177,6 +177,7 @@ void ExperimentResiduals::set_value(std::size_t datum, double value) {
   FitDatum& d = data_.at(datum);
   d.sigma = value_sigma(config_.data[d.choice], value, d.sigma, "simulated datum");
   d.value = value;
+  set_plain_value(datum);
 }
 
 }  // namespace tpm

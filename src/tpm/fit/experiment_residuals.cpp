@@ -57,6 +57,61 @@ void ExperimentResiduals::count_residuals() {
   if (residual_count_ == 0) {
     throw bad_input("fit", "no datum is left to fit", "at least one that is not excluded");
   }
+  set_up_plain();
+}
+
+bool ExperimentResiduals::is_plain() const {
+  if (config_.loss.kind != Loss::none || !is_normal_of_stated_size()) return false;
+  for (std::size_t i = 0; i < config_.data.size(); ++i) {
+    if (noise(i).kind == NoiseKind::log || has_normalisation(i)) return false;
+  }
+  return std::all_of(data_.begin(), data_.end(),
+                     [](const FitDatum& d) { return d.held_out || d.value.has_value(); });
+}
+
+void ExperimentResiduals::set_up_plain() {
+  plain_.reset();
+  if (!is_plain()) return;
+  plain_ = {Eigen::VectorXd(residual_count_), Eigen::VectorXd(residual_count_),
+            std::vector<Eigen::Index>(data_.size(), -1)};
+  Eigen::Index row = 0;
+  for (const Experiment& experiment : fitted()) {
+    for (const std::size_t i : experiment.data) {
+      if (data_[i].held_out) continue;
+      plain_->row[i] = row++;
+      set_plain_value(i);
+    }
+  }
+}
+
+void ExperimentResiduals::set_plain_value(std::size_t datum) {
+  const Eigen::Index row = plain_ ? plain_->row[datum] : -1;
+  if (row < 0) return;
+  plain_->observed[row] = *data_[datum].value;
+  plain_->factor[row] = weight(datum) / data_[datum].sigma;
+}
+
+void ExperimentResiduals::evaluate_plain(std::span<const double> natural, Eigen::VectorXd& residual,
+                                         RowMatrix* jacobian) const {
+  const Want want = jacobian != nullptr ? Want::values_and_sensitivity : Want::values;
+  residual.resize(residual_count_);
+  if (jacobian != nullptr) jacobian->setZero(residual_count_, std::ssize(config_.parameters));
+  for (const Experiment& experiment : fitted()) {
+    const Response response =
+        respond_to(experiment, model_parameters(config_, natural, experiment.choice), want);
+    const auto columns = columns_for(experiment.choice);
+    for (std::size_t k = 0; k < experiment.data.size(); ++k) {
+      const Eigen::Index row = plain_->row[experiment.data[k]];
+      if (row < 0) continue;
+      const auto from = static_cast<Eigen::Index>(k);
+      const double factor = plain_->factor[row];
+      residual[row] = factor * (response.value[from] - plain_->observed[row]);
+      if (jacobian == nullptr) continue;
+      for (const auto& [source, target] : columns) {
+        (*jacobian)(row, target) += factor * response.sensitivity(from, source);
+      }
+    }
+  }
 }
 
 int ExperimentResiduals::value_count() const {
@@ -128,8 +183,11 @@ bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::Vecto
   RowMatrix sensitivity;
   Eigen::VectorXd answer;
   try {
-    answer = answers(fitted_.empty() ? experiments_ : fitted_, natural,
-                     jacobian != nullptr ? &sensitivity : nullptr);
+    if (plain_) {
+      evaluate_plain(natural, residual, jacobian);
+      return residual.allFinite();
+    }
+    answer = answers(fitted(), natural, jacobian != nullptr ? &sensitivity : nullptr);
   } catch (const Error& error) {
     // A solver that gives up at some trial parameters is for the optimiser to back away from; bad
     // input is not.
@@ -237,6 +295,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->fitted_ = fitted_;
   other->moving_sigma_ = moving_sigma_;
   other->counts_ = counts_;
+  other->plain_ = plain_;
   other->residual_count_ = residual_count_;
   other->offset_ = offset_;
   return other;

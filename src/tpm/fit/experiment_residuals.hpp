@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -105,6 +106,21 @@ class ExperimentResiduals final : public ResidualFunction {
   /// Two residuals stand for each value: sigma moves with the parameters.
   [[nodiscard]] bool has_normalisation(std::size_t choice) const;
 
+  /// Residuals that are differences times constants: normal noise of stated size, values only.
+  struct PlainResiduals {
+    Eigen::VectorXd observed, factor;
+    std::vector<Eigen::Index> row;  ///< of each datum; -1 of what is held out
+  };
+  void set_up_plain();
+  void set_plain_value(std::size_t datum);
+  [[nodiscard]] bool is_plain() const;
+  void evaluate_plain(std::span<const double> natural, Eigen::VectorXd& residual,
+                      RowMatrix* jacobian) const;
+  /// Experiments without what is held out.
+  [[nodiscard]] const std::vector<Experiment>& fitted() const {
+    return fitted_.empty() ? experiments_ : fitted_;
+  }
+
   FitConfig config_;
   std::shared_ptr<const Model> model_;
   std::vector<FitDatum> data_;
@@ -112,6 +128,7 @@ class ExperimentResiduals final : public ResidualFunction {
   std::vector<Experiment> fitted_;  ///< without what is held out; empty if nothing is
   std::vector<std::optional<MovingSigma>> moving_sigma_;  ///< of each data set
   std::vector<int> counts_;                               ///< empty: every datum counts once
+  std::optional<PlainResiduals> plain_;
   Eigen::Index residual_count_ = 0;
   double offset_ = 0.0;
 };

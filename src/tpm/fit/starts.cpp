@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -38,6 +39,19 @@ std::vector<double> projected(const ResidualFunction& function,
   return start;
 }
 
+/// The normal equations without bounds; false if they are near singular or the solution is not
+/// within the bounds.
+bool solve_within(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right,
+                  const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, Eigen::VectorXd& x) {
+  if (!(gram.diagonal().minCoeff() > 0.0)) return false;
+  const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(scale.asDiagonal() * gram * scale.asDiagonal());
+  constexpr double kLeastPivot = 1e-9;
+  if (!(ldlt.vectorD().minCoeff() > kLeastPivot)) return false;
+  x = scale.asDiagonal() * ldlt.solve(scale.asDiagonal() * right);
+  return (x.array() >= lower.array()).all() && (x.array() <= upper.array()).all();
+}
+
 }  // namespace
 
 Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a,
@@ -47,6 +61,7 @@ Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a
   const Eigen::MatrixXd gram = a.transpose() * a;
   const Eigen::VectorXd right = a.transpose() * b;
   Eigen::VectorXd x(n);
+  if (solve_within(gram, right, lower, upper, x)) return x;
   for (Eigen::Index k = 0; k < n; ++k) x[k] = std::clamp(0.0, lower[k], upper[k]);
   constexpr int kMostSweeps = 2000;
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {

@@ -4,10 +4,12 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
+#include <utility>
 
 #include "tpm/core/error.hpp"
 
@@ -121,14 +123,14 @@ class ProfileWalk {
   std::optional<double> run(int direction, double first_step, Profile& profile) {
     const FitParameter& p = parameters_[index_];
     const double bound = direction > 0 ? p.theta_upper() : p.theta_lower();
-    double theta = p.theta(minimum_.natural[index_]);
-    double risen = minimum_.deviance - best_deviance_;
     double step = first_step;
-    warm_ = minimum_.natural;
-    for (int steps = 0; steps < 400 && (bound - theta) * direction > 0.0; ++steps) {
-      double next = theta + direction * step;
+    last_ = {p.theta(minimum_.natural[index_]), minimum_.deviance - best_deviance_,
+             minimum_.natural};
+    before_ = last_;
+    for (int steps = 0; steps < 400 && (bound - last_.theta) * direction > 0.0; ++steps) {
+      double next = last_.theta + direction * step;
       if ((bound - next) * direction < 1e-3 * step) next = bound;
-      const Minimum m = constrained(next);
+      const Minimum m = constrained(next, true);
       if (!m.usable) {
         ++profile.failures;
         step *= 0.25;
@@ -139,18 +141,16 @@ class ProfileWalk {
         profile.better = m;
         return std::nullopt;
       }
-      if (risen_next > 4.0 * rise_ && risen < 0.5 * rise_ && step > 1e-6 * first_step) {
+      if (risen_next > 4.0 * rise_ && last_.risen < 0.5 * rise_ && step > 1e-6 * first_step) {
         step *= 0.25;  // too far to draw a profile from
         continue;
       }
       profile.points.push_back({m.natural[index_], m.deviance});
-      warm_ = m.natural;
-      if (risen_next >= rise_) return limit_between(theta, next);
-      const double gained = risen_next - risen;
+      const double gained = risen_next - last_.risen;
+      before_ = std::exchange(last_, {next, risen_next, m.natural});
+      if (risen_next >= rise_) return limit_between(before_, last_);
       if (gained < 0.08 * rise_) step *= 2.0;
       if (gained > 0.35 * rise_) step *= 0.5;
-      theta = next;
-      risen = risen_next;
     }
     return std::nullopt;
   }
@@ -158,15 +158,38 @@ class ProfileWalk {
  private:
   static constexpr double kBetterBy = 1e-7;
 
-  /// The other parameters re-optimised, from where the walk stands and, because a profile may
+  /// A point of the profile.
+  struct Place {
+    double theta = 0.0;
+    double risen = 0.0;
+    std::vector<double> natural;
+  };
+
+  /// The other parameters where the line (in theta) through the two last points leads.
+  std::vector<double> predicted(double theta) const {
+    std::vector<double> start = last_.natural;
+    const double run = last_.theta - before_.theta;
+    const double share = run != 0.0 ? (theta - last_.theta) / run : 0.0;
+    for (std::size_t i = 0; i < start.size(); ++i) {
+      const FitParameter& p = parameters_[i];
+      const double to = p.theta(last_.natural[i]);
+      const double moved = share * (to - p.theta(before_.natural[i]));
+      if (moved == 0.0 || !std::isfinite(moved)) continue;
+      const double there = std::clamp(to + moved, p.theta_lower(), p.theta_upper());
+      start[i] = std::clamp(p.natural(there), p.lower, p.upper);
+    }
+    return start;
+  }
+
+  /// The other parameters re-optimised, from where the profile leads and, because a profile may
   /// change valleys, from the unconstrained minimum.
-  Minimum constrained(double theta) const {
+  Minimum constrained(double theta, bool both_starts) const {
     const FitParameter& p = parameters_[index_];
     const double value = std::clamp(p.natural(theta), p.lower, p.upper);
-    std::vector<double> start = warm_;
+    std::vector<double> start = predicted(theta);
     start[index_] = value;
     Minimum m = minimise_near(function_, parameters_, start, fixed_);
-    if (!m.usable || m.deviance > best_deviance_ + rise_) {
+    if (both_starts && (!m.usable || m.deviance > best_deviance_ + rise_)) {
       start = minimum_.natural;
       start[index_] = value;
       const Minimum other = minimise_near(function_, parameters_, start, fixed_);
@@ -175,28 +198,50 @@ class ProfileWalk {
     return m;
   }
 
+  double limit_between(const Place& inside, const Place& outside) {
+    const std::array<Place, 2> ends{inside, outside};
+    const double limit = root_between(ends[0], ends[1], false);
+    // In another valley the deviance may be lower there: then the limit lies further out.
+    std::vector<double> start = minimum_.natural;
+    const FitParameter& p = parameters_[index_];
+    start[index_] = std::clamp(p.natural(limit), p.lower, p.upper);
+    const Minimum other = minimise_near(function_, parameters_, start, fixed_);
+    if (!other.usable || other.deviance - best_deviance_ > (1.0 - 1e-5) * rise_) return limit;
+    return root_between(ends[0], ends[1], true);
+  }
+
   /// sqrt(rise) is nearly linear in theta, which the root finder likes.
-  double limit_between(double inside, double outside) const {
+  double root_between(const Place& inside, const Place& outside, bool both_starts) {
+    const double target = std::sqrt(rise_);
+    const auto excess_of = [&](double risen) { return std::sqrt(std::max(risen, 0.0)) - target; };
+    before_ = inside;
+    last_ = outside;
     const auto excess = [&](double theta) {
-      const Minimum m = constrained(theta);
-      const double risen = m.usable ? std::max(m.deviance - best_deviance_, 0.0)
-                                    : std::numeric_limits<double>::max();
-      return std::sqrt(risen) - std::sqrt(rise_);
+      const Minimum m = constrained(theta, both_starts);
+      if (!m.usable) return std::sqrt(std::numeric_limits<double>::max());
+      Place here{theta, m.deviance - best_deviance_, m.natural};
+      const double off = excess_of(here.risen);
+      (here.risen < rise_ ? before_ : last_) = std::move(here);
+      return std::abs(off) <= kLimitAccuracy * target ? 0.0 : off;
     };
-    const double low = std::min(inside, outside);
-    const double high = std::max(inside, outside);
-    const double f_low = excess(low);
-    const double f_high = excess(high);
-    if (f_low == 0.0) return low;
-    if (f_high == 0.0) return high;
-    if (f_low * f_high > 0.0) return outside;
-    const double width = 1e-9 * (std::abs(outside) + std::abs(outside - inside));
+    const bool rising = inside.theta < outside.theta;
+    const Place& low = rising ? inside : outside;
+    const Place& high = rising ? outside : inside;
+    const double f_low = excess_of(low.risen);
+    const double f_high = excess_of(high.risen);
+    if (f_low == 0.0) return low.theta;
+    if (f_high == 0.0) return high.theta;
+    const double width =
+        kLimitAccuracy *
+        std::abs(outside.theta - parameters_[index_].theta(minimum_.natural[index_]));
     std::uintmax_t iterations = 60;
     const auto bracket = boost::math::tools::toms748_solve(
-        excess, low, high, f_low, f_high,
+        excess, low.theta, high.theta, f_low, f_high,
         [width](double a, double b) { return std::abs(b - a) <= width; }, iterations);
     return 0.5 * (bracket.first + bracket.second);
   }
+
+  static constexpr double kLimitAccuracy = 1e-7;  ///< of the distance from the minimum
 
   const ResidualFunction& function_;
   std::span<const FitParameter> parameters_;
@@ -205,7 +250,7 @@ class ProfileWalk {
   std::size_t index_;
   double rise_;
   FixedMask fixed_;
-  std::vector<double> warm_;
+  Place last_, before_;  ///< between which, or beyond which, the next point is looked for
 };
 
 double first_step(const FitParameter& p, std::size_t index, const Covariance& covariance,

@@ -68,9 +68,9 @@ struct Profile {
 };
 
 /// Walks outwards from each minimum in theta with adaptive steps until the deviance has risen by
-/// the threshold above the best one (then the limit is bracketed and found to 1e-9 of theta's
-/// width) or the bound is reached. Several minima within the threshold may give separate ranges:
-/// the limits then enclose them all and `connected` is false.
+/// the threshold above the best one (then the limit is found to 1e-7 of its distance from the
+/// minimum, in theta) or the bound is reached. Several minima within the threshold may give
+/// separate ranges: the limits then enclose them all and `connected` is false.
 /// @param minima rising deviance, the best first
 [[nodiscard]] Profile profile_likelihood(const ResidualFunction& function,
                                          std::span<const FitParameter> parameters,

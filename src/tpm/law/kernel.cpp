@@ -38,14 +38,15 @@ TensionShape::Tangent TensionShape::tangent(double u) const {
   return {t.slope, t.d_spacing * (3.0 / u - u * y * y * s) - y * y * t.value * d_factor_dy};
 }
 
-KernelShape::KernelShape(Kernel kernel, double reference, double exponent, double tension_share,
-                         double spacing)
+KernelShape::KernelShape(Kernel kernel, double reference, double exponent,
+                         std::optional<double> tension_share, double spacing)
     : kernel_(kernel),
       reference_(reference),
       exponent_(kernel == Kernel::linear  ? 1.0
                 : kernel == Kernel::hertz ? 1.5
                                           : exponent),
-      share_(tension_share),
+      has_share_(tension_share.has_value()),
+      share_(tension_share.value_or(0.0)),
       tension_{reference, spacing} {}
 
 double KernelShape::value(double u) const {
@@ -69,6 +70,7 @@ KernelShape::Values KernelShape::at(double u) const {
     k.slope = exponent_ * k.value / u;
     k.d_exponent = k.value * log_u;
   }
+  if (!has_share_) return k;
   const TensionShape::Values t = tension_.at(u);
   k.d_share = t.value - k.value;
   if (share_ != 0.0) {
@@ -78,6 +80,15 @@ KernelShape::Values KernelShape::at(double u) const {
     k.d_exponent *= 1.0 - share_;
   }
   return k;
+}
+
+KernelShape::Jet KernelShape::jet(double u) const {
+  if (has_share_ || u <= 0.0) return {at(u), tangent(u)};
+  const Values k = at(u);
+  // V = u_ref (u/u_ref)^m: V' = m V/u
+  const double by_exponent =
+      kernel_ == Kernel::power ? (k.value + exponent_ * k.d_exponent) / u : 0;
+  return {k, {k.slope, by_exponent, 0.0, 0.0}};
 }
 
 KernelShape::Tangent KernelShape::tangent(double u) const {

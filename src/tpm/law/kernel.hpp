@@ -1,4 +1,6 @@
 #pragma once
+#include <optional>
+
 #include "tpm/law/law.hpp"
 
 namespace tpm {
@@ -27,8 +29,8 @@ struct TensionShape {
 class KernelShape {
  public:
   /// @param exponent used by Kernel::power
-  /// @param tension_share 0 without relaxing tension
-  KernelShape(Kernel kernel, double reference, double exponent, double tension_share,
+  /// @param tension_share nothing for a law without relaxing tension: derivatives by it are then 0
+  KernelShape(Kernel kernel, double reference, double exponent, std::optional<double> tension_share,
               double spacing);
 
   struct Values {
@@ -41,6 +43,12 @@ class KernelShape {
     double slope, d_exponent, d_share, d_spacing;
   };
   [[nodiscard]] Tangent tangent(double u) const;
+  /// Both at once.
+  struct Jet {
+    Values values;
+    Tangent tangent;
+  };
+  [[nodiscard]] Jet jet(double u) const;
   /// u with value(u) = v; v >= 0
   [[nodiscard]] double inverse(double v) const;
   /// V is a straight line: histories need no refinement.
@@ -50,6 +58,7 @@ class KernelShape {
   Kernel kernel_;
   double reference_;
   double exponent_;
+  bool has_share_;
   double share_;
   TensionShape tension_;
 };

@@ -10,6 +10,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/contact_history.hpp"
+#include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/kelvin_chain.hpp"
 #include "tpm/solve/exponential_sum.hpp"
 
@@ -112,6 +113,37 @@ void walk(const Protocol& protocol, std::span<const double> times_s, ContactHist
   }
 }
 
+/// The general way: any drive, with contact lost and found again.
+Response respond_by_steps(const LawAtParameters& law, const Protocol& protocol,
+                          std::span<const double> times_s, Want want) {
+  const bool displacement = protocol.drive() == Drive::displacement;
+  const double peak = displacement ? protocol.peak() - law.contact : law.tension.reference;
+  ContactHistory contact(law, peak, want);
+  Response response;
+  response.value.resize(static_cast<Eigen::Index>(times_s.size()));
+  const bool want_slopes = want == Want::values_and_sensitivity;
+  if (want_slopes) response.sensitivity.resize(response.value.size(), law.parameter_count);
+  walk(protocol, times_s, contact, [&](std::size_t i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    response.value[row] = displacement ? contact.force() : contact.drive();
+    if (!want_slopes) return;
+    response.sensitivity.row(row) =
+        (displacement ? contact.force_slopes() : contact.drive_slopes()).matrix().transpose();
+  });
+  return response;
+}
+
+/// A depth without jumps that the surface follows all the way, which is what recordings are fitted
+/// with; nothing where it is otherwise.
+std::optional<Response> respond_quickly(const LawAtParameters& law, const Protocol& protocol,
+                                        std::span<const double> times_s, Want want) {
+  const auto& rates = law.memory.rate_parameter;
+  const bool fixed_rates = std::find(rates.begin(), rates.end(), -1) != rates.end();
+  if (protocol.drive() != Drive::displacement || fixed_rates) return std::nullopt;
+  const auto path = drive_path(protocol, times_s);
+  return path ? respond_in_contact(law, *path, want) : std::nullopt;
+}
+
 }  // namespace
 
 /// The law in parallel form at given parameters, and how its slopes turn into those of the
@@ -209,21 +241,25 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values,
   const double spacing = get("spacing", std::numeric_limits<double>::infinity(), place.spacing);
   const double contact = get("contact", 0.0, place.contact);
   const double offset = get("offset", 0.0, place.offset);
-  Prepared prepared{{{},
-                     KernelShape(spec_.kernel, spec_.reference, exponent, ratio, spacing),
-                     TensionShape{spec_.reference, spacing},
-                     k_tension,
-                     contact,
-                     offset,
-                     place,
-                     static_cast<int>(parameters_.size())},
-                    {}};
+  Prepared prepared{
+      {{},
+       KernelShape(spec_.kernel, spec_.reference, exponent,
+                   place.tension_share < 0 ? std::nullopt : std::optional(ratio), spacing),
+       TensionShape{spec_.reference, spacing},
+       k_tension,
+       contact,
+       offset,
+       place,
+       static_cast<int>(parameters_.size())},
+      {}};
   if (spec_.form == BranchForm::series) {
     const auto n = static_cast<std::size_t>(spec_.branches);
     KelvinChain chain;
     chain.k0 = values[0];
-    chain.k.assign(values.begin() + 1, values.begin() + 1 + spec_.branches);
-    chain.T_s.assign(values.begin() + 1 + spec_.branches, values.begin() + 1 + 2 * spec_.branches);
+    const auto k = values.subspan(1, n);
+    const auto times_s = values.subspan(1 + n, n);
+    chain.k.assign(k.begin(), k.end());
+    chain.T_s.assign(times_s.begin(), times_s.end());
     ParallelWithSlopes parallel = to_parallel_with_slopes(chain);
     std::vector<double> flat{parallel.law.k_inf};
     flat.insert(flat.end(), parallel.law.k.begin(), parallel.law.k.end());
@@ -249,21 +285,13 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
   const LawAtParameters& law = prepared.law;
   const bool displacement = protocol.drive() == Drive::displacement;
   if (displacement && law.memory.dashpot > 0.0) require_no_jump(protocol, law.contact);
-  const double peak = displacement ? protocol.peak() - law.contact : spec_.reference;
-  ContactHistory contact(law, peak, want);
-  Response response;
-  response.value.resize(static_cast<Eigen::Index>(times_s.size()));
   const bool want_slopes = want == Want::values_and_sensitivity;
-  if (want_slopes) {
-    response.sensitivity.resize(response.value.size(), law.parameter_count);
+  Response response;
+  if (const auto in_contact = respond_quickly(law, protocol, times_s, want)) {
+    response = *in_contact;
+  } else {
+    response = respond_by_steps(law, protocol, times_s, want);
   }
-  walk(protocol, times_s, contact, [&](std::size_t i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    response.value[row] = displacement ? contact.force() : contact.drive();
-    if (!want_slopes) return;
-    response.sensitivity.row(row) =
-        (displacement ? contact.force_slopes() : contact.drive_slopes()).matrix().transpose();
-  });
   if (want_slopes && prepared.chain_slopes.size() > 0) {
     const Eigen::Index n = prepared.chain_slopes.rows();
     response.sensitivity.leftCols(n) =
