@@ -57,7 +57,9 @@ if(NOT TPM_CONSUMER)
   find_package(Boost 1.74 REQUIRED)  # quadrature and quantiles of Boost.Math
   find_package(utf8cpp 3.2 REQUIRED)
   find_package(valijson REQUIRED)
+  find_package(nanoflann 1.4 REQUIRED)
   add_library(tpm_header_only INTERFACE IMPORTED)
-  target_link_libraries(tpm_header_only INTERFACE Boost::headers utf8::cpp valijson)
+  target_link_libraries(tpm_header_only INTERFACE Boost::headers utf8::cpp valijson
+                        nanoflann::nanoflann)
   find_package(CLI11 2.1 REQUIRED)
 endif()
