@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace tpm {
@@ -34,5 +35,21 @@ struct Organ {
 /// a radius or spacing that is not above 0, a contact sphere that does not exist.
 /// @param where for messages
 void require_valid(const Organ& organ, std::string_view where);
+
+/// The organ turned about the origin and then shifted: positions p become rotation * p + shift.
+/// @param rotation a proper rotation
+/// @param shift m
+[[nodiscard]] Organ moved(Organ organ, const Eigen::Matrix3d& rotation,
+                          const Eigen::Vector3d& shift);
+
+/// Distances to the nearest other sphere of the organ, in units of its spacing, over the spheres
+/// of one layer.
+struct NearestDistances {
+  std::size_t spheres = 0;
+  double min = 0.0, mean = 0.0, max = 0.0;
+};
+
+/// One entry a layer, outermost first. The organ has at least two spheres.
+[[nodiscard]] std::vector<NearestDistances> nearest_distances(const Organ& organ);
 
 }  // namespace tpm
