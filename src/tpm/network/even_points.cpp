@@ -13,6 +13,8 @@ namespace tpm {
 
 namespace {
 
+/// In spacings, of the repulsion: just above 1, so that it ends where all keep their distance.
+constexpr double kReach = 1.05;
 constexpr std::size_t kMost = 1'000'000;
 const double kCell = std::sqrt(3.0) / 2.0;  // area of a point of a triangular lattice of spacing 1
 
@@ -21,9 +23,9 @@ int sweeps_for(std::size_t count) {
   return count <= 20'000 ? 120 : 30;
 }
 
-/// Each point is pushed away from those nearer than 1.5 spacings, then put back on the surface.
+/// Each point is pushed away from those nearer than the reach, then put back on the surface.
 void repel(const Surface& surface, double spacing, double step, Positions& points) {
-  const double reach = 1.5 * spacing;
+  const double reach = kReach * spacing;
   Positions push = Positions::Zero(3, points.cols());
   for (const NeighbourPair& pair : pairs_within(points, reach)) {
     const auto a = static_cast<Eigen::Index>(pair.first);
@@ -65,7 +67,7 @@ Positions even_points(const Surface& surface, std::size_t count, std::uint64_t s
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     // Large steps first to even out the density, small ones at the end to settle.
     const double left = 1.0 - static_cast<double>(sweep) / sweeps;
-    repel(surface, spacing, 0.1 + 0.3 * left, points);
+    repel(surface, spacing, 0.3 + 0.2 * left, points);
   }
   return points;
 }

@@ -92,18 +92,26 @@ std::size_t total(const Surface& surface, Lattice lattice, double spacing) {
   return even_count(surface, spacing) + DeepPoints(surface, lattice, spacing).count();
 }
 
-/// About the largest spacing that gives at least `count` spheres, by bisection.
+/// About the largest spacing that gives at least `count` spheres: bisection, ended early where the
+/// surplus is below a thousandth.
 double spacing_for(const Surface& surface, Lattice lattice, std::size_t count) {
   const auto wanted = static_cast<double>(count);
   double too_far = 1.01 * even_spacing(surface, 1);
-  double enough = std::min(0.5 * too_far, std::cbrt(surface.volume() / wanted));
-  while (total(surface, lattice, enough) < count) {
+  double enough = std::min(0.5 * too_far, 1.2 * std::cbrt(surface.volume() / wanted));
+  for (int round = 0; round < 60 && too_far / enough > 1.0 + 1e-6; ++round) {
+    const std::size_t found = total(surface, lattice, enough);
+    if (found >= count) {
+      if (static_cast<double>(found - count) <= 1e-3 * wanted) return enough;
+      break;
+    }
     too_far = enough;
-    enough *= 0.8;
+    enough *= 0.95;
   }
-  for (int round = 0; round < 20 && too_far / enough > 1.0 + 1e-5; ++round) {
+  for (int round = 0; round < 20 && too_far / enough > 1.0 + 1e-6; ++round) {
     const double between = std::sqrt(enough * too_far);
-    (total(surface, lattice, between) >= count ? enough : too_far) = between;
+    const std::size_t found = total(surface, lattice, between);
+    (found >= count ? enough : too_far) = between;
+    if (found >= count && static_cast<double>(found - count) <= 1e-3 * wanted) break;
   }
   return enough;
 }
@@ -111,6 +119,7 @@ double spacing_for(const Surface& surface, Lattice lattice, std::size_t count) {
 /// A lattice point of the filling.
 struct InnerSphere {
   Eigen::Index point = 0;
+  Vector3d outwards;   ///< to the nearest point of the surface, m
   double depth = 0.0;  ///< m
   int layer = 0;
 };
@@ -121,7 +130,9 @@ std::vector<InnerSphere> deepest(const Surface& surface, const Positions& points
   std::vector<InnerSphere> inner(static_cast<std::size_t>(points.cols()));
   for (std::size_t i = 0; i < inner.size(); ++i) {
     inner[i].point = static_cast<Eigen::Index>(i);
-    inner[i].depth = -surface.signed_distance(points.col(inner[i].point));
+    const Vector3d point = points.col(inner[i].point);
+    inner[i].outwards = surface.nearest(point).position - point;
+    inner[i].depth = inner[i].outwards.norm();
   }
   std::sort(inner.begin(), inner.end(), [](const InnerSphere& a, const InnerSphere& b) {
     return std::tuple(-a.depth, a.point) < std::tuple(-b.depth, b.point);
@@ -199,9 +210,7 @@ Organ fill_solid(const Surface& surface, const SolidRequest& request) {
     organ.layer.push_back(0);
   }
   for (const InnerSphere& sphere : inner) {
-    const Vector3d position = lattice.col(sphere.point);
-    const Vector3d outwards = (surface.nearest(position).position - position).normalized();
-    set_sphere(organ, at++, position, outwards);
+    set_sphere(organ, at++, lattice.col(sphere.point), sphere.outwards.normalized());
     organ.layer.push_back(sphere.layer);
   }
   round_to_nanometres(organ.position);

@@ -1,6 +1,7 @@
 #include "tpm/network/triangle_tree.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -100,11 +101,12 @@ void TriangleTree::split(int node, int first, int count) {
 TrianglePoint TriangleTree::nearest(const Vector3d& point) const {
   TrianglePoint best;
   best.squared_distance = std::numeric_limits<double>::infinity();
-  std::vector<std::pair<double, int>> open{{bounds().squaredExteriorDistance(point), 0}};
-  open.reserve(64);
-  while (!open.empty()) {
-    const auto [bound, index] = open.back();
-    open.pop_back();
+  // Halving leaves at most 31 levels below an int of triangles, each with one node set aside.
+  std::array<std::pair<double, int>, 64> open;
+  std::size_t depth = 0;
+  open[depth++] = {0.0, 0};
+  while (depth > 0) {
+    const auto [bound, index] = open[--depth];
     if (bound >= best.squared_distance) continue;
     const Node& node = nodes_[static_cast<std::size_t>(index)];
     if (node.count == 0) {
@@ -114,8 +116,8 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point) const {
       std::pair<double, int> near{bound_of(node.first), node.first};
       std::pair<double, int> far{bound_of(node.first + 1), node.first + 1};
       if (far.first < near.first) std::swap(near, far);
-      open.push_back(far);
-      open.push_back(near);
+      open[depth++] = far;
+      open[depth++] = near;
       continue;
     }
     for (int at = node.first; at < node.first + node.count; ++at) {
