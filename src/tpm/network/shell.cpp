@@ -16,7 +16,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kRoom = 0.8;        // share of the inner radius that the layers may take
-constexpr double kClearance = 0.7;   // least distance of an inner sphere, in steps
+constexpr double kClearance = 0.62;   // least distance of an inner sphere, in steps
 constexpr double kAgreement = 0.01;  // of a count and a spacing that are both given
 constexpr int kSweeps = 200;
 
