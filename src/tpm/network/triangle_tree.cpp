@@ -60,6 +60,15 @@ TriangleTree::TriangleTree(TriangleMesh mesh) : mesh_(std::move(mesh)) {
   nodes_.reserve(order_.size());
   nodes_.emplace_back();
   split(0, 0, count);
+  pack();
+}
+
+void TriangleTree::pack() {
+  packed_.reserve(order_.size());
+  for (const int t : order_) {
+    packed_.push_back({mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2),
+                       mesh_.area_vector(t).normalized()});
+  }
 }
 
 Eigen::AlignedBox3d TriangleTree::box_of(int triangle) const {
@@ -121,14 +130,15 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point) const {
       continue;
     }
     for (int at = node.first; at < node.first + node.count; ++at) {
-      const int t = order_[static_cast<std::size_t>(at)];
-      const Vector3d a = mesh_.corner(t, 0);
-      const Vector3d b = mesh_.corner(t, 1);
-      const Vector3d c = mesh_.corner(t, 2);
+      const auto& [a, b, c, normal] = packed_[static_cast<std::size_t>(at)];
+      const double height = normal.dot(point - a);
+      if (height * height >= best.squared_distance) continue;  // its plane is too far already
       const Vector3d weights = nearest_weights(a, b, c, point);
       const Vector3d position = weights[0] * a + weights[1] * b + weights[2] * c;
       const double squared = (position - point).squaredNorm();
-      if (squared < best.squared_distance) best = {t, weights, position, squared};
+      if (squared < best.squared_distance) {
+        best = {order_[static_cast<std::size_t>(at)], weights, position, squared};
+      }
     }
   }
   return best;

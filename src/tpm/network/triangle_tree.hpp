@@ -33,10 +33,17 @@ class TriangleTree {
     int first = 0;  ///< first of order_ in a leaf, else the left child; the right one follows it
     int count = 0;  ///< triangles of a leaf; 0 in an inner node
   };
+  /// A triangle as nearest() wants it, in the order of the leaves.
+  struct Packed {
+    Eigen::Vector3d a, b, c;
+    Eigen::Vector3d normal;  ///< unit
+  };
   void split(int node, int first, int count);
+  void pack();
 
   TriangleMesh mesh_;
   std::vector<int> order_;
+  std::vector<Packed> packed_;
   std::vector<Node> nodes_;
 };
 
