@@ -58,9 +58,8 @@ class LiverFunction {
     const Vector3d towards_bowel = Vector3d(-0.25, -0.72, 0.65).normalized();
     hollow_centre_ = 0.65 * right_.centre + 0.35 * left_.centre +
                      (hollow_radius_ + 0.75 * (0.5 - s.visceral_hollow) * s.height) * towards_bowel;
-    notch_ = {
-        {s.width * (0.5 - s.right_share), (0.4 * s.notch_depth - 0.5) * s.height, -0.1 * s.depth},
-        {s.notch_width * s.width, std::max(1.6 * s.notch_depth, 0.01) * s.height, s.depth}};
+    notch_ = {{s.width * (0.5 - s.right_share), (s.notch_depth - 0.5) * s.height, -0.1 * s.depth},
+              {s.notch_width * s.width, s.notch_depth * s.height, s.depth}};
   }
 
   [[nodiscard]] double operator()(const Vector3d& point) const {
@@ -168,10 +167,10 @@ const std::array<LiverMeasure, 9>& liver_measures() noexcept {
       {"height", &LiverShape::height, 0.5, 1.2, &LiverShape::width},
       {"depth", &LiverShape::depth, 0.35, 0.9, &LiverShape::width},
       {"right_share", &LiverShape::right_share, 0.5, 0.75, nullptr},
-      {"left_height", &LiverShape::left_height, 0.4, 0.9, nullptr},
-      {"left_depth", &LiverShape::left_depth, 0.35, 0.9, nullptr},
-      {"notch_depth", &LiverShape::notch_depth, 0.0, 0.3, nullptr},
-      {"notch_width", &LiverShape::notch_width, 0.03, 0.12, nullptr},
+      {"left_height", &LiverShape::left_height, 0.4, 0.65, nullptr},
+      {"left_depth", &LiverShape::left_depth, 0.45, 0.8, nullptr},
+      {"notch_depth", &LiverShape::notch_depth, 0.1, 0.2, nullptr},
+      {"notch_width", &LiverShape::notch_width, 0.08, 0.14, nullptr},
       {"visceral_hollow", &LiverShape::visceral_hollow, 0.0, 0.3, nullptr},
   }};
   return kMeasures;

@@ -16,7 +16,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kRoom = 0.8;        // share of the inner radius that the layers may take
-constexpr double kClearance = 0.62;   // least distance of an inner sphere, in steps
+constexpr double kClearance = 0.62;  // least distance of an inner sphere, in steps
 constexpr double kAgreement = 0.01;  // of a count and a spacing that are both given
 constexpr int kSweeps = 200;
 
@@ -40,7 +40,9 @@ double inner_radius(const Surface& surface) {
   const Eigen::AlignedBox3d box = surface.bounds();
   double deepest = 0.0;
   for (int i = 0; i < kGrid * kGrid * kGrid; ++i) {
-    const Vector3d share(i % kGrid, i / kGrid % kGrid, i / kGrid / kGrid);
+    const int row = i / kGrid;
+    const int plane = row / kGrid;
+    const Vector3d share(i % kGrid, row % kGrid, plane);
     const Vector3d point =
         box.min() + ((share.array() + 0.5) / kGrid * box.sizes().array()).matrix();
     deepest = std::max(deepest, -surface.signed_distance(point));
