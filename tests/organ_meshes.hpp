@@ -31,6 +31,7 @@ inline TriangleMesh mesh_of(const std::vector<Eigen::Vector3d>& vertices,
 /// Axis-parallel cuboid from `low` to `high` in 12 triangles.
 inline TriangleMesh cuboid(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
   std::vector<Eigen::Vector3d> v;
+  v.reserve(8);
   for (int i = 0; i < 8; ++i) {
     v.emplace_back((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(),
                    (i & 4) != 0 ? high.z() : low.z());

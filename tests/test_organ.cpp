@@ -277,7 +277,7 @@ TEST_CASE("the layers of a solid filling lie ever deeper") {
 
 TEST_CASE("a block is a lattice with all points on its faces") {
   const Organ cubic = block(3, 2, 1, 0.02, Lattice::cubic);
-  CHECK(cubic.size() == 4 * 3 * 2);
+  CHECK(cubic.size() == 24);
   CHECK(cubic.layer_count() == 2);
   CHECK(cubic.position.col(0) == Vector3d(0, 0, 0.02));
   CHECK(cubic.normal.col(5) == Vector3d::UnitZ());

@@ -167,7 +167,7 @@ const std::array<LiverMeasure, 9>& liver_measures() noexcept {
       {"height", &LiverShape::height, 0.5, 1.2, &LiverShape::width},
       {"depth", &LiverShape::depth, 0.35, 0.9, &LiverShape::width},
       {"right_share", &LiverShape::right_share, 0.5, 0.75, nullptr},
-      {"left_height", &LiverShape::left_height, 0.4, 0.65, nullptr},
+      {"left_height", &LiverShape::left_height, 0.4, 0.6, nullptr},
       {"left_depth", &LiverShape::left_depth, 0.45, 0.8, nullptr},
       {"notch_depth", &LiverShape::notch_depth, 0.1, 0.2, nullptr},
       {"notch_width", &LiverShape::notch_width, 0.08, 0.14, nullptr},

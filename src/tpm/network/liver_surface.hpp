@@ -15,7 +15,7 @@ struct LiverShape {
   double height = 0.160;          ///< of the right lobe, top to bottom, m; 0.5 to 1.2 widths
   double depth = 0.115;           ///< of the right lobe, front to back, m; 0.35 to 0.9 widths
   double right_share = 0.62;      ///< of the width that is right lobe; 0.5 to 0.75
-  double left_height = 0.55;      ///< of the left lobe, in heights of the right one; 0.4 to 0.65
+  double left_height = 0.55;      ///< of the left lobe, in heights of the right one; 0.4 to 0.6
   double left_depth = 0.50;       ///< of the left lobe, in depths of the right one; 0.45 to 0.8
   double notch_depth = 0.20;      ///< between the lobes, from below, in heights; 0.1 to 0.2
   double notch_width = 0.10;      ///< half width of the notch, in widths; 0.08 to 0.14
