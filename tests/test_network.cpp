@@ -6,6 +6,7 @@
 #include "tpm/core/random.hpp"
 #include "tpm/model/model.hpp"
 #include "tpm/network/quasistatic.hpp"
+#include "tpm/network/rigidity.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;
@@ -87,4 +88,19 @@ TEST_CASE("the guided star follows the closed form of creep with the true tensio
   const QuasiStaticRun run = star.run(protocol, times, {1e-11, 5});
   CAPTURE(run.work.steps, run.work.rejected, run.work.iterations);
   CHECK((run.response - exact).cwiseAbs().maxCoeff() / exact.maxCoeff() < 1e-10);
+}
+
+TEST_CASE("the unguided star is a mechanism out of its plane, and says which sphere is loose") {
+  const TpmParameters p;
+  const Network network = join(star_organ(p.spacing_m), Star::pairs(), {}, "star");
+  const BondSystem bonds(network, p);
+  Freedom freedom(4);
+  for (const std::size_t i : {1, 2, 3}) freedom.hold(i);
+  const ZeroEnergyModes modes = zero_energy_modes(bonds, network.organ.position, freedom);
+  CHECK(modes.count == 1);
+  CHECK(modes.spheres == std::vector<std::size_t>{0});
+  CHECK_THROWS_WITH(require_rigid(bonds, network.organ.position, freedom, "star.json"),
+                    Catch::StartsWith("star.json: 1 zero-energy mode; loose: sphere 1; expected"));
+  freedom.guide(0, Eigen::Vector3d::UnitZ());
+  CHECK(zero_energy_modes(bonds, network.organ.position, freedom).is_rigid());
 }
