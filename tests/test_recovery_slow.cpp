@@ -34,8 +34,8 @@ void require_recovered(const char* name, std::vector<LawSpec> contest = {}) {
   const RecoveryResult& r = results.front();
   INFO(to_terminal_text(results));
   CHECK(r.failed == 0);
-  CHECK(r.trials - r.right() <= most_failures());
-  CHECK(r.larger <= most_failures());
+  CHECK(r.trials - r.choices.front().right() <= most_failures());
+  CHECK(r.choices.front().larger <= most_failures());
   for (const ParameterCoverage& p : r.parameters) {
     INFO(p.name);
     CHECK(p.p_value > 0.001);
@@ -79,13 +79,13 @@ TEST_CASE("a law that cannot describe the data is not called right") {
   std::vector<double> one_branch = visible_parameters(law);
   one_branch[2] = 0.0;  // k2: linear-1 is then the law behind the data, and less is right
   const RecoveryResult less = recover(law, one_branch, options);
-  CHECK(less.returned == 0);
-  CHECK(less.equivalent == 3);
-  CHECK(less.larger == 0);
+  CHECK(less.choices.front().returned == 0);
+  CHECK(less.choices.front().equivalent == 3);
+  CHECK(less.choices.front().larger == 0);
 
   options.selection.laws = contest_of({"linear"});
   const RecoveryResult wrong = recover(law, visible_parameters(law), options);
-  CHECK(wrong.right() == 0);
+  CHECK(wrong.choices.front().right() == 0);
   CHECK_FALSE(wrong.fulfilled());
 }
 

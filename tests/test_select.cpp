@@ -61,6 +61,33 @@ TEST_CASE("select returns the law behind a recording and says what the protocol 
   CHECK(hidden);  // 0.4 s under a ramp of 2.5 s
 }
 
+TEST_CASE("one point of a profile tells whether the interval holds a value", "[select]") {
+  const std::vector<PreparedRecording> one{
+      prepare_recording("one.csv", simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 5))};
+  const ExperimentResiduals function(recording_config(parse_law_name("linear-1", "test"), one, {}),
+                                     data_sets(one));
+  const FitResult fit = fit_experiments(function);
+  std::vector<FitParameter> parameters;
+  for (const ParameterResult& p : fit.parameters) parameters.push_back(p.parameter);
+  Threshold threshold;
+  threshold.scale_known = false;
+  threshold.data_count = fit.value_count;
+  threshold.parameter_count = static_cast<int>(parameters.size());
+  threshold.inflation = fit.inflation;
+  const double rise = threshold.rise(fit.best.deviance);
+  const std::vector<std::vector<double>> starts{fit.best.natural};
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const ParameterResult& p = fit.parameters[i];
+    if (p.parameter.name == "offset" || p.parameter.name == "contact") continue;
+    INFO(p.parameter.name);
+    for (const double limit : {p.lower.value(), p.upper.value()}) {
+      const double risen =
+          profile_deviance(function, parameters, starts, i, limit) - fit.best.deviance;
+      CHECK_THAT(risen, WithinRel(rise, 1e-4));
+    }
+  }
+}
+
 TEST_CASE("the printed configuration gives the same fit again", "[select]") {
   const test::TempFolder folder;
   Recording r = simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 7);

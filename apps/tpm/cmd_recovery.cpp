@@ -17,6 +17,8 @@ struct RecoveryCommandOptions {
   std::string trials = "200";
   std::string noise = "0.01";
   std::string seed = "0";
+  std::string order = "0.4";
+  std::vector<std::string> margins;
   std::string output;
 };
 
@@ -25,6 +27,13 @@ double parse_noise(const std::string& text) {
   if (noise > 0.0 && noise < 1.0) return noise;
   throw Error(ExitCode::usage, "--noise", fmt::format("'{}'", printable(text)),
               "a part of the peak above 0 and below 1");
+}
+
+double parse_order(const std::string& text) {
+  const double order = parse_number(text, "--order");
+  if (order > 0.0 && order < 1.0) return order;
+  throw Error(ExitCode::usage, "--order", fmt::format("'{}'", printable(text)),
+              "an order of a fractional element above 0 and below 1");
 }
 
 Json to_json(const std::vector<RecoveryResult>& results) {
@@ -38,10 +47,14 @@ int recovery(const RecoveryCommandOptions& options, const Session& session) {
   study.noise = parse_noise(options.noise);
   study.trials = static_cast<int>(parse_whole_number(options.trials, "--trials", 1));
   study.seed = parse_whole_number(options.seed, "--seed", 0);
+  for (const std::string& margin : options.margins) {
+    study.margins.push_back(parse_number(margin, "--margin"));
+  }
   study.selection.laws = chosen_laws({}, options.family);
+  const double order = parse_order(options.order);
   std::vector<RecoveryResult> results;
   for (const LawSpec& law : chosen_laws(options.laws, options.family)) {
-    results.push_back(recover(law, visible_parameters(law), study));
+    results.push_back(recover(law, visible_parameters(law, order), study));
   }
   deliver(session.json() ? to_text(to_json(results)) : to_terminal_text(results), options.output);
   const bool all = std::all_of(results.begin(), results.end(),
@@ -67,9 +80,16 @@ void add_recovery_command(CLI::App& app, Session& session) {
   command->add_option("--noise", options->noise, "Standard deviation of the force over its peak")
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of the noise")->capture_default_str();
+  command->add_option("--order", options->order, "Order of the fractional elements that generate")
+      ->capture_default_str();
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command
+      ->add_option("--margin", options->margins,
+                   "Margins of BIC, each judging the same fits (default: that of tpm select)")
+      ->delimiter(',');
   add_format_option(*command, session);
   command->footer(
+      "Intervals are those of the profile likelihood, as in tpm fit.\n"
       "A ramp to 5 mm at 5 mm/s, held 20 s, contact and offset unknown.\n"
       "Exit code 1 if a law is not returned (nor one within one sigma of it) in 95 % of the "
       "trials,\n"

@@ -14,7 +14,7 @@ struct SelectOptions {
   RecordingOptions recordings;
   std::vector<std::string> laws;
   std::string family = "classical";
-  std::string margin = "6";
+  std::string margin = "3";
   std::string seed = "0";
   std::string output;
   bool no_held_out = false;

@@ -17,6 +17,24 @@ ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vec
   experiments_ = std::move(set.experiments);
   resolve_noise_parameters();
   count_residuals();
+  find_linear();
+}
+
+void ExperimentResiduals::find_linear() {
+  const bool noise_stays =
+      config_.loss.kind == Loss::none &&
+      std::all_of(config_.data.begin(), config_.data.end(), [](const DataChoice& d) {
+        return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model &&
+               d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
+      });
+  linear_.clear();
+  linear_.reserve(config_.parameters.size());
+  for (const EstimatedParameter& p : config_.parameters) {
+    linear_.push_back(noise_stays && p.fit.scale == Scale::linear && !p.sets.empty() &&
+                      std::all_of(p.sets.begin(), p.sets.end(), [&](const Target& target) {
+                        return model_->linear_in(target.parameter);
+                      }));
+  }
 }
 
 void ExperimentResiduals::leave_out_held_out() {
@@ -260,26 +278,45 @@ void ExperimentResiduals::set_counts(std::vector<int> counts) {
   count_residuals();
 }
 
+namespace {
+
+/// A course with every so manieth of its knots and samples, and the last.
+void thin(Experiment& experiment, std::size_t stride) {
+  auto& course = std::get<TimeCourse>(experiment.imposed);
+  const std::size_t n = experiment.data.size();
+  std::vector<Knot> knots;
+  std::vector<double> times_s;
+  std::vector<std::size_t> data;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (i % stride != 0 && i + 1 != n) continue;
+    knots.push_back(course.protocol.knots()[i]);
+    times_s.push_back(course.times_s[i]);
+    data.push_back(experiment.data[i]);
+  }
+  Protocol protocol(course.protocol.drive(), std::move(knots), course.protocol.name());
+  protocol.set_relaxed_at_start(course.protocol.relaxed_at_start());
+  course = {std::move(protocol), std::move(times_s)};
+  experiment.data = std::move(data);
+}
+
+}  // namespace
+
 std::unique_ptr<ExperimentResiduals> ExperimentResiduals::thinned(std::size_t most) const {
-  auto few = copy();
-  for (Experiment& experiment : few->experiments_) {
+  // Not a copy(): of a million data only the few that are kept are taken along.
+  std::unique_ptr<ExperimentResiduals> few(new ExperimentResiduals());
+  few->config_ = config_;
+  few->model_ = model_;
+  few->moving_sigma_ = moving_sigma_;
+  few->linear_ = linear_;
+  for (Experiment experiment : experiments_) {
     const std::size_t n = experiment.data.size();
-    if (!experiment.is_recording || n <= most) continue;
-    auto& course = std::get<TimeCourse>(experiment.imposed);
-    const std::size_t stride = (n + most - 1) / most;
-    std::vector<Knot> knots;
-    std::vector<double> times_s;
-    std::vector<std::size_t> data;
-    for (std::size_t i = 0; i < n; ++i) {
-      if (i % stride != 0 && i + 1 != n) continue;
-      knots.push_back(course.protocol.knots()[i]);
-      times_s.push_back(course.times_s[i]);
-      data.push_back(experiment.data[i]);
+    if (experiment.is_recording && n > most) thin(experiment, (n + most - 1) / most);
+    for (std::size_t& datum : experiment.data) {
+      if (!counts_.empty()) few->counts_.push_back(counts_[datum]);
+      few->data_.push_back(data_[datum]);
+      datum = few->data_.size() - 1;
     }
-    Protocol protocol(course.protocol.drive(), std::move(knots), course.protocol.name());
-    protocol.set_relaxed_at_start(course.protocol.relaxed_at_start());
-    course = {std::move(protocol), std::move(times_s)};
-    experiment.data = std::move(data);
+    few->experiments_.push_back(std::move(experiment));
   }
   few->count_residuals();
   return few;
@@ -295,6 +332,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->fitted_ = fitted_;
   other->moving_sigma_ = moving_sigma_;
   other->counts_ = counts_;
+  other->linear_ = linear_;
   other->plain_ = plain_;
   other->residual_count_ = residual_count_;
   other->offset_ = offset_;

@@ -25,6 +25,7 @@ class ExperimentResiduals final : public ResidualFunction {
   [[nodiscard]] bool information_root(std::span<const double> natural,
                                       RowMatrix& root) const override;
   [[nodiscard]] double offset() const override { return offset_; }
+  [[nodiscard]] bool linear_in(std::size_t parameter) const override { return linear_[parameter]; }
 
   [[nodiscard]] const std::vector<FitDatum>& data() const { return data_; }
   [[nodiscard]] const std::vector<Experiment>& experiments() const { return experiments_; }
@@ -111,6 +112,7 @@ class ExperimentResiduals final : public ResidualFunction {
     Eigen::VectorXd observed, factor;
     std::vector<Eigen::Index> row;  ///< of each datum; -1 of what is held out
   };
+  void find_linear();
   void set_up_plain();
   void set_plain_value(std::size_t datum);
   [[nodiscard]] bool is_plain() const;
@@ -128,6 +130,7 @@ class ExperimentResiduals final : public ResidualFunction {
   std::vector<Experiment> fitted_;  ///< without what is held out; empty if nothing is
   std::vector<std::optional<MovingSigma>> moving_sigma_;  ///< of each data set
   std::vector<int> counts_;                               ///< empty: every datum counts once
+  std::vector<bool> linear_;  ///< of each estimated parameter: linear_in
   std::optional<PlainResiduals> plain_;
   Eigen::Index residual_count_ = 0;
   double offset_ = 0.0;

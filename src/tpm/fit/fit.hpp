@@ -77,12 +77,13 @@ struct RecordingFit {
   Quantity drive_quantity = Quantity::indentation_depth;
   Quantity response_quantity = Quantity::contact_force;
   Provenance provenance = Provenance::measured;
-  std::vector<double> time_s, drive, observed, predicted;  ///< SI
+  std::vector<double> time_s, drive, observed, predicted;  ///< SI; see Response for NaN
   std::vector<double> standardised;                        ///< residuals in standard deviations
   std::vector<bool> fitted;                                ///< false: outside the window
   double peak = 0.0;                                       ///< largest |observed| in the window
   double rms_residual = 0.0;                               ///< in the window, SI
-  std::optional<double> rms_outside;  ///< of the samples outside, if there are any
+  std::optional<double> rms_outside;  ///< of the predicted samples outside, if there are any
+  std::size_t not_predicted = 0;      ///< samples outside whose `predicted` is NaN
   /// Prediction band, where one new sample falls, SI; empty if the covariance is not of full rank.
   std::vector<double> lower, upper;
   std::optional<double> share_inside;      ///< of the fitted samples, within that band

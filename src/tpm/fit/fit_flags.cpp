@@ -55,11 +55,22 @@ void flag_noise(FitResult& result) {
   }
 }
 
+void flag_not_predicted(FitResult& result) {
+  for (const RecordingFit& r : result.recordings) {
+    if (r.not_predicted == 0) continue;
+    result.flags.push_back(
+        fmt::format("{} samples of '{}' are not predicted: the contact shrinks or grows again in a "
+                    "way that the law does not cover",
+                    r.not_predicted, result.config.data[r.choice].dataset));
+  }
+}
+
 }  // namespace
 
 void add_flags(FitResult& result, const ExperimentResiduals& function) {
   flag_outliers(result, function);
   flag_noise(result);
+  flag_not_predicted(result);
   for (const DataChoice& data : result.config.data) {
     if (data.protocol.rate_provenance == Provenance::assumed) {
       result.flags.push_back(fmt::format("the ramp rate of {:.4g} mm/s is assumed for '{}'",

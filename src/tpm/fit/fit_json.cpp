@@ -173,6 +173,7 @@ Json recordings_json(const FitResult& result) {
     if (r.rms_outside) {
       j[tpm::si_key(r.response_quantity, "rms_residual_outside")] = number(*r.rms_outside);
     }
+    if (r.not_predicted > 0) j["samples_not_predicted"] = r.not_predicted;
     j["share_inside_prediction_band"] = optional_number(r.share_inside);
     if (r.correlation) j["correlation"] = correlation_json(*r.correlation);
     list.push_back(std::move(j));

@@ -98,6 +98,48 @@ std::optional<double> natural_standard_error(const FitResult& result, std::size_
          std::abs(p.natural_slope(p.theta(result.best.natural[index])));
 }
 
+/// What lies below the threshold belongs to every interval. A profile that lay in another valley
+/// may thus show a point beyond the limit of this one: the furthest on either side.
+std::vector<Minimum> beyond_limits(const FitResult& result, std::size_t index) {
+  const Profile& own = result.parameters[index].profile;
+  constexpr double kBeyond = 1e-3;  // of the way from the estimate to the limit
+  std::vector<Minimum> beyond;
+  const double estimate = result.best.natural[index];
+  for (const auto& [limit, sign] : {std::pair(own.lower, -1.0), std::pair(own.upper, 1.0)}) {
+    if (!limit) continue;
+    const Minimum* furthest = nullptr;
+    double distance = (1.0 + kBeyond) * (*limit - estimate) * sign;
+    for (const ParameterResult& other : result.parameters) {
+      for (const Minimum& m : other.profile.inside) {
+        const double here = (m.natural[index] - estimate) * sign;
+        if (!(here > distance)) continue;
+        distance = here;
+        furthest = &m;
+      }
+    }
+    if (furthest != nullptr) beyond.push_back(*furthest);
+  }
+  return beyond;
+}
+
+/// Walks the profiles that others reach beyond again, from there, too.
+void widen_profiles(const ResidualFunction& function, FitResult& result,
+                    std::span<const FitParameter> parameters,
+                    const std::vector<Minimum>& candidates, const Threshold& threshold) {
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const std::vector<Minimum> beyond = beyond_limits(result, i);
+    if (beyond.empty()) continue;
+    std::vector<Minimum> starts = candidates;
+    starts.insert(starts.end(), beyond.begin(), beyond.end());
+    Profile profile =
+        profile_likelihood(function, parameters, starts, i, result.covariance, threshold);
+    if (profile.better) continue;
+    result.parameters[i].lower = profile.lower;
+    result.parameters[i].upper = profile.upper;
+    result.parameters[i].profile = std::move(profile);
+  }
+}
+
 /// Profiles of every parameter; on meeting a deeper minimum descends into it and starts again.
 void profile_all(const ResidualFunction& function, FitResult& result,
                  std::span<const FitParameter> parameters, const Threshold& threshold) {
@@ -122,7 +164,9 @@ void profile_all(const ResidualFunction& function, FitResult& result,
       result.parameters[i].profile = std::move(profile);
       progress.advance();
     }
-    if (!deeper) return;
+    if (deeper) continue;
+    widen_profiles(function, result, parameters, candidates, threshold);
+    return;
   }
   throw Error(ExitCode::numerical, "profiles", "a deeper minimum was met again and again");
 }

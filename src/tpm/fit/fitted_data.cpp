@@ -94,6 +94,10 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
     fit.observed.push_back(*d.value);
     fit.predicted.push_back(answer);
     fit.fitted.push_back(!d.held_out);
+    if (d.held_out && !std::isfinite(answer)) {
+      ++fit.not_predicted;
+      continue;
+    }
     const double off = answer - *d.value;
     (d.held_out ? outside : inside) += off * off;
     if (d.held_out) continue;
@@ -101,7 +105,7 @@ RecordingFit recording_fit(const ExperimentResiduals& function, const Experiment
     fit.peak = std::max(fit.peak, std::abs(*d.value));
   }
   fit.rms_residual = std::sqrt(inside / static_cast<double>(std::max<std::size_t>(fitted, 1)));
-  const std::size_t rest = fit.time_s.size() - fitted;
+  const std::size_t rest = fit.time_s.size() - fitted - fit.not_predicted;
   if (rest > 0) fit.rms_outside = std::sqrt(outside / static_cast<double>(rest));
   return fit;
 }

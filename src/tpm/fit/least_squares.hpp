@@ -39,6 +39,10 @@ class ResidualFunction {
     return evaluate(natural, residual, &root);
   }
 
+  /// Whether the residuals are linear in a parameter while the others are held: a search can solve
+  /// for it.
+  [[nodiscard]] virtual bool linear_in(std::size_t /*parameter*/) const { return false; }
+
   /// Constant part of the sum of squares that is not deviance.
   [[nodiscard]] virtual double offset() const { return 0.0; }
 };

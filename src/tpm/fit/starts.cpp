@@ -39,43 +39,95 @@ std::vector<double> projected(const ResidualFunction& function,
   return start;
 }
 
-/// The normal equations without bounds; false if they are near singular or the solution is not
-/// within the bounds.
-bool solve_within(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right,
-                  const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, Eigen::VectorXd& x) {
-  if (!(gram.diagonal().minCoeff() > 0.0)) return false;
-  const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(scale.asDiagonal() * gram * scale.asDiagonal());
-  constexpr double kLeastPivot = 1e-9;
-  if (!(ldlt.vectorD().minCoeff() > kLeastPivot)) return false;
-  x = scale.asDiagonal() * ldlt.solve(scale.asDiagonal() * right);
-  return (x.array() >= lower.array()).all() && (x.array() <= upper.array()).all();
+/// Minimum over the free columns while the others keep their x.
+Eigen::VectorXd with_free(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right,
+                          const std::vector<Eigen::Index>& free, Eigen::VectorXd x) {
+  constexpr double kRidge = 1e-12;  // columns that repeat each other share, instead of a pivot of 0
+  Eigen::VectorXd held = x;
+  for (const Eigen::Index k : free) held[k] = 0.0;
+  const Eigen::VectorXd rest = right - gram * held;
+  Eigen::MatrixXd a = gram(free, free);
+  const Eigen::VectorXd scale = a.diagonal().cwiseSqrt().cwiseInverse();
+  a = scale.asDiagonal() * a * scale.asDiagonal();
+  a.diagonal().array() += kRidge;
+  const Eigen::VectorXd b = scale.asDiagonal() * rest(free);
+  const Eigen::VectorXd y = scale.asDiagonal() * a.ldlt().solve(b);
+  for (std::size_t i = 0; i < free.size(); ++i) x[free[i]] = y[static_cast<Eigen::Index>(i)];
+  return x;
+}
+
+/// Goes from x towards `wanted` as far as the bounds let it; tells whether it arrived. What meets
+/// its bound leaves the free columns.
+bool go_within(const Eigen::VectorXd& wanted, const Eigen::VectorXd& lower,
+               const Eigen::VectorXd& upper, std::vector<Eigen::Index>& free, Eigen::VectorXd& x) {
+  double share = 1.0;
+  Eigen::Index first = -1;
+  for (const Eigen::Index k : free) {
+    const double bound = wanted[k] < lower[k] ? lower[k] : upper[k];
+    if (wanted[k] >= lower[k] && wanted[k] <= upper[k]) continue;
+    const double to_bound = std::clamp((bound - x[k]) / (wanted[k] - x[k]), 0.0, 1.0);
+    if (first >= 0 && to_bound >= share) continue;
+    share = to_bound;
+    first = k;
+  }
+  if (first < 0) {
+    x = wanted;
+    return true;
+  }
+  const double bound = wanted[first] < lower[first] ? lower[first] : upper[first];
+  for (const Eigen::Index k : free) {
+    x[k] = std::clamp(x[k] + share * (wanted[k] - x[k]), lower[k], upper[k]);
+  }
+  x[first] = bound;
+  std::erase(free, first);
+  return false;
+}
+
+/// The column at a bound that gains most by leaving it; -1 if there is none.
+Eigen::Index most_pulled(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right,
+                         const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
+                         const Eigen::VectorXd& x, const std::vector<Eigen::Index>& free) {
+  constexpr double kRounding = 1e-12;
+  const Eigen::VectorXd pull = right - gram * x;
+  Eigen::Index best = -1;
+  double strongest = 0.0;
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    if (!(gram(k, k) > 0.0) || std::find(free.begin(), free.end(), k) != free.end()) continue;
+    const double inward = x[k] <= lower[k] ? pull[k] : -pull[k];
+    const double noise = std::abs(right[k]) + gram.row(k).cwiseAbs().dot(x.cwiseAbs());
+    const double strength = inward / std::sqrt(gram(k, k));
+    if (lower[k] == upper[k] || inward <= kRounding * noise || strength <= strongest) continue;
+    strongest = strength;
+    best = k;
+  }
+  return best;
 }
 
 }  // namespace
 
+Eigen::VectorXd bounded_minimum(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right,
+                                const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
+  const Eigen::Index n = gram.cols();
+  Eigen::VectorXd x(n);
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    x[k] = std::clamp(0.0, lower[k], upper[k]);
+    if (gram(k, k) > 0.0) free.push_back(k);
+  }
+  for (Eigen::Index step = 0; step < 10 * n; ++step) {
+    while (!free.empty() && !go_within(with_free(gram, right, free, x), lower, upper, free, x)) {
+    }
+    const Eigen::Index pulled = most_pulled(gram, right, lower, upper, x, free);
+    if (pulled < 0) break;
+    free.push_back(pulled);
+  }
+  return x;
+}
+
 Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a,
                                       const Eigen::VectorXd& b, const Eigen::VectorXd& lower,
                                       const Eigen::VectorXd& upper) {
-  const Eigen::Index n = a.cols();
-  const Eigen::MatrixXd gram = a.transpose() * a;
-  const Eigen::VectorXd right = a.transpose() * b;
-  Eigen::VectorXd x(n);
-  if (solve_within(gram, right, lower, upper, x)) return x;
-  for (Eigen::Index k = 0; k < n; ++k) x[k] = std::clamp(0.0, lower[k], upper[k]);
-  constexpr int kMostSweeps = 2000;
-  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-    double moved = 0.0;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      if (!(gram(k, k) > 0.0)) continue;
-      const double free = x[k] + (right[k] - gram.row(k).dot(x)) / gram(k, k);
-      const double next = std::clamp(free, lower[k], upper[k]);
-      moved = std::max(moved, std::abs(next - x[k]) * std::sqrt(gram(k, k)));
-      x[k] = next;
-    }
-    if (moved <= 1e-10 * (b.norm() + std::numeric_limits<double>::min())) break;
-  }
-  return x;
+  return bounded_minimum(a.transpose() * a, a.transpose() * b, lower, upper);
 }
 
 std::vector<std::vector<double>> projected_starts(const ResidualFunction& function,
@@ -110,15 +162,8 @@ namespace {
 
 /// Which estimated parameters the residuals are linear in.
 std::vector<bool> linear_parameters(const ExperimentResiduals& function) {
-  const FitConfig& config = function.config();
-  std::vector<bool> linear;
-  linear.reserve(config.parameters.size());
-  for (const EstimatedParameter& p : config.parameters) {
-    linear.push_back(p.fit.scale == Scale::linear && !p.sets.empty() &&
-                     std::all_of(p.sets.begin(), p.sets.end(), [&](const Target& target) {
-                       return function.model().linear_in(target.parameter);
-                     }));
-  }
+  std::vector<bool> linear(function.config().parameters.size());
+  for (std::size_t i = 0; i < linear.size(); ++i) linear[i] = function.linear_in(i);
   return linear;
 }
 
@@ -151,15 +196,9 @@ void sort_branches(const FitConfig& config, std::vector<double>& start) {
 }  // namespace
 
 StartKind start_kind(const ExperimentResiduals& function) {
-  const FitConfig& config = function.config();
-  const bool linear_noise = std::all_of(config.data.begin(), config.data.end(), [](const auto& d) {
-    return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model &&
-           d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
-  });
   const std::vector<bool> linear = linear_parameters(function);
   const bool any = std::find(linear.begin(), linear.end(), true) != linear.end();
-  return any && linear_noise && config.loss.kind == Loss::none ? StartKind::solved
-                                                               : StartKind::anywhere;
+  return any ? StartKind::solved : StartKind::anywhere;
 }
 
 std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,

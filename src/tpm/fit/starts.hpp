@@ -13,8 +13,15 @@ enum class StartKind {
   solved,    ///< their linear parameters were solved for: the search from nearby
 };
 
-/// Minimum of |A x - b| with lower <= x <= upper, by coordinate descent on the normal equations:
-/// for a handful of columns. Columns of zeros leave x at the bound nearest to 0.
+/// Minimum of x' G x / 2 - g' x with lower <= x <= upper by an active set of bounds; x is as near
+/// to 0 as they let it where G does not tell. For a handful of columns.
+[[nodiscard]] Eigen::VectorXd bounded_minimum(const Eigen::MatrixXd& gram,
+                                              const Eigen::VectorXd& right,
+                                              const Eigen::VectorXd& lower,
+                                              const Eigen::VectorXd& upper);
+
+/// Minimum of |A x - b| with lower <= x <= upper, from the normal equations: for a handful of
+/// columns. Columns of zeros leave x at the bound nearest to 0.
 [[nodiscard]] Eigen::VectorXd bounded_least_squares(const Eigen::Ref<const Eigen::MatrixXd>& a,
                                                     const Eigen::VectorXd& b,
                                                     const Eigen::VectorXd& lower,

@@ -9,6 +9,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "tpm/core/error.hpp"
@@ -146,6 +147,7 @@ class ProfileWalk {
         continue;
       }
       profile.points.push_back({m.natural[index_], m.deviance});
+      if (risen_next < rise_) profile.inside.push_back(m);
       const double gained = risen_next - last_.risen;
       before_ = std::exchange(last_, {next, risen_next, m.natural});
       if (risen_next >= rise_) return limit_between(before_, last_);
@@ -316,6 +318,20 @@ Profile profile_likelihood(const ResidualFunction& function,
   std::sort(profile.points.begin(), profile.points.end(),
             [](const ProfilePoint& a, const ProfilePoint& b) { return a.natural < b.natural; });
   return profile;
+}
+
+double profile_deviance(const ResidualFunction& function, std::span<const FitParameter> parameters,
+                        std::span<const std::vector<double>> starts, std::size_t index,
+                        double value) {
+  FixedMask fixed(parameters.size(), false);
+  fixed[index] = true;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::vector<double> start : starts) {
+    start[index] = value;
+    const Minimum m = minimise_near(function, parameters, start, fixed);
+    if (m.usable) least = std::min(least, m.deviance);
+  }
+  return least;
 }
 
 }  // namespace tpm

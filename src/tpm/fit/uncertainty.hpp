@@ -64,6 +64,7 @@ struct Profile {
   std::optional<double> upper;
   bool connected = true;          ///< false: the values between the limits do not all belong
   std::optional<Minimum> better;  ///< a deeper minimum met on the way; the profile is then void
+  std::vector<Minimum> inside;    ///< ends of the constrained fits below the threshold
   int failures = 0;               ///< constrained fits that could not be evaluated
 };
 
@@ -76,5 +77,15 @@ struct Profile {
                                          std::span<const FitParameter> parameters,
                                          std::span<const Minimum> minima, std::size_t index,
                                          const Covariance& covariance, const Threshold& threshold);
+
+/// One point of that profile: the least deviance with one parameter held at a value. The value is
+/// in the confidence set if it rises by no more than the threshold, so that one point tells whether
+/// an interval holds a known truth.
+/// @param starts natural values of all parameters, from which the others are searched
+/// @return infinity if no search ended in a usable point
+[[nodiscard]] double profile_deviance(const ResidualFunction& function,
+                                      std::span<const FitParameter> parameters,
+                                      std::span<const std::vector<double>> starts,
+                                      std::size_t index, double value);
 
 }  // namespace tpm

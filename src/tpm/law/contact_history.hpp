@@ -39,6 +39,8 @@ struct LawAtParameters {
   int parameter_count = 0;
 };
 
+struct ContactEdge;
+
 /// The contact of one law with a probe: the states of all branches, stepped exactly through pieces
 /// on which the drive is linear, with derivatives by all parameters.
 ///
@@ -70,6 +72,10 @@ class ContactHistory {
   /// Drive that the surface answers (contact included) and its derivatives.
   [[nodiscard]] double drive() const { return now_.u + law_.contact; }
   [[nodiscard]] Slopes drive_slopes() const;
+  /// Force (offset included) of a contact whose edge has drawn back to `edge`; the history is that
+  /// up to edge.met_s.
+  [[nodiscard]] double force_within(const ContactEdge& edge) const;
+  [[nodiscard]] Slopes force_slopes_within(const ContactEdge& edge) const;
   /// The probe does not touch the surface.
   [[nodiscard]] bool detached() const { return free_; }
 

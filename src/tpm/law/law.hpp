@@ -14,8 +14,8 @@ namespace tpm {
 /// How the elastic force of a contact grows with its depth u, relative to a reference depth u_ref.
 enum class Kernel {
   linear,  ///< W = u (the paper; a flat punch; a stretched strip)
-  hertz,   ///< W = u_ref (u/u_ref)^(3/2): rigid sphere on a half space. Lee and Radok's solution,
-           ///< valid while the contact grows
+  hertz,   ///< W = u_ref (u/u_ref)^(3/2): rigid sphere on a half space. Lee and Radok's solution
+           ///< while the contact grows, Ting's while it shrinks
   power,   ///< W = u_ref (u/u_ref)^m, 1 <= m: quasi-linear viscoelasticity after Fung
 };
 

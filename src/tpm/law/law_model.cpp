@@ -10,6 +10,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/contact_history.hpp"
+#include "tpm/law/contact_retreat.hpp"
 #include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/kelvin_chain.hpp"
 #include "tpm/solve/exponential_sum.hpp"
@@ -69,9 +70,10 @@ FractionalMemory rates_for(const LawSpec& spec, const Protocol& protocol,
 
 /// Walks a contact through a protocol, stopping at each asked time.
 /// @param report called once for each asked time with its index
-template <class Report>
+/// @param passed called after each knot
+template <class Report, class Passed>
 void walk(const Protocol& protocol, std::span<const double> times_s, ContactHistory& contact,
-          const Report& report) {
+          const Report& report, const Passed& passed) {
   const auto order = rising_order(times_s);
   const auto knots = protocol.knots();
   const bool displacement = protocol.drive() == Drive::displacement;
@@ -110,26 +112,112 @@ void walk(const Protocol& protocol, std::span<const double> times_s, ContactHist
     } else {
       jump(to.value);
     }
+    passed();
   }
 }
 
+/// Whether a law is the solution of a contact problem only while the contact grows. A contact
+/// without relaxation has no history and may shrink and grow.
+bool depends_on_growth(const LawSpec& spec) {
+  return spec.kernel == Kernel::hertz && (spec.branches > 0 || spec.fractional != Fractional::none);
+}
+
+/// Whether Ting's solution is built in for the law; of the others nothing is predicted once the
+/// contact shrinks.
+bool may_shrink(const LawSpec& spec) {
+  return spec.fractional == Fractional::none && spec.tension == Tension::none;
+}
+
+/// Moments at which the history of the contact is looked at to answer each asked time.
+struct Stops {
+  std::vector<double> time_s;           ///< the asked time, or when the edge of then was met
+  std::vector<ContactEdge> edges;       ///< after the turn, rising in time
+  std::vector<std::ptrdiff_t> edge_of;  ///< place in edges of each asked time, or -1
+};
+
+Stops stops_for(const LawSpec& spec, const LawAtParameters& law, const Protocol& protocol,
+                std::span<const double> times_s, Want want) {
+  Stops stops{{times_s.begin(), times_s.end()}, {}, {}};
+  stops.edge_of.assign(times_s.size(), -1);
+  if (protocol.drive() == Drive::force || !depends_on_growth(spec)) return stops;
+  const auto turn = find_turn(protocol, law.contact);
+  if (!turn) return stops;
+  std::vector<double> later;
+  for (const std::size_t i : rising_order(times_s)) {
+    if (times_s[i] <= (may_shrink(spec) ? turn->peak_s : turn->noticed_s)) continue;
+    stops.edge_of[i] = std::ssize(later);
+    later.push_back(times_s[i]);
+  }
+  if (may_shrink(spec)) {
+    stops.edges = contact_edges(law, protocol, *turn, later, want);
+  } else {
+    stops.edges.resize(later.size(), {.state = ContactEdge::State::unknown, .pull_by = {}});
+  }
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    if (stops.edge_of[i] < 0) continue;
+    const ContactEdge& edge = stops.edges[static_cast<std::size_t>(stops.edge_of[i])];
+    const bool touching = edge.state == ContactEdge::State::touching;
+    stops.time_s[i] = touching ? edge.met_s : protocol.start_s();
+  }
+  return stops;
+}
+
+struct Answer {
+  double value;
+  Slopes slopes;
+};
+
+Answer not_predicted(int parameters) {
+  constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+  return {kNothing, Slopes::Constant(parameters, kNothing)};
+}
+
+/// The answer of a contact that stands at one of the stops.
+/// @param edge null while the contact grows
+Answer answer_of(const ContactHistory& contact, const ContactEdge* edge, const LawAtParameters& law,
+                 bool displacement, bool want_slopes) {
+  const Slopes none;
+  if (edge == nullptr && !displacement) {
+    return {contact.drive(), want_slopes ? contact.drive_slopes() : none};
+  }
+  if (edge == nullptr) return {contact.force(), want_slopes ? contact.force_slopes() : none};
+  switch (edge->state) {
+    case ContactEdge::State::touching:
+      return {contact.force_within(*edge), want_slopes ? contact.force_slopes_within(*edge) : none};
+    case ContactEdge::State::lost: {
+      Slopes offset_alone = Slopes::Zero(law.parameter_count);
+      offset_alone[law.place.offset] = 1.0;
+      return {law.offset, offset_alone};
+    }
+    case ContactEdge::State::unknown:
+      break;
+  }
+  return not_predicted(law.parameter_count);
+}
+
 /// The general way: any drive, with contact lost and found again.
-Response respond_by_steps(const LawAtParameters& law, const Protocol& protocol,
-                          std::span<const double> times_s, Want want) {
+Response respond_by_steps(const LawSpec& spec, const LawAtParameters& law, const Protocol& protocol,
+                          const Stops& stops, Want want) {
   const bool displacement = protocol.drive() == Drive::displacement;
+  const bool want_slopes = want == Want::values_and_sensitivity;
   const double peak = displacement ? protocol.peak() - law.contact : law.tension.reference;
   ContactHistory contact(law, peak, want);
   Response response;
-  response.value.resize(static_cast<Eigen::Index>(times_s.size()));
-  const bool want_slopes = want == Want::values_and_sensitivity;
+  response.value.resize(std::ssize(stops.time_s));
   if (want_slopes) response.sensitivity.resize(response.value.size(), law.parameter_count);
-  walk(protocol, times_s, contact, [&](std::size_t i) {
+  ShrinkWatch watch(!displacement && depends_on_growth(spec));
+  const auto watch_depth = [&] { watch.see(contact.drive() - law.contact); };
+  const auto answer = [&](std::size_t i) {
     const auto row = static_cast<Eigen::Index>(i);
-    response.value[row] = displacement ? contact.force() : contact.drive();
-    if (!want_slopes) return;
-    response.sensitivity.row(row) =
-        (displacement ? contact.force_slopes() : contact.drive_slopes()).matrix().transpose();
-  });
+    watch_depth();
+    const std::ptrdiff_t place = stops.edge_of[i];
+    const ContactEdge* edge = place < 0 ? nullptr : &stops.edges[static_cast<std::size_t>(place)];
+    const Answer a = watch.shrunk() ? not_predicted(law.parameter_count)
+                                    : answer_of(contact, edge, law, displacement, want_slopes);
+    response.value[row] = a.value;
+    if (want_slopes) response.sensitivity.row(row) = a.slopes.matrix().transpose();
+  };
+  walk(protocol, stops.time_s, contact, answer, watch_depth);
   return response;
 }
 
@@ -287,11 +375,10 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
   if (displacement && law.memory.dashpot > 0.0) require_no_jump(protocol, law.contact);
   const bool want_slopes = want == Want::values_and_sensitivity;
   Response response;
-  if (const auto in_contact = respond_quickly(law, protocol, times_s, want)) {
-    response = *in_contact;
-  } else {
-    response = respond_by_steps(law, protocol, times_s, want);
-  }
+  const Stops stops = stops_for(spec_, law, protocol, times_s, want);
+  const auto in_contact = stops.edges.empty() ? respond_quickly(law, protocol, times_s, want)
+                                              : std::optional<Response>();
+  response = in_contact ? *in_contact : respond_by_steps(spec_, law, protocol, stops, want);
   if (want_slopes && prepared.chain_slopes.size() > 0) {
     const Eigen::Index n = prepared.chain_slopes.rows();
     response.sensitivity.leftCols(n) =

@@ -18,6 +18,12 @@ class FractionalMemory;
 /// freely and the response is the offset until the probe meets it again. Force-driven: adaptive
 /// implicit steps. Times at infinity are answered by full relaxation.
 ///
+/// A hertz kernel that relaxes follows Lee and Radok while the contact grows and Ting (1966) when
+/// it shrinks, without branches any history. Not predicted (NaN) from then on: where the contact
+/// grows again by more than kContactJitter of the largest depth; with fractional elements or
+/// tension, where the depth has fallen by more than that; under an imposed load, where the depth
+/// that follows has.
+///
 /// Fractional laws are answered at the knots and asked times to 1e-10 of G at their smallest
 /// spacing times the total variation of the drive (docs/fractional.md), and creep to 1e-9
 /// (spring-pots 5e-6) of the depth. A spring-pot cannot jump: Error(bad_input) if the drive does;

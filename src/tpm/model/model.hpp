@@ -17,7 +17,8 @@ namespace tpm {
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// What a model answers: one value per asked time (N or m, after the protocol's drive) and, where
-/// asked for, the derivative of each value with respect to each natural parameter.
+/// asked for, the derivative of each value with respect to each natural parameter. A value that the
+/// model does not predict is NaN, and so are its derivatives; the model says when that happens.
 struct Response {
   Eigen::VectorXd value;  ///< size n_times
   RowMatrix sensitivity;  ///< n_times x n_parameters, SI over SI; 0 x 0 unless asked for

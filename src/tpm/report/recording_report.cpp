@@ -36,13 +36,13 @@ std::string file_stem(const std::string& path) {
   return std::filesystem::path(path).stem().string();
 }
 
-/// Takes every k-th sample for which `wanted` holds.
+/// Takes every k-th sample for which `wanted` holds and that has a value (a law may not predict).
 template <class Wanted>
 Series sampled(Series series, const RecordingFit& r, const std::vector<double>& x, double x_unit,
                const std::vector<double>& y, double y_unit, const Wanted& wanted) {
   const std::size_t stride = 1 + r.time_s.size() / kMostDrawn;
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
-    if (!wanted(i)) continue;
+    if (!wanted(i) || !std::isfinite(y[i])) continue;
     series.x.push_back(x[i] / x_unit);
     series.y.push_back(y[i] / y_unit);
   }
@@ -147,6 +147,10 @@ Figure recording_figure(const FitResult& fit, std::size_t recording) {
       "{} and the law {}, driven by the measured {}; rms residual {} % of the peak where fitted.",
       words_of(r.response_quantity), law, words_of(r.drive_quantity),
       significant(100.0 * r.rms_residual / r.peak, 3));
+  if (r.not_predicted > 0) {
+    figure.caption += fmt::format(
+        " The law's line ends where it predicts nothing: {} samples beyond.", r.not_predicted);
+  }
   figure.panels = {response_panel(r, true), response_panel(r, false), residual_panel(r)};
   return figure;
 }

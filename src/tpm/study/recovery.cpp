@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
 #include "tpm/core/error.hpp"
@@ -28,11 +27,11 @@ double largest(const std::vector<double>& values) {
   return *std::max_element(values.begin(), values.end());
 }
 
-double visible_value(const LawParameter& p, int branches) {
+double visible_value(const LawParameter& p, int branches, double order) {
   constexpr double kStiffness = 200.0;  // N/m: about a newton at 5 mm
   static const std::vector<std::vector<double>> times_s = {{}, {2.0}, {0.5, 5.0}, {0.3, 2.0, 12.0}};
   if (p.preset) return *p.preset;
-  if (p.name == "alpha") return 0.4;
+  if (p.name == "alpha") return order;
   if (p.name == "exponent") return 2.2;
   if (p.name == "tension_share") return 0.5;
   if (p.dimension != Dimension::time) return kStiffness;
@@ -72,73 +71,73 @@ std::string reason_against(const Candidate& candidate, double margin) {
                                       : "a law with no more parameters is within the margin of BIC";
 }
 
-void count_choice(const Selection& selection, const Trials& trials, RecoveryResult& result) {
-  const Candidate& chosen = selection.candidates[selection.recommended];
+void count_choice(const Selection& selection, const Trials& trials, ChoiceCount& count) {
+  const Candidate& chosen = selection.candidates[least_within(selection.candidates, count.margin)];
   const std::string truth = law_name(trials.law);
   const std::string name = law_name(chosen.law);
-  ++result.chosen[name];
+  ++count.chosen[name];
   const auto generating =
       std::find_if(selection.candidates.begin(), selection.candidates.end(),
                    [&](const Candidate& c) { return law_name(c.law) == truth; });
   if (name == truth) {
-    ++result.returned;
+    ++count.returned;
   } else if (predicts_the_truth(chosen.fit, trials)) {
-    ++result.equivalent;
+    ++count.equivalent;
   }
   if (generating == selection.candidates.end()) return;
-  if (chosen.parameters > generating->parameters) ++result.larger;
-  if (name != truth) ++result.reasons[reason_against(*generating, selection.margin)];
+  if (chosen.parameters > generating->parameters) ++count.larger;
+  if (name != truth) ++count.reasons[reason_against(*generating, count.margin)];
 }
 
-/// Half the width of an interval in standard errors.
-double reach(const FitResult& fit) {
-  const double degrees =
-      fit.value_count / fit.inflation - static_cast<double>(fit.parameters.size());
-  const boost::math::students_t distribution(std::max(degrees, 1.0));
-  return boost::math::quantile(distribution, 0.5 * (1.0 + kLevel));
-}
-
-/// The fit of the generating law, with the reference depth of the truth so that its parameters
-/// mean the same.
-FitResult fit_generating_law(const PreparedRecording& recording, const Trials& trials,
-                             SetupOptions setup) {
+/// The residuals of the generating law, with the reference depth of the truth so that its
+/// parameters mean the same.
+ExperimentResiduals generating_residuals(const PreparedRecording& recording, const Trials& trials,
+                                         SetupOptions setup) {
   setup.profiles = false;
   const std::span<const PreparedRecording> one(&recording, 1);
   FitConfig config = recording_config(trials.law, one, setup);
   config.law->reference = trials.law.reference;
-  return run_fit(config, data_sets(one));
+  return {config, data_sets(one)};
 }
 
-/// Whether the truth lies deeper than where the fit ended.
-bool missed_the_minimum(const FitResult& fit, const Trials& trials) {
-  const RecordingFit& r = fit.recordings.front();
-  double at_truth = 0.0;
-  double at_fit = 0.0;
-  for (std::size_t i = 0; i < r.observed.size(); ++i) {
-    if (!r.fitted[i]) continue;
-    at_truth += std::pow(r.observed[i] - trials.clean.response[i], 2);
-    at_fit += std::pow(r.observed[i] - r.predicted[i], 2);
-  }
-  return at_fit > at_truth;
-}
-
-void count_intervals(const FitResult& fit, const Trials& trials, RecoveryResult& result) {
+/// The estimated parameters at the truth; the nuisance ones, which belong to the simulated test,
+/// are 0 there.
+std::vector<double> estimated_truth(const FitResult& fit, const Trials& trials) {
   const LawModel model(trials.law);
-  const double half_width = reach(fit);
-  for (ParameterCoverage& coverage : result.parameters) {
-    const auto p = std::find_if(fit.parameters.begin(), fit.parameters.end(),
-                                [&](const auto& q) { return q.parameter.name == coverage.name; });
-    const auto index = static_cast<std::size_t>(p - fit.parameters.begin());
-    const std::vector<std::size_t>& free = fit.covariance.free;
-    const auto place = std::find(free.begin(), free.end(), index);
-    if (!fit.covariance.full_rank || place == free.end()) {
-      ++coverage.one_sided;
-      continue;
-    }
-    const double truth = trials.truth[model.index(coverage.name)];
-    const double error = p->parameter.theta(p->estimate) - p->parameter.theta(truth);
-    if (std::abs(error) <= half_width * fit.covariance.theta_sd[place - free.begin()]) {
-      ++coverage.covered;
+  std::vector<double> natural;
+  for (const ParameterResult& p : fit.parameters) {
+    natural.push_back(trials.truth[model.index(p.parameter.name)]);
+  }
+  return natural;
+}
+
+/// Counts which profile-likelihood intervals hold the truth.
+void count_intervals(const ExperimentResiduals& function, const Trials& trials,
+                     RecoveryResult& result) {
+  const FitResult fit = fit_experiments(function);
+  std::vector<FitParameter> parameters;
+  for (const ParameterResult& p : fit.parameters) parameters.push_back(p.parameter);
+  const std::vector<double> truth = estimated_truth(fit, trials);
+  const std::vector<std::vector<double>> starts{fit.best.natural, truth};
+  std::vector<double> deviance;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    deviance.push_back(profile_deviance(function, parameters, starts, i, truth[i]));
+  }
+  const double least =
+      std::min(fit.best.deviance, *std::min_element(deviance.begin(), deviance.end()));
+  // The search ends within 1e-4 standard deviations of a minimum.
+  constexpr double kDeeper = 1e-3;
+  if (least < fit.best.deviance * (1.0 - kDeeper / fit.value_count)) ++result.missed;
+  Threshold threshold;
+  threshold.level = kLevel;
+  threshold.scale_known = false;
+  threshold.data_count = fit.value_count;
+  threshold.parameter_count = static_cast<int>(parameters.size());
+  threshold.inflation = fit.inflation;
+  const double rise = threshold.rise(least);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    for (ParameterCoverage& coverage : result.parameters) {
+      if (coverage.name == parameters[i].name && deviance[i] - least <= rise) ++coverage.covered;
     }
   }
 }
@@ -147,12 +146,12 @@ void run_trial(const Trials& trials, const SelectionOptions& options, Random& ra
                RecoveryResult& result) {
   Recording simulated = scattered(trials, random);
   ++result.trials;
+  for (ChoiceCount& count : result.choices) ++count.trials;
   try {
     const PreparedRecording recording = prepare_recording("simulated", std::move(simulated));
-    const FitResult fit = fit_generating_law(recording, trials, options.setup);
-    if (missed_the_minimum(fit, trials)) ++result.missed;
-    count_intervals(fit, trials, result);
-    count_choice(select_law(std::span(&recording, 1), options), trials, result);
+    count_intervals(generating_residuals(recording, trials, options.setup), trials, result);
+    const Selection selection = select_law(std::span(&recording, 1), options);
+    for (ChoiceCount& count : result.choices) count_choice(selection, trials, count);
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
     ++result.failed;
@@ -169,10 +168,10 @@ std::string coverage_text(const std::vector<ParameterCoverage>& parameters, int 
 }
 
 /// The laws that were returned instead, most frequent first.
-std::string others_text(const RecoveryResult& r) {
+std::string others_text(const ChoiceCount& c, const std::string& truth) {
   std::vector<std::pair<int, std::string>> others;
-  for (const auto& [name, count] : r.chosen) {
-    if (name != law_name(r.law)) others.emplace_back(-count, name);
+  for (const auto& [name, count] : c.chosen) {
+    if (name != truth) others.emplace_back(-count, name);
   }
   std::sort(others.begin(), others.end());
   std::string text;
@@ -204,15 +203,20 @@ Recording simulated_recording(const LawSpec& law, std::span<const double> parame
   return recording;
 }
 
-std::vector<double> visible_parameters(const LawSpec& law) {
+std::vector<double> visible_parameters(const LawSpec& law, double order) {
   std::vector<double> values;
   for (const LawParameter& p : law_parameters(law)) {
-    values.push_back(visible_value(p, law.branches));
+    values.push_back(visible_value(p, law.branches, order));
   }
   return values;
 }
 
 bool RecoveryResult::fulfilled() const {
+  return std::all_of(choices.begin(), choices.end(),
+                     [](const ChoiceCount& c) { return c.fulfilled(); });
+}
+
+bool ChoiceCount::fulfilled() const {
   return right() >= kRequired * trials && larger <= (1.0 - kRequired) * trials;
 }
 
@@ -231,6 +235,9 @@ RecoveryResult recover(const LawSpec& law, std::span<const double> truth,
   result.truth = trials.truth;
   result.noise = options.noise;
   result.seed = options.seed;
+  std::vector<double> margins = options.margins;
+  if (margins.empty()) margins.push_back(selection.margin);
+  for (const double margin : margins) result.choices.emplace_back().margin = margin;
   for (const LawParameter& p : law_parameters(law)) {
     if (!p.nuisance && !p.preset) result.parameters.push_back({p.name, 0, 0, 1.0});
   }
@@ -246,18 +253,27 @@ RecoveryResult recover(const LawSpec& law, std::span<const double> truth,
   return result;
 }
 
+namespace {
+
+Json choice_json(const ChoiceCount& c) {
+  return {{"margin_bic", c.margin}, {"returned", c.returned},     {"equivalent", c.equivalent},
+          {"larger", c.larger},     {"fulfilled", c.fulfilled()}, {"chosen", c.chosen},
+          {"reasons", c.reasons}};
+}
+
+}  // namespace
+
 Json to_json(const RecoveryResult& r) {
-  Json j{{"law", law_name(r.law)},     {"noise_over_peak", r.noise}, {"seed", r.seed},
-         {"trials", r.trials},         {"failed", r.failed},         {"returned", r.returned},
-         {"equivalent", r.equivalent}, {"larger", r.larger},         {"fulfilled", r.fulfilled()},
-         {"missed_minimum", r.missed}, {"chosen", r.chosen},         {"reasons", r.reasons}};
+  Json j{{"law", law_name(r.law)}, {"noise_over_peak", r.noise}, {"seed", r.seed},
+         {"trials", r.trials},     {"failed", r.failed},         {"missed_minimum", r.missed}};
+  j["choices"] = Json::array();
+  for (const ChoiceCount& c : r.choices) j["choices"].push_back(choice_json(c));
   Json list = Json::array();
   const LawModel model(r.law);
   for (const ParameterCoverage& p : r.parameters) {
     list.push_back({{"name", p.name},
                     {"truth_SI", r.truth[model.index(p.name)]},
                     {"covered", p.covered},
-                    {"open_intervals", p.one_sided},
                     {"binomial_p_value", rounded(p.p_value, 6)}});
   }
   j["parameters"] = std::move(list);
@@ -265,14 +281,18 @@ Json to_json(const RecoveryResult& r) {
 }
 
 std::string to_terminal_text(std::span<const RecoveryResult> results) {
-  std::string text = fmt::format("{:<20} {:>6} {:>8} {:>6} {:>6} {:>6}  {}\n", "law", "trials",
-                                 "returned", "equiv.", "larger", "failed",
+  std::string text = fmt::format("{:<20} {:>6} {:>6} {:>8} {:>6} {:>6} {:>6}  {}\n", "law",
+                                 "margin", "trials", "returned", "equiv.", "larger", "failed",
                                  "95 % intervals that hold the truth, % | returned instead");
   for (const RecoveryResult& r : results) {
-    text +=
-        fmt::format("{:<20} {:>6} {:>8} {:>6} {:>6} {:>6}{} {} | {}\n", law_name(r.law), r.trials,
-                    r.returned, r.equivalent, r.larger, r.failed, r.fulfilled() ? " " : "!",
-                    coverage_text(r.parameters, r.trials), others_text(r));
+    for (const ChoiceCount& c : r.choices) {
+      const bool first = &c == r.choices.data();
+      text +=
+          fmt::format("{:<20} {:>6} {:>6} {:>8} {:>6} {:>6} {:>6}{} {} | {}\n", law_name(r.law),
+                      shortest(c.margin), c.trials, c.returned, c.equivalent, c.larger, r.failed,
+                      c.fulfilled() ? " " : "!", first ? coverage_text(r.parameters, r.trials) : "",
+                      others_text(c, law_name(r.law)));
+    }
   }
   text +=
       "!  below 95 % right (returned or equivalent), above 5 % larger, or a coverage that\n"

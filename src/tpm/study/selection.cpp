@@ -146,19 +146,6 @@ void add_laws_without_plateau(Selection& s, std::span<const PreparedRecording> r
   }
 }
 
-std::size_t choose(const std::vector<Candidate>& candidates, double margin) {
-  std::optional<std::size_t> chosen;
-  for (const bool only_identified : {true, false}) {
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      const Candidate& c = candidates[i];
-      if (c.failed || c.delta_bic > margin || (only_identified && !c.identified)) continue;
-      if (!chosen || c.parameters < candidates[*chosen].parameters) chosen = i;
-    }
-    if (chosen) return *chosen;
-  }
-  throw Error(ExitCode::numerical, "select", "no law could be fitted");
-}
-
 /// Fits the material to some recordings and predicts another, whose nuisance parameters alone are
 /// fitted to it.
 HeldOut predict_one(const Candidate& candidate, std::span<const PreparedRecording> recordings,
@@ -333,86 +320,17 @@ std::vector<LawSpec> fractional_family() {
   return laws;
 }
 
-std::vector<std::string> outside_words(const FitResult& fit) {
-  constexpr double kDescribes = 3.0;  // times the residual inside the window
-  std::vector<std::string> words;
-  for (const RecordingFit& r : fit.recordings) {
-    double sum = 0.0;
-    double observed_left = 0.0;
-    std::size_t count = 0;
-    double last_s = 0.0;
-    for (std::size_t i = 0; i < r.time_s.size(); ++i) last_s = r.fitted[i] ? r.time_s[i] : last_s;
-    for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-      if (r.time_s[i] <= last_s) continue;
-      sum += std::pow(r.predicted[i] - r.observed[i], 2);
-      observed_left = r.drive[i];
-      ++count;
+std::size_t least_within(const std::vector<Candidate>& candidates, double margin) {
+  std::optional<std::size_t> chosen;
+  for (const bool only_identified : {true, false}) {
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      const Candidate& c = candidates[i];
+      if (c.failed || c.delta_bic > margin || (only_identified && !c.identified)) continue;
+      if (!chosen || c.parameters < candidates[*chosen].parameters) chosen = i;
     }
-    if (count == 0) continue;
-    if (fit.config.law && fit.config.law->kernel == Kernel::hertz) {
-      words.push_back(
-          fmt::format("{}: Lee and Radok's solution ends where the contact shrinks: after {} s the "
-                      "Hertz kernel "
-                      "predicts nothing",
-                      fit.config.data[r.choice].dataset, significant(last_s, 4)));
-      continue;
-    }
-    const double rms = std::sqrt(sum / static_cast<double>(count));
-    const bool describes = rms <= kDescribes * r.rms_residual;
-    words.push_back(
-        fmt::format("{}: after the fitted part (from {} s, {} samples, to a drive of {}) the "
-                    "prediction is off by "
-                    "{} % of the peak (rms){}",
-                    fit.config.data[r.choice].dataset, significant(last_s, 4), count,
-                    significant(observed_left, 3), significant(100.0 * rms / r.peak, 3),
-                    describes ? "" : ": the law does not describe the unloading and what follows"));
+    if (chosen) return *chosen;
   }
-  return words;
-}
-
-std::vector<std::string> protocol_warnings(const FitResult& fit,
-                                           std::span<const PreparedRecording> recordings) {
-  std::vector<std::string> warnings;
-  double ramp_s = std::numeric_limits<double>::infinity();
-  double hold_s = 0.0;
-  double step_s = std::numeric_limits<double>::infinity();
-  for (const PreparedRecording& r : recordings) {
-    const std::vector<double>& time = r.recording.time_s;
-    for (const Phase& phase : r.phases.phases) {
-      const double length = time[phase.last] - time[phase.first];
-      if (time[phase.first] >= r.to_s) break;
-      if (phase.kind == PhaseKind::loading) ramp_s = std::min(ramp_s, length);
-      if (phase.kind == PhaseKind::hold) hold_s = std::max(hold_s, length);
-      if (phase.last > phase.first) {
-        step_s = std::min(step_s, length / static_cast<double>(phase.last - phase.first));
-      }
-    }
-  }
-  if (hold_s == 0.0) {
-    warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");
-  }
-  for (const ParameterResult& p : fit.parameters) {
-    const bool time = p.parameter.unit.dimension == Dimension::time;
-    if (!time) continue;
-    if (p.estimate < ramp_s) {
-      warnings.push_back(fmt::format(
-          "{} = {} is shorter than the shortest ramp ({} s): what relaxed during the ramp is known "
-          "only through the ramp's shape; a faster ramp would show it",
-          p.parameter.name, in_unit(p.parameter, p.estimate), significant(ramp_s, 3)));
-    }
-    if (hold_s > 0.0 && p.estimate > hold_s / 3.0) {
-      warnings.push_back(fmt::format(
-          "{} = {} is long for the longest hold ({} s): no plateau is seen; hold for at least {} s",
-          p.parameter.name, in_unit(p.parameter, p.estimate), significant(hold_s, 3),
-          significant(3.0 * p.estimate, 2)));
-    }
-    if (p.estimate < 3.0 * step_s) {
-      warnings.push_back(fmt::format(
-          "{} = {} is sampled by fewer than 3 points ({} s apart): sampling cannot support it",
-          p.parameter.name, in_unit(p.parameter, p.estimate), significant(step_s, 3)));
-    }
-  }
-  return warnings;
+  throw Error(ExitCode::numerical, "select", "no law could be fitted");
 }
 
 Selection select_law(std::span<const PreparedRecording> recordings,
@@ -458,7 +376,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
                      if (a.failed != b.failed) return b.failed;
                      return a.bic < b.bic;
                    });
-  s.recommended = choose(s.candidates, options.margin);
+  s.recommended = least_within(s.candidates, options.margin);
   if (options.held_out) {
     Progress predicting("predicting what was held out", s.candidates.size());
     for (Candidate& c : s.candidates) {

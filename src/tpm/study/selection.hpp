@@ -39,7 +39,7 @@ struct Candidate {
 struct SelectionOptions {
   std::vector<LawSpec> laws;  ///< empty: the classical family
   bool only_listed = false;   ///< do not try laws without plateau besides
-  double margin = 6.0;        ///< how much of BIC a larger law must gain to be preferred
+  double margin = 3.0;        ///< how much of BIC a larger law must gain to be preferred
   bool held_out = true;
   double prediction_factor = 2.0;  ///< a law predicts if its error is at most this many times the
                                    ///< least residual that any law leaves where it is fitted
@@ -50,7 +50,7 @@ struct Selection {
   std::vector<Candidate> candidates;  ///< rising BIC; failed ones last
   std::size_t recommended = 0;        ///< place in candidates
   std::size_t best_bic = 0;
-  double margin = 6.0;
+  double margin = 3.0;
   double prediction_factor = 2.0;
   int samples = 0;  ///< fitted
   double effective_count = 0.0;
@@ -83,8 +83,14 @@ struct Selection {
 [[nodiscard]] Json to_json(const Selection& selection);
 [[nodiscard]] std::string to_terminal_text(const Selection& selection);
 
+/// The law that select_law recommends with a given margin of BIC.
+/// @param candidates in any order, with their scores
+/// @return place in candidates. Throws Error(numerical) if no law could be fitted.
+[[nodiscard]] std::size_t least_within(const std::vector<Candidate>& candidates, double margin);
+
 /// What the fitted law does with the samples outside the window: "unloading and after: rms 12 % of
-/// the peak; the law does not describe it". Empty if there are none.
+/// the peak; the law does not describe it", and which of them it does not predict. Empty if there
+/// are none.
 [[nodiscard]] std::vector<std::string> outside_words(const FitResult& fit);
 
 /// What the protocol of a recording cannot tell about a fitted law: relaxation times shorter than

@@ -1,0 +1,116 @@
+// What a selection says about the samples outside the window, and about the protocol.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/text.hpp"
+#include "tpm/study/selection.hpp"
+
+namespace tpm {
+namespace {
+
+/// The samples after the fitted part, and those of them that the law predicts.
+struct Outside {
+  double last_fitted_s = 0.0;
+  std::size_t count = 0, predicted = 0;
+  double sum_of_squares = 0.0;
+  double last_drive = 0.0;  ///< of the predicted ones
+  double unknown_s = 0.0;   ///< from here on the law has no answer, if predicted < count
+};
+
+Outside outside_of(const RecordingFit& r) {
+  Outside o;
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    if (r.fitted[i]) o.last_fitted_s = r.time_s[i];
+  }
+  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
+    if (r.time_s[i] <= o.last_fitted_s) continue;
+    ++o.count;
+    if (!std::isfinite(r.predicted[i])) {
+      if (o.unknown_s == 0.0) o.unknown_s = r.time_s[i];
+      continue;
+    }
+    ++o.predicted;
+    o.sum_of_squares += std::pow(r.predicted[i] - r.observed[i], 2);
+    o.last_drive = r.drive[i];
+  }
+  return o;
+}
+
+}  // namespace
+
+std::vector<std::string> outside_words(const FitResult& fit) {
+  constexpr double kDescribes = 3.0;  // times the residual inside the window
+  std::vector<std::string> words;
+  for (const RecordingFit& r : fit.recordings) {
+    const Outside o = outside_of(r);
+    const std::string& name = fit.config.data[r.choice].dataset;
+    if (o.predicted > 0) {
+      const double rms = std::sqrt(o.sum_of_squares / static_cast<double>(o.predicted));
+      const bool describes = rms <= kDescribes * r.rms_residual;
+      words.push_back(fmt::format(
+          "{}: after the fitted part (from {} s, {} samples, to a drive of {}) the prediction is "
+          "off "
+          "by {} % of the peak (rms){}",
+          name, significant(o.last_fitted_s, 4), o.predicted, significant(o.last_drive, 3),
+          significant(100.0 * rms / r.peak, 3),
+          describes ? "" : ": the law does not describe the unloading and what follows"));
+    }
+    if (o.predicted < o.count) {
+      words.push_back(fmt::format(
+          "{}: from {} s on {} samples are not predicted: there the contact of a Hertz kernel "
+          "shrinks or grows again in a way that the law does not cover (docs/laws.md)",
+          name, significant(o.unknown_s, 4), o.count - o.predicted));
+    }
+  }
+  return words;
+}
+
+std::vector<std::string> protocol_warnings(const FitResult& fit,
+                                           std::span<const PreparedRecording> recordings) {
+  std::vector<std::string> warnings;
+  double ramp_s = std::numeric_limits<double>::infinity();
+  double hold_s = 0.0;
+  double step_s = std::numeric_limits<double>::infinity();
+  for (const PreparedRecording& r : recordings) {
+    const std::vector<double>& time = r.recording.time_s;
+    for (const Phase& phase : r.phases.phases) {
+      const double length = time[phase.last] - time[phase.first];
+      if (time[phase.first] >= r.to_s) break;
+      if (phase.kind == PhaseKind::loading) ramp_s = std::min(ramp_s, length);
+      if (phase.kind == PhaseKind::hold) hold_s = std::max(hold_s, length);
+      if (phase.last > phase.first) {
+        step_s = std::min(step_s, length / static_cast<double>(phase.last - phase.first));
+      }
+    }
+  }
+  if (hold_s == 0.0) {
+    warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");
+  }
+  for (const ParameterResult& p : fit.parameters) {
+    const bool time = p.parameter.unit.dimension == Dimension::time;
+    if (!time) continue;
+    if (p.estimate < ramp_s) {
+      warnings.push_back(fmt::format(
+          "{} = {} is shorter than the shortest ramp ({} s): what relaxed during the ramp is known "
+          "only through the ramp's shape; a faster ramp would show it",
+          p.parameter.name, in_unit(p.parameter, p.estimate), significant(ramp_s, 3)));
+    }
+    if (hold_s > 0.0 && p.estimate > hold_s / 3.0) {
+      warnings.push_back(fmt::format(
+          "{} = {} is long for the longest hold ({} s): no plateau is seen; hold for at least {} s",
+          p.parameter.name, in_unit(p.parameter, p.estimate), significant(hold_s, 3),
+          significant(3.0 * p.estimate, 2)));
+    }
+    if (p.estimate < 3.0 * step_s) {
+      warnings.push_back(fmt::format(
+          "{} = {} is sampled by fewer than 3 points ({} s apart): sampling cannot support it",
+          p.parameter.name, in_unit(p.parameter, p.estimate), significant(step_s, 3)));
+    }
+  }
+  return warnings;
+}
+
+}  // namespace tpm
