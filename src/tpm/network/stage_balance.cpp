@@ -228,14 +228,20 @@ bool StageBalance::balance(const TissueState& state, double tolerance) {
 }
 
 double StageBalance::error_of(double z) const {
-  // The end of a step is more accurate than its inside, which outputs are taken from.
+  // Judged where outputs are taken from: at the stages, of which the last is more accurate than
+  // the others, and before the first of them, where a step that is long against the relaxation
+  // time hides how the tissue settles after a change of rate.
+  const double first = inner_.nodes().front();
   double worst = 0.0;
-  for (Eigen::Index j = 0; j < stages_; ++j) {
-    Eigen::VectorXd difference = weights_.col(j);
-    difference.tail(stages_) -= inner_.weights(inner_.nodes()[static_cast<std::size_t>(j)], z);
+  const auto judge = [&](double c) {
+    Eigen::VectorXd difference = full_.weights(c, z);
+    difference.tail(stages_) -= inner_.weights(c, z);
     const Eigen::VectorXd change = goal_.cwiseProduct(elongation_ * difference);
     worst = std::max(worst, std::abs(change.sum()) + 0.1 * change.lpNorm<1>());
-  }
+  };
+  judge(0.25 * first);
+  judge(0.5 * first);
+  for (const double c : inner_.nodes()) judge(c);
   return worst;
 }
 
