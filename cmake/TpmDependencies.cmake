@@ -22,6 +22,7 @@ tpm_find(Ceres 2.1)
 tpm_find(SUNDIALS 6.4 COMPONENTS cvodes sunmatrixdense sunlinsoldense nvecserial)
 tpm_find(muparser 2.3)
 tpm_find(OpenSSL 3 COMPONENTS Crypto)
+tpm_find(assimp 5.2)
 
 # libsundials-dev brings the MPI build of HDF5 along, which is not thread safe: the serial one is
 # asked for by name, and an MPI one is refused rather than linked silently.
@@ -48,6 +49,8 @@ target_include_directories(tpm_hdf5 INTERFACE ${HDF5_INCLUDE_DIRS})
 target_link_libraries(tpm_hdf5 INTERFACE ${HDF5_C_LIBRARIES})
 add_library(tpm_muparser INTERFACE IMPORTED)
 target_link_libraries(tpm_muparser INTERFACE muparser::muparser)
+add_library(tpm_assimp INTERFACE IMPORTED)
+target_link_libraries(tpm_assimp INTERFACE assimp::assimp)
 add_library(tpm_csv INTERFACE IMPORTED)
 target_include_directories(tpm_csv INTERFACE ${TPM_CSV_INCLUDE})
 target_link_libraries(tpm_csv INTERFACE ${TPM_CSV_LIBRARY})
@@ -57,7 +60,8 @@ if(NOT TPM_CONSUMER)
   find_package(Boost 1.74 REQUIRED)  # quadrature and quantiles of Boost.Math
   find_package(utf8cpp 3.2 REQUIRED)
   find_package(valijson REQUIRED)
+  find_package(nanoflann 1.4 REQUIRED)  # neighbours within a radius
   add_library(tpm_header_only INTERFACE IMPORTED)
-  target_link_libraries(tpm_header_only INTERFACE Boost::headers utf8::cpp valijson)
+  target_link_libraries(tpm_header_only INTERFACE Boost::headers utf8::cpp valijson nanoflann::nanoflann)
   find_package(CLI11 2.1 REQUIRED)
 endif()

@@ -1,0 +1,65 @@
+#include "tpm/network/freedom.hpp"
+
+#include <cmath>
+
+namespace tpm {
+
+Freedom::Freedom(std::size_t spheres)
+    : state_(spheres, State::free), projector_(spheres, Eigen::Matrix3d::Identity()) {}
+
+void Freedom::hold(std::size_t sphere) {
+  state_.at(sphere) = State::held;
+  projector_[sphere].setZero();
+}
+
+void Freedom::guide(std::size_t sphere, const Eigen::Vector3d& direction) {
+  state_.at(sphere) = State::partly;
+  projector_[sphere] = direction * direction.transpose();
+}
+
+void Freedom::impose(std::size_t sphere, const Eigen::Vector3d& direction) {
+  Eigen::Matrix3d& p = projector_.at(sphere);
+  const Eigen::Vector3d free = p * direction;
+  const double part = free.norm();
+  if (part > 0.0) p -= free * free.transpose() / (part * part);
+  // What rounding leaves of a direction that is gone would become a soft one.
+  const bool held = p.trace() < 0.5;
+  if (held) p.setZero();
+  state_[sphere] = held ? State::held : State::partly;
+}
+
+std::size_t Freedom::count() const {
+  double sum = 0.0;
+  for (const Eigen::Matrix3d& p : projector_) sum += p.trace();
+  return static_cast<std::size_t>(std::lround(sum));
+}
+
+void Freedom::project(Eigen::Ref<Eigen::Matrix3Xd> vectors) const {
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (state_[i] == State::free) continue;
+    const auto column = static_cast<Eigen::Index>(i);
+    vectors.col(column) = (projector_[i] * vectors.col(column)).eval();
+  }
+}
+
+void Freedom::constrain(const BondSystem& bonds, BlockMatrix<double>& matrix) const {
+  for (std::size_t i = 0; i < bonds.size(); ++i) {
+    const std::uint32_t a = bonds.end_a()[i];
+    const std::uint32_t b = bonds.end_b()[i];
+    if (is_free(a) && is_free(b)) continue;
+    const auto [index, transposed] = bonds.place(i);
+    const std::uint32_t row = transposed ? b : a;
+    const std::uint32_t column = transposed ? a : b;
+    Eigen::Matrix3d& block = matrix.below[index];
+    block = (projector_[row] * block * projector_[column]).eval();
+  }
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (is_free(i)) continue;
+    Eigen::Matrix3d& block = matrix.diagonal[i];
+    const double scale = block.trace() > 0.0 ? block.trace() : 1.0;
+    block = (projector_[i] * block * projector_[i]).eval() +
+            scale * (Eigen::Matrix3d::Identity() - projector_[i]);
+  }
+}
+
+}  // namespace tpm

@@ -1,0 +1,46 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "tpm/network/bond_system.hpp"
+
+namespace tpm {
+
+/// In which directions each sphere may follow the forces on it. Where it may not, it stands still
+/// or moves as something outside decides, and the force there is a reaction.
+class Freedom {
+ public:
+  /// All spheres free.
+  explicit Freedom(std::size_t spheres);
+
+  /// Nothing is free any more.
+  void hold(std::size_t sphere);
+  /// Only the motion along a unit direction stays free.
+  void guide(std::size_t sphere, const Eigen::Vector3d& direction);
+  /// The motion along a unit direction is imposed from outside. On a guided sphere it is the
+  /// direction of the guide.
+  void impose(std::size_t sphere, const Eigen::Vector3d& direction);
+
+  [[nodiscard]] std::size_t size() const { return state_.size(); }
+  /// Free coordinates.
+  [[nodiscard]] std::size_t count() const;
+  [[nodiscard]] bool is_free(std::size_t sphere) const { return state_[sphere] == State::free; }
+  /// The orthogonal projector onto the free directions.
+  [[nodiscard]] const Eigen::Matrix3d& projector(std::size_t sphere) const {
+    return projector_[sphere];
+  }
+
+  /// Takes the part along what is not free out of vectors, one column per sphere.
+  void project(Eigen::Ref<Eigen::Matrix3Xd> vectors) const;
+
+  /// P K P + s (1 - P): the stiffness that the free coordinates feel, and a harmless one elsewhere.
+  /// @param matrix on bonds.pattern()
+  void constrain(const BondSystem& bonds, BlockMatrix<double>& matrix) const;
+
+ private:
+  enum class State { free, partly, held };
+  std::vector<State> state_;
+  std::vector<Eigen::Matrix3d> projector_;
+};
+
+}  // namespace tpm

@@ -1,0 +1,213 @@
+#include "tpm/network/liver_surface.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kSubdivisions = 5;
+
+struct Ellipsoid {
+  Vector3d centre;
+  Vector3d radii;  ///< half axes
+
+  /// About the signed distance: exact on the surface, of the right slope there.
+  [[nodiscard]] double value(const Vector3d& point) const {
+    const Vector3d q = (point - centre).cwiseQuotient(radii);
+    const double reach = q.norm();
+    const double slope = q.cwiseQuotient(radii).norm();
+    return slope > 0.0 ? reach * (reach - 1.0) / slope : -radii.minCoeff();
+  }
+};
+
+/// The smaller of two values, rounded off twice differentiably where they differ by less than
+/// `width` (the polynomial smooth minimum of I. Quilez).
+double smooth_min(double a, double b, double width) {
+  const double h = std::max(width - std::abs(a - b), 0.0) / width;
+  return std::min(a, b) - h * h * h * width / 6.0;
+}
+
+double smooth_max(double a, double b, double width) {
+  return -smooth_min(-a, -b, width);
+}
+
+/// The shape as a function that is negative inside.
+class LiverFunction {
+ public:
+  explicit LiverFunction(const LiverShape& s)
+      : right_{{0.5 * s.width * (1.0 - s.right_share), 0.0, 0.0},
+               0.5 * Vector3d(s.right_share * s.width, s.height, s.depth)},
+        left_{Vector3d::Zero(), 0.5 * Vector3d((1.24 - s.right_share) * s.width,
+                                               s.left_height * s.height, s.left_depth * s.depth)},
+        lobes_(0.35 * s.height),
+        groove_(0.2 * s.height),
+        hollow_radius_(1.2 * s.height) {
+    // The left lobe reaches to the left end, hangs a little below the dome, and lies in front.
+    left_.centre = Vector3d(-0.5 * s.width + left_.radii.x(), 0.40 * s.height - left_.radii.y(),
+                            -0.45 * s.depth + left_.radii.z());
+    const Vector3d towards_bowel = Vector3d(-0.25, -0.72, 0.65).normalized();
+    hollow_centre_ = 0.65 * right_.centre + 0.35 * left_.centre +
+                     (hollow_radius_ + 0.75 * (0.5 - s.visceral_hollow) * s.height) * towards_bowel;
+    notch_ = {{s.width * (0.5 - s.right_share), (s.notch_depth - 0.5) * s.height, -0.1 * s.depth},
+              {s.notch_width * s.width, s.notch_depth * s.height, s.depth}};
+  }
+
+  [[nodiscard]] double operator()(const Vector3d& point) const {
+    const double body = smooth_min(right_.value(point), left_.value(point), lobes_);
+    const double ball = (point - hollow_centre_).norm() - hollow_radius_;
+    return smooth_max(smooth_max(body, -ball, lobes_), -notch_.value(point), groove_);
+  }
+
+  /// A point from which all of the surface is seen.
+  [[nodiscard]] Vector3d middle() const { return 0.7 * right_.centre + 0.3 * left_.centre; }
+
+ private:
+  Ellipsoid right_, left_, notch_{};
+  double lobes_, groove_;  ///< widths of the blends, m
+  double hollow_radius_;
+  Vector3d hollow_centre_;
+};
+
+/// Every triangle of a unit sphere cut into four at the middles of its edges.
+std::vector<Eigen::Vector3i> quartered(const std::vector<Eigen::Vector3i>& faces,
+                                       std::vector<Vector3d>& vertices) {
+  std::map<std::pair<int, int>, int> halfway;
+  const auto middle = [&](int a, int b) {
+    const auto [found, fresh] =
+        halfway.try_emplace(std::minmax({a, b}), static_cast<int>(vertices.size()));
+    if (fresh) {
+      vertices.push_back(
+          (vertices[static_cast<std::size_t>(a)] + vertices[static_cast<std::size_t>(b)])
+              .normalized());
+    }
+    return found->second;
+  };
+  std::vector<Eigen::Vector3i> finer;
+  finer.reserve(4 * faces.size());
+  for (const Eigen::Vector3i& f : faces) {
+    const Eigen::Vector3i m(middle(f[0], f[1]), middle(f[1], f[2]), middle(f[2], f[0]));
+    finer.emplace_back(f[0], m[0], m[2]);
+    finer.emplace_back(f[1], m[1], m[0]);
+    finer.emplace_back(f[2], m[2], m[1]);
+    finer.push_back(m);
+  }
+  return finer;
+}
+
+/// Unit sphere: an icosahedron whose triangles are cut into four, again and again.
+TriangleMesh icosphere(int subdivisions) {
+  const double golden = (1.0 + std::sqrt(5.0)) / 2.0;
+  TriangleMesh mesh;
+  mesh.vertices.resize(3, 12);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      Vector3d corner = Vector3d::Zero();
+      corner[axis] = k < 2 ? 1.0 : -1.0;
+      corner[(axis + 1) % 3] = k % 2 == 0 ? golden : -golden;
+      mesh.vertices.col(4 * axis + k) = corner.normalized();
+    }
+  }
+  // The 20 triples of corners that are all one edge length apart, turned outwards.
+  const double edge = 1.1 * 2.0 / std::sqrt(golden * golden + 1.0);
+  std::vector<Eigen::Vector3i> faces;
+  const auto near = [&](int a, int b) {
+    return (mesh.vertices.col(a) - mesh.vertices.col(b)).norm() < edge;
+  };
+  for (int a = 0; a < 12; ++a) {
+    for (int b = a + 1; b < 12; ++b) {
+      for (int c = b + 1; c < 12; ++c) {
+        if (!near(a, b) || !near(b, c) || !near(c, a)) continue;
+        const Vector3d va = mesh.vertices.col(a);
+        const Vector3d vb = mesh.vertices.col(b);
+        const bool outwards = va.cross(vb).dot(mesh.vertices.col(c)) > 0.0;
+        faces.emplace_back(a, outwards ? b : c, outwards ? c : b);
+      }
+    }
+  }
+  std::vector<Vector3d> vertices;
+  for (Eigen::Index v = 0; v < 12; ++v) vertices.emplace_back(mesh.vertices.col(v));
+  for (int round = 0; round < subdivisions; ++round) faces = quartered(faces, vertices);
+  mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    mesh.vertices.col(static_cast<Eigen::Index>(v)) = vertices[v];
+  }
+  mesh.triangles.resize(3, static_cast<Eigen::Index>(faces.size()));
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    mesh.triangles.col(static_cast<Eigen::Index>(f)) = faces[f];
+  }
+  return mesh;
+}
+
+/// Where a ray from the middle leaves the shape, by bisection.
+double reach_along(const LiverFunction& liver, const Vector3d& direction, double farthest) {
+  double inside = 0.0;
+  double outside = farthest;
+  while (outside - inside > 1e-12 * farthest) {
+    const double between = 0.5 * (inside + outside);
+    (liver(liver.middle() + between * direction) < 0.0 ? inside : outside) = between;
+  }
+  return inside;
+}
+
+}  // namespace
+
+const std::array<LiverMeasure, 9>& liver_measures() noexcept {
+  static constexpr std::array<LiverMeasure, 9> kMeasures{{
+      {"width", &LiverShape::width, 1e-6, 1e3, nullptr},
+      {"height", &LiverShape::height, 0.5, 1.2, &LiverShape::width},
+      {"depth", &LiverShape::depth, 0.35, 0.9, &LiverShape::width},
+      {"right_share", &LiverShape::right_share, 0.5, 0.75, nullptr},
+      {"left_height", &LiverShape::left_height, 0.4, 0.6, nullptr},
+      {"left_depth", &LiverShape::left_depth, 0.45, 0.8, nullptr},
+      {"notch_depth", &LiverShape::notch_depth, 0.1, 0.2, nullptr},
+      {"notch_width", &LiverShape::notch_width, 0.08, 0.14, nullptr},
+      {"visceral_hollow", &LiverShape::visceral_hollow, 0.0, 0.3, nullptr},
+  }};
+  return kMeasures;
+}
+
+void require_valid(const LiverShape& shape, std::string_view where) {
+  for (const LiverMeasure& measure : liver_measures()) {
+    const double unit = measure.unit == nullptr ? 1.0 : shape.*measure.unit;
+    const double value = shape.*measure.value;
+    const double slack = 1e-12 * unit;  // scaling a shape at the end of a range leaves it valid
+    if (value >= measure.least * unit - slack && value <= measure.most * unit + slack) continue;
+    throw bad_input(where, fmt::format("{} of the liver is {:.6g}", measure.name, value),
+                    fmt::format("{:.6g} to {:.6g}", measure.least * unit, measure.most * unit));
+  }
+}
+
+LiverShape scaled(LiverShape shape, double factor) {
+  shape.width *= factor;
+  shape.height *= factor;
+  shape.depth *= factor;
+  return shape;
+}
+
+MeshSurface liver_surface(const LiverShape& shape) {
+  require_valid(shape, "liver");
+  const LiverFunction liver(shape);
+  TriangleMesh mesh = icosphere(kSubdivisions);
+  const double farthest = shape.width + shape.height + shape.depth;
+  for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v) {
+    const Vector3d direction = mesh.vertices.col(v);
+    mesh.vertices.col(v) = liver.middle() + reach_along(liver, direction, farthest) * direction;
+  }
+  return MeshSurface(std::move(mesh));
+}
+
+SurfacePoint front_of_right_lobe(const LiverShape& shape, const Surface& surface) {
+  return surface.nearest({0.5 * shape.width * (1.0 - shape.right_share), 0.0, -0.5 * shape.depth});
+}
+
+}  // namespace tpm

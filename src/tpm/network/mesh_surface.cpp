@@ -1,0 +1,158 @@
+#include "tpm/network/mesh_surface.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "tpm/core/random.hpp"
+
+namespace tpm {
+
+namespace {
+
+using Eigen::Vector3d;
+
+const double kSmooth = std::sqrt(3.0) / 2.0;  // cosine of 30 degrees
+
+/// Angle of a triangle at a corner, rad.
+double angle_at(const TriangleMesh& mesh, Eigen::Index triangle, Eigen::Index which) {
+  const Vector3d u = mesh.corner(triangle, (which + 1) % 3) - mesh.corner(triangle, which);
+  const Vector3d v = mesh.corner(triangle, (which + 2) % 3) - mesh.corner(triangle, which);
+  return std::atan2(u.cross(v).norm(), u.dot(v));
+}
+
+/// For every vertex the triangles that meet there.
+std::vector<std::vector<Eigen::Index>> fans(const TriangleMesh& mesh) {
+  std::vector<std::vector<Eigen::Index>> fan(static_cast<std::size_t>(mesh.vertices.cols()));
+  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t) {
+    for (const int vertex : mesh.triangles.col(t))
+      fan[static_cast<std::size_t>(vertex)].push_back(t);
+  }
+  return fan;
+}
+
+Eigen::Index corner_number(const TriangleMesh& mesh, Eigen::Index triangle, int vertex) {
+  Eigen::Index which = 0;
+  while (mesh.triangles(which, triangle) != vertex) ++which;
+  return which;
+}
+
+}  // namespace
+
+MeshSurface::MeshSurface(TriangleMesh mesh)
+    : tree_(std::move(mesh)), area_(mesh_area(tree_.mesh())), volume_(mesh_volume(tree_.mesh())) {
+  normals_.resize(static_cast<std::size_t>(this->mesh().triangles.cols()));
+  for (std::size_t t = 0; t < normals_.size(); ++t) {
+    normals_[t].face = this->mesh().area_vector(static_cast<Eigen::Index>(t)).normalized();
+  }
+  set_corner_normals();
+  set_edge_normals();
+}
+
+void MeshSurface::set_corner_normals() {
+  const auto fan = fans(mesh());
+  vertex_normals_.setZero(3, mesh().vertices.cols());
+  for (std::size_t v = 0; v < fan.size(); ++v) {
+    const auto vertex = static_cast<int>(v);
+    std::vector<double> angle;
+    for (const Eigen::Index t : fan[v]) {
+      angle.push_back(angle_at(mesh(), t, corner_number(mesh(), t, vertex)));
+      vertex_normals_.col(vertex) += angle.back() * normals_[static_cast<std::size_t>(t)].face;
+    }
+    vertex_normals_.col(vertex).normalize();
+    for (const Eigen::Index t : fan[v]) {
+      Normals& own = normals_[static_cast<std::size_t>(t)];
+      Vector3d sum = Vector3d::Zero();
+      for (std::size_t k = 0; k < fan[v].size(); ++k) {
+        const Vector3d& other = normals_[static_cast<std::size_t>(fan[v][k])].face;
+        if (own.face.dot(other) >= kSmooth) sum += angle[k] * other;
+      }
+      own.smooth.col(corner_number(mesh(), t, vertex)) = sum.normalized();
+    }
+  }
+}
+
+void MeshSurface::set_edge_normals() {
+  using Side = std::pair<std::size_t, Eigen::Index>;  // triangle and edge
+  std::map<std::pair<int, int>, Side> open;
+  on_crease_.assign(static_cast<std::size_t>(mesh().vertices.cols()), false);
+  for (std::size_t t = 0; t < normals_.size(); ++t) {
+    const auto corner = mesh().triangles.col(static_cast<Eigen::Index>(t));
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const std::pair<int, int> key = std::minmax({corner[i], corner[(i + 1) % 3]});
+      const auto [found, fresh] = open.try_emplace(key, t, i);
+      if (fresh) continue;
+      const auto [other, edge] = found->second;
+      const Vector3d mean = (normals_[t].face + normals_[other].face).normalized();
+      const bool crease = normals_[t].face.dot(normals_[other].face) < kSmooth;
+      normals_[t].edge.col(i) = mean;
+      normals_[other].edge.col(edge) = mean;
+      normals_[t].crease[i] = normals_[other].crease[edge] = crease;
+      if (crease) {
+        on_crease_[static_cast<std::size_t>(key.first)] = true;
+        on_crease_[static_cast<std::size_t>(key.second)] = true;
+      }
+      open.erase(found);
+    }
+  }
+}
+
+/// What tells inside from outside at the nearest point (Baerentzen and Aanaes 2005).
+Vector3d MeshSurface::pseudonormal(const TrianglePoint& at) const {
+  const Normals& own = normals_[static_cast<std::size_t>(at.triangle)];
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const bool before_zero = at.weights[(i + 1) % 3] <= 0.0;
+    const bool after_zero = at.weights[(i + 2) % 3] <= 0.0;
+    if (before_zero && after_zero) return vertex_normals_.col(mesh().triangles(i, at.triangle));
+  }
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (at.weights[(i + 2) % 3] <= 0.0) return own.edge.col(i);
+  }
+  return own.face;
+}
+
+Vector3d MeshSurface::normal(const TrianglePoint& at) const {
+  const Normals& own = normals_[static_cast<std::size_t>(at.triangle)];
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const bool at_corner = at.weights[(i + 1) % 3] <= 0.0 && at.weights[(i + 2) % 3] <= 0.0;
+    const auto vertex = static_cast<std::size_t>(mesh().triangles(i, at.triangle));
+    if (at_corner && on_crease_[vertex]) return pseudonormal(at);
+    if (at.weights[(i + 2) % 3] <= 0.0 && own.crease[i]) return pseudonormal(at);
+  }
+  return (own.smooth * at.weights).normalized();
+}
+
+SurfacePoint MeshSurface::nearest(const Vector3d& point) const {
+  const TrianglePoint at = tree_.nearest(point);
+  return {at.position, normal(at)};
+}
+
+double MeshSurface::signed_distance(const Vector3d& point) const {
+  const TrianglePoint at = tree_.nearest(point);
+  const double distance = std::sqrt(at.squared_distance);
+  return pseudonormal(at).dot(point - at.position) < 0.0 ? -distance : distance;
+}
+
+// Stratified: the k-th point takes the k-th slice of the area, triangle after triangle.
+Positions MeshSurface::spread(std::size_t count, std::uint64_t seed) const {
+  Random random(seed);
+  Positions points(3, static_cast<Eigen::Index>(count));
+  const double slice = area_ / static_cast<double>(count);
+  const Eigen::Index last = mesh().triangles.cols() - 1;
+  Eigen::Index triangle = 0;
+  double reached = mesh().area_vector(0).norm();  // area up to the end of this triangle
+  for (Eigen::Index k = 0; k < points.cols(); ++k) {
+    const double target = (static_cast<double>(k) + random.uniform()) * slice;
+    while (reached < target && triangle < last) reached += mesh().area_vector(++triangle).norm();
+    const double root = std::sqrt(random.uniform());
+    const double share = random.uniform();
+    points.col(k) = (1.0 - root) * mesh().corner(triangle, 0) +
+                    root * (1.0 - share) * mesh().corner(triangle, 1) +
+                    root * share * mesh().corner(triangle, 2);
+  }
+  return points;
+}
+
+}  // namespace tpm

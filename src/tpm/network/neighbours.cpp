@@ -1,0 +1,80 @@
+#include "tpm/network/neighbours.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nanoflann.hpp>
+#include <utility>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+
+namespace {
+
+/// What nanoflann asks of a set of points.
+class PointCloud {
+ public:
+  explicit PointCloud(const Positions& points) : points_(points) {}
+  [[nodiscard]] std::size_t kdtree_get_point_count() const {
+    return static_cast<std::size_t>(points_.cols());
+  }
+  [[nodiscard]] double kdtree_get_pt(std::size_t index, std::size_t axis) const {
+    return points_(static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(index));
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+
+ private:
+  const Positions& points_;
+};
+
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointCloud>,
+                                                 PointCloud, 3, std::size_t>;
+
+}  // namespace
+
+std::vector<NeighbourPair> pairs_within(const Positions& points, double radius) {
+  if (!std::isfinite(radius) || !(radius > 0.0)) {
+    throw bad_input("support radius", fmt::format("{} m", radius), "a length above 0");
+  }
+  std::vector<NeighbourPair> pairs;
+  if (points.cols() < 2) return pairs;
+  const PointCloud cloud(points);
+  const Tree tree(3, cloud);
+  // The tree keeps what lies strictly inside the squared radius; a point on it counts.
+  const double squared = std::nextafter(radius * radius, 2.0 * radius * radius);
+  std::vector<std::pair<std::size_t, double>> found;
+  for (std::size_t i = 0; i < cloud.kdtree_get_point_count(); ++i) {
+    const double* centre = points.col(static_cast<Eigen::Index>(i)).data();
+    tree.radiusSearch(centre, squared, found, nanoflann::SearchParams(0, 0.0F, false));
+    const std::size_t before = pairs.size();
+    for (const auto& [j, distance] : found) {
+      if (j > i) pairs.push_back({i, j});
+    }
+    std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(before), pairs.end(),
+              [](const NeighbourPair& a, const NeighbourPair& b) { return a.second < b.second; });
+  }
+  return pairs;
+}
+
+std::vector<double> distances_to_nearest(const Positions& points) {
+  const PointCloud cloud(points);
+  const Tree tree(3, cloud);
+  std::vector<double> nearest(cloud.kdtree_get_point_count());
+  for (std::size_t i = 0; i < nearest.size(); ++i) {
+    std::array<std::size_t, 2> index{};
+    std::array<double, 2>
+        squared{};  // the point itself, or one at its place, and the nearest other
+    tree.knnSearch(points.col(static_cast<Eigen::Index>(i)).data(), 2, index.data(),
+                   squared.data());
+    nearest[i] = std::sqrt(squared[1]);
+  }
+  return nearest;
+}
+
+}  // namespace tpm

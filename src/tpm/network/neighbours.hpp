@@ -1,0 +1,26 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "tpm/network/organ.hpp"
+
+namespace tpm {
+
+/// Two points nearer to each other than a support radius; first < second.
+struct NeighbourPair {
+  std::size_t first = 0;
+  std::size_t second = 0;
+  bool operator==(const NeighbourPair&) const = default;
+};
+
+/// All pairs of points at a distance of at most `radius`, sorted by first and then second; found
+/// with a k-d tree in O(n log n) for a bounded number of neighbours.
+/// @param points one finite point per column, m
+/// @param radius m, finite, above 0; Error(bad_input) otherwise
+[[nodiscard]] std::vector<NeighbourPair> pairs_within(const Positions& points, double radius);
+
+/// For every point the distance to the nearest other one, m. At least two points.
+[[nodiscard]] std::vector<double> distances_to_nearest(const Positions& points);
+
+}  // namespace tpm

@@ -1,0 +1,130 @@
+#include "tpm/network/network.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+void require_valid(const NetworkOptions& options, std::string_view where) {
+  if (!(options.support > 1.0) || !std::isfinite(options.support)) {
+    throw bad_input(where, fmt::format("support = {}", shortest(options.support)),
+                    "a number of spacings above 1");
+  }
+  if (!(options.reference_spacing_m > 0.0) || !std::isfinite(options.reference_spacing_m)) {
+    throw bad_input(where,
+                    fmt::format("reference spacing = {} m", shortest(options.reference_spacing_m)),
+                    "a length above 0");
+  }
+}
+
+Bond bond_of(const Organ& organ, const NeighbourPair& pair, std::string_view where) {
+  const auto [a, b] = std::minmax(pair.first, pair.second);
+  if (b >= organ.size() || a == b) {
+    throw bad_input(where, fmt::format("a bond of the spheres {} and {}", a + 1, b + 1),
+                    fmt::format("two different spheres from 1 to {}", organ.size()));
+  }
+  Bond bond;
+  bond.a = static_cast<std::uint32_t>(a);
+  bond.b = static_cast<std::uint32_t>(b);
+  bond.kind = organ.layer[a] == organ.layer[b] ? BondKind::lateral : BondKind::radial;
+  bond.rest_length_m = (organ.position.col(a) - organ.position.col(b)).norm();
+  return bond;
+}
+
+double cosine_squared(const Organ& organ, const Bond& bond, std::uint32_t sphere) {
+  const Eigen::Vector3d along =
+      (organ.position.col(bond.b) - organ.position.col(bond.a)) / bond.rest_length_m;
+  const double cosine = along.dot(organ.normal.col(sphere));
+  return cosine * cosine;
+}
+
+/// What a sphere's sum allows each of its bonds; 0 where the sphere has no say.
+double share_at(const BondSums& sums, BondKind kind) {
+  if (kind == BondKind::lateral) return 2.0 / sums.lateral_count;
+  return sums.radial > 0.0 ? 1.0 / sums.radial : 0.0;
+}
+
+void normalise(Network& network, std::string_view where) {
+  const std::vector<BondSums> sums = bond_sums(network);  // all factors are 1
+  for (Bond& bond : network.bonds) {
+    const double a = share_at(sums[bond.a], bond.kind);
+    const double b = share_at(sums[bond.b], bond.kind);
+    if (a == 0.0 && b == 0.0) {
+      throw bad_input(where,
+                      fmt::format("the bond of the spheres {} and {} between two layers is square "
+                                  "to the normals of both",
+                                  bond.a + 1, bond.b + 1),
+                      "layers one above the other");
+    }
+    bond.factor = a == 0.0 || b == 0.0 ? a + b : 0.5 * (a + b);
+  }
+  if (!network.organ.contact) return;
+  const std::size_t contact = *network.organ.contact;
+  const BondSums at_contact = bond_sums(network)[contact];
+  for (Bond& bond : network.bonds) {
+    if (bond.a != contact && bond.b != contact) continue;
+    bond.factor /= bond.kind == BondKind::lateral ? 0.5 * at_contact.lateral : at_contact.radial;
+  }
+}
+
+}  // namespace
+
+std::vector<BondSums> bond_sums(const Network& network) {
+  std::vector<BondSums> sums(network.organ.size());
+  for (const Bond& bond : network.bonds) {
+    for (const std::uint32_t sphere : {bond.a, bond.b}) {
+      BondSums& s = sums[sphere];
+      if (bond.kind == BondKind::lateral) {
+        s.lateral += bond.factor;
+        ++s.lateral_count;
+      } else {
+        s.radial += bond.factor * cosine_squared(network.organ, bond, sphere);
+        ++s.radial_count;
+      }
+    }
+  }
+  return sums;
+}
+
+Network join(Organ organ, std::span<const NeighbourPair> pairs, const NetworkOptions& options,
+             std::string_view where) {
+  require_valid(organ, where);
+  require_valid(options, where);
+  Network network{std::move(organ), options, {}};
+  network.bonds.reserve(pairs.size());
+  for (const NeighbourPair& pair : pairs) {
+    network.bonds.push_back(bond_of(network.organ, pair, where));
+  }
+  const auto key = [](const Bond& bond) { return std::pair(bond.a, bond.b); };
+  std::sort(network.bonds.begin(), network.bonds.end(),
+            [&](const Bond& p, const Bond& q) { return key(p) < key(q); });
+  const auto twice =
+      std::adjacent_find(network.bonds.begin(), network.bonds.end(),
+                         [&](const Bond& p, const Bond& q) { return key(p) == key(q); });
+  if (twice != network.bonds.end()) {
+    throw bad_input(
+        where, fmt::format("the spheres {} and {} are joined twice", twice->a + 1, twice->b + 1),
+        "each pair once");
+  }
+  if (options.rule == StiffnessRule::normalised) normalise(network, where);
+  if (options.spacing_law == SpacingLaw::continuum) {
+    const double scale = network.organ.spacing / options.reference_spacing_m;
+    for (Bond& bond : network.bonds) bond.factor *= scale;
+  }
+  return network;
+}
+
+Network build_network(Organ organ, const NetworkOptions& options, std::string_view where) {
+  require_valid(organ, where);
+  require_valid(options, where);
+  const auto pairs = pairs_within(organ.position, options.support * organ.spacing);
+  return join(std::move(organ), pairs, options, where);
+}
+
+}  // namespace tpm

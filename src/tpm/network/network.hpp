@@ -1,0 +1,76 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tpm/material/tpm_element.hpp"
+#include "tpm/network/neighbours.hpp"
+#include "tpm/network/organ.hpp"
+
+namespace tpm {
+
+enum class BondKind {
+  radial,   ///< between layers: the Zener element along the bond
+  lateral,  ///< within a layer: elastic, modulus E'
+};
+
+/// How stiff a bond is against the paper's E A0/l0 (MODEL.md, section 4).
+enum class StiffnessRule {
+  /// A radial bond carries the mean over its ends of 1/S, S the sum of cos^2 (angle to the local
+  /// normal) over the sphere's radial bonds; a lateral bond the mean over its ends of 2/n, n the
+  /// sphere's lateral bonds; the bonds of the contact sphere are then rescaled so that its own sums
+  /// are 1 and 2, those of the four-sphere star.
+  normalised,
+  per_bond,  ///< every bond has E A0/l0, as printed
+};
+
+/// How stiffness follows the spacing.
+enum class SpacingLaw {
+  paper,      ///< not at all
+  continuum,  ///< in proportion to x, so that a block keeps its modulus under refinement
+};
+
+struct NetworkOptions {
+  double support = 1.5;  ///< neighbours are closer than this many spacings, > 1
+  StiffnessRule rule = StiffnessRule::normalised;
+  SpacingLaw spacing_law = SpacingLaw::paper;
+  double reference_spacing_m = 0.020;  ///< where the continuum law has the paper's stiffness, > 0
+};
+
+/// Two spheres joined; a < b.
+struct Bond {
+  std::uint32_t a = 0, b = 0;
+  BondKind kind = BondKind::radial;
+  double rest_length_m = 0.0;
+  double factor = 1.0;  ///< times E A0/l0
+};
+
+/// The spheres and their bonds.
+struct Network {
+  Organ organ;
+  NetworkOptions options;
+  std::vector<Bond> bonds;  ///< by a, then b
+};
+
+/// Joins the pairs given. Bonds within a layer are lateral, all others radial.
+/// Throws Error(bad_input) for options out of range, a pair that is no pair of the organ's spheres
+/// or stands twice, and, under the rule `normalised`, a radial bond square to both its normals.
+[[nodiscard]] Network join(Organ organ, std::span<const NeighbourPair> pairs,
+                           const NetworkOptions& options, std::string_view where);
+
+/// Joins all spheres within the support radius of each other.
+/// Throws Error(bad_input) as join does.
+[[nodiscard]] Network build_network(Organ organ, const NetworkOptions& options,
+                                    std::string_view where);
+
+/// Sums over the bonds of one sphere, those that the rule `normalised` aims at 1 and 2.
+struct BondSums {
+  double radial = 0.0;   ///< of factor times cos^2 (angle to the sphere's normal)
+  double lateral = 0.0;  ///< of factors
+  int radial_count = 0, lateral_count = 0;
+};
+
+[[nodiscard]] std::vector<BondSums> bond_sums(const Network& network);
+
+}  // namespace tpm

@@ -1,0 +1,220 @@
+#include "tpm/network/quasistatic.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/model/model.hpp"
+#include "tpm/network/stage_balance.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kStepShare = 0.1;   // of the tolerance, for one step
+constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
+constexpr double kLeastMove = 1e-5;  // of a jump
+constexpr double kSafety = 0.8;
+
+/// One run: the state and how it is carried through the protocol.
+class Run {
+ public:
+  Run(const BondSystem& bonds, const Positions& rest, const Freedom& freedom, const Probe& probe,
+      const QuasiStaticOptions& options, const Protocol& protocol, std::span<const double> times_s)
+      : protocol_(protocol),
+        options_(options),
+        times_s_(times_s),
+        tissue_(bonds, rest, freedom, probe, protocol.drive()),
+        stages_(tissue_, options.stages) {
+    order_.resize(times_s.size());
+    std::iota(order_.begin(), order_.end(), std::size_t{0});
+    std::stable_sort(order_.begin(), order_.end(),
+                     [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
+    result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
+  }
+
+  QuasiStaticRun go() {
+    start();
+    const auto knots = protocol_.knots();
+    for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+      const Knot& from = knots[k];
+      const Knot& to = knots[k + 1];
+      if (to.time_s == from.time_s) {
+        jump(to.value);
+      } else {
+        cross(from, to);
+      }
+    }
+    if (next_ < order_.size()) hold_on(knots.back());
+    result_.work = stages_.work();
+    result_.position = state_.position;
+    result_.remembered = state_.remembered;
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] Error failed(double imposed, std::string_view what) const {
+    const bool depth = protocol_.drive() == Drive::displacement;
+    return Error(
+        ExitCode::numerical, "network",
+        fmt::format("at t = {} s and {} of {} {} {}", significant(state_.time_s, 5),
+                    depth ? "a depth" : "a load", significant(depth ? 1e3 * imposed : imposed, 4),
+                    depth ? "mm" : "N", what));
+  }
+
+  void start() {
+    const Knot& first = protocol_.knots().front();
+    state_ = tissue_.at_rest(first.time_s);
+    stages_.set_scale(tissue_.linear_response(state_, protocol_.peak()));
+    if (protocol_.relaxed_at_start()) {
+      move_to(first.value, true);
+    } else if (first.value != 0.0) {
+      jump(first.value);
+    }
+  }
+
+  void jump(double value) { move_to(value, false); }
+
+  /// Goes to an imposed value through equilibria, at once or with everything relaxed on the way.
+  void move_to(double value, bool relaxed) {
+    const double begin = state_.imposed;
+    double done = 0.0;
+    double stride = 1.0;
+    const double tolerance = 1e-3 * options_.tolerance;
+    while (done < 1.0) {
+      const double aim = std::min(1.0, done + stride);
+      const double imposed = begin + aim * (value - begin);
+      const TissueMove move = stages_.move(state_, imposed, relaxed, tolerance);
+      if (move == TissueMove::done) {
+        done = aim;
+        stride *= 2.0;
+        continue;
+      }
+      stride *= 0.5;
+      if (stride > kLeastMove) continue;
+      throw failed(imposed, move == TissueMove::unstable
+                                ? "the tissue buckles: its stiffness is no longer positive"
+                                : "no equilibrium is found: it may snap through");
+    }
+    stages_.see(tissue_.response(state_));
+  }
+
+  /// Steps through a piece in which the imposed value is linear.
+  void cross(const Knot& from, const Knot& to) {
+    const double length = to.time_s - from.time_s;
+    const double rate = (to.value - from.value) / length;
+    double h = length;
+    if (rate == 0.0 && from.value == 0.0 && is_relaxed()) return stand_still(to.time_s);
+    while (state_.time_s < to.time_s) {
+      const double left = to.time_s - state_.time_s;
+      const bool last = h >= left * (1.0 - 1e-12);
+      if (last) h = left;
+      const StepOutcome outcome =
+          stages_.try_step(state_, h, rate, kStepShare * options_.tolerance);
+      if (!outcome.accepted) {
+        ++result_.work.rejected;
+        h *= outcome.balanced ? std::clamp(kSafety * outcome.growth, 0.1, 0.9) : 0.25;
+        if (h > kLeastStep * length) continue;
+        throw failed(state_.imposed, outcome.unstable
+                                         ? "the tissue buckles: its stiffness is no longer positive"
+                                         : "the forces cannot be balanced: it may snap through");
+      }
+      report_within(h, rate);
+      result_.error_estimate += outcome.error;
+      stages_.accept(state_, h, rate);
+      if (last) state_.time_s = to.time_s;
+      state_.imposed = last ? to.value : state_.imposed;
+      h *= std::clamp(kSafety * outcome.growth, 0.2, 8.0);
+    }
+  }
+
+  [[nodiscard]] bool is_relaxed() const { return state_.remembered.isZero(0.0); }
+
+  void stand_still(double until_s) {
+    while (next_ < order_.size() && times_s_[order_[next_]] < until_s) {
+      put(tissue_.response(state_));
+    }
+    state_.time_s = until_s;
+  }
+
+  /// Answers the times asked for within the step just found, its end left out.
+  void report_within(double h, double rate) {
+    while (next_ < order_.size() && times_s_[order_[next_]] < state_.time_s + h) {
+      const double c = (times_s_[order_[next_]] - state_.time_s) / h;
+      put(stages_.response_within(state_, std::max(c, 0.0), h, rate));
+    }
+  }
+
+  /// The last value held for as long as is asked, and for ever.
+  void hold_on(const Knot& last) {
+    while (next_ < order_.size()) {
+      const double time = times_s_[order_[next_]];
+      if (std::isinf(time)) {
+        move_to(last.value, true);
+      } else if (time > state_.time_s) {
+        const double latest = latest_finite_time();
+        cross({state_.time_s, last.value}, {latest, last.value});
+        continue;
+      }
+      put(tissue_.response(state_));
+    }
+  }
+
+  [[nodiscard]] double latest_finite_time() const {
+    double latest = state_.time_s;
+    for (const double t : times_s_) {
+      if (std::isfinite(t)) latest = std::max(latest, t);
+    }
+    return latest;
+  }
+
+  void put(double response) {
+    result_.response[static_cast<Eigen::Index>(order_[next_++])] = response;
+  }
+
+  const Protocol& protocol_;
+  const QuasiStaticOptions& options_;
+  std::span<const double> times_s_;
+  std::vector<std::size_t> order_;  ///< of times_s_, rising
+  std::size_t next_ = 0;            ///< the first of them not answered yet
+  DrivenTissue tissue_;
+  StageBalance stages_;
+  TissueState state_;
+  QuasiStaticRun result_;
+};
+
+}  // namespace
+
+QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probe probe,
+                         QuasiStaticOptions options)
+    : bonds_(bonds),
+      rest_(std::move(rest)),
+      freedom_(std::move(freedom)),
+      probe_(std::move(probe)),
+      options_(options) {
+  if (!(options.tolerance >= 1e-12 && options.tolerance <= 0.1)) {
+    throw bad_input("tolerance", shortest(options.tolerance), "1e-12 to 0.1");
+  }
+  if (options.stages < 2 || options.stages > 8) {
+    throw bad_input("stages", std::to_string(options.stages), "2 to 8");
+  }
+  if (probe_.sphere >= freedom_.size()) {
+    throw bad_input("probe", fmt::format("sphere {}", probe_.sphere + 1),
+                    fmt::format("a sphere from 1 to {}", freedom_.size()));
+  }
+  const Eigen::Vector3d free = freedom_.projector(probe_.sphere) * probe_.direction;
+  if (std::abs(free.norm() - 1.0) > 1e-9) {
+    throw bad_input("probe", fmt::format("sphere {} is held", probe_.sphere + 1),
+                    "a sphere that is free to move along the direction of the probe");
+  }
+}
+
+QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s) const {
+  require_times_within(protocol, times_s);
+  return Run(bonds_, rest_, freedom_, probe_, options_, protocol, times_s).go();
+}
+
+}  // namespace tpm

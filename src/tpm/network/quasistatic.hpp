@@ -1,0 +1,63 @@
+#pragma once
+#include <span>
+
+#include "tpm/network/equilibrium.hpp"
+#include "tpm/protocol/protocol.hpp"
+
+namespace tpm {
+
+/// The sphere that the protocol drives, and where to.
+struct Probe {
+  std::size_t sphere = 0;
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector into the tissue
+};
+
+struct QuasiStaticOptions {
+  /// Error of the response that steps are chosen for, in parts of its largest value; 1e-12 to 0.1.
+  double tolerance = 1e-6;
+  int stages = 5;  ///< of a step, 2 to 8
+};
+
+/// What a run took.
+struct QuasiStaticWork {
+  int steps = 0, rejected = 0;
+  int iterations = 0;  ///< of all stages of a step at once
+  int factorisations = 0;
+  int back_solves = 0;
+};
+
+struct QuasiStaticRun {
+  Eigen::VectorXd response;     ///< contact force, N, or depth, m, at each asked time
+  double error_estimate = 0.0;  ///< sum of the steps' error estimates, N or m
+  QuasiStaticWork work;
+  Positions position;          ///< where the run ended
+  Eigen::VectorXd remembered;  ///< y of each bond there, m
+};
+
+/// The quasi-static network: force balance on every free sphere at each instant (MODEL.md, section
+/// 4, formulation 5). The elongations of a step are a polynomial through its Radau nodes, under
+/// which what the bonds remember is advanced exactly; the stages are balanced together with one
+/// factorisation, that many steps share. Steps follow an estimate of the error of the response,
+/// found with the displacement field of the probe as its own adjoint.
+class QuasiStatic {
+ public:
+  /// @param freedom of the network without the probe: what is held and guided
+  /// @param bonds must live as long as this
+  /// Throws Error(bad_input) for options out of range or a probe that cannot move.
+  QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probe probe,
+              QuasiStaticOptions options = {});
+
+  /// @param times_s any order, within the protocol
+  /// Throws Error(bad_input) for times outside it, Error(numerical) where the tissue buckles, snaps
+  /// through or cannot be balanced; the message says when and at which depth or load.
+  [[nodiscard]] QuasiStaticRun run(const Protocol& protocol, std::span<const double> times_s) const;
+
+ private:
+  const BondSystem& bonds_;
+  Positions rest_;
+  Freedom freedom_;
+  Probe probe_;
+  QuasiStaticOptions options_;
+};
+
+}  // namespace tpm

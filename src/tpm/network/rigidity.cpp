@@ -1,0 +1,119 @@
+#include "tpm/network/rigidity.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <numeric>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/random.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kZero = 1e-9;          // of the mean diagonal
+constexpr std::size_t kMostModes = 24;  // found one by one
+constexpr int kInverseIterations = 4;   // each gains about nine digits over what is stiff
+constexpr double kTakesPart = 0.01;     // of the largest motion in the modes
+constexpr std::size_t kMostNamed = 10;
+
+/// The matrix at rest plus a multiple of 1 on what is free.
+BlockMatrix<double> shifted(const BlockMatrix<double>& stiffness, const Freedom& freedom,
+                            double shift) {
+  BlockMatrix<double> matrix = stiffness;
+  for (std::size_t i = 0; i < freedom.size(); ++i) {
+    matrix.diagonal[i] += shift * freedom.projector(i);
+  }
+  return matrix;
+}
+
+double mean_diagonal(const BlockMatrix<double>& matrix) {
+  double sum = 0.0;
+  for (const Eigen::Matrix3d& block : matrix.diagonal) sum += block.trace();
+  return sum / (3.0 * static_cast<double>(matrix.diagonal.size()));
+}
+
+/// An orthonormal basis of the softest motions, one column each, coordinates of all spheres.
+Eigen::MatrixXd softest(const BlockPattern& pattern, const BlockMatrix<double>& matrix,
+                        const Freedom& freedom, Eigen::Index count) {
+  BlockLdlt<double> factor(pattern);
+  const auto n = static_cast<Eigen::Index>(freedom.size());
+  Eigen::MatrixXd basis(3 * n, count);
+  Random random(1);
+  for (double& x : basis.reshaped()) x = random.normal();
+  if (!factor.factorise(matrix)) return Eigen::MatrixXd::Zero(3 * n, count);
+  for (int i = 0; i < kInverseIterations; ++i) {
+    for (Eigen::Index j = 0; j < count; ++j) {
+      Eigen::Map<Eigen::Matrix3Xd> mode(basis.col(j).data(), 3, n);
+      freedom.project(mode);
+      factor.solve(mode);
+      freedom.project(mode);
+    }
+    basis = Eigen::HouseholderQR<Eigen::MatrixXd>(basis).householderQ() *
+            Eigen::MatrixXd::Identity(3 * n, count);
+  }
+  return basis;
+}
+
+std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::size_t spheres) {
+  std::vector<double> motion(spheres);
+  for (std::size_t i = 0; i < spheres; ++i) {
+    motion[i] = modes.middleRows(3 * static_cast<Eigen::Index>(i), 3).norm();
+  }
+  const double most = *std::max_element(motion.begin(), motion.end());
+  std::vector<std::size_t> order(spheres);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return motion[a] > motion[b]; });
+  std::erase_if(order, [&](std::size_t i) { return motion[i] < kTakesPart * most; });
+  return order;
+}
+
+}  // namespace
+
+ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
+                                  const Freedom& freedom) {
+  const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
+  BlockMatrix<double> stiffness(bonds.pattern());
+  bonds.add_stiffness(rest, none, stiffness);
+  const double mean = mean_diagonal(stiffness);
+  const double size = mean > 0.0 ? mean : 1.0;
+  freedom.constrain(bonds, stiffness);
+
+  ZeroEnergyModes modes;
+  BlockLdlt<double> factor(bonds.pattern());
+  if (!factor.factorise(shifted(stiffness, freedom, -kZero * size))) {
+    throw Error(ExitCode::numerical, "network", "the stiffness at rest cannot be factorised");
+  }
+  modes.count = factor.negative_count();
+  if (modes.count == 0) return modes;
+  const auto found = static_cast<Eigen::Index>(std::min(modes.count, kMostModes));
+  modes.spheres = spheres_that_move(
+      softest(bonds.pattern(), shifted(stiffness, freedom, kZero * size), freedom, found),
+      freedom.size());
+  return modes;
+}
+
+std::string words(const ZeroEnergyModes& modes) {
+  std::string list;
+  const std::size_t named = std::min(modes.spheres.size(), kMostNamed);
+  for (std::size_t i = 0; i < named; ++i) {
+    list += fmt::format("{}{}", i == 0 ? "" : ", ", modes.spheres[i] + 1);
+  }
+  if (modes.spheres.size() > named) {
+    list += fmt::format(" and {} more", modes.spheres.size() - named);
+  }
+  return fmt::format("{} zero-energy mode{}; loose: sphere{} {}", modes.count,
+                     modes.count == 1 ? "" : "s", modes.spheres.size() == 1 ? "" : "s", list);
+}
+
+void require_rigid(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+                   std::string_view where) {
+  const ZeroEnergyModes modes = zero_energy_modes(bonds, rest, freedom);
+  if (modes.is_rigid()) return;
+  throw bad_input(where, words(modes),
+                  "a network without mechanisms: more bonds (a wider support) or more anchors");
+}
+
+}  // namespace tpm

@@ -1,0 +1,203 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+
+#include "tpm/core/error.hpp"
+#include "tpm/network/filling.hpp"
+#include "tpm/network/neighbours.hpp"
+
+namespace tpm {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kRoom = 0.8;        // share of the inner radius that the layers may take
+constexpr double kClearance = 0.62;  // least distance of an inner sphere, in steps
+constexpr double kAgreement = 0.01;  // of a count and a spacing that are both given
+constexpr int kSweeps = 200;
+
+/// A request with everything decided.
+struct ShellPlan {
+  std::size_t count = 0;
+  int layers = 0;
+  double spacing = 0.0;
+  double step = 0.0;  ///< between layers, m
+
+  /// Spheres of a layer.
+  [[nodiscard]] std::size_t in_layer(int layer) const {
+    const auto parts = static_cast<std::size_t>(layers);
+    return count / parts + (static_cast<std::size_t>(layer) < count % parts ? 1 : 0);
+  }
+};
+
+/// Radius of about the largest ball inside: the deepest point of a grid of 24^3.
+double inner_radius(const Surface& surface) {
+  constexpr int kGrid = 24;
+  const Eigen::AlignedBox3d box = surface.bounds();
+  double deepest = 0.0;
+  for (int i = 0; i < kGrid * kGrid * kGrid; ++i) {
+    const int row = i / kGrid;
+    const int plane = row / kGrid;
+    const Vector3d share(i % kGrid, row % kGrid, plane);
+    const Vector3d point =
+        box.min() + ((share.array() + 0.5) / kGrid * box.sizes().array()).matrix();
+    deepest = std::max(deepest, -surface.signed_distance(point));
+  }
+  return deepest;
+}
+
+void require_spacing(double spacing) {
+  if (std::isfinite(spacing) && spacing > 0.0) return;
+  throw bad_input("spacing", fmt::format("{} m", spacing), "a length above 0");
+}
+
+/// The count that a request means.
+std::size_t decided_count(const Surface& surface, const ShellRequest& request) {
+  if (request.layers < 1 || request.layers > 100) {
+    throw bad_input("layers", fmt::format("{}", request.layers), "1 to 100");
+  }
+  if (request.spacing) require_spacing(*request.spacing);
+  if (request.count) return *request.count;
+  if (!request.spacing) {
+    throw bad_input("shell", "neither a number of spheres nor a spacing is given", "one of them");
+  }
+  return even_count(surface, *request.spacing) * static_cast<std::size_t>(request.layers);
+}
+
+ShellPlan planned(const Surface& surface, const ShellRequest& request) {
+  ShellPlan plan;
+  plan.layers = request.layers;
+  plan.count = decided_count(surface, request);
+  require_sphere_count(plan.count);
+  if (plan.count < static_cast<std::size_t>(plan.layers)) {
+    throw bad_input("layers", fmt::format("{} layers of {} spheres", plan.layers, plan.count),
+                    "at least one sphere a layer");
+  }
+  const double even = even_spacing(surface, plan.in_layer(0));
+  plan.spacing = request.spacing.value_or(even);
+  if (request.count && request.spacing && std::abs(plan.spacing / even - 1.0) > kAgreement) {
+    throw bad_input("shell",
+                    fmt::format("{} spheres in {} layers at a spacing of {:.6g} m do not fit a "
+                                "surface of {:.6g} m^2",
+                                plan.count, plan.layers, plan.spacing, surface.area()),
+                    fmt::format("a spacing of {:.6g} m, or only one of the two", even));
+  }
+  plan.step = plan.spacing;
+  if (plan.layers > 1) {
+    plan.step = std::min(plan.step, kRoom * inner_radius(surface) / (plan.layers - 1));
+  }
+  return plan;
+}
+
+/// Inner spheres closer than the clearance give way, and stay at their depth or below it.
+class InnerLayers {
+ public:
+  InnerLayers(const Surface& surface, const ShellPlan& plan, Organ& organ)
+      : surface_(surface),
+        organ_(organ),
+        step_(plan.step),
+        fixed_(static_cast<Eigen::Index>(plan.in_layer(0))) {}
+
+  void settle() {
+    std::vector<Eigen::Index> moved(static_cast<std::size_t>(organ_.position.cols() - fixed_));
+    std::iota(moved.begin(), moved.end(), fixed_);
+    for (int sweep = 0; sweep < kSweeps && !moved.empty(); ++sweep) {
+      for (const Eigen::Index i : moved) keep_depth(i);
+      moved = push_apart();
+    }
+  }
+
+ private:
+  void keep_depth(Eigen::Index i) {
+    const double wanted = kClearance * step_ * organ_.layer[static_cast<std::size_t>(i)];
+    const double depth = -surface_.signed_distance(organ_.position.col(i));
+    if (depth >= wanted) return;
+    const SurfacePoint at = surface_.nearest(organ_.position.col(i));
+    organ_.position.col(i) -= (wanted - depth) * at.normal;
+  }
+
+  std::vector<Eigen::Index> push_apart() {
+    const double clearance = kClearance * step_;
+    Positions push = Positions::Zero(3, organ_.position.cols());
+    std::vector<bool> touched(organ_.size(), false);
+    for (const NeighbourPair& pair : pairs_within(organ_.position, clearance)) {
+      const auto a = static_cast<Eigen::Index>(pair.first);
+      const auto b = static_cast<Eigen::Index>(pair.second);
+      if (b < fixed_) continue;  // both in the outer layer
+      Vector3d apart = organ_.position.col(b) - organ_.position.col(a);
+      double distance = apart.norm();
+      if (distance > 0.999 * clearance) continue;
+      if (!(distance > 0.0)) {  // two columns that end at one place part along their normals
+        apart = organ_.normal.col(b) - organ_.normal.col(a);
+        distance = std::max(apart.norm(), 1e-300);
+      }
+      const Vector3d lacking =
+          ((clearance - (organ_.position.col(b) - organ_.position.col(a)).norm()) / distance) *
+          apart;
+      const double share = a < fixed_ ? 1.0 : 0.5;
+      push.col(b) += share * lacking;
+      touched[pair.second] = true;
+      if (a < fixed_) continue;
+      push.col(a) -= share * lacking;
+      touched[pair.first] = true;
+    }
+    std::vector<Eigen::Index> moved;
+    for (Eigen::Index i = fixed_; i < organ_.position.cols(); ++i) {
+      if (!touched[static_cast<std::size_t>(i)]) continue;
+      organ_.position.col(i) += 0.7 * push.col(i);
+      moved.push_back(i);
+    }
+    return moved;
+  }
+
+  const Surface& surface_;
+  Organ& organ_;
+  double step_;
+  Eigen::Index fixed_;
+};
+
+/// The columns below the outer layer, straight down.
+Organ stacked(const Surface& surface, const ShellPlan& plan, const Positions& outer) {
+  Organ organ;
+  const auto count = static_cast<Eigen::Index>(plan.count);
+  organ.position.resize(3, count);
+  organ.normal.resize(3, count);
+  Eigen::Index at = 0;
+  for (int layer = 0; layer < plan.layers; ++layer) {
+    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(plan.in_layer(layer)); ++i, ++at) {
+      const Vector3d normal =
+          layer == 0 ? surface.nearest(outer.col(i)).normal : Vector3d(organ.normal.col(i));
+      organ.position.col(at) = outer.col(i) - layer * plan.step * normal;
+      organ.normal.col(at) = normal;
+      organ.layer.push_back(layer);
+    }
+  }
+  return organ;
+}
+
+}  // namespace
+
+Organ fill_shell(const Surface& surface, const ShellRequest& request) {
+  const ShellPlan plan = planned(surface, request);
+  const Positions outer = sorted_by_x(even_points(surface, plan.in_layer(0), request.seed));
+  Organ organ = stacked(surface, plan, outer);
+  InnerLayers(surface, plan, organ).settle();
+  round_to_nanometres(organ.position);
+  organ.name = fmt::format("shell of {} spheres in {} layers", plan.count, plan.layers);
+  organ.spacing = plan.spacing;
+  organ.radius = request.radius.value_or(0.5 * plan.spacing);
+  organ.assumptions.emplace_back("the centres of the outer layer lie on the surface");
+  if (plan.layers > 1) {
+    organ.assumptions.emplace_back("the spheres are split evenly over the layers");
+    organ.assumptions.push_back(fmt::format("the layers are {:.4g} mm apart, {:.3g} spacings",
+                                            plan.step * 1e3, plan.step / plan.spacing));
+  }
+  require_valid(organ, organ.name);
+  return organ;
+}
+
+}  // namespace tpm

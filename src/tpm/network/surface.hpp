@@ -1,0 +1,38 @@
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+
+#include "tpm/network/organ.hpp"
+
+namespace tpm {
+
+/// A point of a surface and the outward unit normal there.
+struct SurfacePoint {
+  Eigen::Vector3d position;  ///< m
+  Eigen::Vector3d normal;
+};
+
+/// A closed surface that bounds one body: what a filling asks of a shape. All lengths in m.
+class Surface {
+ public:
+  Surface() = default;
+  Surface(const Surface&) = delete;
+  Surface& operator=(const Surface&) = delete;
+  Surface(Surface&&) = default;
+  Surface& operator=(Surface&&) = default;
+  virtual ~Surface() = default;
+
+  /// The point of the surface nearest to a point.
+  [[nodiscard]] virtual SurfacePoint nearest(const Eigen::Vector3d& point) const = 0;
+  /// Distance to the surface, negative inside.
+  [[nodiscard]] virtual double signed_distance(const Eigen::Vector3d& point) const = 0;
+  /// `count` points spread over the surface in proportion to area, the same for the same seed.
+  [[nodiscard]] virtual Positions spread(std::size_t count, std::uint64_t seed) const = 0;
+  [[nodiscard]] virtual Eigen::AlignedBox3d bounds() const = 0;
+  [[nodiscard]] virtual double area() const = 0;    ///< m^2
+  [[nodiscard]] virtual double volume() const = 0;  ///< m^3
+};
+
+}  // namespace tpm

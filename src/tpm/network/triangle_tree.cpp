@@ -1,0 +1,168 @@
+#include "tpm/network/triangle_tree.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+namespace tpm {
+
+namespace {
+
+constexpr int kLeaf = 4;
+
+using Eigen::Vector3d;
+
+/// Nearest point on the edge from corner `from` to corner `to`, as weights of the three corners.
+Vector3d edge_weights(const Vector3d& start, const Vector3d& end, const Vector3d& point,
+                      Eigen::Index from, Eigen::Index to) {
+  const Vector3d edge = end - start;
+  const double share = std::clamp(edge.dot(point - start) / edge.squaredNorm(), 0.0, 1.0);
+  Vector3d weights = Vector3d::Zero();
+  weights[from] = 1.0 - share;
+  weights[to] = share;
+  return weights;
+}
+
+/// Weights of the corners a, b, c at the point of their triangle nearest to `point`.
+Vector3d nearest_weights(const Vector3d& a, const Vector3d& b, const Vector3d& c,
+                         const Vector3d& point) {
+  const Vector3d normal = (b - a).cross(c - a);
+  const double inside_a = normal.dot((b - point).cross(c - point));
+  const double inside_b = normal.dot((c - point).cross(a - point));
+  const double inside_c = normal.dot((a - point).cross(b - point));
+  if (inside_a > 0.0 && inside_b > 0.0 && inside_c > 0.0) {
+    const Vector3d inside(inside_a, inside_b, inside_c);
+    return inside / inside.sum();
+  }
+  Vector3d best = Vector3d::Zero();
+  double least = std::numeric_limits<double>::infinity();
+  const auto consider = [&](const Vector3d& weights) {
+    const double squared = (weights[0] * a + weights[1] * b + weights[2] * c - point).squaredNorm();
+    if (squared < least) {
+      least = squared;
+      best = weights;
+    }
+  };
+  if (!(inside_c > 0.0)) consider(edge_weights(a, b, point, 0, 1));
+  if (!(inside_a > 0.0)) consider(edge_weights(b, c, point, 1, 2));
+  if (!(inside_b > 0.0)) consider(edge_weights(c, a, point, 2, 0));
+  return best;
+}
+
+}  // namespace
+
+TriangleTree::TriangleTree(TriangleMesh mesh) : mesh_(std::move(mesh)) {
+  const auto count = static_cast<int>(mesh_.triangles.cols());
+  order_.resize(static_cast<std::size_t>(count));
+  std::iota(order_.begin(), order_.end(), 0);
+  nodes_.reserve(order_.size());
+  nodes_.emplace_back();
+  split(0, 0, count);
+  pack();
+}
+
+void TriangleTree::pack() {
+  packed_.reserve(order_.size());
+  for (const int t : order_) {
+    packed_.push_back({mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2),
+                       mesh_.area_vector(t).normalized()});
+  }
+}
+
+Eigen::AlignedBox3d TriangleTree::box_of(int triangle) const {
+  Eigen::AlignedBox3d box;
+  for (Eigen::Index which = 0; which < 3; ++which) box.extend(mesh_.corner(triangle, which));
+  return box;
+}
+
+void TriangleTree::split(int node, int first, int count) {
+  Eigen::AlignedBox3d box;
+  Eigen::AlignedBox3d centres;
+  const auto begin = order_.begin() + first;
+  for (auto it = begin; it != begin + count; ++it) {
+    const Eigen::AlignedBox3d own = box_of(*it);
+    box.extend(own);
+    centres.extend(own.center());
+  }
+  Node& filled = nodes_[static_cast<std::size_t>(node)];
+  filled.box = box;
+  filled.first = first;
+  filled.count = count;
+  if (count <= kLeaf) return;
+  Eigen::Index axis = 0;
+  centres.sizes().maxCoeff(&axis);
+  const int half = count / 2;
+  std::nth_element(begin, begin + half, begin + count, [&](int a, int b) {
+    const double left = box_of(a).center()[axis];
+    const double right = box_of(b).center()[axis];
+    return left != right ? left < right : a < b;
+  });
+  const auto child = static_cast<int>(nodes_.size());
+  filled.first = child;
+  filled.count = 0;
+  nodes_.resize(nodes_.size() + 2);  // `filled` is not valid from here on
+  split(child, first, half);
+  split(child + 1, first + half, count - half);
+}
+
+TrianglePoint TriangleTree::nearest(const Vector3d& point) const {
+  TrianglePoint best;
+  best.squared_distance = std::numeric_limits<double>::infinity();
+  // Halving leaves at most 31 levels below an int of triangles, each with one node set aside.
+  std::array<std::pair<double, int>, 64> open;
+  std::size_t depth = 0;
+  open[depth++] = {0.0, 0};
+  while (depth > 0) {
+    const auto [bound, index] = open[--depth];
+    if (bound >= best.squared_distance) continue;
+    const Node& node = nodes_[static_cast<std::size_t>(index)];
+    if (node.count == 0) {
+      const auto bound_of = [&](int child) {
+        return nodes_[static_cast<std::size_t>(child)].box.squaredExteriorDistance(point);
+      };
+      std::pair<double, int> near{bound_of(node.first), node.first};
+      std::pair<double, int> far{bound_of(node.first + 1), node.first + 1};
+      if (far.first < near.first) std::swap(near, far);
+      open[depth++] = far;
+      open[depth++] = near;
+      continue;
+    }
+    for (int at = node.first; at < node.first + node.count; ++at) {
+      const auto& [a, b, c, normal] = packed_[static_cast<std::size_t>(at)];
+      const double height = normal.dot(point - a);
+      if (height * height >= best.squared_distance) continue;  // its plane is too far already
+      const Vector3d weights = nearest_weights(a, b, c, point);
+      const Vector3d position = weights[0] * a + weights[1] * b + weights[2] * c;
+      const double squared = (position - point).squaredNorm();
+      if (squared < best.squared_distance) {
+        best = {order_[static_cast<std::size_t>(at)], weights, position, squared};
+      }
+    }
+  }
+  return best;
+}
+
+std::vector<int> TriangleTree::meeting(const Eigen::AlignedBox3d& box) const {
+  std::vector<int> found;
+  std::vector<int> open{0};
+  while (!open.empty()) {
+    const Node& node = nodes_[static_cast<std::size_t>(open.back())];
+    open.pop_back();
+    if (!node.box.intersects(box)) continue;
+    if (node.count == 0) {
+      open.push_back(node.first);
+      open.push_back(node.first + 1);
+      continue;
+    }
+    for (int at = node.first; at < node.first + node.count; ++at) {
+      const int triangle = order_[static_cast<std::size_t>(at)];
+      if (box_of(triangle).intersects(box)) found.push_back(triangle);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+}  // namespace tpm

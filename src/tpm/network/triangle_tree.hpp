@@ -1,0 +1,50 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "tpm/network/triangle_mesh.hpp"
+
+namespace tpm {
+
+/// The point of a triangle nearest to a given point.
+struct TrianglePoint {
+  int triangle = -1;
+  Eigen::Vector3d weights = Eigen::Vector3d::Zero();  ///< barycentric; exactly 0 off the interior
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double squared_distance = 0.0;  ///< m^2
+};
+
+/// A mesh in a hierarchy of bounding boxes, so that a query costs O(log n).
+class TriangleTree {
+ public:
+  /// @param mesh at least one triangle
+  explicit TriangleTree(TriangleMesh mesh);
+
+  [[nodiscard]] const TriangleMesh& mesh() const { return mesh_; }
+  [[nodiscard]] const Eigen::AlignedBox3d& bounds() const { return nodes_.front().box; }
+  [[nodiscard]] TrianglePoint nearest(const Eigen::Vector3d& point) const;
+  /// The triangles whose bounding boxes meet a box, in rising order.
+  [[nodiscard]] std::vector<int> meeting(const Eigen::AlignedBox3d& box) const;
+  [[nodiscard]] Eigen::AlignedBox3d box_of(int triangle) const;
+
+ private:
+  struct Node {
+    Eigen::AlignedBox3d box;
+    int first = 0;  ///< first of order_ in a leaf, else the left child; the right one follows it
+    int count = 0;  ///< triangles of a leaf; 0 in an inner node
+  };
+  /// A triangle as nearest() wants it, in the order of the leaves.
+  struct Packed {
+    Eigen::Vector3d a, b, c;
+    Eigen::Vector3d normal;  ///< unit
+  };
+  void split(int node, int first, int count);
+  void pack();
+
+  TriangleMesh mesh_;
+  std::vector<int> order_;
+  std::vector<Packed> packed_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace tpm

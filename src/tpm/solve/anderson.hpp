@@ -1,0 +1,45 @@
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <algorithm>
+
+namespace tpm {
+
+/// Anderson acceleration of a fixed-point iteration x <- x + d(x) (Walker and Ni 2011): the step
+/// that would have brought the latest few d's nearest to 0, were d linear.
+class Anderson {
+ public:
+  /// @param size of x
+  /// @param depth how many earlier steps are remembered, >= 1
+  Anderson(Eigen::Index size, Eigen::Index depth)
+      : dx_(size, depth), dd_(size, depth), last_x_(size), last_d_(size) {}
+
+  void restart() { known_ = -1; }
+
+  /// Replaces x, where the plain step would be d, by the accelerated next point.
+  void step(Eigen::Ref<Eigen::VectorXd> x, const Eigen::Ref<const Eigen::VectorXd>& d) {
+    if (known_ >= 0) {
+      const Eigen::Index slot = known_ % dx_.cols();
+      dx_.col(slot) = x - last_x_;
+      dd_.col(slot) = d - last_d_;
+    }
+    ++known_;
+    last_x_ = x;
+    last_d_ = d;
+    const Eigen::Index used = std::min(known_, dx_.cols());
+    x += d;
+    if (used == 0) return;
+    const auto differences = dd_.leftCols(used);
+    const Eigen::MatrixXd gram = differences.transpose() * differences;
+    const Eigen::VectorXd mix =
+        gram.completeOrthogonalDecomposition().solve(differences.transpose() * d);
+    x -= (dx_.leftCols(used) + differences) * mix;
+  }
+
+ private:
+  Eigen::MatrixXd dx_, dd_;
+  Eigen::VectorXd last_x_, last_d_;
+  Eigen::Index known_ = -1;  ///< differences so far; -1 before the first point
+};
+
+}  // namespace tpm

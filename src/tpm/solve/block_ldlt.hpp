@@ -1,0 +1,103 @@
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace tpm {
+
+/// Which 3x3 blocks of a symmetric matrix may differ from 0, and where a factorisation of it fills
+/// in: found once for a graph, used by every matrix on it.
+///
+/// Nodes are reordered by approximate minimum degree (Eigen's AMDOrdering), which decides fill but
+/// no result beyond rounding.
+class BlockPattern {
+ public:
+  /// @param nodes number of 3x3 blocks on the diagonal
+  /// @param edges pairs of different nodes, each in any order; repetitions do no harm
+  BlockPattern(std::size_t nodes, std::span<const std::array<std::uint32_t, 2>> edges);
+
+  [[nodiscard]] std::size_t nodes() const { return order_.size(); }
+  /// Blocks below the diagonal of the factor.
+  [[nodiscard]] std::size_t factor_blocks() const { return row_.size(); }
+  /// Multiplications of 3x3 blocks that a factorisation takes.
+  [[nodiscard]] std::size_t factor_products() const { return products_; }
+
+  /// Where the block of two nodes stands among the blocks below the diagonal.
+  struct Place {
+    std::uint32_t index = 0;
+    bool transposed = false;  ///< the block (b, a) stands there, not (a, b)
+  };
+  /// Throws std::out_of_range for nodes that are not neighbours.
+  [[nodiscard]] Place place(std::uint32_t a, std::uint32_t b) const;
+
+ private:
+  template <typename Scalar>
+  friend class BlockLdlt;
+
+  /// An entry of a row of the factor, met while its column is updated.
+  struct RowEntry {
+    std::uint32_t column;
+    std::uint32_t index;
+  };
+
+  std::vector<std::uint32_t> order_;      ///< place in the factor of each node
+  std::vector<std::uint32_t> column_;     ///< first block of each column, one more at the end
+  std::vector<std::uint32_t> row_;        ///< row of each block, rising in a column
+  std::vector<std::uint32_t> row_begin_;  ///< first entry of each row, one more at the end
+  std::vector<RowEntry> row_entry_;
+  std::size_t products_ = 0;
+};
+
+/// A symmetric matrix of 3x3 blocks on a pattern: the diagonal and what lies below it, in the order
+/// of the factor.
+template <typename Scalar>
+struct BlockMatrix {
+  using Block = Eigen::Matrix<Scalar, 3, 3>;
+
+  explicit BlockMatrix(const BlockPattern& pattern)
+      : diagonal(pattern.nodes(), Block::Zero()), below(pattern.factor_blocks(), Block::Zero()) {}
+  void set_zero();
+
+  std::vector<Block> diagonal;  ///< of each node, in the order of the nodes
+  std::vector<Block> below;     ///< where BlockPattern::place says
+};
+
+/// L D L^T of a symmetric matrix with 3x3 pivots, without exchange of rows: stable for positive
+/// definite matrices, and for others good enough to count signs.
+///
+/// factorise() and solve() allocate nothing.
+template <typename Scalar>
+class BlockLdlt {
+ public:
+  using Block = typename BlockMatrix<Scalar>::Block;
+  using Vectors = Eigen::Matrix<Scalar, 3, Eigen::Dynamic>;
+
+  /// @param pattern must live as long as this
+  explicit BlockLdlt(const BlockPattern& pattern);
+
+  /// False if a pivot cannot be inverted or is not finite; the factor is then of no use.
+  [[nodiscard]] bool factorise(const BlockMatrix<Scalar>& matrix);
+  /// Of the last factorisation: eigenvalues below 0 that the matrix has (Sylvester's law).
+  [[nodiscard]] std::size_t negative_count() const { return negative_; }
+
+  /// Replaces the right-hand side, one column per node, by the solution.
+  void solve(Eigen::Ref<Vectors> x) const;
+
+ private:
+  void gather_column(const BlockMatrix<Scalar>& matrix, std::uint32_t column);
+  void eliminate_before(std::uint32_t column);
+
+  const BlockPattern& pattern_;
+  std::vector<std::uint32_t> node_of_;  ///< node at each place of the factor
+  std::vector<Block> lower_;            ///< L, in the places of the pattern
+  std::vector<Block> pivot_, inverse_;
+  std::vector<Block> work_;  ///< a column being updated, by row
+  mutable Vectors permuted_;
+  std::size_t negative_ = 0;
+};
+
+}  // namespace tpm

@@ -1,0 +1,36 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+namespace tpm {
+
+/// Right-hand Radau nodes of the unit interval: `count` rising numbers, the last of them 1.
+/// @param count 1 to 8
+[[nodiscard]] std::vector<double> radau_nodes(int count);
+
+/// Exact update of dy/dt = (l - y)/tau over a step h in which l is the polynomial through its
+/// values at given nodes of the step: at the fraction c of the step
+///
+///     y(c) = exp(-z c) y(0) + sum_k weight_k(c) l_k,   z = h / tau
+///     weight_k(c) = z * integral_0^c exp(-z (c - s)) L_k(s) ds,   L_k the Lagrange polynomials
+class ExponentialCollocation {
+ public:
+  /// @param nodes different numbers in [0, 1], at most 10
+  explicit ExponentialCollocation(std::vector<double> nodes);
+
+  [[nodiscard]] const std::vector<double>& nodes() const { return nodes_; }
+
+  /// The weights of all nodes, to about 1e-13.
+  /// @param c in [0, 1]
+  /// @param z >= 0
+  [[nodiscard]] Eigen::VectorXd weights(double c, double z) const;
+
+  /// L_k(c) of all nodes: what interpolates at c.
+  [[nodiscard]] Eigen::VectorXd interpolation(double c) const;
+
+ private:
+  std::vector<double> nodes_;
+  Eigen::MatrixXd coefficients_;  ///< row k: L_k in powers of c
+};
+
+}  // namespace tpm
