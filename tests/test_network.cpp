@@ -32,9 +32,7 @@ Organ star_organ(double spacing) {
 
 struct Star {
   explicit Star(const TpmParameters& p)
-      : network(join(star_organ(p.spacing_m), pairs(), {}, "star")),
-        bonds(network, p),
-        freedom(4) {
+      : network(join(star_organ(p.spacing_m), pairs(), {}, "star")), bonds(network, p), freedom(4) {
     freedom.guide(0, Eigen::Vector3d::UnitZ());
     for (const std::size_t i : {1, 2, 3}) freedom.hold(i);
   }

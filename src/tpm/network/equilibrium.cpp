@@ -30,6 +30,8 @@ bool Equilibrium::factorise(const Positions& position, const BondMemory& memory)
   return factor_.factorise(matrix_);
 }
 
+// A Ref is a view: what it shows is changed.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
 void Equilibrium::displace(Eigen::Ref<Eigen::Matrix3Xd> vectors) const {
   freedom_.project(vectors);
   factor_.solve(vectors);

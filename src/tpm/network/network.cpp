@@ -33,7 +33,7 @@ Bond bond_of(const Organ& organ, const NeighbourPair& pair, std::string_view whe
   bond.a = static_cast<std::uint32_t>(a);
   bond.b = static_cast<std::uint32_t>(b);
   bond.kind = organ.layer[a] == organ.layer[b] ? BondKind::lateral : BondKind::radial;
-  bond.rest_length_m = (organ.position.col(a) - organ.position.col(b)).norm();
+  bond.rest_length_m = (organ.position.col(bond.a) - organ.position.col(bond.b)).norm();
   return bond;
 }
 
