@@ -37,6 +37,9 @@ class BondSystem {
   [[nodiscard]] double relaxation_time_s() const { return relaxation_time_s_; }
   [[nodiscard]] std::span<const std::uint32_t> end_a() const { return end_a_; }
   [[nodiscard]] std::span<const std::uint32_t> end_b() const { return end_b_; }
+  [[nodiscard]] const Eigen::VectorXd& rest_length_m() const { return rest_length_; }
+  /// It pulls only, as a rope.
+  [[nodiscard]] bool is_rope(std::size_t bond) const { return rope_[bond]; }
   /// k of each bond, N/m.
   [[nodiscard]] const Eigen::VectorXd& stiffness() const { return stiffness_; }
   /// g of each bond, N/m, 0 <= g <= k.

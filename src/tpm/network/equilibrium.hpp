@@ -40,6 +40,7 @@ class Equilibrium {
   /// the stiffness of the last factorisation.
   void displace(Eigen::Ref<Eigen::Matrix3Xd> vectors) const;
 
+  [[nodiscard]] const BlockLdlt<double>& factor() const { return factor_; }
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Freedom& freedom() const { return freedom_; }
 

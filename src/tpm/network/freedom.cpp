@@ -42,6 +42,18 @@ void Freedom::project(Eigen::Ref<Eigen::Matrix3Xd> vectors) const {
   }
 }
 
+void Freedom::project(LaneMatrix& vectors) const {
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (state_[i] == State::free) continue;
+    auto of_sphere = vectors.middleCols<3>(3 * static_cast<Eigen::Index>(i));
+    if (state_[i] == State::held) {
+      of_sphere.setZero();
+    } else {
+      of_sphere = (of_sphere * projector_[i]).eval();
+    }
+  }
+}
+
 void Freedom::constrain(const BondSystem& bonds, BlockMatrix<double>& matrix) const {
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const std::uint32_t a = bonds.end_a()[i];

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "tpm/network/bond_system.hpp"
+#include "tpm/solve/lanes.hpp"
 
 namespace tpm {
 
@@ -32,6 +33,9 @@ class Freedom {
 
   /// Takes the part along what is not free out of vectors, one column per sphere.
   void project(Eigen::Ref<Eigen::Matrix3Xd> vectors) const;
+
+  /// The same for states side by side, three columns per sphere.
+  void project(LaneMatrix& vectors) const;
 
   /// P K P + s (1 - P): the stiffness that the free coordinates feel, and a harmless one elsewhere.
   /// @param matrix on bonds.pattern()

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -17,7 +18,32 @@ namespace {
 constexpr double kStepShare = 0.1;   // of the tolerance, for one step
 constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
 constexpr double kLeastMove = 1e-5;  // of a jump
+constexpr double kFirstStep = 3.0;   // after a change of rate, in relaxation times
 constexpr double kSafety = 0.8;
+constexpr double kMostGrowth = 30.0;  // from one step to the next
+
+/// By how much the next step may be longer. The error of smooth motion goes with a high power of
+/// the step, but behind a change of rate the motion itself calms down while steps grow: the power
+/// is taken from the two latest steps.
+class StepGrowth {
+ public:
+  explicit StepGrowth(int order) : order_(order) {}
+
+  [[nodiscard]] double after(double h, const StepOutcome& outcome) {
+    double power = order_;
+    if (outcome.balanced && last_h_ > 0.0 && h != last_h_) {
+      power = std::log(outcome.error / last_error_) / std::log(h / last_h_);
+      power = std::clamp(power, 1.0, order_);
+    }
+    last_h_ = outcome.balanced ? h : 0.0;
+    last_error_ = outcome.error;
+    return kSafety * std::pow(outcome.allowed / outcome.error, 1.0 / power);
+  }
+
+ private:
+  double order_;
+  double last_h_ = 0.0, last_error_ = 0.0;
+};
 
 /// One run: the state and how it is carried through the protocol.
 class Run {
@@ -28,7 +54,7 @@ class Run {
         options_(options),
         times_s_(times_s),
         tissue_(bonds, rest, freedom, probe, protocol.drive()),
-        stages_(tissue_, options.stages) {
+        stages_(tissue_, options.stages, !options.step_s) {
     order_.resize(times_s.size());
     std::iota(order_.begin(), order_.end(), std::size_t{0});
     std::stable_sort(order_.begin(), order_.end(),
@@ -49,7 +75,13 @@ class Run {
       }
     }
     if (next_ < order_.size()) hold_on(knots.back());
+    const int rejected = result_.work.rejected;
     result_.work = stages_.work();
+    result_.work.rejected = rejected;
+    if (options_.energies) {
+      energy_.stored_J = stored_J();
+      result_.energy = energy_;
+    }
     result_.position = state_.position;
     result_.remembered = state_.remembered;
     return std::move(result_);
@@ -78,8 +110,30 @@ class Run {
 
   void jump(double value) { move_to(value, false); }
 
+  [[nodiscard]] double stored_J() const {
+    return tissue_.bonds().stored_energy_J(state_.position, state_.remembered);
+  }
+
   /// Goes to an imposed value through equilibria, at once or with everything relaxed on the way.
+  /// Such a move is reversible: the work is what is stored.
   void move_to(double value, bool relaxed) {
+    const double before_J = stored_J();
+    follow(value, relaxed);
+    energy_.work_J += stored_J() - before_J;
+  }
+
+  /// Waits for ever; what the springs lose then and the probe adds turns into heat.
+  void settle() {
+    const double before_J = stored_J();
+    const double response = tissue_.response(state_);
+    follow(state_.imposed, true);
+    const double work_J =
+        tissue_.depth_driven() ? 0.0 : state_.imposed * (tissue_.response(state_) - response);
+    energy_.work_J += work_J;
+    energy_.dissipated_J += work_J + before_J - stored_J();
+  }
+
+  void follow(double value, bool relaxed) {
     const double begin = state_.imposed;
     double done = 0.0;
     double stride = 1.0;
@@ -106,7 +160,9 @@ class Run {
   void cross(const Knot& from, const Knot& to) {
     const double length = to.time_s - from.time_s;
     const double rate = (to.value - from.value) / length;
-    double h = length;
+    StepGrowth growth(options_.stages + 1);
+    double h = std::min(length,
+                        options_.step_s.value_or(kFirstStep * tissue_.bonds().relaxation_time_s()));
     if (rate == 0.0 && from.value == 0.0 && is_relaxed()) return stand_still(to.time_s);
     while (state_.time_s < to.time_s) {
       const double left = to.time_s - state_.time_s;
@@ -114,20 +170,27 @@ class Run {
       if (last) h = left;
       const StepOutcome outcome =
           stages_.try_step(state_, h, rate, kStepShare * options_.tolerance);
-      if (!outcome.accepted) {
+      const double factor = growth.after(h, outcome);
+      const bool kept = outcome.accepted || (options_.step_s && outcome.balanced);
+      if (!kept) {
         ++result_.work.rejected;
-        h *= outcome.balanced ? std::clamp(kSafety * outcome.growth, 0.1, 0.9) : 0.25;
+        h *= outcome.balanced ? std::clamp(factor, 0.05, 0.9) : 0.25;
         if (h > kLeastStep * length) continue;
         throw failed(state_.imposed, outcome.unstable
                                          ? "the tissue buckles: its stiffness is no longer positive"
                                          : "the forces cannot be balanced: it may snap through");
       }
       report_within(h, rate);
+      if (options_.energies) {
+        const QuasiStaticEnergy part = stages_.energy_of_step(state_, h, rate);
+        energy_.work_J += part.work_J;
+        energy_.dissipated_J += part.dissipated_J;
+      }
       result_.error_estimate += outcome.error;
       stages_.accept(state_, h, rate);
       if (last) state_.time_s = to.time_s;
       state_.imposed = last ? to.value : state_.imposed;
-      h *= std::clamp(kSafety * outcome.growth, 0.2, 8.0);
+      h = options_.step_s ? *options_.step_s : h * std::clamp(factor, 0.2, kMostGrowth);
     }
   }
 
@@ -142,9 +205,18 @@ class Run {
 
   /// Answers the times asked for within the step just found, its end left out.
   void report_within(double h, double rate) {
-    while (next_ < order_.size() && times_s_[order_[next_]] < state_.time_s + h) {
-      const double c = (times_s_[order_[next_]] - state_.time_s) / h;
-      put(stages_.response_within(state_, std::max(c, 0.0), h, rate));
+    std::array<double, kLanes> fractions{};
+    for (;;) {
+      std::size_t count = 0;
+      while (count < kLanes && next_ + count < order_.size()) {
+        const double time = times_s_[order_[next_ + count]];
+        if (!(time < state_.time_s + h)) break;
+        fractions[count++] = std::max((time - state_.time_s) / h, 0.0);
+      }
+      if (count == 0) return;
+      const LaneVector responses =
+          stages_.responses_within(state_, {fractions.data(), count}, h, rate);
+      for (std::size_t i = 0; i < count; ++i) put(responses[static_cast<Eigen::Index>(i)]);
     }
   }
 
@@ -153,7 +225,7 @@ class Run {
     while (next_ < order_.size()) {
       const double time = times_s_[order_[next_]];
       if (std::isinf(time)) {
-        move_to(last.value, true);
+        settle();
       } else if (time > state_.time_s) {
         const double latest = latest_finite_time();
         cross({state_.time_s, last.value}, {latest, last.value});
@@ -183,6 +255,7 @@ class Run {
   DrivenTissue tissue_;
   StageBalance stages_;
   TissueState state_;
+  QuasiStaticEnergy energy_;
   QuasiStaticRun result_;
 };
 
@@ -198,8 +271,11 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedo
   if (!(options.tolerance >= 1e-12 && options.tolerance <= 0.1)) {
     throw bad_input("tolerance", shortest(options.tolerance), "1e-12 to 0.1");
   }
-  if (options.stages < 2 || options.stages > 8) {
-    throw bad_input("stages", std::to_string(options.stages), "2 to 8");
+  if (options.stages < 2 || options.stages > kLanes) {
+    throw bad_input("stages", std::to_string(options.stages), fmt::format("2 to {}", kLanes));
+  }
+  if (options.step_s && !(*options.step_s > 0.0 && std::isfinite(*options.step_s))) {
+    throw bad_input("step", shortest(*options.step_s) + " s", "a time above 0");
   }
   if (probe_.sphere >= freedom_.size()) {
     throw bad_input("probe", fmt::format("sphere {}", probe_.sphere + 1),

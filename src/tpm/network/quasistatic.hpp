@@ -1,8 +1,10 @@
 #pragma once
+#include <optional>
 #include <span>
 
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/protocol/protocol.hpp"
+#include "tpm/solve/lanes.hpp"
 
 namespace tpm {
 
@@ -15,7 +17,11 @@ struct Probe {
 struct QuasiStaticOptions {
   /// Error of the response that steps are chosen for, in parts of its largest value; 1e-12 to 0.1.
   double tolerance = 1e-6;
-  int stages = 5;  ///< of a step, 2 to 8
+  int stages = kLanes;  ///< of a step, 2 to kLanes
+  /// If given, s: all steps are that long (but for the last of a piece of the protocol), whatever
+  /// their error, and what is left unbalanced is still judged by the tolerance.
+  std::optional<double> step_s = std::nullopt;
+  bool energies = false;  ///< work and dissipation are integrated along
 };
 
 /// What a run took.
@@ -26,12 +32,20 @@ struct QuasiStaticWork {
   int back_solves = 0;
 };
 
+/// Where the energy went. In exact arithmetic work = stored + dissipated.
+struct QuasiStaticEnergy {
+  double work_J = 0.0;        ///< done by the probe since the start
+  double dissipated_J = 0.0;  ///< by the dashpots, >= 0
+  double stored_J = 0.0;      ///< in the springs at the end
+};
+
 struct QuasiStaticRun {
   Eigen::VectorXd response;     ///< contact force, N, or depth, m, at each asked time
   double error_estimate = 0.0;  ///< sum of the steps' error estimates, N or m
   QuasiStaticWork work;
-  Positions position;          ///< where the run ended
-  Eigen::VectorXd remembered;  ///< y of each bond there, m
+  std::optional<QuasiStaticEnergy> energy;  ///< if asked for
+  Positions position;                       ///< where the run ended
+  Eigen::VectorXd remembered;               ///< y of each bond there, m
 };
 
 /// The quasi-static network: force balance on every free sphere at each instant (MODEL.md, section

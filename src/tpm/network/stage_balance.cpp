@@ -1,121 +1,54 @@
 #include "tpm/network/stage_balance.hpp"
 
 #include <algorithm>
+#include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
+#include <limits>
 
 namespace tpm {
 namespace {
 
 constexpr int kMostIterations = 25;
-constexpr int kTooManyIterations = 8;     // a new factorisation pays
-constexpr double kFollowingChange = 0.2;  // likewise
-constexpr double kBalanceShare = 0.1;     // of a step's tolerance, for what is left unbalanced
+constexpr int kTooManyIterations = 8;      // a new factorisation pays
+constexpr double kFollowingChange = 0.45;  // likewise
+constexpr double kHopeless = 10.0;         // times the tolerance: an error that no balance mends
+constexpr int kLastHopeless = 2;           // iterations after which only the balance decides
 constexpr double kFurthestExtrapolation = 1.0;  // of the step before
 constexpr Eigen::Index kMemoryDepth = 6;
+constexpr double kGrains = 8.0;          // roundings of a coordinate that no balance gets below
+constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the force
 
 std::vector<double> with_start(std::vector<double> nodes) {
   nodes.insert(nodes.begin(), 0.0);
   return nodes;
 }
 
+Eigen::Map<Eigen::VectorXd> flat(LaneMatrix& lanes) {
+  return {lanes.data(), lanes.size()};
+}
+
+Eigen::Map<const Eigen::RowVectorXd> by_coordinate(const Eigen::Matrix3Xd& vectors) {
+  return {vectors.data(), vectors.size()};
+}
+
 }  // namespace
 
-DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom,
-                           const Probe& probe, Drive drive)
-    : bonds_(bonds),
-      rest_(std::move(rest)),
-      freedom_(std::move(freedom)),
-      probe_(probe),
-      drive_(drive),
-      equilibrium_(bonds_, freedom_) {
-  if (depth_driven()) freedom_.impose(probe.sphere, probe.direction);
-}
-
-TissueState DrivenTissue::at_rest(double time_s) const {
-  TissueState state;
-  state.time_s = time_s;
-  state.position = rest_;
-  bonds_.elongations(rest_, state.elongation);
-  state.remembered = Eigen::VectorXd::Zero(state.elongation.size());
-  return state;
-}
-
-void DrivenTissue::impose(Positions& position, double imposed) const {
-  if (!depth_driven()) return;
-  const auto column = static_cast<Eigen::Index>(probe_.sphere);
-  const double depth = (position.col(column) - rest_.col(column)).dot(probe_.direction);
-  position.col(column) += (imposed - depth) * probe_.direction;
-}
-
-void DrivenTissue::load(double imposed, Eigen::Matrix3Xd& force) const {
-  force.setZero(3, rest_.cols());
-  if (depth_driven()) return;
-  force.col(static_cast<Eigen::Index>(probe_.sphere)) = imposed * probe_.direction;
-}
-
-double DrivenTissue::response(const Positions& position, const Eigen::Matrix3Xd& force) const {
-  const auto column = static_cast<Eigen::Index>(probe_.sphere);
-  if (depth_driven()) return -force.col(column).dot(probe_.direction);
-  return (position.col(column) - rest_.col(column)).dot(probe_.direction);
-}
-
-double DrivenTissue::response(const TissueState& state) const {
-  Eigen::Matrix3Xd force;
-  load(state.imposed, force);
-  bonds_.add_forces(state.position, {state.remembered, 0.0}, force);
-  return response(state.position, force);
-}
-
-void DrivenTissue::unit_field(const TissueState& state, const BondMemory& memory,
-                              Eigen::Matrix3Xd& field, double& stiffness) const {
-  const auto column = static_cast<Eigen::Index>(probe_.sphere);
-  Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  unit.col(column) = probe_.direction;
-  if (!depth_driven()) {
-    field = unit;
-    equilibrium_.displace(field);
-    stiffness = field.col(column).dot(probe_.direction);
-    return;
-  }
-  Eigen::Matrix3Xd pushed = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  bonds_.add_stiffness_times(state.position, memory, unit, pushed);
-  field = -pushed;
-  equilibrium_.displace(field);
-  stiffness = -pushed.cwiseProduct(field).sum();
-  field += unit;
-}
-
-double DrivenTissue::linear_response(const TissueState& rest, double peak) {
-  const BondMemory relaxed{Eigen::VectorXd::Zero(rest.elongation.size()), 1.0};
-  Eigen::Matrix3Xd field;
-  double path = 0.0;
-  if (!equilibrium_.factorise(rest.position, relaxed)) return 0.0;
-  unit_field(rest, relaxed, field, path);
-  if (!depth_driven()) return path * peak;
-  Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  bonds_.add_stiffness_times(rest.position, relaxed, field, force);
-  return force.col(static_cast<Eigen::Index>(probe_.sphere)).dot(probe_.direction) * peak;
-}
-
-StageBalance::StageBalance(DrivenTissue& tissue, int stages)
+StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
     : tissue_(tissue),
       stages_(stages),
+      choosing_(choosing),
       coordinates_(3 * static_cast<Eigen::Index>(tissue.freedom().size())),
+      bonds_(tissue.bonds()),
       full_(with_start(radau_nodes(stages))),
       inner_(radau_nodes(stages)),
-      anderson_(coordinates_ * stages, kMemoryDepth),
-      x_(coordinates_ * stages),
-      d_(coordinates_ * stages) {
-  const auto bonds = static_cast<Eigen::Index>(tissue.bonds().size());
-  elongation_.resize(bonds, stages + 1);
-  remembered_.resize(bonds, stages);
-  weights_.resize(stages + 1, stages);
-  decay_.resize(stages);
-  imposed_.resize(static_cast<std::size_t>(stages));
-}
+      factor_(tissue.bonds().pattern()),
+      anderson_(coordinates_ * kLanes, kMemoryDepth),
+      x_(kLanes, coordinates_),
+      d_(kLanes, coordinates_),
+      force_(kLanes, coordinates_) {}
 
-Eigen::Map<Positions> StageBalance::stage(Eigen::Index j) {
-  return {x_.data() + j * coordinates_, 3, coordinates_ / 3};
+double StageBalance::node(int lane) const {
+  return inner_.nodes()[static_cast<std::size_t>(std::min(lane, stages_ - 1))];
 }
 
 TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, double tolerance) {
@@ -126,10 +59,11 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   tissue_.impose(position, imposed);
   Eigen::Matrix3Xd load;
   tissue_.load(imposed, load);
-  // A force error of this size is within the tolerance whatever it acts on.
+  // A force error of this size is within the tolerance whatever it acts on; below the least one
+  // the rounding of positions decides.
   const double force_scale = tissue_.depth_driven() ? scale_ : std::abs(imposed);
-  const EquilibriumSearch search =
-      tissue_.equilibrium().find(position, memory, load, tolerance * force_scale);
+  const EquilibriumSearch search = tissue_.equilibrium().find(
+      position, memory, load, std::max(tolerance, kLeastBalance) * force_scale);
   work_.factorisations += search.factorisations;
   work_.back_solves += search.iterations;
   factorised_ = false;
@@ -143,179 +77,247 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   return TissueMove::done;
 }
 
+void StageBalance::set_weights(double z) {
+  weights_.setZero();
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const Eigen::VectorXd weight = full_.weights(node(lane), z);
+    start_weight_[lane] = weight[0];
+    weights_.row(lane).head(stages_) = weight.tail(stages_).transpose();
+    decay_[lane] = std::exp(-z * node(lane));
+  }
+  // The error is judged where outputs are taken from: at the stages, of which the last is more
+  // accurate than the others, and before the first of them, where a step that is long against the
+  // relaxation time hides how the tissue settles after a change of rate.
+  std::vector<double> places = inner_.nodes();
+  places.push_back(0.25 * inner_.nodes().front());
+  places.push_back(0.5 * inner_.nodes().front());
+  const auto count = static_cast<Eigen::Index>(places.size());
+  judge_.setZero(count, kLanes);
+  judge_start_.resize(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    Eigen::VectorXd difference = full_.weights(places[static_cast<std::size_t>(i)], z);
+    difference.tail(stages_) -= inner_.weights(places[static_cast<std::size_t>(i)], z);
+    judge_start_[i] = difference[0];
+    judge_.row(i).head(stages_) = difference.tail(stages_).transpose();
+  }
+}
+
 bool StageBalance::refactorise(const TissueState& state, double following) {
-  const BondSystem& bonds = tissue_.bonds();
   following_ = following;
   // The same memory at this instant, of which a share follows.
-  memory_.following = following;
-  memory_.offset = state.remembered - following * state.elongation;
+  const BondMemory memory{state.remembered - following * state.elongation, following};
   ++work_.factorisations;
-  factorised_ =
-      tissue_.equilibrium().factorise(state.position, memory_) && tissue_.equilibrium().is_stable();
+  Equilibrium& equilibrium = tissue_.equilibrium();
+  factorised_ = equilibrium.factorise(state.position, memory) && equilibrium.is_stable();
   if (!factorised_) return false;
-  tissue_.unit_field(state, memory_, field_, path_stiffness_);
+  factor_.copy(equilibrium.factor());
+  tissue_.unit_field(state, memory, field_, path_stiffness_);
+  lane_field_ = by_coordinate(field_);
   ++work_.back_solves;
-  bonds.elongation_changes(state.position, field_, goal_);
-  goal_ = tissue_.adjoint_sign() * goal_.cwiseProduct(bonds.relaxing());
+  Eigen::VectorXd change;
+  tissue_.bonds().elongation_changes(state.position, field_, change);
+  goal_ =
+      tissue_.adjoint_sign() * bonds_.of_relaxing(change.cwiseProduct(tissue_.bonds().relaxing()));
+  grain_ = kGrains * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff() *
+           (tissue_.depth_driven() ? path_stiffness_ : 1.0);
   last_iterations_ = 0;
   return true;
 }
 
 void StageBalance::predict(const TissueState& state, double h, double rate) {
-  for (Eigen::Index j = 0; j < stages_; ++j) {
-    const double c = inner_.nodes()[static_cast<std::size_t>(j)];
-    imposed_[static_cast<std::size_t>(j)] = state.imposed + c * h * rate;
-    auto x = stage(j);
-    if (has_last_ && last_rate_ == rate) {
-      // Only what is free moves: rounding in the extrapolation would make held spheres drift.
-      const double ahead = std::min(c * h / last_h_, kFurthestExtrapolation);
-      const Eigen::VectorXd path = last_path_ * full_.interpolation(1.0 + ahead);
-      Eigen::Matrix3Xd moved =
-          Eigen::Map<const Positions>(path.data(), 3, coordinates_ / 3) - state.position;
-      tissue_.freedom().project(moved);
-      x = state.position + moved;
-    } else {
-      x = state.position + c * h * rate * field_;
+  LaneVector c;
+  for (int lane = 0; lane < kLanes; ++lane) c[lane] = node(lane);
+  imposed_ = (h * rate * c).array() + state.imposed;
+  if (has_last_ && last_rate_ == rate) {
+    Eigen::Matrix<double, kLanes, kLanes> shape = Eigen::Matrix<double, kLanes, kLanes>::Zero();
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const double ahead = std::min(c[lane] * h / last_h_, kFurthestExtrapolation);
+      const Eigen::VectorXd at = full_.interpolation(1.0 + ahead);
+      shape.row(lane).head(stages_) = at.tail(stages_).transpose();
     }
-    Positions imposed = x;
-    tissue_.impose(imposed, imposed_[static_cast<std::size_t>(j)]);
-    x = imposed;
+    // From where the step before began to each stage, less the way to where this one begins.
+    x_.noalias() = shape * last_path_;
+    x_.rowwise() -= last_path_.row(stages_ - 1).eval();
+    // Only what is free moves: rounding would make held spheres drift.
+    tissue_.freedom().project(x_);
+    x_.rowwise() += start_;
+  } else {
+    x_.noalias() = h * rate * c * lane_field_;
+    x_.rowwise() += start_;
   }
+  tissue_.impose(x_, imposed_);
 }
 
-void StageBalance::residuals(const TissueState& state) {
-  const BondSystem& bonds = tissue_.bonds();
-  Eigen::VectorXd column;
-  for (Eigen::Index j = 0; j < stages_; ++j) {
-    bonds.elongations(stage(j), column);
-    elongation_.col(j + 1) = column;
-  }
-  remembered_.noalias() = elongation_ * weights_;
-  remembered_.noalias() += state.remembered * decay_.transpose();
-  imbalance_ = 0.0;
-  memory_.following = 0.0;
-  for (Eigen::Index j = 0; j < stages_; ++j) {
-    tissue_.load(imposed_[static_cast<std::size_t>(j)], force_);
-    memory_.offset = remembered_.col(j);
-    bonds.add_forces(stage(j), memory_, force_);
-    tissue_.freedom().project(force_);
-    Eigen::Map<Eigen::Matrix3Xd> d(d_.data() + j * coordinates_, 3, coordinates_ / 3);
-    d = force_;
-    tissue_.equilibrium().displace(d);
-    imbalance_ = std::max(imbalance_, d.cwiseProduct(force_).sum());
-  }
+void StageBalance::update_memory() {
+  bonds_.elongations(x_, elongation_);
+  memory_.noalias() = weights_ * elongation_;
+  memory_.noalias() += start_weight_ * start_elongation_;
+  memory_.noalias() += decay_ * start_memory_;
+}
+
+void StageBalance::residuals() {
+  update_memory();
+  force_.setZero();
+  tissue_.add_load(imposed_, force_);
+  bonds_.add_forces(x_, memory_, force_);
+  tissue_.freedom().project(force_);
+  d_ = force_;
+  factor_.solve(d_);
+  tissue_.freedom().project(d_);
   work_.back_solves += stages_;
   ++work_.iterations;
-  imbalance_ = std::sqrt(std::max(imbalance_, 0.0) * path_stiffness_);
+  const double energy = d_.cwiseProduct(force_).rowwise().sum().maxCoeff();
+  imbalance_ = std::sqrt(std::max(energy, 0.0) * path_stiffness_);
+  if (!std::isfinite(energy)) imbalance_ = energy;
 }
 
-bool StageBalance::balance(const TissueState& state, double tolerance) {
+StageBalance::Balance StageBalance::balance(double tolerance) {
   anderson_.restart();
   double first = 0.0;
   for (int i = 0; i < kMostIterations; ++i) {
-    residuals(state);
+    residuals();
     last_iterations_ = i;
-    if (!std::isfinite(imbalance_)) return false;
+    if (!std::isfinite(imbalance_)) return Balance::failed;
     if (imbalance_ <= tolerance) {
       x_ += d_;  // the correction is known: it costs nothing
-      return true;
+      return Balance::found;
+    }
+    if (choosing_ && i > 0 && i <= kLastHopeless &&
+        error() > kHopeless * (tolerance + imbalance_)) {
+      return Balance::hopeless;
     }
     if (i == 0) first = imbalance_;
-    if (i > 3 && imbalance_ > 10.0 * first) return false;
-    anderson_.step(x_, d_);
+    if (i > 3 && imbalance_ > 10.0 * first) return Balance::failed;
+    anderson_.step(flat(x_), flat(d_));
   }
-  return false;
+  return Balance::failed;
 }
 
-double StageBalance::error_of(double z) const {
-  // Judged where outputs are taken from: at the stages, of which the last is more accurate than
-  // the others, and before the first of them, where a step that is long against the relaxation
-  // time hides how the tissue settles after a change of rate.
-  const double first = inner_.nodes().front();
-  double worst = 0.0;
-  const auto judge = [&](double c) {
-    Eigen::VectorXd difference = full_.weights(c, z);
-    difference.tail(stages_) -= inner_.weights(c, z);
-    const Eigen::VectorXd change = goal_.cwiseProduct(elongation_ * difference);
-    worst = std::max(worst, std::abs(change.sum()) + 0.1 * change.lpNorm<1>());
-  };
-  judge(0.25 * first);
-  judge(0.5 * first);
-  for (const double c : inner_.nodes()) judge(c);
-  return worst;
+double StageBalance::error() const {
+  Eigen::MatrixXd change = judge_ * elongation_;
+  change.noalias() += judge_start_ * start_elongation_;
+  const Eigen::VectorXd sum = change * goal_;
+  const Eigen::VectorXd size = change.cwiseAbs() * goal_.cwiseAbs();
+  return (sum.cwiseAbs() + 0.1 * size).maxCoeff();
 }
 
 StepOutcome StageBalance::try_step(const TissueState& state, double h, double rate,
                                    double tolerance) {
-  const double z = h / tissue_.bonds().relaxation_time_s();
-  double following = 0.0;
-  for (Eigen::Index j = 0; j < stages_; ++j) {
-    const double c = inner_.nodes()[static_cast<std::size_t>(j)];
-    weights_.col(j) = full_.weights(c, z);
-    decay_[j] = std::exp(-z * c);
-    following += weights_(j + 1, j) / stages_;
-  }
+  set_weights(h / tissue_.bonds().relaxation_time_s());
   StepOutcome outcome;
+  const double following = weights_.diagonal().head(stages_).mean();
   const bool stale = !factorised_ || last_iterations_ > kTooManyIterations ||
                      std::abs(following - following_) > kFollowingChange;
   if (stale && !refactorise(state, following)) {
     outcome.unstable = true;
     return outcome;
   }
-  elongation_.col(0) = state.elongation;
+  start_ = by_coordinate(state.position);
+  start_elongation_ = bonds_.of_relaxing(state.elongation).transpose();
+  start_memory_ = bonds_.of_relaxing(state.remembered).transpose();
   predict(state, h, rate);
-  outcome.balanced = balance(state, kBalanceShare * tolerance * scale_);
+  outcome.allowed = tolerance * scale_;
+  const Balance balanced = balance(std::max(outcome.allowed, grain_));
+  outcome.balanced = balanced != Balance::failed;
   if (!outcome.balanced) {
     factorised_ = false;
     return outcome;
   }
-  Eigen::VectorXd column;
-  for (Eigen::Index j = 0; j < stages_; ++j) {
-    tissue_.bonds().elongations(stage(j), column);
-    elongation_.col(j + 1) = column;
-  }
-  remembered_.noalias() = elongation_ * weights_;
-  remembered_.noalias() += state.remembered * decay_.transpose();
-  outcome.error = error_of(z);
-  const double allowed = tolerance * scale_;
-  outcome.accepted = outcome.error <= allowed;
-  outcome.growth = std::pow(allowed / std::max(outcome.error, 1e-30), 1.0 / (stages_ + 1));
+  if (balanced == Balance::found) update_memory();
+  outcome.error = std::max(error(), 1e-12 * outcome.allowed);
+  outcome.accepted =
+      balanced == Balance::found && outcome.error <= std::max(outcome.allowed, grain_);
   return outcome;
 }
 
-double StageBalance::corrected_response(const Positions& position, const BondMemory& memory,
-                                        double imposed) {
-  tissue_.load(imposed, force_);
-  tissue_.bonds().add_forces(position, memory, force_);
-  const double plain = tissue_.response(position, force_);
-  tissue_.freedom().project(force_);
-  return plain + tissue_.adjoint_sign() * field_.cwiseProduct(force_).sum();
+StageBalance::Within StageBalance::within(const TissueState& state,
+                                          std::span<const double> fractions, double h,
+                                          double rate) const {
+  const double z = h / tissue_.bonds().relaxation_time_s();
+  Eigen::Matrix<double, kLanes, kLanes> shape = Eigen::Matrix<double, kLanes, kLanes>::Zero();
+  Eigen::Matrix<double, kLanes, kLanes> weights = shape;
+  LaneVector start_weight, decay;
+  Within states;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
+    const Eigen::VectorXd at = full_.interpolation(c);
+    const Eigen::VectorXd weight = full_.weights(c, z);
+    shape.row(lane).head(stages_) = at.tail(stages_).transpose();
+    start_weight[lane] = weight[0];
+    weights.row(lane).head(stages_) = weight.tail(stages_).transpose();
+    decay[lane] = std::exp(-z * c);
+    states.imposed[lane] = state.imposed + c * h * rate;
+  }
+  // Of displacements, not of coordinates, for the sake of rounding.
+  states.position.noalias() = shape * (x_.rowwise() - start_);
+  states.position.rowwise() += start_;
+  bonds_.elongations(states.position, states.elongation);
+  states.memory.noalias() = weights * elongation_;
+  states.memory.noalias() += start_weight * start_elongation_;
+  states.memory.noalias() += decay * start_memory_;
+  return states;
 }
 
-double StageBalance::response_within(const TissueState& state, double c, double h, double rate) {
-  const double z = h / tissue_.bonds().relaxation_time_s();
-  const Eigen::VectorXd shape = full_.interpolation(c);
-  Positions position = shape[0] * state.position;
-  for (Eigen::Index j = 0; j < stages_; ++j) position += shape[j + 1] * stage(j);
-  memory_.following = 0.0;
-  memory_.offset = elongation_ * full_.weights(c, z) + std::exp(-z * c) * state.remembered;
-  return corrected_response(position, memory_, state.imposed + c * h * rate);
+LaneVector StageBalance::responses(const Within& states) {
+  force_.setZero();
+  tissue_.add_load(states.imposed, force_);
+  bonds_.add_forces(states.position, states.memory, force_);
+  const LaneVector plain = tissue_.response(states.position, force_);
+  tissue_.freedom().project(force_);
+  return plain + tissue_.adjoint_sign() * (force_ * lane_field_.transpose());
+}
+
+LaneVector StageBalance::responses_within(const TissueState& state,
+                                          std::span<const double> fractions, double h,
+                                          double rate) {
+  return responses(within(state, fractions, h, rate));
+}
+
+QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double h, double rate) {
+  using Rule = boost::math::quadrature::gauss<double, 2 * kLanes>;
+  const Eigen::VectorXd relaxing = bonds_.of_relaxing(tissue_.bonds().relaxing());
+  QuasiStaticEnergy energy;
+  double response_integral = 0.0;  // over the imposed value
+  for (const double side : {-1.0, 1.0}) {
+    std::array<double, kLanes> fractions{};
+    LaneVector weight;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const auto i = static_cast<std::size_t>(lane);
+      fractions[i] = 0.5 * (1.0 + side * Rule::abscissa()[i]);
+      weight[lane] = 0.5 * h * Rule::weights()[i];
+    }
+    const Within states = within(state, fractions, h, rate);
+    response_integral += rate * weight.dot(responses(states));
+    const LaneVector heat =
+        (states.elongation - states.memory).cwiseAbs2() * relaxing;  // times the relaxation time
+    energy.dissipated_J += weight.dot(heat) / tissue_.bonds().relaxation_time_s();
+  }
+  if (tissue_.depth_driven()) {
+    energy.work_J = response_integral;
+  } else {
+    // The integral of F du, by parts.
+    constexpr std::array<double, 2> kEnds{0.0, 1.0};
+    const LaneVector depth = responses_within(state, kEnds, h, rate);
+    energy.work_J =
+        (state.imposed + h * rate) * depth[1] - state.imposed * depth[0] - response_integral;
+  }
+  return energy;
 }
 
 void StageBalance::accept(TissueState& state, double h, double rate) {
-  last_path_.resize(coordinates_, stages_ + 1);
-  last_path_.col(0) = Eigen::Map<const Eigen::VectorXd>(state.position.data(), coordinates_);
-  for (Eigen::Index j = 0; j < stages_; ++j) {
-    last_path_.col(j + 1) = x_.segment(j * coordinates_, coordinates_);
-  }
+  last_path_ = x_.rowwise() - start_;
   has_last_ = true;
   last_h_ = h;
   last_rate_ = rate;
   state.time_s += h;
   state.imposed += h * rate;
-  state.position = stage(stages_ - 1);
-  state.elongation = elongation_.col(stages_);
-  state.remembered = remembered_.col(stages_ - 1);
+  const Eigen::RowVectorXd end = x_.row(stages_ - 1);
+  state.position = Eigen::Map<const Positions>(end.data(), 3, coordinates_ / 3);
+  tissue_.bonds().elongations(state.position, state.elongation);
+  for (std::size_t i = 0; i < bonds_.relaxing_bonds().size(); ++i) {
+    state.remembered[static_cast<Eigen::Index>(bonds_.relaxing_bonds()[i])] =
+        memory_(stages_ - 1, static_cast<Eigen::Index>(i));
+  }
   ++work_.steps;
   see(tissue_.response(state));
 }

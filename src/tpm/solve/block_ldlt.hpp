@@ -37,6 +37,7 @@ class BlockPattern {
  private:
   template <typename Scalar>
   friend class BlockLdlt;
+  friend class LaneFactor;
 
   /// An entry of a row of the factor, met while its column is updated.
   struct RowEntry {
@@ -88,6 +89,7 @@ class BlockLdlt {
   void solve(Eigen::Ref<Vectors> x) const;
 
  private:
+  friend class LaneFactor;
   void gather_column(const BlockMatrix<Scalar>& matrix, std::uint32_t column);
   void eliminate_before(std::uint32_t column);
 

@@ -83,13 +83,16 @@ Eigen::VectorXd ExponentialCollocation::weights(double c, double z) const {
 }
 
 Eigen::VectorXd ExponentialCollocation::interpolation(double c) const {
-  Eigen::VectorXd powers(coefficients_.cols());
-  double power = 1.0;
-  for (double& p : powers) {
-    p = power;
-    power *= c;
+  // As products: powers of c would cancel.
+  const auto n = nodes_.size();
+  Eigen::VectorXd values = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
+  for (std::size_t k = 0; k < n; ++k) {
+    for (std::size_t j = 0; j < n; ++j) {
+      if (j == k) continue;
+      values[static_cast<Eigen::Index>(k)] *= (c - nodes_[j]) / (nodes_[k] - nodes_[j]);
+    }
   }
-  return coefficients_ * powers;
+  return values;
 }
 
 }  // namespace tpm

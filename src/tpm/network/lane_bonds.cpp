@@ -1,0 +1,115 @@
+#include "tpm/network/lane_bonds.hpp"
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/wide_vectors.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::size_t kSphere = std::size_t{3} * kLanes;
+
+/// The vector from one end of a bond to the other.
+struct Span {
+  std::array<double, kLanes> x, y, z, length, inverse;
+};
+
+[[gnu::always_inline]] inline void measure(const double* from, const double* to, Span& span) {
+  std::array<double, kLanes> square;
+#pragma omp simd
+  for (std::size_t s = 0; s < kLanes; ++s) {
+    span.x[s] = to[s] - from[s];
+    span.y[s] = to[kLanes + s] - from[kLanes + s];
+    span.z[s] = to[2 * kLanes + s] - from[2 * kLanes + s];
+    square[s] = span.x[s] * span.x[s] + span.y[s] * span.y[s] + span.z[s] * span.z[s];
+  }
+#pragma omp simd
+  for (std::size_t s = 0; s < kLanes; ++s) {
+    span.length[s] = std::sqrt(square[s]);
+    span.inverse[s] = 1.0 / span.length[s];
+  }
+}
+
+}  // namespace
+
+LaneBonds::LaneBonds(const BondSystem& bonds) {
+  std::vector<Data> lasting;
+  for (std::size_t i = 0; i < bonds.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    constexpr double kNever = -std::numeric_limits<double>::infinity();
+    const Data data{bonds.end_a()[i],       bonds.end_b()[i],      bonds.rest_length_m()[row],
+                    bonds.stiffness()[row], bonds.relaxing()[row], bonds.is_rope(i) ? 0.0 : kNever};
+    if (data.g > 0.0) {
+      relaxing_.push_back(i);
+      bond_.push_back(data);
+    } else {
+      lasting.push_back(data);
+    }
+  }
+  bond_.insert(bond_.end(), lasting.begin(), lasting.end());
+}
+
+Eigen::VectorXd LaneBonds::of_relaxing(const Eigen::VectorXd& all) const {
+  Eigen::VectorXd part(static_cast<Eigen::Index>(relaxing_.size()));
+  for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+    part[static_cast<Eigen::Index>(i)] = all[static_cast<Eigen::Index>(relaxing_[i])];
+  }
+  return part;
+}
+
+void LaneBonds::elongations(const LaneMatrix& position, LaneMatrix& elongation) const {
+  elongation.resize(kLanes, static_cast<Eigen::Index>(relaxing_.size()));
+  const double* const x = position.data();
+  double* const l = elongation.data();
+  run_wide([&]() __attribute__((always_inline)) {
+    Span span;
+    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+      measure(x + kSphere * bond_[i].a, x + kSphere * bond_[i].b, span);
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s)
+        l[kLanes * i + s] = span.length[s] - bond_[i].rest_length_m;
+    }
+  });
+}
+
+void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
+                           LaneMatrix& force) const {
+  const double* const x = position.data();
+  const double* const y = memory.data();
+  double* const f = force.data();
+  const std::size_t relaxing = relaxing_.size();
+  run_wide([&]() __attribute__((always_inline)) {
+    constexpr std::array<double, kLanes> kNothing{};
+    Span span;
+    for (std::size_t i = 0; i < bond_.size(); ++i) {
+      const Data bond = bond_[i];
+      const double* const remembered = i < relaxing ? y + kLanes * i : kNothing.data();
+      measure(x + kSphere * bond.a, x + kSphere * bond.b, span);
+      std::array<double, kLanes> share;
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        const double l = span.length[s] - bond.rest_length_m;
+        const double taut = l >= bond.least ? 1.0 : 0.0;
+        share[s] = taut * (bond.k * l - bond.g * remembered[s]) * span.inverse[s];
+      }
+      double* const fa = f + kSphere * bond.a;
+      double* const fb = f + kSphere * bond.b;
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        const double px = share[s] * span.x[s];
+        const double py = share[s] * span.y[s];
+        const double pz = share[s] * span.z[s];
+        fa[s] += px;
+        fa[kLanes + s] += py;
+        fa[2 * kLanes + s] += pz;
+        fb[s] -= px;
+        fb[kLanes + s] -= py;
+        fb[2 * kLanes + s] -= pz;
+      }
+    }
+  });
+}
+
+}  // namespace tpm

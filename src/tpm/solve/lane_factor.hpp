@@ -1,0 +1,40 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "tpm/solve/block_ldlt.hpp"
+#include "tpm/solve/lanes.hpp"
+
+namespace tpm {
+
+/// Three coordinates of a node, one number per lane, in vectors of the processor (g++ and clang).
+struct alignas(kLanes * sizeof(float)) LaneNode {
+  using Floats [[gnu::vector_size(kLanes * sizeof(float))]] = float;
+  Floats x, y, z;
+};
+
+/// A copy of a factorisation in single precision, which solves for all lanes at once: to correct
+/// iterates whose residual is found in double precision. solve() allocates nothing.
+class LaneFactor {
+ public:
+  /// @param pattern must live as long as this
+  explicit LaneFactor(const BlockPattern& pattern);
+
+  /// @param factor of a matrix on the same pattern, factorised
+  void copy(const BlockLdlt<double>& factor);
+
+  /// Replaces the right-hand sides, three columns per node, by the solutions, to about 1e-5 of
+  /// them for matrices that are not near singular.
+  void solve(LaneMatrix& x);
+
+ private:
+  using Block = std::array<float, 9>;  ///< by rows
+
+  const BlockPattern& pattern_;
+  std::vector<std::uint32_t> node_of_;
+  std::vector<Block> lower_, inverse_;
+  std::vector<LaneNode> y_;  ///< in the order of the factor
+};
+
+}  // namespace tpm

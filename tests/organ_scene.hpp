@@ -1,0 +1,37 @@
+#pragma once
+// An organ with its far side held, pushed at its contact sphere: for tests and measurements.
+#include "tpm/network/freedom.hpp"
+#include "tpm/network/network.hpp"
+#include "tpm/network/quasistatic.hpp"
+
+namespace tpm::testing {
+
+struct OrganScene {
+  /// @param far_share spheres of the outer layer further than this share of the organ's extent
+  ///   from the contact, along the push, are held
+  explicit OrganScene(const Organ& organ, double far_share = 0.6)
+      : network(build_network(organ, {}, "scene")), freedom(organ.size()) {
+    probe.sphere = organ.contact.value_or(0);
+    probe.direction = -organ.normal.col(static_cast<Eigen::Index>(probe.sphere));
+    const Eigen::VectorXd along = organ.position.transpose() * probe.direction;
+    const double near = along[static_cast<Eigen::Index>(probe.sphere)];
+    for (std::size_t i = 0; i < organ.size(); ++i) {
+      const double further = along[static_cast<Eigen::Index>(i)] - near;
+      if (organ.layer[i] == 0 && further > far_share * (along.maxCoeff() - near)) freedom.hold(i);
+    }
+  }
+
+  [[nodiscard]] QuasiStaticRun run(const TpmParameters& material, const Protocol& protocol,
+                                   std::span<const double> times_s,
+                                   QuasiStaticOptions options) const {
+    const BondSystem bonds(network, material);
+    return QuasiStatic(bonds, network.organ.position, freedom, probe, options)
+        .run(protocol, times_s);
+  }
+
+  Network network;
+  Freedom freedom;
+  Probe probe;
+};
+
+}  // namespace tpm::testing
