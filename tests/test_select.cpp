@@ -166,3 +166,17 @@ TEST_CASE("branches are pooled by their times, however a fit numbers them", "[se
   }
   CHECK_NOTHROW(to_json(figures));
 }
+
+TEST_CASE("a depth of metres is taken for a slip of the unit", "[select]") {
+  Recording r = simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 6);
+  for (double& depth : r.drive) depth *= 1000.0;
+  SelectionOptions options;
+  options.laws = {parse_law_name("linear-1", "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  options.setup.profiles = false;
+  const std::vector<PreparedRecording> one{prepare_recording("slip.csv", r)};
+  const Selection s = select_law(one, options);
+  REQUIRE_FALSE(s.warnings.empty());
+  CHECK_THAT(s.warnings.front(), Catch::Contains("changes by 5 m: is its unit right?"));
+}

@@ -135,6 +135,10 @@ Panel specimen_panel(const SpecimenStudy& study, const PooledParameter& p) {
   typical.y.assign(2, p.parameter.natural(p.effects.mean) / unit);
   if (p.effects.new_specimen) {
     panel.series.push_back(pooled_band(p, *p.effects.new_specimen, "a new specimen", last));
+  } else if (p.effects.tau_squared && *p.effects.tau_squared > 0.0) {
+    const double sd = std::sqrt(*p.effects.tau_squared);
+    panel.series.push_back(pooled_band(p, {p.effects.mean - sd, p.effects.mean + sd},
+                                       "spread between specimens (one sd)", last));
   }
   panel.series.push_back(pooled_band(p, p.effects.interval, "interval of the typical one", last));
   panel.series.push_back(std::move(typical));

@@ -14,7 +14,8 @@ namespace tpm {
 [[nodiscard]] Figure spectrum_figure(const FitResult& fit, std::size_t choice);
 
 /// Each recording's own estimate and interval beside the typical specimen, its interval and the
-/// range of a new specimen: a panel for each pooled parameter, three to a figure.
+/// range of a new specimen (of two specimens their spread): a panel for each pooled parameter,
+/// three to a figure.
 [[nodiscard]] std::vector<Figure> specimen_figures(const SpecimenStudy& study);
 
 /// Writes figures.json and, as SVG and PNG, a figure for each recording and each spectrum of a fit
