@@ -47,6 +47,7 @@ FitResult search(const ExperimentResiduals& function, const std::vector<FitParam
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical) throw;
     std::vector<double> nominal;
+    nominal.reserve(parameters.size());
     for (const FitParameter& p : parameters) nominal.push_back(p.start);
     if (const auto reason = unpredicted_window(function, nominal)) throw *reason;
     throw;
