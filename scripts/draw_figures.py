@@ -197,6 +197,12 @@ def plain_number(value, _position):
     return power if abs(factor - 1) < 1e-9 else f"{factor:g}·{power}"
 
 
+def counts(panel):
+    """True if the panel's x are counts or running numbers, which have no tick between them."""
+    places = [x for s in panel["series"] if s["kind"] in ("points", "bracket") for x in s["x"]]
+    return not panel["x"]["unit"] and not panel["x"]["logarithmic"] and places and all(x == int(x) for x in places)
+
+
 def draw_panel(axes, panel, look, handles):
     """Draws one panel and adds a handle per new legend text to `handles`."""
     for series in panel["series"]:
@@ -210,6 +216,8 @@ def draw_panel(axes, panel, look, handles):
         getattr(axes, f"set_{name}lim")(axis.get("lower"), axis.get("upper"))
         if axis["logarithmic"]:
             tick_short_log_axis(getattr(axes, f"{name}axis"), getattr(axes, f"get_{name}lim")())
+    if counts(panel):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     for series in panel["series"]:
         if series["kind"] == "bracket":
             finish_bracket(axes, series, look[series["label"]])

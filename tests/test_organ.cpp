@@ -5,6 +5,7 @@
 #include <map>
 
 #include "organ_meshes.hpp"
+#include "refusal.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/liver.hpp"
@@ -40,12 +41,7 @@ bool same(const Organ& a, const Organ& b) {
 }
 
 std::string refusal(const Organ& organ) {
-  try {
-    require_valid(organ, "organ");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+  return refusal_of([&] { require_valid(organ, "organ"); });
 }
 
 /// The largest angle between the normals of two triangles with a common edge, rad.

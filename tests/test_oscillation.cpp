@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <numbers>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
@@ -11,6 +12,7 @@
 #include "tpm/fit/gradient_check.hpp"
 #include "tpm/law/frequency_response.hpp"
 #include "tpm/law/law_model.hpp"
+#include "tpm/report/fit_report.hpp"
 
 using namespace tpm;
 using Catch::Contains;
@@ -340,4 +342,31 @@ TEST_CASE("spectra that the configuration cannot answer are refused") {
   refused(kOscillation, "1 kPa", R"(, "stiffness_per_modulus": "0 mm")", "not above 0");
   refused(kOscillation, "1 kPa", "", "/data/0/noise/absolute");
   refused(kOscillation, "1 N/m", R"(, "from": "1 s")", "without a recording");
+}
+
+TEST_CASE("the figure of a spectrum holds its readings and the law's answer to them") {
+  const FitResult fit =
+      run_fit(read_fit_config(TPM_TEST_SOURCE_DIR "/configs/oscillation_example/fit.json"));
+  const Figure figure = spectrum_figure(fit, 1);
+  REQUIRE(figure.panels.size() == 1);
+  const Panel& panel = figure.panels.front();
+  CHECK((panel.x.logarithmic && panel.y.logarithmic));
+  CHECK(panel.y.unit == "N/m");
+  REQUIRE(panel.series.size() == 4);
+  const std::size_t readings = panel.series[0].x.size() + panel.series[1].x.size();
+  CHECK(readings == fit.data.size());
+  for (const std::size_t part : {0U, 1U}) {
+    const Series& data = panel.series[part];
+    const Series& law = panel.series[part + 2];
+    CHECK(law.x.front() < data.x.front());
+    CHECK(law.x.back() > data.x.back());
+    // k_inf + k1 (w tau)^2/(1 + (w tau)^2) and k1 w tau/(1 + (w tau)^2)
+    for (std::size_t i = 0; i < law.x.size(); ++i) {
+      const double z = 2.0 * std::numbers::pi * law.x[i] * fit.best.natural[2];
+      const double k1 = fit.best.natural[1] / (1.0 + z * z);
+      CHECK_THAT(law.y[i], WithinRel(part == 0 ? fit.best.natural[0] + k1 * z * z : k1 * z, 1e-12));
+    }
+  }
+  CHECK_NOTHROW(to_json(std::vector<Figure>{figure}));
+  CHECK_THROWS_WITH(spectrum_figure(fit, 0), Contains("no spectrum"));
 }

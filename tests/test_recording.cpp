@@ -270,7 +270,8 @@ TEST_CASE("what cannot be cut into phases is refused") {
   Recording recording = made(kRampHold, Making{});
   Recording none = recording;
   none.time_s.clear();
-  CHECK_THROWS_WITH(find_phases(none), "made: the recording has no times; expected a time column");
+  CHECK_THROWS_WITH(find_phases(none),
+                    "made: the recording has no times; expected a time column (--time COLUMN)");
   none = recording;
   none.drive.clear();
   CHECK_THROWS_WITH(find_phases(none), Catch::Contains("does not say what was imposed"));

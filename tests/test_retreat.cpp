@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "refusal.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/law/contact_retreat.hpp"
 #include "tpm/law/law_model.hpp"
@@ -382,4 +383,42 @@ TEST_CASE("a fit predicts the unloading of a Hertz contact, and says where it pr
   for (const Series& s : figure.panels.front().series) {
     if (s.label == "law, predicted") CHECK(s.x.back() < 11.0);
   }
+}
+
+TEST_CASE("a fitted window that a Hertz law does not predict is named with what to do",
+          "[retreat]") {
+  // Ramp to 5 mm, back to 3 mm at 6 s, and from 8 s down again.
+  Recording recording;
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.05 * i;
+    const double u = t < 6.0   ? std::min(5e-3, 5e-3 * t)
+                     : t < 8.0 ? std::max(3e-3, 5e-3 - 4e-3 * (t - 6.0))
+                               : 3e-3 + 1e-3 * (t - 8.0);
+    recording.time_s.push_back(t);
+    recording.drive.push_back(u);
+    recording.response.push_back(40.0 * u * (1.0 + std::exp(-t)));
+  }
+  PreparedRecording whole = prepare_recording("cycle.csv", recording);
+  whole.to_s = recording.time_s.back();
+  SetupOptions setup;
+  setup.profiles = false;
+  const auto message_of = [&](const char* law) {
+    const std::vector<PreparedRecording> one{whole};
+    return test::refusal_of([&] {
+      static_cast<void>(
+          run_fit(recording_config(parse_law_name(law, "test"), one, setup), data_sets(one)));
+    });
+  };
+  const std::string message = message_of("hertz-1");
+  CHECK_THAT(message, Catch::StartsWith("cycle.csv: ") && Catch::Contains("of the 200 samples") &&
+                          Catch::Contains("to 9.95 s, are not predicted by hertz-1") &&
+                          Catch::Contains("\"to\" of the data set"));
+  // The window that the message proposes is predicted.
+  const std::string_view before = "a window that ends by ";
+  REQUIRE(message.find(before) != std::string::npos);
+  whole.to_s = std::stod(message.substr(message.find(before) + before.size()));
+  CHECK(whole.to_s > 6.4);
+  CHECK(message_of("hertz-1").empty());
+  whole.to_s = recording.time_s.back();
+  CHECK(message_of("power-1").empty());
 }

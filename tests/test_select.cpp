@@ -7,6 +7,7 @@
 #include "temp_folder.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/law/law_model.hpp"
+#include "tpm/report/fit_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/selection.hpp"
 #include "tpm/study/specimens.hpp"
@@ -128,4 +129,54 @@ TEST_CASE("one specimen's recording is told from the spread between specimens", 
   CHECK_THAT(std::exp(k_inf.mean), WithinRel(102.4, 0.03));   // geometric mean
   CHECK(std::sqrt(*k_inf.tau_squared) > 0.1);                 // they do differ
   CHECK(study.pooled[2].effects.tau_squared.value() < 0.01);  // the time is one
+}
+
+TEST_CASE("branches are pooled by their times, however a fit numbers them", "[select]") {
+  std::vector<PreparedRecording> specimens;
+  for (int i = 0; i < 4; ++i) {
+    specimens.push_back(prepare_recording(
+        fmt::format("{}.csv", i), simulated("linear-2", {100.0, 120.0, 80.0, 0.4, 6.0, 0.0, 0.0},
+                                            static_cast<std::uint64_t>(40 + i))));
+  }
+  SelectionOptions options;
+  options.setup.profiles = false;
+  const SpecimenStudy study =
+      study_specimens(specimens, parse_law_name("linear-2", "test"), options);
+  const std::size_t tau1 = 3;
+  for (const SpecimenRow& row : study.rows) {
+    REQUIRE(row.fit);
+    REQUIRE(row.parameter(tau1).parameter.name.starts_with("tau"));
+    CHECK(row.parameter(tau1).estimate < row.parameter(tau1 + 1).estimate);
+    CHECK(row.parameter(1).parameter.name.back() == row.parameter(tau1).parameter.name.back());
+  }
+  for (const PooledParameter& p : study.pooled) {
+    const double typical = p.parameter.natural(p.effects.mean);
+    if (p.parameter.name == "tau1") CHECK_THAT(typical, WithinRel(0.4, 0.1));
+    if (p.parameter.name == "tau2") CHECK_THAT(typical, WithinRel(6.0, 0.05));
+    if (p.parameter.name == "k1") CHECK_THAT(typical, WithinRel(120.0, 0.1));
+  }
+  // A figure for three parameters each; every recording stands in every panel.
+  const std::vector<Figure> figures = specimen_figures(study);
+  REQUIRE(figures.size() == 2);
+  CHECK(figures[0].panels.size() == 3);
+  CHECK(figures[1].panels.size() == 2);
+  for (const Panel& panel : figures[1].panels) {
+    REQUIRE(panel.series.back().label == "estimate of a recording");
+    CHECK(panel.series.back().x == std::vector<double>{1, 2, 3, 4});
+  }
+  CHECK_NOTHROW(to_json(figures));
+}
+
+TEST_CASE("a depth of metres is taken for a slip of the unit", "[select]") {
+  Recording r = simulated("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 6);
+  for (double& depth : r.drive) depth *= 1000.0;
+  SelectionOptions options;
+  options.laws = {parse_law_name("linear-1", "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  options.setup.profiles = false;
+  const std::vector<PreparedRecording> one{prepare_recording("slip.csv", r)};
+  const Selection s = select_law(one, options);
+  REQUIRE_FALSE(s.warnings.empty());
+  CHECK_THAT(s.warnings.front(), Catch::Contains("changes by 5 m: is its unit right?"));
 }

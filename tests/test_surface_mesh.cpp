@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "organ_meshes.hpp"
+#include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
@@ -23,12 +24,7 @@ using Eigen::Vector3d;
 namespace {
 
 std::string refusal(const TriangleMesh& mesh) {
-  try {
-    (void)closed_mesh(mesh, "m.stl");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+  return refusal_of([&] { (void)closed_mesh(mesh, "m.stl"); });
 }
 
 TriangleMesh without_triangle(const TriangleMesh& mesh, Eigen::Index dropped) {
@@ -80,12 +76,8 @@ std::string write(const TempFolder& folder, const std::string& name, const std::
 }
 
 std::string file_refusal(const std::string& path) {
-  try {
-    (void)read_closed_mesh(path, parse_unit("mm", Dimension::length, "test"));
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+  return refusal_of(
+      [&] { (void)read_closed_mesh(path, parse_unit("mm", Dimension::length, "test")); });
 }
 
 }  // namespace

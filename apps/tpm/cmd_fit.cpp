@@ -10,6 +10,7 @@
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/tables.hpp"
+#include "tpm/report/fit_report.hpp"
 #include "tpm/report/recording_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/specimens.hpp"
@@ -103,9 +104,26 @@ std::vector<std::string> recordings_in(const std::filesystem::path& folder) {
   return files;
 }
 
+std::string written(const std::string& folder, const std::vector<std::string>& files) {
+  return fmt::format("\nwritten to {}: {}\n", folder, fmt::join(files, ", "));
+}
+
+/// --folder, or NAME_fit after the recording or the folder of recordings.
+std::string figure_folder(const FitOptions& options, const std::string& input) {
+  if (!options.folder.empty()) return options.folder;
+  std::filesystem::path path = std::filesystem::absolute(input).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  return path.stem().string() + "_fit";
+}
+
 int fit_configuration(const FitOptions& options, const Session& session) {
   const FitResult result = run_fit(configured(options));
-  deliver(session.json() ? to_text(to_json(result)) : to_terminal_text(result), options.output);
+  std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
+  if (!options.folder.empty() && !options.no_draw) {
+    const auto files = write_fit_report(options.folder, result);
+    if (!session.json()) text += written(options.folder, files);
+  }
+  deliver(text, options.output);
   return 0;
 }
 
@@ -116,7 +134,13 @@ int fit_folder(const FitOptions& options, const Session& session) {
   const std::optional<LawSpec> law =
       selection.laws.empty() ? std::nullopt : std::optional<LawSpec>(selection.laws.front());
   const SpecimenStudy study = study_specimens(read_recordings(input), law, selection);
-  deliver(session.json() ? to_text(to_json(study)) : to_terminal_text(study), options.output);
+  std::string text = session.json() ? to_text(to_json(study)) : to_terminal_text(study);
+  if (!options.no_draw) {
+    const std::string folder = figure_folder(options, options.recordings.files.front());
+    const auto files = write_specimen_report(folder, study);
+    if (!session.json()) text += written(folder, files);
+  }
+  deliver(text, options.output);
   return 0;
 }
 
@@ -135,12 +159,9 @@ int fit_recordings(const FitOptions& options, const Session& session) {
     for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);
   }
   if (!options.no_draw) {
-    const std::string stem = std::filesystem::path(recordings.front().name).stem().string();
-    const std::string folder = options.folder.empty() ? stem + "_fit" : options.folder;
+    const std::string folder = figure_folder(options, recordings.front().name);
     const auto files = write_recording_report(folder, selection);
-    if (!session.json()) {
-      text += fmt::format("\nwritten to {}: {}\n", folder, fmt::join(files, ", "));
-    }
+    if (!session.json()) text += written(folder, files);
   }
   if (!session.json()) {
     text += fmt::format("\nthe configuration (edit it and run: tpm fit {}):\n{}",
@@ -180,8 +201,9 @@ void add_fit_command(CLI::App& app, Session& session) {
       "--law", options->law,
       "Recordings: fit this law, e.g. power-2 (default: the least that they support)");
   command->add_option("--folder", options->folder,
-                      "Recordings: where figures and config.json go (default: NAME_fit)");
-  command->add_flag("--no-draw", options->no_draw, "Recordings: write no figures and files");
+                      "Where figures and files go (default: NAME_fit for recordings, none are "
+                      "written for a configuration)");
+  command->add_flag("--no-draw", options->no_draw, "Write no figures and files");
   add_recording_options(*command, options->recordings);
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
   command->add_option("--rate", options->rate, "Assume this ramp rate instead, e.g. \"2 mm/s\"");

@@ -26,9 +26,11 @@ void require_usable(const Recording& recording) {
   constexpr std::size_t kLeast = 3;
   const std::string& id = recording.header.id;
   const std::size_t size = recording.response.size();
-  if (recording.time_s.empty()) throw bad_input(id, "the recording has no times", "a time column");
+  if (recording.time_s.empty())
+    throw bad_input(id, "the recording has no times", "a time column (--time COLUMN)");
   if (recording.drive.empty()) {
-    throw bad_input(id, "the recording does not say what was imposed", "a column of the drive");
+    throw bad_input(id, "the recording does not say what was imposed",
+                    "a column of the depth or relative length (--drive COLUMN)");
   }
   if (size < kLeast || recording.time_s.size() != size || recording.drive.size() != size) {
     throw bad_input(id,

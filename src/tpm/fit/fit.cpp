@@ -5,6 +5,7 @@
 #include "tpm/fit/fitted_data.hpp"
 #include "tpm/fit/hypothesis_test.hpp"
 #include "tpm/fit/starts.hpp"
+#include "tpm/fit/unpredicted.hpp"
 
 namespace tpm {
 namespace {
@@ -35,6 +36,24 @@ Approach approach_to(const ExperimentResiduals& function,
   return {{found.best.natural}, StartKind::solved};
 }
 
+/// Where no start can be evaluated, the reason is said if it lies in the recording.
+FitResult search(const ExperimentResiduals& function, const std::vector<FitParameter>& parameters,
+                 const Threshold& threshold) {
+  try {
+    const Approach approach = approach_to(function, parameters);
+    return fit_residuals(
+        function, parameters, approach.starts, threshold, function.config().profiles, approach.kind,
+        [&](std::span<const double> best) { return inflation_at(function, best); });
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::numerical) throw;
+    std::vector<double> nominal;
+    nominal.reserve(parameters.size());
+    for (const FitParameter& p : parameters) nominal.push_back(p.start);
+    if (const auto reason = unpredicted_window(function, nominal)) throw *reason;
+    throw;
+  }
+}
+
 }  // namespace
 
 FitResult run_fit(const FitConfig& config) {
@@ -55,10 +74,7 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
   threshold.data_count = function.value_count();
   threshold.parameter_count = static_cast<int>(parameters.size());
 
-  const Approach approach = approach_to(function, parameters);
-  FitResult result = fit_residuals(
-      function, parameters, approach.starts, threshold, config.profiles, approach.kind,
-      [&](std::span<const double> best) { return inflation_at(function, best); });
+  FitResult result = search(function, parameters, threshold);
   threshold.inflation = result.inflation;
   result.config = config;
   result.value_count = function.value_count();

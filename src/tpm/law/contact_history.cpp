@@ -346,24 +346,11 @@ void ContactHistory::move_smooth(double from, double to, double h, double time_s
   constexpr double kStraight = 3e-6;
   constexpr double kQuartic = 0.05;
   const double part = std::abs(b - a) / std::min(a, b);
-  if (part > kQuartic && level < kMostHalvings) {
-    const KernelShape& v = law_.kernel;
-    const double v0 = v.value(a);
-    const double v1 = v.value(0.75 * a + 0.25 * b);
-    const double v2 = v.value(0.5 * (a + b));
-    const double v3 = v.value(0.25 * a + 0.75 * b);
-    const double v4 = v.value(b);
-    // The polynomial at 1/8 and 7/8, where its error is largest.
-    const double early = (35.0 * v0 + 140.0 * v1 - 70.0 * v2 + 28.0 * v3 - 5.0 * v4) / 128.0;
-    const double late = (-5.0 * v0 + 28.0 * v1 - 70.0 * v2 + 140.0 * v3 + 35.0 * v4) / 128.0;
-    const double off = std::max(std::abs(early - v.value(0.875 * a + 0.125 * b)),
-                                std::abs(late - v.value(0.125 * a + 0.875 * b)));
-    if (off > v_tolerance_) {
-      const double middle = 0.5 * (from + to);
-      move_smooth(from, middle, 0.5 * h, time_scale, level + 1);
-      move_smooth(middle, to, 0.5 * h, time_scale, level + 1);
-      return;
-    }
+  if (part > kQuartic && level < kMostHalvings && law_.kernel.quartic_error(a, b) > v_tolerance_) {
+    const double middle = 0.5 * (from + to);
+    move_smooth(from, middle, 0.5 * h, time_scale, level + 1);
+    move_smooth(middle, to, 0.5 * h, time_scale, level + 1);
+    return;
   }
   move_piece(from, to, h, time_scale, !free_ && part > kStraight);
 }

@@ -1,5 +1,6 @@
 #include "tpm/law/kernel.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tpm {
@@ -107,6 +108,18 @@ KernelShape::Tangent KernelShape::tangent(double u) const {
           t.slope - of_kernel, share_ * t.d_spacing};
 }
 
+double KernelShape::quartic_error(double a, double b) const {
+  const double v0 = value(a);
+  const double v1 = value(0.75 * a + 0.25 * b);
+  const double v2 = value(0.5 * (a + b));
+  const double v3 = value(0.25 * a + 0.75 * b);
+  const double v4 = value(b);
+  const double early = (35.0 * v0 + 140.0 * v1 - 70.0 * v2 + 28.0 * v3 - 5.0 * v4) / 128.0;
+  const double late = (-5.0 * v0 + 28.0 * v1 - 70.0 * v2 + 140.0 * v3 + 35.0 * v4) / 128.0;
+  return std::max(std::abs(early - value(0.875 * a + 0.125 * b)),
+                  std::abs(late - value(0.125 * a + 0.875 * b)));
+}
+
 double KernelShape::inverse(double v) const {
   if (v <= 0.0) return 0.0;
   const auto of_kernel = [this](double w) {
@@ -128,6 +141,18 @@ double KernelShape::inverse(double v) const {
     u = next;
   }
   return u;
+}
+
+KernelBetween kernel_between(double depth_change, double v0, double slope0, double v1,
+                             double slope1) {
+  const double m0 = depth_change * slope0;
+  const double m1 = depth_change * slope1;
+  const double rise = v1 - v0;
+  return {{v0 + 0.15625 * rise + 0.140625 * m0 - 0.046875 * m1, v0 + 0.5 * rise + 0.125 * (m0 - m1),
+           v0 + 0.84375 * rise + 0.046875 * m0 - 0.140625 * m1},
+          {(1.125 * rise + 0.1875 * m0 - 0.3125 * m1) / depth_change,
+           (1.5 * rise - 0.25 * (m0 + m1)) / depth_change,
+           (1.125 * rise - 0.3125 * m0 + 0.1875 * m1) / depth_change}};
 }
 
 }  // namespace tpm

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <optional>
 
 #include "tpm/law/law.hpp"
@@ -49,6 +50,9 @@ class KernelShape {
     Tangent tangent;
   };
   [[nodiscard]] Jet jet(double u) const;
+  /// How far the polynomial of fourth degree through V at five evenly spaced depths from a to b is
+  /// off at 1/8 and 7/8 of the way, where its error is largest. a, b >= 0
+  [[nodiscard]] double quartic_error(double a, double b) const;
   /// u with value(u) = v; v >= 0
   [[nodiscard]] double inverse(double v) const;
   /// V is a straight line: histories need no refinement.
@@ -62,5 +66,15 @@ class KernelShape {
   double share_;
   TensionShape tension_;
 };
+
+/// The kernel at 1/4, 1/2 and 3/4 between two depths from its values and slopes at both: cubic
+/// interpolation, for depths that differ by so little (kCubicPart) that it holds to 1e-10.
+struct KernelBetween {
+  std::array<double, 3> value;
+  std::array<double, 3> slope;  ///< dV/du
+};
+inline constexpr double kCubicPart = 3e-3;  ///< of the smaller depth
+[[nodiscard]] KernelBetween kernel_between(double depth_change, double v0, double slope0, double v1,
+                                           double slope1);
 
 }  // namespace tpm

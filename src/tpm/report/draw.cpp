@@ -109,4 +109,16 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
                           printable(last_line(outcome.error_output), 200)));
 }
 
+std::vector<std::string> write_figures(const std::filesystem::path& folder,
+                                       const std::vector<Figure>& figures) {
+  std::vector<std::string> files{"figures.json"};
+  write_file(folder / files.front(), to_text(to_json(figures)));
+  draw_figures(find_drawing_python(), folder / files.front(), folder, Drawings::svg_and_png);
+  for (const Figure& figure : figures) {
+    files.push_back(fmt::format("{}.svg", figure.id));
+    files.push_back(fmt::format("{}.png", figure.id));
+  }
+  return files;
+}
+
 }  // namespace tpm

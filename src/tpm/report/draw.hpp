@@ -1,6 +1,9 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
+
+#include "tpm/report/figure.hpp"
 
 namespace tpm {
 
@@ -16,5 +19,10 @@ enum class Drawings { svg, svg_and_png };
 /// fails.
 void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
                   const std::filesystem::path& folder, Drawings drawings = Drawings::svg);
+
+/// Writes figures.json into `folder` and draws its figures there as SVG and PNG. Returns the names
+/// of the files. Throws Error(environment) if drawing is not possible; figures.json is then there.
+[[nodiscard]] std::vector<std::string> write_figures(const std::filesystem::path& folder,
+                                                     const std::vector<Figure>& figures);
 
 }  // namespace tpm

@@ -239,16 +239,12 @@ std::vector<std::string> write_recording_report(const std::filesystem::path& fol
   }
   figures.push_back(selection_figure(selection));
   figures.push_back(waterfall_figure(fit));
-  std::vector<std::string> files{"config.json", "selection.json", "figures.json", "law.json"};
+  std::vector<std::string> files{"config.json", "selection.json", "law.json"};
   write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
   write_file(folder / files[1], to_text(to_json(selection)));
-  write_file(folder / files[2], to_text(to_json(figures)));
-  write_law(folder / files[3], fitted_law(fit));
-  draw_figures(find_drawing_python(), folder / files[2], folder, Drawings::svg_and_png);
-  for (const Figure& figure : figures) {
-    files.push_back(fmt::format("{}.svg", figure.id));
-    files.push_back(fmt::format("{}.png", figure.id));
-  }
+  write_law(folder / files[2], fitted_law(fit));
+  const std::vector<std::string> drawn = write_figures(folder, figures);
+  files.insert(files.end(), drawn.begin(), drawn.end());
   return files;
 }
 

@@ -39,6 +39,22 @@ Outside outside_of(const RecordingFit& r) {
   return o;
 }
 
+/// Depths of soft tissue are millimetres: metres come from a unit that is not the file's.
+std::vector<std::string> unit_warnings(std::span<const PreparedRecording> recordings) {
+  constexpr double kDeepest_m = 0.5;
+  std::vector<std::string> warnings;
+  for (const PreparedRecording& r : recordings) {
+    if (r.recording.drive_quantity != Quantity::indentation_depth) continue;
+    const auto [low, high] =
+        std::minmax_element(r.recording.drive.begin(), r.recording.drive.end());
+    if (*high - *low <= kDeepest_m) continue;
+    warnings.push_back(
+        fmt::format("{}: the depth changes by {} m: is its unit right? (--unit \"COLUMN=mm\")",
+                    r.name, significant(*high - *low, 3)));
+  }
+  return warnings;
+}
+
 }  // namespace
 
 std::vector<std::string> outside_words(const FitResult& fit) {
@@ -70,7 +86,7 @@ std::vector<std::string> outside_words(const FitResult& fit) {
 
 std::vector<std::string> protocol_warnings(const FitResult& fit,
                                            std::span<const PreparedRecording> recordings) {
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings = unit_warnings(recordings);
   double ramp_s = std::numeric_limits<double>::infinity();
   double hold_s = 0.0;
   double step_s = std::numeric_limits<double>::infinity();

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <tuple>
 
 #include "tpm/core/error.hpp"
@@ -66,12 +68,41 @@ std::pair<LawSpec, std::string> common_law(std::span<const PreparedRecording> re
                       chosen->identified)};
 }
 
+std::optional<std::size_t> place_of(const FitResult& fit, const std::string& name) {
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+    if (fit.parameters[i].parameter.name == name) return i;
+  }
+  return std::nullopt;
+}
+
+/// See SpecimenRow::place.
+std::vector<std::size_t> branches_by_time(const LawSpec& law, const FitResult& fit) {
+  std::vector<std::size_t> place(fit.parameters.size());
+  std::iota(place.begin(), place.end(), std::size_t{0});
+  std::vector<std::pair<std::size_t, std::size_t>> branches;  // places of k and tau
+  for (int i = 1; i <= law.branches; ++i) {
+    const auto k = place_of(fit, fmt::format("k{}", i));
+    const auto tau = place_of(fit, fmt::format("tau{}", i));
+    if (k && tau) branches.emplace_back(*k, *tau);
+  }
+  auto sorted = branches;
+  std::stable_sort(sorted.begin(), sorted.end(), [&](const auto& a, const auto& b) {
+    return fit.parameters[a.second].estimate < fit.parameters[b.second].estimate;
+  });
+  for (std::size_t i = 0; i < branches.size(); ++i) {
+    place[branches[i].first] = sorted[i].first;
+    place[branches[i].second] = sorted[i].second;
+  }
+  return place;
+}
+
 SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> one,
                          const SetupOptions& setup) {
   SpecimenRow row;
   row.name = one.front().name;
   try {
     row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
+    row.place = branches_by_time(law, *row.fit);
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical) throw;
     row.reason = error.what();
@@ -96,7 +127,7 @@ std::vector<PooledParameter> pool(const std::vector<SpecimenRow>& rows, double l
     std::vector<SpecimenEstimate> estimates;
     for (const SpecimenRow& row : rows) {
       if (!row.fit) continue;
-      const ParameterResult& r = row.fit->parameters[i];
+      const ParameterResult& r = row.parameter(i);
       const bool usable = r.standard_error && !r.at_lower_bound && !r.at_upper_bound &&
                           (p.parameter.scale == Scale::linear || r.estimate > 0.0);
       if (!usable) {
@@ -138,6 +169,11 @@ Json to_json(const SpecimenStudy& study) {
     Json entry{{"recording", row.name}, {"fitted", row.fit.has_value()}};
     if (row.fit) {
       entry["fit"] = to_json(*row.fit);
+      Json order = Json::array();
+      for (std::size_t i = 0; i < row.place.size(); ++i) {
+        order.push_back(row.parameter(i).parameter.name);
+      }
+      entry["pooled_as"] = std::move(order);
     } else {
       entry["reason"] = row.reason;
     }
@@ -190,7 +226,8 @@ std::string to_terminal_text(const SpecimenStudy& study) {
     const RecordingFit& r = row.fit->recordings.front();
     text += fmt::format("{:<32} {:>9}", row.name,
                         significant(100.0 * r.rms_residual / r.peak, 3) + " %");
-    for (const ParameterResult& p : row.fit->parameters) {
+    for (std::size_t i = 0; i < row.place.size(); ++i) {
+      const ParameterResult& p = row.parameter(i);
       const double unit = p.parameter.unit.to_si;
       text += fmt::format(
           " {:>22}", p.standard_error ? fmt::format("{} +- {}", significant(p.estimate / unit, 4),

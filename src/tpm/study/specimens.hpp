@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,14 @@ struct SpecimenRow {
   std::string name;
   std::optional<FitResult> fit;  ///< empty if it could not be fitted
   std::string reason;            ///< then why
+  /// Which of the fit's parameters stands for each of the common law's: a fit may number its
+  /// branches in any order, here they are sorted by their relaxation times.
+  std::vector<std::size_t> place;
+
+  /// The result for the common law's parameter i of a recording that was fitted.
+  [[nodiscard]] const ParameterResult& parameter(std::size_t i) const {
+    return fit.value().parameters[place[i]];
+  }
 };
 
 /// One material parameter over the specimens.
