@@ -6,12 +6,16 @@
 
 namespace tpm::sundials {
 
+std::string flag_name(int flag) {
+  char* name = CVodeGetReturnFlagName(flag);
+  std::string text = name;
+  std::free(name);  // NOLINT(cppcoreguidelines-no-malloc): SUNDIALS allocates it with malloc
+  return text;
+}
+
 void check(int flag, std::string_view call) {
   if (flag >= 0) return;
-  char* name = CVodeGetReturnFlagName(flag);
-  const std::string text = fmt::format("{} returned {}", call, name);
-  std::free(name);  // NOLINT(cppcoreguidelines-no-malloc): SUNDIALS allocates it with malloc
-  throw Error(ExitCode::numerical, "CVODES", text);
+  throw Error(ExitCode::numerical, "CVODES", fmt::format("{} returned {}", call, flag_name(flag)));
 }
 
 Context make_context() {
