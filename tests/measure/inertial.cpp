@@ -2,7 +2,8 @@
 #include <fmt/format.h>
 
 #include <ctime>
-#include <optional>
+#include <initializer_list>
+#include <limits>
 
 #include "far_side.hpp"
 #include "tpm/network/inertial.hpp"
@@ -11,6 +12,8 @@
 using namespace tpm;
 
 namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
 
 struct Scene {
   explicit Scene(const TpmParameters& p)
@@ -87,6 +90,12 @@ Outcome measure(const Scene& scene, const Reference& reference, const InertialOp
   return outcome;
 }
 
+InertialOptions options_of(int order) {
+  InertialOptions options;
+  options.highest_order = order;
+  return options;
+}
+
 void measure_material(double eta1) {
   TpmParameters p;
   p.eta1_Pa_s = eta1;
@@ -99,29 +108,38 @@ void measure_material(double eta1) {
   fmt::print("{:<10} {:>5} {:>9} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9} {:>10} {:>10}\n", "solver",
              "order", "tolerance", "steps", "rejected", "Newton", "factors", "CPU s", "ratio",
              "error end", "error max");
-  std::optional<double> cheapest;
-  const auto row = [&](NewtonSolver newton, int order, double tolerance) {
-    InertialOptions options;
-    options.newton = newton;
-    options.highest_order = order;
-    options.tolerance = tolerance;
-    const Outcome outcome = measure(scene, reference, options);
-    if (outcome.error_at_end > 1e-3) return;
-    cheapest = std::min(cheapest.value_or(outcome.seconds), outcome.seconds);
-  };
-  for (const int order : {1, 2, 5}) {
-    for (const double tolerance : {1e-1, 1e-2, 1e-3, 1e-4, 1e-5}) {
-      row(NewtonSolver::eliminated, order, tolerance);
+  // The loosest setting of a series that comes near enough, as do all tighter ones: not by luck.
+  double cheapest = kNever;
+  const auto series = [&](InertialOptions options, std::initializer_list<double> tolerances) {
+    double seconds = kNever;
+    for (const double tolerance : tolerances) {
+      options.tolerance = tolerance;
+      const Outcome outcome = measure(scene, reference, options);
+      if (outcome.error_at_end > 1e-3) seconds = kNever;
+      if (outcome.error_at_end <= 1e-3) seconds = std::min(seconds, outcome.seconds);
     }
+    cheapest = std::min(cheapest, seconds);
+  };
+  series(options_of(1), {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6});
+  series(options_of(2), {1e-1, 1e-2, 1e-3, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6});
+  series(options_of(3), {1e-4, 1e-5});
+  series(options_of(5), {1e-1, 1e-2, 1e-3, 1e-4, 1e-5});
+  InertialOptions klu = options_of(2);
+  klu.newton = NewtonSolver::klu;
+  series(klu, {1e-2, 1e-4});
+  InertialOptions dashpots = options_of(5);
+  dashpots.stiffness_share = 1.0;
+  fmt::print("the same ratio by dashpots along the bonds (not counted below):\n");
+  for (const double tolerance : {1e-3, 1e-4, 1e-5}) {
+    dashpots.tolerance = tolerance;
+    static_cast<void>(measure(scene, reference, dashpots));
   }
-  for (const double tolerance : {1e-2, 1e-4}) row(NewtonSolver::klu, 2, tolerance);
-  row(NewtonSolver::klu, 5, 1e-4);
-  if (!cheapest) {
-    fmt::print("no setting comes within 1e-3 of the quasi-static force at the end of the hold\n");
+  if (cheapest == kNever) {
+    fmt::print("no series comes within 1e-3 of the quasi-static force at the end of the hold\n");
     return;
   }
   fmt::print("cheapest within 1e-3 at the end: {:.3f} s, {:.0f} times the quasi-static network\n",
-             *cheapest, *cheapest / reference.seconds);
+             cheapest, cheapest / reference.seconds);
 }
 
 }  // namespace
