@@ -39,19 +39,21 @@ void InertialEquation::add_bond_entries(Triplets& entries, std::size_t bond,
   }
   const auto end = [&](std::uint32_t here, std::uint32_t there, double sign) {
     const Eigen::Matrix3d p = tissue_.freedom().projector(here) / inertia_.mass_kg[here];
-    const Eigen::Index v = coordinates() + 3 * here;
-    add_block(entries, v, 3 * there, p * (across + turning));
+    const Eigen::Index u = 3 * Eigen::Index{here};
+    const Eigen::Index u_there = 3 * Eigen::Index{there};
+    const Eigen::Index v = coordinates() + u;
+    add_block(entries, v, u_there, p * (across + turning));
     if (damped) {
-      add_block(entries, v, 3 * here, -(p * turning));
-      add_block(entries, v, coordinates() + 3 * there, p * damping);
-      add_block(entries, v, coordinates() + 3 * here, -(p * damping));
+      add_block(entries, v, u, -(p * turning));
+      add_block(entries, v, coordinates() + u_there, p * damping);
+      add_block(entries, v, v, -(p * damping));
     }
     const Eigen::Index y = memory_of_[bond];
     if (y < 0) return;
     const Eigen::Vector3d pull = sign * bonds.relaxing()[row] * (p * n);
     for (Eigen::Index i = 0; i < 3; ++i) {
       entries.emplace_back(v + i, y, -pull[i]);
-      entries.emplace_back(y, 3 * here + i, -sign * n[i] / bonds.relaxation_time_s());
+      entries.emplace_back(y, u + i, -sign * n[i] / bonds.relaxation_time_s());
     }
   };
   end(a, b, 1.0);
