@@ -2,9 +2,11 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -205,7 +207,8 @@ TEST_CASE("the lowest mode of a block agrees with the dense eigenvalue problem")
     block.freedom.project(force);
     stiffness.col(i) = force.reshaped() / mass[0];
   }
-  Eigen::VectorXd squares = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(stiffness).eigenvalues();
+  const Eigen::VectorXd squares =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(stiffness).eigenvalues();
   const auto held = 3 * n - static_cast<Eigen::Index>(block.freedom.count());
   CHECK(squares[held - 1] < 1e-6 * squares[held]);
   CHECK_THAT(mode.angular_frequency(), WithinRel(std::sqrt(squares[held]), 1e-8));

@@ -1,8 +1,10 @@
 // The mass-spring model, and roughness as the measure that compares it with the tissue.
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 
 #include "star_network.hpp"
@@ -195,7 +197,7 @@ TEST_CASE("the rim is where the normals turn") {
   const Network network = build_network(organ, {1.2, StiffnessRule::per_bond}, "plate");
   // A sphere in the middle of that side has 2 neighbours alike and 1 at 45 degrees, in the mean 15;
   // one beside it has 1 of 4 at 45 degrees.
-  CHECK(spheres_at_rim(network, 14.0 * M_PI / 180.0) ==
+  CHECK(spheres_at_rim(network, 14.0 * std::numbers::pi / 180.0) ==
         std::vector<std::size_t>{0, 1, 5, 10, 15, 20, 21});
-  CHECK(spheres_at_rim(network, 50.0 * M_PI / 180.0).empty());
+  CHECK(spheres_at_rim(network, 50.0 * std::numbers::pi / 180.0).empty());
 }

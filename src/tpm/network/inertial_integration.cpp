@@ -92,9 +92,7 @@ InertialIntegration::InertialIntegration(InertialEquation& eq, const InertialOpt
   check(CVodeSVtolerances(m, 0.0, error_.get()), "CVodeSVtolerances");
   check(CVodeSetMaxOrd(m, options.highest_order), "CVodeSetMaxOrd");
   check(CVodeSetMaxNumSteps(m, 50'000'000), "CVodeSetMaxNumSteps");
-  check(CVodeSetErrHandlerFn(
-            m, [](int, const char*, const char*, char*, void*) {}, nullptr),
-        "CVodeSetErrHandlerFn");  // what goes wrong is thrown, not printed
+  sundials::mute(m);
   options.newton == NewtonSolver::klu ? use_klu() : use_elimination();
   if (!energy_error) return;
   energy_.reset(N_VNew_Serial(3, context_.get()));

@@ -26,7 +26,19 @@ Context make_context() {
   const int flag = SUNContext_Create(nullptr, &context);
 #endif
   if (flag != 0) throw Error(ExitCode::numerical, "SUNDIALS", "could not create a context");
+#if SUNDIALS_VERSION_MAJOR >= 7
+  SUNContext_ClearErrHandlers(context);
+#endif
   return Context(context);
+}
+
+void mute(void* cvodes) {
+#if SUNDIALS_VERSION_MAJOR >= 7
+  static_cast<void>(cvodes);  // there the context prints, and make_context has told it not to
+#else
+  const CVErrHandlerFn nothing = [](int, const char*, const char*, char*, void*) {};
+  check(CVodeSetErrHandlerFn(cvodes, nothing, nullptr), "CVodeSetErrHandlerFn");
+#endif
 }
 
 }  // namespace tpm::sundials

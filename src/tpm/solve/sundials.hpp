@@ -46,4 +46,7 @@ void check(int flag, std::string_view call);
 
 [[nodiscard]] Context make_context();
 
+/// Lets an integrator print nothing: what goes wrong is thrown where its return value is checked.
+void mute(void* cvodes);
+
 }  // namespace tpm::sundials
