@@ -19,7 +19,8 @@ tpm_find(fmt 9)
 
 # --- linked by the library ----------------------------------------------------------------------
 tpm_find(Ceres 2.1)
-tpm_find(SUNDIALS 6.4 COMPONENTS cvodes sunmatrixdense sunlinsoldense nvecserial)
+tpm_find(SUNDIALS 6.4 COMPONENTS cvodes sunmatrixdense sunlinsoldense sunmatrixsparse sunlinsolklu
+         nvecserial)
 tpm_find(muparser 2.3)
 tpm_find(OpenSSL 3 COMPONENTS Crypto)
 tpm_find(assimp 5.2)
@@ -43,7 +44,8 @@ add_library(tpm_ceres INTERFACE IMPORTED)
 target_link_libraries(tpm_ceres INTERFACE Ceres::ceres)
 add_library(tpm_sundials INTERFACE IMPORTED)
 target_link_libraries(tpm_sundials INTERFACE SUNDIALS::cvodes SUNDIALS::nvecserial
-  SUNDIALS::sunmatrixdense SUNDIALS::sunlinsoldense)
+  SUNDIALS::sunmatrixdense SUNDIALS::sunlinsoldense SUNDIALS::sunmatrixsparse
+  SUNDIALS::sunlinsolklu)
 add_library(tpm_hdf5 INTERFACE IMPORTED)
 target_include_directories(tpm_hdf5 INTERFACE ${HDF5_INCLUDE_DIRS})
 target_link_libraries(tpm_hdf5 INTERFACE ${HDF5_C_LIBRARIES})

@@ -2,62 +2,16 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "star_network.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/model/model.hpp"
-#include "tpm/network/quasistatic.hpp"
 #include "tpm/network/rigidity.hpp"
 
 using namespace tpm;
+using namespace tpm_test;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
-
-namespace {
-
-/// B between A and C at the spacing, its partner D below; only B may move.
-Organ star_organ(double spacing) {
-  Organ organ;
-  organ.name = "star";
-  organ.position.resize(3, 4);
-  organ.position << 0, -spacing, spacing, 0,  //
-      0, 0, 0, 0,                             //
-      0, 0, 0, 0.02;
-  organ.normal = Eigen::Vector3d(0, 0, -1).replicate(1, 4);
-  organ.layer = {0, 0, 0, 1};
-  organ.radius = 0.01;
-  organ.spacing = spacing;
-  organ.contact = 0;
-  return organ;
-}
-
-struct Star {
-  explicit Star(const TpmParameters& p)
-      : network(join(star_organ(p.spacing_m), pairs(), {}, "star")), bonds(network, p), freedom(4) {
-    freedom.guide(0, Eigen::Vector3d::UnitZ());
-    for (const std::size_t i : {1, 2, 3}) freedom.hold(i);
-  }
-  static const std::vector<NeighbourPair>& pairs() {
-    static const std::vector<NeighbourPair> list{{0, 1}, {0, 2}, {0, 3}};
-    return list;
-  }
-  [[nodiscard]] QuasiStaticRun run(const Protocol& protocol, std::span<const double> times,
-                                   QuasiStaticOptions options) const {
-    return QuasiStatic(bonds, network.organ.position, freedom, {0, Eigen::Vector3d::UnitZ()},
-                       options)
-        .run(protocol, times);
-  }
-  Network network;
-  BondSystem bonds;
-  Freedom freedom;
-};
-
-std::vector<double> even_times(double end, int n) {
-  std::vector<double> times;
-  for (int i = 0; i <= n; ++i) times.push_back(end * i / n);
-  return times;
-}
-
-}  // namespace
 
 TEST_CASE("the guided star follows the closed form of ramp and hold") {
   for (const double eta1 : {5.0, 1e3, 2.4e5, 1e7}) {

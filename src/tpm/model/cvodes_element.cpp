@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -303,10 +302,7 @@ Response CvodesElement::respond(const Protocol& protocol, std::span<const double
     throw bad_input(protocol.name(), "an integrator does not reach t = infinity",
                     "a finite time, or the model 'closed_form'");
   }
-  std::vector<std::size_t> order(times_s.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
+  const std::vector<std::size_t> order = rising_order(times_s);
 
   ElementEquation eq(p, options_.tension, protocol);
   Integration run(eq, protocol, depth_scale_m(protocol, p), options_.relative_tolerance, want);

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -50,6 +52,14 @@ void require_times_within(const Protocol& protocol, std::span<const double> time
                     fmt::format("a time from {} to {} s", shortest(protocol.start_s()),
                                 shortest(protocol.end_s())));
   }
+}
+
+std::vector<std::size_t> rising_order(std::span<const double> times_s) {
+  std::vector<std::size_t> order(times_s.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
+  return order;
 }
 
 }  // namespace tpm

@@ -91,4 +91,7 @@ struct ModelOptions {
 /// Throws Error(bad_input) unless every time lies in the protocol.
 void require_times_within(const Protocol& protocol, std::span<const double> times_s);
 
+/// Indices of the times in rising order; equal times keep theirs.
+[[nodiscard]] std::vector<std::size_t> rising_order(std::span<const double> times_s);
+
 }  // namespace tpm

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -55,10 +54,7 @@ class Run {
         times_s_(times_s),
         tissue_(bonds, rest, freedom, probe, protocol.drive()),
         stages_(tissue_, options.stages, !options.step_s) {
-    order_.resize(times_s.size());
-    std::iota(order_.begin(), order_.end(), std::size_t{0});
-    std::stable_sort(order_.begin(), order_.end(),
-                     [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
+    order_ = rising_order(times_s);
     result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
   }
 
@@ -261,6 +257,18 @@ class Run {
 
 }  // namespace
 
+void require_valid(const Probe& probe, const Freedom& freedom) {
+  if (probe.sphere >= freedom.size()) {
+    throw bad_input("probe", fmt::format("sphere {}", probe.sphere + 1),
+                    fmt::format("a sphere from 1 to {}", freedom.size()));
+  }
+  const Eigen::Vector3d free = freedom.projector(probe.sphere) * probe.direction;
+  if (std::abs(free.norm() - 1.0) > 1e-9) {
+    throw bad_input("probe", fmt::format("sphere {} is held", probe.sphere + 1),
+                    "a sphere that is free to move along the direction of the probe");
+  }
+}
+
 QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probe probe,
                          QuasiStaticOptions options)
     : bonds_(bonds),
@@ -277,15 +285,7 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedo
   if (options.step_s && !(*options.step_s > 0.0 && std::isfinite(*options.step_s))) {
     throw bad_input("step", shortest(*options.step_s) + " s", "a time above 0");
   }
-  if (probe_.sphere >= freedom_.size()) {
-    throw bad_input("probe", fmt::format("sphere {}", probe_.sphere + 1),
-                    fmt::format("a sphere from 1 to {}", freedom_.size()));
-  }
-  const Eigen::Vector3d free = freedom_.projector(probe_.sphere) * probe_.direction;
-  if (std::abs(free.norm() - 1.0) > 1e-9) {
-    throw bad_input("probe", fmt::format("sphere {} is held", probe_.sphere + 1),
-                    "a sphere that is free to move along the direction of the probe");
-  }
+  require_valid(probe_, freedom_);
 }
 
 QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s) const {

@@ -14,6 +14,10 @@ struct Probe {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector into the tissue
 };
 
+/// Throws Error(bad_input) unless the probe's sphere exists and is free to move along its
+/// direction.
+void require_valid(const Probe& probe, const Freedom& freedom);
+
 struct QuasiStaticOptions {
   /// Error of the response that steps are chosen for, in parts of its largest value; 1e-12 to 0.1.
   double tolerance = 1e-6;

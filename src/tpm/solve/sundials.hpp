@@ -8,6 +8,7 @@
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <memory>
+#include <string>
 #include <string_view>
 #include <type_traits>
 
@@ -37,9 +38,15 @@ using Matrix = std::unique_ptr<std::remove_pointer_t<SUNMatrix>, FreeMatrix>;
 using LinearSolver = std::unique_ptr<std::remove_pointer_t<SUNLinearSolver>, FreeSolver>;
 using Cvodes = std::unique_ptr<void, FreeCvodes>;
 
+/// "CV_TOO_MUCH_WORK" and the like.
+[[nodiscard]] std::string flag_name(int flag);
+
 /// Throws Error(numerical) "CVODES: CALL: FLAG" for a negative return value.
 void check(int flag, std::string_view call);
 
 [[nodiscard]] Context make_context();
+
+/// Lets an integrator print nothing: what goes wrong is thrown where its return value is checked.
+void mute(void* cvodes);
 
 }  // namespace tpm::sundials

@@ -1,0 +1,231 @@
+#include "tpm/network/inertial.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/model/model.hpp"
+#include "tpm/network/inertial_integration.hpp"
+
+namespace tpm {
+namespace {
+
+void require_valid(const InertialOptions& options) {
+  const auto require = [](bool good, std::string_view what, double got, std::string_view expected) {
+    if (!good) throw bad_input(what, shortest(got), expected);
+  };
+  require(options.tolerance >= 1e-12 && options.tolerance <= 0.1, "tolerance", options.tolerance,
+          "1e-12 to 0.1");
+  require(options.highest_order >= 1 && options.highest_order <= 5, "highest order",
+          options.highest_order, "1 to 5");
+  require(options.damping_ratio >= 0.0 && options.damping_ratio <= 10.0, "damping ratio",
+          options.damping_ratio, "0 to 10");
+  require(options.stiffness_share >= 0.0 && options.stiffness_share <= 1.0, "stiffness share",
+          options.stiffness_share, "0 to 1");
+}
+
+Inertia inertia_of(const BondSystem& bonds, const Eigen::VectorXd& mass, const LowestMode& lowest,
+                   const InertialOptions& options) {
+  const double omega = lowest.angular_frequency();
+  Inertia inertia{mass, 2.0 * options.damping_ratio * omega * (1.0 - options.stiffness_share), {}};
+  const double beta = 2.0 * options.damping_ratio * options.stiffness_share / omega;
+  if (beta > 0.0) {
+    inertia.dashpot_N_s_m = beta * (bonds.stiffness() - lowest.following * bonds.relaxing());
+  }
+  return inertia;
+}
+
+/// The knots up to the last time asked for, where the last value is held for ever.
+std::vector<Knot> finite_knots(const Protocol& protocol, std::span<const double> times_s) {
+  std::vector<Knot> knots(protocol.knots().begin(), protocol.knots().end());
+  double latest = knots.back().time_s;
+  for (const double t : times_s) {
+    if (std::isinf(t)) {
+      throw bad_input(protocol.name(), "an integrator does not reach t = infinity",
+                      "a finite time, or the quasi-static network");
+    }
+    latest = std::max(latest, t);
+  }
+  if (latest > knots.back().time_s) knots.push_back({latest, knots.back().value});
+  return knots;
+}
+
+void require_no_jump_of_depth(const Protocol& protocol) {
+  if (protocol.drive() == Drive::force) return;
+  const auto knots = protocol.knots();
+  bool jumps = knots.front().value != 0.0 && !protocol.relaxed_at_start();
+  for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+    jumps =
+        jumps || (knots[k].time_s == knots[k + 1].time_s && knots[k].value != knots[k + 1].value);
+  }
+  if (!jumps) return;
+  throw bad_input(protocol.name(),
+                  "the depth jumps, which takes an infinite force where spheres "
+                  "have mass",
+                  "a ramp");
+}
+
+/// One run: the state and how it is carried through the protocol.
+class MotionRun {
+ public:
+  MotionRun(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+            const Probe& probe, const Inertia& inertia, const InertialOptions& options,
+            double omega, const Protocol& protocol, std::span<const double> times_s)
+      : options_(options),
+        protocol_(protocol),
+        times_s_(times_s),
+        order_(rising_order(times_s)),
+        knots_(finite_knots(protocol, times_s)),
+        tissue_(bonds, rest, freedom, probe, protocol.drive()),
+        equation_(tissue_, rest, inertia) {
+    TissueState start = tissue_.at_rest(knots_.front().time_s);
+    const double response_scale = std::abs(tissue_.linear_response(start, protocol.peak()));
+    const double depth = tissue_.depth_driven() ? protocol.peak() : response_scale;
+    if (protocol.relaxed_at_start() && knots_.front().value != 0.0) {
+      preload(bonds, rest, freedom, probe, start);
+    }
+    integration_.emplace(equation_, options, equation_.pack(start.position, start.remembered),
+                         step_error(depth, omega), energy_error(response_scale));
+    result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
+    result_.of_driven_sphere.resize(result_.response.size());
+  }
+
+  InertialRun go() {
+    for (std::size_t k = 0; k + 1 < knots_.size(); ++k) {
+      if (knots_[k].time_s < knots_[k + 1].time_s) cross(knots_[k], knots_[k + 1]);
+    }
+    const double end = knots_.back().time_s;
+    while (next_ < order_.size()) put(end);
+    finish(end);
+    return std::move(result_);
+  }
+
+ private:
+  /// Where a load or a depth held for ever has brought the tissue.
+  void preload(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+               const Probe& probe, TissueState& state) const {
+    const double forever = std::numeric_limits<double>::infinity();
+    const Protocol held(protocol_.drive(), {{0.0, knots_.front().value}}, "preload", true);
+    const QuasiStaticRun run =
+        QuasiStatic(bonds, rest, freedom, probe, {std::min(options_.tolerance, 1e-6), 5})
+            .run(held, std::span(&forever, 1));
+    state.position = run.position;
+    state.remembered = run.remembered;
+  }
+
+  [[nodiscard]] Eigen::VectorXd step_error(double depth, double omega) const {
+    // A protocol that imposes nothing has no scale of its own, and nothing moves.
+    const double scale = options_.tolerance * (depth > 0.0 ? depth : 1e-3);
+    Eigen::VectorXd error = Eigen::VectorXd::Constant(equation_.size(), scale);
+    error.segment(equation_.coordinates(), equation_.coordinates()) *= omega;
+    return error;
+  }
+
+  [[nodiscard]] std::optional<double> energy_error(double response_scale) const {
+    if (!options_.energy) return std::nullopt;
+    const double work = protocol_.peak() * response_scale;
+    return options_.tolerance * (work > 0.0 ? work : 1e-6);
+  }
+
+  void cross(const Knot& from, const Knot& to) {
+    const double speed_before = equation_.imposed_speed();
+    equation_.set_piece(from, to);
+    if (!started_) begin(from.time_s);
+    blow(from.time_s, speed_before);
+    integration_->restart(from.time_s, to.time_s);
+    while (next_ < order_.size() && times_s_[order_[next_]] < to.time_s) {
+      const double time = times_s_[order_[next_]];
+      // CVODES refuses times that rounding alone separates from where it starts.
+      const bool apart = time - from.time_s > 1e-14 * std::max(std::abs(time), to.time_s);
+      if (apart) integration_->advance_to(time);
+      put(time);
+    }
+    integration_->advance_to(to.time_s);
+  }
+
+  void begin(double time_s) {
+    started_ = true;
+    stored_at_start_ = equation_.stored_J(time_s, integration_->state());
+  }
+
+  void blow(double time_s, double speed_before) {
+    const double speed = equation_.imposed_speed();
+    if (speed == speed_before) return;
+    const double mass = equation_.driven_mass_kg();
+    result_.blows.push_back({time_s, mass * (speed - speed_before)});
+    blow_work_ += 0.5 * mass * (speed * speed - speed_before * speed_before);
+  }
+
+  void put(double time_s) {
+    const auto row = static_cast<Eigen::Index>(order_[next_++]);
+    result_.response[row] = equation_.response(time_s, integration_->state());
+    result_.of_driven_sphere[row] = equation_.drag_on_driven_sphere_N();
+  }
+
+  void finish(double end) {
+    result_.work = integration_->work();
+    if (options_.energy) {
+      const Eigen::Vector3d spent = integration_->spent_J();
+      InertialEnergy energy;
+      energy.work = spent[0] + blow_work_;
+      energy.stored = equation_.stored_J(end, integration_->state()) - stored_at_start_;
+      energy.kinetic = equation_.kinetic_J(end, integration_->state());
+      energy.bond_heat = spent[1];
+      energy.damping_heat = spent[2];
+      result_.energy = energy;
+    }
+    const TissueMotion& last = equation_.unpack(end, integration_->state());
+    result_.position = last.position;
+    result_.velocity = last.velocity;
+    result_.remembered = last.remembered;
+  }
+
+  const InertialOptions& options_;
+  const Protocol& protocol_;
+  std::span<const double> times_s_;
+  std::vector<std::size_t> order_;
+  std::size_t next_ = 0;  ///< the first of order_ not answered yet
+  std::vector<Knot> knots_;
+  DrivenTissue tissue_;
+  InertialEquation equation_;
+  std::optional<InertialIntegration> integration_;
+  bool started_ = false;
+  double stored_at_start_ = 0.0;
+  double blow_work_ = 0.0;
+  InertialRun result_;
+};
+
+}  // namespace
+
+Inertial::Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Probe probe,
+                   Eigen::VectorXd mass_kg, InertialOptions options)
+    : bonds_(bonds),
+      rest_(std::move(rest)),
+      freedom_(std::move(freedom)),
+      probe_(std::move(probe)),
+      mass_kg_(std::move(mass_kg)),
+      options_(options) {
+  require_valid(options_);
+  require_valid(probe_, freedom_);
+  for (Eigen::Index i = 0; i < rest_.cols(); ++i) {
+    if (mass_kg_.size() == rest_.cols() && mass_kg_[i] > 0.0 && std::isfinite(mass_kg_[i]))
+      continue;
+    throw bad_input("mass", fmt::format("of sphere {} is not above 0", i + 1),
+                    "one mass above 0 for every sphere");
+  }
+  lowest_ = lowest_mode(bonds_, rest_, freedom_, mass_kg_);
+}
+
+InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s) const {
+  require_times_within(protocol, times_s);
+  require_no_jump_of_depth(protocol);
+  return MotionRun(bonds_, rest_, freedom_, probe_, inertia_of(bonds_, mass_kg_, lowest_, options_),
+                   options_, lowest_.angular_frequency(), protocol, times_s)
+      .go();
+}
+
+}  // namespace tpm

@@ -1,0 +1,116 @@
+#pragma once
+#include <optional>
+
+#include "tpm/network/lowest_mode.hpp"
+#include "tpm/network/quasistatic.hpp"
+
+namespace tpm {
+
+/// How the linear systems of CVODE's Newton iteration are solved.
+enum class NewtonSolver {
+  /// y and the velocities eliminated by hand; 3x3 blocks, one a sphere, are left.
+  eliminated,
+  /// The whole Jacobian, sparse, through KLU: the reference.
+  klu,
+};
+
+struct InertialOptions {
+  /// Error that a step may have, root mean square over the coordinates, in parts of the largest
+  /// depth (velocities: of that depth times the lowest angular frequency); 1e-12 to 0.1.
+  double tolerance = 1e-5;
+  /// Highest order of the BDF formulae, 1 to 5. Those above 2 are not stable on the imaginary axis,
+  /// where vibrations live: they keep the step short for as long as something rings.
+  int highest_order = 2;
+  NewtonSolver newton = NewtonSolver::eliminated;
+  /// Of the lowest mode of the network without its probe, 0 to 10; what the bonds' own dashpots add
+  /// is not in it.
+  double damping_ratio = 0.1;
+  /// Share of that ratio that comes from a dashpot along each bond, in proportion to its stiffness;
+  /// the rest is in proportion to mass and slows every velocity alike. 0 to 1.
+  double stiffness_share = 0.0;
+  bool energy = false;  ///< keep account of the energy (InertialRun::energy)
+};
+
+/// What a run took.
+struct InertialWork {
+  long steps = 0;
+  long rejected = 0;  ///< error tests failed
+  long rates = 0;     ///< evaluations of the equations of motion
+  long newton_iterations = 0;
+  long newton_failures = 0;
+  long factorisations = 0;
+};
+
+/// The account of a run, J. The probe pays for everything else.
+struct InertialEnergy {
+  double work = 0.0;          ///< of the probe
+  double stored = 0.0;        ///< in the springs, change since the start
+  double kinetic = 0.0;       ///< at the end; at the start all spheres stand still
+  double bond_heat = 0.0;     ///< of the dashpots in the Zener bonds
+  double damping_heat = 0.0;  ///< of the damping
+  [[nodiscard]] double missing() const {
+    return work - stored - kinetic - bond_heat - damping_heat;
+  }
+};
+
+/// The blow by which the probe changes the speed of the driven sphere where an imposed depth
+/// changes its rate.
+struct ProbeBlow {
+  double time_s = 0.0;
+  double impulse_N_s = 0.0;
+};
+
+struct InertialRun {
+  /// Contact force, N, or depth, m, at each asked time. The force is all that the probe exerts on
+  /// the driven sphere, blows left out.
+  Eigen::VectorXd response;
+  /// The part of the contact force that the driven sphere itself takes, N: its mass times (its
+  /// acceleration, which is 0 between kinks, + alpha its velocity). 0 under a load.
+  Eigen::VectorXd of_driven_sphere;
+  std::vector<ProbeBlow> blows;
+  InertialWork work;
+  std::optional<InertialEnergy> energy;
+  Positions position;          ///< where the run ended
+  Eigen::Matrix3Xd velocity;   ///< there, m/s
+  Eigen::VectorXd remembered;  ///< y of each bond there, m; 0 where nothing relaxes
+};
+
+/// The inertial network (MODEL.md, section 4, formulation 6): spheres with mass, joined by bonds
+/// with memory, damped:
+///
+///     dx/dt = v,   m dv/dt = f(x, y) - alpha m v - beta sum of k_w (dl/dt) along the bond,
+///     dy/dt = (l(x) - y)/tau
+///
+/// with alpha = 2 zeta omega (1 - s), beta = 2 zeta s/omega, zeta the damping ratio, s the
+/// stiffness share, omega that of lowest_mode() and k_w the bond's storage stiffness there.
+/// Integrated by CVODES (BDF, Newton), restarted at every kink of the protocol. See
+/// docs/inertial.md.
+class Inertial {
+ public:
+  /// @param freedom of the network without the probe: what is held and guided
+  /// @param mass_kg one per sphere, > 0
+  /// @param bonds must live as long as this
+  /// Throws Error(bad_input) for options out of range, masses that are not positive, a probe that
+  /// cannot move, and a network with zero-energy modes.
+  Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Probe probe,
+           Eigen::VectorXd mass_kg, InertialOptions options = {});
+
+  /// @param times_s any order, finite, within the protocol; at a jump the value just after it
+  /// Throws Error(bad_input) for times outside it and for a jump of depth, which would need an
+  /// infinite force; Error(numerical) where CVODES gives up, with the time.
+  [[nodiscard]] InertialRun run(const Protocol& protocol, std::span<const double> times_s) const;
+
+  /// The mode that the damping ratio is one of.
+  [[nodiscard]] const LowestMode& lowest() const { return lowest_; }
+
+ private:
+  const BondSystem& bonds_;
+  Positions rest_;
+  Freedom freedom_;
+  Probe probe_;
+  Eigen::VectorXd mass_kg_;
+  InertialOptions options_;
+  LowestMode lowest_;
+};
+
+}  // namespace tpm

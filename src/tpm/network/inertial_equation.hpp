@@ -1,0 +1,104 @@
+#pragma once
+// The inside of Inertial: the equations of motion, their Jacobian, and Newton's matrix.
+#include <Eigen/SparseCore>
+#include <cstdint>
+
+#include "tpm/network/stage_balance.hpp"
+
+namespace tpm {
+
+/// Mass and damping of a network.
+struct Inertia {
+  Eigen::VectorXd mass_kg;        ///< of each sphere
+  double drag_per_s = 0.0;        ///< alpha
+  Eigen::VectorXd dashpot_N_s_m;  ///< along each bond; empty if there are none
+};
+
+/// A network in motion, for calculation: everything of one instant, unpacked from a state vector.
+struct TissueMotion {
+  Positions position;
+  Eigen::Matrix3Xd velocity;
+  Eigen::VectorXd remembered;
+};
+
+/// The equations of motion of a driven network as a system of first order. The state vector holds
+/// the displacements from rest along free directions (3 a sphere), their velocities (3 a sphere)
+/// and y of each bond that relaxes; what is not free or imposed stays 0 in it.
+class InertialEquation {
+ public:
+  using Vector = Eigen::VectorXd;
+  using ConstVector = Eigen::Ref<const Eigen::VectorXd>;
+  using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int64_t>;
+
+  /// @param tissue must live as long as this
+  InertialEquation(const DrivenTissue& tissue, const Positions& rest, Inertia inertia);
+
+  [[nodiscard]] Eigen::Index size() const;
+  [[nodiscard]] Eigen::Index coordinates() const { return 3 * rest_.cols(); }
+  [[nodiscard]] const DrivenTissue& tissue() const { return tissue_; }
+  [[nodiscard]] const Inertia& inertia() const { return inertia_; }
+  [[nodiscard]] double driven_mass_kg() const;
+
+  /// The piece of the protocol that holds from now on, linear in time.
+  void set_piece(const Knot& from, const Knot& to);
+  /// Rate of an imposed depth, m/s; 0 under a load.
+  [[nodiscard]] double imposed_speed() const;
+
+  [[nodiscard]] Vector pack(const Positions& position, const Vector& remembered) const;
+  [[nodiscard]] const TissueMotion& unpack(double time_s, const ConstVector& state);
+
+  void rate(double time_s, const ConstVector& state, Eigen::Ref<Vector> rate);
+
+  /// d rate / d state, every entry that may differ from 0 and the whole diagonal stored.
+  [[nodiscard]] Sparse jacobian(double time_s, const ConstVector& state);
+
+  /// Contact force, N, or depth, m.
+  [[nodiscard]] double response(double time_s, const ConstVector& state);
+  /// The part of it that drags the driven sphere itself, N.
+  [[nodiscard]] double drag_on_driven_sphere_N() const;
+
+  /// Work of the probe, heat of the bonds, heat of the damping, W.
+  [[nodiscard]] Eigen::Vector3d powers_W(double time_s, const ConstVector& state);
+  [[nodiscard]] double kinetic_J(double time_s, const ConstVector& state);
+  [[nodiscard]] double stored_J(double time_s, const ConstVector& state);
+
+  /// Factorises 1 - gamma times the Jacobian with the velocities and y eliminated: on the free
+  /// coordinates M (1 + gamma alpha) + gamma C + gamma^2 K, where K follows with a share
+  /// (gamma/tau)/(1 + gamma/tau) of y. The turning of the bonds' dashpots is left out of it (it is
+  /// not symmetric, and small like the velocities). False if it cannot be factorised.
+  [[nodiscard]] bool factorise(double time_s, const ConstVector& state, double gamma);
+  /// Replaces a right-hand side by the solution, with the last factorisation.
+  void solve(Eigen::Ref<Vector> x);
+
+ private:
+  [[nodiscard]] double imposed(double time_s) const;
+  /// All forces on the spheres but the drag, load included.
+  void forces(double time_s, Eigen::Matrix3Xd& force) const;
+  void add_dashpot_forces(const Positions& position, const Eigen::Matrix3Xd& velocity,
+                          Eigen::Matrix3Xd& force) const;
+  /// Unit vector along a bond, and its length.
+  [[nodiscard]] Eigen::Vector3d along(std::size_t bond, double& length) const;
+  void add_bond_entries(std::vector<Eigen::Triplet<double, std::int64_t>>& entries,
+                        std::size_t bond, const BlockMatrix<double>& stiffness) const;
+
+  const DrivenTissue& tissue_;
+  Positions rest_;
+  Inertia inertia_;
+  std::vector<Eigen::Index> memory_of_;  ///< of each bond: its y in the state, or -1
+  std::vector<std::size_t> relaxing_;    ///< bond of each y
+  Knot from_{0.0, 0.0};
+  double slope_ = 0.0;
+
+  TissueMotion motion_;
+  Eigen::Matrix3Xd force_;
+  Vector elongation_;
+  BondMemory memory_;
+
+  // Newton's matrix.
+  BlockMatrix<double> matrix_;
+  BlockLdlt<double> factor_;
+  double gamma_ = 0.0;
+  Positions factorised_at_;
+};
+
+}  // namespace tpm

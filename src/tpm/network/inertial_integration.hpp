@@ -1,0 +1,45 @@
+#pragma once
+// The inside of Inertial: CVODES on the equations of motion.
+#include "tpm/network/inertial.hpp"
+#include "tpm/network/inertial_equation.hpp"
+#include "tpm/solve/sundials.hpp"
+
+namespace tpm {
+
+/// One integration by CVODES (BDF, Newton), restarted wherever the equations change.
+class InertialIntegration {
+ public:
+  /// @param equation must live as long as this
+  /// @param error that a step may make in each entry of the state
+  /// @param energy_error that a step may make in work and heat, J; none if they are not asked for
+  InertialIntegration(InertialEquation& equation, const InertialOptions& options,
+                      const Eigen::VectorXd& start, const Eigen::VectorXd& error,
+                      std::optional<double> energy_error);
+
+  /// Begins a piece that ends at `stop_s`, from the state reached.
+  void restart(double time_s, double stop_s);
+  /// Throws Error(numerical) with the time where CVODES gives up.
+  void advance_to(double time_s);
+
+  [[nodiscard]] Eigen::Map<const Eigen::VectorXd> state() const;
+  /// Work of the probe, heat of the bonds, heat of the damping since the start, J.
+  [[nodiscard]] Eigen::Vector3d spent_J() const;
+  /// Of all pieces so far.
+  [[nodiscard]] InertialWork work() const;
+
+ private:
+  void use_klu();
+  void use_elimination();
+  [[nodiscard]] InertialWork work_of_piece() const;
+
+  InertialEquation& equation_;
+  sundials::Context context_;
+  sundials::Vector state_, error_, energy_;
+  sundials::Matrix matrix_;
+  sundials::LinearSolver solver_;
+  sundials::Cvodes memory_;
+  bool started_ = false;
+  InertialWork before_;  ///< of the pieces that are over
+};
+
+}  // namespace tpm

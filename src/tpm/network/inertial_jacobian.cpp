@@ -1,0 +1,90 @@
+// The sparse Jacobian of the equations of motion.
+#include "tpm/network/inertial_equation.hpp"
+
+namespace tpm {
+namespace {
+
+using Triplets = std::vector<Eigen::Triplet<double, std::int64_t>>;
+
+void add_block(Triplets& entries, Eigen::Index row, Eigen::Index column,
+               const Eigen::Matrix3d& block) {
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j) entries.emplace_back(row + i, column + j, block(i, j));
+  }
+}
+
+}  // namespace
+
+void InertialEquation::add_bond_entries(Triplets& entries, std::size_t bond,
+                                        const BlockMatrix<double>& stiffness) const {
+  const BondSystem& bonds = tissue_.bonds();
+  const auto row = static_cast<Eigen::Index>(bond);
+  const std::uint32_t a = bonds.end_a()[bond];
+  const std::uint32_t b = bonds.end_b()[bond];
+  double length = 0.0;
+  const Eigen::Vector3d n = along(bond, length);
+  Eigen::Matrix3d across = stiffness.below[bonds.place(bond).index];  // d f / d x of the other end
+  across *= -1.0;
+  const bool damped = inertia_.dashpot_N_s_m.size() > 0;
+  Eigen::Matrix3d damping = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();
+  if (damped) {
+    const double c = inertia_.dashpot_N_s_m[row];
+    const Eigen::Vector3d apart = motion_.velocity.col(b) - motion_.velocity.col(a);
+    const double lengthening = n.dot(apart);
+    damping = c * n * n.transpose();
+    turning = c / length *
+              (n * (apart - lengthening * n).transpose() +
+               lengthening * (Eigen::Matrix3d::Identity() - n * n.transpose()));
+  }
+  const auto end = [&](std::uint32_t here, std::uint32_t there, double sign) {
+    const Eigen::Matrix3d p = tissue_.freedom().projector(here) / inertia_.mass_kg[here];
+    const Eigen::Index u = 3 * Eigen::Index{here};
+    const Eigen::Index u_there = 3 * Eigen::Index{there};
+    const Eigen::Index v = coordinates() + u;
+    add_block(entries, v, u_there, p * (across + turning));
+    if (damped) {
+      add_block(entries, v, u, -(p * turning));
+      add_block(entries, v, coordinates() + u_there, p * damping);
+      add_block(entries, v, v, -(p * damping));
+    }
+    const Eigen::Index y = memory_of_[bond];
+    if (y < 0) return;
+    const Eigen::Vector3d pull = sign * bonds.relaxing()[row] * (p * n);
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      entries.emplace_back(v + i, y, -pull[i]);
+      entries.emplace_back(y, u + i, -sign * n[i] / bonds.relaxation_time_s());
+    }
+  };
+  end(a, b, 1.0);
+  end(b, a, -1.0);
+}
+
+InertialEquation::Sparse InertialEquation::jacobian(double time_s, const ConstVector& state) {
+  const BondSystem& bonds = tissue_.bonds();
+  const TissueMotion& now = unpack(time_s, state);
+  BlockMatrix<double> stiffness(bonds.pattern());
+  bonds.add_stiffness(now.position, {now.remembered, 0.0}, stiffness);
+  Triplets entries;
+  for (Eigen::Index i = 0; i < coordinates(); ++i) {
+    entries.emplace_back(i, i, 0.0);
+    entries.emplace_back(i, coordinates() + i, 1.0);
+  }
+  for (Eigen::Index i = 0; i < rest_.cols(); ++i) {
+    const auto sphere = static_cast<std::size_t>(i);
+    const Eigen::Matrix3d& p = tissue_.freedom().projector(sphere);
+    const Eigen::Index v = coordinates() + 3 * i;
+    add_block(entries, v, 3 * i, p / -inertia_.mass_kg[i] * stiffness.diagonal[sphere]);
+    add_block(entries, v, v, -inertia_.drag_per_s * p);
+  }
+  for (std::size_t bond = 0; bond < bonds.size(); ++bond) {
+    add_bond_entries(entries, bond, stiffness);
+    const Eigen::Index y = memory_of_[bond];
+    if (y >= 0) entries.emplace_back(y, y, -1.0 / bonds.relaxation_time_s());
+  }
+  Sparse matrix(size(), size());
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
+}  // namespace tpm

@@ -1,0 +1,117 @@
+#include "tpm/network/lowest_mode.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/network/rigidity.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::size_t kVectors = 6;  // iterated at once: the lowest converges by its gap to the 7th
+constexpr int kMostIterations = 500;
+constexpr double kConverged = 1e-13;  // relative change of omega^2
+
+/// Subspace iteration for the lowest eigenvalues of K against M.
+class InverseIteration {
+ public:
+  InverseIteration(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+                   const Eigen::VectorXd& mass)
+      : bonds_(bonds), rest_(rest), freedom_(freedom), factor_(bonds.pattern()) {
+    mass_ = mass.transpose().replicate(3, 1).reshaped();
+    basis_.resize(mass_.size(), static_cast<Eigen::Index>(std::min(kVectors, freedom.count())));
+    Random random(1);
+    for (double& x : basis_.reshaped()) x = random.normal();
+    for (Eigen::Index j = 0; j < basis_.cols(); ++j) freedom_.project(column(j));
+  }
+
+  /// The lowest omega^2 where a share of the relaxing stiffness has relaxed.
+  double lowest(double following) {
+    const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())),
+                            following};
+    BlockMatrix<double> matrix(bonds_.pattern());
+    bonds_.add_stiffness(rest_, memory, matrix);
+    freedom_.constrain(bonds_, matrix);
+    if (!factor_.factorise(matrix) || factor_.negative_count() > 0) {
+      throw Error(ExitCode::numerical, "lowest mode", "the stiffness at rest is not positive");
+    }
+    double last = 0.0;
+    for (int i = 0; i < kMostIterations; ++i) {
+      const double value = iterate();
+      if (std::abs(value - last) <= kConverged * value) return value;
+      last = value;
+    }
+    throw Error(ExitCode::numerical, "lowest mode", "inverse iteration does not converge");
+  }
+
+  [[nodiscard]] Eigen::Matrix3Xd shape() const {
+    return basis_.col(0).reshaped(3, basis_.rows() / 3);
+  }
+
+ private:
+  Eigen::Map<Eigen::Matrix3Xd> column(Eigen::Index j) {
+    return {basis_.col(j).data(), 3, basis_.rows() / 3};
+  }
+
+  /// One inverse iteration and Rayleigh-Ritz in what it spans.
+  double iterate() {
+    const Eigen::MatrixXd pushed = mass_.asDiagonal() * basis_;
+    basis_ = pushed;
+    for (Eigen::Index j = 0; j < basis_.cols(); ++j) {
+      factor_.solve(column(j));
+      freedom_.project(column(j));
+    }
+    // basis = K^-1 pushed, so that basis' K basis = basis' pushed.
+    const Eigen::MatrixXd stiffness = basis_.transpose() * pushed;
+    const Eigen::MatrixXd mass = basis_.transpose() * mass_.asDiagonal() * basis_;
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(
+        0.5 * (stiffness + stiffness.transpose()), mass);
+    basis_ = (basis_ * ritz.eigenvectors()).eval();
+    return ritz.eigenvalues()[0];
+  }
+
+  const BondSystem& bonds_;
+  const Positions& rest_;
+  const Freedom& freedom_;
+  BlockLdlt<double> factor_;
+  Eigen::VectorXd mass_;   ///< of each coordinate
+  Eigen::MatrixXd basis_;  ///< one column a vector, M-orthonormal
+};
+
+}  // namespace
+
+double LowestMode::angular_frequency() const {
+  return 2.0 * std::numbers::pi * frequency_Hz;
+}
+
+Eigen::VectorXd sphere_masses_kg(const Organ& organ, double density_kg_per_m3) {
+  const double volume = 4.0 / 3.0 * std::numbers::pi * std::pow(organ.radius, 3);
+  return Eigen::VectorXd::Constant(organ.position.cols(), density_kg_per_m3 * volume);
+}
+
+LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+                       const Eigen::VectorXd& mass_kg) {
+  require_rigid(bonds, rest, freedom, "lowest mode");
+  if (freedom.count() == 0) throw bad_input("lowest mode", "nothing is free", "a free coordinate");
+  InverseIteration iteration(bonds, rest, freedom, mass_kg);
+  LowestMode mode;
+  // From the unrelaxed network downwards: omega falls steadily to its own fixed point.
+  double square = iteration.lowest(0.0);
+  for (int i = 0; i < kMostIterations; ++i) {
+    const double tau = bonds.relaxation_time_s();
+    mode.following = 1.0 / (1.0 + square * tau * tau);
+    const double last = square;
+    square = iteration.lowest(mode.following);
+    if (std::abs(square - last) > 10.0 * kConverged * square) continue;
+    mode.frequency_Hz = std::sqrt(square) / (2.0 * std::numbers::pi);
+    mode.shape = iteration.shape();
+    return mode;
+  }
+  throw Error(ExitCode::numerical, "lowest mode", "its frequency does not settle");
+}
+
+}  // namespace tpm

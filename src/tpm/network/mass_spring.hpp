@@ -1,0 +1,33 @@
+#pragma once
+#include "tpm/network/bond_system.hpp"
+#include "tpm/network/quasistatic.hpp"
+
+namespace tpm {
+
+/// Which springs the mass-spring model has.
+enum class SpringRule {
+  like_the_bonds,  ///< in proportion to the bonds' factors
+  equal,           ///< one stiffness for all: the textbook's model
+};
+
+/// Force per depth at the probe for small depths, N/m, after everything has relaxed (following = 1)
+/// or before anything has (0).
+/// Throws Error(bad_input) for a probe that cannot move or a network with zero-energy modes.
+[[nodiscard]] double contact_stiffness_N_per_m(const BondSystem& bonds, const Positions& rest,
+                                               const Freedom& freedom, const Probe& probe,
+                                               double following);
+
+/// The mass-spring model on the spheres of a network: every bond becomes one elastic spring along
+/// itself (in this library's terms a lateral bond), so that nothing relaxes. The masses are the
+/// spheres', the dampers those of InertialOptions with stiffness_share = 1: one beside each spring.
+[[nodiscard]] Network msm_network(const Network& network, SpringRule rule);
+
+/// The material with which the springs of an msm_network, held and pushed alike, meet a small depth
+/// with the given stiffness: the one given, E' set to do so.
+/// @param stiffness_N_per_m > 0, as contact_stiffness_N_per_m gives it for the tissue
+/// Throws Error(bad_input) as contact_stiffness_N_per_m does, and for a stiffness that is not > 0.
+[[nodiscard]] TpmParameters msm_material(const Network& msm, TpmParameters material,
+                                         const Freedom& freedom, const Probe& probe,
+                                         double stiffness_N_per_m);
+
+}  // namespace tpm

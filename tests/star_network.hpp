@@ -1,0 +1,54 @@
+#pragma once
+// The four-sphere star of MODEL.md, section 4, as a network.
+#include "tpm/network/network.hpp"
+#include "tpm/network/quasistatic.hpp"
+
+namespace tpm_test {
+
+/// B between A and C at the spacing, its partner D below; only B may move.
+inline tpm::Organ star_organ(double spacing) {
+  tpm::Organ organ;
+  organ.name = "star";
+  organ.position.resize(3, 4);
+  organ.position << 0, -spacing, spacing, 0,  //
+      0, 0, 0, 0,                             //
+      0, 0, 0, 0.02;
+  organ.normal = Eigen::Vector3d(0, 0, -1).replicate(1, 4);
+  organ.layer = {0, 0, 0, 1};
+  organ.radius = 0.01;
+  organ.spacing = spacing;
+  organ.contact = 0;
+  return organ;
+}
+
+struct Star {
+  explicit Star(const tpm::TpmParameters& p)
+      : network(tpm::join(star_organ(p.spacing_m), pairs(), {}, "star")),
+        bonds(network, p),
+        freedom(4) {
+    freedom.guide(0, Eigen::Vector3d::UnitZ());
+    for (const std::size_t i : {1, 2, 3}) freedom.hold(i);
+  }
+  static const std::vector<tpm::NeighbourPair>& pairs() {
+    static const std::vector<tpm::NeighbourPair> list{{0, 1}, {0, 2}, {0, 3}};
+    return list;
+  }
+  [[nodiscard]] tpm::QuasiStaticRun run(const tpm::Protocol& protocol,
+                                        std::span<const double> times,
+                                        tpm::QuasiStaticOptions options) const {
+    return tpm::QuasiStatic(bonds, network.organ.position, freedom, probe(), options)
+        .run(protocol, times);
+  }
+  [[nodiscard]] static tpm::Probe probe() { return {0, Eigen::Vector3d::UnitZ()}; }
+  tpm::Network network;
+  tpm::BondSystem bonds;
+  tpm::Freedom freedom;
+};
+
+inline std::vector<double> even_times(double end, int n) {
+  std::vector<double> times;
+  for (int i = 0; i <= n; ++i) times.push_back(end * i / n);
+  return times;
+}
+
+}  // namespace tpm_test
