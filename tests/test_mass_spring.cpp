@@ -40,7 +40,7 @@ struct Plate {
   [[nodiscard]] Eigen::Matrix3Xd displacement(const Network& of, const TpmParameters& p,
                                               double load) const {
     const BondSystem bonds(of, p);
-    const QuasiStaticRun run = QuasiStatic(bonds, of.organ.position, freedom, probe(), {1e-6, 5})
+    const QuasiStaticRun run = QuasiStatic(bonds, of.organ.position, freedom, probe(), {1e-6})
                                    .run(creep(load, kForever), std::span(&kForever, 1));
     return run.position - of.organ.position;
   }

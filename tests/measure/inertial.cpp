@@ -49,7 +49,7 @@ Reference quasi_static(const Scene& scene) {
   for (int i = 1; i <= 29; ++i) reference.times.push_back(2.0 + i);
   const auto force = [&](double tolerance) {
     return QuasiStatic(scene.bonds, scene.network.organ.position, scene.freedom, scene.probe,
-                       {tolerance, 5})
+                       {tolerance})
         .run(reference.protocol, reference.times)
         .response;
   };
