@@ -17,4 +17,9 @@ enum class Drawings { svg, svg_and_png };
 void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
                   const std::filesystem::path& folder, Drawings drawings = Drawings::svg);
 
+/// Draws a network_picture() as STEM.svg and STEM.png with scripts/draw_network.py. Throws as
+/// draw_figures does.
+void draw_network(const std::string& python, const std::filesystem::path& picture_json,
+                  const std::filesystem::path& stem);
+
 }  // namespace tpm
