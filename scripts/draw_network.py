@@ -3,8 +3,9 @@
 
     draw_network.py PICTURE.json STEM
 
-Two views: from the front, where the probe comes from (along +z), and from the side. What lies nearer to
-the viewer is drawn later. The same input gives the same bytes.
+Two views, as an eye sees them: from the front (looking along +z) and from the side of large x (looking
+along -x), so that x and z grow to the left. Of a liver that is the patient's front and right. What lies
+nearer is drawn later and stronger. The same input gives the same bytes.
 """
 
 import argparse
@@ -24,12 +25,16 @@ from matplotlib.lines import Line2D  # noqa: E402
 
 LAYER_COLOURS = ["#B4564A", "#E6A15C", "#7C6BB0", "#4F9D8C"]
 ANCHOR, CONTACT = "#1F3D7A", "#D9007E"
+ARROW = 7.0  # length of the probe, in radii
 MOST_BONDS = 40_000  # more are a blot
-# Name, axes across and up, axis towards the viewer and its sign, words of the axes.
+# Axes across and up, axis towards the viewer and its sign; name and axis of a liver, and of anything else.
 VIEWS = [
-    ("From the front, as the probe sees it", 0, 1, 2, -1, "to the patient's right, x", "up, y"),
-    ("From the side (the probe comes from the left)", 2, 1, 0, 1, "front to back, z", "up, y"),
+    (0, 1, 2, -1, "From the front", "to the patient's right, x", "Seen along +z", "x"),
+    (2, 1, 0, 1, "From the patient's right", "front to back, z", "Seen along -x", "z"),
 ]
+# Inches.
+WIDTH, LEFT, RIGHT, ABOVE, BELOW, MOST_HIGH = 11.0, 0.7, 0.15, 0.75, 1.15, 7.0
+SLABS = 16  # of the depth, drawn one after the other
 STYLE = {"svg.fonttype": "path", "svg.hashsalt": "tpmkit", "font.family": "DejaVu Sans", "font.size": 8.5,
          "axes.titlesize": 9.5, "axes.spines.top": False, "axes.spines.right": False}
 
@@ -40,52 +45,53 @@ def shaded(colours, depth):
     return colours * (1.0 - fade) + fade
 
 
-def draw_bonds(axes, at, bonds, depth, visible):
-    if len(bonds) > MOST_BONDS:
-        return
+def slab_of(depth):
+    return np.minimum((SLABS * depth).astype(int), SLABS - 1)
+
+
+def draw_bonds(axes, at, bonds, depth, slab):
     near = 0.5 * (depth[bonds[:, 0]] + depth[bonds[:, 1]])
-    for kind, colour in ((0, "#777777"), (1, "#333333")):
-        chosen = bonds[:, 2] == kind
-        ends = at[bonds[chosen][:, :2]]
-        rgba = np.tile([*to_rgb(colour), 1.0], (len(ends), 1))
-        rgba[:, 3] = 0.06 + 0.34 * near[chosen] ** 2
-        axes.add_collection(LineCollection(ends, colors=rgba, linewidths=0.35, zorder=1.5 if visible else 1))
+    ends = at[bonds[slab_of(near) == slab][:, :2]]
+    strength = 0.85 - 0.65 * (slab + 0.5) / SLABS  # grey, darker where nearer
+    axes.add_collection(LineCollection(ends, colors=str(round(strength, 3)), linewidths=0.6, zorder=2 + slab))
 
 
-def draw_spheres(axes, at, depth, picture, face, anchored):
+def draw_spheres(axes, at, depth, picture, face, anchored, slab):
     """Circles from far to near; anchored ones with a dark rim."""
-    radius = 1e3 * picture["radius_m"] * 0.78  # a little smaller than they are, so that bonds show
+    radius = 1e3 * picture["radius_m"] * 0.5  # smaller than they are, so that bonds show
     order = np.argsort(depth, kind="stable")
+    order = order[slab_of(depth[order]) == slab]
     size = np.full(len(order), 2 * radius)
-    rim = np.where(anchored[order][:, None], to_rgb(ANCHOR), 0.55 * face[order])
+    rim = np.where(anchored[order][:, None], to_rgb(ANCHOR), 0.45 * face[order])
     axes.add_collection(EllipseCollection(
         size, size, np.zeros(len(order)), units="xy", offsets=at[order], transOffset=axes.transData,
-        facecolors=shaded(face, depth)[order], edgecolors=rim, linewidths=np.where(anchored[order], 1.6, 0.3), zorder=2))
+        facecolors=shaded(face, depth)[order], edgecolors=rim, linewidths=np.where(anchored[order], 1.5, 0.4),
+        zorder=2.5 + slab))
 
 
-def draw_contact(axes, at, picture, position, view):
+def draw_contact(axes, at, picture, view):
     contact = picture["contact"]
     if contact is None:
         return
-    _, across, up, towards, _, _, _ = view
+    across, up = view[:2]
     normal = np.array(picture["normal"][contact])
-    here = at[contact]
-    axes.plot(*here, "o", ms=6.5, mfc=CONTACT, mec="white", mew=0.8, zorder=6)
+    here, size = at[contact], 1e3 * picture["radius_m"]
+    axes.plot(*here, "o", ms=6.5, mfc=CONTACT, mec="white", mew=0.8, zorder=90)
     flat = np.array([normal[across], normal[up]])
     if np.linalg.norm(flat) < 0.5:  # the probe points into the page
-        axes.plot(*here, "o", ms=15, mfc="none", mec=CONTACT, mew=1.4, zorder=6)
-        text_at = here + np.array([0.0, 16.0e3 * picture["radius_m"] / 10])
+        axes.plot(*here, "o", ms=15, mfc="none", mec=CONTACT, mew=1.6, zorder=90)
+        text_at = here + np.array([0.0, 1.2 * size])
     else:
-        start = here + 45e3 * picture["radius_m"] / 10 * flat
-        axes.annotate("", here + 4e2 * picture["radius_m"] * flat, start,
-                      arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 1.8}, zorder=6)
-        text_at = start + np.array([0.0, 5e3 * picture["radius_m"] / 10])
-    axes.annotate(f"probe: sphere {contact + 1}", text_at, ha="center", va="bottom", color=CONTACT, fontweight="bold",
-                  fontsize=8.5, zorder=7, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1})
+        start = here + ARROW * size * flat
+        axes.annotate("", here + 0.6 * size * flat, start, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 2.0},
+                      zorder=90)
+        text_at = here + 0.6 * ARROW * size * flat + np.array([0.0, 0.5 * size])
+    axes.annotate(f"probe on sphere {contact + 1}", text_at, ha="center", va="bottom", color=CONTACT, fontweight="bold",
+                  zorder=91, bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 1.5})
 
 
 def draw_view(axes, picture, position, view):
-    name, across, up, towards, sign, across_words, up_words = view
+    across, up, towards, sign, name, across_words, plain_name, plain_words = view
     at = position[:, [across, up]]
     toward = sign * position[:, towards]
     span = np.ptp(toward)
@@ -95,24 +101,36 @@ def draw_view(axes, picture, position, view):
     anchored = np.zeros(len(at), bool)
     anchored[picture["anchors"]] = True
     face[anchored] = 0.55 * face[anchored] + 0.45 * np.array(to_rgb(ANCHOR))
-    draw_spheres(axes, at, depth, picture, face, anchored)
-    draw_bonds(axes, at, np.array(picture["bonds"], int).reshape(-1, 3), depth, True)
-    draw_contact(axes, at, picture, position, view)
-    margin = 1.6e3 * picture["radius_m"]
+    bonds = np.array(picture["bonds"], int).reshape(-1, 3)
+    for slab in range(SLABS):
+        if len(bonds) <= MOST_BONDS:
+            draw_bonds(axes, at, bonds, depth, slab)
+        draw_spheres(axes, at, depth, picture, face, anchored, slab)
+    draw_contact(axes, at, picture, view)
+    margin = 1e3 * picture["radius_m"]
     low, high = at.min(axis=0) - margin, at.max(axis=0) + margin
-    if towards != 2 and picture["contact"] is not None:  # room for the arrow
-        low[0] -= 45e3 * picture["radius_m"] / 10
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1] + margin)
+    if picture["contact"] is not None:  # room for the arrow and its words
+        tip = at[picture["contact"]] + ARROW * margin * np.array(picture["normal"][picture["contact"]])[[across, up]]
+        low, high = np.minimum(low, tip - margin), np.maximum(high, tip + margin)
+    axes.set_xlim(high[0], low[0])  # grows to the left
+    axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
-    axes.set_title(name, loc="left")
-    axes.set_xlabel(f"{across_words} (mm)")
-    axes.set_ylabel(f"{up_words} (mm)")
+    liver = picture["liver"]
+    axes.set_title(name if liver else plain_name, loc="left")
+    axes.set_xlabel(f"{across_words if liver else plain_words} (mm)")
+    axes.set_ylabel(f"{'up, y' if liver else 'y'} (mm)")
+    return high - low
 
 
-def legend(page, picture):
+def layer_name(k, count):
+    if k == 0:
+        return "outer layer"
+    return "inner layer" if count == 2 else f"layer {k + 1}"
+
+
+def legend(page, picture, bottom):
     handles = [Line2D([], [], ls="", marker="o", ms=8, mfc=LAYER_COLOURS[k % len(LAYER_COLOURS)], mec="#553333",
-                      label="outer layer" if k == 0 else f"layer {k + 1}") for k in range(min(picture["layer_count"], 4))]
+                      label=layer_name(k, picture["layer_count"])) for k in range(min(picture["layer_count"], 4))]
     if picture["layer_count"] > 4:
         handles[-1].set_label("and deeper, the colours repeating")
     if picture["anchors"]:
@@ -121,21 +139,25 @@ def legend(page, picture):
     if picture["contact"] is not None:
         handles.append(Line2D([], [], ls="", marker="o", ms=6, mfc=CONTACT, mec="white", label="contact sphere"))
     if len(picture["bonds"]) <= MOST_BONDS:
-        handles.append(Line2D([], [], color="#555555", lw=0.8, label=f"bonds ({len(picture['bonds'])})"))
-    page.legend(handles=handles, loc="lower center", ncol=len(handles), frameon=False, bbox_to_anchor=(0.5, 0.045))
+        handles.append(Line2D([], [], color="#555555", lw=1.0, label=f"bonds ({len(picture['bonds'])})"))
+    page.legend(handles=handles, loc="lower center", ncol=len(handles), frameon=False, bbox_to_anchor=(0.5, bottom))
 
 
 def draw(picture):
     position = 1e3 * np.array(picture["position_m"])
-    extent = np.ptp(position, axis=0) + 3.2e3 * picture["radius_m"]
-    room = 0.0 if picture["contact"] is None else 45e3 * picture["radius_m"] / 10
-    page, axes = plt.subplots(1, 2, figsize=(11, 6.4), gridspec_kw={"width_ratios": [extent[0], extent[2] + room]})
-    for one, view in zip(axes, VIEWS):
-        draw_view(one, picture, position, view)
-    page.suptitle(picture["title"], x=0.06, ha="left", fontsize=11, fontweight="bold")
-    legend(page, picture)
-    page.text(0.06, 0.015, picture["provenance"], fontsize=7, color="#555555")
-    page.subplots_adjust(left=0.06, right=0.985, top=0.90, bottom=0.17, wspace=0.16)
+    page, axes = plt.subplots(1, 2)
+    extents = [draw_view(one, picture, position, view) for one, view in zip(axes, VIEWS)]
+    # One scale for both views, mm to inches: what the width leaves, unless that gets too high.
+    scale = min((WIDTH - 2 * LEFT - RIGHT) / sum(e[0] for e in extents), MOST_HIGH / max(e[1] for e in extents))
+    height = scale * max(e[1] for e in extents) + BELOW + ABOVE
+    page.set_size_inches(WIDTH, height)
+    left = LEFT
+    for one, extent in zip(axes, extents):
+        one.set_position([left / WIDTH, BELOW / height, scale * extent[0] / WIDTH, scale * extent[1] / height])
+        left += scale * extent[0] + LEFT
+    page.text(LEFT / WIDTH, 1 - 0.3 / height, picture["title"], fontsize=11, fontweight="bold")
+    legend(page, picture, 0.27 / height)
+    page.text(LEFT / WIDTH, 0.1 / height, picture["provenance"], fontsize=7, color="#555555")
     return page
 
 

@@ -1,11 +1,14 @@
 // tpm network: build, check and show the network of spheres that a scene describes.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/network/local_support.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/network_report.hpp"
 #include "tpm/scene/network_file.hpp"
@@ -76,14 +79,21 @@ int check(const NetworkChoice& choice, const Session& session) {
     fault = error.what();
   }
   const NetworkInspection inspection = inspect(tissue);
+  const std::vector<double> support =
+      local_support(tissue.bonds(), tissue.network.organ, tissue.freedom());
+  const auto least = std::min_element(support.begin(), support.end());
   if (session.json()) {
     Json json = network_json(tissue, inspection);
+    json["least_support"] = rounded(*least, 6);
+    json["least_supported_sphere"] = least - support.begin() + 1;
     json["stands"] = fault.empty();
     json["fault"] = fault.empty() ? Json(nullptr) : Json(fault);
     json["modes_counted"] = tissue.network.organ.size() <= kMostSpheresForModes;
     fmt::print("{}", to_text(json));
   } else {
-    fmt::print("{}", network_text(tissue, inspection));
+    fmt::print("{}least support: {} at sphere {} (loose below {})\n",
+               network_text(tissue, inspection), significant(*least, 3),
+               least - support.begin() + 1, shortest(kLooseSupport));
     if (fault.empty()) {
       fmt::print("stands: no sphere is loose{}\n",
                  tissue.network.organ.size() <= kMostSpheresForModes

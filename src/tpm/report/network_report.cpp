@@ -111,6 +111,7 @@ Json network_picture(const Tissue& tissue) {
       {"provenance", fmt::format("computed by tpm {}; {} spheres, {} bonds; places of spheres "
                                  "and anchors are assumed where the paper prints none",
                                  version(), organ.size(), tissue.network.bonds.size())},
+      {"liver", tissue.liver},
       {"radius_m", organ.radius},
       {"layer_count", organ.layer_count()}};
   json["contact"] = organ.contact ? Json(*organ.contact) : Json(nullptr);

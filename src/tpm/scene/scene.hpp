@@ -20,6 +20,7 @@ struct Guide {
 /// What a scene says about the tissue: spheres, bonds, material, and what is held.
 struct Tissue {
   std::string title;
+  bool liver = false;  ///< x is to the patient's right, y up, z to the back
   Network network;
   TpmParameters material;
   LateralBond lateral = LateralBond::elastic;
