@@ -22,6 +22,7 @@ std::vector<Spread> by_layer(const Organ& organ, const std::vector<BondSums>& su
     values[static_cast<std::size_t>(organ.layer[i])].push_back(quantity(sums[i]));
   }
   std::vector<Spread> spreads;
+  spreads.reserve(values.size());
   for (const std::vector<double>& layer : values) spreads.push_back(spread_of(layer));
   return spreads;
 }

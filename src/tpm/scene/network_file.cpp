@@ -110,7 +110,7 @@ std::string xdmf(const Network& network, const std::string& raw_file) {
   text += fmt::format(
       "      <Topology TopologyType=\"Polyvertex\" NodesPerElement=\"1\" "
       "NumberOfElements=\"{}\">{}</Topology>\n",
-      n, item(file, "/spheres/index", fmt::format("{} 1", n), false));
+      n, item(file, "/spheres/index", std::to_string(n), false));
   text += geometry;
   for (const char* name : {"number", "layer", "held", "contact"}) {
     text += attribute(file, "spheres", name, "Node", n, false);
