@@ -7,8 +7,8 @@
 
 namespace tpm {
 
-/// Below this share a sphere counts as loose. Sound networks (livers of 2 and 3 layers, blocks of
-/// every lattice; support 1.5) have 0.39 and more everywhere, a shell without diagonal bonds 0.001.
+/// Below this share a sphere counts as loose. Sound networks (livers, shells and solid, blocks of
+/// every lattice; support 1.5) have 0.33 and more everywhere, a shell without diagonal bonds 0.001.
 inline constexpr double kLooseSupport = 0.05;
 
 /// How well its surroundings carry each sphere: its stiffness along its normal at rest with all but
