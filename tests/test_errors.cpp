@@ -505,12 +505,76 @@ std::vector<ErrorCase> law_cases() {
   };
 }
 
+std::vector<ErrorCase> scene_cases() {
+  const std::string type = "scene";
+  const std::string check = "network check {}/s.json";
+  const auto scene = [](std::string text) { return files({{"s.json", std::move(text)}}); };
+  // A dented tetrahedron without its last face.
+  const std::string corners = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nv 3 3 3\n";
+  const std::string open = corners + "f 1 3 2\nf 1 2 4\nf 2 3 5\nf 3 4 5\nf 4 2 5\n";
+  const auto mesh = [&](std::string obj) {
+    return files(
+        {{"m.obj", std::move(obj)},
+         {"s.json", R"({"organ": {"kind": "mesh", "mesh": "m.obj", "unit": "cm", "count": 90}})"}});
+  };
+  const auto liver = [&](const std::string& more) {
+    return scene(R"({"organ": {"kind": "liver"}, )" + more + "}");
+  };
+  const auto organ = [&](const std::string& keys) { return scene(R"({"organ": {)" + keys + "}}"); };
+  const std::string listed = R"("kind": "listed", "unit": "mm", "spacing": "20 mm", "spheres": )";
+  return {
+      {type, "missing", check, files({})},
+      {type, "empty", check, scene("")},
+      {type, "truncated", check, scene("{\"organ\": {")},
+      {type, "binary garbage", check, scene(kGarbage)},
+      {type, "no organ", check, scene("{}")},
+      {type, "unknown key", check, organ(R"("kind": "liver", "cuont": 424)")},
+      {type, "key of another kind", check, organ(R"("kind": "liver", "cells": [2, 2, 2])")},
+      {type, "unknown kind", check, organ(R"("kind": "kidney")")},
+      {type, "one sphere", check, organ(R"("kind": "liver", "count": 1)")},
+      {type, "NaN", check, organ(R"("kind": "liver", "spacing": "nan mm")")},
+      {type, "overflow", check, organ(listed + R"([{"at": [0, 0, 1e400]}, {"at": [0, 0, 1]}])")},
+      {type, "spacing and width", check,
+       organ(R"("kind": "liver", "spacing": "20 mm", "shape": {"width": "21 cm"})")},
+      {type, "measure out of range", check,
+       organ(R"("kind": "liver", "shape": {"notch_depth": 0.5})")},
+      {type, "coinciding spheres", check,
+       organ(listed + R"([{"at": [0, 0, 0]}, {"at": [20, 0, 0]}, {"at": [20, 0, 0]}])")},
+      {type, "normal without length", check,
+       organ(listed + R"([{"at": [0, 0, 0], "normal": [0, 0, 0]}, {"at": [20, 0, 0]}])")},
+      {type, "open mesh", check, mesh(open)},
+      {type, "missing mesh", check,
+       organ(R"("kind": "mesh", "mesh": "m.stl", "unit": "mm", "count": 90)")},
+      {type, "mesh without unit", check, organ(R"("kind": "mesh", "mesh": "m.stl", "count": 90)")},
+      {type, "negative stiffness", check, liver(R"("material": {"Eprime": "-12 kPa"})")},
+      {type, "wrong unit", check, liver(R"("material": {"E1": "12 mm"})")},
+      {type, "support below 1", check, liver(R"("bonds": {"support": 0.9})")},
+      {type, "no anchors", check, liver(R"("anchors": [])")},
+      {type, "no sphere of that number", check,
+       liver(R"("anchors": [{"kind": "spheres", "spheres": [425]}])")},
+      {type, "anchors hold nothing", check,
+       liver(
+           R"("anchors": [{"kind": "half_space", "point": ["9 m", "0 m", "0 m"], "normal": [1, 0, 0]}])")},
+      {type, "contact anchored", check,
+       liver(R"("anchors": [{"kind": "far_side", "fraction": 1}])")},
+      {type, "guide anchored", check,
+       liver(R"("anchors": [{"kind": "spheres", "spheres": [7]}], "guides": [7])")},
+      {type, "far side without contact", check,
+       scene(
+           R"({"organ": {"kind": "block", "cells": [2, 2, 2]}, "anchors": [{"kind": "far_side"}]})")},
+      {type, "one radial bond a sphere", check, liver(R"("bonds": {"diagonals": false})")},
+      {type, "unguided star", check, scene(R"({"organ": {"kind": "star"}, "guides": []})")},
+      {type, "scene and options", check + " --count 424", liver(R"("title": "t")")},
+      {type, "bad count", "network build --count 1 -o {}/out", files({})},
+  };
+}
+
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
   for (const auto& cases :
        {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
         hdf5_cases(), fit_config_cases(), oscillation_cases(), fit_tables_cases(), design_cases(),
-        claims_cases(), law_cases()}) {
+        claims_cases(), law_cases(), scene_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -5,18 +5,9 @@
 #include <string_view>
 
 #include "tpm/fit/config.hpp"
+#include "tpm/store/document_place.hpp"
 
 namespace tpm {
-
-/// A place in a document, for messages: "FILE: key /a/b".
-struct DocumentPlace {
-  std::string where;
-  [[nodiscard]] DocumentPlace key(std::string_view name) const;
-};
-
-/// The value with its unit that stands under a key, SI.
-[[nodiscard]] double quantity_at(const Json& object, std::string_view key, Dimension dimension,
-                                 const DocumentPlace& place);
 
 /// The dimension of the readings of a data set, and so of a in sigma = a + b |model|.
 [[nodiscard]] Dimension reading_dimension(const FitConfig& config, const DataChoice& data);

@@ -17,6 +17,9 @@ struct ShellRequest {
   std::optional<double> spacing;     ///< x, m
   std::optional<double> radius;      ///< m; half the spacing (spheres that touch) if not given
   std::uint64_t seed = 1;            ///< of the places from which the outer layer starts
+  /// Where the probe lands, m: the nearest outer sphere becomes the contact, with a flat landing
+  /// site around it (landing_site.hpp). None: no contact.
+  std::optional<Eigen::Vector3d> landing;
 };
 
 /// What a solid filling is asked to be; exactly one of count and spacing.
@@ -35,7 +38,8 @@ struct SolidRequest {
 /// that would come closer than 0.62 steps to another one give way to it.
 ///
 /// The count is split evenly; each of the first (count mod layers) layers has one more. Numbers run
-/// layer by layer, and within each from the smallest x to the largest, so that sphere i of layer k
+/// layer by layer, and within each from the smallest x to the largest (as they
+/// lay before a landing site was flattened), so that sphere i of layer k
 /// stands above sphere i of layer k + 1; only the last sphere of a longer layer has none below.
 /// Coordinates are rounded to nanometres. O(n log n). Throws Error(bad_input).
 [[nodiscard]] Organ fill_shell(const Surface& surface, const ShellRequest& request);

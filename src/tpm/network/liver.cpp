@@ -34,16 +34,6 @@ LiverShape sized(const LiverRequest& request) {
   return scaled(request.shape, *request.spacing / even_spacing(surface, outer));
 }
 
-/// Of the first `full` spheres the one nearest to a place.
-std::size_t nearest_sphere(const Organ& organ, std::size_t full, const Vector3d& place) {
-  Eigen::Index nearest = 0;
-  (organ.position.leftCols(static_cast<Eigen::Index>(full)).colwise() - place)
-      .colwise()
-      .squaredNorm()
-      .minCoeff(&nearest);
-  return static_cast<std::size_t>(nearest);
-}
-
 /// The organ with the first `full` spheres of every layer moved on by `shift` numbers, cyclically.
 Organ wrapped(const Organ& organ, std::size_t full, std::size_t shift) {
   std::vector<Eigen::Index> order(organ.size());
@@ -87,12 +77,11 @@ Organ fill_liver(const LiverRequest& request) {
   shell.layers = request.layers;
   shell.spacing = request.spacing;
   shell.seed = request.seed;
+  shell.landing = front_of_right_lobe(shape, surface).position;
   Organ organ = fill_shell(surface, shell);
   const std::size_t full = organ.size() / static_cast<std::size_t>(request.layers);
-  const std::size_t found =
-      nearest_sphere(organ, full, front_of_right_lobe(shape, surface).position);
   const std::size_t contact = std::min(kContactNumber, full) - 1;
-  organ = placed(wrapped(organ, full, full + contact - found), contact);
+  organ = placed(wrapped(organ, full, full + contact - *organ.contact), contact);
   organ.name = fmt::format("liver of {} spheres in {} layers", organ.size(), request.layers);
   organ.assumptions.insert(
       organ.assumptions.begin(),

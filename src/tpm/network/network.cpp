@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 
 namespace tpm {
 namespace {
+
+constexpr double kRounding = 1e-12;  // of a lattice whose neighbours lie exactly on the support
 
 void require_valid(const NetworkOptions& options, std::string_view where) {
   if (!(options.support > 1.0) || !std::isfinite(options.support)) {
@@ -23,6 +26,11 @@ void require_valid(const NetworkOptions& options, std::string_view where) {
   }
 }
 
+Eigen::Vector3d separation(const Organ& organ, std::size_t from, std::size_t to) {
+  return organ.position.col(static_cast<Eigen::Index>(to)) -
+         organ.position.col(static_cast<Eigen::Index>(from));
+}
+
 Bond bond_of(const Organ& organ, const NeighbourPair& pair, std::string_view where) {
   const auto [a, b] = std::minmax(pair.first, pair.second);
   if (b >= organ.size() || a == b) {
@@ -33,14 +41,14 @@ Bond bond_of(const Organ& organ, const NeighbourPair& pair, std::string_view whe
   bond.a = static_cast<std::uint32_t>(a);
   bond.b = static_cast<std::uint32_t>(b);
   bond.kind = organ.layer[a] == organ.layer[b] ? BondKind::lateral : BondKind::radial;
-  bond.rest_length_m = (organ.position.col(bond.a) - organ.position.col(bond.b)).norm();
+  bond.rest_length_m = separation(organ, a, b).norm();
   return bond;
 }
 
-double cosine_squared(const Organ& organ, const Bond& bond, std::uint32_t sphere) {
-  const Eigen::Vector3d along =
-      (organ.position.col(bond.b) - organ.position.col(bond.a)) / bond.rest_length_m;
-  const double cosine = along.dot(organ.normal.col(sphere));
+/// cos^2 of the angle between the line through two spheres and the normal of one of them.
+double cosine_squared(const Organ& organ, std::size_t sphere, std::size_t other) {
+  const Eigen::Vector3d along = separation(organ, sphere, other).normalized();
+  const double cosine = along.dot(organ.normal.col(static_cast<Eigen::Index>(sphere)));
   return cosine * cosine;
 }
 
@@ -73,18 +81,78 @@ void normalise(Network& network, std::string_view where) {
   }
 }
 
+bool in_one_layer(const Organ& organ, const NeighbourPair& pair) {
+  return organ.layer[pair.first] == organ.layer[pair.second];
+}
+
+/// The local spacing of every sphere, m, as build_network describes it.
+std::vector<double> local_spacings(const Organ& organ, std::span<const NeighbourPair> pairs) {
+  constexpr std::size_t kNearest = 6;  // neighbours in a triangular lattice
+  std::vector<std::vector<double>> distances(organ.size());
+  for (const NeighbourPair& pair : pairs) {
+    if (!in_one_layer(organ, pair)) continue;
+    const double distance = separation(organ, pair.first, pair.second).norm();
+    distances[pair.first].push_back(distance);
+    distances[pair.second].push_back(distance);
+  }
+  std::vector<double> spacing(organ.size(), organ.spacing);
+  for (std::size_t i = 0; i < organ.size(); ++i) {
+    std::vector<double>& d = distances[i];
+    if (d.size() < kNearest) continue;
+    std::sort(d.begin(), d.end());
+    const double mean = std::accumulate(d.begin(), d.begin() + kNearest, 0.0) / kNearest;
+    spacing[i] = std::min(mean, organ.spacing);
+  }
+  return spacing;
+}
+
+/// Drops the pairs of one layer that are no neighbours at their local spacing.
+void drop_far_laterals(const Organ& organ, double support, std::vector<NeighbourPair>& pairs) {
+  const std::vector<double> spacing = local_spacings(organ, pairs);
+  std::erase_if(pairs, [&](const NeighbourPair& pair) {
+    const double reach = support * 0.5 * (spacing[pair.first] + spacing[pair.second]);
+    return in_one_layer(organ, pair) &&
+           separation(organ, pair.first, pair.second).norm() > (1.0 + kRounding) * reach;
+  });
+}
+
+/// Keeps of the pairs across layers, for each sphere, the one with the next deeper layer that is
+/// nearest to its normal.
+void drop_diagonals(const Organ& organ, std::vector<NeighbourPair>& pairs) {
+  std::vector<double> straightest(organ.size(), -1.0);
+  std::vector<std::size_t> partner(organ.size());
+  const auto upper_first = [&](const NeighbourPair& pair) {
+    return organ.layer[pair.first] < organ.layer[pair.second]
+               ? pair
+               : NeighbourPair{pair.second, pair.first};
+  };
+  for (const NeighbourPair& pair : pairs) {
+    const auto [upper, lower] = upper_first(pair);
+    if (organ.layer[lower] != organ.layer[upper] + 1) continue;
+    const double straight = cosine_squared(organ, upper, lower);
+    if (straight <= straightest[upper]) continue;
+    straightest[upper] = straight;
+    partner[upper] = lower;
+  }
+  std::erase_if(pairs, [&](const NeighbourPair& pair) {
+    if (in_one_layer(organ, pair)) return false;
+    const auto [upper, lower] = upper_first(pair);
+    return straightest[upper] < 0.0 || partner[upper] != lower;
+  });
+}
+
 }  // namespace
 
 std::vector<BondSums> bond_sums(const Network& network) {
   std::vector<BondSums> sums(network.organ.size());
   for (const Bond& bond : network.bonds) {
-    for (const std::uint32_t sphere : {bond.a, bond.b}) {
+    for (const auto& [sphere, other] : {std::pair(bond.a, bond.b), std::pair(bond.b, bond.a)}) {
       BondSums& s = sums[sphere];
       if (bond.kind == BondKind::lateral) {
         s.lateral += bond.factor;
         ++s.lateral_count;
       } else {
-        s.radial += bond.factor * cosine_squared(network.organ, bond, sphere);
+        s.radial += bond.factor * cosine_squared(network.organ, sphere, other);
         ++s.radial_count;
       }
     }
@@ -123,7 +191,9 @@ Network join(Organ organ, std::span<const NeighbourPair> pairs, const NetworkOpt
 Network build_network(Organ organ, const NetworkOptions& options, std::string_view where) {
   require_valid(organ, where);
   require_valid(options, where);
-  const auto pairs = pairs_within(organ.position, options.support * organ.spacing);
+  auto pairs = pairs_within(organ.position, options.support * organ.spacing);
+  drop_far_laterals(organ, options.support, pairs);
+  if (!options.diagonals) drop_diagonals(organ, pairs);
   return join(std::move(organ), pairs, options, where);
 }
 

@@ -32,7 +32,10 @@ enum class SpacingLaw {
 };
 
 struct NetworkOptions {
-  double support = 1.5;  ///< neighbours are closer than this many spacings, > 1
+  double support = 1.5;  ///< neighbours are within this many spacings, > 1
+  /// Without: of the bonds of a sphere with the next deeper layer only the one nearest to its
+  /// normal (one radial bond per sphere; usually a mechanism, MODEL.md, section 4).
+  bool diagonals = true;
   StiffnessRule rule = StiffnessRule::normalised;
   SpacingLaw spacing_law = SpacingLaw::paper;
   double reference_spacing_m = 0.020;  ///< where the continuum law has the paper's stiffness, > 0
@@ -59,8 +62,11 @@ struct Network {
 [[nodiscard]] Network join(Organ organ, std::span<const NeighbourPair> pairs,
                            const NetworkOptions& options, std::string_view where);
 
-/// Joins all spheres within the support radius of each other.
-/// Throws Error(bad_input) as join does.
+/// Joins the spheres that are neighbours: of different layers within `support` spacings of the
+/// organ; of one layer within `support` times the mean of their local spacings, so that a crowded
+/// layer is joined to its first neighbours as the others are. The local spacing of a sphere is the
+/// mean distance of its six nearest in its layer, and at most the organ's spacing; it is the
+/// organ's spacing if fewer than six are within the support. Throws Error(bad_input) as join does.
 [[nodiscard]] Network build_network(Organ organ, const NetworkOptions& options,
                                     std::string_view where);
 

@@ -8,6 +8,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/network/local_support.hpp"
 
 namespace tpm {
 namespace {
@@ -16,7 +17,6 @@ constexpr double kZero = 1e-9;          // of the mean diagonal
 constexpr std::size_t kMostModes = 24;  // found one by one
 constexpr int kInverseIterations = 4;   // each gains about nine digits over what is stiff
 constexpr double kTakesPart = 0.01;     // of the largest motion in the modes
-constexpr std::size_t kMostNamed = 10;
 
 /// The matrix at rest plus a multiple of 1 on what is free.
 BlockMatrix<double> shifted(const BlockMatrix<double>& stiffness, const Freedom& freedom,
@@ -96,16 +96,8 @@ ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest
 }
 
 std::string words(const ZeroEnergyModes& modes) {
-  std::string list;
-  const std::size_t named = std::min(modes.spheres.size(), kMostNamed);
-  for (std::size_t i = 0; i < named; ++i) {
-    list += fmt::format("{}{}", i == 0 ? "" : ", ", modes.spheres[i] + 1);
-  }
-  if (modes.spheres.size() > named) {
-    list += fmt::format(" and {} more", modes.spheres.size() - named);
-  }
-  return fmt::format("{} zero-energy mode{}; loose: sphere{} {}", modes.count,
-                     modes.count == 1 ? "" : "s", modes.spheres.size() == 1 ? "" : "s", list);
+  return fmt::format("{} zero-energy mode{}; loose: {}", modes.count, modes.count == 1 ? "" : "s",
+                     sphere_list(modes.spheres));
 }
 
 void require_rigid(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,

@@ -7,6 +7,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
+#include "tpm/network/landing_site.hpp"
 #include "tpm/network/neighbours.hpp"
 
 namespace tpm {
@@ -161,7 +162,8 @@ class InnerLayers {
 };
 
 /// The columns below the outer layer, straight down.
-Organ stacked(const Surface& surface, const ShellPlan& plan, const Positions& outer) {
+/// @param normal of the outer layer
+Organ stacked(const ShellPlan& plan, const Positions& outer, const Eigen::Matrix3Xd& normal) {
   Organ organ;
   const auto count = static_cast<Eigen::Index>(plan.count);
   organ.position.resize(3, count);
@@ -169,28 +171,67 @@ Organ stacked(const Surface& surface, const ShellPlan& plan, const Positions& ou
   Eigen::Index at = 0;
   for (int layer = 0; layer < plan.layers; ++layer) {
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(plan.in_layer(layer)); ++i, ++at) {
-      const Vector3d normal =
-          layer == 0 ? surface.nearest(outer.col(i)).normal : Vector3d(organ.normal.col(i));
-      organ.position.col(at) = outer.col(i) - layer * plan.step * normal;
-      organ.normal.col(at) = normal;
+      organ.position.col(at) = outer.col(i) - layer * plan.step * normal.col(i);
+      organ.normal.col(at) = normal.col(i);
       organ.layer.push_back(layer);
     }
   }
   return organ;
 }
 
+/// Of the first `count` places the one nearest to a point.
+std::size_t nearest_of(const Positions& places, std::size_t count, const Vector3d& point) {
+  Eigen::Index nearest = 0;
+  (places.leftCols(static_cast<Eigen::Index>(count)).colwise() - point)
+      .colwise()
+      .squaredNorm()
+      .minCoeff(&nearest);
+  return static_cast<std::size_t>(nearest);
+}
+
+/// The outer layer in the order of its numbers, with its normals.
+struct OuterLayer {
+  Positions position;
+  Eigen::Matrix3Xd normal;
+  std::optional<std::size_t> contact;
+  std::string assumption;  ///< about the contact
+};
+
+OuterLayer outer_layer(const Surface& surface, const ShellPlan& plan, const ShellRequest& request) {
+  OuterLayer outer;
+  outer.position = sorted_by_x(even_points(surface, plan.in_layer(0), request.seed));
+  LandingSite site;
+  if (request.landing) {
+    // The contact has a partner in every layer.
+    outer.contact = nearest_of(outer.position, plan.in_layer(plan.layers - 1), *request.landing);
+    site = flatten_landing_site(surface, outer.position, *outer.contact, plan.spacing);
+    outer.assumption =
+        site.flat ? fmt::format("the outer layer is flat within {} spacings of the contact sphere",
+                                kLandingReach)
+                  : "the outer layer is too curved around the contact sphere to be made flat there";
+  }
+  outer.normal.resize(3, outer.position.cols());
+  for (Eigen::Index i = 0; i < outer.position.cols(); ++i) {
+    outer.normal.col(i) = surface.nearest(outer.position.col(i)).normal;
+  }
+  if (outer.contact) outer.normal.col(static_cast<Eigen::Index>(*outer.contact)) = site.normal;
+  return outer;
+}
+
 }  // namespace
 
 Organ fill_shell(const Surface& surface, const ShellRequest& request) {
   const ShellPlan plan = planned(surface, request);
-  const Positions outer = sorted_by_x(even_points(surface, plan.in_layer(0), request.seed));
-  Organ organ = stacked(surface, plan, outer);
+  const OuterLayer outer = outer_layer(surface, plan, request);
+  Organ organ = stacked(plan, outer.position, outer.normal);
   InnerLayers(surface, plan, organ).settle();
   round_to_nanometres(organ.position);
   organ.name = fmt::format("shell of {} spheres in {} layers", plan.count, plan.layers);
   organ.spacing = plan.spacing;
   organ.radius = request.radius.value_or(0.5 * plan.spacing);
+  organ.contact = outer.contact;
   organ.assumptions.emplace_back("the centres of the outer layer lie on the surface");
+  if (outer.contact) organ.assumptions.push_back(outer.assumption);
   if (plan.layers > 1) {
     organ.assumptions.emplace_back("the spheres are split evenly over the layers");
     organ.assumptions.push_back(fmt::format("the layers are {:.4g} mm apart, {:.3g} spacings",

@@ -81,6 +81,19 @@ std::string last_line(std::string text) {
   return start == std::string::npos ? text : text.substr(start + 1);
 }
 
+/// Runs a script of the project; throws if it fails.
+void run_script(const std::string& python, const char* name,
+                const std::vector<std::string>& arguments) {
+  const std::string script = (share_dir() / "scripts" / name).string();
+  std::vector<std::string> words{python, script};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const Outcome outcome = run(words);
+  if (outcome.status == 0) return;
+  throw Error(ExitCode::environment, script,
+              fmt::format("ended with status {}: {}", outcome.status,
+                          printable(last_line(outcome.error_output), 200)));
+}
+
 }  // namespace
 
 std::string find_drawing_python() {
@@ -99,14 +112,14 @@ std::string find_drawing_python() {
 
 void draw_figures(const std::string& python, const std::filesystem::path& figures_json,
                   const std::filesystem::path& folder, Drawings drawings) {
-  const std::string script = (share_dir() / "scripts" / "draw_figures.py").string();
-  std::vector<std::string> words{python, script, figures_json.string(), folder.string()};
+  std::vector<std::string> words{figures_json.string(), folder.string()};
   if (drawings == Drawings::svg_and_png) words.emplace_back("--png");
-  const Outcome outcome = run(words);
-  if (outcome.status == 0) return;
-  throw Error(ExitCode::environment, script,
-              fmt::format("ended with status {}: {}", outcome.status,
-                          printable(last_line(outcome.error_output), 200)));
+  run_script(python, "draw_figures.py", words);
+}
+
+void draw_network(const std::string& python, const std::filesystem::path& picture_json,
+                  const std::filesystem::path& stem) {
+  run_script(python, "draw_network.py", {picture_json.string(), stem.string()});
 }
 
 std::vector<std::string> write_figures(const std::filesystem::path& folder,

@@ -25,4 +25,9 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
 [[nodiscard]] std::vector<std::string> write_figures(const std::filesystem::path& folder,
                                                      const std::vector<Figure>& figures);
 
+/// Draws a network_picture() as STEM.svg and STEM.png with scripts/draw_network.py. Throws as
+/// draw_figures does.
+void draw_network(const std::string& python, const std::filesystem::path& picture_json,
+                  const std::filesystem::path& stem);
+
 }  // namespace tpm

@@ -115,9 +115,11 @@ void Hdf5Writer::group(const std::string& name) {
   if (!made.valid()) fail(fmt::format("cannot write group {}", name));
 }
 
-Hdf5Handle Hdf5Writer::dataset(const std::string& name, hid_t type, std::size_t size) {
-  const hsize_t extent = size;
-  const Hdf5Handle space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
+Hdf5Handle Hdf5Writer::dataset(const std::string& name, hid_t type,
+                               const std::vector<std::uint64_t>& extents) {
+  const std::vector<hsize_t> shape(extents.begin(), extents.end());
+  const Hdf5Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
+                         H5Sclose);
   const Hdf5Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
   H5Pset_create_intermediate_group(links.get(), 1);
   const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
@@ -131,8 +133,28 @@ Hdf5Handle Hdf5Writer::dataset(const std::string& name, hid_t type, std::size_t 
 
 void Hdf5Writer::numbers(const std::string& name, const std::vector<double>& values) {
   const QuietErrors quiet;
-  const Hdf5Handle set = dataset(name, H5T_IEEE_F64LE, values.size());
+  const Hdf5Handle set = dataset(name, H5T_IEEE_F64LE, {values.size()});
   if (H5Dwrite(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::table(const std::string& name, const std::vector<double>& values,
+                       std::size_t columns) {
+  const QuietErrors quiet;
+  const Hdf5Handle set = dataset(name, H5T_IEEE_F64LE, {values.size() / columns, columns});
+  if (H5Dwrite(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::integers(const std::string& name, const std::vector<std::int32_t>& values,
+                          std::size_t columns) {
+  const QuietErrors quiet;
+  std::vector<std::uint64_t> extents{values.size() / columns};
+  if (columns > 1) extents.push_back(columns);
+  const Hdf5Handle set = dataset(name, H5T_STD_I32LE, extents);
+  if (H5Dwrite(set.get(), H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
     fail(fmt::format("cannot write dataset {}", name));
   }
 }
@@ -140,7 +162,7 @@ void Hdf5Writer::numbers(const std::string& name, const std::vector<double>& val
 void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& values) {
   const QuietErrors quiet;
   const Hdf5Handle type = text_type();
-  const Hdf5Handle set = dataset(name, type.get(), values.size());
+  const Hdf5Handle set = dataset(name, type.get(), {values.size()});
   std::vector<const char*> pointers;
   pointers.reserve(values.size());
   for (const std::string& value : values) pointers.push_back(value.c_str());

@@ -43,13 +43,20 @@ class Hdf5Writer {
 
   void group(const std::string& name);
   void numbers(const std::string& name, const std::vector<double>& values);
+  /// Rows of `columns` numbers each, one after the other.
+  void table(const std::string& name, const std::vector<double>& values, std::size_t columns);
+  /// A list (one column), or rows of `columns` whole numbers each.
+  void integers(const std::string& name, const std::vector<std::int32_t>& values,
+                std::size_t columns);
   void texts(const std::string& name, const std::vector<std::string>& values);
   /// Attaches a text to a group or dataset that stands already.
   void attribute(const std::string& object, const std::string& name, const std::string& text);
   void commit();
 
  private:
-  [[nodiscard]] Hdf5Handle dataset(const std::string& name, Hdf5Handle::Id type, std::size_t size);
+  /// @param extents one or two
+  [[nodiscard]] Hdf5Handle dataset(const std::string& name, Hdf5Handle::Id type,
+                                   const std::vector<std::uint64_t>& extents);
   [[noreturn]] void fail(const std::string& what) const;
 
   std::filesystem::path path_;

@@ -1,0 +1,171 @@
+// tpm network: build, check and show the network of spheres that a scene describes.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/network/local_support.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/network_report.hpp"
+#include "tpm/scene/network_file.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm::app {
+namespace fs = std::filesystem;
+namespace {
+
+struct NetworkChoice {
+  std::string scene;
+  std::string count, layers, spacing, seed, filling;
+  std::string output;
+};
+
+/// The scene that the options spell, for the common case of a liver.
+Json scene_of_options(const NetworkChoice& choice) {
+  Json organ{{"kind", "liver"}};
+  const auto number = [&](const char* key, const char* option, const std::string& text,
+                          std::uint64_t least) {
+    if (!text.empty()) organ[key] = parse_whole_number(text, option, least);
+  };
+  number("count", "--count", choice.count, 2);
+  number("layers", "--layers", choice.layers, 1);
+  number("seed", "--seed", choice.seed, 0);
+  if (!choice.spacing.empty()) organ["spacing"] = choice.spacing;
+  if (!choice.filling.empty()) organ["filling"] = choice.filling;
+  return {{"organ", organ}};
+}
+
+Tissue tissue_of(const NetworkChoice& choice) {
+  const Json from_options = scene_of_options(choice);
+  if (choice.scene.empty()) return parse_tissue(from_options, "options", {});
+  if (from_options.at("organ").size() > 1) {
+    throw Error(ExitCode::usage, choice.scene, "beside options of the organ",
+                "either a scene or options");
+  }
+  return read_tissue(choice.scene);
+}
+
+std::string place_of(const NetworkChoice& choice) {
+  return choice.scene.empty() ? "options" : choice.scene;
+}
+
+int build(const NetworkChoice& choice, const Session& session) {
+  const Tissue tissue = tissue_of(choice);
+  const fs::path xdmf = write_network(tissue, choice.output);
+  const NetworkInspection inspection = inspect(tissue);
+  if (session.json()) {
+    Json json = network_json(tissue, inspection);
+    json["files"] = {choice.output, xdmf.string()};
+    fmt::print("{}", to_text(json));
+  } else {
+    fmt::print("{}wrote {} and {}\n", network_text(tissue, inspection), choice.output,
+               xdmf.string());
+  }
+  return 0;
+}
+
+/// A network that would not stand is an answer, not a fault of the file.
+int check(const NetworkChoice& choice, const Session& session) {
+  const Tissue tissue = tissue_of(choice);
+  std::string fault;
+  try {
+    require_standing(tissue, place_of(choice));
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::bad_input) throw;
+    fault = error.what();
+  }
+  const NetworkInspection inspection = inspect(tissue);
+  const std::vector<double> support =
+      local_support(tissue.bonds(), tissue.network.organ, tissue.freedom());
+  const auto least = std::min_element(support.begin(), support.end());
+  if (session.json()) {
+    Json json = network_json(tissue, inspection);
+    json["least_support"] = rounded(*least, 6);
+    json["least_supported_sphere"] = least - support.begin() + 1;
+    json["stands"] = fault.empty();
+    json["fault"] = fault.empty() ? Json(nullptr) : Json(fault);
+    json["modes_counted"] = tissue.network.organ.size() <= kMostSpheresForModes;
+    fmt::print("{}", to_text(json));
+  } else {
+    fmt::print("{}least support: {} at sphere {} (loose below {})\n",
+               network_text(tissue, inspection), significant(*least, 3),
+               least - support.begin() + 1, shortest(kLooseSupport));
+    if (fault.empty()) {
+      fmt::print("stands: no sphere is loose{}\n",
+                 tissue.network.organ.size() <= kMostSpheresForModes
+                     ? ", no motion is free of energy"
+                     : "; motions of the whole were not looked for, there are too many spheres");
+    }
+  }
+  if (fault.empty()) return 0;
+  fmt::print(stderr, "tpm: {}\n", fault);
+  return static_cast<int>(ExitCode::answer_is_no);
+}
+
+int show(const NetworkChoice& choice) {
+  const Tissue tissue = tissue_of(choice);
+  const std::string python = find_drawing_python();
+  fs::path stem = choice.output;
+  if (stem.extension() == ".png" || stem.extension() == ".svg") stem.replace_extension();
+  const fs::path picture = stem.string() + ".json";
+  write_file(picture, to_text(network_picture(tissue)));
+  draw_network(python, picture, stem);
+  fmt::print("wrote {0}.svg, {0}.png and {0}.json\n", stem.string());
+  return 0;
+}
+
+std::shared_ptr<NetworkChoice> add_choice(CLI::App& command) {
+  auto choice = std::make_shared<NetworkChoice>();
+  command.add_option("SCENE", choice->scene,
+                     "JSON scene (schemas/scene.schema.json); without one the liver of the paper");
+  command.add_option("--count", choice->count, "Number of spheres of a liver");
+  command.add_option("--layers", choice->layers, "Layers of a shell");
+  command.add_option("--spacing", choice->spacing, "Distance of neighbours, e.g. \"20 mm\"");
+  command.add_option("--filling", choice->filling, "shell or solid");
+  command.add_option("--seed", choice->seed, "Seed of the filling");
+  return choice;
+}
+
+}  // namespace
+
+void add_network_command(CLI::App& app, Session& session) {
+  CLI::App* network = app.add_subcommand("network", "Organs of spheres: build, check, show");
+  network->require_subcommand(1);
+
+  CLI::App* build_command = network->add_subcommand("build", "Write a network to HDF5 and XDMF");
+  const auto to_build = add_choice(*build_command);
+  build_command->add_option("-o,--output", to_build->output, "HDF5 file; an XDMF goes beside it")
+      ->required();
+  add_format_option(*build_command, session);
+  build_command->footer(
+      "Example:\n  tpm network build --count 424 --layers 2 -o organ.h5\n"
+      "  tpm network build configs/liver_scene.json -o organ.h5");
+  build_command->callback([to_build, &session] {
+    session.run = [to_build, &session] { return build(*to_build, session); };
+  });
+
+  CLI::App* check_command =
+      network->add_subcommand("check", "Does it stand? Loose spheres, bond sums, neighbours");
+  const auto to_check = add_choice(*check_command);
+  add_format_option(*check_command, session);
+  check_command->footer("Example:\n  tpm network check configs/liver_scene.json");
+  check_command->callback([to_check, &session] {
+    session.run = [to_check, &session] { return check(*to_check, session); };
+  });
+
+  CLI::App* show_command = network->add_subcommand("show", "Draw it from the front and the side");
+  const auto to_show = add_choice(*show_command);
+  to_show->output = "network";
+  show_command
+      ->add_option("-o,--output", to_show->output, "Name of the pictures, without an ending")
+      ->capture_default_str();
+  show_command->footer("Example:\n  tpm network show configs/liver_scene.json -o liver");
+  show_command->callback(
+      [to_show, &session] { session.run = [to_show] { return show(*to_show); }; });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,181 @@
+#!/usr/bin/env python3
+"""Draws the network of spheres that `tpm network show` describes, as STEM.svg and STEM.png.
+
+    draw_network.py PICTURE.json STEM
+
+Two views, as an eye sees them: from the front (looking along +z) and from the side of large x (looking
+along -x), so that x and z grow to the left. Of a liver that is the patient's front and right. What lies
+nearer is drawn later and stronger. The same input gives the same bytes.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
+import numpy as np  # noqa: E402
+from matplotlib.collections import EllipseCollection, LineCollection  # noqa: E402
+from matplotlib.colors import to_rgb  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
+
+LAYER_COLOURS = ["#B4564A", "#E6A15C", "#7C6BB0", "#4F9D8C"]
+ANCHOR, CONTACT = "#1F3D7A", "#D9007E"
+ARROW = 7.0  # length of the probe, in radii
+MOST_BONDS = 40_000  # more are a blot
+# Axes across and up, axis towards the viewer and its sign; name and axis of a liver, and of anything else.
+VIEWS = [
+    (0, 1, 2, -1, "From the front", "to the patient's right, x", "Seen along +z", "x"),
+    (2, 1, 0, 1, "From the patient's right", "front to back, z", "Seen along -x", "z"),
+]
+# Inches.
+WIDTH, LEFT, RIGHT, ABOVE, BELOW, MOST_HIGH = 11.0, 0.7, 0.15, 0.75, 1.15, 7.0
+SLABS = 16  # of the depth, drawn one after the other
+STYLE = {"svg.fonttype": "path", "svg.hashsalt": "tpmkit", "font.family": "DejaVu Sans", "font.size": 8.5,
+         "axes.titlesize": 9.5, "axes.spines.top": False, "axes.spines.right": False}
+
+
+def shaded(colours, depth):
+    """Lighter with the distance from the viewer: depth 1 is nearest."""
+    fade = 0.62 * (1.0 - depth)[:, None]
+    return colours * (1.0 - fade) + fade
+
+
+def slab_of(depth):
+    return np.minimum((SLABS * depth).astype(int), SLABS - 1)
+
+
+def draw_bonds(axes, at, bonds, depth, slab):
+    near = 0.5 * (depth[bonds[:, 0]] + depth[bonds[:, 1]])
+    ends = at[bonds[slab_of(near) == slab][:, :2]]
+    strength = 0.85 - 0.65 * (slab + 0.5) / SLABS  # grey, darker where nearer
+    axes.add_collection(LineCollection(ends, colors=str(round(strength, 3)), linewidths=0.6, zorder=2 + slab))
+
+
+def draw_spheres(axes, at, depth, picture, face, anchored, slab):
+    """Circles from far to near; anchored ones with a dark rim."""
+    radius = 1e3 * picture["radius_m"] * 0.5  # smaller than they are, so that bonds show
+    order = np.argsort(depth, kind="stable")
+    order = order[slab_of(depth[order]) == slab]
+    size = np.full(len(order), 2 * radius)
+    rim = np.where(anchored[order][:, None], to_rgb(ANCHOR), 0.45 * face[order])
+    axes.add_collection(EllipseCollection(
+        size, size, np.zeros(len(order)), units="xy", offsets=at[order], transOffset=axes.transData,
+        facecolors=shaded(face, depth)[order], edgecolors=rim, linewidths=np.where(anchored[order], 1.5, 0.4),
+        zorder=2.5 + slab))
+
+
+def draw_contact(axes, at, picture, view):
+    contact = picture["contact"]
+    if contact is None:
+        return
+    across, up = view[:2]
+    normal = np.array(picture["normal"][contact])
+    here, size = at[contact], 1e3 * picture["radius_m"]
+    axes.plot(*here, "o", ms=6.5, mfc=CONTACT, mec="white", mew=0.8, zorder=90)
+    flat = np.array([normal[across], normal[up]])
+    if np.linalg.norm(flat) < 0.5:  # the probe points into the page
+        axes.plot(*here, "o", ms=15, mfc="none", mec=CONTACT, mew=1.6, zorder=90)
+        text_at = here + np.array([0.0, 1.2 * size])
+    else:
+        start = here + ARROW * size * flat
+        axes.annotate("", here + 0.6 * size * flat, start, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 2.0},
+                      zorder=90)
+        text_at = here + 0.6 * ARROW * size * flat + np.array([0.0, 0.5 * size])
+    axes.annotate(f"probe on sphere {contact + 1}", text_at, ha="center", va="bottom", color=CONTACT, fontweight="bold",
+                  zorder=91, bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 1.5})
+
+
+def draw_view(axes, picture, position, view):
+    across, up, towards, sign, name, across_words, plain_name, plain_words = view
+    at = position[:, [across, up]]
+    toward = sign * position[:, towards]
+    span = np.ptp(toward)
+    depth = (toward - toward.min()) / span if span > 0 else np.ones(len(toward))
+    layer = np.array(picture["layer"])
+    face = np.array([to_rgb(LAYER_COLOURS[k % len(LAYER_COLOURS)]) for k in layer])
+    anchored = np.zeros(len(at), bool)
+    anchored[picture["anchors"]] = True
+    face[anchored] = 0.55 * face[anchored] + 0.45 * np.array(to_rgb(ANCHOR))
+    bonds = np.array(picture["bonds"], int).reshape(-1, 3)
+    for slab in range(SLABS):
+        if len(bonds) <= MOST_BONDS:
+            draw_bonds(axes, at, bonds, depth, slab)
+        draw_spheres(axes, at, depth, picture, face, anchored, slab)
+    draw_contact(axes, at, picture, view)
+    margin = 1e3 * picture["radius_m"]
+    low, high = at.min(axis=0) - margin, at.max(axis=0) + margin
+    if picture["contact"] is not None:  # room for the arrow and its words
+        tip = at[picture["contact"]] + ARROW * margin * np.array(picture["normal"][picture["contact"]])[[across, up]]
+        low, high = np.minimum(low, tip - margin), np.maximum(high, tip + margin)
+    axes.set_xlim(high[0], low[0])  # grows to the left
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    liver = picture["liver"]
+    axes.set_title(name if liver else plain_name, loc="left")
+    axes.set_xlabel(f"{across_words if liver else plain_words} (mm)")
+    axes.set_ylabel(f"{'up, y' if liver else 'y'} (mm)")
+    return high - low
+
+
+def layer_name(k, count):
+    if k == 0:
+        return "outer layer"
+    return "inner layer" if count == 2 else f"layer {k + 1}"
+
+
+def legend(page, picture, bottom):
+    handles = [Line2D([], [], ls="", marker="o", ms=8, mfc=LAYER_COLOURS[k % len(LAYER_COLOURS)], mec="#553333",
+                      label=layer_name(k, picture["layer_count"])) for k in range(min(picture["layer_count"], 4))]
+    if picture["layer_count"] > 4:
+        handles[-1].set_label("and deeper, the colours repeating")
+    if picture["anchors"]:
+        handles.append(Line2D([], [], ls="", marker="o", ms=8, mfc="#8890A8", mec=ANCHOR, mew=1.8,
+                              label=f"anchored ({len(picture['anchors'])} spheres)"))
+    if picture["contact"] is not None:
+        handles.append(Line2D([], [], ls="", marker="o", ms=6, mfc=CONTACT, mec="white", label="contact sphere"))
+    if len(picture["bonds"]) <= MOST_BONDS:
+        handles.append(Line2D([], [], color="#555555", lw=1.0, label=f"bonds ({len(picture['bonds'])})"))
+    page.legend(handles=handles, loc="lower center", ncol=len(handles), frameon=False, bbox_to_anchor=(0.5, bottom))
+
+
+def draw(picture):
+    position = 1e3 * np.array(picture["position_m"])
+    page, axes = plt.subplots(1, 2)
+    extents = [draw_view(one, picture, position, view) for one, view in zip(axes, VIEWS)]
+    # One scale for both views, mm to inches: what the width leaves, unless that gets too high.
+    scale = min((WIDTH - 2 * LEFT - RIGHT) / sum(e[0] for e in extents), MOST_HIGH / max(e[1] for e in extents))
+    height = scale * max(e[1] for e in extents) + BELOW + ABOVE
+    page.set_size_inches(WIDTH, height)
+    left = LEFT
+    for one, extent in zip(axes, extents):
+        one.set_position([left / WIDTH, BELOW / height, scale * extent[0] / WIDTH, scale * extent[1] / height])
+        left += scale * extent[0] + LEFT
+    page.text(LEFT / WIDTH, 1 - 0.3 / height, picture["title"], fontsize=11, fontweight="bold")
+    legend(page, picture, 0.27 / height)
+    page.text(LEFT / WIDTH, 0.1 / height, picture["provenance"], fontsize=7, color="#555555")
+    return page
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("picture", type=Path, help="as written by tpm network show")
+    parser.add_argument("stem", help="path of the drawings without an ending")
+    arguments = parser.parse_args()
+    try:
+        picture = json.loads(arguments.picture.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        sys.exit(f"draw_network.py: {arguments.picture}: {error}; expected a picture of tpm network show")
+    matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
+    matplotlib.rcParams.update(STYLE)
+    page = draw(picture)
+    page.savefig(f"{arguments.stem}.svg", metadata={"Date": None, "Creator": None})
+    page.savefig(f"{arguments.stem}.png", dpi=130, metadata={"Software": None})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,25 @@
+#include "tpm/network/contact_stiffness.hpp"
+
+namespace tpm {
+
+HeldStiffness held_stiffness(const BondSystem& bonds, const Positions& rest, std::size_t sphere,
+                             const Eigen::Vector3d& direction) {
+  const auto column = static_cast<Eigen::Index>(sphere);
+  Eigen::Matrix3Xd displacement = Eigen::Matrix3Xd::Zero(3, rest.cols());
+  displacement.col(column) = direction;
+  const auto stiffness = [&](double following) {
+    const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
+                            following};
+    Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.cols());
+    bonds.add_stiffness_times(rest, memory, displacement, force);
+    return direction.dot(force.col(column));
+  };
+  return {stiffness(0.0), stiffness(1.0)};
+}
+
+HeldStiffness star_stiffness(const TpmParameters& material) {
+  const double length = material.modulus_to_stiffness_m();
+  return {material.E2_Pa * length, material.relaxed_modulus_Pa() * length};
+}
+
+}  // namespace tpm

@@ -1,0 +1,21 @@
+#pragma once
+#include "tpm/network/bond_system.hpp"
+
+namespace tpm {
+
+/// Resistance to a small displacement of one sphere while all others are held, N/m.
+struct HeldStiffness {
+  double at_once = 0.0;  ///< before anything has relaxed
+  double relaxed = 0.0;  ///< after everything has
+};
+
+/// @param rest the positions at which every bond has its rest length
+/// @param direction unit vector
+[[nodiscard]] HeldStiffness held_stiffness(const BondSystem& bonds, const Positions& rest,
+                                           std::size_t sphere, const Eigen::Vector3d& direction);
+
+/// The same of the four-sphere star along its radial bond: E2 A0/l0 and P2 A0/l0 (its lateral bonds
+/// are square to the displacement).
+[[nodiscard]] HeldStiffness star_stiffness(const TpmParameters& material);
+
+}  // namespace tpm

@@ -1,0 +1,16 @@
+#pragma once
+#include <string>
+
+#include "tpm/scene/inspection.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// What a network is like, as docs/network.md describes the keys. Spheres are numbered from 1.
+[[nodiscard]] Json network_json(const Tissue& tissue, const NetworkInspection& inspection);
+[[nodiscard]] std::string network_text(const Tissue& tissue, const NetworkInspection& inspection);
+
+/// The picture that scripts/draw_network.py draws: spheres, bonds, anchors, contact.
+[[nodiscard]] Json network_picture(const Tissue& tissue);
+
+}  // namespace tpm

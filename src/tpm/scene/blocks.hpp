@@ -1,0 +1,43 @@
+#pragma once
+// Parts of parse_tissue, one per block of a scene. All throw Error(bad_input) with the key; all are
+// given blocks that the schema has accepted.
+#include "tpm/scene/scene.hpp"
+#include "tpm/store/document_place.hpp"
+
+namespace tpm {
+
+/// What the block `organ` leads to: the spheres, and the pairs to be joined if it names them.
+struct OrganBlock {
+  Organ organ;
+  bool star = false;   ///< the four spheres of the element: bonds, anchors and guide are its own
+  bool liver = false;  ///< has a far side that is held unless the scene says otherwise
+};
+
+/// Block `organ`.
+[[nodiscard]] OrganBlock parse_organ(const Json& block, const DocumentPlace& place,
+                                     const std::filesystem::path& folder);
+
+/// Block `bonds`.
+[[nodiscard]] NetworkOptions parse_bonds(const Json& block, const DocumentPlace& place);
+[[nodiscard]] LateralBond parse_lateral(const Json& block, const DocumentPlace& place);
+
+/// Block `material`. The spacing is that of the organ.
+[[nodiscard]] TpmParameters parse_material(const Json& block, double spacing_m,
+                                           const DocumentPlace& place);
+
+/// The spheres that an entry of `anchors` holds, and that in words.
+struct AnchorBlock {
+  std::vector<std::size_t> spheres;
+  std::string words;
+};
+[[nodiscard]] AnchorBlock parse_anchor(const Json& entry, const Organ& organ,
+                                       const DocumentPlace& place);
+
+/// A number of a sphere, from 1 in the file and from 0 in memory.
+[[nodiscard]] std::size_t parse_sphere(const Json& number, const Organ& organ,
+                                       const DocumentPlace& place);
+
+/// Three lengths such as ["2 mm", "0 mm", "1 cm"], m.
+[[nodiscard]] Eigen::Vector3d parse_point(const Json& list, const DocumentPlace& place);
+
+}  // namespace tpm

@@ -1,0 +1,135 @@
+#include "tpm/scene/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "tpm/core/error.hpp"
+#include "tpm/network/local_support.hpp"
+#include "tpm/network/rigidity.hpp"
+#include "tpm/scene/blocks.hpp"
+
+namespace tpm {
+namespace {
+
+/// Blocks of a scene that say what is done to the tissue, not what it is.
+constexpr std::array<const char*, 4> kOtherBlocks{"contacts", "protocol", "outputs", "tolerance"};
+
+Network joined(OrganBlock block, const NetworkOptions& options, const std::string& where) {
+  if (!block.star) return build_network(std::move(block.organ), options, where);
+  // B with A, C and its partner D: the element has no diagonals, however near the spheres are.
+  constexpr std::array<NeighbourPair, 3> kElement{{{0, 1}, {1, 2}, {1, 3}}};
+  return join(std::move(block.organ), kElement, options, where);
+}
+
+/// What is held if the scene does not say.
+Json usual_anchors(bool star, bool liver) {
+  if (star) return Json::array({{{"kind", "spheres"}, {"spheres", {1, 3, 4}}}});
+  if (liver) return Json::array({{{"kind", "far_side"}}});
+  return Json::array();
+}
+
+void read_anchors(const Json& entries, Tissue& tissue, const DocumentPlace& place) {
+  std::size_t index = 0;
+  for (const Json& entry : entries) {
+    AnchorBlock block =
+        parse_anchor(entry, tissue.network.organ, place.key(std::to_string(index++)));
+    tissue.anchor_words.push_back(std::move(block.words));
+    tissue.anchors.insert(tissue.anchors.end(), block.spheres.begin(), block.spheres.end());
+  }
+  std::sort(tissue.anchors.begin(), tissue.anchors.end());
+  tissue.anchors.erase(std::unique(tissue.anchors.begin(), tissue.anchors.end()),
+                       tissue.anchors.end());
+}
+
+bool is_anchored(const Tissue& tissue, std::size_t sphere) {
+  return std::binary_search(tissue.anchors.begin(), tissue.anchors.end(), sphere);
+}
+
+void read_guides(const Json& numbers, Tissue& tissue, const DocumentPlace& place) {
+  const Organ& organ = tissue.network.organ;
+  std::size_t index = 0;
+  for (const Json& number : numbers) {
+    const DocumentPlace entry = place.key(std::to_string(index++));
+    const std::size_t sphere = parse_sphere(number, organ, entry);
+    if (is_anchored(tissue, sphere)) {
+      throw bad_input(entry.where, fmt::format("sphere {} is anchored", sphere + 1),
+                      "a sphere that may move");
+    }
+    tissue.guides.push_back({sphere, organ.normal.col(static_cast<Eigen::Index>(sphere))});
+  }
+}
+
+}  // namespace
+
+Freedom Tissue::freedom() const {
+  Freedom freedom(network.organ.size());
+  for (const Guide& guide : guides) freedom.guide(guide.sphere, guide.direction);
+  for (const std::size_t sphere : anchors) freedom.hold(sphere);
+  return freedom;
+}
+
+Tissue parse_tissue(const Json& scene, std::string_view where,
+                    const std::filesystem::path& folder) {
+  check_schema(scene, "scene", where);
+  const DocumentPlace place{std::string(where)};
+  const auto block = [&](const char* key) { return scene.value(key, Json::object()); };
+  OrganBlock organ = parse_organ(scene.at("organ"), place.key("organ"), folder);
+  const Json anchors = scene.value("anchors", usual_anchors(organ.star, organ.liver));
+  const Json guides = scene.value("guides", organ.star ? Json::array({2}) : Json::array());
+  Tissue tissue;
+  tissue.liver = organ.liver;
+  tissue.title = scene.value("title", organ.organ.name);
+  tissue.material = parse_material(block("material"), organ.organ.spacing, place.key("material"));
+  tissue.lateral = parse_lateral(block("bonds"), place.key("bonds"));
+  tissue.network =
+      joined(std::move(organ), parse_bonds(block("bonds"), place.key("bonds")), place.where);
+  read_anchors(anchors, tissue, place.key("anchors"));
+  read_guides(guides, tissue, place.key("guides"));
+  for (const char* key : kOtherBlocks) {
+    if (scene.contains(key)) tissue.unused_blocks.emplace_back(key);
+  }
+  return tissue;
+}
+
+Tissue read_tissue(const std::filesystem::path& scene) {
+  return parse_tissue(read_json(scene), scene.string(), scene.parent_path());
+}
+
+void require_standing(const Tissue& tissue, std::string_view where) {
+  const Organ& organ = tissue.network.organ;
+  const BondSystem bonds = tissue.bonds();
+  const Freedom freedom = tissue.freedom();
+  if (tissue.anchors.empty()) {
+    const std::string modes = organ.size() > kMostSpheresForModes
+                                  ? std::string("the 6 motions of a rigid body")
+                                  : words(zero_energy_modes(bonds, organ.position, freedom));
+    throw bad_input(where, fmt::format("not anchored: {}", modes),
+                    "anchors that hold the organ, such as [{\"kind\": \"inner_layer\"}]");
+  }
+  if (organ.contact && is_anchored(tissue, *organ.contact)) {
+    throw bad_input(where, fmt::format("the contact sphere {} is anchored", *organ.contact + 1),
+                    "anchors that leave it free");
+  }
+  if (organ.size() <= kMostSpheresForModes) require_rigid(bonds, organ.position, freedom, where);
+  require_supported(bonds, organ, freedom, where);
+}
+
+void require_loadable(const Tissue& tissue, std::size_t sphere, const Eigen::Vector3d& direction,
+                      std::string_view where) {
+  const std::size_t count = tissue.network.organ.size();
+  if (sphere >= count) {
+    throw bad_input(where, fmt::format("no sphere {}", sphere + 1), fmt::format("1 to {}", count));
+  }
+  if (is_anchored(tissue, sphere)) {
+    throw bad_input(where, fmt::format("a load on sphere {}, which is anchored", sphere + 1),
+                    "a sphere that may move");
+  }
+  if ((tissue.freedom().projector(sphere) * direction).norm() < 1e-6 * direction.norm()) {
+    throw bad_input(where, fmt::format("a load on sphere {} square to its guide", sphere + 1),
+                    "a direction in which the sphere may move");
+  }
+}
+
+}  // namespace tpm

@@ -1,0 +1,62 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/network/bond_system.hpp"
+#include "tpm/network/freedom.hpp"
+#include "tpm/network/network.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// A sphere that may only move along a line.
+struct Guide {
+  std::size_t sphere = 0;
+  Eigen::Vector3d direction;  ///< unit vector
+};
+
+/// What a scene says about the tissue: spheres, bonds, material, and what is held.
+struct Tissue {
+  std::string title;
+  bool liver = false;  ///< x is to the patient's right, y up, z to the back
+  Network network;
+  TpmParameters material;
+  LateralBond lateral = LateralBond::elastic;
+  std::vector<std::size_t> anchors;       ///< held spheres, rising, from 0
+  std::vector<std::string> anchor_words;  ///< one entry per anchor block, for people
+  std::vector<Guide> guides;
+  std::vector<std::string>
+      unused_blocks;  ///< blocks of the scene that say nothing about the tissue
+
+  [[nodiscard]] BondSystem bonds() const { return {network, material, lateral}; }
+  [[nodiscard]] Freedom freedom() const;
+};
+
+/// Reads the blocks organ, bonds, material, anchors and guides of a scene
+/// (schemas/scene.schema.json, docs/network.md).
+/// @param where for messages, usually the file
+/// @param folder that a mesh path is relative to
+/// Throws Error(bad_input) with the key.
+[[nodiscard]] Tissue parse_tissue(const Json& scene, std::string_view where,
+                                  const std::filesystem::path& folder);
+
+/// read_json and parse_tissue.
+[[nodiscard]] Tissue read_tissue(const std::filesystem::path& scene);
+
+/// Throws Error(bad_input) unless the network stands: something is anchored, the contact sphere is
+/// not, no motion is free of energy (not looked for above kMostSpheresForModes spheres), no sphere
+/// is loose (local_support.hpp).
+void require_standing(const Tissue& tissue, std::string_view where);
+
+/// Above this a scene's modes are not counted: the factorisation would take too long.
+inline constexpr std::size_t kMostSpheresForModes = 20'000;
+
+/// Throws Error(bad_input) unless a load or an imposed depth on a sphere can move it along a
+/// direction: it exists, is not anchored, and its guide, if any, is not square to the direction.
+/// @param sphere from 0
+void require_loadable(const Tissue& tissue, std::size_t sphere, const Eigen::Vector3d& direction,
+                      std::string_view where);
+
+}  // namespace tpm

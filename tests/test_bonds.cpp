@@ -1,0 +1,191 @@
+// Which spheres are joined and how stiffly: the contact of the liver against the star, the two
+// stiffness rules, neighbours, and mechanisms.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/network/contact_stiffness.hpp"
+#include "tpm/network/liver.hpp"
+#include "tpm/network/local_support.hpp"
+#include "tpm/network/quasistatic.hpp"
+#include "tpm/network/rigidity.hpp"
+#include "tpm/network/simple_organs.hpp"
+
+using namespace tpm;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr std::size_t kContact = 70;
+
+/// Moduli that differ, so that nothing agrees by chance.
+TpmParameters unequal_material() {
+  TpmParameters p;
+  p.E1_Pa = 7e3;
+  p.E2_Pa = 19e3;
+  p.Eprime_Pa = 31e3;
+  return p;
+}
+
+NetworkOptions with_rule(StiffnessRule rule) {
+  NetworkOptions options;
+  options.rule = rule;
+  return options;
+}
+
+/// Everything but the contact is held.
+Freedom only_contact_guided(const Network& network) {
+  Freedom freedom(network.organ.size());
+  for (std::size_t i = 0; i < network.organ.size(); ++i) {
+    if (i != kContact) freedom.hold(i);
+  }
+  freedom.guide(kContact, Vector3d::UnitZ());
+  return freedom;
+}
+
+/// The lower layer is held.
+Freedom inner_layer_held(const Organ& organ) {
+  Freedom freedom(organ.size());
+  for (std::size_t i = 0; i < organ.size(); ++i) {
+    if (organ.layer[i] == 1) freedom.hold(i);
+  }
+  return freedom;
+}
+
+struct MeanCounts {
+  double lateral = 0.0, radial = 0.0;
+};
+
+MeanCounts mean_counts(const Network& network, int layer) {
+  MeanCounts mean;
+  int spheres = 0;
+  const std::vector<BondSums> sums = bond_sums(network);
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    if (network.organ.layer[i] != layer) continue;
+    ++spheres;
+    mean.lateral += sums[i].lateral_count;
+    mean.radial += sums[i].radial_count;
+  }
+  mean.lateral /= spheres;
+  mean.radial /= spheres;
+  return mean;
+}
+
+}  // namespace
+
+TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rule normalised") {
+  const TpmParameters p = unequal_material();
+  const Network network = build_network(paper_liver(), {}, "liver");
+  const BondSystem bonds(network, p);
+  const HeldStiffness star = star_stiffness(p);
+  const HeldStiffness liver =
+      held_stiffness(bonds, network.organ.position, kContact, Vector3d::UnitZ());
+  CHECK_THAT(star.at_once, WithinRel(19e3 * 12.56e-3, 1e-12));
+  CHECK_THAT(star.relaxed, WithinRel(7e3 * 19e3 / 26e3 * 12.56e-3, 1e-12));
+  CHECK_THAT(liver.at_once, WithinRel(star.at_once, 1e-6));
+  CHECK_THAT(liver.relaxed, WithinRel(star.relaxed, 1e-6));
+
+  // The same as a force, after an indentation by a nanometre in a picosecond and in a second.
+  const double depth = 1e-9;
+  const QuasiStatic tissue(bonds, network.organ.position, only_contact_guided(network),
+                           {kContact, Vector3d::UnitZ()}, {1e-9, 5});
+  const auto force = [&](double rate, double hold) {
+    const Protocol protocol = ramp_and_hold(depth, rate, hold);
+    return tissue.run(protocol, std::vector<double>{depth / rate + hold}).response(0);
+  };
+  CHECK_THAT(force(1e3, 0.0) / depth, WithinRel(star.at_once, 1e-6));
+  CHECK_THAT(force(1e-9, 1.0) / depth, WithinRel(star.relaxed, 1e-6));
+}
+
+TEST_CASE("under per_bond sphere 71 is stiffer by the sum of its bonds' squared cosines") {
+  const TpmParameters p = unequal_material();
+  const Network network = build_network(paper_liver(), with_rule(StiffnessRule::per_bond), "liver");
+  const BondSums sums = bond_sums(network)[kContact];
+  CHECK(sums.lateral_count == 6);
+  CHECK(sums.radial_count == 7);
+  const BondSystem bonds(network, p);
+  const HeldStiffness liver =
+      held_stiffness(bonds, network.organ.position, kContact, Vector3d::UnitZ());
+  const double factor = liver.at_once / star_stiffness(p).at_once;
+  CHECK_THAT(factor, WithinRel(sums.radial, 1e-6));
+  CHECK_THAT(liver.relaxed / star_stiffness(p).relaxed, WithinRel(factor, 1e-6));
+  CHECK(factor > 3.5);
+  CHECK(factor < 5.0);
+}
+
+TEST_CASE("a crowded layer has first neighbours only, as the others have") {
+  const Network network = build_network(paper_liver(), {}, "liver");
+  const MeanCounts outer = mean_counts(network, 0);
+  const MeanCounts inner = mean_counts(network, 1);
+  CHECK_THAT(outer.lateral, WithinAbs(6.2, 0.1));
+  CHECK_THAT(inner.lateral, WithinAbs(7.7, 0.1));
+  CHECK_THAT(outer.radial, WithinAbs(7.6, 0.1));
+  for (const BondSums& s : bond_sums(network)) {
+    CHECK(s.lateral_count >= 5);
+    CHECK(s.lateral_count <= 12);
+    CHECK(s.radial_count >= 4);
+  }
+  Freedom held = inner_layer_held(network.organ);
+  CHECK(zero_energy_modes(BondSystem(network, {}), network.organ.position, held).is_rigid());
+}
+
+TEST_CASE("a lattice keeps its neighbours whatever its layers' own spacing") {
+  // 1.5 spacings: along an edge, and across the face of a cell.
+  const Network cubic = build_network(block(4, 4, 4, 0.02, Lattice::cubic), {}, "block");
+  const BondSums inside = bond_sums(cubic)[2 * 25 + 2 * 5 + 2];
+  CHECK(inside.lateral_count == 8);
+  CHECK(inside.radial_count == 10);
+}
+
+TEST_CASE("one radial bond per sphere and a free inner layer is refused, loose spheres named") {
+  NetworkOptions options;
+  options.diagonals = false;
+  const Network network = build_network(paper_liver(), options, "liver");
+  const std::vector<BondSums> sums = bond_sums(network);
+  Freedom freedom(network.organ.size());
+  for (std::size_t i = 0; i < network.organ.size(); ++i) {
+    if (network.organ.layer[i] == 0) CHECK(sums[i].radial_count == 1);
+    if (network.organ.position(2, static_cast<Eigen::Index>(i)) > 0.135) freedom.hold(i);
+  }
+  // Its curvature alone resists, a little: no mode is exactly free, but the contact is loose.
+  const BondSystem bonds(network, {});
+  const std::vector<double> support = local_support(bonds, network.organ, freedom);
+  CHECK(support[kContact] < 0.01);
+  const std::vector<std::size_t> loose = loose_spheres(support);
+  CHECK(std::find(loose.begin(), loose.end(), kContact) != loose.end());
+  CHECK_THROWS_WITH(require_supported(bonds, network.organ, freedom, "scene.json"),
+                    Catch::StartsWith("scene.json: nearly a mechanism") &&
+                        Catch::Contains(fmt::format("sphere{} {}", "s", loose.front() + 1)));
+
+  const Network braced = build_network(paper_liver(), {}, "liver");
+  const BondSystem stiff(braced, {});
+  CHECK(zero_energy_modes(stiff, braced.organ.position, freedom).is_rigid());
+  const std::vector<double> well = local_support(stiff, braced.organ, freedom);
+  CHECK(*std::min_element(well.begin(), well.end()) > 0.5);
+  CHECK_NOTHROW(require_supported(stiff, braced.organ, freedom, "scene.json"));
+}
+
+TEST_CASE("a flat plate without diagonals is an exact mechanism") {
+  NetworkOptions options;
+  options.diagonals = false;
+  const Network plate = build_network(block(4, 4, 1, 0.02, Lattice::cubic), options, "plate");
+  Freedom freedom(plate.organ.size());
+  for (std::size_t i = 0; i < 5; ++i) freedom.hold(i);  // an edge of the top
+  const BondSystem bonds(plate, {});
+  CHECK(zero_energy_modes(bonds, plate.organ.position, freedom).count > 20);
+  CHECK(loose_spheres(local_support(bonds, plate.organ, freedom)).size() > 10);
+}
+
+TEST_CASE("the local support of the star is that of its held neighbours") {
+  const Network network = build_network(star(0.02, 0.02), {}, "star");
+  Freedom freedom(4);
+  freedom.guide(1, Vector3d::UnitZ());
+  for (const std::size_t i : {0, 2, 3}) freedom.hold(i);
+  CHECK_THAT(local_support(BondSystem(network, {}), network.organ, freedom)[1],
+             WithinRel(1.0, 1e-8));
+}
