@@ -2,12 +2,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "indented_scene.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/network/equilibrium.hpp"
-#include "tpm/network/filling.hpp"
-#include "tpm/network/indentation.hpp"
-#include "tpm/network/large_equilibrium.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/solve/preconditioners.hpp"
@@ -17,35 +14,6 @@ using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
 namespace {
-
-/// A network that stands on its far side while a patch is pushed along a direction.
-struct Scene {
-  Scene(Organ organ, double patch_radius, double far_thickness,
-        const Eigen::Vector3d& direction = Eigen::Vector3d::UnitZ())
-      : network(build_network(std::move(organ), {}, "scene")),
-        bonds(network, TpmParameters{}),
-        freedom(network.organ.size()) {
-    const Organ& body = network.organ;
-    Eigen::Index front = 0;
-    (body.position.transpose() * direction).minCoeff(&front);
-    if (body.contact) front = static_cast<Eigen::Index>(*body.contact);
-    push.direction = direction;
-    push.patch = surface_patch(body, body.position.col(front), patch_radius);
-    for (const std::size_t i : push.patch) freedom.hold(i);
-    for (const std::size_t i : far_side(body, direction, far_thickness)) freedom.hold(i);
-  }
-  Network network;
-  BondSystem bonds;
-  Freedom freedom;
-  PatchIndentation push;
-  [[nodiscard]] const Positions& rest() const { return network.organ.position; }
-};
-
-Organ solid_liver(std::size_t count) {
-  SolidRequest request;
-  request.count = count;
-  return fill_solid(liver_surface(LiverShape{}), request);
-}
 
 Eigen::Matrix3Xd random_forces(const Freedom& freedom) {
   Eigen::Matrix3Xd forces(3, static_cast<Eigen::Index>(freedom.size()));
@@ -62,7 +30,7 @@ BondMemory no_memory(const BondSystem& bonds) {
 }  // namespace
 
 TEST_CASE("conjugate gradients solve what the factorisation solves") {
-  Scene scene(solid_liver(1500), 0.02, 0.03);
+  IndentedScene scene(solid_liver(1500), 0.02, 0.03);
   scene.freedom.guide(700, Eigen::Vector3d(1, 2, 2) / 3.0);  // one that is partly free
   const BondMemory memory = no_memory(scene.bonds);
   Equilibrium direct(scene.bonds, scene.freedom);
@@ -83,7 +51,7 @@ TEST_CASE("conjugate gradients solve what the factorisation solves") {
 }
 
 TEST_CASE("the preconditioners are symmetric") {
-  const Scene scene(solid_liver(1500), 0.02, 0.03);
+  const IndentedScene scene(solid_liver(1500), 0.02, 0.03);
   StiffnessRows stiffness(scene.bonds, scene.freedom);
   const auto& matrix = stiffness.assemble(scene.rest(), no_memory(scene.bonds));
   RigidModes<3> modes(scene.freedom.size());
@@ -110,29 +78,14 @@ TEST_CASE("the preconditioners are symmetric") {
   }
 }
 
-TEST_CASE("iterative and direct equilibria are the same") {
-  const auto compare = [](Organ organ, double patch_radius, double far_thickness) {
-    Scene scene(std::move(organ), patch_radius, far_thickness);
-    scene.push.strides = 4;
-    Equilibrium direct(scene.bonds, scene.freedom);
-    LargeEquilibrium large(scene.bonds, scene.freedom, scene.rest());
-    const auto a = indent(scene.bonds, scene.freedom, scene.rest(), scene.push, finder_of(direct));
-    const auto b = indent(scene.bonds, scene.freedom, scene.rest(), scene.push, finder_of(large));
-    CAPTURE(scene.network.organ.name, a.newton_steps, b.newton_steps, large.work().iterations);
-    CHECK(a.force_N > 0.0);
-    CHECK_THAT(b.force_N, WithinRel(a.force_N, 1e-8));
-    CHECK((a.position - b.position).cwiseAbs().maxCoeff() < 1e-8 * scene.push.depth_m);
-    CHECK(b.residual_N <= scene.push.tolerance_N);
-    CHECK(b.imbalance_N < 1e-10 * b.force_N);
-  };
-  compare(paper_liver(), 0.03, 0.05);
-  compare(solid_liver(4000), 0.02, 0.03);
+TEST_CASE("iterative and direct equilibria of the paper's liver are the same") {
+  compare_solvers({paper_liver(), 0.03, 0.05});
 }
 
 TEST_CASE("multigrid needs about as many iterations for more spheres, block Jacobi more") {
   const auto iterations = [](int cells, PreconditionerKind kind) {
-    const Scene scene(block(cells, cells, cells, 0.1 / cells, Lattice::fcc), 0.03, 0.02,
-                      -Eigen::Vector3d::UnitZ());
+    const IndentedScene scene(block(cells, cells, cells, 0.1 / cells, Lattice::fcc), 0.03, 0.02,
+                              -Eigen::Vector3d::UnitZ());
     LargeEquilibriumOptions options;
     options.preconditioner = kind;
     LargeEquilibrium large(scene.bonds, scene.freedom, scene.rest(), options);
@@ -200,7 +153,8 @@ TEST_CASE("a probe with random forces finds loose spheres that the load does not
 }
 
 TEST_CASE("an indentation refuses what it cannot do") {
-  const Scene scene(block(4, 4, 4, 0.01, Lattice::fcc), 0.015, 0.005, -Eigen::Vector3d::UnitZ());
+  const IndentedScene scene(block(4, 4, 4, 0.01, Lattice::fcc), 0.015, 0.005,
+                            -Eigen::Vector3d::UnitZ());
   Equilibrium direct(scene.bonds, scene.freedom);
   const auto run = [&](const PatchIndentation& push) {
     return indent(scene.bonds, scene.freedom, scene.rest(), push, finder_of(direct));

@@ -33,6 +33,10 @@ void require_valid(const PatchIndentation& indentation, const Freedom& freedom) 
   }
 }
 
+BondMemory at_rest(const BondSystem& bonds, double following) {
+  return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), following};
+}
+
 [[noreturn]] void give_up(double depth_m, std::string_view why) {
   throw Error(ExitCode::numerical, "indentation",
               fmt::format("{} at a depth of {:.4g} mm", why, depth_m * 1e3));
@@ -101,11 +105,29 @@ std::vector<std::size_t> far_side(const Organ& organ, const Eigen::Vector3d& dir
   return found;
 }
 
+double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,
+                       std::span<const std::size_t> patch, const Eigen::Vector3d& direction,
+                       double following, double tolerance) {
+  const BondMemory memory = at_rest(solver.bonds(), following);
+  Eigen::Matrix3Xd moved = Eigen::Matrix3Xd::Zero(3, rest.cols());
+  for (const std::size_t sphere : patch) moved.col(static_cast<Eigen::Index>(sphere)) = direction;
+  const EquilibriumFinder finder{
+      [&](const Positions& position, const BondMemory& with, Eigen::Matrix3Xd& forces) {
+        return solver.solve(position, with, forces, tolerance);
+      },
+      {}};
+  Positions after = rest;
+  follow(solver.bonds(), solver.freedom(), memory, moved, finder, 0.0, after);
+  const Eigen::Matrix3Xd displacement = after - rest;
+  Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.cols());
+  solver.bonds().add_stiffness_times(rest, memory, displacement, force);
+  return displacement.cwiseProduct(force).sum();
+}
+
 IndentationResult indent(const BondSystem& bonds, const Freedom& freedom, const Positions& rest,
                          const PatchIndentation& indentation, const EquilibriumFinder& finder) {
   require_valid(indentation, freedom);
-  const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
-                          indentation.following};
+  const BondMemory memory = at_rest(bonds, indentation.following);
   const double stride = indentation.depth_m / indentation.strides;
   const Eigen::Matrix3Xd no_load = Eigen::Matrix3Xd::Zero(3, rest.cols());
   Eigen::Matrix3Xd moved = no_load;

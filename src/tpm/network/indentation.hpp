@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <span>
 
 #include "tpm/network/newton_balance.hpp"
 
@@ -47,6 +48,17 @@ class LargeEquilibrium;
 [[nodiscard]] std::vector<std::size_t> far_side(const Organ& organ,
                                                 const Eigen::Vector3d& direction,
                                                 double thickness_m);
+
+/// Force of a glued punch per depth at rest, to first order, N/m: u^T K u of the displacements
+/// under a motion of 1 of the patch, so that an error of u counts by its square.
+/// @param patch spheres that are held in the freedom of the solver
+/// @param following see BondMemory
+/// @param tolerance of LargeEquilibrium::solve
+/// Throws Error(numerical) if the stiffness is not positive definite or the solution fails.
+[[nodiscard]] double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,
+                                     std::span<const std::size_t> patch,
+                                     const Eigen::Vector3d& direction, double following,
+                                     double tolerance);
 
 /// Pushes the patch to its depth, stride by stride: in each the free spheres follow to first order,
 /// then they find their balance.
