@@ -229,10 +229,13 @@ void measure_all(const std::filesystem::path& folder) {
     std::string kind, solver;
     std::vector<std::size_t> counts;
   };
-  const std::vector<Asked> asked{
-      {"solid", "direct", {424, 1300, 4000, 12'000}}, {"solid", "block_jacobi", all},
-      {"solid", "incomplete_cholesky", all},          {"solid", "multigrid", all},
-      {"shell", "direct", {424, 4000, 40'000}},       {"shell", "multigrid", all}};
+  const std::vector<std::size_t> fewer{424, 4000, 40'000};
+  const std::vector<Asked> asked{{"solid", "multigrid", all},
+                                 {"shell", "multigrid", all},
+                                 {"solid", "direct", {424, 1300, 4000}},
+                                 {"solid", "block_jacobi", fewer},
+                                 {"solid", "incomplete_cholesky", fewer},
+                                 {"shell", "direct", {424, 4000}}};
   Figure figure{"growth", "One indentation of a liver against the number of spheres", "", {}};
   Panel time{"Solution", {"spheres", "", true, {}, {}}, {"processor time", "s", true, {}, {}}, {}};
   Panel memory{"Peak memory", {"spheres", "", true, {}, {}}, {"memory", "GiB", true, {}, {}}, {}};

@@ -96,7 +96,11 @@ void print_levels(const std::string& title, const PunchOnBlock& scene,
     if (force.size() >= 3) {
       const std::size_t n = force.size();
       const Richardson r = richardson(force[n - 3], force[n - 2], force[n - 1], 2.0);
-      fmt::print("  order {:.3f}  limit {:.3f} N/m", r.order, r.limit);
+      if (std::isfinite(r.order) && r.order > 0.0) {
+        fmt::print("  order {:.3f}  limit {:.3f} N/m", r.order, r.limit);
+      } else {
+        fmt::print("  no order");
+      }
     }
     fmt::print("\n");
     std::fflush(stdout);

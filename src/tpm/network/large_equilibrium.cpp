@@ -122,7 +122,8 @@ EquilibriumSearch LargeEquilibrium::find(Positions& position, const BondMemory& 
       probe_definiteness(stiffness_.matrix(), *preconditioner_, options_.probe_tolerance,
                          options_.most_iterations, options_.probe_seed);
   work_.probe_iterations += probe.iterations;
-  search.stable = probe.end == GradientsEnd::converged;
+  search.stable = probe.end != GradientsEnd::not_definite;
+  search.converged = probe.end != GradientsEnd::unfinished;  // an equilibrium nobody judged
   return search;
 }
 

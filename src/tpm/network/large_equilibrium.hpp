@@ -37,7 +37,7 @@ struct LargeEquilibriumWork {
 ///
 /// Negative stiffness is noticed where a direction of a solution shows it, and looked for with a
 /// random right-hand side at the equilibrium (probe_definiteness): `stable` means that neither met
-/// any.
+/// any. A search whose probe does not come to an end has not converged.
 class LargeEquilibrium {
  public:
   /// @param bonds, freedom must live as long as this
