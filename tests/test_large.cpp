@@ -94,9 +94,9 @@ TEST_CASE("multigrid needs about as many iterations for more spheres, block Jaco
     return large.work().iterations;
   };
   const int small = iterations(6, PreconditionerKind::multigrid);
-  const int large = iterations(18, PreconditionerKind::multigrid);
+  const int large = iterations(14, PreconditionerKind::multigrid);
   const int small_jacobi = iterations(6, PreconditionerKind::block_jacobi);
-  const int large_jacobi = iterations(18, PreconditionerKind::block_jacobi);
+  const int large_jacobi = iterations(14, PreconditionerKind::block_jacobi);
   CAPTURE(small, large, small_jacobi, large_jacobi);
   CHECK(large <= small + small / 2);
   CHECK(large_jacobi >= 2 * small_jacobi);
