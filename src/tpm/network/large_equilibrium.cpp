@@ -16,6 +16,7 @@ constexpr double kForcingFactor = 0.9;
 constexpr double kFirstForcing = 0.1;
 constexpr double kSafeguard = 0.1;
 constexpr double kLeastForcing = 1e-10;
+constexpr double kTired = 1.5;  // growth of the iterations that makes a preconditioner too old
 
 /// How exactly the next step is worth solving.
 class Forcing {
@@ -90,17 +91,29 @@ std::unique_ptr<Preconditioner> LargeEquilibrium::preconditioner() const {
   return std::make_unique<Multigrid>(stiffness_.matrix(), modes_);
 }
 
+void LargeEquilibrium::prepare() {
+  const bool serves = last_rate_ <= kTired * rate_when_new_ + 1.0;
+  if (preconditioner_ && serves && preconditioner_->refresh()) return;
+  preconditioner_.reset();  // the old one's memory is needed
+  preconditioner_ = preconditioner();
+  rate_when_new_ = last_rate_ = 0.0;
+  ++work_.preconditioners;
+}
+
 TangentAnswer LargeEquilibrium::solve(const Positions& position, const BondMemory& memory,
                                       Eigen::Matrix3Xd& vectors, double tolerance) {
-  preconditioner_.reset();  // the old one's memory is needed
   stiffness_.assemble(position, memory);
-  preconditioner_ = preconditioner();
+  prepare();
   freedom_.project(vectors);
   Eigen::Matrix3Xd x;
   const GradientsOutcome outcome = conjugate_gradients(
       stiffness_.matrix(), *preconditioner_, vectors, tolerance, options_.most_iterations, x);
   ++work_.solutions;
   work_.iterations += outcome.iterations;
+  if (outcome.iterations > 0) {
+    last_rate_ = -outcome.iterations / std::log10(std::min(outcome.reduction, 0.5));
+    if (rate_when_new_ == 0.0) rate_when_new_ = last_rate_;
+  }
   freedom_.project(x);
   vectors = std::move(x);
   return answer_of(outcome.end);
@@ -116,8 +129,8 @@ EquilibriumSearch LargeEquilibrium::find(Positions& position, const BondMemory& 
   EquilibriumSearch search =
       newton_balance(bonds_, freedom_, position, memory, load, tolerance_N, step);
   if (!search.converged || !search.stable) return search;
-  // The preconditioner is of the step before: that costs iterations, not the answer.
   stiffness_.assemble(position, memory);
+  prepare();
   const GradientsOutcome probe =
       probe_definiteness(stiffness_.matrix(), *preconditioner_, options_.probe_tolerance,
                          options_.most_iterations, options_.probe_seed);

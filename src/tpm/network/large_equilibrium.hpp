@@ -27,7 +27,8 @@ struct LargeEquilibriumOptions {
 /// What the solutions of a LargeEquilibrium took so far.
 struct LargeEquilibriumWork {
   int solutions = 0;
-  int iterations = 0;  ///< of conjugate gradients, without those of probes
+  int preconditioners = 0;  ///< made anew
+  int iterations = 0;       ///< of conjugate gradients, without those of probes
   int probe_iterations = 0;
 };
 
@@ -63,6 +64,8 @@ class LargeEquilibrium {
 
  private:
   [[nodiscard]] std::unique_ptr<Preconditioner> preconditioner() const;
+  /// Makes the preconditioner fit the matrix: anew, unless what there is still serves.
+  void prepare();
 
   const BondSystem& bonds_;
   const Freedom& freedom_;
@@ -70,6 +73,7 @@ class LargeEquilibrium {
   RigidModes<3> modes_;
   StiffnessRows stiffness_;
   std::unique_ptr<Preconditioner> preconditioner_;
+  double rate_when_new_ = 0.0, last_rate_ = 0.0;  ///< iterations per decade; 0: not known yet
   LargeEquilibriumWork work_;
 };
 

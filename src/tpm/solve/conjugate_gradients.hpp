@@ -12,6 +12,9 @@ class Preconditioner {
   Preconditioner& operator=(const Preconditioner&) = delete;
   virtual ~Preconditioner() = default;
 
+  /// Takes note that the matrix has changed, as far as must be to stay symmetric and positive
+  /// definite. False if the preconditioner has to be made anew.
+  [[nodiscard]] virtual bool refresh() { return false; }
   /// False if making it proved that the matrix is not positive definite; it is then of no use.
   [[nodiscard]] virtual bool definite() const = 0;
   /// z = M^-1 r.

@@ -234,6 +234,13 @@ void Multigrid::build(const RigidModes<3>& modes) {
   factorise_coarsest();
 }
 
+bool Multigrid::refresh() {
+  if (!definite_) return false;
+  fine_.inverse = inverse_diagonal(finest_);
+  definite_ = !fine_.inverse.empty();
+  return true;
+}
+
 void Multigrid::factorise_coarsest() {
   const BlockRows<6, 6>& matrix = coarse_matrix_.back();
   const auto n = static_cast<Eigen::Index>(matrix.rows());

@@ -34,6 +34,11 @@ class Multigrid final : public Preconditioner {
   /// @param modes of every node; zero where a node is held
   Multigrid(const BlockRows<3, 3>& matrix, const RigidModes<3>& modes);
 
+  /// Keeps all levels below the finest, whose sweeps follow the matrix as it is now: with z = M^-1
+  /// r for such a sweep and C for the correction from below, the cycle is M^-T D M^-1 + (1 - M^-T
+  /// A) C (1 - A M^-1), positive definite with the diagonal blocks D whatever positive definite
+  /// matrix C was made of.
+  [[nodiscard]] bool refresh() override;
   [[nodiscard]] bool definite() const override { return definite_; }
   void apply(const BlockVector<3>& r, BlockVector<3>& z) const override;
 
