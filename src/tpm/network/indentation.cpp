@@ -12,6 +12,9 @@
 namespace tpm {
 namespace {
 
+// Met before the balance is reached, it may be the stride's fault.
+constexpr std::string_view kNotDefinite =
+    "the stiffness is not positive definite (the tissue buckles, or strides are too long)";
 constexpr double kFollowTolerance = 1e-2;  // of the first-order answer to a stride
 
 void require_valid(const PatchIndentation& indentation, const Freedom& freedom) {
@@ -51,7 +54,7 @@ void follow(const BondSystem& bonds, const Freedom& freedom, const BondMemory& m
   left = -left;
   freedom.project(left);
   const TangentAnswer answer = finder.solve(position, memory, left);
-  if (answer == TangentAnswer::not_definite) give_up(depth_m, "the tissue buckles");
+  if (answer == TangentAnswer::not_definite) give_up(depth_m, kNotDefinite);
   if (answer == TangentAnswer::failed) give_up(depth_m, "no solution with the stiffness");
   position += moved + left;
 }
@@ -141,7 +144,7 @@ IndentationResult indent(const BondSystem& bonds, const Freedom& freedom, const 
     follow(bonds, freedom, memory, moved, finder, depth, result.position);
     const EquilibriumSearch search =
         finder.find(result.position, memory, no_load, indentation.tolerance_N);
-    if (!search.stable) give_up(depth, "the tissue buckles");
+    if (!search.stable) give_up(depth, kNotDefinite);
     if (!search.converged) give_up(depth, "the forces do not come to balance");
     result.newton_steps += search.iterations;
     result.residual_N = search.residual_N;

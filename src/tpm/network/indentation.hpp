@@ -64,7 +64,8 @@ class LargeEquilibrium;
 /// then they find their balance.
 /// @param freedom in which the patch is held already
 /// Throws Error(bad_input) for an empty patch or numbers out of range, Error(numerical) where the
-/// tissue buckles or does not come to balance; the message tells the depth.
+/// stiffness is not positive definite, at the balance or on the way to it, or no balance is found;
+/// the message tells the depth.
 [[nodiscard]] IndentationResult indent(const BondSystem& bonds, const Freedom& freedom,
                                        const Positions& rest, const PatchIndentation& indentation,
                                        const EquilibriumFinder& finder);
