@@ -3,23 +3,13 @@
 #include <cmath>
 
 namespace tpm {
-namespace {
-
-std::vector<std::array<std::uint32_t, 2>> edges_of(const Network& network) {
-  std::vector<std::array<std::uint32_t, 2>> edges;
-  edges.reserve(network.bonds.size());
-  for (const Bond& bond : network.bonds) edges.push_back({bond.a, bond.b});
-  return edges;
-}
-
-}  // namespace
 
 BondSystem::BondSystem(const Network& network, const TpmParameters& material, LateralBond lateral)
-    : rest_length_(static_cast<Eigen::Index>(network.bonds.size())),
+    : spheres_(network.organ.size()),
+      rest_length_(static_cast<Eigen::Index>(network.bonds.size())),
       stiffness_(rest_length_.size()),
       relaxing_(rest_length_.size()),
-      relaxation_time_s_(material.relaxation_time_s()),
-      pattern_(network.organ.size(), edges_of(network)) {
+      relaxation_time_s_(material.relaxation_time_s()) {
   const double per_Pa = material.modulus_to_stiffness_m();
   for (const Bond& bond : network.bonds) {
     const auto i = static_cast<Eigen::Index>(end_a_.size());
@@ -30,8 +20,18 @@ BondSystem::BondSystem(const Network& network, const TpmParameters& material, La
     stiffness_[i] = bond.factor * per_Pa * (radial ? material.E2_Pa : material.Eprime_Pa);
     relaxing_[i] = radial ? bond.factor * per_Pa * material.relaxing_modulus_Pa() : 0.0;
     rope_.push_back(!radial && lateral == LateralBond::tension_only);
-    place_.push_back(pattern_.place(bond.a, bond.b));
   }
+}
+
+const BondSystem::Graph& BondSystem::graph() const {
+  std::call_once(graph_->once, [&] {
+    std::vector<std::array<std::uint32_t, 2>> edges(size());
+    for (std::size_t i = 0; i < size(); ++i) edges[i] = {end_a_[i], end_b_[i]};
+    graph_->graph.emplace(Graph{BlockPattern(spheres_, edges), {}});
+    Graph& found = *graph_->graph;
+    for (const auto& [a, b] : edges) found.place.push_back(found.pattern.place(a, b));
+  });
+  return *graph_->graph;
 }
 
 BondSystem::Pull BondSystem::pull(std::size_t bond, double elongation,
@@ -64,20 +64,27 @@ void BondSystem::add_forces(const Positions& position, const BondMemory& memory,
   }
 }
 
+Eigen::Matrix3d BondSystem::stiffness_block(std::size_t bond, const Positions& position,
+                                            const BondMemory& memory) const {
+  const Eigen::Vector3d along = position.col(end_b_[bond]) - position.col(end_a_[bond]);
+  const double length = along.norm();
+  const Eigen::Vector3d direction = along / length;
+  const double rest = rest_length_[static_cast<Eigen::Index>(bond)];
+  const auto [force, slope] = pull(bond, length - rest, memory);
+  const double across = force / length;
+  Eigen::Matrix3d block = (slope - across) * direction * direction.transpose();
+  block.diagonal().array() += across;
+  return block;
+}
+
 void BondSystem::add_stiffness(const Positions& position, const BondMemory& memory,
                                BlockMatrix<double>& matrix) const {
+  const Graph& on = graph();
   for (std::size_t i = 0; i < size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const Eigen::Vector3d along = position.col(end_b_[i]) - position.col(end_a_[i]);
-    const double length = along.norm();
-    const Eigen::Vector3d direction = along / length;
-    const auto [force, slope] = pull(i, length - rest_length_[row], memory);
-    const double across = force / length;
-    Eigen::Matrix3d block = (slope - across) * direction * direction.transpose();
-    block.diagonal().array() += across;
+    const Eigen::Matrix3d block = stiffness_block(i, position, memory);
     matrix.diagonal[end_a_[i]] += block;
     matrix.diagonal[end_b_[i]] += block;
-    matrix.below[place_[i].index] -= block;  // symmetric: the same either way round
+    matrix.below[on.place[i].index] -= block;  // symmetric: the same either way round
   }
 }
 

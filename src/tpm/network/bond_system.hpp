@@ -1,4 +1,7 @@
 #pragma once
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,6 +37,7 @@ class BondSystem {
              LateralBond lateral = LateralBond::elastic);
 
   [[nodiscard]] std::size_t size() const { return end_a_.size(); }
+  [[nodiscard]] std::size_t spheres() const { return spheres_; }
   [[nodiscard]] double relaxation_time_s() const { return relaxation_time_s_; }
   [[nodiscard]] std::span<const std::uint32_t> end_a() const { return end_a_; }
   [[nodiscard]] std::span<const std::uint32_t> end_b() const { return end_b_; }
@@ -77,9 +81,15 @@ class BondSystem {
   [[nodiscard]] double dissipation_W(const Positions& position,
                                      const Eigen::VectorXd& remembered) const;
 
-  /// The graph of the spheres, and where each bond stands on it.
-  [[nodiscard]] const BlockPattern& pattern() const { return pattern_; }
-  [[nodiscard]] BlockPattern::Place place(std::size_t bond) const { return place_[bond]; }
+  /// Minus the derivative of the force on sphere a by the place of sphere a (or b by b), N/m;
+  /// minus this block stands at (a, b) and (b, a) of the stiffness matrix.
+  [[nodiscard]] Eigen::Matrix3d stiffness_block(std::size_t bond, const Positions& position,
+                                                const BondMemory& memory) const;
+
+  /// The graph of the spheres, and where each bond stands on it. Found when first asked for:
+  /// factors of large networks do not fit into memory, and what iterates needs none.
+  [[nodiscard]] const BlockPattern& pattern() const { return graph().pattern; }
+  [[nodiscard]] BlockPattern::Place place(std::size_t bond) const { return graph().place[bond]; }
 
  private:
   /// N and dN/dl of a bond; a slack rope has neither.
@@ -88,12 +98,23 @@ class BondSystem {
   };
   [[nodiscard]] Pull pull(std::size_t bond, double elongation, const BondMemory& memory) const;
 
+  struct Graph {
+    BlockPattern pattern;
+    std::vector<BlockPattern::Place> place;
+  };
+  /// A graph that is found once, also if several threads ask; copies of the system share it.
+  struct LazyGraph {
+    std::once_flag once;
+    std::optional<Graph> graph;
+  };
+  [[nodiscard]] const Graph& graph() const;
+
+  std::size_t spheres_;
   std::vector<std::uint32_t> end_a_, end_b_;
   Eigen::VectorXd rest_length_, stiffness_, relaxing_;
   std::vector<bool> rope_;
   double relaxation_time_s_;
-  BlockPattern pattern_;
-  std::vector<BlockPattern::Place> place_;
+  std::shared_ptr<LazyGraph> graph_ = std::make_shared<LazyGraph>();
 };
 
 }  // namespace tpm

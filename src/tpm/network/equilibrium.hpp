@@ -1,22 +1,11 @@
 #pragma once
-#include <optional>
-
-#include "tpm/network/bond_system.hpp"
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/newton_balance.hpp"
 
 namespace tpm {
 
-/// Where an equilibrium was looked for, and what came of it.
-struct EquilibriumSearch {
-  bool converged = false;
-  bool stable = true;  ///< the stiffness at the end is positive definite on what is free
-  int iterations = 0;  ///< Newton steps
-  int factorisations = 0;
-  double residual_N = 0.0;  ///< largest force left on a free sphere
-};
-
-/// Balances the forces on the free spheres of a network by Newton's method, with steps shortened
-/// until the potential of bonds and loads falls.
+/// Balances the forces on the free spheres of a network by Newton's method with a factorisation of
+/// the stiffness, whose pivots tell whether it is positive definite. For networks whose factor does
+/// not fit there is LargeEquilibrium.
 class Equilibrium {
  public:
   /// @param bonds, freedom must live as long as this
@@ -45,9 +34,6 @@ class Equilibrium {
   [[nodiscard]] const Freedom& freedom() const { return freedom_; }
 
  private:
-  [[nodiscard]] double potential(const Positions& position, const BondMemory& memory,
-                                 const Eigen::Matrix3Xd& load) const;
-
   const BondSystem& bonds_;
   const Freedom& freedom_;
   BlockMatrix<double> matrix_;

@@ -35,4 +35,17 @@ bool LatticePoints::holds(int i, int j, int k) const {
   return true;
 }
 
+double volume_per_sphere(Lattice lattice, double spacing) {
+  const double grid = std::pow(pitch_of(lattice, spacing), 3);
+  switch (lattice) {
+    case Lattice::bcc:
+      return 4.0 * grid;  // a cell of 8 grid cubes holds two
+    case Lattice::fcc:
+      return 2.0 * grid;  // and four
+    case Lattice::cubic:
+      break;
+  }
+  return grid;
+}
+
 }  // namespace tpm

@@ -28,4 +28,8 @@ class LatticePoints {
   double pitch_;
 };
 
+/// Volume that one sphere of a lattice fills up, m^3.
+/// @param spacing distance of nearest neighbours, m
+[[nodiscard]] double volume_per_sphere(Lattice lattice, double spacing);
+
 }  // namespace tpm

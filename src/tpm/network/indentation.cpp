@@ -1,0 +1,161 @@
+#include "tpm/network/indentation.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/network/equilibrium.hpp"
+#include "tpm/network/large_equilibrium.hpp"
+
+namespace tpm {
+namespace {
+
+// Met before the balance is reached, it may be the stride's fault.
+constexpr std::string_view kNotDefinite =
+    "the stiffness is not positive definite (the tissue buckles, or strides are too long)";
+constexpr double kFollowTolerance = 1e-2;  // of the first-order answer to a stride
+
+void require_valid(const PatchIndentation& indentation, const Freedom& freedom) {
+  const auto refuse = [](const std::string& got, std::string_view expected) {
+    throw bad_input("indentation", got, expected);
+  };
+  if (indentation.patch.empty()) refuse("a patch without spheres", "a wider patch");
+  for (const std::size_t sphere : indentation.patch) {
+    if (sphere >= freedom.size() || !freedom.projector(sphere).isZero(0.0)) {
+      refuse(fmt::format("sphere {} of the patch", sphere + 1), "a sphere that is held by it");
+    }
+  }
+  if (!std::isfinite(indentation.depth_m)) {
+    refuse(fmt::format("a depth of {} m", shortest(indentation.depth_m)), "a finite length");
+  }
+  if (indentation.strides < 1) refuse(fmt::format("{} strides", indentation.strides), "1 or more");
+  if (!(indentation.tolerance_N > 0.0)) {
+    refuse(fmt::format("a tolerance of {} N", shortest(indentation.tolerance_N)), "above 0");
+  }
+}
+
+BondMemory at_rest(const BondSystem& bonds, double following) {
+  return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), following};
+}
+
+[[noreturn]] void give_up(double depth_m, std::string_view why) {
+  throw Error(ExitCode::numerical, "indentation",
+              fmt::format("{} at a depth of {:.4g} mm", why, depth_m * 1e3));
+}
+
+/// The free spheres follow a motion of the patch to first order.
+void follow(const BondSystem& bonds, const Freedom& freedom, const BondMemory& memory,
+            const Eigen::Matrix3Xd& moved, const EquilibriumFinder& finder, double depth_m,
+            Positions& position) {
+  Eigen::Matrix3Xd left = Eigen::Matrix3Xd::Zero(3, moved.cols());
+  bonds.add_stiffness_times(position, memory, moved, left);
+  left = -left;
+  freedom.project(left);
+  const TangentAnswer answer = finder.solve(position, memory, left);
+  if (answer == TangentAnswer::not_definite) give_up(depth_m, kNotDefinite);
+  if (answer == TangentAnswer::failed) give_up(depth_m, "no solution with the stiffness");
+  position += moved + left;
+}
+
+}  // namespace
+
+EquilibriumFinder finder_of(Equilibrium& solver) {
+  const auto solve = [&solver](const Positions& position, const BondMemory& memory,
+                               Eigen::Matrix3Xd& forces) {
+    if (!solver.factorise(position, memory)) return TangentAnswer::failed;
+    if (!solver.is_stable()) return TangentAnswer::not_definite;
+    solver.displace(forces);
+    return TangentAnswer::solved;
+  };
+  return {solve, [&solver](Positions& position, const BondMemory& memory,
+                           const Eigen::Matrix3Xd& load, double tolerance_N) {
+            return solver.find(position, memory, load, tolerance_N);
+          }};
+}
+
+EquilibriumFinder finder_of(LargeEquilibrium& solver) {
+  const auto solve = [&solver](const Positions& position, const BondMemory& memory,
+                               Eigen::Matrix3Xd& forces) {
+    return solver.solve(position, memory, forces, kFollowTolerance);
+  };
+  return {solve, [&solver](Positions& position, const BondMemory& memory,
+                           const Eigen::Matrix3Xd& load, double tolerance_N) {
+            return solver.find(position, memory, load, tolerance_N);
+          }};
+}
+
+std::vector<std::size_t> surface_patch(const Organ& organ, const Eigen::Vector3d& point,
+                                       double radius_m) {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < organ.size(); ++i) {
+    if (organ.layer[i] != 0) continue;
+    const auto column = static_cast<Eigen::Index>(i);
+    if ((organ.position.col(column) - point).norm() <= radius_m) found.push_back(i);
+  }
+  return found;
+}
+
+std::vector<std::size_t> far_side(const Organ& organ, const Eigen::Vector3d& direction,
+                                  double thickness_m) {
+  const Eigen::VectorXd along = organ.position.transpose() * direction;
+  const double farthest = along.maxCoeff();
+  std::vector<std::size_t> found;
+  for (Eigen::Index i = 0; i < along.size(); ++i) {
+    if (along[i] >= farthest - thickness_m) found.push_back(static_cast<std::size_t>(i));
+  }
+  return found;
+}
+
+double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,
+                       std::span<const std::size_t> patch, const Eigen::Vector3d& direction,
+                       double following, double tolerance) {
+  const BondMemory memory = at_rest(solver.bonds(), following);
+  Eigen::Matrix3Xd moved = Eigen::Matrix3Xd::Zero(3, rest.cols());
+  for (const std::size_t sphere : patch) moved.col(static_cast<Eigen::Index>(sphere)) = direction;
+  const EquilibriumFinder finder{
+      [&](const Positions& position, const BondMemory& with, Eigen::Matrix3Xd& forces) {
+        return solver.solve(position, with, forces, tolerance);
+      },
+      {}};
+  Positions after = rest;
+  follow(solver.bonds(), solver.freedom(), memory, moved, finder, 0.0, after);
+  const Eigen::Matrix3Xd displacement = after - rest;
+  Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.cols());
+  solver.bonds().add_stiffness_times(rest, memory, displacement, force);
+  return displacement.cwiseProduct(force).sum();
+}
+
+IndentationResult indent(const BondSystem& bonds, const Freedom& freedom, const Positions& rest,
+                         const PatchIndentation& indentation, const EquilibriumFinder& finder) {
+  require_valid(indentation, freedom);
+  const BondMemory memory = at_rest(bonds, indentation.following);
+  const double stride = indentation.depth_m / indentation.strides;
+  const Eigen::Matrix3Xd no_load = Eigen::Matrix3Xd::Zero(3, rest.cols());
+  Eigen::Matrix3Xd moved = no_load;
+  for (const std::size_t sphere : indentation.patch) {
+    moved.col(static_cast<Eigen::Index>(sphere)) = stride * indentation.direction;
+  }
+  IndentationResult result;
+  result.position = rest;
+  for (int i = 1; i <= indentation.strides; ++i) {
+    const double depth = stride * i;
+    follow(bonds, freedom, memory, moved, finder, depth, result.position);
+    const EquilibriumSearch search =
+        finder.find(result.position, memory, no_load, indentation.tolerance_N);
+    if (!search.stable) give_up(depth, kNotDefinite);
+    if (!search.converged) give_up(depth, "the forces do not come to balance");
+    result.newton_steps += search.iterations;
+    result.residual_N = search.residual_N;
+  }
+  Eigen::Matrix3Xd force;
+  balance_forces(bonds, result.position, memory, no_load, force);
+  for (const std::size_t sphere : indentation.patch) {
+    result.force_N -= indentation.direction.dot(force.col(static_cast<Eigen::Index>(sphere)));
+  }
+  result.imbalance_N = force.rowwise().sum().norm();
+  return result;
+}
+
+}  // namespace tpm

@@ -1,0 +1,80 @@
+#pragma once
+#include <array>
+#include <memory>
+
+#include "tpm/core/word_table.hpp"
+#include "tpm/network/newton_balance.hpp"
+#include "tpm/network/stiffness_rows.hpp"
+#include "tpm/solve/multigrid.hpp"
+
+namespace tpm {
+
+/// How conjugate gradients are preconditioned.
+enum class PreconditionerKind { block_jacobi, incomplete_cholesky, multigrid };
+
+inline constexpr std::array<Word<PreconditionerKind>, 3> kPreconditionerWords{
+    {{PreconditionerKind::block_jacobi, "block_jacobi"},
+     {PreconditionerKind::incomplete_cholesky, "incomplete_cholesky"},
+     {PreconditionerKind::multigrid, "multigrid"}}};
+
+struct LargeEquilibriumOptions {
+  PreconditionerKind preconditioner = PreconditionerKind::multigrid;
+  int most_iterations = 5000;     ///< of conjugate gradients in one solution, >= 1
+  double probe_tolerance = 1e-6;  ///< of the search for negative stiffness at the end
+  std::uint64_t probe_seed = 1;
+};
+
+/// What the solutions of a LargeEquilibrium took so far.
+struct LargeEquilibriumWork {
+  int solutions = 0;
+  int preconditioners = 0;  ///< made anew
+  int iterations = 0;       ///< of conjugate gradients, without those of probes
+  int probe_iterations = 0;
+};
+
+/// Equilibrium for networks whose factor does not fit into memory: the same Newton method, its
+/// steps solved by preconditioned conjugate gradients, as exactly as they deserve (Eisenstat &
+/// Walker, SIAM J. Sci. Comput. 17, 1996, choice 2).
+///
+/// Negative stiffness is noticed where a direction of a solution shows it, and looked for with a
+/// random right-hand side at the equilibrium (probe_definiteness): `stable` means that neither met
+/// any. A search whose probe does not come to an end has not converged.
+class LargeEquilibrium {
+ public:
+  /// @param bonds, freedom must live as long as this
+  /// @param rest positions of the spheres, m: whence the rigid motions of the multigrid
+  /// Throws Error(bad_input) if a solution is allowed no iteration.
+  LargeEquilibrium(const BondSystem& bonds, const Freedom& freedom, const Positions& rest,
+                   LargeEquilibriumOptions options = {});
+
+  /// As Equilibrium::find; `factorisations` counts linear solutions.
+  [[nodiscard]] EquilibriumSearch find(Positions& position, const BondMemory& memory,
+                                       const Eigen::Matrix3Xd& load, double tolerance_N);
+
+  /// Replaces forces on the free spheres by displacements, with the stiffness at a position.
+  /// @param tolerance of sqrt(r^T M^-1 r) against its start
+  [[nodiscard]] TangentAnswer solve(const Positions& position, const BondMemory& memory,
+                                    Eigen::Matrix3Xd& vectors, double tolerance);
+
+  [[nodiscard]] const LargeEquilibriumWork& work() const { return work_; }
+  [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
+  [[nodiscard]] const Freedom& freedom() const { return freedom_; }
+  /// Nodes on each level of the last multigrid; empty without one.
+  [[nodiscard]] std::vector<std::size_t> level_sizes() const;
+
+ private:
+  [[nodiscard]] std::unique_ptr<Preconditioner> preconditioner() const;
+  /// Makes the preconditioner fit the matrix: anew, unless what there is still serves.
+  void prepare();
+
+  const BondSystem& bonds_;
+  const Freedom& freedom_;
+  LargeEquilibriumOptions options_;
+  RigidModes<3> modes_;
+  StiffnessRows stiffness_;
+  std::unique_ptr<Preconditioner> preconditioner_;
+  double rate_when_new_ = 0.0, last_rate_ = 0.0;  ///< iterations per decade; 0: not known yet
+  LargeEquilibriumWork work_;
+};
+
+}  // namespace tpm

@@ -1,0 +1,31 @@
+#pragma once
+#include "tpm/network/freedom.hpp"
+#include "tpm/solve/block_rows.hpp"
+
+namespace tpm {
+
+/// The stiffness matrix of what is free, by rows, for solvers that iterate: P K P + s (1 - P) as
+/// Freedom::constrain makes it, without the blocks between spheres of which one is held.
+class StiffnessRows {
+ public:
+  /// @param bonds, freedom must live as long as this
+  StiffnessRows(const BondSystem& bonds, const Freedom& freedom);
+
+  /// The matrix at a position; the one before is overwritten.
+  const BlockRows<3, 3>& assemble(const Positions& position, const BondMemory& memory);
+  [[nodiscard]] const BlockRows<3, 3>& matrix() const { return matrix_; }
+
+ private:
+  void constrain();
+
+  const BondSystem& bonds_;
+  const Freedom& freedom_;
+  BlockRows<3, 3> matrix_;
+  std::vector<std::size_t> diagonal_;  ///< where each sphere's block stands
+  struct Pair {
+    std::size_t ab, ba;
+  };
+  std::vector<Pair> off_diagonal_;  ///< where each bond's blocks stand; kNone where left out
+};
+
+}  // namespace tpm

@@ -1,0 +1,171 @@
+// Iterative solvers against the direct one: linear systems, equilibria, buckling.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "indented_scene.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/network/liver.hpp"
+#include "tpm/network/simple_organs.hpp"
+#include "tpm/solve/preconditioners.hpp"
+
+using namespace tpm;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+Eigen::Matrix3Xd random_forces(const Freedom& freedom) {
+  Eigen::Matrix3Xd forces(3, static_cast<Eigen::Index>(freedom.size()));
+  Random random(3);
+  for (double& value : forces.reshaped()) value = random.normal();
+  freedom.project(forces);
+  return forces;
+}
+
+BondMemory no_memory(const BondSystem& bonds) {
+  return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
+}
+
+}  // namespace
+
+TEST_CASE("conjugate gradients solve what the factorisation solves") {
+  IndentedScene scene(solid_liver(1500), 0.02, 0.03);
+  scene.freedom.guide(700, Eigen::Vector3d(1, 2, 2) / 3.0);  // one that is partly free
+  const BondMemory memory = no_memory(scene.bonds);
+  Equilibrium direct(scene.bonds, scene.freedom);
+  REQUIRE(direct.factorise(scene.rest(), memory));
+  const Eigen::Matrix3Xd forces = random_forces(scene.freedom);
+  Eigen::Matrix3Xd exact = forces;
+  direct.displace(exact);
+  for (const auto& entry : kPreconditionerWords) {
+    LargeEquilibriumOptions options;
+    options.preconditioner = entry.meaning;
+    LargeEquilibrium large(scene.bonds, scene.freedom, scene.rest(), options);
+    Eigen::Matrix3Xd x = forces;
+    CAPTURE(entry.text);
+    REQUIRE(large.solve(scene.rest(), memory, x, 1e-12) == TangentAnswer::solved);
+    CAPTURE(large.work().iterations);
+    CHECK((x - exact).norm() < 1e-9 * exact.norm());
+  }
+}
+
+TEST_CASE("the preconditioners are symmetric") {
+  const IndentedScene scene(solid_liver(1500), 0.02, 0.03);
+  StiffnessRows stiffness(scene.bonds, scene.freedom);
+  const auto& matrix = stiffness.assemble(scene.rest(), no_memory(scene.bonds));
+  RigidModes<3> modes(scene.freedom.size());
+  for (std::size_t i = 0; i < modes.size(); ++i) {
+    modes[i].setZero();
+    modes[i].leftCols<3>() = scene.freedom.projector(i);
+  }
+  const BlockJacobi jacobi(matrix);
+  const IncompleteCholesky cholesky(matrix);
+  const Multigrid multigrid(matrix, modes);
+  const Eigen::Matrix3Xd a = random_forces(scene.freedom);
+  const Eigen::Matrix3Xd b = a.rowwise().reverse();
+  for (const Preconditioner* p :
+       {static_cast<const Preconditioner*>(&jacobi), static_cast<const Preconditioner*>(&cholesky),
+        static_cast<const Preconditioner*>(&multigrid)}) {
+    REQUIRE(p->definite());
+    Eigen::Matrix3Xd pa;
+    Eigen::Matrix3Xd pb;
+    p->apply(a, pa);
+    p->apply(b, pb);
+    CHECK_THAT(b.cwiseProduct(pa).sum(),
+               WithinAbs(a.cwiseProduct(pb).sum(), 1e-12 * pa.norm() * b.norm()));
+    CHECK(a.cwiseProduct(pa).sum() > 0.0);
+  }
+}
+
+TEST_CASE("iterative and direct equilibria of the paper's liver are the same") {
+  compare_solvers({paper_liver(), 0.03, 0.05});
+}
+
+TEST_CASE("multigrid needs about as many iterations for more spheres, block Jacobi more") {
+  const auto iterations = [](int cells, PreconditionerKind kind) {
+    const IndentedScene scene(block(cells, cells, cells, 0.1 / cells, Lattice::fcc), 0.03, 0.02,
+                              -Eigen::Vector3d::UnitZ());
+    LargeEquilibriumOptions options;
+    options.preconditioner = kind;
+    LargeEquilibrium large(scene.bonds, scene.freedom, scene.rest(), options);
+    Eigen::Matrix3Xd x = random_forces(scene.freedom);
+    REQUIRE(large.solve(scene.rest(), no_memory(scene.bonds), x, 1e-8) == TangentAnswer::solved);
+    return large.work().iterations;
+  };
+  const int small = iterations(6, PreconditionerKind::multigrid);
+  const int large = iterations(14, PreconditionerKind::multigrid);
+  const int small_jacobi = iterations(6, PreconditionerKind::block_jacobi);
+  const int large_jacobi = iterations(14, PreconditionerKind::block_jacobi);
+  CAPTURE(small, large, small_jacobi, large_jacobi);
+  CHECK(large <= small + small / 2);
+  CHECK(large_jacobi >= 2 * small_jacobi);
+  CHECK(large_jacobi >= 4 * large);
+}
+
+TEST_CASE("a column pressed beyond its buckling load is found unstable by both solvers") {
+  // Straight between smooth plates it stays in balance; only the sign of the stiffness tells.
+  const Organ column = block(2, 2, 24, 0.01, Lattice::cubic);
+  const Network network = build_network(column, {}, "column");
+  const BondSystem bonds(network, TpmParameters{});
+  Freedom freedom(column.size());
+  const double top = column.position.row(2).maxCoeff();
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    const double z = column.position(2, static_cast<Eigen::Index>(i));
+    if (z < 1e-9 || z > top - 1e-9) freedom.hold(i);
+  }
+  const BondMemory memory = no_memory(bonds);
+  const Eigen::Matrix3Xd no_load = Eigen::Matrix3Xd::Zero(3, column.position.cols());
+  bool buckled = false;
+  bool stood = false;
+  for (const double compression : {0.005, 0.02, 0.08}) {
+    Positions pressed = column.position;
+    pressed.row(2) *= 1.0 - compression;
+    Positions again = pressed;
+    Equilibrium direct(bonds, freedom);
+    LargeEquilibrium large(bonds, freedom, column.position);
+    const EquilibriumSearch a = direct.find(pressed, memory, no_load, 1e-9);
+    const EquilibriumSearch b = large.find(again, memory, no_load, 1e-9);
+    CAPTURE(compression, a.stable, b.stable, a.converged, b.converged);
+    CHECK(a.stable == b.stable);
+    buckled = buckled || !b.stable;
+    stood = stood || (b.stable && b.converged);
+  }
+  CHECK(stood);
+  CHECK(buckled);
+}
+
+TEST_CASE("a probe with random forces finds loose spheres that the load does not stir") {
+  // A cubic lattice without diagonals, pushed exactly along its bonds, carries the load.
+  NetworkOptions narrow;
+  narrow.support = 1.1;
+  const Organ organ = block(3, 3, 3, 0.01, Lattice::cubic);
+  const Network network = build_network(organ, narrow, "lattice");
+  const BondSystem bonds(network, TpmParameters{});
+  Freedom freedom(organ.size());
+  for (std::size_t i = 0; i < 16; ++i) freedom.hold(i);
+  LargeEquilibrium large(bonds, freedom, organ.position);
+  Positions position = organ.position;
+  const EquilibriumSearch search = large.find(
+      position, no_memory(bonds), Eigen::Matrix3Xd::Zero(3, organ.position.cols()), 1e-9);
+  CHECK(search.converged);
+  CHECK_FALSE(search.stable);
+}
+
+TEST_CASE("an indentation refuses what it cannot do") {
+  const IndentedScene scene(block(4, 4, 4, 0.01, Lattice::fcc), 0.015, 0.005,
+                            -Eigen::Vector3d::UnitZ());
+  Equilibrium direct(scene.bonds, scene.freedom);
+  const auto run = [&](const PatchIndentation& push) {
+    return indent(scene.bonds, scene.freedom, scene.rest(), push, finder_of(direct));
+  };
+  PatchIndentation none = scene.push;
+  none.patch.clear();
+  CHECK_THROWS_WITH(run(none), Catch::Contains("without spheres"));
+  PatchIndentation still = scene.push;
+  still.strides = 0;
+  CHECK_THROWS_WITH(run(still), Catch::Contains("0 strides"));
+  PatchIndentation far = scene.push;
+  far.depth_m = 0.05;  // through the block
+  CHECK_THROWS_AS(run(far), Error);
+}
