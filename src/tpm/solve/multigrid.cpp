@@ -247,7 +247,8 @@ void Multigrid::factorise_coarsest() {
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(6 * n, 6 * n);
   for (std::size_t i = 0; i < matrix.rows(); ++i) {
     for (std::size_t p = matrix.begin[i]; p < matrix.begin[i + 1]; ++p) {
-      dense.block<6, 6>(6 * static_cast<Eigen::Index>(i), 6 * matrix.column[p]) = matrix.block[p];
+      dense.block<6, 6>(6 * static_cast<Eigen::Index>(i),
+                        6 * static_cast<Eigen::Index>(matrix.column[p])) = matrix.block[p];
     }
   }
   coarsest_.compute(dense);
