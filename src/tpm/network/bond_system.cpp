@@ -78,7 +78,7 @@ Eigen::Matrix3d BondSystem::stiffness_block(std::size_t bond, const Positions& p
 }
 
 void BondSystem::add_stiffness(const Positions& position, const BondMemory& memory,
-                               BlockMatrix<double>& matrix) const {
+                               BlockMatrix& matrix) const {
   const Graph& on = graph();
   for (std::size_t i = 0; i < size(); ++i) {
     const Eigen::Matrix3d block = stiffness_block(i, position, memory);

@@ -60,7 +60,7 @@ class BondSystem {
 
   /// Adds the stiffness matrix -d force / d position.
   void add_stiffness(const Positions& position, const BondMemory& memory,
-                     BlockMatrix<double>& matrix) const;
+                     BlockMatrix& matrix) const;
 
   /// The change of each bond's elongation, m, under small displacements of the spheres, m.
   void elongation_changes(const Positions& position, const Eigen::Matrix3Xd& displacement,

@@ -29,15 +29,15 @@ class Equilibrium {
   /// the stiffness of the last factorisation.
   void displace(Eigen::Ref<Eigen::Matrix3Xd> vectors) const;
 
-  [[nodiscard]] const BlockLdlt<double>& factor() const { return factor_; }
+  [[nodiscard]] const BlockLdlt& factor() const { return factor_; }
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Freedom& freedom() const { return freedom_; }
 
  private:
   const BondSystem& bonds_;
   const Freedom& freedom_;
-  BlockMatrix<double> matrix_;
-  BlockLdlt<double> factor_;
+  BlockMatrix matrix_;
+  BlockLdlt factor_;
 };
 
 }  // namespace tpm

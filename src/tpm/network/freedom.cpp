@@ -54,7 +54,7 @@ void Freedom::project(LaneMatrix& vectors) const {
   }
 }
 
-void Freedom::constrain(const BondSystem& bonds, BlockMatrix<double>& matrix) const {
+void Freedom::constrain(const BondSystem& bonds, BlockMatrix& matrix) const {
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const std::uint32_t a = bonds.end_a()[i];
     const std::uint32_t b = bonds.end_b()[i];

@@ -39,7 +39,7 @@ class Freedom {
 
   /// P K P + s (1 - P): the stiffness that the free coordinates feel, and a harmless one elsewhere.
   /// @param matrix on bonds.pattern()
-  void constrain(const BondSystem& bonds, BlockMatrix<double>& matrix) const;
+  void constrain(const BondSystem& bonds, BlockMatrix& matrix) const;
 
  private:
   enum class State { free, partly, held };

@@ -79,7 +79,7 @@ class InertialEquation {
   /// Unit vector along a bond, and its length.
   [[nodiscard]] Eigen::Vector3d along(std::size_t bond, double& length) const;
   void add_bond_entries(std::vector<Eigen::Triplet<double, std::int64_t>>& entries,
-                        std::size_t bond, const BlockMatrix<double>& stiffness) const;
+                        std::size_t bond, const BlockMatrix& stiffness) const;
 
   const DrivenTissue& tissue_;
   Positions rest_;
@@ -95,8 +95,8 @@ class InertialEquation {
   BondMemory memory_;
 
   // Newton's matrix.
-  BlockMatrix<double> matrix_;
-  BlockLdlt<double> factor_;
+  BlockMatrix matrix_;
+  BlockLdlt factor_;
   double gamma_ = 0.0;
   Positions factorised_at_;
 };

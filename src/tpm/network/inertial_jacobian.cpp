@@ -16,7 +16,7 @@ void add_block(Triplets& entries, Eigen::Index row, Eigen::Index column,
 }  // namespace
 
 void InertialEquation::add_bond_entries(Triplets& entries, std::size_t bond,
-                                        const BlockMatrix<double>& stiffness) const {
+                                        const BlockMatrix& stiffness) const {
   const BondSystem& bonds = tissue_.bonds();
   const auto row = static_cast<Eigen::Index>(bond);
   const std::uint32_t a = bonds.end_a()[bond];
@@ -63,7 +63,7 @@ void InertialEquation::add_bond_entries(Triplets& entries, std::size_t bond,
 InertialEquation::Sparse InertialEquation::jacobian(double time_s, const ConstVector& state) {
   const BondSystem& bonds = tissue_.bonds();
   const TissueMotion& now = unpack(time_s, state);
-  BlockMatrix<double> stiffness(bonds.pattern());
+  BlockMatrix stiffness(bonds.pattern());
   bonds.add_stiffness(now.position, {now.remembered, 0.0}, stiffness);
   Triplets entries;
   for (Eigen::Index i = 0; i < coordinates(); ++i) {

@@ -33,7 +33,7 @@ class InverseIteration {
   double lowest(double following) {
     const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())),
                             following};
-    BlockMatrix<double> matrix(bonds_.pattern());
+    BlockMatrix matrix(bonds_.pattern());
     bonds_.add_stiffness(rest_, memory, matrix);
     freedom_.constrain(bonds_, matrix);
     if (!factor_.factorise(matrix) || factor_.negative_count() > 0) {
@@ -77,7 +77,7 @@ class InverseIteration {
   const BondSystem& bonds_;
   const Positions& rest_;
   const Freedom& freedom_;
-  BlockLdlt<double> factor_;
+  BlockLdlt factor_;
   Eigen::VectorXd mass_;   ///< of each coordinate
   Eigen::MatrixXd basis_;  ///< one column a vector, M-orthonormal
 };

@@ -19,25 +19,24 @@ constexpr int kInverseIterations = 4;   // each gains about nine digits over wha
 constexpr double kTakesPart = 0.01;     // of the largest motion in the modes
 
 /// The matrix at rest plus a multiple of 1 on what is free.
-BlockMatrix<double> shifted(const BlockMatrix<double>& stiffness, const Freedom& freedom,
-                            double shift) {
-  BlockMatrix<double> matrix = stiffness;
+BlockMatrix shifted(const BlockMatrix& stiffness, const Freedom& freedom, double shift) {
+  BlockMatrix matrix = stiffness;
   for (std::size_t i = 0; i < freedom.size(); ++i) {
     matrix.diagonal[i] += shift * freedom.projector(i);
   }
   return matrix;
 }
 
-double mean_diagonal(const BlockMatrix<double>& matrix) {
+double mean_diagonal(const BlockMatrix& matrix) {
   double sum = 0.0;
   for (const Eigen::Matrix3d& block : matrix.diagonal) sum += block.trace();
   return sum / (3.0 * static_cast<double>(matrix.diagonal.size()));
 }
 
 /// An orthonormal basis of the softest motions, one column each, coordinates of all spheres.
-Eigen::MatrixXd softest(const BlockPattern& pattern, const BlockMatrix<double>& matrix,
+Eigen::MatrixXd softest(const BlockPattern& pattern, const BlockMatrix& matrix,
                         const Freedom& freedom, Eigen::Index count) {
-  BlockLdlt<double> factor(pattern);
+  BlockLdlt factor(pattern);
   const auto n = static_cast<Eigen::Index>(freedom.size());
   Eigen::MatrixXd basis(3 * n, count);
   Random random(1);
@@ -75,14 +74,14 @@ std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::si
 ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
                                   const Freedom& freedom) {
   const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
-  BlockMatrix<double> stiffness(bonds.pattern());
+  BlockMatrix stiffness(bonds.pattern());
   bonds.add_stiffness(rest, none, stiffness);
   const double mean = mean_diagonal(stiffness);
   const double size = mean > 0.0 ? mean : 1.0;
   freedom.constrain(bonds, stiffness);
 
   ZeroEnergyModes modes;
-  BlockLdlt<double> factor(bonds.pattern());
+  BlockLdlt factor(bonds.pattern());
   if (!factor.factorise(shifted(stiffness, freedom, -kZero * size))) {
     throw Error(ExitCode::numerical, "network", "the stiffness at rest cannot be factorised");
   }

@@ -5,10 +5,34 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "tpm/core/wide_vectors.hpp"
+
 namespace tpm {
 namespace {
 
 using Edge = std::array<std::uint32_t, 2>;
+
+/// C = A B^T, where A and C are by columns and B is padded.
+[[gnu::always_inline]] inline void multiply_transposed(const double* a, const double* b,
+                                                       double* c) {
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) {
+      c[3 * column + row] =
+          a[row] * b[column] + a[3 + row] * b[4 + column] + a[6 + row] * b[8 + column];
+    }
+  }
+}
+
+/// W -= A F, where A and W are padded and F is by columns.
+[[gnu::always_inline]] inline void subtract_product(const double* a, const double* f, double* w) {
+  using Column [[gnu::vector_size(32)]] = double;
+  const auto* const from = reinterpret_cast<const Column*>(a);
+  auto* const to = reinterpret_cast<Column*>(w);
+  const Column a0 = from[0], a1 = from[1], a2 = from[2];
+  to[0] -= a0 * f[0] + a1 * f[1] + a2 * f[2];
+  to[1] -= a0 * f[3] + a1 * f[4] + a2 * f[5];
+  to[2] -= a0 * f[6] + a1 * f[7] + a2 * f[8];
+}
 
 /// The place of each node in an elimination order with little fill.
 std::vector<std::uint32_t> elimination_order(std::size_t nodes, std::span<const Edge> edges) {
@@ -88,91 +112,99 @@ BlockPattern::Place BlockPattern::place(std::uint32_t a, std::uint32_t b) const 
   return {static_cast<std::uint32_t>(found - row_.begin()), order_[a] == low};
 }
 
-template <typename Scalar>
-void BlockMatrix<Scalar>::set_zero() {
-  std::fill(diagonal.begin(), diagonal.end(), Block::Zero());
-  std::fill(below.begin(), below.end(), Block::Zero());
+void BlockMatrix::set_zero() {
+  std::fill(diagonal.begin(), diagonal.end(), Eigen::Matrix3d::Zero());
+  std::fill(below.begin(), below.end(), Eigen::Matrix3d::Zero());
 }
 
-template <typename Scalar>
-BlockLdlt<Scalar>::BlockLdlt(const BlockPattern& pattern)
+BlockLdlt::BlockLdlt(const BlockPattern& pattern)
     : pattern_(pattern),
       node_of_(pattern.nodes()),
       lower_(pattern.factor_blocks()),
       pivot_(pattern.nodes()),
       inverse_(pattern.nodes()),
-      work_(pattern.nodes(), Block::Zero()),
+      work_(pattern.nodes()),
       permuted_(3, static_cast<Eigen::Index>(pattern.nodes())) {
   for (std::uint32_t node = 0; node < node_of_.size(); ++node) {
     node_of_[pattern.order_[node]] = node;
   }
 }
 
-template <typename Scalar>
-void BlockLdlt<Scalar>::gather_column(const BlockMatrix<Scalar>& matrix, std::uint32_t column) {
-  work_[column] = matrix.diagonal[node_of_[column]];
+void BlockLdlt::gather_column(const BlockMatrix& matrix, std::uint32_t column) {
+  work_[column].matrix() = matrix.diagonal[node_of_[column]];
   for (std::uint32_t p = pattern_.column_[column]; p < pattern_.column_[column + 1]; ++p) {
-    work_[pattern_.row_[p]] = matrix.below[p];
+    work_[pattern_.row_[p]].matrix() = matrix.below[p];
   }
 }
 
-template <typename Scalar>
-void BlockLdlt<Scalar>::eliminate_before(std::uint32_t column) {
-  for (std::uint32_t e = pattern_.row_begin_[column]; e < pattern_.row_begin_[column + 1]; ++e) {
-    const auto [k, at] = pattern_.row_entry_[e];
-    const Block factor = pivot_[k] * lower_[at].transpose();
-    for (std::uint32_t p = at; p < pattern_.column_[k + 1]; ++p) {
-      work_[pattern_.row_[p]].noalias() -= lower_[p].lazyProduct(factor);
+void BlockLdlt::eliminate_before(std::uint32_t column) {
+  const BlockPattern::RowEntry* const entries = pattern_.row_entry_.data();
+  const std::uint32_t begin = pattern_.row_begin_[column];
+  const std::uint32_t end = pattern_.row_begin_[column + 1];
+  const std::uint32_t* const columns = pattern_.column_.data();
+  const std::uint32_t* const row = pattern_.row_.data();
+  const PaddedBlock* const lower = lower_.data();
+  const Eigen::Matrix3d* const pivot = pivot_.data();
+  PaddedBlock* const work = work_.data();
+  run_wide([=]() __attribute__((always_inline)) {
+    for (std::uint32_t e = begin; e < end; ++e) {
+      const auto [k, at] = entries[e];
+      std::array<double, 9> factor;  // pivot times the transposed block, by columns
+      multiply_transposed(pivot[k].data(), lower[at].column.data(), factor.data());
+      const std::uint32_t last = columns[k + 1];
+      for (std::uint32_t p = at; p < last; ++p) {
+        subtract_product(lower[p].column.data(), factor.data(), work[row[p]].column.data());
+      }
     }
-  }
+  });
 }
 
-template <typename Scalar>
-bool BlockLdlt<Scalar>::factorise(const BlockMatrix<Scalar>& matrix) {
+bool BlockLdlt::invert_pivot(std::uint32_t column) {
+  Eigen::Matrix3d& pivot = pivot_[column];
+  pivot = 0.5 * (work_[column].matrix() + work_[column].matrix().transpose());
+  if (!pivot.allFinite()) return false;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> signs;
+  signs.computeDirect(pivot, Eigen::EigenvaluesOnly);
+  negative_ += static_cast<std::size_t>((signs.eigenvalues().array() < 0.0).count());
+  bool invertible = false;
+  pivot.computeInverseWithCheck(inverse_[column], invertible, 0.0);
+  return invertible;
+}
+
+bool BlockLdlt::factorise(const BlockMatrix& matrix) {
   negative_ = 0;
   const auto n = static_cast<std::uint32_t>(pattern_.nodes());
   for (std::uint32_t j = 0; j < n; ++j) {
     gather_column(matrix, j);
     eliminate_before(j);
-    pivot_[j] = Scalar(0.5) * (work_[j] + work_[j].transpose());
-    if (!pivot_[j].allFinite()) return false;
-    Eigen::SelfAdjointEigenSolver<Block> signs;
-    signs.computeDirect(pivot_[j], Eigen::EigenvaluesOnly);
-    negative_ += static_cast<std::size_t>((signs.eigenvalues().array() < Scalar(0)).count());
-    bool invertible = false;
-    pivot_[j].computeInverseWithCheck(inverse_[j], invertible, Scalar(0));
-    if (!invertible) return false;
+    if (!invert_pivot(j)) return false;
     for (std::uint32_t p = pattern_.column_[j]; p < pattern_.column_[j + 1]; ++p) {
-      lower_[p] = work_[pattern_.row_[p]].lazyProduct(inverse_[j]);
+      lower_[p].matrix() = work_[pattern_.row_[p]].matrix().lazyProduct(inverse_[j]);
     }
   }
   return true;
 }
 
-template <typename Scalar>
-void BlockLdlt<Scalar>::solve(Eigen::Ref<Vectors> x) const {
+// A Ref is a view: what it shows is changed.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
+void BlockLdlt::solve(Eigen::Ref<Eigen::Matrix3Xd> x) const {
   const auto n = static_cast<std::uint32_t>(pattern_.nodes());
-  Vectors& y = permuted_;
+  Eigen::Matrix3Xd& y = permuted_;
   for (std::uint32_t j = 0; j < n; ++j) y.col(j) = x.col(node_of_[j]);
   for (std::uint32_t j = 0; j < n; ++j) {
-    const Eigen::Matrix<Scalar, 3, 1> value = y.col(j);
+    const Eigen::Vector3d value = y.col(j);
     for (std::uint32_t p = pattern_.column_[j]; p < pattern_.column_[j + 1]; ++p) {
-      y.col(pattern_.row_[p]).noalias() -= lower_[p] * value;
+      y.col(pattern_.row_[p]).noalias() -= lower_[p].matrix() * value;
     }
   }
   for (std::uint32_t j = n; j-- > 0;) {
-    Eigen::Matrix<Scalar, 3, 1> value = inverse_[j] * y.col(j);
+    Eigen::Vector3d value = inverse_[j] * y.col(j);
     for (std::uint32_t p = pattern_.column_[j]; p < pattern_.column_[j + 1]; ++p) {
-      value.noalias() -= lower_[p].transpose() * y.col(pattern_.row_[p]);
+      value.noalias() -= lower_[p].matrix().transpose() * y.col(pattern_.row_[p]);
     }
     y.col(j) = value;
   }
   for (std::uint32_t j = 0; j < n; ++j) x.col(node_of_[j]) = y.col(j);
 }
-
-template struct BlockMatrix<double>;
-template struct BlockMatrix<float>;
-template class BlockLdlt<double>;
-template class BlockLdlt<float>;
 
 }  // namespace tpm

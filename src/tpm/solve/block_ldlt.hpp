@@ -35,7 +35,6 @@ class BlockPattern {
   [[nodiscard]] Place place(std::uint32_t a, std::uint32_t b) const;
 
  private:
-  template <typename Scalar>
   friend class BlockLdlt;
   friend class LaneFactor;
 
@@ -55,50 +54,57 @@ class BlockPattern {
 
 /// A symmetric matrix of 3x3 blocks on a pattern: the diagonal and what lies below it, in the order
 /// of the factor.
-template <typename Scalar>
 struct BlockMatrix {
-  using Block = Eigen::Matrix<Scalar, 3, 3>;
-
   explicit BlockMatrix(const BlockPattern& pattern)
-      : diagonal(pattern.nodes(), Block::Zero()), below(pattern.factor_blocks(), Block::Zero()) {}
+      : diagonal(pattern.nodes(), Eigen::Matrix3d::Zero()),
+        below(pattern.factor_blocks(), Eigen::Matrix3d::Zero()) {}
   void set_zero();
 
-  std::vector<Block> diagonal;  ///< of each node, in the order of the nodes
-  std::vector<Block> below;     ///< where BlockPattern::place says
+  std::vector<Eigen::Matrix3d> diagonal;  ///< of each node, in the order of the nodes
+  std::vector<Eigen::Matrix3d> below;     ///< where BlockPattern::place says
+};
+
+/// A 3x3 block by columns, each filled up with a 0: vectors of the processor.
+struct alignas(32) PaddedBlock {
+  std::array<double, 12> column{};
+
+  [[nodiscard]] auto matrix() const {
+    return Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>>(column.data());
+  }
+  [[nodiscard]] auto matrix() {
+    return Eigen::Map<Eigen::Matrix3d, 0, Eigen::OuterStride<4>>(column.data());
+  }
 };
 
 /// L D L^T of a symmetric matrix with 3x3 pivots, without exchange of rows: stable for positive
 /// definite matrices, and for others good enough to count signs.
 ///
 /// factorise() and solve() allocate nothing.
-template <typename Scalar>
 class BlockLdlt {
  public:
-  using Block = typename BlockMatrix<Scalar>::Block;
-  using Vectors = Eigen::Matrix<Scalar, 3, Eigen::Dynamic>;
-
   /// @param pattern must live as long as this
   explicit BlockLdlt(const BlockPattern& pattern);
 
   /// False if a pivot cannot be inverted or is not finite; the factor is then of no use.
-  [[nodiscard]] bool factorise(const BlockMatrix<Scalar>& matrix);
+  [[nodiscard]] bool factorise(const BlockMatrix& matrix);
   /// Of the last factorisation: eigenvalues below 0 that the matrix has (Sylvester's law).
   [[nodiscard]] std::size_t negative_count() const { return negative_; }
 
   /// Replaces the right-hand side, one column per node, by the solution.
-  void solve(Eigen::Ref<Vectors> x) const;
+  void solve(Eigen::Ref<Eigen::Matrix3Xd> x) const;
 
  private:
   friend class LaneFactor;
-  void gather_column(const BlockMatrix<Scalar>& matrix, std::uint32_t column);
+  void gather_column(const BlockMatrix& matrix, std::uint32_t column);
   void eliminate_before(std::uint32_t column);
+  [[nodiscard]] bool invert_pivot(std::uint32_t column);
 
   const BlockPattern& pattern_;
   std::vector<std::uint32_t> node_of_;  ///< node at each place of the factor
-  std::vector<Block> lower_;            ///< L, in the places of the pattern
-  std::vector<Block> pivot_, inverse_;
-  std::vector<Block> work_;  ///< a column being updated, by row
-  mutable Vectors permuted_;
+  std::vector<PaddedBlock> lower_;      ///< L, in the places of the pattern
+  std::vector<Eigen::Matrix3d> pivot_, inverse_;
+  std::vector<PaddedBlock> work_;  ///< a column being updated, by row
+  mutable Eigen::Matrix3Xd permuted_;
   std::size_t negative_ = 0;
 };
 

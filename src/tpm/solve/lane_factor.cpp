@@ -33,11 +33,12 @@ LaneFactor::LaneFactor(const BlockPattern& pattern)
   }
 }
 
-void LaneFactor::copy(const BlockLdlt<double>& factor) {
-  const auto put = [](const Eigen::Matrix3d& from, Block& to) {
-    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(to.data()) = from.cast<float>();
+void LaneFactor::copy(const BlockLdlt& factor) {
+  const auto put = [](const auto& from, Block& to) {
+    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(to.data()) =
+        from.template cast<float>();
   };
-  for (std::size_t i = 0; i < lower_.size(); ++i) put(factor.lower_[i], lower_[i]);
+  for (std::size_t i = 0; i < lower_.size(); ++i) put(factor.lower_[i].matrix(), lower_[i]);
   for (std::size_t i = 0; i < inverse_.size(); ++i) put(factor.inverse_[i], inverse_[i]);
 }
 

@@ -22,7 +22,7 @@ class LaneFactor {
   explicit LaneFactor(const BlockPattern& pattern);
 
   /// @param factor of a matrix on the same pattern, factorised
-  void copy(const BlockLdlt<double>& factor);
+  void copy(const BlockLdlt& factor);
 
   /// Replaces the right-hand sides, three columns per node, by the solutions, to about 1e-5 of
   /// them for matrices that are not near singular.
