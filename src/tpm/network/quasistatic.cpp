@@ -48,22 +48,26 @@ class StepGrowth {
 class Run {
  public:
   Run(const BondSystem& bonds, const Positions& rest, const Freedom& freedom, const Probe& probe,
-      const QuasiStaticOptions& options, const Protocol& protocol, std::span<const double> times_s)
+      const QuasiStaticOptions& options, const Protocol& protocol, std::span<const double> times_s,
+      const QuasiStaticObserver& observer)
       : protocol_(protocol),
         options_(options),
         times_s_(times_s),
+        observer_(observer),
         tissue_(bonds, rest, freedom, probe, protocol.drive()),
         stages_(tissue_, options.stages, !options.step_s) {
     order_ = rising_order(times_s);
     result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
   }
 
-  QuasiStaticRun go() {
-    start();
+  QuasiStaticRun go(const QuasiStaticState* begin) {
+    begin ? start_from(*begin) : start();
     const auto knots = protocol_.knots();
     for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
-      const Knot& from = knots[k];
+      Knot from = knots[k];
       const Knot& to = knots[k + 1];
+      if (begin && to.time_s <= begin->time_s) continue;
+      if (begin && from.time_s < begin->time_s) from = {state_.time_s, state_.imposed};
       if (to.time_s == from.time_s) {
         jump(to.value);
       } else {
@@ -74,10 +78,7 @@ class Run {
     const int rejected = result_.work.rejected;
     result_.work = stages_.work();
     result_.work.rejected = rejected;
-    if (options_.energies) {
-      energy_.stored_J = stored_J();
-      result_.energy = energy_;
-    }
+    if (options_.energies) result_.energy = energy_of(state_, energy_);
     result_.position = state_.position;
     result_.remembered = state_.remembered;
     return std::move(result_);
@@ -104,10 +105,30 @@ class Run {
     }
   }
 
+  /// A state is known up to the tolerance of the run that found it; its forces are balanced here.
+  void start_from(const QuasiStaticState& begin) {
+    state_ = tissue_.at_rest(begin.time_s);
+    stages_.set_scale(tissue_.linear_response(state_, protocol_.peak()));
+    stages_.see(begin.response);
+    state_.position = begin.position;
+    state_.remembered = begin.remembered;
+    tissue_.bonds().elongations(state_.position, state_.elongation);
+    state_.imposed = begin.imposed;
+    if (begin.energy) energy_ = *begin.energy;
+    follow(begin.imposed, false);
+  }
+
   void jump(double value) { move_to(value, false); }
 
   [[nodiscard]] double stored_J() const {
     return tissue_.bonds().stored_energy_J(state_.position, state_.remembered);
+  }
+
+  /// The account of the energy where the tissue is in a state.
+  [[nodiscard]] QuasiStaticEnergy energy_of(const TissueState& state,
+                                            QuasiStaticEnergy spent) const {
+    spent.stored_J = tissue_.bonds().stored_energy_J(state.position, state.remembered);
+    return spent;
   }
 
   /// Goes to an imposed value through equilibria, at once or with everything relaxed on the way.
@@ -194,7 +215,7 @@ class Run {
 
   void stand_still(double until_s) {
     while (next_ < order_.size() && times_s_[order_[next_]] < until_s) {
-      put(tissue_.response(state_));
+      put(tissue_.response(state_), state_, energy_);
     }
     state_.time_s = until_s;
   }
@@ -212,8 +233,22 @@ class Run {
       if (count == 0) return;
       const LaneVector responses =
           stages_.responses_within(state_, {fractions.data(), count}, h, rate);
-      for (std::size_t i = 0; i < count; ++i) put(responses[static_cast<Eigen::Index>(i)]);
+      for (std::size_t i = 0; i < count; ++i) {
+        const double response = responses[static_cast<Eigen::Index>(i)];
+        observer_ ? show_within(response, fractions[i], h, rate) : put(response);
+      }
     }
+  }
+
+  /// A response within the step just found, with the state there.
+  void show_within(double response, double fraction, double h, double rate) {
+    QuasiStaticEnergy spent = energy_;
+    if (options_.energies) {
+      const QuasiStaticEnergy part = stages_.energy_of_step(state_, h, rate, fraction);
+      spent.work_J += part.work_J;
+      spent.dissipated_J += part.dissipated_J;
+    }
+    put(response, stages_.state_within(state_, fraction, h, rate), spent);
   }
 
   /// The last value held for as long as is asked, and for ever.
@@ -227,7 +262,7 @@ class Run {
         cross({state_.time_s, last.value}, {latest, last.value});
         continue;
       }
-      put(tissue_.response(state_));
+      put(tissue_.response(state_), state_, energy_);
     }
   }
 
@@ -243,9 +278,20 @@ class Run {
     result_.response[static_cast<Eigen::Index>(order_[next_++])] = response;
   }
 
+  void put(double response, const TissueState& state, const QuasiStaticEnergy& spent) {
+    const double time_s = times_s_[order_[next_]];
+    put(response);
+    if (!observer_) return;
+    QuasiStaticState shown{time_s,         state.imposed,    response,
+                           state.position, state.remembered, std::nullopt};
+    if (options_.energies) shown.energy = energy_of(state, spent);
+    observer_(shown);
+  }
+
   const Protocol& protocol_;
   const QuasiStaticOptions& options_;
   std::span<const double> times_s_;
+  const QuasiStaticObserver& observer_;
   std::vector<std::size_t> order_;  ///< of times_s_, rising
   std::size_t next_ = 0;            ///< the first of them not answered yet
   DrivenTissue tissue_;
@@ -254,6 +300,22 @@ class Run {
   QuasiStaticEnergy energy_;
   QuasiStaticRun result_;
 };
+
+void require_same_network(const QuasiStaticState& from, const BondSystem& bonds) {
+  const auto spheres = static_cast<std::size_t>(from.position.cols());
+  const auto remembered = static_cast<std::size_t>(from.remembered.size());
+  if (spheres == bonds.spheres() && remembered == bonds.size()) return;
+  throw bad_input("state", fmt::format("{} spheres and {} bonds", spheres, remembered),
+                  fmt::format("{} and {}, as the network has", bonds.spheres(), bonds.size()));
+}
+
+void require_later(std::span<const double> times_s, double from_s) {
+  for (const double time : times_s) {
+    if (time >= from_s) continue;
+    throw bad_input("times", fmt::format("{} s", shortest(time)),
+                    fmt::format("times from {} s on, where the run begins", shortest(from_s)));
+  }
+}
 
 }  // namespace
 
@@ -288,9 +350,16 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedo
   require_valid(probe_, freedom_);
 }
 
-QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s) const {
+QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s,
+                                const QuasiStaticObserver& observer,
+                                const QuasiStaticState* from) const {
   require_times_within(protocol, times_s);
-  return Run(bonds_, rest_, freedom_, probe_, options_, protocol, times_s).go();
+  if (from) {
+    require_times_within(protocol, {&from->time_s, 1});
+    require_same_network(*from, bonds_);
+    require_later(times_s, from->time_s);
+  }
+  return Run(bonds_, rest_, freedom_, probe_, options_, protocol, times_s, observer).go(from);
 }
 
 }  // namespace tpm

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <optional>
 #include <span>
 
@@ -43,6 +44,19 @@ struct QuasiStaticEnergy {
   double stored_J = 0.0;      ///< in the springs at the end
 };
 
+/// The network at an instant of a run; a run can go on from there.
+struct QuasiStaticState {
+  double time_s = 0.0;
+  double imposed = 0.0;                     ///< depth, m, or load, N
+  double response = 0.0;                    ///< contact force, N, or depth, m
+  Positions position;                       ///< of all spheres, m
+  Eigen::VectorXd remembered;               ///< y of each bond, m
+  std::optional<QuasiStaticEnergy> energy;  ///< if asked for; until here
+};
+
+/// Gets the state at every asked time, in the order of time. What it throws ends the run.
+using QuasiStaticObserver = std::function<void(const QuasiStaticState&)>;
+
 struct QuasiStaticRun {
   Eigen::VectorXd response;     ///< contact force, N, or depth, m, at each asked time
   double error_estimate = 0.0;  ///< sum of the steps' error estimates, N or m
@@ -68,7 +82,13 @@ class QuasiStatic {
   /// @param times_s any order, within the protocol
   /// Throws Error(bad_input) for times outside it, Error(numerical) where the tissue buckles, snaps
   /// through or cannot be balanced; the message says when and at which depth or load.
-  [[nodiscard]] QuasiStaticRun run(const Protocol& protocol, std::span<const double> times_s) const;
+  /// @param observer if any, sees the state at each asked time; the responses do not change by it
+  /// @param from if any, where to go on in the protocol instead of beginning at rest: a state of an
+  ///        earlier run of the same network, at which all jumps up to its time are over. No time
+  ///        before it can be asked for.
+  [[nodiscard]] QuasiStaticRun run(const Protocol& protocol, std::span<const double> times_s,
+                                   const QuasiStaticObserver& observer = {},
+                                   const QuasiStaticState* from = nullptr) const;
 
  private:
   const BondSystem& bonds_;

@@ -273,7 +273,32 @@ LaneVector StageBalance::responses_within(const TissueState& state,
   return responses(within(state, fractions, h, rate));
 }
 
-QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double h, double rate) {
+TissueState StageBalance::state_within(const TissueState& state, double fraction, double h,
+                                       double rate) {
+  Within states = within(state, {&fraction, 1}, h, rate);
+  force_.setZero();
+  tissue_.add_load(states.imposed, force_);
+  bonds_.add_forces(states.position, states.memory, force_);
+  tissue_.freedom().project(force_);
+  d_ = force_;
+  factor_.solve(d_);
+  tissue_.freedom().project(d_);
+  ++work_.back_solves;
+  TissueState at = state;
+  at.time_s += fraction * h;
+  at.imposed = states.imposed[0];
+  const Eigen::RowVectorXd place = states.position.row(0) + d_.row(0);
+  at.position = Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3);
+  tissue_.bonds().elongations(at.position, at.elongation);
+  for (std::size_t i = 0; i < bonds_.relaxing_bonds().size(); ++i) {
+    at.remembered[static_cast<Eigen::Index>(bonds_.relaxing_bonds()[i])] =
+        states.memory(0, static_cast<Eigen::Index>(i));
+  }
+  return at;
+}
+
+QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double h, double rate,
+                                               double until) {
   using Rule = boost::math::quadrature::gauss<double, 2 * kLanes>;
   const Eigen::VectorXd relaxing = bonds_.of_relaxing(tissue_.bonds().relaxing());
   QuasiStaticEnergy energy;
@@ -283,8 +308,8 @@ QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double 
     LaneVector weight;
     for (int lane = 0; lane < kLanes; ++lane) {
       const auto i = static_cast<std::size_t>(lane);
-      fractions[i] = 0.5 * (1.0 + side * Rule::abscissa()[i]);
-      weight[lane] = 0.5 * h * Rule::weights()[i];
+      fractions[i] = 0.5 * until * (1.0 + side * Rule::abscissa()[i]);
+      weight[lane] = 0.5 * until * h * Rule::weights()[i];
     }
     const Within states = within(state, fractions, h, rate);
     response_integral += rate * weight.dot(responses(states));
@@ -296,10 +321,10 @@ QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double 
     energy.work_J = response_integral;
   } else {
     // The integral of F du, by parts.
-    constexpr std::array<double, 2> kEnds{0.0, 1.0};
-    const LaneVector depth = responses_within(state, kEnds, h, rate);
-    energy.work_J =
-        (state.imposed + h * rate) * depth[1] - state.imposed * depth[0] - response_integral;
+    const std::array<double, 2> ends{0.0, until};
+    const LaneVector depth = responses_within(state, ends, h, rate);
+    energy.work_J = (state.imposed + until * h * rate) * depth[1] - state.imposed * depth[0] -
+                    response_integral;
   }
   return energy;
 }
