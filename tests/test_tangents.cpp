@@ -16,13 +16,16 @@ using tpm_test::Star;
 namespace {
 
 /// d / d ln of E1, E2, E', eta1 and of all that is imposed.
-std::vector<TangentDirection> all_directions(const Network& network, const BondSystem& bonds,
+std::vector<TangentDirection> all_directions(const Network& network,
                                              const TpmParameters& material) {
   std::vector<TangentDirection> directions;
-  for (TangentDirection& d : material_directions(network, bonds, material)) {
-    directions.push_back(std::move(d));
+  const TpmVector values = to_vector(material);
+  for (TangentDirection& d : material_directions(network, material)) {
+    const double value = values[directions.size()];
+    directions.push_back({value * d.stiffness, value * d.relaxing, value * d.log_relaxation_time});
   }
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(bonds.stiffness().size());
+  const Eigen::VectorXd zero =
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(network.bonds.size()));
   directions.push_back({zero, zero, 1.0, 0.0});
   directions.push_back({zero, zero, 0.0, 1.0});
   return directions;
@@ -37,19 +40,13 @@ TpmParameters unequal(double relaxation_time_s) {
   return p;
 }
 
-Protocol scaled(const Protocol& protocol, double factor) {
-  std::vector<Knot> knots(protocol.knots().begin(), protocol.knots().end());
-  for (Knot& knot : knots) knot.value *= factor;
-  return {protocol.drive(), knots, protocol.name(), std::isinf(protocol.end_s())};
-}
-
 void check_star(const Protocol& protocol, const std::vector<double>& times) {
   for (const double tau : {1e-3, 0.5, 20.0}) {
     const TpmParameters p = unequal(tau);
     const Star star(p);
     const QuasiStaticRun run =
         star.run(protocol, times,
-                 {.tolerance = 1e-10, .directions = all_directions(star.network, star.bonds, p)});
+                 {.tolerance = 1e-10, .directions = all_directions(star.network, p)});
     const Response exact =
         make_model("closed_form")
             ->respond(protocol, times, to_vector(p), Want::values_and_sensitivity);
@@ -92,17 +89,16 @@ TEST_CASE("an organ's derivatives are the limits of its differences") {
        {Protocol(Drive::displacement, {{0.0, 0.0}, {0.0, 1e-3}, {2.0, 6e-3}, {3.0, 4e-3}}, "d",
                  true),
         Protocol(Drive::force, {{0.0, 0.0}, {0.0, 0.02}, {2.0, 0.15}, {3.0, 0.1}}, "f", true)}) {
-    const BondSystem bonds(scene.network, p);
     const QuasiStaticRun run =
         scene.run(p, protocol, times,
-                  {.tolerance = 1e-10, .directions = all_directions(scene.network, bonds, p)});
+                  {.tolerance = 1e-10, .directions = all_directions(scene.network, p)});
     const double scale = run.response.cwiseAbs().maxCoeff();
     constexpr double kChange = 1e-4;
     const auto value = [&](int direction, double sign) {
       TpmVector values = to_vector(p);
       const double factor = std::exp(sign * kChange);
       if (direction < 4) values[static_cast<std::size_t>(direction)] *= factor;
-      const Protocol imposed = scaled(protocol, direction < 4 ? 1.0 : factor);
+      const Protocol imposed = protocol.scaled(direction < 4 ? 1.0 : factor);
       return scene.run(from_vector(values), imposed, times, {.tolerance = 1e-11}).response;
     };
     for (int i = 0; i < 5; ++i) {

@@ -58,7 +58,7 @@ enum class Observable {
 [[nodiscard]] Quantity observable_quantity(Observable observable) noexcept;
 
 /// The indenter of an experiment.
-struct Probe {
+struct ProbeShape {
   std::string shape;  ///< "hemisphere", "sphere", "flat punch"; empty if unknown
   std::optional<double> diameter_m;
   std::optional<Provenance> provenance;
@@ -71,7 +71,7 @@ struct CurveHeader {
   std::string citation;  ///< authors, journal, year, pages
   std::string doi;
   std::string specimen;
-  Probe probe;
+  ProbeShape probe;
   std::string note;
   std::string sha256;  ///< of the CSV bytes
 };

@@ -47,8 +47,8 @@ ColumnDescription read_column(const std::string& name, const Json& json, const s
   return column;
 }
 
-Probe read_probe(const Json& json, const std::string& file) {
-  Probe probe;
+ProbeShape read_probe(const Json& json, const std::string& file) {
+  ProbeShape probe;
   probe.shape = text_of(json, "shape");
   if (json.contains("diameter")) {
     const std::string where = file + ": key /probe/diameter";
@@ -86,7 +86,7 @@ void put(Json& object, const char* key, std::string_view text) {
   if (!text.empty()) object[key] = text;
 }
 
-Json probe_json(const Probe& probe) {
+Json probe_json(const ProbeShape& probe) {
   Json json = Json::object();
   put(json, "shape", probe.shape);
   if (probe.diameter_m) {

@@ -9,6 +9,7 @@
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/law/law_model.hpp"
 #include "tpm/material/tpm_element.hpp"
+#include "tpm/scene/organ_model.hpp"
 
 namespace tpm {
 
@@ -49,6 +50,26 @@ LawSpec parse_law(const Json& j, const DocumentPlace& place) {
   return spec;
 }
 
+/// The organ of the scene that the document names, ready for experiments.
+void read_organ(const Json& document, FitConfig& config, const std::filesystem::path& folder,
+                const DocumentPlace& place) {
+  const bool wanted = config.model == "organ";
+  if (wanted != document.contains("scene")) {
+    throw bad_input(place.key("scene").where, wanted ? "missing" : "without the model 'organ'",
+                    "\"model\": \"organ\" and the scene that holds the organ, or neither");
+  }
+  if (!wanted) return;
+  if (config.tension.kind != TensionRule::Kind::exact) {
+    throw bad_input(place.key("tension").where, "a rule for lambda1 beside the model 'organ'",
+                    "no tension: the bonds of a network pull along themselves");
+  }
+  config.scene = document.at("scene").get<std::string>();
+  const std::filesystem::path path = folder / config.scene;
+  auto tissue = std::make_shared<Tissue>(read_tissue(path));
+  require_standing(*tissue, path.string());
+  config.organ = std::move(tissue);
+}
+
 }  // namespace
 
 bool Target::applies_to(std::size_t choice) const {
@@ -57,6 +78,7 @@ bool Target::applies_to(std::size_t choice) const {
 
 std::unique_ptr<Model> make_model(const FitConfig& config) {
   if (config.law) return std::make_unique<LawModel>(*config.law);
+  if (config.organ) return std::make_unique<OrganModel>(config.organ);
   return make_model(config.model, {config.tension, 1e-10});
 }
 
@@ -71,15 +93,18 @@ std::vector<double> model_parameters(const FitConfig& config, std::span<const do
   return values;
 }
 
-FitConfig parse_fit_config(const Json& document, std::string_view where) {
+FitConfig parse_fit_config(const Json& document, std::string_view where,
+                           const std::filesystem::path& folder) {
   check_schema(document, "fit", where);
   const DocumentPlace place{std::string(where)};
   FitConfig config;
+  config.folder = folder;
   config.title = document.at("title").get<std::string>();
   config.model = document.value("model", config.model);
   if (document.value("tension", "exact") == "frozen_at_peak") {
     config.tension = TensionRule::frozen_at_peak();
   }
+  read_organ(document, config, folder, place);
   if (document.contains("law")) {
     if (document.contains("model") || document.contains("tension")) {
       throw bad_input(place.key("law").where, "beside 'model' or 'tension'",
@@ -132,9 +157,7 @@ FitConfig parse_fit_config(const Json& document, std::string_view where) {
 }
 
 FitConfig read_fit_config(const std::filesystem::path& path) {
-  FitConfig config = parse_fit_config(read_json(path), path.string());
-  config.folder = path.parent_path();
-  return config;
+  return parse_fit_config(read_json(path), path.string(), path.parent_path());
 }
 
 }  // namespace tpm

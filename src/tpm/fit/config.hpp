@@ -15,6 +15,7 @@
 #include "tpm/fit/parameter.hpp"
 #include "tpm/law/law.hpp"
 #include "tpm/model/model.hpp"
+#include "tpm/scene/scene.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm {
@@ -93,7 +94,10 @@ struct Hypothesis {
 /// Everything that decides the result of a fit (schemas/fit.schema.json).
 struct FitConfig {
   std::string title;
-  std::string model = "closed_form";  ///< formulation of the paper's element; not used with `law`
+  /// Formulation of the paper's element, or "organ"; not used with `law`.
+  std::string model = "closed_form";
+  std::string scene;                    ///< of the organ, as the configuration names it
+  std::shared_ptr<const Tissue> organ;  ///< what the scene says
   TensionRule tension;
   std::optional<LawSpec> law;  ///< a law of the family instead of the paper's element
   std::vector<EstimatedParameter> parameters;
@@ -120,7 +124,9 @@ struct FitConfig {
                                                    std::size_t choice);
 
 /// Reads and checks a configuration. Throws Error(bad_input) with the file and the key.
+/// @param folder that paths in the document are relative to
 [[nodiscard]] FitConfig read_fit_config(const std::filesystem::path& path);
-[[nodiscard]] FitConfig parse_fit_config(const Json& document, std::string_view where);
+[[nodiscard]] FitConfig parse_fit_config(const Json& document, std::string_view where,
+                                         const std::filesystem::path& folder = {});
 
 }  // namespace tpm

@@ -18,6 +18,15 @@ ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vec
   resolve_noise_parameters();
   count_residuals();
   find_linear();
+  set_up_scout();
+}
+
+void ExperimentResiduals::set_up_scout() {
+  std::shared_ptr<const Model> scout = model_->scout();
+  if (!scout) return;
+  scout_ = copy();
+  scout_->model_ = std::move(scout);
+  scout_->find_linear();
 }
 
 void ExperimentResiduals::find_linear() {
@@ -150,6 +159,10 @@ Response ExperimentResiduals::respond_to(const Experiment& experiment,
     return respond(*oscillation, parameters, want);
   }
   const auto& course = std::get<TimeCourse>(experiment.imposed);
+  if (scout_ && want == Want::values_and_sensitivity) {
+    return model_->respond_along(course.protocol, course.times_s, parameters,
+                                 changes_for(experiment.choice));
+  }
   return model_->respond(course.protocol, course.times_s, parameters, want);
 }
 
@@ -183,9 +196,25 @@ Eigen::VectorXd ExperimentResiduals::answers(const std::vector<Experiment>& expe
   return answer;
 }
 
+Eigen::MatrixXd ExperimentResiduals::changes_for(std::size_t choice) const {
+  Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(std::ssize(model_->parameters()),
+                                                  std::ssize(config_.parameters));
+  for (Eigen::Index j = 0; j < changes.cols(); ++j) {
+    for (const Target& target : config_.parameters[static_cast<std::size_t>(j)].sets) {
+      if (!target.applies_to(choice)) continue;
+      changes(static_cast<Eigen::Index>(target.parameter), j) = 1.0;
+    }
+  }
+  return changes;
+}
+
 std::vector<std::pair<Eigen::Index, Eigen::Index>> ExperimentResiduals::columns_for(
     std::size_t choice) const {
   std::vector<std::pair<Eigen::Index, Eigen::Index>> columns;
+  if (scout_) {  // respond_along() answers by the estimated parameters
+    for (Eigen::Index j = 0; j < std::ssize(config_.parameters); ++j) columns.emplace_back(j, j);
+    return columns;
+  }
   for (std::size_t j = 0; j < config_.parameters.size(); ++j) {
     for (const Target& target : config_.parameters[j].sets) {
       if (!target.applies_to(choice)) continue;
@@ -274,6 +303,7 @@ double ExperimentResiduals::weight(std::size_t datum) const {
 }
 
 void ExperimentResiduals::set_counts(std::vector<int> counts) {
+  if (scout_) scout_->set_counts(counts);
   counts_ = std::move(counts);
   count_residuals();
 }
@@ -336,6 +366,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->plain_ = plain_;
   other->residual_count_ = residual_count_;
   other->offset_ = offset_;
+  if (scout_) other->scout_ = scout_->copy();
   return other;
 }
 

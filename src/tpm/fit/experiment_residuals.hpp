@@ -26,6 +26,7 @@ class ExperimentResiduals final : public ResidualFunction {
                                       RowMatrix& root) const override;
   [[nodiscard]] double offset() const override { return offset_; }
   [[nodiscard]] bool linear_in(std::size_t parameter) const override { return linear_[parameter]; }
+  [[nodiscard]] const ExperimentResiduals* scout() const override { return scout_.get(); }
 
   [[nodiscard]] const std::vector<FitDatum>& data() const { return data_; }
   [[nodiscard]] const std::vector<Experiment>& experiments() const { return experiments_; }
@@ -50,6 +51,7 @@ class ExperimentResiduals final : public ResidualFunction {
   /// A copy with at most about `most` samples of each recording, evenly taken from the history and
   /// from the response: to look for starts, not to judge.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> thinned(std::size_t most) const;
+
 
   /// Scale of the noise law of a value, given the model's answer to it.
   [[nodiscard]] double noise_scale(std::size_t datum, double answer,
@@ -100,6 +102,9 @@ class ExperimentResiduals final : public ResidualFunction {
                                         RowMatrix* sensitivity) const;
   /// Fills fitted_.
   void leave_out_held_out();
+  void set_up_scout();
+  /// Changes of the model parameters with each of the estimated ones.
+  [[nodiscard]] Eigen::MatrixXd changes_for(std::size_t choice) const;
   /// Columns of a response's sensitivity and the estimated parameters that they belong to.
   [[nodiscard]] std::vector<std::pair<Eigen::Index, Eigen::Index>> columns_for(
       std::size_t choice) const;
@@ -132,6 +137,7 @@ class ExperimentResiduals final : public ResidualFunction {
   std::vector<int> counts_;                               ///< empty: every datum counts once
   std::vector<bool> linear_;  ///< of each estimated parameter: linear_in
   std::optional<PlainResiduals> plain_;
+  std::unique_ptr<ExperimentResiduals> scout_;  ///< the same, asking the model's scout
   Eigen::Index residual_count_ = 0;
   double offset_ = 0.0;
 };

@@ -12,6 +12,7 @@ namespace {
 
 constexpr Eigen::Index kMostSearched = 20'000;  // residuals that many starts are followed with
 constexpr std::size_t kThinnedTo = 2'000;       // samples that stand for a longer recording
+constexpr std::size_t kMostScouted = 5;         // minima of a cheap model that are gone on from
 
 /// Where the search begins and how it goes on from there.
 struct Approach {
@@ -19,21 +20,37 @@ struct Approach {
   StartKind kind;
 };
 
+/// What a search with a stand-in for the function finds; no profiles.
+FitResult survey(const ExperimentResiduals& stand_in, std::span<const FitParameter> parameters) {
+  Threshold threshold;
+  threshold.scale_known = stand_in.config().data.front().noise.scale_known;
+  threshold.data_count = static_cast<int>(stand_in.residual_count());
+  return fit_residuals(stand_in, {parameters.begin(), parameters.end()},
+                       fit_starts(stand_in, parameters), threshold, false, start_kind(stand_in));
+}
+
+/// The configured start, and the minima of a cheap model.
+Approach scouted_approach(const ExperimentResiduals& scout,
+                          std::span<const FitParameter> parameters) {
+  Approach approach{{{}}, StartKind::solved};
+  for (const FitParameter& p : parameters) approach.starts.front().push_back(p.start);
+  for (const DistinctMinimum& m : survey(scout, parameters).minima) {
+    if (approach.starts.size() > kMostScouted) break;
+    approach.starts.push_back(m.minimum.natural);
+  }
+  return approach;
+}
+
 /// Long recordings are approached through a few of their samples; the minimum is then found with
 /// all of them.
 Approach approach_to(const ExperimentResiduals& function,
                      std::span<const FitParameter> parameters) {
+  if (const ExperimentResiduals* scout = function.scout()) return scouted_approach(*scout, parameters);
   if (function.residual_count() <= kMostSearched) {
     return {fit_starts(function, parameters), start_kind(function)};
   }
   const auto few = function.thinned(kThinnedTo);
-  Threshold threshold;
-  threshold.scale_known = function.config().data.front().noise.scale_known;
-  threshold.data_count = static_cast<int>(few->residual_count());
-  const FitResult found =
-      fit_residuals(*few, std::vector<FitParameter>(parameters.begin(), parameters.end()),
-                    fit_starts(*few, parameters), threshold, false, start_kind(*few));
-  return {{found.best.natural}, StartKind::solved};
+  return {{survey(*few, parameters).best.natural}, StartKind::solved};
 }
 
 /// Where no start can be evaluated, the reason is said if it lies in the recording.

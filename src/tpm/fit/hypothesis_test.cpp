@@ -9,6 +9,21 @@
 
 namespace tpm {
 
+namespace {
+
+/// The deepest of the ends; not usable if none is.
+Minimum deepest(const ResidualFunction& function, std::span<const FitParameter> parameters,
+                const std::vector<std::vector<double>>& starts, const FixedMask& fixed) {
+  Minimum best;
+  for (const auto& start : starts) {
+    const Minimum m = minimise(function, parameters, start, fixed);
+    if (m.usable && (!best.usable || m.deviance < best.deviance)) best = m;
+  }
+  return best;
+}
+
+}  // namespace
+
 HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitResult& fit,
                                  std::span<const FitParameter> parameters,
                                  const Hypothesis& hypothesis, const Threshold& threshold) {
@@ -26,11 +41,12 @@ HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitR
       for (auto& start : starts) start[i] = value;
     }
   }
-  for (const auto& start : starts) {
-    const Minimum m = minimise(function, parameters, start, fixed);
-    const bool deeper = !result.minimum.usable || m.deviance < result.minimum.deviance;
-    if (m.usable && deeper) result.minimum = m;
+  if (const ResidualFunction* scout = function.scout()) {
+    const Minimum there = deepest(*scout, parameters, starts, fixed);
+    starts.resize(1);
+    if (there.usable) starts.push_back(there.natural);
   }
+  result.minimum = deepest(function, parameters, starts, fixed);
   if (!result.minimum.usable) {
     throw Error(ExitCode::numerical, fmt::format("hypothesis '{}'", hypothesis.name),
                 "the model cannot be evaluated there");

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "tpm/core/random.hpp"
+#include "tpm/fit/scouted_minimum.hpp"
 
 namespace tpm {
 namespace {
@@ -194,6 +195,9 @@ void polish(const ResidualFunction& function, std::span<const FitParameter> para
 
 Minimum minimise(const ResidualFunction& function, std::span<const FitParameter> parameters,
                  std::span<const double> start, const FixedMask& fixed, FirstStep first_step) {
+  if (const ResidualFunction* scout = function.scout()) {
+    return minimise_by_scout(function, *scout, parameters, start, fixed);
+  }
   keep_ceres_quiet();
   Minimum minimum;
   minimum.natural.assign(start.begin(), start.end());

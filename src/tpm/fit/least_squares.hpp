@@ -43,6 +43,10 @@ class ResidualFunction {
   /// for it.
   [[nodiscard]] virtual bool linear_in(std::size_t /*parameter*/) const { return false; }
 
+  /// A cheap function of the same parameters whose residuals change much as these do, where these
+  /// are costly: searches then take it along. None if these are cheap.
+  [[nodiscard]] virtual const ResidualFunction* scout() const { return nullptr; }
+
   /// Constant part of the sum of squares that is not deviance.
   [[nodiscard]] virtual double offset() const { return 0.0; }
 };
@@ -67,6 +71,7 @@ enum class FirstStep { bold, cautious };
 /// Trust-region descent (Ceres, Levenberg-Marquardt with box bounds) in theta.
 /// @param start natural values within the bounds (a start outside is moved to the bound)
 /// @param fixed empty, or one flag per parameter
+/// A function with a scout is searched with its help instead (scouted_minimum.hpp).
 [[nodiscard]] Minimum minimise(const ResidualFunction& function,
                                std::span<const FitParameter> parameters,
                                std::span<const double> start, const FixedMask& fixed = {},
@@ -76,6 +81,7 @@ enum class FirstStep { bold, cautious };
 /// linear parameters were solved for): projected Levenberg-Marquardt with an active set of bounds,
 /// a few evaluations where the general search needs dozens. Ends when a step changes the residuals
 /// by less than 1e-4 standard deviations in all, or after 200 steps (then not `converged`).
+/// A function with a scout is searched with its help instead.
 [[nodiscard]] Minimum minimise_near(const ResidualFunction& function,
                                     std::span<const FitParameter> parameters,
                                     std::span<const double> start, const FixedMask& fixed = {});

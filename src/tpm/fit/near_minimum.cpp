@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "tpm/fit/least_squares.hpp"
+#include "tpm/fit/scouted_minimum.hpp"
 #include "tpm/fit/starts.hpp"
 
 namespace tpm {
@@ -270,6 +271,9 @@ Minimum NearSearch::end() const {
 
 Minimum minimise_near(const ResidualFunction& function, std::span<const FitParameter> parameters,
                       std::span<const double> start, const FixedMask& fixed) {
+  if (const ResidualFunction* scout = function.scout()) {
+    return minimise_by_scout(function, *scout, parameters, start, fixed);
+  }
   NearSearch search(function, parameters, start, fixed);
   if (!search.begin()) return minimise(function, parameters, start, fixed);
   search.run();

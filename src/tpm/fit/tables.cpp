@@ -292,8 +292,7 @@ FitProblem parse_fit_tables(const Json& problem, const fs::path& path) {
       {"noiseParameters", "label", "provenance"});
   FitProblem result;
   add_measurements(measurements, conditions, observables, document, result.data);
-  result.config = parse_fit_config(document, path.string());
-  result.config.folder = path.parent_path();
+  result.config = parse_fit_config(document, path.string(), path.parent_path());
   return result;
 }
 
@@ -303,8 +302,7 @@ FitProblem read_fit_problem(const fs::path& path) {
   const Json document = read_json(path);
   if (document.contains("measurement_file")) return parse_fit_tables(document, path);
   FitProblem problem;
-  problem.config = parse_fit_config(document, path.string());
-  problem.config.folder = path.parent_path();
+  problem.config = parse_fit_config(document, path.string(), path.parent_path());
   return problem;
 }
 

@@ -115,6 +115,7 @@ class ProfileWalk {
         best_deviance_(best_deviance),
         index_(index),
         rise_(rise),
+        accuracy_(function.scout() == nullptr ? kLimitAccuracy : kCostlyLimitAccuracy),
         fixed_(parameters.size(), false) {
     fixed_[index] = true;
   }
@@ -224,7 +225,7 @@ class ProfileWalk {
       Place here{theta, m.deviance - best_deviance_, m.natural};
       const double off = excess_of(here.risen);
       (here.risen < rise_ ? before_ : last_) = std::move(here);
-      return std::abs(off) <= kLimitAccuracy * target ? 0.0 : off;
+      return std::abs(off) <= accuracy_ * target ? 0.0 : off;
     };
     const bool rising = inside.theta < outside.theta;
     const Place& low = rising ? inside : outside;
@@ -234,7 +235,7 @@ class ProfileWalk {
     if (f_low == 0.0) return low.theta;
     if (f_high == 0.0) return high.theta;
     const double width =
-        kLimitAccuracy *
+        accuracy_ *
         std::abs(outside.theta - parameters_[index_].theta(minimum_.natural[index_]));
     std::uintmax_t iterations = 60;
     const auto bracket = boost::math::tools::toms748_solve(
@@ -244,6 +245,7 @@ class ProfileWalk {
   }
 
   static constexpr double kLimitAccuracy = 1e-7;  ///< of the distance from the minimum
+  static constexpr double kCostlyLimitAccuracy = 1e-4;
 
   const ResidualFunction& function_;
   std::span<const FitParameter> parameters_;
@@ -251,6 +253,7 @@ class ProfileWalk {
   double best_deviance_;
   std::size_t index_;
   double rise_;
+  double accuracy_;  ///< of a limit, in parts of its distance from the minimum
   FixedMask fixed_;
   Place last_, before_;  ///< between which, or beyond which, the next point is looked for
 };

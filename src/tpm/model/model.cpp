@@ -18,6 +18,14 @@ std::vector<std::string> model_names() {
   return {"closed_form", "cvodes"};
 }
 
+Response Model::respond_along(const Protocol& protocol, std::span<const double> times_s,
+                              std::span<const double> parameters,
+                              const Eigen::MatrixXd& along) const {
+  Response response = respond(protocol, times_s, parameters, Want::values_and_sensitivity);
+  response.sensitivity = response.sensitivity * along;
+  return response;
+}
+
 std::unique_ptr<Model> make_model(std::string_view name, const ModelOptions& options) {
   if (name == "closed_form") return std::make_unique<ClosedForm>(options);
   if (name == "cvodes") return std::make_unique<CvodesElement>(options);

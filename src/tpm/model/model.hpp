@@ -61,10 +61,22 @@ class Model {
   [[nodiscard]] virtual Response respond(const Protocol& protocol, std::span<const double> times_s,
                                          std::span<const double> parameters, Want want) const = 0;
 
+  /// The same with derivatives along changes of the parameters: sensitivity is d value / d
+  /// parameters times `along` (n_parameters x any). Some models find few such columns sooner than
+  /// the derivatives by every parameter.
+  [[nodiscard]] virtual Response respond_along(const Protocol& protocol,
+                                               std::span<const double> times_s,
+                                               std::span<const double> parameters,
+                                               const Eigen::MatrixXd& along) const;
+
   /// Physical range of a parameter, SI.
   [[nodiscard]] virtual std::pair<double, double> range(std::size_t /*parameter*/) const {
     return {0.0, std::numeric_limits<double>::infinity()};
   }
+
+  /// A much cheaper model of the same parameters whose best fits lie near those of this one: where
+  /// a search can begin. None if this one is cheap.
+  [[nodiscard]] virtual std::unique_ptr<Model> scout() const { return nullptr; }
 
   /// The response to an imposed displacement is linear in this parameter while the others are held:
   /// a search can solve for it.

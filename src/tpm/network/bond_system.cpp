@@ -8,19 +8,32 @@ BondSystem::BondSystem(const Network& network, const TpmParameters& material, La
     : spheres_(network.organ.size()),
       rest_length_(static_cast<Eigen::Index>(network.bonds.size())),
       stiffness_(rest_length_.size()),
-      relaxing_(rest_length_.size()),
-      relaxation_time_s_(material.relaxation_time_s()) {
-  const double per_Pa = material.modulus_to_stiffness_m();
+      relaxing_(rest_length_.size()) {
   for (const Bond& bond : network.bonds) {
-    const auto i = static_cast<Eigen::Index>(end_a_.size());
-    const bool radial = bond.kind == BondKind::radial;
+    rest_length_[static_cast<Eigen::Index>(end_a_.size())] = bond.rest_length_m;
     end_a_.push_back(bond.a);
     end_b_.push_back(bond.b);
-    rest_length_[i] = bond.rest_length_m;
+    rope_.push_back(bond.kind == BondKind::lateral && lateral == LateralBond::tension_only);
+  }
+  set_material(network, material);
+}
+
+void BondSystem::set_material(const Network& network, const TpmParameters& material) {
+  relaxation_time_s_ = material.relaxation_time_s();
+  const double per_Pa = material.modulus_to_stiffness_m();
+  Eigen::Index i = 0;
+  for (const Bond& bond : network.bonds) {
+    const bool radial = bond.kind == BondKind::radial;
     stiffness_[i] = bond.factor * per_Pa * (radial ? material.E2_Pa : material.Eprime_Pa);
     relaxing_[i] = radial ? bond.factor * per_Pa * material.relaxing_modulus_Pa() : 0.0;
-    rope_.push_back(!radial && lateral == LateralBond::tension_only);
+    ++i;
   }
+}
+
+BondSystem BondSystem::with_material(const Network& network, const TpmParameters& material) const {
+  BondSystem other = *this;
+  other.set_material(network, material);
+  return other;
 }
 
 const BondSystem::Graph& BondSystem::graph() const {

@@ -36,6 +36,10 @@ class BondSystem {
   BondSystem(const Network& network, const TpmParameters& material,
              LateralBond lateral = LateralBond::elastic);
 
+  /// The same bonds with another material; the graph is shared.
+  [[nodiscard]] BondSystem with_material(const Network& network,
+                                         const TpmParameters& material) const;
+
   [[nodiscard]] std::size_t size() const { return end_a_.size(); }
   [[nodiscard]] std::size_t spheres() const { return spheres_; }
   [[nodiscard]] double relaxation_time_s() const { return relaxation_time_s_; }
@@ -98,6 +102,8 @@ class BondSystem {
   };
   [[nodiscard]] Pull pull(std::size_t bond, double elongation, const BondMemory& memory) const;
 
+  void set_material(const Network& network, const TpmParameters& material);
+
   struct Graph {
     BlockPattern pattern;
     std::vector<BlockPattern::Place> place;
@@ -113,7 +119,7 @@ class BondSystem {
   std::vector<std::uint32_t> end_a_, end_b_;
   Eigen::VectorXd rest_length_, stiffness_, relaxing_;
   std::vector<bool> rope_;
-  double relaxation_time_s_;
+  double relaxation_time_s_ = 0.0;
   std::shared_ptr<LazyGraph> graph_ = std::make_shared<LazyGraph>();
 };
 

@@ -60,7 +60,8 @@ class Run {
     const auto asked = static_cast<Eigen::Index>(times_s.size());
     result_.response.resize(asked);
     if (options.directions.empty()) return;
-    tangents_.emplace(tissue_, stages_, options.directions, kStepShare * options.tolerance);
+    tangents_.emplace(tissue_, stages_, options.directions,
+                      kStepShare * options.derivative_tolerance.value_or(options.tolerance));
     result_.derivative.setZero(asked, tangents_->count());
   }
 

@@ -19,7 +19,8 @@ struct Probe {
 /// direction.
 void require_valid(const Probe& probe, const Freedom& freedom);
 
-/// A direction in which material and imposed history may change: a run can answer derivatives.
+/// A direction in which material and imposed history may change: a run can answer derivatives. They
+/// are found to an accuracy in parts of the response: choose units that make them of its size.
 struct TangentDirection {
   Eigen::VectorXd stiffness;         ///< change of k of each bond, N/m
   Eigen::VectorXd relaxing;          ///< change of g of each bond, N/m
@@ -36,6 +37,8 @@ struct QuasiStaticOptions {
   std::optional<double> step_s = std::nullopt;
   bool energies = false;                          ///< work and dissipation are integrated along
   std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
+  /// What is left unbalanced of a derivative, as `tolerance`; none: that.
+  std::optional<double> derivative_tolerance = std::nullopt;
 };
 
 /// What a run took.

@@ -53,6 +53,12 @@ double Protocol::peak() const noexcept {
   return peak;
 }
 
+Protocol Protocol::scaled(double factor) const {
+  Protocol other = *this;
+  for (Knot& knot : other.knots_) knot.value *= factor;
+  return other;
+}
+
 Protocol step_and_hold(double depth_m, double hold_s) {
   if (std::isinf(hold_s)) return {Drive::displacement, {{0.0, depth_m}}, "step and hold", true};
   require_not_negative(hold_s, "hold", "s");

@@ -39,6 +39,9 @@ class Protocol {
   /// Largest absolute imposed value.
   [[nodiscard]] double peak() const noexcept;
 
+  /// The same history with every value times a factor.
+  [[nodiscard]] Protocol scaled(double factor) const;
+
   /// The first value was held for ever before the first knot, so that everything has relaxed under
   /// it (a preload), instead of a jump from 0.
   [[nodiscard]] bool relaxed_at_start() const noexcept { return relaxed_at_start_; }

@@ -1,0 +1,182 @@
+#include "tpm/fit/scouted_minimum.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tpm {
+namespace {
+
+constexpr int kMostSteps = 60;
+constexpr double kSmallGain = 1e-6;  // of the mean squared residual
+constexpr double kFirstPull = 0.02;  // of the residuals' own curvature
+constexpr double kRaise = 8.0;
+constexpr double kMostPull = 1e8;
+constexpr double kGoodShare = 0.5;  // of the gain that was promised
+
+/// Residuals of the costly function and their derivatives by theta at a point.
+struct KnownPoint {
+  std::vector<double> natural;
+  Eigen::VectorXd theta, residual;
+  RowMatrix jacobian;
+
+  [[nodiscard]] double cost() const { return residual.squaredNorm(); }
+};
+
+Eigen::VectorXd theta_of(std::span<const FitParameter> parameters,
+                         std::span<const double> natural) {
+  Eigen::VectorXd theta(std::ssize(parameters));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    theta[static_cast<Eigen::Index>(i)] = parameters[i].theta(natural[i]);
+  }
+  return theta;
+}
+
+/// d natural / d theta
+Eigen::VectorXd slopes_at(std::span<const FitParameter> parameters, const Eigen::VectorXd& theta) {
+  Eigen::VectorXd slope(theta.size());
+  for (Eigen::Index i = 0; i < slope.size(); ++i) {
+    slope[i] = parameters[static_cast<std::size_t>(i)].natural_slope(theta[i]);
+  }
+  return slope;
+}
+
+bool evaluate(const ResidualFunction& function, std::span<const FitParameter> parameters,
+              KnownPoint& point) {
+  if (!function.evaluate(point.natural, point.residual, &point.jacobian)) return false;
+  point.theta = theta_of(parameters, point.natural);
+  point.jacobian = point.jacobian * slopes_at(parameters, point.theta).asDiagonal();
+  return std::isfinite(point.cost()) && point.jacobian.allFinite();
+}
+
+/// The scout with what it lacks at a point, and below its residuals the pull towards that point.
+class CorrectedScout final : public ResidualFunction {
+ public:
+  CorrectedScout(const ResidualFunction& scout, std::span<const FitParameter> parameters)
+      : scout_(scout), parameters_(parameters) {}
+
+  /// Corrects it at a point; false if the scout cannot be evaluated there.
+  [[nodiscard]] bool correct_at(const KnownPoint& point) {
+    KnownPoint own{point.natural, {}, {}, {}};
+    if (!tpm::evaluate(scout_, parameters_, own)) return false;
+    const RowMatrix slope = point.jacobian - own.jacobian;
+    if (theta_.size() > 0) learn(point.theta - theta_, slope - slope_lacking_);
+    theta_ = point.theta;
+    lacking_ = point.residual - own.residual;
+    slope_lacking_ = slope;
+    unit_ = point.jacobian.colwise().norm().transpose();
+    return true;
+  }
+  void set_pull(double pull) { root_pull_ = std::sqrt(pull); }
+
+  [[nodiscard]] Eigen::Index residual_count() const override {
+    return scout_.residual_count() + std::ssize(parameters_);
+  }
+
+  [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
+                              RowMatrix* jacobian) const override {
+    if (!scout_.evaluate(natural, residual, jacobian)) return false;
+    const Eigen::VectorXd moved = theta_of(parameters_, natural) - theta_;
+    const Eigen::Index own = residual.size();
+    const Eigen::VectorXd pull = root_pull_ * unit_;
+    const RowMatrix bend = bend_along(moved);
+    residual += lacking_ + slope_lacking_ * moved + 0.5 * bend * moved;
+    residual.conservativeResize(residual_count());
+    residual.tail(moved.size()) = pull.cwiseProduct(moved);
+    if (jacobian == nullptr) return true;
+    const Eigen::VectorXd per_natural = slopes_at(parameters_, theta_ + moved).cwiseInverse();
+    *jacobian += (slope_lacking_ + bend) * per_natural.asDiagonal();
+    jacobian->conservativeResize(residual_count(), Eigen::NoChange);
+    jacobian->bottomRows(moved.size()) = RowMatrix(pull.cwiseProduct(per_natural).asDiagonal());
+    return own + moved.size() == residual_count();
+  }
+
+  /// Sum of squares without the pull.
+  [[nodiscard]] double cost_at(std::span<const double> natural) const {
+    Eigen::VectorXd residual;
+    if (!evaluate(natural, residual, nullptr)) return std::numeric_limits<double>::infinity();
+    return residual.head(scout_.residual_count()).squaredNorm();
+  }
+
+ private:
+  /// Second derivatives of what the scout lacks, times a step: one row per residual.
+  [[nodiscard]] RowMatrix bend_along(const Eigen::VectorXd& step) const {
+    RowMatrix bend = RowMatrix::Zero(scout_.residual_count(), step.size());
+    for (std::size_t i = 0; i < bend_.size(); ++i) {
+      bend.row(static_cast<Eigen::Index>(i)) = bend_[i] * step;
+    }
+    return bend;
+  }
+
+  /// The least symmetric change of the second derivatives that tells the slopes' change over a step
+  /// (Powell's symmetric Broyden update), in the residuals' own scales.
+  void learn(const Eigen::VectorXd& step, const RowMatrix& change) {
+    bend_.resize(static_cast<std::size_t>(change.rows()),
+                 Eigen::MatrixXd::Zero(step.size(), step.size()));
+    const Eigen::VectorXd weighted = unit_.cwiseAbs2().cwiseProduct(step);
+    const double length2 = weighted.dot(step);
+    if (!(length2 > 0.0)) return;
+    const Eigen::VectorXd w = weighted / length2;
+    for (std::size_t i = 0; i < bend_.size(); ++i) {
+      const Eigen::VectorXd off =
+          change.row(static_cast<Eigen::Index>(i)).transpose() - bend_[i] * step;
+      bend_[i] += off * w.transpose() + w * off.transpose() - off.dot(step) * w * w.transpose();
+    }
+  }
+
+  const ResidualFunction& scout_;
+  std::span<const FitParameter> parameters_;
+  Eigen::VectorXd theta_, lacking_, unit_;
+  RowMatrix slope_lacking_;
+  std::vector<Eigen::MatrixXd> bend_;  ///< by residual
+  double root_pull_ = 0.0;
+};
+
+}  // namespace
+
+Minimum minimise_by_scout(const ResidualFunction& function, const ResidualFunction& scout,
+                          std::span<const FitParameter> parameters, std::span<const double> start,
+                          const FixedMask& fixed) {
+  KnownPoint here{{start.begin(), start.end()}, {}, {}, {}};
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (!fixed.empty() && fixed[i]) continue;
+    here.natural[i] = std::clamp(start[i], parameters[i].lower, parameters[i].upper);
+  }
+  Minimum minimum;
+  minimum.natural = here.natural;
+  CorrectedScout corrected(scout, parameters);
+  if (!evaluate(function, parameters, here) || !corrected.correct_at(here)) {
+    return minimum;
+  }
+  double pull = 0.0;
+  while (!minimum.converged && minimum.iterations < kMostSteps) {
+    ++minimum.iterations;
+    corrected.set_pull(pull);
+    KnownPoint next;
+    next.natural = minimise_near(corrected, parameters, here.natural, fixed).natural;
+    const double promised = here.cost() - corrected.cost_at(next.natural);
+    const auto count = static_cast<double>(here.residual.size());
+    if (promised <= kSmallGain * here.cost() / count || pull > kMostPull) {
+      minimum.converged = true;
+      break;
+    }
+    const bool known = evaluate(function, parameters, next);
+    const double gained = known ? here.cost() - next.cost() : -1.0;
+    if (gained < kGoodShare * promised) {
+      pull = std::max(kRaise * pull, kFirstPull);
+    } else {
+      pull = pull > kFirstPull ? pull / kRaise : 0.0;
+    }
+    if (!(gained > 0.0)) continue;
+    here = std::move(next);
+    if (!corrected.correct_at(here)) break;
+  }
+  minimum.natural = here.natural;
+  minimum.deviance = here.cost() - function.offset();
+  minimum.usable = true;
+  minimum.message =
+      minimum.converged ? "corrected scout: nothing left to gain" : "corrected scout: out of steps";
+  return minimum;
+}
+
+}  // namespace tpm
