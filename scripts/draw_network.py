@@ -56,8 +56,8 @@ def draw_bonds(axes, at, bonds, depth, slab):
     axes.add_collection(LineCollection(ends, colors=str(round(strength, 3)), linewidths=0.6, zorder=2 + slab))
 
 
-def draw_spheres(axes, at, depth, picture, face, anchored, slab):
-    """Circles from far to near; anchored ones with a dark rim."""
+def draw_spheres(axes, at, depth, picture, face, anchored, slab, fade=True):
+    """Circles from far to near; anchored ones with a dark rim. Colours that mean a number do not fade."""
     radius = 1e3 * picture["radius_m"] * 0.5  # smaller than they are, so that bonds show
     order = np.argsort(depth, kind="stable")
     order = order[slab_of(depth[order]) == slab]
@@ -65,7 +65,7 @@ def draw_spheres(axes, at, depth, picture, face, anchored, slab):
     rim = np.where(anchored[order][:, None], to_rgb(ANCHOR), 0.45 * face[order])
     axes.add_collection(EllipseCollection(
         size, size, np.zeros(len(order)), units="xy", offsets=at[order], transOffset=axes.transData,
-        facecolors=shaded(face, depth)[order], edgecolors=rim, linewidths=np.where(anchored[order], 1.5, 0.4),
+        facecolors=(shaded(face, depth) if fade else face)[order], edgecolors=rim, linewidths=np.where(anchored[order], 1.5, 0.4),
         zorder=2.5 + slab))
 
 

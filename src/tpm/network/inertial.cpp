@@ -74,9 +74,11 @@ class MotionRun {
  public:
   MotionRun(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
             const Probe& probe, const Inertia& inertia, const InertialOptions& options,
-            double omega, const Protocol& protocol, std::span<const double> times_s)
+            double omega, const Protocol& protocol, std::span<const double> times_s,
+            const QuasiStaticObserver& observer)
       : options_(options),
         protocol_(protocol),
+        observer_(observer),
         times_s_(times_s),
         order_(rising_order(times_s)),
         knots_(finite_knots(protocol, times_s)),
@@ -164,6 +166,12 @@ class MotionRun {
     const auto row = static_cast<Eigen::Index>(order_[next_++]);
     result_.response[row] = equation_.response(time_s, integration_->state());
     result_.of_driven_sphere[row] = equation_.drag_on_driven_sphere_N();
+    if (observer_) show(time_s, result_.response[row]);
+  }
+
+  void show(double time_s, double response) {
+    const TissueMotion& now = equation_.unpack(time_s, integration_->state());
+    observer_({time_s, equation_.imposed(time_s), response, now.position, now.remembered, {}});
   }
 
   void finish(double end) {
@@ -186,6 +194,7 @@ class MotionRun {
 
   const InertialOptions& options_;
   const Protocol& protocol_;
+  const QuasiStaticObserver& observer_;
   std::span<const double> times_s_;
   std::vector<std::size_t> order_;
   std::size_t next_ = 0;  ///< the first of order_ not answered yet
@@ -220,11 +229,12 @@ Inertial::Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Pro
   lowest_ = lowest_mode(bonds_, rest_, freedom_, mass_kg_);
 }
 
-InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s) const {
+InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s,
+                          const QuasiStaticObserver& observer) const {
   require_times_within(protocol, times_s);
   require_no_jump_of_depth(protocol);
   return MotionRun(bonds_, rest_, freedom_, probe_, inertia_of(bonds_, mass_kg_, lowest_, options_),
-                   options_, lowest_.angular_frequency(), protocol, times_s)
+                   options_, lowest_.angular_frequency(), protocol, times_s, observer)
       .go();
 }
 

@@ -98,7 +98,9 @@ class Inertial {
   /// @param times_s any order, finite, within the protocol; at a jump the value just after it
   /// Throws Error(bad_input) for times outside it and for a jump of depth, which would need an
   /// infinite force; Error(numerical) where CVODES gives up, with the time.
-  [[nodiscard]] InertialRun run(const Protocol& protocol, std::span<const double> times_s) const;
+  /// @param observer if any, sees positions and memory at each asked time in turn (no energies)
+  [[nodiscard]] InertialRun run(const Protocol& protocol, std::span<const double> times_s,
+                                const QuasiStaticObserver& observer = {}) const;
 
   /// The mode that the damping ratio is one of.
   [[nodiscard]] const LowestMode& lowest() const { return lowest_; }

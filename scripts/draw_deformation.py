@@ -1,0 +1,274 @@
+#!/usr/bin/env python3
+"""Draws the organ that `tpm simulate --figures FOLDER` describes, as SVG and PNG.
+
+    draw_deformation.py PICTURES.json FOLDER
+
+undeformed, deformed, displacement, force, validity: from the front, from the side, and a slice through the
+contact, enlarged; side_by_side if there are two states (TPM and MSM). Displacements are never magnified.
+The same input gives the same bytes.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import draw_network as net
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.colors import Normalize, to_rgb
+from matplotlib.lines import Line2D
+
+# Inches.
+WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW = 13.0, 0.65, 0.6, 0.95, 0.85, 0.95
+MOST_HIGH = 5.0
+SLICE_HALF_WIDTH = 90.0  # mm to each side of the contact
+SLICE_THICKNESS = 1.1  # spheres nearer to the plane than this many radii are in it
+REST, INSIDE = "#9A9A9A", "#D9D9D9"
+FLAGS = [(1, "#F0A83C", "indented by more than 10 mm (paper's validity)"),
+         (2, "#C8321E", "by more than 12 mm (damage)"),
+         (4, "#6A3D9A", "at a lateral bond turned by more than 30°")]
+
+
+class Colouring:
+    """Faces of the spheres, and of the bonds if they carry a number; what a colour means."""
+
+    def __init__(self, face, title, bar=None, bonds=None, flags=None):
+        self.face, self.title, self.bar, self.bonds, self.flags = face, title, bar, bonds, flags
+
+
+def by_layer(picture, title):
+    face = np.array([to_rgb(net.LAYER_COLOURS[k % len(net.LAYER_COLOURS)]) for k in picture["layer"]])
+    anchors = picture["anchors"]
+    face[anchors] = 0.55 * face[anchors] + 0.45 * np.array(to_rgb(net.ANCHOR))
+    return Colouring(face, title)
+
+
+def by_number(values, label, title, scale=None):
+    bar = ScalarMappable(Normalize(0.0, scale or max(values.max(), 1e-12)), "viridis")
+    return Colouring(bar.to_rgba(values)[:, :3], title, (bar, label))
+
+
+def by_force(state):
+    """Bonds by their force: blue pushes, red pulls; spheres by the largest force at them."""
+    force = np.array(state["bond_force_mN"])
+    largest = np.array(state["largest_bond_force_mN"])
+    scale = max(np.abs(force).max(), 1e-12)
+    bar = ScalarMappable(Normalize(-scale, scale), "RdBu_r")
+    spheres = plt.get_cmap("Greys")(0.05 + 0.75 * largest / scale)[:, :3]
+    strength = np.abs(force) / scale
+    return Colouring(spheres, "Force in the bonds (spheres: the largest at them, darker)",
+                     (bar, "force of a bond, pulling > 0 [mN]"), (bar.to_rgba(force), 0.3 + 2.2 * strength))
+
+
+def by_validity(state):
+    flags = np.array(state["validity"])
+    face = np.tile(to_rgb(INSIDE), (len(flags), 1))
+    for bit, colour, _ in (FLAGS[2], FLAGS[0], FLAGS[1]):  # the worst last
+        face[(flags & bit) > 0] = to_rgb(colour)
+    counts = [(colour, f"{words}: {np.count_nonzero(flags & bit)} spheres") for bit, colour, words in FLAGS]
+    return Colouring(face, "Limits of validity at this time", flags=[(INSIDE, "within all limits"), *counts])
+
+
+def draw_bonds(axes, at, bonds, depth, slab, colouring):
+    if colouring.bonds is None:
+        net.draw_bonds(axes, at, bonds, depth, slab)
+        return
+    near = 0.5 * (depth[bonds[:, 0]] + depth[bonds[:, 1]])
+    chosen = net.slab_of(near) == slab
+    colours, widths = colouring.bonds
+    axes.add_collection(LineCollection(at[bonds[chosen][:, :2]], colors=colours[chosen], linewidths=widths[chosen],
+                                       zorder=2 + slab))
+
+
+def scale_bar(axes, low, high, length):
+    """A bar of some millimetres at the lower end; x grows to the left."""
+    x, y = high[0] - 0.04 * (high[0] - low[0]), low[1] + 0.04 * (high[1] - low[1])
+    axes.plot([x, x - length], [y, y], color="black", lw=2.2, solid_capstyle="butt", zorder=95)
+    axes.annotate(f"{length:g} mm", (x - 0.5 * length, y), xytext=(0, 3), textcoords="offset points", ha="center",
+                  va="bottom", zorder=95, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1})
+
+
+def finish_axes(axes, low, high, view, liver, title):
+    _, _, _, _, name, across_words, plain_name, plain_words = view
+    axes.set_xlim(high[0], low[0])  # grows to the left
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    axes.set_title(title or (name if liver else plain_name), loc="left")
+    axes.set_xlabel(f"{across_words if liver else plain_words} [mm]")
+    axes.set_ylabel(f"{'up, y' if liver else 'y'} [mm]")
+
+
+def frame_of(picture, view):
+    """Lower and upper corner of a view: the organ at rest and the arrow of the probe."""
+    across, up = view[:2]
+    rest = 1e3 * np.array(picture["position_m"])[:, [across, up]]
+    margin = 1e3 * picture["radius_m"]
+    tip = rest[picture["contact"]] + net.ARROW * margin * np.array(picture["normal"][picture["contact"]])[[across, up]]
+    return np.minimum(rest.min(axis=0), tip) - margin, np.maximum(rest.max(axis=0), tip) + margin
+
+
+def draw_view(axes, picture, position_m, colouring, view, title=None):
+    across, up, towards, sign = view[:4]
+    position = 1e3 * np.array(position_m)
+    at = position[:, [across, up]]
+    toward = sign * position[:, towards]
+    span = np.ptp(toward)
+    depth = (toward - toward.min()) / span if span > 0 else np.ones(len(toward))
+    anchored = np.zeros(len(at), bool)
+    anchored[picture["anchors"]] = True
+    bonds = np.array(picture["bonds"], int).reshape(-1, 3)
+    for slab in range(net.SLABS):
+        if len(bonds) <= net.MOST_BONDS:
+            draw_bonds(axes, at, bonds, depth, slab, colouring)
+        net.draw_spheres(axes, at, depth, picture, colouring.face, anchored, slab, fade=colouring.bar is None)
+    net.draw_contact(axes, at, picture, view)
+    low, high = frame_of(picture, view)
+    scale_bar(axes, low, high, 50)
+    finish_axes(axes, low, high, view, picture["liver"], title)
+
+
+def slice_frame(picture, view):
+    across, up = view[:2]
+    at = 1e3 * np.array(picture["position_m"])[picture["contact"]][[across, up]]
+    into = np.array(picture["direction"])[[across, up]]
+    centre = at + 0.45 * SLICE_HALF_WIDTH * into
+    return centre - [0.75 * SLICE_HALF_WIDTH, SLICE_HALF_WIDTH], centre + [0.75 * SLICE_HALF_WIDTH, SLICE_HALF_WIDTH]
+
+
+def draw_slice(axes, picture, position_m, colouring, view, title=None):
+    """The spheres that the plane through the contact meets at rest: where they are, and dashed where they were."""
+    across, up, towards = view[:3]
+    rest, position = 1e3 * np.array(picture["position_m"]), 1e3 * np.array(position_m)
+    radius = 1e3 * picture["radius_m"]
+    inside = np.abs(rest[:, towards] - rest[picture["contact"], towards]) < SLICE_THICKNESS * radius
+    at, before = position[:, [across, up]], rest[:, [across, up]]
+    bonds = np.array(picture["bonds"], int).reshape(-1, 3)
+    chosen = inside[bonds[:, 0]] & inside[bonds[:, 1]]
+    colours, widths = colouring.bonds if colouring.bonds is not None else (np.array([to_rgb("#777777")] * len(bonds)),
+                                                                          np.full(len(bonds), 0.9))
+    axes.add_collection(LineCollection(at[bonds[chosen][:, :2]], colors=colours[chosen], linewidths=1.3 * widths[chosen],
+                                       zorder=3))
+    size = np.full(np.count_nonzero(inside), radius)
+    common = {"units": "xy", "transOffset": axes.transData}
+    axes.add_collection(EllipseCollection(size, size, 0 * size, offsets=before[inside], facecolors="none",
+                                          edgecolors=REST, linestyles="--", linewidths=0.8, zorder=2, **common))
+    anchored = np.isin(np.flatnonzero(inside), picture["anchors"])
+    axes.add_collection(EllipseCollection(
+        size, size, 0 * size, offsets=at[inside], facecolors=colouring.face[inside], zorder=4,
+        edgecolors=[net.ANCHOR if a else "#333333" for a in anchored], linewidths=np.where(anchored, 1.8, 0.6), **common))
+    contact = picture["contact"]
+    into = np.array(picture["direction"])[[across, up]]
+    axes.annotate("", at[contact] - 0.55 * radius * into, at[contact] - 2.6 * radius * into, zorder=90,
+                  arrowprops={"arrowstyle": "-|>", "color": net.CONTACT, "lw": 2.0})
+    low, high = slice_frame(picture, view)
+    scale_bar(axes, low, high, 20)
+    finish_axes(axes, low, high, view, picture["liver"], title)
+
+
+def place(page, rows, extents, above=ABOVE):
+    """One row of axes above the other; each row has its own scale, mm to inches. Returns the page's height."""
+    scales = []
+    for row in extents:
+        room = WIDTH - LEFT - GAP * (len(row) - 1) - RIGHT
+        scales.append(min(room / sum(e[0] for e in row), MOST_HIGH / max(e[1] for e in row)))
+    heights = [s * max(e[1] for e in row) for s, row in zip(scales, extents)]
+    height = above + sum(heights) + 0.8 * (len(rows) - 1) + BELOW
+    page.set_size_inches(WIDTH, height)
+    top = height - above
+    for row, sizes, scale, high in zip(rows, extents, scales, heights):
+        left = LEFT
+        for axes, size in zip(row, sizes):
+            axes.set_position([left / WIDTH, (top - scale * size[1]) / height, scale * size[0] / WIDTH, scale * size[1] / height])
+            left += scale * size[0] + GAP
+        top -= high + 0.8
+    return height
+
+
+def decorate(page, height, picture, colouring, words, axes):
+    page.text(LEFT / WIDTH, 1 - 0.28 / height, picture["title"], fontsize=11, fontweight="bold")
+    page.text(LEFT / WIDTH, 1 - 0.5 / height, f"{colouring.title}; {words}", fontsize=9)
+    page.text(LEFT / WIDTH, 0.1 / height, picture["provenance"], fontsize=7, color="#555555")
+    if colouring.bar is not None:
+        mappable, label = colouring.bar
+        box = axes.get_position()
+        bar = page.add_axes([1 - 0.72 / WIDTH, box.y0, 0.14 / WIDTH, box.height])
+        page.colorbar(mappable, cax=bar).set_label(label)
+    handles = [Line2D([], [], ls="", marker="o", ms=8, mfc=colour, mec="#444444", label=text)
+               for colour, text in colouring.flags or []]
+    handles.append(Line2D([], [], ls="", marker="o", ms=8, mfc="white", mec=net.ANCHOR, mew=1.8,
+                          label=f"anchored ({len(picture['anchors'])} spheres)"))
+    handles.append(Line2D([], [], ls="", marker="o", ms=8, mfc="none", mec=REST, mew=0.9, label="slice: where it was at rest"))
+    page.legend(handles=handles, loc="lower center", ncol=len(handles), frameon=False, bbox_to_anchor=(0.5, 0.22 / height))
+
+
+def size_of(frame):
+    return frame[1] - frame[0]
+
+
+def draw_one(picture, position_m, colouring, words):
+    page, axes = plt.subplots(1, 3)
+    front, side = net.VIEWS
+    for one, view in zip(axes, (front, side)):
+        draw_view(one, picture, position_m, colouring, view)
+    draw_slice(axes[2], picture, position_m, colouring, side, "Slice through the contact, from the same side")
+    extents = [size_of(frame_of(picture, front)), size_of(frame_of(picture, side)), size_of(slice_frame(picture, side))]
+    height = place(page, [axes], [extents])
+    decorate(page, height, picture, colouring, words, axes[2])
+    return page
+
+
+def draw_two(picture):
+    """Both states, coloured by displacement on one scale: from the side, and the slice."""
+    states = picture["states"]
+    values = [np.array(s["displacement_mm"]) for s in states]
+    scale = max(v.max() for v in values)
+    side = net.VIEWS[1]
+    page, axes = plt.subplots(1, 4)
+    extents = []
+    for k, (state, value) in enumerate(zip(states, values)):
+        colouring = by_number(value, "displacement [mm]", "Displacement, one scale for both", scale)
+        draw_view(axes[2 * k], picture, state["position_m"], colouring, side, f"{state['name']}: {state['words']}")
+        draw_slice(axes[2 * k + 1], picture, state["position_m"], colouring, side, f"{state['name']}, slice through the contact")
+        extents += [size_of(frame_of(picture, side)), size_of(slice_frame(picture, side))]
+    height = place(page, [axes], [extents])
+    decorate(page, height, picture, colouring, " and ".join(s["name"] for s in states), axes[3])
+    return page
+
+
+def pages(picture):
+    state = picture["states"][0]
+    words = f"{state['name']}, {state['words']}"
+    yield "undeformed", draw_one(picture, picture["position_m"], by_layer(picture, "Undeformed"), "at rest")
+    for name, colouring in [
+            ("deformed", by_layer(picture, "Deformed, not magnified")),
+            ("displacement", by_number(np.array(state["displacement_mm"]), "displacement [mm]", "Displacement")),
+            ("force", by_force(state)), ("validity", by_validity(state))]:
+        yield name, draw_one(picture, state["position_m"], colouring, words)
+    if len(picture["states"]) > 1:
+        yield "side_by_side", draw_two(picture)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("pictures", type=Path, help="as written by tpm simulate --figures")
+    parser.add_argument("folder", type=Path, help="where the drawings go")
+    arguments = parser.parse_args()
+    try:
+        picture = json.loads(arguments.pictures.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        sys.exit(f"draw_deformation.py: {arguments.pictures}: {error}; expected pictures of tpm simulate")
+    matplotlib.rcdefaults()  # not what a matplotlibrc of this machine says
+    matplotlib.rcParams.update(net.STYLE)
+    picture["normal"][picture["contact"]] = [-d for d in picture["direction"]]  # the arrow comes along the push
+    for name, page in pages(picture):
+        page.savefig(arguments.folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+        page.savefig(arguments.folder / f"{name}.png", dpi=110, metadata={"Software": None})
+        plt.close(page)
+
+
+if __name__ == "__main__":
+    main()
