@@ -315,9 +315,9 @@ TEST_CASE("driven slowly, the inertial network is the quasi-static one") {
     InertialOptions options;
     options.tolerance = 1e-9;
     const InertialRun run = block.inertial(options).run(ramp, times);
-    const QuasiStaticRun exact = QuasiStatic(block.bonds, block.network.organ.position,
-                                             block.freedom, block.probe, {1e-9})
-                                     .run(ramp, times);
+    const QuasiStaticRun exact =
+        QuasiStatic(block.bonds, block.network.organ.position, block.freedom, block.probe, {1e-9})
+            .run(ramp, times);
     const Eigen::VectorXd error = (run.response - exact.response) / exact.response[1];
     CAPTURE(slowness, error.transpose());
     // On the ramp the difference is the drag on the moving spheres, in proportion to the speed.

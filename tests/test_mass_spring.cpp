@@ -127,7 +127,8 @@ TEST_CASE("unevenness is 0 for translations and small rotations of a curved orga
 
 TEST_CASE("on a regular lattice unevenness is a quarter of a^2 times the Laplacian") {
   Organ organ = block(4, 4, 1, 0.02, Lattice::cubic);
-  const Network network = build_network(organ, {1.2, StiffnessRule::per_bond}, "lattice");
+  const Network network =
+      build_network(organ, {.support = 1.2, .rule = StiffnessRule::per_bond}, "lattice");
   Eigen::Matrix3Xd u = Eigen::Matrix3Xd::Zero(3, organ.position.cols());
   // Laplacian of 3 x^2 - y^2 + x y + x: 4 (per metre)
   const auto x = organ.position.row(0).array();
@@ -142,7 +143,8 @@ TEST_CASE("on a regular lattice unevenness is a quarter of a^2 times the Laplaci
 
 TEST_CASE("one sphere that stands out alone has the roughness that its neighbourhood says") {
   const Organ organ = block(4, 4, 1, 0.02, Lattice::cubic);
-  const Network network = build_network(organ, {1.2, StiffnessRule::per_bond}, "lattice");
+  const Network network =
+      build_network(organ, {.support = 1.2, .rule = StiffnessRule::per_bond}, "lattice");
   Eigen::Matrix3Xd u = Eigen::Matrix3Xd::Zero(3, organ.position.cols());
   u(2, 12) = -1e-3;
   const std::vector<std::size_t> alone{12};
@@ -194,7 +196,8 @@ TEST_CASE("the rim is where the normals turn") {
   for (const Eigen::Index i : {0, 5, 10, 15, 20}) {  // one side of the outer plane
     organ.normal.col(i) = Eigen::Vector3d(-1, 0, 1).normalized();
   }
-  const Network network = build_network(organ, {1.2, StiffnessRule::per_bond}, "plate");
+  const Network network =
+      build_network(organ, {.support = 1.2, .rule = StiffnessRule::per_bond}, "plate");
   // A sphere in the middle of that side has 2 neighbours alike and 1 at 45 degrees, in the mean 15;
   // one beside it has 1 of 4 at 45 degrees.
   CHECK(spheres_at_rim(network, 14.0 * std::numbers::pi / 180.0) ==

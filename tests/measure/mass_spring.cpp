@@ -99,9 +99,8 @@ class Scene {
 
   [[nodiscard]] Eigen::Matrix3Xd settled(const Tissue& tissue, double load) const {
     const BondSystem bonds(tissue.network, tissue.material);
-    const QuasiStaticRun run =
-        QuasiStatic(bonds, liver_.organ.position, freedom_, probe_, {1e-6})
-            .run(creep(load, kForever), std::span(&kForever, 1));
+    const QuasiStaticRun run = QuasiStatic(bonds, liver_.organ.position, freedom_, probe_, {1e-6})
+                                   .run(creep(load, kForever), std::span(&kForever, 1));
     return run.position - liver_.organ.position;
   }
 

@@ -89,6 +89,15 @@ void DrivenTissue::unit_field(const TissueState& state, const BondMemory& memory
   field += unit;
 }
 
+double DrivenTissue::held_stiffness(const Positions& position, const BondMemory& memory) const {
+  const auto column = static_cast<Eigen::Index>(probe_.sphere);
+  Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, rest_.cols());
+  unit.col(column) = probe_.direction;
+  Eigen::Matrix3Xd pushed = Eigen::Matrix3Xd::Zero(3, rest_.cols());
+  bonds_.add_stiffness_times(position, memory, unit, pushed);
+  return pushed.col(column).dot(probe_.direction);
+}
+
 double DrivenTissue::linear_response(const TissueState& rest, double peak) {
   const BondMemory relaxed{Eigen::VectorXd::Zero(rest.elongation.size()), 1.0};
   Eigen::Matrix3Xd field;

@@ -51,6 +51,9 @@ class DrivenTissue {
                   double& stiffness) const;
   [[nodiscard]] double adjoint_sign() const { return depth_driven() ? -1.0 : 1.0; }
 
+  /// Force on the driven sphere per displacement along the probe while all others stand still, N/m.
+  [[nodiscard]] double held_stiffness(const Positions& position, const BondMemory& memory) const;
+
   /// Size of the response to a peak of what is imposed, with the relaxed stiffness at rest.
   [[nodiscard]] double linear_response(const TissueState& rest, double peak);
 

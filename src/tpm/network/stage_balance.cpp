@@ -118,8 +118,8 @@ bool StageBalance::refactorise(const TissueState& state, double following) {
   tissue_.bonds().elongation_changes(state.position, field_, change);
   goal_ =
       tissue_.adjoint_sign() * bonds_.of_relaxing(change.cwiseProduct(tissue_.bonds().relaxing()));
-  grain_ = kGrains * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff() *
-           (tissue_.depth_driven() ? path_stiffness_ : 1.0);
+  grain_ = kGrains * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
+  if (tissue_.depth_driven()) grain_ *= tissue_.held_stiffness(state.position, memory);
   last_iterations_ = 0;
   return true;
 }

@@ -8,30 +8,21 @@
 namespace tpm {
 namespace {
 
-/// z * integral_0^c exp(-z (c - s)) s^p ds for p = 0, 1, ..., size - 1.
-Eigen::VectorXd moments(double c, double z, Eigen::Index size) {
-  Eigen::VectorXd moment = Eigen::VectorXd::Zero(size);
-  if (z * c > 2.0 * static_cast<double>(size)) {
-    // Rising recurrence: each step damps the error of the one before.
-    moment[0] = -std::expm1(-z * c);
-    double power = 1.0;
-    for (Eigen::Index p = 1; p < size; ++p) {
-      power *= c;
-      moment[p] = power - static_cast<double>(p) / z * moment[p - 1];
-    }
-    return moment;
-  }
+/// z times an interval behind which exp(-z s) is below rounding.
+constexpr double kForgotten = 40.0;
+
+/// Visits the abscissas s in (0, c) and weights of a quadrature of exp(-z (c - s)) times a
+/// polynomial, 1e-16 for degrees up to 10: Gauss over what is not forgotten.
+template <class Visit>
+void quadrature(double c, double z, Visit&& visit) {
   using Rule = boost::math::quadrature::gauss<double, 30>;
-  const auto add = [&](double abscissa, double weight) {
-    const double s = 0.5 * c * (1.0 + abscissa);
-    double term = 0.5 * c * weight * z * std::exp(-z * (c - s));
-    for (Eigen::Index p = 0; p < size; ++p, term *= s) moment[p] += term;
-  };
+  const double half = 0.5 * (z * c > kForgotten ? kForgotten / z : c);
   for (std::size_t i = 0; i < Rule::abscissa().size(); ++i) {
-    add(Rule::abscissa()[i], Rule::weights()[i]);
-    add(-Rule::abscissa()[i], Rule::weights()[i]);
+    for (const double side : {-1.0, 1.0}) {
+      const double ago = half * (1.0 + side * Rule::abscissa()[i]);
+      visit(c - ago, half * Rule::weights()[i] * std::exp(-z * ago));
+    }
   }
-  return moment;
 }
 
 }  // namespace
@@ -59,27 +50,19 @@ std::vector<double> radau_nodes(int count) {
 }
 
 ExponentialCollocation::ExponentialCollocation(std::vector<double> nodes)
-    : nodes_(std::move(nodes)) {
-  const auto n = static_cast<Eigen::Index>(nodes_.size());
-  coefficients_ = Eigen::MatrixXd::Zero(n, n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const double own = nodes_[static_cast<std::size_t>(k)];
-    Eigen::VectorXd row = Eigen::VectorXd::Unit(n, 0);
-    Eigen::Index degree = 0;
-    for (Eigen::Index j = 0; j < n; ++j) {
-      if (j == k) continue;
-      const double other = nodes_[static_cast<std::size_t>(j)];
-      // Times (c - other) / (own - other).
-      for (Eigen::Index p = ++degree; p >= 0; --p) {
-        row[p] = ((p > 0 ? row[p - 1] : 0.0) - other * row[p]) / (own - other);
-      }
-    }
-    coefficients_.row(k) = row.transpose();
-  }
-}
+    : nodes_(std::move(nodes)) {}
 
 Eigen::VectorXd ExponentialCollocation::weights(double c, double z) const {
-  return coefficients_ * moments(c, z, coefficients_.cols());
+  Eigen::VectorXd weight = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(nodes_.size()));
+  quadrature(c, z, [&](double s, double part) { weight += z * part * interpolation(s); });
+  return weight;
+}
+
+Eigen::VectorXd ExponentialCollocation::weight_slopes(double c, double z) const {
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(nodes_.size()));
+  quadrature(
+      c, z, [&](double s, double part) { slope += (1.0 - z * (c - s)) * part * interpolation(s); });
+  return slope;
 }
 
 Eigen::VectorXd ExponentialCollocation::interpolation(double c) const {

@@ -20,17 +20,19 @@ class ExponentialCollocation {
 
   [[nodiscard]] const std::vector<double>& nodes() const { return nodes_; }
 
-  /// The weights of all nodes, to about 1e-13.
+  /// The weights of all nodes, to rounding.
   /// @param c in [0, 1]
   /// @param z >= 0
   [[nodiscard]] Eigen::VectorXd weights(double c, double z) const;
+
+  /// The derivatives of the weights by z.
+  [[nodiscard]] Eigen::VectorXd weight_slopes(double c, double z) const;
 
   /// L_k(c) of all nodes: what interpolates at c.
   [[nodiscard]] Eigen::VectorXd interpolation(double c) const;
 
  private:
   std::vector<double> nodes_;
-  Eigen::MatrixXd coefficients_;  ///< row k: L_k in powers of c
 };
 
 }  // namespace tpm
