@@ -19,12 +19,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
-from matplotlib.colors import Normalize, to_rgb
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from matplotlib.lines import Line2D
 
 # Inches.
-WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW = 13.0, 0.65, 0.6, 0.95, 0.85, 0.95
+WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW, LEGEND_ROW = 13.0, 0.65, 0.6, 0.95, 0.9, 0.7, 0.22
 MOST_HIGH = 5.0
+LEGEND_COLUMNS = 3
+ARROW = 3.5  # length of the probe, in radii
+BAR = 50  # mm, of the bar that shows the scale
+FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#08306B", "#4292C6", "#DADADA", "#EF6548", "#7F0000"])
 SLICE_HALF_WIDTH = 90.0  # mm to each side of the contact
 SLICE_THICKNESS = 1.1  # spheres nearer to the plane than this many radii are in it
 REST, INSIDE = "#9A9A9A", "#D9D9D9"
@@ -36,8 +40,9 @@ FLAGS = [(1, "#F0A83C", "indented by more than 10 mm (paper's validity)"),
 class Colouring:
     """Faces of the spheres, and of the bonds if they carry a number; what a colour means."""
 
-    def __init__(self, face, title, bar=None, bonds=None, flags=None):
+    def __init__(self, face, title, bar=None, bonds=None, flags=None, share=0.5):
         self.face, self.title, self.bar, self.bonds, self.flags = face, title, bar, bonds, flags
+        self.share = share  # of their radius that spheres are drawn with
 
 
 def by_layer(picture, title):
@@ -57,11 +62,11 @@ def by_force(state):
     force = np.array(state["bond_force_mN"])
     largest = np.array(state["largest_bond_force_mN"])
     scale = max(np.abs(force).max(), 1e-12)
-    bar = ScalarMappable(Normalize(-scale, scale), "RdBu_r")
-    spheres = plt.get_cmap("Greys")(0.05 + 0.75 * largest / scale)[:, :3]
+    bar = ScalarMappable(Normalize(-scale, scale), FORCE_MAP)
+    spheres = plt.get_cmap("Greys")(0.1 + 0.7 * largest / scale)[:, :3]
     strength = np.abs(force) / scale
-    return Colouring(spheres, "Force in the bonds (spheres: the largest at them, darker)",
-                     (bar, "force of a bond, pulling > 0 [mN]"), (bar.to_rgba(force), 0.3 + 2.2 * strength))
+    return Colouring(spheres, "Force in the bonds (spheres: darker where the largest at them is larger)",
+                     (bar, "force of a bond, pulling > 0 [mN]"), (bar.to_rgba(force), 0.5 + 3.0 * strength), share=0.25)
 
 
 def by_validity(state):
@@ -84,11 +89,11 @@ def draw_bonds(axes, at, bonds, depth, slab, colouring):
                                        zorder=2 + slab))
 
 
-def scale_bar(axes, low, high, length):
-    """A bar of some millimetres at the lower end; x grows to the left."""
+def scale_bar(axes, low, high):
+    """At the lower end; x grows to the left."""
     x, y = high[0] - 0.04 * (high[0] - low[0]), low[1] + 0.04 * (high[1] - low[1])
-    axes.plot([x, x - length], [y, y], color="black", lw=2.2, solid_capstyle="butt", zorder=95)
-    axes.annotate(f"{length:g} mm", (x - 0.5 * length, y), xytext=(0, 3), textcoords="offset points", ha="center",
+    axes.plot([x, x - BAR], [y, y], color="black", lw=2.2, solid_capstyle="butt", zorder=95)
+    axes.annotate(f"{BAR} mm", (x - 0.5 * BAR, y), xytext=(0, 3), textcoords="offset points", ha="center",
                   va="bottom", zorder=95, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1})
 
 
@@ -107,7 +112,7 @@ def frame_of(picture, view):
     across, up = view[:2]
     rest = 1e3 * np.array(picture["position_m"])[:, [across, up]]
     margin = 1e3 * picture["radius_m"]
-    tip = rest[picture["contact"]] + net.ARROW * margin * np.array(picture["normal"][picture["contact"]])[[across, up]]
+    tip = rest[picture["contact"]] + ARROW * margin * np.array(picture["normal"][picture["contact"]])[[across, up]]
     return np.minimum(rest.min(axis=0), tip) - margin, np.maximum(rest.max(axis=0), tip) + margin
 
 
@@ -124,10 +129,11 @@ def draw_view(axes, picture, position_m, colouring, view, title=None):
     for slab in range(net.SLABS):
         if len(bonds) <= net.MOST_BONDS:
             draw_bonds(axes, at, bonds, depth, slab, colouring)
-        net.draw_spheres(axes, at, depth, picture, colouring.face, anchored, slab, fade=colouring.bar is None)
-    net.draw_contact(axes, at, picture, view)
+        net.draw_spheres(axes, at, depth, picture, colouring.face, anchored, slab, colouring.bar is None,
+                         colouring.share)
+    net.draw_contact(axes, at, picture, view, ARROW, named=False)
     low, high = frame_of(picture, view)
-    scale_bar(axes, low, high, 50)
+    scale_bar(axes, low, high)
     finish_axes(axes, low, high, view, picture["liver"], title)
 
 
@@ -152,7 +158,7 @@ def draw_slice(axes, picture, position_m, colouring, view, title=None):
                                                                           np.full(len(bonds), 0.9))
     axes.add_collection(LineCollection(at[bonds[chosen][:, :2]], colors=colours[chosen], linewidths=1.3 * widths[chosen],
                                        zorder=3))
-    size = np.full(np.count_nonzero(inside), radius)
+    size = np.full(np.count_nonzero(inside), 2 * colouring.share * radius)
     common = {"units": "xy", "transOffset": axes.transData}
     axes.add_collection(EllipseCollection(size, size, 0 * size, offsets=before[inside], facecolors="none",
                                           edgecolors=REST, linestyles="--", linewidths=0.8, zorder=2, **common))
@@ -165,44 +171,49 @@ def draw_slice(axes, picture, position_m, colouring, view, title=None):
     axes.annotate("", at[contact] - 0.55 * radius * into, at[contact] - 2.6 * radius * into, zorder=90,
                   arrowprops={"arrowstyle": "-|>", "color": net.CONTACT, "lw": 2.0})
     low, high = slice_frame(picture, view)
-    scale_bar(axes, low, high, 20)
+    scale_bar(axes, low, high)
     finish_axes(axes, low, high, view, picture["liver"], title)
 
 
-def place(page, rows, extents, above=ABOVE):
-    """One row of axes above the other; each row has its own scale, mm to inches. Returns the page's height."""
-    scales = []
-    for row in extents:
-        room = WIDTH - LEFT - GAP * (len(row) - 1) - RIGHT
-        scales.append(min(room / sum(e[0] for e in row), MOST_HIGH / max(e[1] for e in row)))
-    heights = [s * max(e[1] for e in row) for s, row in zip(scales, extents)]
-    height = above + sum(heights) + 0.8 * (len(rows) - 1) + BELOW
+def legend_of(picture, colouring):
+    def dot(label, size=8, **style):
+        return Line2D([], [], ls="", marker="o", ms=size, label=label, **style)
+
+    handles = [dot(text, mfc=colour, mec="#444444") for colour, text in colouring.flags or []]
+    return [*handles, dot(f"probe on sphere {picture['contact'] + 1}", 6, mfc=net.CONTACT, mec="white"),
+            dot(f"anchored ({len(picture['anchors'])} spheres)", mfc="white", mec=net.ANCHOR, mew=1.8),
+            dot("slice: where it was at rest", mfc="none", mec=REST, mew=0.9)]
+
+
+def place(page, row, sizes, legend_rows):
+    """Axes side by side on one scale, mm to inches. Returns the page's height."""
+    room = WIDTH - LEFT - GAP * (len(row) - 1) - RIGHT
+    scale = min(room / sum(e[0] for e in sizes), MOST_HIGH / max(e[1] for e in sizes))
+    below = BELOW + LEGEND_ROW * legend_rows
+    height = ABOVE + scale * max(e[1] for e in sizes) + below
     page.set_size_inches(WIDTH, height)
-    top = height - above
-    for row, sizes, scale, high in zip(rows, extents, scales, heights):
-        left = LEFT
-        for axes, size in zip(row, sizes):
-            axes.set_position([left / WIDTH, (top - scale * size[1]) / height, scale * size[0] / WIDTH, scale * size[1] / height])
-            left += scale * size[0] + GAP
-        top -= high + 0.8
+    left = LEFT
+    for axes, size in zip(row, sizes):
+        axes.set_position([left / WIDTH, 1 - (ABOVE + scale * size[1]) / height, scale * size[0] / WIDTH,
+                           scale * size[1] / height])
+        left += scale * size[0] + GAP
     return height
 
 
-def decorate(page, height, picture, colouring, words, axes):
+def decorate(page, row, sizes, picture, colouring, words):
+    """Places the axes and writes around them."""
+    handles = legend_of(picture, colouring)
+    height = place(page, row, sizes, -(-len(handles) // LEGEND_COLUMNS))
     page.text(LEFT / WIDTH, 1 - 0.28 / height, picture["title"], fontsize=11, fontweight="bold")
     page.text(LEFT / WIDTH, 1 - 0.5 / height, f"{colouring.title}; {words}", fontsize=9)
     page.text(LEFT / WIDTH, 0.1 / height, picture["provenance"], fontsize=7, color="#555555")
     if colouring.bar is not None:
         mappable, label = colouring.bar
-        box = axes.get_position()
+        box = row[-1].get_position()
         bar = page.add_axes([1 - 0.72 / WIDTH, box.y0, 0.14 / WIDTH, box.height])
         page.colorbar(mappable, cax=bar).set_label(label)
-    handles = [Line2D([], [], ls="", marker="o", ms=8, mfc=colour, mec="#444444", label=text)
-               for colour, text in colouring.flags or []]
-    handles.append(Line2D([], [], ls="", marker="o", ms=8, mfc="white", mec=net.ANCHOR, mew=1.8,
-                          label=f"anchored ({len(picture['anchors'])} spheres)"))
-    handles.append(Line2D([], [], ls="", marker="o", ms=8, mfc="none", mec=REST, mew=0.9, label="slice: where it was at rest"))
-    page.legend(handles=handles, loc="lower center", ncol=len(handles), frameon=False, bbox_to_anchor=(0.5, 0.22 / height))
+    page.legend(handles=handles, loc="lower center", ncol=LEGEND_COLUMNS, frameon=False,
+                bbox_to_anchor=(0.5, 0.22 / height))
 
 
 def size_of(frame):
@@ -214,10 +225,9 @@ def draw_one(picture, position_m, colouring, words):
     front, side = net.VIEWS
     for one, view in zip(axes, (front, side)):
         draw_view(one, picture, position_m, colouring, view)
-    draw_slice(axes[2], picture, position_m, colouring, side, "Slice through the contact, from the same side")
-    extents = [size_of(frame_of(picture, front)), size_of(frame_of(picture, side)), size_of(slice_frame(picture, side))]
-    height = place(page, [axes], [extents])
-    decorate(page, height, picture, colouring, words, axes[2])
+    draw_slice(axes[2], picture, position_m, colouring, side, "Slice through the contact")
+    sizes = [size_of(frame_of(picture, front)), size_of(frame_of(picture, side)), size_of(slice_frame(picture, side))]
+    decorate(page, axes, sizes, picture, colouring, words)
     return page
 
 
@@ -228,14 +238,14 @@ def draw_two(picture):
     scale = max(v.max() for v in values)
     side = net.VIEWS[1]
     page, axes = plt.subplots(1, 4)
-    extents = []
+    sizes = []
     for k, (state, value) in enumerate(zip(states, values)):
         colouring = by_number(value, "displacement [mm]", "Displacement, one scale for both", scale)
-        draw_view(axes[2 * k], picture, state["position_m"], colouring, side, f"{state['name']}: {state['words']}")
-        draw_slice(axes[2 * k + 1], picture, state["position_m"], colouring, side, f"{state['name']}, slice through the contact")
-        extents += [size_of(frame_of(picture, side)), size_of(slice_frame(picture, side))]
-    height = place(page, [axes], [extents])
-    decorate(page, height, picture, colouring, " and ".join(s["name"] for s in states), axes[3])
+        draw_view(axes[2 * k], picture, state["position_m"], colouring, side, f"{state['name']}, {state['words']}")
+        draw_slice(axes[2 * k + 1], picture, state["position_m"], colouring, side, f"{state['name']}, slice")
+        sizes += [size_of(frame_of(picture, side)), size_of(slice_frame(picture, side))]
+    words = "; ".join(f"{s['name']}: {s['roughness']}" for s in states)
+    decorate(page, axes, sizes, picture, colouring, words)
     return page
 
 

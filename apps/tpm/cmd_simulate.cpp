@@ -26,79 +26,129 @@ struct SimulateChoice {
 };
 
 /// What a signal handler may touch has to be of static storage.
-volatile std::sig_atomic_t interrupt_seen = 0;
+volatile std::sig_atomic_t stop_signal = 0;
 
-/// While this lives, the first interrupt from the keyboard is remembered and a second one kills.
+/// While this lives, the first SIGINT or SIGTERM is remembered and a second one kills.
 class InterruptWatch {
  public:
   InterruptWatch() {
     struct sigaction action {};
-    action.sa_handler = [](int) { interrupt_seen = 1; };
+    action.sa_handler = [](int signal) { stop_signal = signal; };
     action.sa_flags = static_cast<int>(SA_RESETHAND);
-    sigaction(SIGINT, &action, &before_);
+    sigaction(SIGINT, &action, &before_interrupt_);
+    sigaction(SIGTERM, &action, &before_terminate_);
   }
-  ~InterruptWatch() { sigaction(SIGINT, &before_, nullptr); }
+  ~InterruptWatch() {
+    sigaction(SIGINT, &before_interrupt_, nullptr);
+    sigaction(SIGTERM, &before_terminate_, nullptr);
+  }
   InterruptWatch(const InterruptWatch&) = delete;
   InterruptWatch& operator=(const InterruptWatch&) = delete;
-  [[nodiscard]] static bool seen() { return interrupt_seen != 0; }
+  [[nodiscard]] static bool seen() { return stop_signal != 0; }
 
  private:
-  struct sigaction before_ {};
+  struct sigaction before_interrupt_ {};
+  struct sigaction before_terminate_ {};
 };
 
+/// A scene, the network it is run on, and what came of it.
+struct Simulated {
+  ExperimentScene scene;
+  RunNetwork network;
+  SimulationRun run;
+  fs::path file, checkpoint;
+};
+
+double checkpoint_interval_s(const SimulateChoice& choice) {
+  const double every =
+      parse_quantity(choice.checkpoint_every, Dimension::time, "--checkpoint-every");
+  if (every >= 0.0) return every;
+  throw Error(ExitCode::usage, "--checkpoint-every", choice.checkpoint_every, "0 s or more");
+}
+
 SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& network,
-                          const SimulateChoice& choice, const char* what, const fs::path& name) {
+                          double checkpoint_every_s, const fs::path& checkpoint) {
   const InterruptWatch interrupts;
   std::optional<Progress> progress;
   SimulationControls controls;
+  std::size_t before = 0;
   controls.progress = [&](std::size_t done, std::size_t total) {
     if (!progress) {
-      progress.emplace(what, total);
-      progress->advance(done);
-    } else {
-      progress->advance();
+      progress.emplace(scene.formulation.mass_spring ? "mass-spring model" : "simulating", total);
     }
+    progress->advance(done - before);
+    before = done;
   };
   controls.interrupted = InterruptWatch::seen;
-  controls.checkpoint = name;
-  controls.checkpoint_every_s =
-      parse_quantity(choice.checkpoint_every, Dimension::time, "--checkpoint-every");
-  if (!(controls.checkpoint_every_s >= 0.0)) {
-    throw Error(ExitCode::usage, "--checkpoint-every", choice.checkpoint_every, "0 s or more");
-  }
+  controls.checkpoint = checkpoint;
+  controls.checkpoint_every_s = checkpoint_every_s;
   controls.note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
   return simulate(scene, network, controls);
 }
 
-int simulate_and_report(const SimulateChoice& choice, const Session& session) {
-  const ExperimentScene scene = read_experiment(choice.scene);
-  const RunNetwork network = network_to_run(scene);
-  const SimulationRun run =
-      run_watched(scene, network, choice, "simulating", choice.output + ".checkpoint");
-  std::vector<std::string> files{choice.output};
-  files.push_back(write_simulation(scene, network, run, choice.output).string());
-  if (!choice.figures.empty()) {
-    std::vector<FiguredRun> runs{{&scene, &network, &run}};
-    ExperimentScene msm_scene = scene;
-    std::optional<RunNetwork> msm;
-    std::optional<SimulationRun> msm_run;
-    if (choice.beside_mass_spring && !scene.formulation.mass_spring) {
-      msm_scene.formulation.mass_spring = true;
-      msm.emplace(network_to_run(msm_scene));
-      msm_run.emplace(run_watched(msm_scene, *msm, choice, "mass-spring model", {}));
-      runs.push_back({&msm_scene, &*msm, &*msm_run});
+Simulated simulated(ExperimentScene scene, fs::path file, double checkpoint_every_s) {
+  RunNetwork network = network_to_run(scene);
+  fs::path checkpoint = file.string() + ".checkpoint";
+  SimulationRun run = run_watched(scene, network, checkpoint_every_s, checkpoint);
+  return {std::move(scene), std::move(network), std::move(run), std::move(file),
+          std::move(checkpoint)};
+}
+
+/// "results.h5" becomes "results-mass_spring.h5".
+fs::path mass_spring_file(const fs::path& file) {
+  fs::path beside = file;
+  return beside.replace_filename(
+      fmt::format("{}-mass_spring{}", file.stem().string(), file.extension().string()));
+}
+
+std::vector<Simulated> simulate_all(const SimulateChoice& choice) {
+  const double every_s = checkpoint_interval_s(choice);
+  ExperimentScene scene = read_experiment(choice.scene);
+  std::vector<Simulated> all;
+  if (choice.beside_mass_spring) {
+    if (scene.formulation.mass_spring) {
+      throw Error(ExitCode::usage, "--beside-mass-spring",
+                  "the scene runs the mass-spring model itself", "a scene of the tissue");
     }
-    for (const std::string& name : write_simulation_figures(choice.figures, runs)) {
-      files.push_back((fs::path(choice.figures) / name).string());
-    }
+    ExperimentScene msm = scene;
+    msm.formulation.mass_spring = true;
+    all.push_back(simulated(std::move(scene), choice.output, every_s));
+    all.push_back(simulated(std::move(msm), mass_spring_file(choice.output), every_s));
+  } else {
+    all.push_back(simulated(std::move(scene), choice.output, every_s));
   }
+  return all;
+}
+
+std::vector<std::string> write_all(const SimulateChoice& choice,
+                                   const std::vector<Simulated>& all) {
+  std::vector<std::string> files;
+  std::vector<FiguredRun> figured;
+  for (const Simulated& s : all) {
+    files.push_back(s.file.string());
+    files.push_back(write_simulation(s.scene, s.network, s.run, s.file).string());
+    fs::remove(s.checkpoint);
+    figured.push_back({&s.scene, &s.network, &s.run});
+  }
+  if (choice.figures.empty()) return files;
+  for (const std::string& name : write_simulation_figures(choice.figures, figured)) {
+    files.push_back((fs::path(choice.figures) / name).string());
+  }
+  return files;
+}
+
+int simulate_and_report(const SimulateChoice& choice, const Session& session) {
+  const std::vector<Simulated> all = simulate_all(choice);
+  const std::vector<std::string> files = write_all(choice, all);
   if (session.json()) {
-    Json json = simulation_json(scene, run);
+    Json json = simulation_json(all.front().scene, all.front().run);
+    if (all.size() > 1) json["mass_spring"] = simulation_json(all[1].scene, all[1].run);
     json["files"] = files;
     fmt::print("{}", to_text(json));
-  } else {
-    fmt::print("{}wrote {}\n", simulation_text(scene, run), fmt::join(files, ", "));
+    return 0;
   }
+  for (const Simulated& s : all) fmt::print("{}", simulation_text(s.scene, s.run));
+  fmt::print("wrote {}\n", fmt::join(files, ", "));
   return 0;
 }
 
@@ -107,9 +157,9 @@ int run_command(const SimulateChoice& choice, const Session& session) {
   try {
     return simulate_and_report(choice, session);
   } catch (const Interrupted& stop) {
-    constexpr int kInterrupted = 130;
+    constexpr int kStoppedBySignal = 128;
     fmt::print(stderr, "tpm: {}\n", stop.what());
-    return kInterrupted;
+    return kStoppedBySignal + stop_signal;
   }
 }
 
@@ -124,7 +174,7 @@ void add_simulate_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--figures", choice->figures, "Folder for pictures (PNG, SVG)");
   command->add_flag("--beside-mass-spring", choice->beside_mass_spring,
-                    "Also run the mass-spring model, and draw both (with --figures)");
+                    "Also run the mass-spring model on the same spheres; figures show both");
   command
       ->add_option("--checkpoint-every", choice->checkpoint_every,
                    "Time between checkpoints, such as \"5 s\"")

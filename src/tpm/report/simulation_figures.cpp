@@ -10,6 +10,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/report/network_report.hpp"
 #include "tpm/simulate/simulation_file.hpp"
+#include "tpm/simulate/smoothness.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -39,6 +40,14 @@ Json list_json(const Numbers& numbers, double unit) {
   return list;
 }
 
+std::string roughness_words(const std::optional<Smoothness>& found) {
+  if (!found) return "nothing has moved";
+  const std::string near =
+      fmt::format("roughness {} near the contact", significant(found->near_contact, 4));
+  if (!found->at_rim) return near;
+  return fmt::format("{}, {} at the rim", near, significant(*found->at_rim, 4));
+}
+
 /// The network as it is at the last output.
 Json state_json(const FiguredRun& figured) {
   const QuasiStaticState& state = figured.run->record.outputs.back();
@@ -59,6 +68,7 @@ Json state_json(const FiguredRun& figured) {
   const double force_N = depth ? state.response : state.imposed;
   json["words"] = fmt::format("t = {} s, depth {} mm, force {} N", significant(state.time_s, 4),
                               significant(1e3 * depth_m, 4), significant(force_N, 4));
+  json["roughness"] = roughness_words(smoothness_of(*figured.scene, state.position));
   return json;
 }
 

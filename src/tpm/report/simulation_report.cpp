@@ -8,6 +8,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/core/version.hpp"
+#include "tpm/simulate/smoothness.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -53,11 +54,30 @@ Json energy_json(const ExperimentScene& scene, const SimulationRun& run) {
             {"dissipated_J", rounded(e.bond_heat + e.damping_heat, kDigits)},
             {"kinetic_J", rounded(e.kinetic, kDigits)}};
   }
-  if (scene.formulation.inertial) return nullptr;
+  if (scene.formulation.inertial()) return nullptr;
   const QuasiStaticEnergy& e = run.record.curve.back().energy;
   return {{"work_J", rounded(e.work_J, kDigits)},
           {"stored_J", rounded(e.stored_J, kDigits)},
           {"dissipated_J", rounded(e.dissipated_J, kDigits)}};
+}
+
+Json smoothness_json(const std::optional<Smoothness>& smoothness) {
+  if (!smoothness) return nullptr;
+  Json json{{"near_contact", rounded(smoothness->near_contact, kDigits)},
+            {"near_spheres", smoothness->near_spheres},
+            {"rim_spheres", smoothness->rim_spheres}};
+  json["at_rim"] = smoothness->at_rim ? Json(rounded(*smoothness->at_rim, kDigits)) : Json(nullptr);
+  return json;
+}
+
+std::string smoothness_text(const std::optional<Smoothness>& smoothness) {
+  if (!smoothness) return "";
+  return fmt::format("roughness at the end: {} near the contact ({} spheres){}\n",
+                     significant(smoothness->near_contact, 4), smoothness->near_spheres,
+                     smoothness->at_rim
+                         ? fmt::format(", {} at the rim ({} spheres)",
+                                       significant(*smoothness->at_rim, 4), smoothness->rim_spheres)
+                         : std::string());
 }
 
 /// "71, 72 and 3 others"
@@ -91,8 +111,12 @@ std::string validity_text(const Validity& validity) {
 std::string equations_text(const ExperimentScene& scene, const SimulationRun& run) {
   const Formulation& f = scene.formulation;
   const char* network = f.mass_spring ? "mass-spring model" : "tissue";
-  if (!f.inertial) {
-    return fmt::format("{}, quasi-static, tolerance {}\n", network, shortest(f.tolerance));
+  if (!f.inertial()) {
+    return fmt::format("{}, {}, tolerance {}\n", network,
+                       f.kind == FormulationKind::relaxed
+                           ? "static: everything has relaxed at each time"
+                           : "quasi-static",
+                       shortest(f.tolerance));
   }
   return fmt::format("{} with mass, damping ratio {} of its lowest mode ({} Hz), tolerance {}\n",
                      network, shortest(f.damping_ratio), significant(run.lowest_frequency_Hz, 4),
@@ -110,7 +134,7 @@ Json simulation_json(const ExperimentScene& scene, const SimulationRun& run) {
             {"version", version()},
             {"scene_sha256", sha256_hex(scene.text)},
             {"network", f.mass_spring ? "mass_spring" : "tissue"},
-            {"formulation", f.inertial ? "inertial" : "quasi_static"},
+            {"formulation", word_of(f.kind)},
             {"tolerance", f.tolerance},
             {"spheres", scene.tissue.network.organ.size()},
             {"bonds", scene.tissue.network.bonds.size()},
@@ -128,8 +152,10 @@ Json simulation_json(const ExperimentScene& scene, const SimulationRun& run) {
   json["last"] = point(record.curve.back());
   json["outputs"] = record.outputs.size();
   json["energy"] = energy_json(scene, run);
-  json["error_estimate"] =
-      run.error_estimate ? Json(rounded(*run.error_estimate, 3)) : Json(nullptr);
+  json["roughness"] = smoothness_json(smoothness_of(scene, record.outputs.back().position));
+  json["error_estimate"] = f.kind == FormulationKind::quasi_static
+                               ? Json(rounded(record.error_estimate, 3))
+                               : Json(nullptr);
   json["resumed_at_s"] = run.resumed_at_s ? Json(*run.resumed_at_s) : Json(nullptr);
   json["validity"] = validity_json(record.validity);
   return json;
@@ -156,6 +182,7 @@ std::string simulation_text(const ExperimentScene& scene, const SimulationRun& r
                       significant(most.time_s, 4));
   text += fmt::format("at the end, {} s: {}\n", significant(record.curve.back().time_s, 4),
                       response(record.curve.back()));
+  text += smoothness_text(smoothness_of(scene, record.outputs.back().position));
   return text + validity_text(record.validity);
 }
 

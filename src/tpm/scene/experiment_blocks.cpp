@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -34,7 +35,9 @@ const std::array<ProtocolKeys, 4>& protocol_kinds() {
 }
 
 constexpr auto kFormulationWords =
-    std::to_array<Word<bool>>({{false, "quasi_static"}, {true, "inertial"}});
+    std::to_array<Word<FormulationKind>>({{FormulationKind::quasi_static, "quasi_static"},
+                                          {FormulationKind::inertial, "inertial"},
+                                          {FormulationKind::relaxed, "static"}});
 constexpr auto kSpringWords = std::to_array<Word<SpringRule>>(
     {{SpringRule::like_the_bonds, "like_the_bonds"}, {SpringRule::equal, "equal"}});
 
@@ -134,20 +137,50 @@ std::vector<double> spaced_times(double spacing, const Protocol& protocol,
   return times;
 }
 
+/// The sphere of the outer layer nearest to a point that lies on the organ.
+std::size_t sphere_at(const Json& point, const Organ& organ, const DocumentPlace& place) {
+  const Eigen::Vector3d at = parse_point(point, place);
+  std::size_t nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < organ.size(); ++i) {
+    const double away = (organ.position.col(static_cast<Eigen::Index>(i)) - at).norm();
+    if (organ.layer[i] != 0 || !(away < least)) continue;
+    nearest = i;
+    least = away;
+  }
+  if (least <= organ.spacing) return nearest;
+  throw bad_input(place.where,
+                  fmt::format("lies outside the organ, {} mm from its nearest outer sphere ({})",
+                              significant(1e3 * least, 4), nearest + 1),
+                  fmt::format("a point within a spacing, {} mm, of an outer sphere",
+                              significant(1e3 * organ.spacing, 4)));
+}
+
+std::size_t driven_sphere(const Json& contact, const Organ& organ, const DocumentPlace& place) {
+  if (contact.contains("number") && contact.contains("at")) {
+    throw bad_input(place.where, "says where twice", "either 'number' or 'at'");
+  }
+  if (contact.contains("number")) {
+    return parse_sphere(contact.at("number"), organ, place.key("number"));
+  }
+  if (contact.contains("at")) return sphere_at(contact.at("at"), organ, place.key("at"));
+  if (organ.contact) return *organ.contact;
+  throw bad_input(place.where, "names no sphere, and the organ has no contact",
+                  "a key 'number', such as 71");
+}
+
 }  // namespace
+
+std::string_view word_of(FormulationKind kind) {
+  return entry_of(kFormulationWords, kind).text;
+}
 
 Probe parse_contacts(const Json& contacts, const Tissue& tissue, const DocumentPlace& place) {
   const DocumentPlace here = place.key("0");
   const Json& contact = contacts.front();
   const Organ& organ = tissue.network.organ;
-  if (!contact.contains("number") && !organ.contact) {
-    throw bad_input(here.where, "names no sphere, and the organ has no contact",
-                    "a key 'number', such as 71");
-  }
   Probe probe;
-  probe.sphere = contact.contains("number")
-                     ? parse_sphere(contact.at("number"), organ, here.key("number"))
-                     : *organ.contact;
+  probe.sphere = driven_sphere(contact, organ, here);
   probe.direction = -organ.normal.col(static_cast<Eigen::Index>(probe.sphere));
   if (contact.contains("direction")) {
     const auto d = contact.at("direction").get<std::array<double, 3>>();
@@ -181,13 +214,17 @@ Protocol parse_scene_protocol(const Json& block, const DocumentPlace& place) {
   return protocol_of_knots(block.at("knots"), place.key("knots"));
 }
 
+double tissue_behind_m(const Organ& organ, const Probe& probe) {
+  const Eigen::VectorXd along = organ.position.transpose() * probe.direction;
+  const double room = along.maxCoeff() - along[static_cast<Eigen::Index>(probe.sphere)];
+  return room > 0.0 ? room : std::numeric_limits<double>::infinity();
+}
+
 void require_within(const Protocol& protocol, const Probe& probe, const Tissue& tissue,
                     const DocumentPlace& place) {
   if (protocol.drive() == Drive::force) return;
-  const Positions& at = tissue.network.organ.position;
-  const Eigen::VectorXd along = at.transpose() * probe.direction;
-  const double room = along.maxCoeff() - along[static_cast<Eigen::Index>(probe.sphere)];
-  if (!(room > 0.0) || protocol.peak() < room) return;
+  const double room = tissue_behind_m(tissue.network.organ, probe);
+  if (protocol.peak() < room) return;
   throw bad_input(place.where,
                   fmt::format("a depth of {} mm", significant(1e3 * protocol.peak(), 4)),
                   fmt::format("less than the {} mm of tissue behind sphere {}",
@@ -200,7 +237,7 @@ Formulation parse_formulation(const Json& block, const DocumentPlace& place) {
     if (!block.contains(key)) return;
     value = parse_word(words, key, block.at(key).get<std::string>(), place.key(key).where);
   };
-  word("kind", kFormulationWords, formulation.inertial);
+  word("kind", kFormulationWords, formulation.kind);
   word("springs", kSpringWords, formulation.springs);
   formulation.mass_spring = block.contains("comparison");
   if (block.contains("springs") && !formulation.mass_spring) {
@@ -208,8 +245,9 @@ Formulation parse_formulation(const Json& block, const DocumentPlace& place) {
                     "springs only with \"comparison\": \"mass_spring\"");
   }
   for (const char* key : {"damping_ratio", "density_kg_per_m3"}) {
-    if (formulation.inertial || !block.contains(key)) continue;
-    throw bad_input(place.key(key).where, "in a quasi-static formulation",
+    if (formulation.inertial() || !block.contains(key)) continue;
+    throw bad_input(place.key(key).where,
+                    fmt::format("in the formulation '{}'", word_of(formulation.kind)),
                     "it only with \"kind\": \"inertial\"");
   }
   formulation.damping_ratio = block.value("damping_ratio", formulation.damping_ratio);

@@ -3,6 +3,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
+#include "tpm/store/file.hpp"
 
 namespace tpm {
 namespace {
@@ -30,7 +31,7 @@ ExperimentScene parse_experiment(const Json& scene, std::string_view where,
   require_within(protocol, probe, tissue, place.key("protocol"));
   Formulation formulation =
       parse_formulation(scene.value("formulation", Json::object()), place.key("formulation"));
-  formulation.tolerance = tolerance_of(scene, formulation.inertial, place);
+  formulation.tolerance = tolerance_of(scene, formulation.inertial(), place);
   Outputs outputs =
       parse_outputs(scene.value("outputs", Json::object()), protocol, place.key("outputs"));
   require_standing(tissue, where);
@@ -40,7 +41,9 @@ ExperimentScene parse_experiment(const Json& scene, std::string_view where,
 }
 
 ExperimentScene read_experiment(const std::filesystem::path& scene) {
-  return parse_experiment(read_json(scene), scene.string(), scene.parent_path());
+  ExperimentScene read = parse_experiment(read_json(scene), scene.string(), scene.parent_path());
+  read.text = read_file(scene);
+  return read;
 }
 
 }  // namespace tpm

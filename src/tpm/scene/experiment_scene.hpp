@@ -9,14 +9,25 @@
 
 namespace tpm {
 
+enum class FormulationKind {
+  quasi_static,  ///< forces balance at each instant; what the bonds remember relaxes in time
+  inertial,      ///< spheres have mass
+  relaxed,       ///< static: everything has relaxed under what is imposed at each time
+};
+
+/// The word for it in scenes and results: quasi_static, inertial, static.
+[[nodiscard]] std::string_view word_of(FormulationKind kind);
+
 /// By which equations a network moves, and which network.
 struct Formulation {
-  bool inertial = false;          ///< spheres have mass; else forces balance at each instant
+  FormulationKind kind = FormulationKind::quasi_static;
   double damping_ratio = 0.1;     ///< inertial: of the lowest mode, 0 to 10
   double density_kg_m3 = 1060.0;  ///< inertial: of the spheres, > 0
   bool mass_spring = false;       ///< the mass-spring model on the same spheres, not the tissue
   SpringRule springs = SpringRule::like_the_bonds;
   double tolerance = 1e-6;  ///< QuasiStaticOptions, InertialOptions
+
+  [[nodiscard]] bool inertial() const { return kind == FormulationKind::inertial; }
 };
 
 /// What is kept of a run besides positions.
@@ -34,8 +45,12 @@ struct ExperimentScene {
   Protocol protocol;
   Formulation formulation;
   Outputs outputs;
-  std::string text;  ///< the scene as it was read, for the record
+  std::string text;  ///< of the scene, for the record
 };
+
+/// How far the organ reaches behind the probe, along its direction, m; infinite where the probe
+/// pulls away from the outermost sphere.
+[[nodiscard]] double tissue_behind_m(const Organ& organ, const Probe& probe);
 
 /// Reads all blocks of a scene (docs/simulate.md). Without a block `protocol` there is nothing to
 /// do, which is an error.
@@ -45,7 +60,7 @@ struct ExperimentScene {
 [[nodiscard]] ExperimentScene parse_experiment(const Json& scene, std::string_view where,
                                                const std::filesystem::path& folder);
 
-/// read_json and parse_experiment.
+/// The same from a file, whose bytes become the record's text.
 [[nodiscard]] ExperimentScene read_experiment(const std::filesystem::path& scene);
 
 }  // namespace tpm

@@ -35,14 +35,14 @@ void write_states(Hdf5Writer& file, const std::string& group,
   file.numbers(group + "/remembered_m", remembered);
 }
 
-/// Reads lists of which each has the same number of rows.
+/// Reads lists whose lengths are known to be multiples of a number; 0 stands for any but empty.
 class ListReader {
  public:
   ListReader(const Hdf5Reader& file, const fs::path& path) : file_(file), path_(path) {}
 
   [[nodiscard]] std::vector<double> list(const std::string& name, std::size_t multiple) const {
     std::vector<double> values = file_.numbers(name);
-    if (multiple == 0 ? values.empty() : values.size() % multiple == 0) return values;
+    if (multiple == 0 ? !values.empty() : values.size() % multiple == 0) return values;
     throw bad_input(path_.string(), fmt::format("{} has {} numbers", name, values.size()),
                     kExpected);
   }
@@ -127,6 +127,7 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
                                p.energy.dissipated_J, p.energy.stored_J});
   }
   file.numbers("/curve", curve);
+  file.numbers("/error_estimate", {record.error_estimate});
   write_states(file, "/outputs", record.outputs);
   write_states(file, "/latest", {&latest, 1});
   write_validity(file, record.validity);
@@ -158,6 +159,7 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   }
   checkpoint.record.outputs = lists.states("/outputs", spheres, bonds);
   checkpoint.record.validity = read_validity(lists);
+  checkpoint.record.error_estimate = lists.list("/error_estimate", 0).front();
   std::vector<QuasiStaticState> latest = lists.states("/latest", spheres, bonds);
   if (latest.size() != 1) throw bad_input(path.string(), "holds no state", kExpected);
   checkpoint.latest = std::move(latest.front());

@@ -1,120 +1,63 @@
 #include "tpm/simulate/simulation.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <chrono>
 
-#include "tpm/core/text.hpp"
 #include "tpm/network/lowest_mode.hpp"
-#include "tpm/simulate/checkpoint.hpp"
+#include "tpm/simulate/recorder.hpp"
+#include "tpm/simulate/static_path.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr int kWatched = 200;  // parts of the protocol's time, whatever is written
+constexpr std::size_t kParts = 16;  // of a run; a checkpoint can be written after each
 
-/// The times of the outputs, those of the curve, and the protocol's corners; rising.
-std::vector<double> times_to_watch(const ExperimentScene& scene) {
-  const Protocol& protocol = scene.protocol;
-  std::vector<double> times = scene.outputs.times_s;
-  const double length = protocol.end_s() - protocol.start_s();
-  for (int i = 0; i < kWatched; ++i) times.push_back(protocol.start_s() + length * i / kWatched);
-  for (const Knot& knot : protocol.knots()) times.push_back(knot.time_s);
-  std::sort(times.begin(), times.end());
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  return times;
+/// Runs that go part by part; `run_part` shows the recorder the states at the times of one.
+template <class RunPart>
+SimulationRun run_in_parts(const ExperimentScene& scene, const SimulationControls& controls,
+                           RunPart&& run_part) {
+  Recorder recorder(scene, controls, kParts);
+  SimulationRun result;
+  std::optional<QuasiStaticState> from = recorder.restore();
+  if (from) result.resumed_at_s = from->time_s;
+  for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {
+    recorder.close_part(run_part(recorder, times, from));
+    from = recorder.latest();
+  }
+  result.record = recorder.take();
+  return result;
 }
-
-/// Keeps what a run shows, and what it needs to go on.
-class Recorder {
- public:
-  Recorder(const ExperimentScene& scene, const SimulationControls& controls)
-      : scene_(scene),
-        controls_(controls),
-        identity_(checkpoint_identity(scene)),
-        watch_(scene.tissue.network, scene.probe),
-        times_(times_to_watch(scene)),
-        written_(Clock::now()) {}
-
-  /// The state to go on from, if there is one.
-  [[nodiscard]] std::optional<QuasiStaticState> restore() {
-    if (controls_.checkpoint.empty()) return std::nullopt;
-    auto found = read_checkpoint(controls_.checkpoint, identity_, controls_.note);
-    if (!found) return std::nullopt;
-    record_ = std::move(found->record);
-    watch_.restore(record_.validity);
-    return std::move(found->latest);
-  }
-
-  /// The times that are not recorded yet.
-  [[nodiscard]] std::span<const double> times() const {
-    return std::span(times_).subspan(std::min(record_.curve.size(), times_.size()));
-  }
-
-  void see(const QuasiStaticState& state) {
-    record_.curve.push_back(
-        {state.time_s, state.imposed, state.response, state.energy.value_or(QuasiStaticEnergy{})});
-    const std::vector<double>& wanted = scene_.outputs.times_s;
-    if (std::binary_search(wanted.begin(), wanted.end(), state.time_s)) {
-      record_.outputs.push_back(state);
-    }
-    watch_.see(state.time_s, state.position);
-    record_.validity = watch_.seen();
-    if (controls_.progress) controls_.progress(record_.curve.size(), times_.size());
-    const bool interrupted = controls_.interrupted && controls_.interrupted();
-    save(state, interrupted);
-    if (interrupted) stop(state);
-  }
-
-  [[nodiscard]] SimulationRecord take() { return std::move(record_); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-
-  void save(const QuasiStaticState& state, bool at_once) {
-    if (controls_.checkpoint.empty()) return;
-    const std::chrono::duration<double> since = Clock::now() - written_;
-    if (!at_once && since.count() < controls_.checkpoint_every_s) return;
-    write_checkpoint(controls_.checkpoint, identity_, record_, state);
-    written_ = Clock::now();
-  }
-
-  [[noreturn]] void stop(const QuasiStaticState& state) const {
-    throw Interrupted(fmt::format(
-        "interrupted at t = {} s of {} s; {}", significant(state.time_s, 4),
-        significant(scene_.protocol.end_s(), 4),
-        controls_.checkpoint.empty()
-            ? std::string("there is no checkpoint to go on from")
-            : fmt::format("the same command goes on from {}", controls_.checkpoint.string())));
-  }
-
-  const ExperimentScene& scene_;
-  const SimulationControls& controls_;
-  std::string identity_;
-  ValidityWatch watch_;
-  std::vector<double> times_;
-  Clock::time_point written_;
-  SimulationRecord record_;
-};
 
 SimulationRun run_quasi_static(const ExperimentScene& scene, const RunNetwork& network,
                                const SimulationControls& controls) {
-  Recorder recorder(scene, controls);
-  SimulationRun result;
-  const std::optional<QuasiStaticState> from = recorder.restore();
-  if (from) result.resumed_at_s = from->time_s;
-  const QuasiStatic equations(network.bonds, network.network.organ.position, scene.tissue.freedom(),
-                              scene.probe,
-                              {.tolerance = scene.formulation.tolerance, .energies = true});
-  const std::vector<double> times(recorder.times().begin(), recorder.times().end());
-  const QuasiStaticRun run = equations.run(
-      scene.protocol, times, [&](const QuasiStaticState& state) { recorder.see(state); },
-      from ? &*from : nullptr);
-  result.error_estimate = run.error_estimate;
-  result.record = recorder.take();
-  if (!controls.checkpoint.empty()) std::filesystem::remove(controls.checkpoint);
-  return result;
+  const double peak = scene.protocol.peak();
+  const auto run_part = [&](Recorder& recorder, std::span<const double> times,
+                            const std::optional<QuasiStaticState>& from) {
+    const Protocol part = history_until(scene.protocol, times.back());
+    // The tolerance is one of the whole: a part of a ramp has a lower peak.
+    const double share = part.peak() > 0.0 ? peak / part.peak() : 1.0;
+    const QuasiStaticOptions options{
+        .tolerance = std::min(share * scene.formulation.tolerance, 0.1), .energies = true};
+    const QuasiStatic equations(network.bonds, network.network.organ.position,
+                                scene.tissue.freedom(), scene.probe, options);
+    const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
+    return equations.run(part, times, see, from ? &*from : nullptr).error_estimate;
+  };
+  return run_in_parts(scene, controls, run_part);
+}
+
+SimulationRun run_static(const ExperimentScene& scene, const RunNetwork& network,
+                         const SimulationControls& controls) {
+  StaticPath path(network.bonds, network.network.organ, scene.tissue.freedom(), scene.probe,
+                  scene.protocol.drive(), scene.protocol.peak(), scene.formulation.tolerance);
+  const auto run_part = [&](Recorder& recorder, std::span<const double> times,
+                            const std::optional<QuasiStaticState>& from) {
+    if (from) path.start_from(*from);
+    for (const double time : times) {
+      recorder.see(path.move_to(value_at(scene.protocol, time), time));
+    }
+    return 0.0;
+  };
+  return run_in_parts(scene, controls, run_part);
 }
 
 SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& network,
@@ -129,12 +72,12 @@ SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& netwo
   const Organ& organ = network.network.organ;
   const Inertial equations(network.bonds, organ.position, scene.tissue.freedom(), scene.probe,
                            sphere_masses_kg(organ, scene.formulation.density_kg_m3), options);
-  Recorder recorder(scene, controls);
-  const std::vector<double> times(recorder.times().begin(), recorder.times().end());
   SimulationRun result;
   result.lowest_frequency_Hz = equations.lowest().frequency_Hz;
-  const InertialRun run = equations.run(
-      scene.protocol, times, [&](const QuasiStaticState& state) { recorder.see(state); });
+  Recorder recorder(scene, controls, 1);
+  const InertialRun run =
+      equations.run(scene.protocol, recorder.next_part(),
+                    [&](const QuasiStaticState& state) { recorder.see(state); });
   result.inertial_energy = run.energy;
   result.record = recorder.take();
   return result;
@@ -157,8 +100,15 @@ RunNetwork network_to_run(const ExperimentScene& scene) {
 
 SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,
                        const SimulationControls& controls) {
-  return scene.formulation.inertial ? run_inertial(scene, network, controls)
-                                    : run_quasi_static(scene, network, controls);
+  switch (scene.formulation.kind) {
+    case FormulationKind::inertial:
+      return run_inertial(scene, network, controls);
+    case FormulationKind::relaxed:
+      return run_static(scene, network, controls);
+    case FormulationKind::quasi_static:
+      break;
+  }
+  return run_quasi_static(scene, network, controls);
 }
 
 }  // namespace tpm

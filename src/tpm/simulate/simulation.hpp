@@ -33,6 +33,7 @@ struct SimulationRecord {
   std::vector<CurvePoint> curve;
   std::vector<QuasiStaticState> outputs;  ///< at the times of the scene's outputs
   Validity validity;
+  double error_estimate = 0.0;  ///< quasi-static: sum of the steps' error estimates, N or m
 };
 
 /// How a run is accompanied. Nothing of it changes what it finds.
@@ -47,8 +48,6 @@ struct SimulationControls {
 struct SimulationRun {
   SimulationRecord record;
   std::optional<double> resumed_at_s;  ///< time of the checkpoint it went on from
-  /// Of a quasi-static run, N or m: the sum of the steps' error estimates since it was resumed.
-  std::optional<double> error_estimate;
   std::optional<InertialEnergy> inertial_energy;
   double lowest_frequency_Hz = 0.0;  ///< of an inertial run
 };
@@ -59,9 +58,10 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Runs a scene. A quasi-static run writes a checkpoint now and then, goes on from one that an
-/// earlier run of the same scene and version has left, and removes it at the end; an inertial run
-/// has none.
+/// Runs a scene. In a static run everything has relaxed under what is imposed at each time. A
+/// quasi-static or static run writes a checkpoint now and then and goes on from one that an earlier
+/// run of the same scene and version has left, with the same result to the bit; the file is left
+/// for the caller to remove once the result is safe. An inertial run has none.
 /// Throws Error(numerical) as the formulations do, Interrupted, Error(environment) where a
 /// checkpoint cannot be written, Error(bad_input) for a damaged checkpoint.
 [[nodiscard]] SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,

@@ -9,6 +9,7 @@
 #include "tpm/core/version.hpp"
 #include "tpm/scene/network_file.hpp"
 #include "tpm/scene/xdmf.hpp"
+#include "tpm/simulate/smoothness.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -27,15 +28,16 @@ void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hd
   const Formulation& f = scene.formulation;
   file.attribute("/", "scene", scene.text);
   file.attribute("/", "scene_sha256", sha256_hex(scene.text));
-  file.attribute("/", "formulation", f.inertial ? "inertial" : "quasi_static");
+  file.attribute("/", "formulation", std::string(word_of(f.kind)));
   file.attribute("/", "network", f.mass_spring ? "mass_spring" : "tissue");
   file.attribute("/", "tolerance", shortest(f.tolerance));
   file.attribute("/", "provenance", "model");
-  if (f.inertial) {
+  if (f.inertial()) {
     file.attribute("/", "damping_ratio", shortest(f.damping_ratio));
     file.attribute("/", "lowest_frequency_Hz", significant(run.lowest_frequency_Hz, 6));
   }
-  if (run.resumed_at_s) file.attribute("/", "resumed_at_s", shortest(*run.resumed_at_s));
+  file.numbers("/probe/sphere", {static_cast<double>(scene.probe.sphere + 1)});
+  file.numbers("/probe/direction", list_of(scene.probe.direction));
 }
 
 void write_curve(const ExperimentScene& scene, const SimulationRecord& record, Hdf5Writer& file) {
@@ -52,7 +54,7 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
   file.numbers("/curve/time_s", time);
   file.numbers(depth ? "/curve/depth_m" : "/curve/load_N", imposed);
   file.numbers(depth ? "/curve/force_N" : "/curve/depth_m", response);
-  if (scene.formulation.inertial) return;
+  if (scene.formulation.inertial()) return;
   file.numbers("/curve/work_J", work);
   file.numbers("/curve/dissipated_J", heat);
   file.numbers("/curve/stored_J", stored);
@@ -76,6 +78,22 @@ void write_validity(const Validity& validity, Hdf5Writer& file) {
     file.numbers(group + "/first_time_s", {*breach.first_time_s});
     file.integers(group + "/spheres", numbers, 1);
   }
+}
+
+/// Of the outputs at which something has moved.
+void write_roughness(const ExperimentScene& scene, const SimulationRecord& record,
+                     Hdf5Writer& file) {
+  std::vector<double> time, near, rim;
+  for (const QuasiStaticState& state : record.outputs) {
+    const std::optional<Smoothness> found = smoothness_of(scene, state.position);
+    if (!found) continue;
+    time.push_back(state.time_s);
+    near.push_back(found->near_contact);
+    if (found->at_rim) rim.push_back(*found->at_rim);
+  }
+  file.numbers("/roughness/time_s", time);
+  file.numbers("/roughness/near_contact", near);
+  if (!rim.empty()) file.numbers("/roughness/at_rim", rim);
 }
 
 void write_step(const ExperimentScene& scene, const RunNetwork& network,
@@ -185,6 +203,7 @@ fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& networ
   write_provenance(scene, run, file);
   write_curve(scene, run.record, file);
   write_validity(run.record.validity, file);
+  write_roughness(scene, run.record, file);
   std::vector<double> times;
   for (std::size_t k = 0; k < run.record.outputs.size(); ++k) {
     times.push_back(run.record.outputs[k].time_s);

@@ -7,6 +7,8 @@
 namespace tpm {
 namespace {
 
+constexpr double kRounding_m = 1e-9;  // a depth of 12 mm that was asked for is not above 12 mm
+
 void insert(std::vector<std::size_t>& rising, std::size_t sphere) {
   const auto at = std::lower_bound(rising.begin(), rising.end(), sphere);
   if (at == rising.end() || *at != sphere) rising.insert(at, sphere);
@@ -61,8 +63,8 @@ std::vector<std::int32_t> ValidityWatch::flags(const Positions& position) const 
   std::vector<std::int32_t> flags(network_.organ.size(), 0);
   for (std::size_t i = 0; i < flags.size(); ++i) {
     const double indentation = indentation_m(static_cast<Eigen::Index>(i), position);
-    if (indentation > kValidIndentation_m) flags[i] |= 1;
-    if (indentation > kDamageIndentation_m) flags[i] |= 2;
+    if (indentation > kValidIndentation_m + kRounding_m) flags[i] |= 1;
+    if (indentation > kDamageIndentation_m + kRounding_m) flags[i] |= 2;
   }
   for (const Bond& bond : network_.bonds) {
     if (bond.kind != BondKind::lateral || !(turned_rad(bond, position) > kValidTurning_rad)) {

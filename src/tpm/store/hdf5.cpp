@@ -201,7 +201,7 @@ Hdf5Reader::Hdf5Reader(fs::path path) : path_(std::move(path)) {
   // HDF5 says the same of a missing file and of garbage: tell them apart first.
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
   if (!read_file(path_).starts_with(kSignature)) {
-    throw bad_input(path_.string(), "is not an HDF5 file", "a file that tpm data pack wrote");
+    throw bad_input(path_.string(), "is not an HDF5 file", "an HDF5 file that tpm wrote");
   }
   file_ = {H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose};
   if (!file_.valid()) {
@@ -223,7 +223,7 @@ bool Hdf5Reader::has(const std::string& name) const {
 std::vector<std::string> Hdf5Reader::members(const std::string& group) const {
   const QuietErrors quiet;
   const Hdf5Handle opened(H5Gopen2(file_.get(), group.c_str(), H5P_DEFAULT), H5Gclose);
-  if (!opened.valid()) fail(group, "no such group", "a file that tpm data pack wrote");
+  if (!opened.valid()) fail(group, "no such group", "an HDF5 file that tpm wrote");
   std::vector<std::string> names;
   const auto collect = [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
     static_cast<std::vector<std::string>*>(list)->emplace_back(name);
@@ -235,18 +235,20 @@ std::vector<std::string> Hdf5Reader::members(const std::string& group) const {
   return names;
 }
 
-Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, bool as_text,
+Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, bool as_text, int dimensions,
                                     std::size_t& size) const {
   Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
-  if (!set.valid()) fail(name, "no such dataset", "a file that tpm data pack wrote");
+  if (!set.valid()) fail(name, "no such dataset", "an HDF5 file that tpm wrote");
   const Hdf5Handle type(H5Dget_type(set.get()), H5Tclose);
   const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
   const bool right = H5Tget_class(type.get()) == (as_text ? H5T_STRING : H5T_FLOAT) &&
-                     H5Sget_simple_extent_ndims(space.get()) == 1 &&
+                     H5Sget_simple_extent_ndims(space.get()) == dimensions &&
                      (!as_text || H5Tis_variable_str(type.get()) > 0);
   if (!right) {
     fail(name, "is of another type",
-         as_text ? "a list of texts" : "a list of floating-point numbers");
+         as_text           ? "a list of texts"
+         : dimensions == 1 ? "a list of floating-point numbers"
+                           : "a table of floating-point numbers");
   }
   size = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.get()));
   // A damaged extent must not become an allocation of that size.
@@ -256,9 +258,17 @@ Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, bool as_text,
 }
 
 std::vector<double> Hdf5Reader::numbers(const std::string& name) const {
+  return real_numbers(name, 1);
+}
+
+std::vector<double> Hdf5Reader::table(const std::string& name) const {
+  return real_numbers(name, 2);
+}
+
+std::vector<double> Hdf5Reader::real_numbers(const std::string& name, int dimensions) const {
   const QuietErrors quiet;
   std::size_t size = 0;
-  const Hdf5Handle set = open_dataset(name, false, size);
+  const Hdf5Handle set = open_dataset(name, false, dimensions, size);
   std::vector<double> values(size);
   if (H5Dread(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
     fail(name, "cannot be read", "a whole HDF5 file");
@@ -269,7 +279,7 @@ std::vector<double> Hdf5Reader::numbers(const std::string& name) const {
 std::vector<std::string> Hdf5Reader::texts(const std::string& name) const {
   const QuietErrors quiet;
   std::size_t size = 0;
-  const Hdf5Handle set = open_dataset(name, true, size);
+  const Hdf5Handle set = open_dataset(name, true, 1, size);
   const Hdf5Handle type = text_type();
   const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
   BorrowedTexts borrowed(type, space, size);
@@ -290,7 +300,7 @@ std::string Hdf5Reader::attribute(const std::string& object, const std::string& 
       H5Aopen_by_name(file_.get(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT),
       H5Aclose);
   if (!opened.valid()) {
-    fail(object, fmt::format("no attribute '{}'", name), "a file that tpm data pack wrote");
+    fail(object, fmt::format("no attribute '{}'", name), "an HDF5 file that tpm wrote");
   }
   const Hdf5Handle stored(H5Aget_type(opened.get()), H5Tclose);
   if (H5Tis_variable_str(stored.get()) <= 0) {

@@ -75,13 +75,16 @@ class Hdf5Reader {
   /// Names of the members of a group, in alphabetical order.
   [[nodiscard]] std::vector<std::string> members(const std::string& group) const;
   [[nodiscard]] std::vector<double> numbers(const std::string& name) const;
+  /// The rows of a table, one after the other.
+  [[nodiscard]] std::vector<double> table(const std::string& name) const;
   [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
   [[nodiscard]] bool has_attribute(const std::string& object, const std::string& name) const;
   [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;
 
  private:
-  [[nodiscard]] Hdf5Handle open_dataset(const std::string& name, bool as_text,
+  [[nodiscard]] Hdf5Handle open_dataset(const std::string& name, bool as_text, int dimensions,
                                         std::size_t& size) const;
+  [[nodiscard]] std::vector<double> real_numbers(const std::string& name, int dimensions) const;
   [[noreturn]] void fail(const std::string& object, const std::string& what,
                          std::string_view expected) const;
 
