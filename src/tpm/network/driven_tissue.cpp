@@ -50,6 +50,20 @@ void DrivenTissue::add_load(const LaneVector& imposed, LaneMatrix& force) const 
       imposed * probe_.direction.transpose();
 }
 
+void DrivenTissue::impose_change(LaneMatrix& displacement, const LaneVector& change) const {
+  if (!depth_driven()) return;
+  auto of_probe = displacement.middleCols<3>(3 * static_cast<Eigen::Index>(probe_.sphere));
+  const LaneVector further = change - of_probe * probe_.direction;
+  of_probe += further * probe_.direction.transpose();
+}
+
+LaneVector DrivenTissue::response_change(const LaneMatrix& displacement,
+                                         const LaneMatrix& force) const {
+  const auto first = 3 * static_cast<Eigen::Index>(probe_.sphere);
+  if (depth_driven()) return -force.middleCols<3>(first) * probe_.direction;
+  return displacement.middleCols<3>(first) * probe_.direction;
+}
+
 LaneVector DrivenTissue::response(const LaneMatrix& position, const LaneMatrix& force) const {
   const auto first = 3 * static_cast<Eigen::Index>(probe_.sphere);
   if (depth_driven()) return -force.middleCols<3>(first) * probe_.direction;

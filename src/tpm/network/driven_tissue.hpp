@@ -38,11 +38,16 @@ class DrivenTissue {
   /// The same for states side by side, one imposed value each; loads are added.
   void impose(LaneMatrix& position, const LaneVector& imposed) const;
   void add_load(const LaneVector& imposed, LaneMatrix& force) const;
+  /// Puts the displacement of the driven sphere to a change of an imposed depth.
+  void impose_change(LaneMatrix& displacement, const LaneVector& change) const;
 
   /// Contact force or depth, given the forces on all spheres.
   [[nodiscard]] double response(const Positions& position, const Eigen::Matrix3Xd& force) const;
   [[nodiscard]] double response(const TissueState& state) const;
   [[nodiscard]] LaneVector response(const LaneMatrix& position, const LaneMatrix& force) const;
+  /// The change of the response, given small displacements and the change of the forces.
+  [[nodiscard]] LaneVector response_change(const LaneMatrix& displacement,
+                                           const LaneMatrix& force) const;
 
   /// The displacements per unit of what is imposed (probe included), from the last factorisation;
   /// with the sign that makes them the adjoint of the response: a force R left on the free spheres

@@ -32,10 +32,18 @@ struct Span {
   }
 }
 
+/// The vector of a bond times the change of its ends.
+[[gnu::always_inline]] inline double along(const Span& span, const double* ua, const double* ub,
+                                           std::size_t s) {
+  return span.x[s] * (ub[s] - ua[s]) + span.y[s] * (ub[kLanes + s] - ua[kLanes + s]) +
+         span.z[s] * (ub[2 * kLanes + s] - ua[2 * kLanes + s]);
+}
+
 }  // namespace
 
 LaneBonds::LaneBonds(const BondSystem& bonds) {
   std::vector<Data> lasting;
+  std::vector<std::size_t> lasting_number;
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     constexpr double kNever = -std::numeric_limits<double>::infinity();
@@ -46,9 +54,20 @@ LaneBonds::LaneBonds(const BondSystem& bonds) {
       bond_.push_back(data);
     } else {
       lasting.push_back(data);
+      lasting_number.push_back(i);
     }
   }
   bond_.insert(bond_.end(), lasting.begin(), lasting.end());
+  number_ = relaxing_;
+  number_.insert(number_.end(), lasting_number.begin(), lasting_number.end());
+}
+
+Eigen::VectorXd LaneBonds::in_order(const Eigen::VectorXd& all) const {
+  Eigen::VectorXd ordered(static_cast<Eigen::Index>(number_.size()));
+  for (std::size_t i = 0; i < number_.size(); ++i) {
+    ordered[static_cast<Eigen::Index>(i)] = all[static_cast<Eigen::Index>(number_[i])];
+  }
+  return ordered;
 }
 
 Eigen::VectorXd LaneBonds::of_relaxing(const Eigen::VectorXd& all) const {
@@ -107,6 +126,80 @@ void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
         fb[s] -= px;
         fb[kLanes + s] -= py;
         fb[2 * kLanes + s] -= pz;
+      }
+    }
+  });
+}
+
+void LaneBonds::elongation_changes(const LaneMatrix& position, const LaneMatrix& displacement,
+                                   LaneMatrix& change) const {
+  change.resize(kLanes, static_cast<Eigen::Index>(relaxing_.size()));
+  const double* const x = position.data();
+  const double* const u = displacement.data();
+  double* const dl = change.data();
+  run_wide([&]() __attribute__((always_inline)) {
+    Span span;
+    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+      measure(x + kSphere * bond_[i].a, x + kSphere * bond_[i].b, span);
+      const double* const ua = u + kSphere * bond_[i].a;
+      const double* const ub = u + kSphere * bond_[i].b;
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        dl[kLanes * i + s] = span.inverse[s] * along(span, ua, ub, s);
+      }
+    }
+  });
+}
+
+void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+                                  const LaneMatrix& displacement, const LaneMatrix& memory_change,
+                                  const Eigen::VectorXd& k_change, const Eigen::VectorXd& g_change,
+                                  LaneMatrix& force) const {
+  const double* const x = position.data();
+  const double* const u = displacement.data();
+  const double* const y = memory.data();
+  const double* const dy = memory_change.data();
+  double* const f = force.data();
+  const std::size_t relaxing = relaxing_.size();
+  run_wide([&]() __attribute__((always_inline)) {
+    constexpr std::array<double, kLanes> kNothing{};
+    Span span;
+    for (std::size_t i = 0; i < bond_.size(); ++i) {
+      const Data bond = bond_[i];
+      const double dk = k_change[static_cast<Eigen::Index>(i)];
+      const double dg = g_change[static_cast<Eigen::Index>(i)];
+      const double* const remembered = i < relaxing ? y + kLanes * i : kNothing.data();
+      const double* const aged = i < relaxing ? dy + kLanes * i : kNothing.data();
+      const double* const ua = u + kSphere * bond.a;
+      const double* const ub = u + kSphere * bond.b;
+      measure(x + kSphere * bond.a, x + kSphere * bond.b, span);
+      // N t with t the unit vector: dN t + N (du - t dl)/length, where dl = t du.
+      std::array<double, kLanes> with_span, with_change;
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        const double l = span.length[s] - bond.rest_length_m;
+        const double taut = l >= bond.least ? 1.0 : 0.0;
+        const double share = taut * span.inverse[s] * (bond.k * l - bond.g * remembered[s]);
+        const double dl = span.inverse[s] * along(span, ua, ub, s);
+        const double dn = bond.k * dl - bond.g * aged[s] + dk * l - dg * remembered[s];
+        with_span[s] = span.inverse[s] * (taut * dn - share * dl);
+        with_change[s] = share;
+      }
+      double* const fa = f + kSphere * bond.a;
+      double* const fb = f + kSphere * bond.b;
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        const std::size_t sy = kLanes + s;
+        const std::size_t sz = 2 * kLanes + s;
+        const double px = with_span[s] * span.x[s] + with_change[s] * (ub[s] - ua[s]);
+        const double py = with_span[s] * span.y[s] + with_change[s] * (ub[sy] - ua[sy]);
+        const double pz = with_span[s] * span.z[s] + with_change[s] * (ub[sz] - ua[sz]);
+        fa[s] += px;
+        fa[sy] += py;
+        fa[sz] += pz;
+        fb[s] -= px;
+        fb[sy] -= py;
+        fb[sz] -= pz;
       }
     }
   });

@@ -19,12 +19,26 @@ class LaneBonds {
   /// The values that belong to relaxing bonds.
   [[nodiscard]] Eigen::VectorXd of_relaxing(const Eigen::VectorXd& all) const;
 
+  /// Values of all bonds in the order in which this works: the relaxing ones first.
+  [[nodiscard]] Eigen::VectorXd in_order(const Eigen::VectorXd& all) const;
+
   /// l of the relaxing bonds.
   void elongations(const LaneMatrix& position, LaneMatrix& elongation) const;
 
   /// Adds what all bonds pull their spheres with, N.
   /// @param memory y of the relaxing bonds, m
   void add_forces(const LaneMatrix& position, const LaneMatrix& memory, LaneMatrix& force) const;
+
+  /// Changes of l of the relaxing bonds with small displacements of the spheres.
+  void elongation_changes(const LaneMatrix& position, const LaneMatrix& displacement,
+                          LaneMatrix& change) const;
+
+  /// Adds the change of what all bonds pull their spheres with, N, with small displacements of the
+  /// spheres, changes of y of the relaxing bonds, and changes of k and g of all, in_order().
+  void add_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+                         const LaneMatrix& displacement, const LaneMatrix& memory_change,
+                         const Eigen::VectorXd& k_change, const Eigen::VectorXd& g_change,
+                         LaneMatrix& force) const;
 
  private:
   struct Data {
@@ -33,7 +47,8 @@ class LaneBonds {
     double least;  ///< elongation below which the bond is slack, m
   };
   std::vector<std::size_t> relaxing_;
-  std::vector<Data> bond_;  ///< the relaxing ones first
+  std::vector<Data> bond_;           ///< the relaxing ones first
+  std::vector<std::size_t> number_;  ///< of each in the system
 };
 
 }  // namespace tpm

@@ -9,7 +9,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/model/model.hpp"
-#include "tpm/network/stage_balance.hpp"
+#include "tpm/network/stage_tangents.hpp"
 
 namespace tpm {
 namespace {
@@ -57,7 +57,11 @@ class Run {
         tissue_(bonds, rest, freedom, probe, protocol.drive()),
         stages_(tissue_, options.stages, !options.step_s) {
     order_ = rising_order(times_s);
-    result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
+    const auto asked = static_cast<Eigen::Index>(times_s.size());
+    result_.response.resize(asked);
+    if (options.directions.empty()) return;
+    tangents_.emplace(tissue_, stages_, options.directions, kStepShare * options.tolerance);
+    result_.derivative.setZero(asked, tangents_->count());
   }
 
   QuasiStaticRun go(const QuasiStaticState* begin) {
@@ -171,6 +175,7 @@ class Run {
                                 : "no equilibrium is found: it may snap through");
     }
     stages_.see(tissue_.response(state_));
+    if (tangents_) tangents_->follow_move(state_, relaxed);
   }
 
   /// Steps through a piece in which the imposed value is linear.
@@ -197,6 +202,7 @@ class Run {
                                          ? "the tissue buckles: its stiffness is no longer positive"
                                          : "the forces cannot be balanced: it may snap through");
       }
+      if (tangents_) tangents_->follow_step(h);
       report_within(h, rate);
       if (options_.energies) {
         const QuasiStaticEnergy part = stages_.energy_of_step(state_, h, rate);
@@ -205,6 +211,7 @@ class Run {
       }
       result_.error_estimate += outcome.error;
       stages_.accept(state_, h, rate);
+      if (tangents_) tangents_->accept();
       if (last) state_.time_s = to.time_s;
       state_.imposed = last ? to.value : state_.imposed;
       h = options_.step_s ? *options_.step_s : h * std::clamp(factor, 0.2, kMostGrowth);
@@ -231,6 +238,13 @@ class Run {
         fractions[count++] = std::max((time - state_.time_s) / h, 0.0);
       }
       if (count == 0) return;
+      if (tangents_) {
+        const Eigen::MatrixXd rows =
+            tangents_->responses_within(state_, {fractions.data(), count}, h, rate);
+        for (std::size_t i = 0; i < count; ++i) {
+          derivative_row(next_ + i) = rows.row(static_cast<Eigen::Index>(i));
+        }
+      }
       const LaneVector responses =
           stages_.responses_within(state_, {fractions.data(), count}, h, rate);
       for (std::size_t i = 0; i < count; ++i) {
@@ -262,8 +276,13 @@ class Run {
         cross({state_.time_s, last.value}, {latest, last.value});
         continue;
       }
+      if (tangents_) derivative_row(next_) = tangents_->response(state_);
       put(tissue_.response(state_), state_, energy_);
     }
+  }
+
+  [[nodiscard]] Eigen::MatrixXd::RowXpr derivative_row(std::size_t rank) {
+    return result_.derivative.row(static_cast<Eigen::Index>(order_[rank]));
   }
 
   [[nodiscard]] double latest_finite_time() const {
@@ -296,6 +315,7 @@ class Run {
   std::size_t next_ = 0;            ///< the first of them not answered yet
   DrivenTissue tissue_;
   StageBalance stages_;
+  std::optional<StageTangents> tangents_;
   TissueState state_;
   QuasiStaticEnergy energy_;
   QuasiStaticRun result_;
@@ -344,6 +364,12 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedo
   if (options.stages < 2 || options.stages > kLanes) {
     throw bad_input("stages", std::to_string(options.stages), fmt::format("2 to {}", kLanes));
   }
+  for (const TangentDirection& direction : options.directions) {
+    const auto size = static_cast<Eigen::Index>(bonds.size());
+    if (direction.stiffness.size() == size && direction.relaxing.size() == size) continue;
+    throw bad_input("directions", "changes of another number of bonds",
+                    fmt::format("one number for each of the {} bonds", size));
+  }
   if (options.step_s && !(*options.step_s > 0.0 && std::isfinite(*options.step_s))) {
     throw bad_input("step", shortest(*options.step_s) + " s", "a time above 0");
   }
@@ -353,6 +379,10 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedo
 QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s,
                                 const QuasiStaticObserver& observer,
                                 const QuasiStaticState* from) const {
+  if (from && !options_.directions.empty()) {
+    throw bad_input("directions", "a run that goes on from a state",
+                    "a run from rest: the derivatives of the state are not known");
+  }
   require_times_within(protocol, times_s);
   if (from) {
     require_times_within(protocol, {&from->time_s, 1});

@@ -19,6 +19,14 @@ struct Probe {
 /// direction.
 void require_valid(const Probe& probe, const Freedom& freedom);
 
+/// A direction in which material and imposed history may change: a run can answer derivatives.
+struct TangentDirection {
+  Eigen::VectorXd stiffness;         ///< change of k of each bond, N/m
+  Eigen::VectorXd relaxing;          ///< change of g of each bond, N/m
+  double log_relaxation_time = 0.0;  ///< change of ln tau
+  double imposed = 0.0;              ///< change of a factor on all that is imposed
+};
+
 struct QuasiStaticOptions {
   /// Error of the response that steps are chosen for, in parts of its largest value; 1e-12 to 0.1.
   double tolerance = 1e-6;
@@ -26,7 +34,8 @@ struct QuasiStaticOptions {
   /// If given, s: all steps are that long (but for the last of a piece of the protocol), whatever
   /// their error, and what is left unbalanced is still judged by the tolerance.
   std::optional<double> step_s = std::nullopt;
-  bool energies = false;  ///< work and dissipation are integrated along
+  bool energies = false;                          ///< work and dissipation are integrated along
+  std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
 };
 
 /// What a run took.
@@ -59,6 +68,7 @@ using QuasiStaticObserver = std::function<void(const QuasiStaticState&)>;
 
 struct QuasiStaticRun {
   Eigen::VectorXd response;     ///< contact force, N, or depth, m, at each asked time
+  Eigen::MatrixXd derivative;   ///< of each response (row) along each direction (column)
   double error_estimate = 0.0;  ///< sum of the steps' error estimates, N or m
   QuasiStaticWork work;
   std::optional<QuasiStaticEnergy> energy;  ///< if asked for

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/error.hpp"
+
 namespace tpm {
 namespace {
 
@@ -21,10 +23,6 @@ constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the f
 std::vector<double> with_start(std::vector<double> nodes) {
   nodes.insert(nodes.begin(), 0.0);
   return nodes;
-}
-
-Eigen::Map<Eigen::VectorXd> flat(LaneMatrix& lanes) {
-  return {lanes.data(), lanes.size()};
 }
 
 Eigen::Map<const Eigen::RowVectorXd> by_coordinate(const Eigen::Matrix3Xd& vectors) {
@@ -122,6 +120,13 @@ bool StageBalance::refactorise(const TissueState& state, double following) {
   if (tissue_.depth_driven()) grain_ *= tissue_.held_stiffness(state.position, memory);
   last_iterations_ = 0;
   return true;
+}
+
+void StageBalance::require_factor(const TissueState& state, double following) {
+  if (factorised_ && following_ == following) return;
+  if (refactorise(state, following)) return;
+  throw Error(ExitCode::numerical, "network",
+              "the stiffness behind a jump is not positive: its derivatives do not exist");
 }
 
 void StageBalance::predict(const TissueState& state, double h, double rate) {
@@ -230,31 +235,60 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   return outcome;
 }
 
+StageBalance::Shapes StageBalance::shapes(std::span<const double> fractions, double z) const {
+  Shapes shapes;
+  shapes.interpolation.setZero();
+  shapes.weights.setZero();
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
+    const Eigen::VectorXd weight = full_.weights(c, z);
+    shapes.interpolation.row(lane).head(stages_) = full_.interpolation(c).tail(stages_).transpose();
+    shapes.start_weight[lane] = weight[0];
+    shapes.weights.row(lane).head(stages_) = weight.tail(stages_).transpose();
+    shapes.decay[lane] = std::exp(-z * c);
+  }
+  return shapes;
+}
+
+std::array<double, kLanes> StageBalance::lane_nodes() const {
+  std::array<double, kLanes> nodes{};
+  for (int lane = 0; lane < kLanes; ++lane) nodes[static_cast<std::size_t>(lane)] = node(lane);
+  return nodes;
+}
+
+LaneMatrix StageBalance::aging(std::span<const double> fractions, double z) const {
+  // y depends on z = h / tau by its weights and by what is left of the start, exp(-z c) y0.
+  Eigen::Matrix<double, kLanes, kLanes> slopes = Eigen::Matrix<double, kLanes, kLanes>::Zero();
+  LaneVector start_slope, decay_slope;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
+    const Eigen::VectorXd slope = full_.weight_slopes(c, z);
+    start_slope[lane] = slope[0];
+    slopes.row(lane).head(stages_) = slope.tail(stages_).transpose();
+    decay_slope[lane] = -c * std::exp(-z * c);
+  }
+  LaneMatrix change = slopes * elongation_;
+  change.noalias() += start_slope * start_elongation_;
+  change.noalias() += decay_slope * start_memory_;
+  return -z * change;
+}
+
 StageBalance::Within StageBalance::within(const TissueState& state,
                                           std::span<const double> fractions, double h,
                                           double rate) const {
-  const double z = h / tissue_.bonds().relaxation_time_s();
-  Eigen::Matrix<double, kLanes, kLanes> shape = Eigen::Matrix<double, kLanes, kLanes>::Zero();
-  Eigen::Matrix<double, kLanes, kLanes> weights = shape;
-  LaneVector start_weight, decay;
+  const Shapes at = shapes(fractions, h / tissue_.bonds().relaxation_time_s());
   Within states;
   for (int lane = 0; lane < kLanes; ++lane) {
     const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
-    const Eigen::VectorXd at = full_.interpolation(c);
-    const Eigen::VectorXd weight = full_.weights(c, z);
-    shape.row(lane).head(stages_) = at.tail(stages_).transpose();
-    start_weight[lane] = weight[0];
-    weights.row(lane).head(stages_) = weight.tail(stages_).transpose();
-    decay[lane] = std::exp(-z * c);
     states.imposed[lane] = state.imposed + c * h * rate;
   }
   // Of displacements, not of coordinates, for the sake of rounding.
-  states.position.noalias() = shape * (x_.rowwise() - start_);
+  states.position.noalias() = at.interpolation * (x_.rowwise() - start_);
   states.position.rowwise() += start_;
   bonds_.elongations(states.position, states.elongation);
-  states.memory.noalias() = weights * elongation_;
-  states.memory.noalias() += start_weight * start_elongation_;
-  states.memory.noalias() += decay * start_memory_;
+  states.memory.noalias() = at.weights * elongation_;
+  states.memory.noalias() += at.start_weight * start_elongation_;
+  states.memory.noalias() += at.decay * start_memory_;
   return states;
 }
 

@@ -56,6 +56,23 @@ class StageBalance {
   void accept(TissueState& state, double h, double rate);
 
  private:
+  friend class StageTangents;
+
+  /// How states at fractions of a step follow from its stages, lane by lane.
+  struct Shapes {
+    Eigen::Matrix<double, kLanes, kLanes> interpolation;  ///< of the way from the start
+    Eigen::Matrix<double, kLanes, kLanes> weights;        ///< of a stage's l in a lane's y
+    LaneVector start_weight, decay;
+  };
+  [[nodiscard]] Shapes shapes(std::span<const double> fractions, double z) const;
+  /// Change of y of the relaxing bonds at fractions of a step per change of ln tau, with
+  /// elongations and the start held.
+  [[nodiscard]] LaneMatrix aging(std::span<const double> fractions, double z) const;
+  /// The fractions of the step at which the lanes stand.
+  [[nodiscard]] std::array<double, kLanes> lane_nodes() const;
+  /// A factorisation at a state, for what follows a move.
+  void require_factor(const TissueState& state, double following);
+
   /// States within a step, one per lane.
   struct Within {
     LaneVector imposed;

@@ -12,4 +12,9 @@ using LaneMatrix = Eigen::Matrix<double, kLanes, Eigen::Dynamic>;
 
 using LaneVector = Eigen::Matrix<double, kLanes, 1>;
 
+/// All numbers of all states as one vector.
+[[nodiscard]] inline Eigen::Map<Eigen::VectorXd> flat(LaneMatrix& lanes) {
+  return {lanes.data(), lanes.size()};
+}
+
 }  // namespace tpm
