@@ -41,8 +41,6 @@ class InertialEquation {
 
   /// The piece of the protocol that holds from now on, linear in time.
   void set_piece(const Knot& from, const Knot& to);
-  /// Depth, m, or load, N, in that piece.
-  [[nodiscard]] double imposed(double time_s) const;
   /// Rate of an imposed depth, m/s; 0 under a load.
   [[nodiscard]] double imposed_speed() const;
 
@@ -73,6 +71,7 @@ class InertialEquation {
   void solve(Eigen::Ref<Vector> x);
 
  private:
+  [[nodiscard]] double imposed(double time_s) const;
   /// All forces on the spheres but the drag, load included.
   void forces(double time_s, Eigen::Matrix3Xd& force) const;
   void add_dashpot_forces(const Positions& position, const Eigen::Matrix3Xd& velocity,

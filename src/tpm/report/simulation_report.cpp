@@ -46,15 +46,14 @@ Json validity_json(const Validity& validity) {
   return json;
 }
 
-Json energy_json(const ExperimentScene& scene, const SimulationRun& run) {
-  if (run.inertial_energy) {
-    const InertialEnergy& e = *run.inertial_energy;
+Json energy_json(const SimulationRun& run) {
+  if (run.record.inertial_energy) {
+    const InertialEnergy& e = *run.record.inertial_energy;
     return {{"work_J", rounded(e.work, kDigits)},
             {"stored_J", rounded(e.stored, kDigits)},
             {"dissipated_J", rounded(e.bond_heat + e.damping_heat, kDigits)},
             {"kinetic_J", rounded(e.kinetic, kDigits)}};
   }
-  if (scene.formulation.inertial()) return nullptr;
   const QuasiStaticEnergy& e = run.record.curve.back().energy;
   return {{"work_J", rounded(e.work_J, kDigits)},
           {"stored_J", rounded(e.stored_J, kDigits)},
@@ -151,7 +150,7 @@ Json simulation_json(const ExperimentScene& scene, const SimulationRun& run) {
   json["largest"] = point(largest(record));
   json["last"] = point(record.curve.back());
   json["outputs"] = record.outputs.size();
-  json["energy"] = energy_json(scene, run);
+  json["energy"] = energy_json(run);
   json["roughness"] = smoothness_json(smoothness_of(scene, record.outputs.back().position));
   json["error_estimate"] = f.kind == FormulationKind::quasi_static
                                ? Json(rounded(record.error_estimate, 3))

@@ -105,6 +105,26 @@ Validity read_validity(const ListReader& file) {
   return validity;
 }
 
+void write_motion(Hdf5Writer& file, const InertialState& s, const InertialEnergy& e) {
+  file.numbers("/motion/state", {s.motion.begin(), s.motion.end()});
+  file.numbers("/motion/scalars", {s.time_s, s.spent_J[0], s.spent_J[1], s.spent_J[2],
+                                   s.blow_work_J, s.stored_at_start_J});
+  file.numbers("/motion/energy", {e.work, e.stored, e.kinetic, e.bond_heat, e.damping_heat});
+}
+
+void read_motion(const ListReader& file, Checkpoint& checkpoint) {
+  const std::vector<double> state = file.list("/motion/state", 0);
+  const std::vector<double> s = file.list("/motion/scalars", 6);
+  const std::vector<double> e = file.list("/motion/energy", 5);
+  checkpoint.motion = InertialState{
+      s.at(0),
+      Eigen::Map<const Eigen::VectorXd>(state.data(), static_cast<Eigen::Index>(state.size())),
+      {s.at(1), s.at(2), s.at(3)},
+      s.at(4),
+      s.at(5)};
+  checkpoint.record.inertial_energy = InertialEnergy{e.at(0), e.at(1), e.at(2), e.at(3), e.at(4)};
+}
+
 }  // namespace
 
 std::string checkpoint_identity(const ExperimentScene& scene) {
@@ -116,7 +136,9 @@ std::string checkpoint_identity(const ExperimentScene& scene) {
 }
 
 void write_checkpoint(const fs::path& path, const std::string& identity,
-                      const SimulationRecord& record, const QuasiStaticState& latest) {
+                      const Checkpoint& checkpoint) {
+  const SimulationRecord& record = checkpoint.record;
+  const QuasiStaticState& latest = checkpoint.latest;
   Hdf5Writer file(path);
   file.attribute("/", "checkpoint_of", identity);
   file.numbers("/spheres", {static_cast<double>(latest.position.cols())});
@@ -131,6 +153,7 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
   write_states(file, "/outputs", record.outputs);
   write_states(file, "/latest", {&latest, 1});
   write_validity(file, record.validity);
+  if (checkpoint.motion) write_motion(file, *checkpoint.motion, record.inertial_energy.value());
   file.commit();
 }
 
@@ -163,6 +186,7 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   std::vector<QuasiStaticState> latest = lists.states("/latest", spheres, bonds);
   if (latest.size() != 1) throw bad_input(path.string(), "holds no state", kExpected);
   checkpoint.latest = std::move(latest.front());
+  if (file.has("/motion")) read_motion(lists, checkpoint);
   return checkpoint;
 }
 

@@ -9,6 +9,7 @@ namespace tpm {
 struct Checkpoint {
   SimulationRecord record;
   QuasiStaticState latest;
+  std::optional<InertialState> motion;  ///< of an inertial run
 };
 
 /// Stands for the scene, the places of its spheres, and the version of the program.
@@ -16,7 +17,7 @@ struct Checkpoint {
 
 /// Writes HDF5, whole or not at all. Throws Error(environment).
 void write_checkpoint(const std::filesystem::path& path, const std::string& identity,
-                      const SimulationRecord& record, const QuasiStaticState& latest);
+                      const Checkpoint& checkpoint);
 
 /// None if there is no such file or if it belongs to another identity, which the note then tells.
 /// Throws Error(bad_input) for a file that is no whole checkpoint.

@@ -36,15 +36,15 @@ Recorder::Recorder(const ExperimentScene& scene, const SimulationControls& contr
       times_(times_to_watch(scene)),
       saved_(Clock::now()) {}
 
-std::optional<QuasiStaticState> Recorder::restore() {
-  if (controls_.checkpoint.empty()) return std::nullopt;
+bool Recorder::restore() {
+  if (controls_.checkpoint.empty()) return false;
   auto found = read_checkpoint(controls_.checkpoint, identity_, controls_.note);
-  if (!found) return std::nullopt;
+  if (!found) return false;
   record_ = std::move(found->record);
-  latest_ = std::move(found->latest);
   watch_.restore(record_.validity);
-  whole_ = {record_.curve.size(), record_.outputs.size(), record_.validity, latest_};
-  return latest_;
+  whole_ = {record_.curve.size(), record_.outputs.size(), record_.validity,
+            std::move(found->latest), std::move(found->motion)};
+  return true;
 }
 
 std::span<const double> Recorder::next_part() const {
@@ -67,7 +67,7 @@ void Recorder::see(const QuasiStaticState& state) {
   }
   watch_.see(state.time_s, state.position);
   record_.validity = watch_.seen();
-  latest_ = state;
+  seen_ = state;
   if (controls_.progress) controls_.progress(record_.curve.size(), times_.size());
   if (controls_.interrupted && controls_.interrupted()) stop(state.time_s);
 }
@@ -87,14 +87,27 @@ void Recorder::require_within(const QuasiStaticState& state) const {
 
 void Recorder::close_part(double error_estimate) {
   record_.error_estimate += error_estimate;
-  whole_ = {record_.curve.size(), record_.outputs.size(), record_.validity, latest_};
+  close();
+}
+
+void Recorder::close_part(InertialState motion, const InertialEnergy& energy) {
+  record_.inertial_energy = energy;
+  whole_.motion = std::move(motion);
+  close();
+}
+
+void Recorder::close() {
+  whole_.curve = record_.curve.size();
+  whole_.outputs = record_.outputs.size();
+  whole_.validity = record_.validity;
+  whole_.state = seen_;
   const std::chrono::duration<double> since = Clock::now() - saved_;
   if (since.count() >= controls_.checkpoint_every_s) save();
 }
 
 void Recorder::save() {
   if (controls_.checkpoint.empty() || whole_.curve == 0) return;
-  write_checkpoint(controls_.checkpoint, identity_, record_, whole_.state);
+  write_checkpoint(controls_.checkpoint, identity_, {record_, whole_.state, whole_.motion});
   saved_ = Clock::now();
 }
 

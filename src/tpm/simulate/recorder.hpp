@@ -18,8 +18,9 @@ class Recorder {
   /// @param scene, controls must live as long as this
   Recorder(const ExperimentScene& scene, const SimulationControls& controls, std::size_t parts);
 
-  /// The state to go on from, if an earlier run has left one.
-  [[nodiscard]] std::optional<QuasiStaticState> restore();
+  /// True if an earlier run has left a state to go on from: latest(), and motion() if it was one
+  /// of spheres with mass.
+  [[nodiscard]] bool restore();
 
   /// The times of the next part; empty if all is done.
   [[nodiscard]] std::span<const double> next_part() const;
@@ -31,8 +32,16 @@ class Recorder {
   /// Ends a part at the state last seen; now and then writes a checkpoint.
   /// @param error_estimate of the part, N or m
   void close_part(double error_estimate);
+  /// The same where spheres have mass.
+  void close_part(InertialState motion, const InertialEnergy& energy);
 
-  [[nodiscard]] const QuasiStaticState& latest() const { return latest_; }
+  /// The state at the end of the last part; none before the first.
+  [[nodiscard]] const QuasiStaticState* latest() const {
+    return whole_.curve > 0 ? &whole_.state : nullptr;
+  }
+  [[nodiscard]] const InertialState* motion() const {
+    return whole_.motion ? &*whole_.motion : nullptr;
+  }
   [[nodiscard]] SimulationRecord take() { return std::move(record_); }
 
  private:
@@ -42,9 +51,11 @@ class Recorder {
     std::size_t curve = 0, outputs = 0;
     Validity validity;
     QuasiStaticState state;
+    std::optional<InertialState> motion;
   };
 
   void require_within(const QuasiStaticState& state) const;
+  void close();
   void save();
   [[noreturn]] void stop(double time_s);
 
@@ -56,7 +67,7 @@ class Recorder {
   std::vector<double> times_;
   Clock::time_point saved_;
   SimulationRecord record_;
-  QuasiStaticState latest_;
+  QuasiStaticState seen_;
   Whole whole_;
 };
 

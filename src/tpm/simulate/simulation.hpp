@@ -34,6 +34,7 @@ struct SimulationRecord {
   std::vector<QuasiStaticState> outputs;  ///< at the times of the scene's outputs
   Validity validity;
   double error_estimate = 0.0;  ///< quasi-static: sum of the steps' error estimates, N or m
+  std::optional<InertialEnergy> inertial_energy;
 };
 
 /// How a run is accompanied. Nothing of it changes what it finds.
@@ -48,8 +49,7 @@ struct SimulationControls {
 struct SimulationRun {
   SimulationRecord record;
   std::optional<double> resumed_at_s;  ///< time of the checkpoint it went on from
-  std::optional<InertialEnergy> inertial_energy;
-  double lowest_frequency_Hz = 0.0;  ///< of an inertial run
+  double lowest_frequency_Hz = 0.0;    ///< of an inertial run
 };
 
 /// A run that was asked to stop; says where it stands.
@@ -58,10 +58,10 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Runs a scene. In a static run everything has relaxed under what is imposed at each time. A
-/// quasi-static or static run writes a checkpoint now and then and goes on from one that an earlier
-/// run of the same scene and version has left, with the same result to the bit; the file is left
-/// for the caller to remove once the result is safe. An inertial run has none.
+/// Runs a scene. In a static run everything has relaxed under what is imposed at each time. A run
+/// writes a checkpoint now and then and goes on from one that an earlier run of the same scene and
+/// version has left, with the same result to the bit; the file is left for the caller to remove
+/// once the result is safe.
 /// Throws Error(numerical) as the formulations do, Interrupted, Error(environment) where a
 /// checkpoint cannot be written, Error(bad_input) for a damaged checkpoint.
 [[nodiscard]] SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,
