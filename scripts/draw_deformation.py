@@ -27,6 +27,7 @@ WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW, LEGEND_ROW = 13.0, 0.65, 0.6, 0.95, 0.9, 
 MOST_HIGH = 5.0
 LEGEND_COLUMNS = 3
 ARROW = 3.5  # length of the probe, in radii
+PROFILE = 100.0  # mm from the contact
 BAR = 50  # mm, of the bar that shows the scale
 FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#08306B", "#4292C6", "#DADADA", "#EF6548", "#7F0000"])
 SLICE_HALF_WIDTH = 90.0  # mm to each side of the contact
@@ -231,21 +232,37 @@ def draw_one(picture, position_m, colouring, words):
     return page
 
 
+def draw_profile(axes, picture, colours):
+    """How far the outer layer yields along the probe, over the distance from the contact."""
+    rest = 1e3 * np.array(picture["position_m"])
+    outer = np.array(picture["layer"]) == 0
+    contact, direction = picture["contact"], np.array(picture["direction"])
+    away = np.linalg.norm(rest - rest[contact], axis=1)
+    chosen = outer & (away < PROFILE)
+    for state, colour, marker in zip(picture["states"], colours, "o^"):
+        yielded = (1e3 * np.array(state["position_m"]) - rest) @ direction
+        axes.plot(away[chosen], yielded[chosen], marker, ms=4.5, mfc=colour, mec="white", mew=0.4, label=state["name"])
+    axes.axhline(0.0, color="#888888", lw=0.6)
+    axes.invert_yaxis()  # into the organ is down
+    axes.set_title("Outer layer", loc="left")
+    axes.set_xlabel("distance from the contact at rest [mm]")
+    axes.set_ylabel("displacement along the probe [mm]")
+    axes.legend(frameon=False, loc="lower right")
+
+
 def draw_two(picture):
-    """Both states, coloured by displacement on one scale: from the side, and the slice."""
+    """Both states: what the outer layer does, and slices coloured by displacement on one scale."""
     states = picture["states"]
     values = [np.array(s["displacement_mm"]) for s in states]
     scale = max(v.max() for v in values)
     side = net.VIEWS[1]
-    page, axes = plt.subplots(1, 4)
-    sizes = []
-    for k, (state, value) in enumerate(zip(states, values)):
-        colouring = by_number(value, "displacement [mm]", "Displacement, one scale for both", scale)
-        draw_view(axes[2 * k], picture, state["position_m"], colouring, side, f"{state['name']}, {state['words']}")
-        draw_slice(axes[2 * k + 1], picture, state["position_m"], colouring, side, f"{state['name']}, slice")
-        sizes += [size_of(frame_of(picture, side)), size_of(slice_frame(picture, side))]
-    words = "; ".join(f"{s['name']}: {s['roughness']}" for s in states)
-    decorate(page, axes, sizes, picture, colouring, words)
+    page, axes = plt.subplots(1, 3)
+    draw_profile(axes[0], picture, ["#0072B2", "#D55E00"])
+    sizes = [size_of(slice_frame(picture, side))] * 3
+    for one, state, value in zip(axes[1:], states, values):
+        colouring = by_number(value, "displacement [mm]", "Both models on the same spheres", scale)
+        draw_slice(one, picture, state["position_m"], colouring, side, f"{state['name']}, {state['words']}")
+    decorate(page, axes, sizes, picture, colouring, "; ".join(f"{s['name']}: {s['roughness']}" for s in states))
     return page
 
 
