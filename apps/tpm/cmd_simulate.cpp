@@ -12,6 +12,7 @@
 #include "tpm/report/simulation_figures.hpp"
 #include "tpm/report/simulation_report.hpp"
 #include "tpm/simulate/simulation_file.hpp"
+#include "tpm/store/hdf5.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;
@@ -87,6 +88,7 @@ SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& networ
 }
 
 Simulated simulated(ExperimentScene scene, fs::path file, double checkpoint_every_s) {
+  (void)Hdf5Writer(file);  // before a long run, not after it: can the result be written?
   RunNetwork network = network_to_run(scene);
   fs::path checkpoint = file.string() + ".checkpoint";
   SimulationRun run = run_watched(scene, network, checkpoint_every_s, checkpoint);
