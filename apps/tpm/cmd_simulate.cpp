@@ -12,6 +12,7 @@
 #include "tpm/report/simulation_figures.hpp"
 #include "tpm/report/simulation_report.hpp"
 #include "tpm/simulate/simulation_file.hpp"
+#include "tpm/simulate/vtkhdf.hpp"
 #include "tpm/store/hdf5.hpp"
 
 namespace tpm::app {
@@ -23,6 +24,7 @@ struct SimulateChoice {
   std::string output = "simulation.h5";
   std::string figures;
   bool beside_mass_spring = false;
+  bool vtkhdf = false;
   std::string checkpoint_every = "5 s";
 };
 
@@ -129,6 +131,11 @@ std::vector<std::string> write_all(const SimulateChoice& choice,
   for (const Simulated& s : all) {
     files.push_back(s.file.string());
     files.push_back(write_simulation(s.scene, s.network, s.run, s.file).string());
+    if (choice.vtkhdf) {
+      fs::path vtkhdf = s.file;
+      write_vtkhdf(s.scene, s.network, s.run, vtkhdf.replace_extension(".vtkhdf"));
+      files.push_back(vtkhdf.string());
+    }
     fs::remove(s.checkpoint);
     figured.push_back({&s.scene, &s.network, &s.run});
   }
@@ -177,6 +184,8 @@ void add_simulate_command(CLI::App& app, Session& session) {
   command->add_option("--figures", choice->figures, "Folder for pictures (PNG, SVG)");
   command->add_flag("--beside-mass-spring", choice->beside_mass_spring,
                     "Also run the mass-spring model on the same spheres; figures show both");
+  command->add_flag("--vtkhdf", choice->vtkhdf,
+                    "Also write a .vtkhdf beside it, for ParaView from 5.12 on");
   command
       ->add_option("--checkpoint-every", choice->checkpoint_every,
                    "Time between checkpoints, such as \"5 s\"")

@@ -9,8 +9,8 @@
 #include "tpm/core/version.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/network_report.hpp"
-#include "tpm/simulate/simulation_file.hpp"
 #include "tpm/simulate/smoothness.hpp"
+#include "tpm/simulate/step_fields.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -42,7 +42,7 @@ Json list_json(const Numbers& numbers, double unit) {
 
 std::string roughness_words(const std::optional<Smoothness>& found) {
   if (!found) return "nothing has moved";
-  const std::string near =
+  std::string near =
       fmt::format("roughness {} near the contact", significant(found->near_contact, 4));
   if (!found->at_rim) return near;
   return fmt::format("{}, {} at the rim", near, significant(*found->at_rim, 4));

@@ -98,6 +98,7 @@ Protocol protocol_of_knots(const Json& list, const DocumentPlace& place) {
 
 std::vector<double> even_times(double begin, double end, int count) {
   std::vector<double> times;
+  times.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     times.push_back(count == 1 ? end : begin + (end - begin) * i / (count - 1));
   }
@@ -129,9 +130,11 @@ std::vector<double> spaced_times(double spacing, const Protocol& protocol,
                     fmt::format("{} s make {} outputs", shortest(spacing), shortest(count)),
                     fmt::format("at most {}", shortest(kMostOutputs)));
   }
+  const auto whole = static_cast<std::size_t>(std::ceil(count * (1.0 - 1e-12)));
   std::vector<double> times;
-  for (int i = 0; i < static_cast<int>(std::ceil(count * (1.0 - 1e-12))); ++i) {
-    times.push_back(protocol.start_s() + i * spacing);
+  times.reserve(whole + 1);
+  for (std::size_t i = 0; i < whole; ++i) {
+    times.push_back(protocol.start_s() + static_cast<double>(i) * spacing);
   }
   times.push_back(protocol.end_s());
   return times;

@@ -10,6 +10,7 @@
 #include "tpm/scene/network_file.hpp"
 #include "tpm/scene/xdmf.hpp"
 #include "tpm/simulate/smoothness.hpp"
+#include "tpm/simulate/step_fields.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -96,24 +97,19 @@ void write_roughness(const ExperimentScene& scene, const SimulationRecord& recor
   if (!rim.empty()) file.numbers("/roughness/at_rim", rim);
 }
 
+void write_field(const StepField& field, const std::string& group, Hdf5Writer& file) {
+  const std::string name = fmt::format("{}/{}", group, field.name);
+  field.columns == 1 ? file.numbers(name, field.values)
+                     : file.table(name, field.values, field.columns);
+}
+
 void write_step(const ExperimentScene& scene, const RunNetwork& network,
                 const QuasiStaticState& state, const std::string& group, Hdf5Writer& file) {
-  const Eigen::Matrix3Xd moved = displacements_m(network.network.organ, state);
   file.table(group + "/position_m", list_of(state.position), 3);
-  file.table(group + "/displacement_m", list_of(moved), 3);
-  file.numbers(group + "/displacement_magnitude_m", list_of(moved.colwise().norm()));
-  file.integers(group + "/validity",
-                ValidityWatch(scene.tissue.network, scene.probe).flags(state.position), 1);
-  const Eigen::VectorXd bond_force = bond_forces_N(network.bonds, state);
-  if (scene.outputs.force) {
-    Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, state.position.cols());
-    network.bonds.add_forces(state.position, {state.remembered, 0.0}, force);
-    file.table(group + "/force_N", list_of(force), 3);
-    file.numbers(group + "/largest_bond_force_N",
-                 largest_bond_forces_N(network.network, bond_force));
-  }
-  if (scene.outputs.bond_force) file.numbers(group + "/bond_force_N", list_of(bond_force));
-  if (scene.outputs.remembered) file.numbers(group + "/remembered_m", list_of(state.remembered));
+  const StepFields fields = fields_of(scene, network, state);
+  for (const StepField& field : fields.of_spheres) write_field(field, group, file);
+  file.integers(group + "/validity", fields.validity, 1);
+  for (const StepField& field : fields.of_bonds) write_field(field, group, file);
 }
 
 /// Spheres and bonds at one time.
@@ -167,34 +163,6 @@ std::string xdmf(const ExperimentScene& scene, const SimulationRecord& record,
 }
 
 }  // namespace
-
-Eigen::VectorXd bond_forces_N(const BondSystem& bonds, const QuasiStaticState& state) {
-  Eigen::VectorXd elongation;
-  bonds.elongations(state.position, elongation);
-  Eigen::VectorXd force =
-      bonds.stiffness().cwiseProduct(elongation) - bonds.relaxing().cwiseProduct(state.remembered);
-  for (std::size_t i = 0; i < bonds.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    if (bonds.is_rope(i) && elongation[row] < 0.0) force[row] = 0.0;
-  }
-  return force;
-}
-
-std::vector<double> largest_bond_forces_N(const Network& network,
-                                          const Eigen::VectorXd& bond_force_N) {
-  std::vector<double> largest(network.organ.size(), 0.0);
-  for (std::size_t i = 0; i < network.bonds.size(); ++i) {
-    const double force = std::abs(bond_force_N[static_cast<Eigen::Index>(i)]);
-    for (const std::size_t end : {network.bonds[i].a, network.bonds[i].b}) {
-      largest[end] = std::max(largest[end], force);
-    }
-  }
-  return largest;
-}
-
-Eigen::Matrix3Xd displacements_m(const Organ& organ, const QuasiStaticState& state) {
-  return state.position - organ.position;
-}
 
 fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& network,
                           const SimulationRun& run, const fs::path& path) {

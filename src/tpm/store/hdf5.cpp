@@ -172,18 +172,56 @@ void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& 
   }
 }
 
+void Hdf5Writer::long_integers(const std::string& name, const std::vector<std::int64_t>& values) {
+  const QuietErrors quiet;
+  const Hdf5Handle set = dataset(name, H5T_STD_I64LE, {values.size()});
+  if (H5Dwrite(set.get(), H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::bytes(const std::string& name, const std::vector<std::uint8_t>& values) {
+  const QuietErrors quiet;
+  const Hdf5Handle set = dataset(name, H5T_STD_U8LE, {values.size()});
+  if (H5Dwrite(set.get(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::attach(const std::string& object, const std::string& name, hid_t type,
+                        const Hdf5Handle& space, const void* values) {
+  const Hdf5Handle made(H5Acreate_by_name(file_.get(), object.c_str(), name.c_str(), type,
+                                          space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                        H5Aclose);
+  if (!made.valid() || H5Awrite(made.get(), type, values) < 0) {
+    fail(fmt::format("cannot write attribute {} of {}", name, object));
+  }
+}
+
 void Hdf5Writer::attribute(const std::string& object, const std::string& name,
                            const std::string& text) {
   const QuietErrors quiet;
-  const Hdf5Handle type = text_type();
-  const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Hdf5Handle made(H5Acreate_by_name(file_.get(), object.c_str(), name.c_str(), type.get(),
-                                          space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                        H5Aclose);
   const char* pointer = text.c_str();
-  if (!made.valid() || H5Awrite(made.get(), type.get(), static_cast<const void*>(&pointer)) < 0) {
-    fail(fmt::format("cannot write attribute {} of {}", name, object));
-  }
+  attach(object, name, text_type().get(), {H5Screate(H5S_SCALAR), H5Sclose},
+         static_cast<const void*>(&pointer));
+}
+
+void Hdf5Writer::fixed_text_attribute(const std::string& object, const std::string& name,
+                                      const std::string& text) {
+  const QuietErrors quiet;
+  const Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.get(), text.size());
+  H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+  attach(object, name, type.get(), {H5Screate(H5S_SCALAR), H5Sclose}, text.data());
+}
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name,
+                           const std::vector<std::int64_t>& values) {
+  const QuietErrors quiet;
+  const hsize_t size = values.size();
+  const Hdf5Handle space(size == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &size, nullptr),
+                         H5Sclose);
+  attach(object, name, H5T_NATIVE_INT64, space, values.data());
 }
 
 void Hdf5Writer::commit() {
