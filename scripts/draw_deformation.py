@@ -27,10 +27,9 @@ WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW, LEGEND_ROW = 13.0, 0.65, 0.6, 0.95, 0.9, 
 MOST_HIGH = 5.0
 LEGEND_COLUMNS = 3
 ARROW = 3.5  # length of the probe, in radii
-PROFILE = 100.0  # mm from the contact
-BAR = 50  # mm, of the bar that shows the scale
+PROFILE = 10.0  # radii from the contact
 FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#08306B", "#4292C6", "#DADADA", "#EF6548", "#7F0000"])
-SLICE_HALF_WIDTH = 90.0  # mm to each side of the contact
+SLICE_HALF_WIDTH = 9.0  # radii to each side of the contact
 SLICE_THICKNESS = 1.1  # spheres nearer to the plane than this many radii are in it
 REST, INSIDE = "#9A9A9A", "#D9D9D9"
 FLAGS = [(1, "#F0A83C", "indented by more than 10 mm (paper's validity)"),
@@ -91,11 +90,14 @@ def draw_bonds(axes, at, bonds, depth, slab, colouring):
 
 
 def scale_bar(axes, low, high):
-    """At the lower end; x grows to the left."""
+    """A round length at the lower end; x grows to the left."""
+    room = 0.4 * (high[0] - low[0])
+    decade = 10.0 ** np.floor(np.log10(room))
+    length = max(k * decade for k in (1, 2, 5) if k * decade <= room)
     x, y = high[0] - 0.04 * (high[0] - low[0]), low[1] + 0.04 * (high[1] - low[1])
-    axes.plot([x, x - BAR], [y, y], color="black", lw=2.2, solid_capstyle="butt", zorder=95)
-    axes.annotate(f"{BAR} mm", (x - 0.5 * BAR, y), xytext=(0, 3), textcoords="offset points", ha="center",
-                  va="bottom", zorder=95, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1})
+    axes.plot([x, x - length], [y, y], color="black", lw=2.2, solid_capstyle="butt", zorder=95)
+    axes.annotate(f"{length:g} mm", (x - 0.5 * length, y), xytext=(0, 3), textcoords="offset points",
+                  ha="center", va="bottom", zorder=95, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1})
 
 
 def finish_axes(axes, low, high, view, liver, title):
@@ -138,12 +140,21 @@ def draw_view(axes, picture, position_m, colouring, view, title=None):
     finish_axes(axes, low, high, view, picture["liver"], title)
 
 
+def slice_view(picture):
+    """Along the axis that the probe moves least along: seen from the side, or from the front."""
+    direction = np.abs(picture["direction"])
+    return net.VIEWS[0] if direction[0] > direction[2] else net.VIEWS[1]
+
+
 def slice_frame(picture, view):
+    """Around the contact, mostly below it; no wider than the organ and the probe need."""
     across, up = view[:2]
-    at = 1e3 * np.array(picture["position_m"])[picture["contact"]][[across, up]]
+    rest, radius = 1e3 * np.array(picture["position_m"])[:, [across, up]], 1e3 * picture["radius_m"]
     into = np.array(picture["direction"])[[across, up]]
-    centre = at + 0.45 * SLICE_HALF_WIDTH * into
-    return centre - [0.75 * SLICE_HALF_WIDTH, SLICE_HALF_WIDTH], centre + [0.75 * SLICE_HALF_WIDTH, SLICE_HALF_WIDTH]
+    width = SLICE_HALF_WIDTH * radius
+    centre = rest[picture["contact"]] + 0.45 * width * into
+    least, most = frame_of(picture, view)
+    return (np.maximum(centre - [0.75 * width, width], least), np.minimum(centre + [0.75 * width, width], most))
 
 
 def draw_slice(axes, picture, position_m, colouring, view, title=None):
@@ -226,8 +237,9 @@ def draw_one(picture, position_m, colouring, words):
     front, side = net.VIEWS
     for one, view in zip(axes, (front, side)):
         draw_view(one, picture, position_m, colouring, view)
-    draw_slice(axes[2], picture, position_m, colouring, side, "Slice through the contact")
-    sizes = [size_of(frame_of(picture, front)), size_of(frame_of(picture, side)), size_of(slice_frame(picture, side))]
+    cut = slice_view(picture)
+    draw_slice(axes[2], picture, position_m, colouring, cut, "Slice through the contact")
+    sizes = [size_of(frame_of(picture, front)), size_of(frame_of(picture, side)), size_of(slice_frame(picture, cut))]
     decorate(page, axes, sizes, picture, colouring, words)
     return page
 
@@ -238,7 +250,7 @@ def draw_profile(axes, picture, colours):
     outer = np.array(picture["layer"]) == 0
     contact, direction = picture["contact"], np.array(picture["direction"])
     away = np.linalg.norm(rest - rest[contact], axis=1)
-    chosen = outer & (away < PROFILE)
+    chosen = outer & (away < PROFILE * 1e3 * picture["radius_m"])
     for state, colour, marker in zip(picture["states"], colours, "o^"):
         yielded = (1e3 * np.array(state["position_m"]) - rest) @ direction
         axes.plot(away[chosen], yielded[chosen], marker, ms=4.5, mfc=colour, mec="white", mew=0.4, label=state["name"])
@@ -255,13 +267,13 @@ def draw_two(picture):
     states = picture["states"]
     values = [np.array(s["displacement_mm"]) for s in states]
     scale = max(v.max() for v in values)
-    side = net.VIEWS[1]
+    cut = slice_view(picture)
     page, axes = plt.subplots(1, 3)
     draw_profile(axes[0], picture, ["#0072B2", "#D55E00"])
-    sizes = [size_of(slice_frame(picture, side))] * 3
+    sizes = [size_of(slice_frame(picture, cut))] * 3
     for one, state, value in zip(axes[1:], states, values):
         colouring = by_number(value, "displacement [mm]", "Both models on the same spheres", scale)
-        draw_slice(one, picture, state["position_m"], colouring, side, f"{state['name']}, {state['words']}")
+        draw_slice(one, picture, state["position_m"], colouring, cut, f"{state['name']}, {state['words']}")
     decorate(page, axes, sizes, picture, colouring, "; ".join(f"{s['name']}: {s['roughness']}" for s in states))
     return page
 

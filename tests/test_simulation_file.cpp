@@ -1,4 +1,5 @@
 // The program tpm simulate: its files, its answers, and what becomes of it when it is stopped.
+#include <fmt/format.h>
 #include <sys/wait.h>
 
 #include <catch2/catch.hpp>
@@ -24,7 +25,6 @@ using test::TempFolder;
 
 namespace {
 
-const std::string kProgram = std::string("\"") + TPM_TEST_PROGRAM + "\" simulate ";
 const std::string kPush = R"("protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s",
   "hold": "2 s"}, "outputs": {"count": 4})";
 
@@ -39,14 +39,20 @@ int exit_code(const std::string& command) {
   return WEXITSTATUS(status);
 }
 
+/// What a shell is told to simulate a scene.
+std::string command_for(const std::string& scene, const std::string& output,
+                        const std::string& more) {
+  return fmt::format("\"{}\" simulate \"{}\" -o \"{}\" {}", TPM_TEST_PROGRAM, scene, output, more);
+}
+
 /// Starts the program, waits for its first checkpoint, sends a signal.
 /// @return its exit code, as a shell states it
-int stop_after_checkpoint(const std::string& arguments, const std::string& checkpoint,
+int stop_after_checkpoint(const std::string& scene, const std::string& output,
                           const std::string& signal) {
-  return exit_code("exec 2>/dev/null; " + kProgram + arguments +
-                   " --checkpoint-every '0 s' >/dev/null & p=$!; " +
-                   "while kill -0 $p && [ ! -e \"" + checkpoint +
-                   "\" ]; do sleep 0.01; done; kill -" + signal + " $p; wait $p");
+  return exit_code(fmt::format(
+      "exec 2>/dev/null; {} & p=$!; while kill -0 $p && [ ! -e \"{}.checkpoint\" ]; do sleep 0.01; "
+      "done; kill -{} $p; wait $p",
+      command_for(scene, output, "--checkpoint-every '0 s' >/dev/null"), output, signal));
 }
 
 std::set<std::string> keys_of(const Json& json) {
@@ -102,7 +108,7 @@ TEST_CASE("the file of a run holds its scene, version, tolerance, and what was f
        it != std::sregex_iterator(); ++it) {
     named.insert((*it)[1]);
   }
-  CHECK(named.size() > 4 * 6);
+  CHECK(named.size() > 24);  // four times, at least six each
   for (const std::string& name : named) CHECK(file.has(name));
   write_simulation(scene, network, run_of(scene), folder / "b.h5");
   CHECK(read_file(folder / "a.h5") == read_file(folder / "b.h5"));
@@ -124,17 +130,18 @@ TEST_CASE("a run that is stopped, by whatever signal, ends as one that was not")
   write_scene(folder / "s.json", R"({"organ": {"kind": "liver", "count": 1500},
     "protocol": {"kind": "ramp_hold", "depth": "6 mm", "rate": "4 mm/s", "hold": "3 s"},
     "material": {"eta1": "16800 Pa s"}, "outputs": {"count": 3}})");
-  const std::string scene = "\"" + (folder / "s.json") + "\" -o \"";
-  REQUIRE(exit_code(kProgram + scene + (folder / "whole.h5") + "\" >/dev/null") == 0);
+  const std::string scene = folder / "s.json";
+  REQUIRE(exit_code(command_for(scene, folder / "whole.h5", ">/dev/null")) == 0);
   for (const auto& [signal, code] : {std::pair{"INT", 130}, {"TERM", 143}, {"KILL", 137}}) {
     CAPTURE(signal);
     const std::string result = folder / (std::string(signal) + ".h5");
     const std::string checkpoint = result + ".checkpoint";
-    CHECK(stop_after_checkpoint(scene + result + "\"", checkpoint, signal) == code);
+    CHECK(stop_after_checkpoint(scene, result, signal) == code);
     CHECK_FALSE(std::filesystem::exists(result));
     REQUIRE(std::filesystem::exists(checkpoint));
-    REQUIRE(exit_code(kProgram + scene + result + "\" >\"" + (folder / "told") + "\"") == 0);
-    CHECK_THAT(read_file(folder / "told"), Contains("resumed at"));
+    const std::string told = folder / "told";
+    REQUIRE(exit_code(command_for(scene, result, fmt::format(">\"{}\"", told))) == 0);
+    CHECK_THAT(read_file(told), Contains("resumed at"));
     CHECK_FALSE(std::filesystem::exists(checkpoint));
     CHECK(read_file(result) == read_file(folder / "whole.h5"));
   }
@@ -143,9 +150,9 @@ TEST_CASE("a run that is stopped, by whatever signal, ends as one that was not")
 TEST_CASE("nothing is said on standard error where that is no terminal") {
   const TempFolder folder;
   write_scene(folder / "s.json", test::small_scene_text(kPush));
-  REQUIRE(exit_code(kProgram + "\"" + (folder / "s.json") + "\" -o \"" + (folder / "a.h5") +
-                    "\" --format json >\"" + (folder / "out") + "\" 2>\"" + (folder / "err") +
-                    "\"") == 0);
+  REQUIRE(exit_code(command_for(
+              folder / "s.json", folder / "a.h5",
+              fmt::format("--format json >\"{}\" 2>\"{}\"", folder / "out", folder / "err"))) == 0);
   CHECK(std::filesystem::file_size(folder / "err") == 0);
   const Json json = parse_json(read_file(folder / "out"), "answer");
   CHECK(json.at("scene_sha256") == sha256_hex(read_file(folder / "s.json")));
@@ -157,9 +164,10 @@ TEST_CASE("tissue and mass-spring model are run and drawn beside each other, twi
   const TempFolder folder;
   write_scene(folder / "s.json", test::small_scene_text(kPush));
   for (const std::string name : {"a", "b"}) {
-    REQUIRE(exit_code(kProgram + "\"" + (folder / "s.json") + "\" --beside-mass-spring -o \"" +
-                      (folder / name) + ".h5\" --figures \"" + (folder / name) +
-                      "\" --format json >\"" + (folder / name) + ".json\"") == 0);
+    REQUIRE(exit_code(command_for(
+                folder / "s.json", folder / (name + ".h5"),
+                fmt::format("--beside-mass-spring --figures \"{0}\" --format json >\"{0}.json\"",
+                            folder / name))) == 0);
   }
   const Json json = parse_json(read_file(folder / "a.json"), "answer");
   CHECK(json.at("network") == "tissue");

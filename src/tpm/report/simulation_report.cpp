@@ -21,11 +21,13 @@ bool by_depth(const ExperimentScene& scene) {
   return scene.protocol.drive() == Drive::displacement;
 }
 
-const CurvePoint& largest(const SimulationRecord& record) {
-  return *std::max_element(record.curve.begin(), record.curve.end(),
-                           [](const CurvePoint& a, const CurvePoint& b) {
-                             return std::abs(a.response) < std::abs(b.response);
-                           });
+/// The first point of the largest response; what differs by less than the tolerance is the same.
+const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
+  double most = 0.0;
+  for (const CurvePoint& p : record.curve) most = std::max(most, std::abs(p.response));
+  return *std::find_if(record.curve.begin(), record.curve.end(), [&](const CurvePoint& p) {
+    return std::abs(p.response) >= (1.0 - tolerance) * most;
+  });
 }
 
 Json validity_json(const Validity& validity) {
@@ -147,7 +149,7 @@ Json simulation_json(const ExperimentScene& scene, const SimulationRun& run) {
                 {"imposed", rounded(p.imposed, kDigits)},
                 {"response", rounded(p.response, kDigits)}};
   };
-  json["largest"] = point(largest(record));
+  json["largest"] = point(largest(record, f.tolerance));
   json["last"] = point(record.curve.back());
   json["outputs"] = record.outputs.size();
   json["energy"] = energy_json(run);
@@ -176,7 +178,7 @@ std::string simulation_text(const ExperimentScene& scene, const SimulationRun& r
   if (run.resumed_at_s) {
     text += fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
   }
-  const CurvePoint& most = largest(record);
+  const CurvePoint& most = largest(record, scene.formulation.tolerance);
   text += fmt::format("largest {}: {}, at {} s\n", depth ? "force" : "depth", response(most),
                       significant(most.time_s, 4));
   text += fmt::format("at the end, {} s: {}\n", significant(record.curve.back().time_s, 4),

@@ -140,22 +140,22 @@ std::vector<double> spaced_times(double spacing, const Protocol& protocol,
   return times;
 }
 
-/// The sphere of the outer layer nearest to a point that lies on the organ.
+/// The sphere nearest to a point that lies on or in the organ.
 std::size_t sphere_at(const Json& point, const Organ& organ, const DocumentPlace& place) {
   const Eigen::Vector3d at = parse_point(point, place);
   std::size_t nearest = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < organ.size(); ++i) {
     const double away = (organ.position.col(static_cast<Eigen::Index>(i)) - at).norm();
-    if (organ.layer[i] != 0 || !(away < least)) continue;
+    if (!(away < least)) continue;
     nearest = i;
     least = away;
   }
   if (least <= organ.spacing) return nearest;
   throw bad_input(place.where,
-                  fmt::format("lies outside the organ, {} mm from its nearest outer sphere ({})",
+                  fmt::format("lies outside the organ, {} mm from its nearest sphere ({})",
                               significant(1e3 * least, 4), nearest + 1),
-                  fmt::format("a point within a spacing, {} mm, of an outer sphere",
+                  fmt::format("a point within a spacing, {} mm, of a sphere",
                               significant(1e3 * organ.spacing, 4)));
 }
 

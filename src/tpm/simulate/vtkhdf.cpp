@@ -103,6 +103,7 @@ void write_moving_fields(const ExperimentScene& scene, const RunNetwork& network
 void write_steps(const Network& network, const std::vector<QuasiStaticState>& outputs,
                  Hdf5Writer& file) {
   std::vector<double> times;
+  times.reserve(outputs.size());
   for (const QuasiStaticState& state : outputs) times.push_back(state.time_s);
   const std::vector<std::int64_t> still(outputs.size(), 0);
   file.numbers("/VTKHDF/Steps/Values", times);
