@@ -239,31 +239,31 @@ def draw_one(picture, position_m, colouring, words):
         draw_view(one, picture, position_m, colouring, view)
     cut = slice_view(picture)
     draw_slice(axes[2], picture, position_m, colouring, cut, "Slice through the contact")
-    sizes = [size_of(frame_of(picture, front)), size_of(frame_of(picture, side)), size_of(slice_frame(picture, cut))]
+    whole, enlarged = [size_of(frame_of(picture, view)) for view in (front, side)], size_of(slice_frame(picture, cut))
+    sizes = [*whole, enlarged * min(whole[0] / enlarged)]  # as high or as wide as the view from the front
     decorate(page, axes, sizes, picture, colouring, words)
     return page
 
 
 def draw_profile(axes, picture, colours):
-    """How far the outer layer yields along the probe, over the distance from the contact."""
+    """How far the contact's layer yields along the probe, over the distance from the contact."""
     rest = 1e3 * np.array(picture["position_m"])
-    outer = np.array(picture["layer"]) == 0
-    contact, direction = picture["contact"], np.array(picture["direction"])
+    layer, contact, direction = np.array(picture["layer"]), picture["contact"], np.array(picture["direction"])
     away = np.linalg.norm(rest - rest[contact], axis=1)
-    chosen = outer & (away < PROFILE * 1e3 * picture["radius_m"])
+    chosen = (layer == layer[contact]) & (away < PROFILE * 1e3 * picture["radius_m"])
     for state, colour, marker in zip(picture["states"], colours, "o^"):
         yielded = (1e3 * np.array(state["position_m"]) - rest) @ direction
         axes.plot(away[chosen], yielded[chosen], marker, ms=4.5, mfc=colour, mec="white", mew=0.4, label=state["name"])
     axes.axhline(0.0, color="#888888", lw=0.6)
     axes.invert_yaxis()  # into the organ is down
-    axes.set_title("Outer layer", loc="left")
+    axes.set_title("The layer of the contact", loc="left")
     axes.set_xlabel("distance from the contact at rest [mm]")
     axes.set_ylabel("displacement along the probe [mm]")
     axes.legend(frameon=False, loc="lower right")
 
 
 def draw_two(picture):
-    """Both states: what the outer layer does, and slices coloured by displacement on one scale."""
+    """Both states: what the layer of the contact does, and slices coloured by displacement on one scale."""
     states = picture["states"]
     values = [np.array(s["displacement_mm"]) for s in states]
     scale = max(v.max() for v in values)
