@@ -331,6 +331,10 @@ TEST_CASE("a run with mass in two halves is one run") {
       CHECK(rest.blows.size() + first.blows.size() == whole.blows.size());
       CHECK_THROWS_WITH(inertial.run(protocol, std::vector{0.0}, {}, &first.end),
                         Catch::Matchers::Contains("times from"));
+      InertialState cut_short = first.end;
+      cut_short.motion.conservativeResize(5);
+      CHECK_THROWS_WITH(inertial.run(protocol, times, {}, &cut_short),
+                        Catch::Matchers::Contains("as the network has"));
     }
   }
 }

@@ -170,6 +170,11 @@ TEST_CASE("the checkpoint of another scene is not used, and that is said") {
   const SimulationRun run = simulate(other, network_to_run(other), controls);
   CHECK_FALSE(run.resumed_at_s);
   CHECK_THAT(note, Contains("of another scene"));
+  ExperimentScene springs = other;
+  springs.formulation.mass_spring = true;
+  note.clear();
+  CHECK_FALSE(simulate(springs, network_to_run(springs), controls).resumed_at_s);
+  CHECK_THAT(note, Contains("of another scene"));
 }
 
 TEST_CASE("limits of validity are dated and name their spheres") {

@@ -98,6 +98,10 @@ class MotionRun {
     if (!from && protocol.relaxed_at_start() && knots_.front().value != 0.0) {
       preload(bonds, rest, freedom, probe, start);
     }
+    if (from && from->motion.size() != equation_.size()) {
+      throw bad_input("state", fmt::format("{} numbers", from->motion.size()),
+                      fmt::format("{}, as the network has", equation_.size()));
+    }
     integration_.emplace(equation_, options,
                          from ? from->motion : equation_.pack(start.position, start.remembered),
                          step_error(depth, omega), energy_error(response_scale),

@@ -129,7 +129,8 @@ void read_motion(const ListReader& file, Checkpoint& checkpoint) {
 
 std::string checkpoint_identity(const ExperimentScene& scene) {
   const Positions& at = scene.tissue.network.organ.position;
-  std::string bytes = fmt::format("{}\n{}\n", version(), scene.text);
+  std::string bytes =
+      fmt::format("{}\n{}\n{}\n", version(), scene.formulation.mass_spring, scene.text);
   bytes.append(reinterpret_cast<const char*>(at.data()),
                sizeof(double) * static_cast<std::size_t>(at.size()));
   return sha256_hex(bytes);

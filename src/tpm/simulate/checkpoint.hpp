@@ -12,7 +12,8 @@ struct Checkpoint {
   std::optional<InertialState> motion;  ///< of an inertial run
 };
 
-/// Stands for the scene, the places of its spheres, and the version of the program.
+/// Stands for the scene, tissue or mass-spring model, the places of its spheres, and the version of
+/// the program.
 [[nodiscard]] std::string checkpoint_identity(const ExperimentScene& scene);
 
 /// Writes HDF5, whole or not at all. Throws Error(environment).
