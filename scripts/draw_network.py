@@ -56,20 +56,20 @@ def draw_bonds(axes, at, bonds, depth, slab):
     axes.add_collection(LineCollection(ends, colors=str(round(strength, 3)), linewidths=0.6, zorder=2 + slab))
 
 
-def draw_spheres(axes, at, depth, picture, face, anchored, slab):
-    """Circles from far to near; anchored ones with a dark rim."""
-    radius = 1e3 * picture["radius_m"] * 0.5  # smaller than they are, so that bonds show
+def draw_spheres(axes, at, depth, picture, face, anchored, slab, fade=True, share=0.5):
+    """Circles from far to near; anchored ones with a dark rim. Colours that mean a number do not fade."""
+    radius = 1e3 * picture["radius_m"] * share  # smaller than they are, so that bonds show
     order = np.argsort(depth, kind="stable")
     order = order[slab_of(depth[order]) == slab]
     size = np.full(len(order), 2 * radius)
     rim = np.where(anchored[order][:, None], to_rgb(ANCHOR), 0.45 * face[order])
     axes.add_collection(EllipseCollection(
         size, size, np.zeros(len(order)), units="xy", offsets=at[order], transOffset=axes.transData,
-        facecolors=shaded(face, depth)[order], edgecolors=rim, linewidths=np.where(anchored[order], 1.5, 0.4),
-        zorder=2.5 + slab))
+        facecolors=(shaded(face, depth) if fade else face)[order], edgecolors=rim,
+        linewidths=np.where(anchored[order], 1.5, 0.4), zorder=2.5 + slab))
 
 
-def draw_contact(axes, at, picture, view):
+def draw_contact(axes, at, picture, view, arrow=ARROW, named=True):
     contact = picture["contact"]
     if contact is None:
         return
@@ -82,10 +82,12 @@ def draw_contact(axes, at, picture, view):
         axes.plot(*here, "o", ms=15, mfc="none", mec=CONTACT, mew=1.6, zorder=90)
         text_at = here + np.array([0.0, 1.2 * size])
     else:
-        start = here + ARROW * size * flat
+        start = here + arrow * size * flat
         axes.annotate("", here + 0.6 * size * flat, start, arrowprops={"arrowstyle": "-|>", "color": CONTACT, "lw": 2.0},
                       zorder=90)
-        text_at = here + 0.6 * ARROW * size * flat + np.array([0.0, 0.5 * size])
+        text_at = here + 0.6 * arrow * size * flat + np.array([0.0, 0.5 * size])
+    if not named:
+        return
     axes.annotate(f"probe on sphere {contact + 1}", text_at, ha="center", va="bottom", color=CONTACT, fontweight="bold",
                   zorder=91, bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 1.5})
 

@@ -14,43 +14,22 @@
 #include <memory>
 #include <regex>
 
+#include "error_case.hpp"
+#include "simulation_error_cases.hpp"
 #include "temp_folder.hpp"
 #include "tpm/curve/load.hpp"
 #include "tpm/curve/pack.hpp"
 #include "tpm/store/file.hpp"
 
 using namespace tpm;
+using test::ErrorCase;
+using test::files;
+using test::Files;
+using test::kGarbage;
+using test::long_line;
 using test::TempFolder;
 
 namespace {
-
-/// One bad input and how the program is run on it.
-struct ErrorCase {
-  std::string file_type;
-  std::string what;
-  std::string arguments;  ///< of tpm; "{}" stands for the folder, "{}/out" for what it may write
-  std::function<void(const TempFolder&)> make;  ///< writes the bad files
-};
-
-using Files = std::vector<std::pair<std::string, std::string>>;
-
-std::function<void(const TempFolder&)> files(Files list) {
-  return [list = std::move(list)](const TempFolder& folder) {
-    for (const auto& [name, bytes] : list) {
-      std::ofstream(folder / name, std::ios::binary) << bytes;
-    }
-  };
-}
-
-const std::string kGarbage(
-    "\x7F"
-    "ELF\x02\x01\x00\x00\xFF\xFE\xA0",
-    11);
-constexpr std::size_t kLongLine = 100'000'000;
-
-std::string long_line() {
-  return std::string(kLongLine, '1') + "\n";
-}
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);
@@ -574,7 +553,7 @@ std::vector<ErrorCase> all_cases() {
   for (const auto& cases :
        {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
         hdf5_cases(), fit_config_cases(), oscillation_cases(), fit_tables_cases(), design_cases(),
-        claims_cases(), law_cases(), scene_cases()}) {
+        claims_cases(), law_cases(), scene_cases(), test::simulation_error_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -306,6 +306,39 @@ TEST_CASE("the work of the probe is stored, moves spheres or becomes heat") {
   }
 }
 
+TEST_CASE("a run with mass in two halves is one run") {
+  const Block block(slow_tissue());
+  const Protocol loads(Drive::force, {{0.0, 0.0}, {0.1, 0.3}, {0.3, 0.3}, {0.3, -0.1}, {0.5, 0.1}});
+  InertialOptions options;
+  options.tolerance = 1e-9;
+  options.highest_order = 5;
+  options.energy = true;
+  const Inertial inertial = block.inertial(options);
+  for (const Protocol& protocol : {push_and_release(), loads}) {
+    const double end = protocol.end_s();
+    const std::vector<double> times{0.7 * end, end};
+    const InertialRun whole = inertial.run(protocol, times);
+    // In the middle of a piece, at a kink or jump, and just before the end.
+    for (const double cut : {0.15 * end, protocol.knots()[1].time_s, protocol.knots()[2].time_s}) {
+      CAPTURE(protocol.drive() == Drive::force, cut);
+      const InertialRun first = inertial.run(history_until(protocol, cut), {});
+      const InertialRun rest = inertial.run(protocol, times, {}, &first.end);
+      CHECK((rest.response - whole.response).cwiseAbs().maxCoeff() <
+            1e-5 * whole.response.cwiseAbs().maxCoeff());
+      CHECK((rest.position - whole.position).cwiseAbs().maxCoeff() < 1e-7);
+      CHECK_THAT(rest.energy->work, WithinRel(whole.energy->work, 1e-4));
+      CHECK_THAT(rest.energy->damping_heat, WithinRel(whole.energy->damping_heat, 1e-4));
+      CHECK(rest.blows.size() + first.blows.size() == whole.blows.size());
+      CHECK_THROWS_WITH(inertial.run(protocol, std::vector{0.0}, {}, &first.end),
+                        Catch::Matchers::Contains("times from"));
+      InertialState cut_short = first.end;
+      cut_short.motion.conservativeResize(5);
+      CHECK_THROWS_WITH(inertial.run(protocol, times, {}, &cut_short),
+                        Catch::Matchers::Contains("as the network has"));
+    }
+  }
+}
+
 TEST_CASE("driven slowly, the inertial network is the quasi-static one") {
   const Block block(slow_tissue());
   double last = 1.0;

@@ -1,45 +1,18 @@
-// The relaxation fit against an independent implementation and optimiser:
-// scripts/judge_relaxation.py (numpy and scipy, no code shared), to 5 digits in chi-square, E and
-// eta1, at three ramp rates.
-#include <fmt/format.h>
-
+// Against independent implementations in numpy and scipy that share no code.
 #include <catch2/catch.hpp>
-#include <cstdio>
-#include <cstdlib>
-#include <memory>
+#include <filesystem>
 
+#include "python_judge.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/network/quasistatic.hpp"
+#include "tpm/scene/network_file.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;
-
-namespace {
-
-/// A python3 that has scipy: the one on the path may be a version manager's without it.
-std::string python_with_scipy() {
-  for (const char* python : {"python3", "/usr/bin/python3"}) {
-    const std::string probe = fmt::format("{} -c 'import scipy' 2>/dev/null", python);
-    if (std::system(probe.c_str()) == 0) return python;
-  }
-  FAIL("no python3 with scipy; Debian: python3-scipy");
-  return {};
-}
-
-std::string output_of(const std::string& command) {
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(command.c_str(), "r"), pclose);
-  REQUIRE(pipe != nullptr);
-  std::string text;
-  for (int c = std::fgetc(pipe.get()); c != EOF; c = std::fgetc(pipe.get())) {
-    text += static_cast<char>(c);
-  }
-  return text;
-}
-
-}  // namespace
+using tpm_test::judged;
 
 TEST_CASE("an independent optimiser finds the same minimum of the relaxation problem") {
   const std::string source = TPM_TEST_SOURCE_DIR;
-  const std::string python = python_with_scipy();
   FitConfig config = read_fit_config(source + "/configs/liver_relaxation.json");
   config.profiles = false;
   config.hypotheses.clear();
@@ -47,12 +20,34 @@ TEST_CASE("an independent optimiser finds the same minimum of the relaxation pro
     CAPTURE(rate);
     config.data[0].protocol.rate_m_per_s = rate * 1e-3;
     const FitResult fit = run_fit(config);
-    const std::string command = fmt::format(
-        "{0} '{1}/scripts/judge_relaxation.py' '{1}/data/evren_relaxation.csv' --rate {2}", python,
-        source, rate);
-    const Json judge = parse_json(output_of(command), "judge");
+    const Json judge =
+        judged("judge_relaxation.py",
+               fmt::format("'{}/data/evren_relaxation.csv' --rate {}", source, rate));
     CHECK_THAT(fit.chi_square, WithinRel(judge.at("chi_square").get<double>(), 1e-5));
     CHECK_THAT(fit.best.natural[0], WithinRel(judge.at("E_Pa").get<double>(), 1e-5));
     CHECK_THAT(fit.best.natural[1], WithinRel(judge.at("eta1_Pa_s").get<double>(), 1e-5));
+  }
+}
+
+TEST_CASE("an independent solver finds the same contact force of the liver, pushed and held") {
+  const std::string source = TPM_TEST_SOURCE_DIR;
+  const std::string file = std::string(TPM_TEST_BINARY_DIR) + "/judged_liver.h5";
+  const Tissue tissue = read_tissue(source + "/configs/liver_scene.json");
+  (void)write_network(tissue, file);
+  const Organ& organ = tissue.network.organ;
+  const std::size_t contact = organ.contact.value();
+  const Probe probe{contact, -organ.normal.col(static_cast<Eigen::Index>(contact))};
+  for (const double tau : {0.5, 10.0}) {
+    CAPTURE(tau);
+    TpmParameters material;
+    material.eta1_Pa_s = tau * (material.E1_Pa + material.E2_Pa);
+    const BondSystem bonds(tissue.network, material);
+    const Eigen::VectorXd force =
+        QuasiStatic(bonds, organ.position, tissue.freedom(), probe, {.tolerance = 1e-8})
+            .run(ramp_and_hold(8e-3, 4e-3, 29.0), std::vector<double>{2.0, 31.0})
+            .response;
+    const Json judge = judged("judge_quasistatic.py", fmt::format("'{}' --tau {}", file, tau));
+    CHECK_THAT(force[0], WithinRel(judge.at("force_at_peak_N").get<double>(), 1e-6));
+    CHECK_THAT(force[1], WithinRel(judge.at("force_at_end_N").get<double>(), 1e-6));
   }
 }

@@ -60,7 +60,8 @@ TEST_CASE("every key of a scene reaches the tissue") {
                  "A0": "5 mm^2", "l0": "6 mm"},
     "anchors": [{"kind": "inner_layer"}, {"kind": "spheres", "spheres": [1, 48]},
                 {"kind": "half_space", "point": ["0 mm", "25 mm", "0 mm"], "normal": [0, 2, 0]}],
-    "guides": [6], "contacts": [], "protocol": {}})");
+    "guides": [6], "contacts": [{"kind": "sphere"}],
+    "protocol": {"kind": "creep", "load": "1 N", "duration": "1 s"}})");
   const Organ& organ = tissue.network.organ;
   REQUIRE(organ.size() == 48);
   CHECK(organ.contact == 4U);

@@ -59,6 +59,7 @@ int run(int argc, char** argv) {
   add_audit_command(app, session);
   add_data_command(app, session);
   add_network_command(app, session);
+  add_simulate_command(app, session);
   add_report_command(app, session);
 
   try {

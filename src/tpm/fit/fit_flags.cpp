@@ -77,6 +77,12 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
                                          data.protocol.rate_m_per_s * 1e3, data.dataset));
     }
   }
+  if (function.scout() != nullptr) {
+    result.flags.push_back(fmt::format(
+        "the search began at the configured start and at the {} best minima that {} starts of the "
+        "closed form have",
+        result.starts_run - 1, result.config.starts));
+  }
   if (result.band_count > 0) {
     result.flags.push_back(fmt::format(
         "{} bands are penalised only outside and are not counted as data", result.band_count));

@@ -69,14 +69,24 @@ void require_no_jump_of_depth(const Protocol& protocol) {
                   "a ramp");
 }
 
+void require_after(const InertialState& from, std::span<const double> times_s) {
+  for (const double time : times_s) {
+    if (time >= from.time_s) continue;
+    throw bad_input("times", fmt::format("{} s", shortest(time)),
+                    fmt::format("times from {} s on, where the run begins", shortest(from.time_s)));
+  }
+}
+
 /// One run: the state and how it is carried through the protocol.
 class MotionRun {
  public:
   MotionRun(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
             const Probe& probe, const Inertia& inertia, const InertialOptions& options,
-            double omega, const Protocol& protocol, std::span<const double> times_s)
+            double omega, const Protocol& protocol, std::span<const double> times_s,
+            const QuasiStaticObserver& observer, const InertialState* from)
       : options_(options),
         protocol_(protocol),
+        observer_(observer),
         times_s_(times_s),
         order_(rising_order(times_s)),
         knots_(finite_knots(protocol, times_s)),
@@ -85,18 +95,30 @@ class MotionRun {
     TissueState start = tissue_.at_rest(knots_.front().time_s);
     const double response_scale = std::abs(tissue_.linear_response(start, protocol.peak()));
     const double depth = tissue_.depth_driven() ? protocol.peak() : response_scale;
-    if (protocol.relaxed_at_start() && knots_.front().value != 0.0) {
+    if (!from && protocol.relaxed_at_start() && knots_.front().value != 0.0) {
       preload(bonds, rest, freedom, probe, start);
     }
-    integration_.emplace(equation_, options, equation_.pack(start.position, start.remembered),
-                         step_error(depth, omega), energy_error(response_scale));
+    if (from && from->motion.size() != equation_.size()) {
+      throw bad_input("state", fmt::format("{} numbers", from->motion.size()),
+                      fmt::format("{}, as the network has", equation_.size()));
+    }
+    integration_.emplace(equation_, options,
+                         from ? from->motion : equation_.pack(start.position, start.remembered),
+                         step_error(depth, omega), energy_error(response_scale),
+                         from ? from->spent_J : Eigen::Vector3d::Zero());
+    if (from) go_on_from(*from);
     result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
     result_.of_driven_sphere.resize(result_.response.size());
   }
 
   InertialRun go() {
     for (std::size_t k = 0; k + 1 < knots_.size(); ++k) {
-      if (knots_[k].time_s < knots_[k + 1].time_s) cross(knots_[k], knots_[k + 1]);
+      if (knots_[k].time_s == knots_[k + 1].time_s) continue;
+      if (knots_[k + 1].time_s > begin_s_) {
+        cross(knots_[k], knots_[k + 1]);
+      } else {  // over already, but the speed it leaves with counts
+        equation_.set_piece(knots_[k], knots_[k + 1]);
+      }
     }
     const double end = knots_.back().time_s;
     while (next_ < order_.size()) put(end);
@@ -105,6 +127,13 @@ class MotionRun {
   }
 
  private:
+  void go_on_from(const InertialState& from) {
+    started_ = true;
+    begin_s_ = from.time_s;
+    blow_work_ = from.blow_work_J;
+    stored_at_start_ = from.stored_at_start_J;
+  }
+
   /// Where a load or a depth held for ever has brought the tissue.
   void preload(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
                const Probe& probe, TissueState& state) const {
@@ -135,12 +164,13 @@ class MotionRun {
     const double speed_before = equation_.imposed_speed();
     equation_.set_piece(from, to);
     if (!started_) begin(from.time_s);
-    blow(from.time_s, speed_before);
-    integration_->restart(from.time_s, to.time_s);
+    const double begin_s = std::max(from.time_s, begin_s_);
+    if (begin_s == from.time_s) blow(from.time_s, speed_before);
+    integration_->restart(begin_s, to.time_s);
     while (next_ < order_.size() && times_s_[order_[next_]] < to.time_s) {
       const double time = times_s_[order_[next_]];
       // CVODES refuses times that rounding alone separates from where it starts.
-      const bool apart = time - from.time_s > 1e-14 * std::max(std::abs(time), to.time_s);
+      const bool apart = time - begin_s > 1e-14 * std::max(std::abs(time), to.time_s);
       if (apart) integration_->advance_to(time);
       put(time);
     }
@@ -164,6 +194,12 @@ class MotionRun {
     const auto row = static_cast<Eigen::Index>(order_[next_++]);
     result_.response[row] = equation_.response(time_s, integration_->state());
     result_.of_driven_sphere[row] = equation_.drag_on_driven_sphere_N();
+    if (observer_) show(time_s, result_.response[row]);
+  }
+
+  void show(double time_s, double response) {
+    const TissueMotion& now = equation_.unpack(time_s, integration_->state());
+    observer_({time_s, value_at(protocol_, time_s), response, now.position, now.remembered, {}});
   }
 
   void finish(double end) {
@@ -182,10 +218,14 @@ class MotionRun {
     result_.position = last.position;
     result_.velocity = last.velocity;
     result_.remembered = last.remembered;
+    result_.end = {end, integration_->state(),
+                   options_.energy ? integration_->spent_J() : Eigen::Vector3d::Zero(), blow_work_,
+                   stored_at_start_};
   }
 
   const InertialOptions& options_;
   const Protocol& protocol_;
+  const QuasiStaticObserver& observer_;
   std::span<const double> times_s_;
   std::vector<std::size_t> order_;
   std::size_t next_ = 0;  ///< the first of order_ not answered yet
@@ -194,6 +234,7 @@ class MotionRun {
   InertialEquation equation_;
   std::optional<InertialIntegration> integration_;
   bool started_ = false;
+  double begin_s_ = -std::numeric_limits<double>::infinity();  ///< where an earlier run has ended
   double stored_at_start_ = 0.0;
   double blow_work_ = 0.0;
   InertialRun result_;
@@ -220,11 +261,13 @@ Inertial::Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Pro
   lowest_ = lowest_mode(bonds_, rest_, freedom_, mass_kg_);
 }
 
-InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s) const {
+InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s,
+                          const QuasiStaticObserver& observer, const InertialState* from) const {
   require_times_within(protocol, times_s);
   require_no_jump_of_depth(protocol);
+  if (from) require_after(*from, times_s);
   return MotionRun(bonds_, rest_, freedom_, probe_, inertia_of(bonds_, mass_kg_, lowest_, options_),
-                   options_, lowest_.angular_frequency(), protocol, times_s)
+                   options_, lowest_.angular_frequency(), protocol, times_s, observer, from)
       .go();
 }
 

@@ -60,6 +60,15 @@ struct ProbeBlow {
   double impulse_N_s = 0.0;
 };
 
+/// Where a run stands; another run can go on from there.
+struct InertialState {
+  double time_s = 0.0;
+  Eigen::VectorXd motion;  ///< the integrator's: displacements, velocities, what bonds remember
+  Eigen::Vector3d spent_J = Eigen::Vector3d::Zero();  ///< work, heat of bonds, heat of damping
+  double blow_work_J = 0.0;
+  double stored_at_start_J = 0.0;
+};
+
 struct InertialRun {
   /// Contact force, N, or depth, m, at each asked time. The force is all that the probe exerts on
   /// the driven sphere, blows left out.
@@ -73,6 +82,7 @@ struct InertialRun {
   Positions position;          ///< where the run ended
   Eigen::Matrix3Xd velocity;   ///< there, m/s
   Eigen::VectorXd remembered;  ///< y of each bond there, m; 0 where nothing relaxes
+  InertialState end;
 };
 
 /// The inertial network (MODEL.md, section 4, formulation 6): spheres with mass, joined by bonds
@@ -98,7 +108,13 @@ class Inertial {
   /// @param times_s any order, finite, within the protocol; at a jump the value just after it
   /// Throws Error(bad_input) for times outside it and for a jump of depth, which would need an
   /// infinite force; Error(numerical) where CVODES gives up, with the time.
-  [[nodiscard]] InertialRun run(const Protocol& protocol, std::span<const double> times_s) const;
+  /// @param observer if any, sees positions and memory at each asked time in turn (no energies)
+  /// @param from if any, where to go on in the protocol instead of beginning at rest: the end of a
+  ///        run of the same network and options. No time before it can be asked for; the account of
+  ///        the energy and `stored_at_start_J` go on, the blows and the work counted do not.
+  [[nodiscard]] InertialRun run(const Protocol& protocol, std::span<const double> times_s,
+                                const QuasiStaticObserver& observer = {},
+                                const InertialState* from = nullptr) const;
 
   /// The mode that the damping ratio is one of.
   [[nodiscard]] const LowestMode& lowest() const { return lowest_; }

@@ -78,7 +78,8 @@ void eliminated_destroy(SUNMatrix matrix) {
 
 InertialIntegration::InertialIntegration(InertialEquation& eq, const InertialOptions& options,
                                          const Eigen::VectorXd& start, const Eigen::VectorXd& error,
-                                         std::optional<double> energy_error)
+                                         std::optional<double> energy_error,
+                                         const Eigen::Vector3d& spent_J)
     : equation_(eq),
       context_(sundials::make_context()),
       state_(N_VNew_Serial(eq.size(), context_.get())),
@@ -96,7 +97,7 @@ InertialIntegration::InertialIntegration(InertialEquation& eq, const InertialOpt
   options.newton == NewtonSolver::klu ? use_klu() : use_elimination();
   if (!energy_error) return;
   energy_.reset(N_VNew_Serial(3, context_.get()));
-  view(energy_.get()).setZero();
+  view(energy_.get()) = spent_J;
   check(CVodeQuadInit(m, motion_powers, energy_.get()), "CVodeQuadInit");
   check(CVodeQuadSStolerances(m, 0.0, *energy_error), "CVodeQuadSStolerances");
   check(CVodeSetQuadErrCon(m, SUNTRUE), "CVodeSetQuadErrCon");

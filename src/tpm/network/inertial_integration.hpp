@@ -12,9 +12,10 @@ class InertialIntegration {
   /// @param equation must live as long as this
   /// @param error that a step may make in each entry of the state
   /// @param energy_error that a step may make in work and heat, J; none if they are not asked for
+  /// @param spent_J at the start, as spent_J() gives it
   InertialIntegration(InertialEquation& equation, const InertialOptions& options,
                       const Eigen::VectorXd& start, const Eigen::VectorXd& error,
-                      std::optional<double> energy_error);
+                      std::optional<double> energy_error, const Eigen::Vector3d& spent_J);
 
   /// Begins a piece that ends at `stop_s`, from the state reached.
   void restart(double time_s, double stop_s);

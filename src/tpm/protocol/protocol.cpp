@@ -59,6 +59,30 @@ Protocol Protocol::scaled(double factor) const {
   return other;
 }
 
+double value_at(const Protocol& protocol, double time_s) {
+  const auto knots = protocol.knots();
+  const auto after = std::upper_bound(knots.begin(), knots.end(), time_s,
+                                      [](double t, const Knot& knot) { return t < knot.time_s; });
+  if (after == knots.begin()) return 0.0;
+  const Knot& from = *(after - 1);
+  if (after == knots.end()) return from.value;
+  return from.value +
+         (after->value - from.value) * (time_s - from.time_s) / (after->time_s - from.time_s);
+}
+
+Protocol history_until(const Protocol& protocol, double time_s) {
+  std::vector<Knot> knots;
+  for (const Knot& knot : protocol.knots()) {
+    if (knot.time_s <= time_s) knots.push_back(knot);
+  }
+  if (knots.empty() || knots.back().time_s < time_s) {
+    knots.push_back({time_s, value_at(protocol, time_s)});
+  }
+  Protocol part(protocol.drive(), std::move(knots), protocol.name());
+  part.set_relaxed_at_start(protocol.relaxed_at_start());
+  return part;
+}
+
 Protocol step_and_hold(double depth_m, double hold_s) {
   if (std::isinf(hold_s)) return {Drive::displacement, {{0.0, depth_m}}, "step and hold", true};
   require_not_negative(hold_s, "hold", "s");

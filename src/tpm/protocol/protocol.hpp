@@ -55,6 +55,13 @@ class Protocol {
   bool relaxed_at_start_ = false;
 };
 
+/// The imposed value at a time from the first knot on; at a jump the one after it, beyond the last
+/// knot the last one.
+[[nodiscard]] double value_at(const Protocol& protocol, double time_s);
+
+/// The history up to a finite time from the first knot on, all jumps at that time included.
+[[nodiscard]] Protocol history_until(const Protocol& protocol, double time_s);
+
 /// Jump to a depth at t = 0, held for `hold_s` (may be infinite).
 [[nodiscard]] Protocol step_and_hold(double depth_m, double hold_s);
 

@@ -122,6 +122,20 @@ void draw_network(const std::string& python, const std::filesystem::path& pictur
   run_script(python, "draw_network.py", {picture_json.string(), stem.string()});
 }
 
+std::vector<std::string> draw_deformation(const std::string& python,
+                                          const std::filesystem::path& pictures_json,
+                                          const std::filesystem::path& folder, bool two) {
+  run_script(python, "draw_deformation.py", {pictures_json.string(), folder.string()});
+  std::vector<std::string> files;
+  for (const char* name :
+       {"undeformed", "deformed", "displacement", "force", "validity", "side_by_side"}) {
+    if (std::string_view(name) == "side_by_side" && !two) continue;
+    files.push_back(fmt::format("{}.svg", name));
+    files.push_back(fmt::format("{}.png", name));
+  }
+  return files;
+}
+
 std::vector<std::string> write_figures(const std::filesystem::path& folder,
                                        const std::vector<Figure>& figures) {
   std::vector<std::string> files{"figures.json"};

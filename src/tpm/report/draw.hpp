@@ -30,4 +30,12 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
 void draw_network(const std::string& python, const std::filesystem::path& picture_json,
                   const std::filesystem::path& stem);
 
+/// Draws deformation_pictures() into `folder` with scripts/draw_deformation.py, SVG and PNG.
+/// Returns the names of the files. Throws as draw_figures does.
+/// @param two there are two states to be drawn side by side
+[[nodiscard]] std::vector<std::string> draw_deformation(const std::string& python,
+                                                        const std::filesystem::path& pictures_json,
+                                                        const std::filesystem::path& folder,
+                                                        bool two);
+
 }  // namespace tpm

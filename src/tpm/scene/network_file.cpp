@@ -6,8 +6,8 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/core/version.hpp"
+#include "tpm/scene/xdmf.hpp"
 #include "tpm/store/file.hpp"
-#include "tpm/store/hdf5.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;
@@ -62,79 +62,34 @@ void write_bonds(const Network& network, Hdf5Writer& file) {
   file.attribute("/bonds/factor", "meaning", "times E A0/l0");
 }
 
-std::string item(const std::string& file, std::string_view name, std::string_view shape,
-                 bool real) {
-  return fmt::format(
-      "<DataItem Format=\"HDF\" NumberType=\"{}\" Precision=\"{}\" "
-      "Dimensions=\"{}\">{}:{}</DataItem>",
-      real ? "Float" : "Int", real ? 8 : 4, shape, file, name);
-}
-
-std::string attribute(const std::string& file, std::string_view group, std::string_view name,
-                      std::string_view centre, std::size_t size, bool real) {
-  return fmt::format(
-      "      <Attribute Name=\"{}\" AttributeType=\"Scalar\" Center=\"{}\">{}</Attribute>\n", name,
-      centre, item(file, fmt::format("/{}/{}", group, name), std::to_string(size), real));
-}
-
-std::string escaped(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        safe += "&amp;";
-        break;
-      case '<':
-        safe += "&lt;";
-        break;
-      case '>':
-        safe += "&gt;";
-        break;
-      default:
-        safe += c;
-    }
-  }
-  return safe;
-}
-
-std::string xdmf(const Network& network, const std::string& raw_file) {
-  const std::string file = escaped(raw_file);
+std::string xdmf(const Network& network, const std::string& file) {
+  using Number = XdmfSource::Number;
+  using Centre = XdmfSource::Centre;
+  const XdmfSource source(file);
   const std::size_t n = network.organ.size();
   const std::size_t m = network.bonds.size();
-  const std::string geometry =
-      fmt::format("      <Geometry GeometryType=\"XYZ\">{}</Geometry>\n",
-                  item(file, "/spheres/position_m", fmt::format("{} 3", n), true));
+  const std::string position = "/spheres/position_m";
   std::string text =
       "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
       "    <Grid Name=\"spheres\" GridType=\"Uniform\">\n";
-  text += fmt::format(
-      "      <Topology TopologyType=\"Polyvertex\" NodesPerElement=\"1\" "
-      "NumberOfElements=\"{}\">{}</Topology>\n",
-      n, item(file, "/spheres/index", std::to_string(n), false));
-  text += geometry;
-  for (const char* name : {"number", "layer", "held", "contact"}) {
-    text += attribute(file, "spheres", name, "Node", n, false);
+  text += source.points(position, n);
+  for (const std::string name : {"number", "layer", "held", "contact"}) {
+    text += source.scalar(name, "/spheres/" + name, Centre::node, n, Number::whole);
   }
-  text += fmt::format(
-      "      <Attribute Name=\"normal\" AttributeType=\"Vector\" Center=\"Node\">{}</Attribute>\n",
-      item(file, "/spheres/normal", fmt::format("{} 3", n), true));
+  text += source.vector("normal", "/spheres/normal", n);
   text += "    </Grid>\n    <Grid Name=\"bonds\" GridType=\"Uniform\">\n";
-  text += fmt::format(
-      "      <Topology TopologyType=\"Polyline\" NodesPerElement=\"2\" "
-      "NumberOfElements=\"{}\">{}</Topology>\n",
-      m, item(file, "/bonds/ends", fmt::format("{} 2", m), false));
-  text += geometry;
-  text += attribute(file, "bonds", "kind", "Cell", m, false);
-  text += attribute(file, "bonds", "rest_length_m", "Cell", m, true);
-  text += attribute(file, "bonds", "factor", "Cell", m, true);
+  text += source.lines(position, n, m);
+  text += source.scalar("kind", "/bonds/kind", Centre::cell, m, Number::whole);
+  for (const std::string name : {"rest_length_m", "factor"}) {
+    text += source.scalar(name, "/bonds/" + name, Centre::cell, m, Number::real);
+  }
   return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
 }
 
 }  // namespace
 
-fs::path write_network(const Tissue& tissue, const fs::path& path) {
+void write_network_datasets(const Tissue& tissue, Hdf5Writer& file) {
   const Organ& organ = tissue.network.organ;
-  Hdf5Writer file(path);
   write_spheres(tissue, file);
   write_bonds(tissue.network, file);
   file.attribute("/", "title", tissue.title);
@@ -142,6 +97,11 @@ fs::path write_network(const Tissue& tissue, const fs::path& path) {
   file.attribute("/", "assumptions", fmt::format("{}", fmt::join(organ.assumptions, "; ")));
   file.numbers("/spacing_m", {organ.spacing});
   file.numbers("/radius_m", {organ.radius});
+}
+
+fs::path write_network(const Tissue& tissue, const fs::path& path) {
+  Hdf5Writer file(path);
+  write_network_datasets(tissue, file);
   file.commit();
   fs::path description = path;
   description.replace_extension(".xdmf");

@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "tpm/scene/scene.hpp"
+#include "tpm/store/hdf5.hpp"
 
 namespace tpm {
 
@@ -11,5 +12,8 @@ namespace tpm {
 /// docs/network.md. Throws Error(environment).
 /// @return the XDMF file
 std::filesystem::path write_network(const Tissue& tissue, const std::filesystem::path& path);
+
+/// What such a file says of spheres and bonds; a file of a simulation says it too.
+void write_network_datasets(const Tissue& tissue, Hdf5Writer& file);
 
 }  // namespace tpm

@@ -14,7 +14,8 @@ namespace tpm {
 namespace {
 
 /// Blocks of a scene that say what is done to the tissue, not what it is.
-constexpr std::array<const char*, 4> kOtherBlocks{"contacts", "protocol", "outputs", "tolerance"};
+constexpr std::array<const char*, 5> kOtherBlocks{"contacts", "protocol", "formulation", "outputs",
+                                                  "tolerance"};
 
 Network joined(OrganBlock block, const NetworkOptions& options, const std::string& where) {
   if (!block.star) return build_network(std::move(block.organ), options, where);

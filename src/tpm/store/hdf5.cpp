@@ -172,18 +172,56 @@ void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& 
   }
 }
 
+void Hdf5Writer::long_integers(const std::string& name, const std::vector<std::int64_t>& values) {
+  const QuietErrors quiet;
+  const Hdf5Handle set = dataset(name, H5T_STD_I64LE, {values.size()});
+  if (H5Dwrite(set.get(), H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::bytes(const std::string& name, const std::vector<std::uint8_t>& values) {
+  const QuietErrors quiet;
+  const Hdf5Handle set = dataset(name, H5T_STD_U8LE, {values.size()});
+  if (H5Dwrite(set.get(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::attach(const std::string& object, const std::string& name, hid_t type,
+                        const Hdf5Handle& space, const void* values) {
+  const Hdf5Handle made(H5Acreate_by_name(file_.get(), object.c_str(), name.c_str(), type,
+                                          space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                        H5Aclose);
+  if (!made.valid() || H5Awrite(made.get(), type, values) < 0) {
+    fail(fmt::format("cannot write attribute {} of {}", name, object));
+  }
+}
+
 void Hdf5Writer::attribute(const std::string& object, const std::string& name,
                            const std::string& text) {
   const QuietErrors quiet;
-  const Hdf5Handle type = text_type();
-  const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Hdf5Handle made(H5Acreate_by_name(file_.get(), object.c_str(), name.c_str(), type.get(),
-                                          space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-                        H5Aclose);
   const char* pointer = text.c_str();
-  if (!made.valid() || H5Awrite(made.get(), type.get(), static_cast<const void*>(&pointer)) < 0) {
-    fail(fmt::format("cannot write attribute {} of {}", name, object));
-  }
+  attach(object, name, text_type().get(), {H5Screate(H5S_SCALAR), H5Sclose},
+         static_cast<const void*>(&pointer));
+}
+
+void Hdf5Writer::fixed_text_attribute(const std::string& object, const std::string& name,
+                                      const std::string& text) {
+  const QuietErrors quiet;
+  const Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.get(), text.size());
+  H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+  attach(object, name, type.get(), {H5Screate(H5S_SCALAR), H5Sclose}, text.data());
+}
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name,
+                           const std::vector<std::int64_t>& values) {
+  const QuietErrors quiet;
+  const hsize_t size = values.size();
+  const Hdf5Handle space(size == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &size, nullptr),
+                         H5Sclose);
+  attach(object, name, H5T_NATIVE_INT64, space, values.data());
 }
 
 void Hdf5Writer::commit() {
@@ -201,7 +239,7 @@ Hdf5Reader::Hdf5Reader(fs::path path) : path_(std::move(path)) {
   // HDF5 says the same of a missing file and of garbage: tell them apart first.
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
   if (!read_file(path_).starts_with(kSignature)) {
-    throw bad_input(path_.string(), "is not an HDF5 file", "a file that tpm data pack wrote");
+    throw bad_input(path_.string(), "is not an HDF5 file", "an HDF5 file that tpm wrote");
   }
   file_ = {H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose};
   if (!file_.valid()) {
@@ -223,7 +261,7 @@ bool Hdf5Reader::has(const std::string& name) const {
 std::vector<std::string> Hdf5Reader::members(const std::string& group) const {
   const QuietErrors quiet;
   const Hdf5Handle opened(H5Gopen2(file_.get(), group.c_str(), H5P_DEFAULT), H5Gclose);
-  if (!opened.valid()) fail(group, "no such group", "a file that tpm data pack wrote");
+  if (!opened.valid()) fail(group, "no such group", "an HDF5 file that tpm wrote");
   std::vector<std::string> names;
   const auto collect = [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
     static_cast<std::vector<std::string>*>(list)->emplace_back(name);
@@ -235,18 +273,20 @@ std::vector<std::string> Hdf5Reader::members(const std::string& group) const {
   return names;
 }
 
-Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, bool as_text,
+Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, bool as_text, int dimensions,
                                     std::size_t& size) const {
   Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
-  if (!set.valid()) fail(name, "no such dataset", "a file that tpm data pack wrote");
+  if (!set.valid()) fail(name, "no such dataset", "an HDF5 file that tpm wrote");
   const Hdf5Handle type(H5Dget_type(set.get()), H5Tclose);
   const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
   const bool right = H5Tget_class(type.get()) == (as_text ? H5T_STRING : H5T_FLOAT) &&
-                     H5Sget_simple_extent_ndims(space.get()) == 1 &&
+                     H5Sget_simple_extent_ndims(space.get()) == dimensions &&
                      (!as_text || H5Tis_variable_str(type.get()) > 0);
   if (!right) {
     fail(name, "is of another type",
-         as_text ? "a list of texts" : "a list of floating-point numbers");
+         as_text           ? "a list of texts"
+         : dimensions == 1 ? "a list of floating-point numbers"
+                           : "a table of floating-point numbers");
   }
   size = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.get()));
   // A damaged extent must not become an allocation of that size.
@@ -256,9 +296,17 @@ Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, bool as_text,
 }
 
 std::vector<double> Hdf5Reader::numbers(const std::string& name) const {
+  return real_numbers(name, 1);
+}
+
+std::vector<double> Hdf5Reader::table(const std::string& name) const {
+  return real_numbers(name, 2);
+}
+
+std::vector<double> Hdf5Reader::real_numbers(const std::string& name, int dimensions) const {
   const QuietErrors quiet;
   std::size_t size = 0;
-  const Hdf5Handle set = open_dataset(name, false, size);
+  const Hdf5Handle set = open_dataset(name, false, dimensions, size);
   std::vector<double> values(size);
   if (H5Dread(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
     fail(name, "cannot be read", "a whole HDF5 file");
@@ -269,7 +317,7 @@ std::vector<double> Hdf5Reader::numbers(const std::string& name) const {
 std::vector<std::string> Hdf5Reader::texts(const std::string& name) const {
   const QuietErrors quiet;
   std::size_t size = 0;
-  const Hdf5Handle set = open_dataset(name, true, size);
+  const Hdf5Handle set = open_dataset(name, true, 1, size);
   const Hdf5Handle type = text_type();
   const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
   BorrowedTexts borrowed(type, space, size);
@@ -290,7 +338,7 @@ std::string Hdf5Reader::attribute(const std::string& object, const std::string& 
       H5Aopen_by_name(file_.get(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT),
       H5Aclose);
   if (!opened.valid()) {
-    fail(object, fmt::format("no attribute '{}'", name), "a file that tpm data pack wrote");
+    fail(object, fmt::format("no attribute '{}'", name), "an HDF5 file that tpm wrote");
   }
   const Hdf5Handle stored(H5Aget_type(opened.get()), H5Tclose);
   if (H5Tis_variable_str(stored.get()) <= 0) {

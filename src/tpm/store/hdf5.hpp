@@ -48,15 +48,25 @@ class Hdf5Writer {
   /// A list (one column), or rows of `columns` whole numbers each.
   void integers(const std::string& name, const std::vector<std::int32_t>& values,
                 std::size_t columns);
+  void long_integers(const std::string& name, const std::vector<std::int64_t>& values);
+  void bytes(const std::string& name, const std::vector<std::uint8_t>& values);
   void texts(const std::string& name, const std::vector<std::string>& values);
   /// Attaches a text to a group or dataset that stands already.
   void attribute(const std::string& object, const std::string& name, const std::string& text);
+  /// Attaches ASCII characters of a fixed number, as VTK wants to read them.
+  void fixed_text_attribute(const std::string& object, const std::string& name,
+                            const std::string& text);
+  /// Attaches whole numbers; a single one as a scalar.
+  void attribute(const std::string& object, const std::string& name,
+                 const std::vector<std::int64_t>& values);
   void commit();
 
  private:
   /// @param extents one or two
   [[nodiscard]] Hdf5Handle dataset(const std::string& name, Hdf5Handle::Id type,
                                    const std::vector<std::uint64_t>& extents);
+  void attach(const std::string& object, const std::string& name, Hdf5Handle::Id type,
+              const Hdf5Handle& space, const void* values);
   [[noreturn]] void fail(const std::string& what) const;
 
   std::filesystem::path path_;
@@ -75,13 +85,16 @@ class Hdf5Reader {
   /// Names of the members of a group, in alphabetical order.
   [[nodiscard]] std::vector<std::string> members(const std::string& group) const;
   [[nodiscard]] std::vector<double> numbers(const std::string& name) const;
+  /// The rows of a table, one after the other.
+  [[nodiscard]] std::vector<double> table(const std::string& name) const;
   [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
   [[nodiscard]] bool has_attribute(const std::string& object, const std::string& name) const;
   [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;
 
  private:
-  [[nodiscard]] Hdf5Handle open_dataset(const std::string& name, bool as_text,
+  [[nodiscard]] Hdf5Handle open_dataset(const std::string& name, bool as_text, int dimensions,
                                         std::size_t& size) const;
+  [[nodiscard]] std::vector<double> real_numbers(const std::string& name, int dimensions) const;
   [[noreturn]] void fail(const std::string& object, const std::string& what,
                          std::string_view expected) const;
 

@@ -1,0 +1,202 @@
+// tpm simulate: run what a scene says is done to its tissue.
+#include <fmt/format.h>
+
+#include <csignal>
+#include <filesystem>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/report/simulation_figures.hpp"
+#include "tpm/report/simulation_report.hpp"
+#include "tpm/simulate/simulation_file.hpp"
+#include "tpm/simulate/vtkhdf.hpp"
+#include "tpm/store/hdf5.hpp"
+
+namespace tpm::app {
+namespace fs = std::filesystem;
+namespace {
+
+struct SimulateChoice {
+  std::string scene;
+  std::string output = "simulation.h5";
+  std::string figures;
+  bool beside_mass_spring = false;
+  bool vtkhdf = false;
+  std::string checkpoint_every = "5 s";
+};
+
+/// What a signal handler may touch has to be of static storage.
+volatile std::sig_atomic_t stop_signal = 0;
+
+/// While this lives, the first SIGINT or SIGTERM is remembered and a second one kills.
+class InterruptWatch {
+ public:
+  InterruptWatch() {
+    struct sigaction action {};
+    action.sa_handler = [](int signal) { stop_signal = signal; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    sigaction(SIGINT, &action, &before_interrupt_);
+    sigaction(SIGTERM, &action, &before_terminate_);
+  }
+  ~InterruptWatch() {
+    sigaction(SIGINT, &before_interrupt_, nullptr);
+    sigaction(SIGTERM, &before_terminate_, nullptr);
+  }
+  InterruptWatch(const InterruptWatch&) = delete;
+  InterruptWatch& operator=(const InterruptWatch&) = delete;
+  [[nodiscard]] static bool seen() { return stop_signal != 0; }
+
+ private:
+  struct sigaction before_interrupt_ {};
+  struct sigaction before_terminate_ {};
+};
+
+/// A scene, the network it is run on, and what came of it.
+struct Simulated {
+  ExperimentScene scene;
+  RunNetwork network;
+  SimulationRun run;
+  fs::path file, checkpoint;
+};
+
+double checkpoint_interval_s(const SimulateChoice& choice) {
+  const double every =
+      parse_quantity(choice.checkpoint_every, Dimension::time, "--checkpoint-every");
+  if (every >= 0.0) return every;
+  throw Error(ExitCode::usage, "--checkpoint-every", choice.checkpoint_every, "0 s or more");
+}
+
+SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& network,
+                          double checkpoint_every_s, const fs::path& checkpoint) {
+  const InterruptWatch interrupts;
+  std::optional<Progress> progress;
+  SimulationControls controls;
+  std::size_t before = 0;
+  controls.progress = [&](std::size_t done, std::size_t total) {
+    if (!progress) {
+      progress.emplace(scene.formulation.mass_spring ? "mass-spring model" : "simulating", total);
+    }
+    progress->advance(done - before);
+    before = done;
+  };
+  controls.interrupted = InterruptWatch::seen;
+  controls.checkpoint = checkpoint;
+  controls.checkpoint_every_s = checkpoint_every_s;
+  controls.note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
+  return simulate(scene, network, controls);
+}
+
+Simulated simulated(ExperimentScene scene, fs::path file, double checkpoint_every_s) {
+  (void)Hdf5Writer(file);  // before a long run, not after it: can the result be written?
+  RunNetwork network = network_to_run(scene);
+  fs::path checkpoint = file.string() + ".checkpoint";
+  SimulationRun run = run_watched(scene, network, checkpoint_every_s, checkpoint);
+  return {std::move(scene), std::move(network), std::move(run), std::move(file),
+          std::move(checkpoint)};
+}
+
+/// "results.h5" becomes "results-mass_spring.h5".
+fs::path mass_spring_file(const fs::path& file) {
+  fs::path beside = file;
+  return beside.replace_filename(
+      fmt::format("{}-mass_spring{}", file.stem().string(), file.extension().string()));
+}
+
+std::vector<Simulated> simulate_all(const SimulateChoice& choice) {
+  const double every_s = checkpoint_interval_s(choice);
+  ExperimentScene scene = read_experiment(choice.scene);
+  std::vector<Simulated> all;
+  if (choice.beside_mass_spring) {
+    if (scene.formulation.mass_spring) {
+      throw Error(ExitCode::usage, "--beside-mass-spring",
+                  "the scene runs the mass-spring model itself", "a scene of the tissue");
+    }
+    ExperimentScene msm = scene;
+    msm.formulation.mass_spring = true;
+    all.push_back(simulated(std::move(scene), choice.output, every_s));
+    all.push_back(simulated(std::move(msm), mass_spring_file(choice.output), every_s));
+  } else {
+    all.push_back(simulated(std::move(scene), choice.output, every_s));
+  }
+  return all;
+}
+
+std::vector<std::string> write_all(const SimulateChoice& choice,
+                                   const std::vector<Simulated>& all) {
+  std::vector<std::string> files;
+  std::vector<FiguredRun> figured;
+  for (const Simulated& s : all) {
+    files.push_back(s.file.string());
+    files.push_back(write_simulation(s.scene, s.network, s.run, s.file).string());
+    if (choice.vtkhdf) {
+      fs::path vtkhdf = s.file;
+      write_vtkhdf(s.scene, s.network, s.run, vtkhdf.replace_extension(".vtkhdf"));
+      files.push_back(vtkhdf.string());
+    }
+    fs::remove(s.checkpoint);
+    figured.push_back({&s.scene, &s.network, &s.run});
+  }
+  if (choice.figures.empty()) return files;
+  for (const std::string& name : write_simulation_figures(choice.figures, figured)) {
+    files.push_back((fs::path(choice.figures) / name).string());
+  }
+  return files;
+}
+
+int simulate_and_report(const SimulateChoice& choice, const Session& session) {
+  const std::vector<Simulated> all = simulate_all(choice);
+  const std::vector<std::string> files = write_all(choice, all);
+  if (session.json()) {
+    Json json = simulation_json(all.front().scene, all.front().run);
+    if (all.size() > 1) json["mass_spring"] = simulation_json(all[1].scene, all[1].run);
+    json["files"] = files;
+    fmt::print("{}", to_text(json));
+    return 0;
+  }
+  for (const Simulated& s : all) fmt::print("{}", simulation_text(s.scene, s.run));
+  fmt::print("wrote {}\n", fmt::join(files, ", "));
+  return 0;
+}
+
+/// Being stopped is not an error of the run: its line, and the exit code that shells expect.
+int run_command(const SimulateChoice& choice, const Session& session) {
+  try {
+    return simulate_and_report(choice, session);
+  } catch (const Interrupted& stop) {
+    constexpr int kStoppedBySignal = 128;
+    fmt::print(stderr, "tpm: {}\n", stop.what());
+    return kStoppedBySignal + stop_signal;
+  }
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& app, Session& session) {
+  CLI::App* command =
+      app.add_subcommand("simulate", "Push or load an organ as a scene says; HDF5, XDMF, pictures");
+  auto choice = std::make_shared<SimulateChoice>();
+  command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)")->required();
+  command->add_option("-o,--output", choice->output, "HDF5 file; an XDMF goes beside it")
+      ->capture_default_str();
+  command->add_option("--figures", choice->figures, "Folder for pictures (PNG, SVG)");
+  command->add_flag("--beside-mass-spring", choice->beside_mass_spring,
+                    "Also run the mass-spring model on the same spheres; figures show both");
+  command->add_flag("--vtkhdf", choice->vtkhdf,
+                    "Also write a .vtkhdf beside it, for ParaView from 5.12 on");
+  command
+      ->add_option("--checkpoint-every", choice->checkpoint_every,
+                   "Time between checkpoints, such as \"5 s\"")
+      ->capture_default_str();
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5 --figures pictures\n"
+      "An interrupted run goes on from its last checkpoint when the same command is given again.");
+  command->callback([choice, &session] {
+    session.run = [choice, &session] { return run_command(*choice, session); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,136 @@
+#include "tpm/report/simulation_figures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/network_report.hpp"
+#include "tpm/simulate/smoothness.hpp"
+#include "tpm/simulate/step_fields.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDigits = 7;  // of numbers that are drawn
+
+std::string name_of(const FiguredRun& figured) {
+  return figured.scene->formulation.mass_spring ? "MSM" : "TPM";
+}
+
+Json rows_json(const Positions& position) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < position.cols(); ++i) {
+    const auto& p = position.col(i);
+    rows.push_back({rounded(p.x(), kDigits), rounded(p.y(), kDigits), rounded(p.z(), kDigits)});
+  }
+  return rows;
+}
+
+template <class Numbers>
+Json list_json(const Numbers& numbers, double unit) {
+  Json list = Json::array();
+  for (const double value : numbers) list.push_back(rounded(value / unit, kDigits));
+  return list;
+}
+
+std::string roughness_words(const std::optional<Smoothness>& found) {
+  if (!found) return "nothing has moved";
+  std::string near =
+      fmt::format("roughness {} near the contact", significant(found->near_contact, 4));
+  if (!found->at_rim) return near;
+  return fmt::format("{}, {} at the rim", near, significant(*found->at_rim, 4));
+}
+
+/// The network as it is at the last output.
+Json state_json(const FiguredRun& figured) {
+  const QuasiStaticState& state = figured.run->record.outputs.back();
+  const Eigen::Matrix3Xd moved = displacements_m(figured.network->network.organ, state);
+  const Eigen::VectorXd lengths = moved.colwise().norm();
+  const Eigen::VectorXd force = bond_forces_N(figured.network->bonds, state);
+  Json json{{"name", name_of(figured)},
+            {"time_s", rounded(state.time_s, kDigits)},
+            {"position_m", rows_json(state.position)},
+            {"displacement_mm", list_json(lengths, 1e-3)},
+            {"bond_force_mN", list_json(force, 1e-3)}};
+  json["largest_bond_force_mN"] =
+      list_json(largest_bond_forces_N(figured.network->network, force), 1e-3);
+  json["validity"] =
+      ValidityWatch(figured.scene->tissue.network, figured.scene->probe).flags(state.position);
+  const bool depth = figured.scene->protocol.drive() == Drive::displacement;
+  const double depth_m = depth ? state.imposed : state.response;
+  const double force_N = depth ? state.response : state.imposed;
+  json["words"] = fmt::format("t = {} s, depth {} mm, force {} N", significant(state.time_s, 4),
+                              significant(1e3 * depth_m, 4), significant(force_N, 4));
+  json["roughness"] = roughness_words(smoothness_of(*figured.scene, state.position));
+  return json;
+}
+
+Panel panel_of(const std::vector<FiguredRun>& runs, bool imposed) {
+  const bool by_depth = runs.front().scene->protocol.drive() == Drive::displacement;
+  const bool length = imposed == by_depth;
+  Panel panel;
+  panel.title = imposed ? "Imposed" : "Response";
+  panel.x = {"time", "s", false, {}, {}};
+  panel.y = length ? Axis{"indentation depth", "mm", false, {}, {}}
+                   : Axis{imposed ? "load" : "contact force", "N", false, {}, {}};
+  for (const FiguredRun& figured : runs) {
+    std::vector<double> x;
+    std::vector<double> y;
+    for (const CurvePoint& p : figured.run->record.curve) {
+      x.push_back(p.time_s);
+      y.push_back((imposed ? p.imposed : p.response) * (length ? 1e3 : 1.0));
+    }
+    panel.series.push_back(line(name_of(figured), std::move(x), std::move(y)));
+    if (imposed) break;  // the same for all
+  }
+  return panel;
+}
+
+}  // namespace
+
+Figure response_figure(const std::vector<FiguredRun>& runs) {
+  Figure figure;
+  figure.id = "response";
+  figure.title = runs.front().scene->tissue.title;
+  figure.caption =
+      fmt::format("Sphere {} of {}, computed by tpm {}", runs.front().scene->probe.sphere + 1,
+                  runs.front().scene->tissue.network.organ.size(), version());
+  figure.panels = {panel_of(runs, true), panel_of(runs, false)};
+  return figure;
+}
+
+Json deformation_pictures(const std::vector<FiguredRun>& runs) {
+  const ExperimentScene& scene = *runs.front().scene;
+  Json json = network_picture(scene.tissue);
+  json["provenance"] = fmt::format(
+      "model: computed by tpm {}, scene {}; {} spheres, {} bonds, deformation not magnified",
+      version(), sha256_hex(scene.text).substr(0, 12), scene.tissue.network.organ.size(),
+      scene.tissue.network.bonds.size());
+  const Eigen::Vector3d& d = scene.probe.direction;
+  json["contact"] = scene.probe.sphere;
+  json["direction"] = {d.x(), d.y(), d.z()};
+  json["states"] = Json::array();
+  for (const FiguredRun& figured : runs) json["states"].push_back(state_json(figured));
+  return json;
+}
+
+std::vector<std::string> write_simulation_figures(const fs::path& folder,
+                                                  const std::vector<FiguredRun>& runs) {
+  write_file(folder / "pictures.json", to_text(deformation_pictures(runs)));
+  std::vector<std::string> files = write_figures(folder, {response_figure(runs)});
+  files.emplace_back("pictures.json");
+  for (const std::string& name :
+       draw_deformation(find_drawing_python(), folder / "pictures.json", folder, runs.size() > 1)) {
+    files.push_back(name);
+  }
+  return files;
+}
+
+}  // namespace tpm

@@ -1,0 +1,33 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/report/figure.hpp"
+#include "tpm/simulate/simulation.hpp"
+
+namespace tpm {
+
+/// A run to be drawn; all must live as long as this.
+struct FiguredRun {
+  const ExperimentScene* scene;
+  const RunNetwork* network;
+  const SimulationRun* run;
+};
+
+/// What is imposed and the response over time, each run a curve.
+[[nodiscard]] Figure response_figure(const std::vector<FiguredRun>& runs);
+
+/// The network of the first run for scripts/draw_deformation.py: undeformed, and deformed at its
+/// last output, coloured by displacement, by force, and by the limits of validity; with two runs
+/// also both side by side.
+[[nodiscard]] Json deformation_pictures(const std::vector<FiguredRun>& runs);
+
+/// Draws all of them into a folder as SVG and PNG. Returns the names of the files, figures.json and
+/// pictures.json, from which they can be drawn again, among them.
+/// @param runs one or two, of the same spheres
+/// Throws Error(environment) if drawing is not possible; the two JSON files are then there.
+std::vector<std::string> write_simulation_figures(const std::filesystem::path& folder,
+                                                  const std::vector<FiguredRun>& runs);
+
+}  // namespace tpm

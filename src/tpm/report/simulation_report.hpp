@@ -1,0 +1,13 @@
+#pragma once
+#include <string>
+
+#include "tpm/simulate/simulation.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// What a run has shown, as docs/simulate.md describes the keys. Spheres are numbered from 1.
+[[nodiscard]] Json simulation_json(const ExperimentScene& scene, const SimulationRun& run);
+[[nodiscard]] std::string simulation_text(const ExperimentScene& scene, const SimulationRun& run);
+
+}  // namespace tpm

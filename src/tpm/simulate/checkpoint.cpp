@@ -1,0 +1,194 @@
+#include "tpm/simulate/checkpoint.hpp"
+
+#include <fmt/format.h>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/hdf5.hpp"
+
+namespace tpm {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kExpected = "a checkpoint of tpm simulate; remove the file to start anew";
+
+void append(std::vector<double>& list, const double* first, Eigen::Index count) {
+  list.insert(list.end(), first, first + count);
+}
+
+/// States one after the other: time, imposed, response, work, heat, stored; positions; y.
+void write_states(Hdf5Writer& file, const std::string& group,
+                  std::span<const QuasiStaticState> states) {
+  std::vector<double> scalars;
+  std::vector<double> position;
+  std::vector<double> remembered;
+  for (const QuasiStaticState& s : states) {
+    const QuasiStaticEnergy energy = s.energy.value_or(QuasiStaticEnergy{});
+    scalars.insert(scalars.end(), {s.time_s, s.imposed, s.response, energy.work_J,
+                                   energy.dissipated_J, energy.stored_J});
+    append(position, s.position.data(), s.position.size());
+    append(remembered, s.remembered.data(), s.remembered.size());
+  }
+  file.numbers(group + "/scalars", scalars);
+  file.numbers(group + "/position_m", position);
+  file.numbers(group + "/remembered_m", remembered);
+}
+
+/// Reads lists whose lengths are known to be multiples of a number; 0 stands for any but empty.
+class ListReader {
+ public:
+  ListReader(const Hdf5Reader& file, const fs::path& path) : file_(file), path_(path) {}
+
+  [[nodiscard]] std::vector<double> list(const std::string& name, std::size_t multiple) const {
+    std::vector<double> values = file_.numbers(name);
+    if (multiple == 0 ? !values.empty() : values.size() % multiple == 0) return values;
+    throw bad_input(path_.string(), fmt::format("{} has {} numbers", name, values.size()),
+                    kExpected);
+  }
+
+  [[nodiscard]] std::vector<QuasiStaticState> states(const std::string& group, std::size_t spheres,
+                                                     std::size_t bonds) const {
+    const std::vector<double> scalars = list(group + "/scalars", 6);
+    const std::size_t count = scalars.size() / 6;
+    const std::vector<double> position = list(group + "/position_m", 3 * spheres);
+    const std::vector<double> remembered = list(group + "/remembered_m", bonds);
+    if (position.size() != 3 * spheres * count || remembered.size() != bonds * count) {
+      throw bad_input(path_.string(), fmt::format("{} is not whole", group), kExpected);
+    }
+    std::vector<QuasiStaticState> states(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double* s = &scalars[6 * i];
+      states[i] = {s[0], s[1], s[2], {}, {}, QuasiStaticEnergy{s[3], s[4], s[5]}};
+      states[i].position = Eigen::Map<const Positions>(position.data() + 3 * spheres * i, 3,
+                                                       static_cast<Eigen::Index>(spheres));
+      states[i].remembered = Eigen::Map<const Eigen::VectorXd>(remembered.data() + bonds * i,
+                                                               static_cast<Eigen::Index>(bonds));
+    }
+    return states;
+  }
+
+ private:
+  const Hdf5Reader& file_;
+  const fs::path& path_;
+};
+
+std::string breach_name(std::size_t limit) {
+  return fmt::format("/validity/{}", key_of(static_cast<ValidityLimit>(limit)));
+}
+
+void write_validity(Hdf5Writer& file, const Validity& validity) {
+  file.numbers("/validity/largest", {validity.deepest_m, validity.most_turned_rad});
+  for (std::size_t k = 0; k < kValidityLimits; ++k) {
+    const ValidityBreach& breach = validity.breach[k];
+    // The time, then the spheres; nothing if the limit is kept.
+    std::vector<double> values;
+    if (breach.first_time_s) values.push_back(*breach.first_time_s);
+    values.insert(values.end(), breach.spheres.begin(), breach.spheres.end());
+    file.numbers(breach_name(k), values);
+  }
+}
+
+Validity read_validity(const ListReader& file) {
+  Validity validity;
+  const std::vector<double> largest = file.list("/validity/largest", 2);
+  validity.deepest_m = largest.at(0);
+  validity.most_turned_rad = largest.at(1);
+  for (std::size_t k = 0; k < kValidityLimits; ++k) {
+    const std::vector<double> values = file.list(breach_name(k), 1);
+    if (values.empty()) continue;
+    validity.breach[k].first_time_s = values.front();
+    for (std::size_t i = 1; i < values.size(); ++i) {
+      validity.breach[k].spheres.push_back(static_cast<std::size_t>(values[i]));
+    }
+  }
+  return validity;
+}
+
+void write_motion(Hdf5Writer& file, const InertialState& s, const InertialEnergy& e) {
+  file.numbers("/motion/state", {s.motion.begin(), s.motion.end()});
+  file.numbers("/motion/scalars", {s.time_s, s.spent_J[0], s.spent_J[1], s.spent_J[2],
+                                   s.blow_work_J, s.stored_at_start_J});
+  file.numbers("/motion/energy", {e.work, e.stored, e.kinetic, e.bond_heat, e.damping_heat});
+}
+
+void read_motion(const ListReader& file, Checkpoint& checkpoint) {
+  const std::vector<double> state = file.list("/motion/state", 0);
+  const std::vector<double> s = file.list("/motion/scalars", 6);
+  const std::vector<double> e = file.list("/motion/energy", 5);
+  checkpoint.motion = InertialState{
+      s.at(0),
+      Eigen::Map<const Eigen::VectorXd>(state.data(), static_cast<Eigen::Index>(state.size())),
+      {s.at(1), s.at(2), s.at(3)},
+      s.at(4),
+      s.at(5)};
+  checkpoint.record.inertial_energy = InertialEnergy{e.at(0), e.at(1), e.at(2), e.at(3), e.at(4)};
+}
+
+}  // namespace
+
+std::string checkpoint_identity(const ExperimentScene& scene) {
+  const Positions& at = scene.tissue.network.organ.position;
+  std::string bytes =
+      fmt::format("{}\n{}\n{}\n", version(), scene.formulation.mass_spring, scene.text);
+  bytes.append(reinterpret_cast<const char*>(at.data()),
+               sizeof(double) * static_cast<std::size_t>(at.size()));
+  return sha256_hex(bytes);
+}
+
+void write_checkpoint(const fs::path& path, const std::string& identity,
+                      const Checkpoint& checkpoint) {
+  const SimulationRecord& record = checkpoint.record;
+  const QuasiStaticState& latest = checkpoint.latest;
+  Hdf5Writer file(path);
+  file.attribute("/", "checkpoint_of", identity);
+  file.numbers("/spheres", {static_cast<double>(latest.position.cols())});
+  file.numbers("/bonds", {static_cast<double>(latest.remembered.size())});
+  std::vector<double> curve;
+  for (const CurvePoint& p : record.curve) {
+    curve.insert(curve.end(), {p.time_s, p.imposed, p.response, p.energy.work_J,
+                               p.energy.dissipated_J, p.energy.stored_J});
+  }
+  file.numbers("/curve", curve);
+  file.numbers("/error_estimate", {record.error_estimate});
+  write_states(file, "/outputs", record.outputs);
+  write_states(file, "/latest", {&latest, 1});
+  write_validity(file, record.validity);
+  if (checkpoint.motion) write_motion(file, *checkpoint.motion, record.inertial_energy.value());
+  file.commit();
+}
+
+std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::string& identity,
+                                          const std::function<void(const std::string&)>& note) {
+  if (!fs::exists(path)) return std::nullopt;
+  const Hdf5Reader file(path);
+  if (!file.has_attribute("/", "checkpoint_of")) {
+    throw bad_input(path.string(), "is no checkpoint", kExpected);
+  }
+  if (file.attribute("/", "checkpoint_of") != identity) {
+    if (note) {
+      note(fmt::format("{}: of another scene or another version of tpm; starting anew",
+                       path.string()));
+    }
+    return std::nullopt;
+  }
+  const ListReader lists(file, path);
+  const auto spheres = static_cast<std::size_t>(lists.list("/spheres", 0).front());
+  const auto bonds = static_cast<std::size_t>(lists.list("/bonds", 0).front());
+  Checkpoint checkpoint;
+  const std::vector<double> curve = lists.list("/curve", 6);
+  for (std::size_t i = 0; i + 6 <= curve.size(); i += 6) {
+    const double* p = &curve[i];
+    checkpoint.record.curve.push_back({p[0], p[1], p[2], {p[3], p[4], p[5]}});
+  }
+  checkpoint.record.outputs = lists.states("/outputs", spheres, bonds);
+  checkpoint.record.validity = read_validity(lists);
+  checkpoint.record.error_estimate = lists.list("/error_estimate", 0).front();
+  std::vector<QuasiStaticState> latest = lists.states("/latest", spheres, bonds);
+  if (latest.size() != 1) throw bad_input(path.string(), "holds no state", kExpected);
+  checkpoint.latest = std::move(latest.front());
+  if (file.has("/motion")) read_motion(lists, checkpoint);
+  return checkpoint;
+}
+
+}  // namespace tpm

@@ -1,0 +1,74 @@
+#pragma once
+#include <chrono>
+#include <span>
+
+#include "tpm/simulate/simulation.hpp"
+
+namespace tpm {
+
+/// The times at which a run is watched: those of the outputs, 200 even parts of the protocol, and
+/// its corners; rising. The same whatever is written, so that limits are dated alike.
+[[nodiscard]] std::vector<double> times_to_watch(const ExperimentScene& scene);
+
+/// Keeps what a run shows. The watched times are cut into parts; at the end of a part the run
+/// starts afresh from the state there, interrupted or not, so that a run that goes on from a
+/// checkpoint computes what one that was never stopped computes, to the bit.
+class Recorder {
+ public:
+  /// @param scene, controls must live as long as this
+  Recorder(const ExperimentScene& scene, const SimulationControls& controls, std::size_t parts);
+
+  /// True if an earlier run has left a state to go on from: latest(), and motion() if it was one
+  /// of spheres with mass.
+  [[nodiscard]] bool restore();
+
+  /// The times of the next part; empty if all is done.
+  [[nodiscard]] std::span<const double> next_part() const;
+
+  /// Takes the state at the next of those times. Throws Interrupted, with a checkpoint of the last
+  /// whole part left behind, and Error(numerical) where a load goes through the organ.
+  void see(const QuasiStaticState& state);
+
+  /// Ends a part at the state last seen; now and then writes a checkpoint.
+  /// @param error_estimate of the part, N or m
+  void close_part(double error_estimate);
+  /// The same where spheres have mass.
+  void close_part(InertialState motion, const InertialEnergy& energy);
+
+  /// The state at the end of the last part; none before the first.
+  [[nodiscard]] const QuasiStaticState* latest() const {
+    return whole_.curve > 0 ? &whole_.state : nullptr;
+  }
+  [[nodiscard]] const InertialState* motion() const {
+    return whole_.motion ? &*whole_.motion : nullptr;
+  }
+  [[nodiscard]] SimulationRecord take() { return std::move(record_); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// How much of the record stands in whole parts.
+  struct Whole {
+    std::size_t curve = 0, outputs = 0;
+    Validity validity;
+    QuasiStaticState state;
+    std::optional<InertialState> motion;
+  };
+
+  void require_within(const QuasiStaticState& state) const;
+  void close();
+  void save();
+  [[noreturn]] void stop(double time_s);
+
+  const ExperimentScene& scene_;
+  const SimulationControls& controls_;
+  std::size_t parts_;
+  std::string identity_;
+  ValidityWatch watch_;
+  std::vector<double> times_;
+  Clock::time_point saved_;
+  SimulationRecord record_;
+  QuasiStaticState seen_;
+  Whole whole_;
+};
+
+}  // namespace tpm

@@ -1,0 +1,120 @@
+#include "tpm/simulate/simulation.hpp"
+
+#include <algorithm>
+
+#include "tpm/network/lowest_mode.hpp"
+#include "tpm/simulate/recorder.hpp"
+#include "tpm/simulate/static_path.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::size_t kParts = 16;  // of a run; a checkpoint can be written after each
+
+/// Runs that go part by part. `run_part` shows the recorder the states at some times, and closes
+/// the part.
+template <class RunPart>
+SimulationRun run_in_parts(const ExperimentScene& scene, const SimulationControls& controls,
+                           RunPart&& run_part) {
+  Recorder recorder(scene, controls, kParts);
+  SimulationRun result;
+  if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
+  for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {
+    run_part(recorder, times);
+  }
+  result.record = recorder.take();
+  return result;
+}
+
+/// The protocol up to the end of a part, and the tolerance there: that of the scene is one of the
+/// whole, and a part of a ramp has a lower peak.
+struct PartOfProtocol {
+  PartOfProtocol(const ExperimentScene& scene, double end_s)
+      : protocol(history_until(scene.protocol, end_s)), tolerance(scene.formulation.tolerance) {
+    if (protocol.peak() > 0.0) tolerance *= scene.protocol.peak() / protocol.peak();
+    tolerance = std::min(tolerance, 0.1);
+  }
+  Protocol protocol;
+  double tolerance;
+};
+
+SimulationRun run_quasi_static(const ExperimentScene& scene, const RunNetwork& network,
+                               const SimulationControls& controls) {
+  const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
+    const PartOfProtocol part(scene, times.back());
+    const QuasiStatic equations(network.bonds, network.network.organ.position,
+                                scene.tissue.freedom(), scene.probe,
+                                {.tolerance = part.tolerance, .energies = true});
+    const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
+    recorder.close_part(equations.run(part.protocol, times, see, recorder.latest()).error_estimate);
+  };
+  return run_in_parts(scene, controls, run_part);
+}
+
+SimulationRun run_static(const ExperimentScene& scene, const RunNetwork& network,
+                         const SimulationControls& controls) {
+  StaticPath path(network.bonds, network.network.organ, scene.tissue.freedom(), scene.probe,
+                  scene.protocol.drive(), scene.protocol.peak(), scene.formulation.tolerance);
+  const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
+    if (recorder.latest()) path.start_from(*recorder.latest());
+    for (const double time : times) {
+      recorder.see(path.move_to(value_at(scene.protocol, time), time));
+    }
+    recorder.close_part(0.0);
+  };
+  return run_in_parts(scene, controls, run_part);
+}
+
+SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& network,
+                           const SimulationControls& controls) {
+  const Organ& organ = network.network.organ;
+  const Eigen::VectorXd mass_kg = sphere_masses_kg(organ, scene.formulation.density_kg_m3);
+  InertialOptions options;
+  options.damping_ratio = scene.formulation.damping_ratio;
+  // The mass-spring model has a damper beside each spring.
+  options.stiffness_share = scene.formulation.mass_spring ? 1.0 : 0.0;
+  options.energy = true;
+  const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
+    const PartOfProtocol part(scene, times.back());
+    options.tolerance = part.tolerance;
+    const Inertial equations(network.bonds, organ.position, scene.tissue.freedom(), scene.probe,
+                             mass_kg, options);
+    const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
+    const InertialRun run = equations.run(part.protocol, times, see, recorder.motion());
+    recorder.close_part(run.end, run.energy.value());
+  };
+  SimulationRun result = run_in_parts(scene, controls, run_part);
+  result.lowest_frequency_Hz =
+      lowest_mode(network.bonds, organ.position, scene.tissue.freedom(), mass_kg).frequency_Hz;
+  return result;
+}
+
+}  // namespace
+
+RunNetwork network_to_run(const ExperimentScene& scene) {
+  const Tissue& tissue = scene.tissue;
+  if (!scene.formulation.mass_spring) return {tissue.network, tissue.material, tissue.bonds()};
+  const Freedom freedom = tissue.freedom();
+  const double stiffness = contact_stiffness_N_per_m(tissue.bonds(), tissue.network.organ.position,
+                                                     freedom, scene.probe, 1.0);
+  Network msm = msm_network(tissue.network, scene.formulation.springs);
+  const TpmParameters material =
+      msm_material(msm, tissue.material, freedom, scene.probe, stiffness);
+  BondSystem bonds(msm, material);
+  return {std::move(msm), material, std::move(bonds)};
+}
+
+SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,
+                       const SimulationControls& controls) {
+  switch (scene.formulation.kind) {
+    case FormulationKind::inertial:
+      return run_inertial(scene, network, controls);
+    case FormulationKind::relaxed:
+      return run_static(scene, network, controls);
+    case FormulationKind::quasi_static:
+      break;
+  }
+  return run_quasi_static(scene, network, controls);
+}
+
+}  // namespace tpm

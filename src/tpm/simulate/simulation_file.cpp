@@ -1,0 +1,191 @@
+#include "tpm/simulate/simulation_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/scene/network_file.hpp"
+#include "tpm/scene/xdmf.hpp"
+#include "tpm/simulate/smoothness.hpp"
+#include "tpm/simulate/step_fields.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace fs = std::filesystem;
+namespace {
+
+std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
+  return {numbers.data(), numbers.data() + numbers.size()};
+}
+
+std::string step_group(std::size_t step) {
+  return fmt::format("/steps/{:05}", step);
+}
+
+void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hdf5Writer& file) {
+  const Formulation& f = scene.formulation;
+  file.attribute("/", "scene", scene.text);
+  file.attribute("/", "scene_sha256", sha256_hex(scene.text));
+  file.attribute("/", "formulation", std::string(word_of(f.kind)));
+  file.attribute("/", "network", f.mass_spring ? "mass_spring" : "tissue");
+  file.attribute("/", "tolerance", shortest(f.tolerance));
+  file.attribute("/", "provenance", "model");
+  if (f.inertial()) {
+    file.attribute("/", "damping_ratio", shortest(f.damping_ratio));
+    file.attribute("/", "lowest_frequency_Hz", significant(run.lowest_frequency_Hz, 6));
+  }
+  file.numbers("/probe/sphere", {static_cast<double>(scene.probe.sphere + 1)});
+  file.numbers("/probe/direction", list_of(scene.probe.direction));
+}
+
+void write_curve(const ExperimentScene& scene, const SimulationRecord& record, Hdf5Writer& file) {
+  std::vector<double> time, imposed, response, work, heat, stored;
+  for (const CurvePoint& p : record.curve) {
+    time.push_back(p.time_s);
+    imposed.push_back(p.imposed);
+    response.push_back(p.response);
+    work.push_back(p.energy.work_J);
+    heat.push_back(p.energy.dissipated_J);
+    stored.push_back(p.energy.stored_J);
+  }
+  const bool depth = scene.protocol.drive() == Drive::displacement;
+  file.numbers("/curve/time_s", time);
+  file.numbers(depth ? "/curve/depth_m" : "/curve/load_N", imposed);
+  file.numbers(depth ? "/curve/force_N" : "/curve/depth_m", response);
+  if (scene.formulation.inertial()) return;
+  file.numbers("/curve/work_J", work);
+  file.numbers("/curve/dissipated_J", heat);
+  file.numbers("/curve/stored_J", stored);
+}
+
+void write_validity(const Validity& validity, Hdf5Writer& file) {
+  file.numbers("/validity/deepest_m", {validity.deepest_m});
+  file.numbers("/validity/most_turned_rad", {validity.most_turned_rad});
+  for (std::size_t k = 0; k < kValidityLimits; ++k) {
+    const auto limit = static_cast<ValidityLimit>(k);
+    const ValidityBreach& breach = validity.of(limit);
+    const std::string group = fmt::format("/validity/{}", key_of(limit));
+    file.group(group);
+    file.attribute(group, "meaning", std::string(words_of(limit)));
+    file.attribute(group, "passed", breach.first_time_s ? "yes" : "no");
+    if (!breach.first_time_s) continue;
+    std::vector<std::int32_t> numbers;
+    for (const std::size_t sphere : breach.spheres) {
+      numbers.push_back(static_cast<std::int32_t>(sphere + 1));
+    }
+    file.numbers(group + "/first_time_s", {*breach.first_time_s});
+    file.integers(group + "/spheres", numbers, 1);
+  }
+}
+
+/// Of the outputs at which something has moved.
+void write_roughness(const ExperimentScene& scene, const SimulationRecord& record,
+                     Hdf5Writer& file) {
+  std::vector<double> time, near, rim;
+  for (const QuasiStaticState& state : record.outputs) {
+    const std::optional<Smoothness> found = smoothness_of(scene, state.position);
+    if (!found) continue;
+    time.push_back(state.time_s);
+    near.push_back(found->near_contact);
+    if (found->at_rim) rim.push_back(*found->at_rim);
+  }
+  file.numbers("/roughness/time_s", time);
+  file.numbers("/roughness/near_contact", near);
+  if (!rim.empty()) file.numbers("/roughness/at_rim", rim);
+}
+
+void write_field(const StepField& field, const std::string& group, Hdf5Writer& file) {
+  const std::string name = fmt::format("{}/{}", group, field.name);
+  field.columns == 1 ? file.numbers(name, field.values)
+                     : file.table(name, field.values, field.columns);
+}
+
+void write_step(const ExperimentScene& scene, const RunNetwork& network,
+                const QuasiStaticState& state, const std::string& group, Hdf5Writer& file) {
+  file.table(group + "/position_m", list_of(state.position), 3);
+  const StepFields fields = fields_of(scene, network, state);
+  for (const StepField& field : fields.of_spheres) write_field(field, group, file);
+  file.integers(group + "/validity", fields.validity, 1);
+  for (const StepField& field : fields.of_bonds) write_field(field, group, file);
+}
+
+/// Spheres and bonds at one time.
+std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
+                      const std::string& group, double time_s, std::size_t n, std::size_t m) {
+  using Number = XdmfSource::Number;
+  using Centre = XdmfSource::Centre;
+  const std::string position = group + "/position_m";
+  std::string text = fmt::format(
+      "   <Grid Name=\"network\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
+      "    <Time Value=\"{}\"/>\n"
+      "    <Grid Name=\"spheres\" GridType=\"Uniform\">\n",
+      shortest(time_s));
+  text += source.points(position, n);
+  for (const std::string name : {"number", "layer", "held", "contact"}) {
+    text += source.scalar(name, "/spheres/" + name, Centre::node, n, Number::whole);
+  }
+  text += source.vector("displacement_m", group + "/displacement_m", n);
+  text += source.scalar("displacement_magnitude_m", group + "/displacement_magnitude_m",
+                        Centre::node, n, Number::real);
+  text += source.scalar("validity", group + "/validity", Centre::node, n, Number::whole);
+  if (scene.outputs.force) {
+    text += source.vector("force_N", group + "/force_N", n);
+    text += source.scalar("largest_bond_force_N", group + "/largest_bond_force_N", Centre::node, n,
+                          Number::real);
+  }
+  text += "    </Grid>\n    <Grid Name=\"bonds\" GridType=\"Uniform\">\n";
+  text += source.lines(position, n, m);
+  text += source.scalar("kind", "/bonds/kind", Centre::cell, m, Number::whole);
+  if (scene.outputs.bond_force) {
+    text += source.scalar("bond_force_N", group + "/bond_force_N", Centre::cell, m, Number::real);
+  }
+  if (scene.outputs.remembered) {
+    text += source.scalar("remembered_m", group + "/remembered_m", Centre::cell, m, Number::real);
+  }
+  return text + "    </Grid>\n   </Grid>\n";
+}
+
+std::string xdmf(const ExperimentScene& scene, const SimulationRecord& record,
+                 const std::string& file) {
+  const XdmfSource source(file);
+  const Network& network = scene.tissue.network;
+  std::string text =
+      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n"
+      "  <Grid Name=\"simulation\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+  for (std::size_t k = 0; k < record.outputs.size(); ++k) {
+    text += step_xdmf(scene, source, step_group(k), record.outputs[k].time_s, network.organ.size(),
+                      network.bonds.size());
+  }
+  return text + "  </Grid>\n </Domain>\n</Xdmf>\n";
+}
+
+}  // namespace
+
+fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& network,
+                          const SimulationRun& run, const fs::path& path) {
+  Hdf5Writer file(path);
+  write_network_datasets(scene.tissue, file);
+  write_provenance(scene, run, file);
+  write_curve(scene, run.record, file);
+  write_validity(run.record.validity, file);
+  write_roughness(scene, run.record, file);
+  std::vector<double> times;
+  for (std::size_t k = 0; k < run.record.outputs.size(); ++k) {
+    times.push_back(run.record.outputs[k].time_s);
+    write_step(scene, network, run.record.outputs[k], step_group(k), file);
+  }
+  file.numbers("/steps/time_s", times);
+  file.attribute("/steps", "validity",
+                 "of each sphere the sum of 1: indented by more than 10 mm, 2: more than 12 mm, 4: "
+                 "at a lateral bond turned by more than 30 degrees");
+  file.commit();
+  fs::path description = path;
+  description.replace_extension(".xdmf");
+  write_file(description, xdmf(scene, run.record, path.filename().string()));
+  return description;
+}
+
+}  // namespace tpm

@@ -1,0 +1,94 @@
+#include "tpm/simulate/static_path.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kLongestMove = 0.05;    // of the spacing, of the driven sphere in one stride
+constexpr double kLeastStride = 1e-4;    // of what is imposed already
+constexpr double kLeastStart = 1e-12;    // of the way, where nothing is imposed yet
+constexpr double kBalanceShare = 1e-3;   // of the tolerance, for forces left
+constexpr double kLeastBalance = 1e-13;  // of the force: below, rounding decides
+
+}  // namespace
+
+StaticPath::StaticPath(const BondSystem& bonds, const Organ& organ, const Freedom& freedom,
+                       const Probe& probe, Drive drive, double peak, double tolerance)
+    : tissue_(bonds, organ.position, freedom, probe, drive),
+      state_(tissue_.at_rest(0.0)),
+      longest_move_m_(kLongestMove * organ.spacing) {
+  require_valid(probe, freedom);
+  const double force =
+      drive == Drive::force ? peak : std::abs(tissue_.linear_response(state_, peak));
+  tolerance_N_ = std::max(kBalanceShare * tolerance, kLeastBalance) * force;
+}
+
+void StaticPath::start_from(const QuasiStaticState& state) {
+  state_.position = state.position;
+  state_.remembered = state.remembered;
+  state_.elongation = state.remembered;
+  state_.imposed = state.imposed;
+}
+
+double StaticPath::probe_depth(const Positions& position) const {
+  const Probe& probe = tissue_.probe();
+  return position.col(static_cast<Eigen::Index>(probe.sphere)).dot(probe.direction);
+}
+
+bool StaticPath::stride_to(double imposed) {
+  const BondMemory relaxed{Eigen::VectorXd::Zero(state_.remembered.size()), 1.0};
+  Positions position = state_.position;
+  tissue_.impose(position, imposed);
+  const double before = probe_depth(state_.position);
+  unstable_ = false;
+  if (std::abs(probe_depth(position) - before) > longest_move_m_) return false;
+  Eigen::Matrix3Xd load;
+  tissue_.load(imposed, load);
+  const EquilibriumSearch search =
+      tissue_.equilibrium().find(position, relaxed, load, tolerance_N_);
+  unstable_ = !search.stable;
+  if (!search.stable || !search.converged) return false;
+  if (std::abs(probe_depth(position) - before) > longest_move_m_) return false;
+  state_.imposed = imposed;
+  state_.position = std::move(position);
+  tissue_.bonds().elongations(state_.position, state_.elongation);
+  state_.remembered = state_.elongation;
+  return true;
+}
+
+QuasiStaticState StaticPath::move_to(double imposed, double time_s) {
+  const double begin = state_.imposed;
+  double done = 0.0;
+  double stride = 1.0;
+  while (done < 1.0 && imposed != begin) {
+    const double aim = std::min(1.0, done + stride);
+    if (stride_to(aim < 1.0 ? begin + aim * (imposed - begin) : imposed)) {
+      done = aim;
+      stride *= 2.0;
+      continue;
+    }
+    stride *= 0.5;
+    const double least = kLeastStride * std::abs(state_.imposed / (imposed - begin));
+    if (stride > std::max(least, kLeastStart)) continue;
+    const bool depth = tissue_.depth_driven();
+    throw Error(
+        ExitCode::numerical, "network",
+        fmt::format("on the way to t = {} s, at {} of {} {}, the tissue {}", significant(time_s, 5),
+                    depth ? "a depth" : "a load",
+                    significant((depth ? 1e3 : 1.0) * state_.imposed, 4), depth ? "mm" : "N",
+                    unstable_ ? "buckles: its stiffness is no longer positive"
+                              : "snaps through: no equilibrium is near"));
+  }
+  const double stored_J = tissue_.bonds().stored_energy_J(state_.position, state_.remembered);
+  return {time_s,          state_.imposed,    tissue_.response(state_),
+          state_.position, state_.remembered, QuasiStaticEnergy{stored_J, 0.0, stored_J}};
+}
+
+}  // namespace tpm

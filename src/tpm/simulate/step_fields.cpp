@@ -1,0 +1,67 @@
+#include "tpm/simulate/step_fields.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tpm {
+namespace {
+
+std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
+  return {numbers.data(), numbers.data() + numbers.size()};
+}
+
+}  // namespace
+
+StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
+                     const QuasiStaticState& state) {
+  StepFields fields;
+  const Eigen::Matrix3Xd moved = displacements_m(network.network.organ, state);
+  fields.of_spheres = {{"displacement_m", 3, list_of(moved)},
+                       {"displacement_magnitude_m", 1, list_of(moved.colwise().norm())}};
+  fields.validity = ValidityWatch(scene.tissue.network, scene.probe).flags(state.position);
+  const Eigen::VectorXd bond_force = bond_forces_N(network.bonds, state);
+  if (scene.outputs.force) {
+    Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, state.position.cols());
+    network.bonds.add_forces(state.position, {state.remembered, 0.0}, force);
+    fields.of_spheres.push_back({"force_N", 3, list_of(force)});
+    fields.of_spheres.push_back(
+        {"largest_bond_force_N", 1, largest_bond_forces_N(network.network, bond_force)});
+  }
+  if (scene.outputs.bond_force) {
+    fields.of_bonds.push_back({"bond_force_N", 1, list_of(bond_force)});
+  }
+  if (scene.outputs.remembered) {
+    fields.of_bonds.push_back({"remembered_m", 1, list_of(state.remembered)});
+  }
+  return fields;
+}
+
+Eigen::VectorXd bond_forces_N(const BondSystem& bonds, const QuasiStaticState& state) {
+  Eigen::VectorXd elongation;
+  bonds.elongations(state.position, elongation);
+  Eigen::VectorXd force =
+      bonds.stiffness().cwiseProduct(elongation) - bonds.relaxing().cwiseProduct(state.remembered);
+  for (std::size_t i = 0; i < bonds.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    if (bonds.is_rope(i) && elongation[row] < 0.0) force[row] = 0.0;
+  }
+  return force;
+}
+
+std::vector<double> largest_bond_forces_N(const Network& network,
+                                          const Eigen::VectorXd& bond_force_N) {
+  std::vector<double> largest(network.organ.size(), 0.0);
+  for (std::size_t i = 0; i < network.bonds.size(); ++i) {
+    const double force = std::abs(bond_force_N[static_cast<Eigen::Index>(i)]);
+    for (const std::size_t end : {network.bonds[i].a, network.bonds[i].b}) {
+      largest[end] = std::max(largest[end], force);
+    }
+  }
+  return largest;
+}
+
+Eigen::Matrix3Xd displacements_m(const Organ& organ, const QuasiStaticState& state) {
+  return state.position - organ.position;
+}
+
+}  // namespace tpm

@@ -1,0 +1,37 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "tpm/simulate/simulation.hpp"
+
+namespace tpm {
+
+/// Numbers that files give for each sphere or bond.
+struct StepField {
+  std::string name;            ///< with its unit
+  std::size_t columns = 1;     ///< 1 or 3
+  std::vector<double> values;  ///< row after row
+};
+
+/// What files say of an output besides positions.
+struct StepFields {
+  std::vector<StepField> of_spheres;
+  std::vector<std::int32_t> validity;  ///< ValidityWatch::flags of each sphere
+  std::vector<StepField> of_bonds;
+};
+
+/// Those that the scene asks for.
+[[nodiscard]] StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
+                                   const QuasiStaticState& state);
+
+/// What the bonds of a network pull with in a state, N: positive when a bond is in tension.
+[[nodiscard]] Eigen::VectorXd bond_forces_N(const BondSystem& bonds, const QuasiStaticState& state);
+
+/// Of each sphere the largest |force| among its bonds, N.
+[[nodiscard]] std::vector<double> largest_bond_forces_N(const Network& network,
+                                                        const Eigen::VectorXd& bond_force_N);
+
+/// The displacements from rest, m.
+[[nodiscard]] Eigen::Matrix3Xd displacements_m(const Organ& organ, const QuasiStaticState& state);
+
+}  // namespace tpm

@@ -1,0 +1,70 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "tpm/network/network.hpp"
+#include "tpm/network/quasistatic.hpp"
+
+namespace tpm {
+
+/// Bounds beyond which a result is a picture rather than tissue (MODEL.md, section 4).
+enum class ValidityLimit : std::size_t {
+  indentation,  ///< beyond kValidIndentation_m: the paper vouches for no more
+  damage,       ///< beyond kDamageIndentation_m: liver is damaged
+  turning,      ///< a lateral bond has turned by more than kValidTurning_rad from rest
+};
+inline constexpr std::size_t kValidityLimits = 3;
+inline constexpr double kValidIndentation_m = 0.010;
+inline constexpr double kDamageIndentation_m = 0.012;
+inline constexpr double kValidTurning_rad = 0.52359877559829887;  // pi/6
+
+[[nodiscard]] std::string_view key_of(ValidityLimit limit);
+[[nodiscard]] std::string_view words_of(ValidityLimit limit);
+
+/// What a run has passed of one limit.
+struct ValidityBreach {
+  std::optional<double> first_time_s;  ///< none: never
+  std::vector<std::size_t> spheres;    ///< that were ever beyond it, rising, from 0
+};
+
+/// What a run has passed so far.
+struct Validity {
+  std::array<ValidityBreach, kValidityLimits> breach;
+  double deepest_m = 0.0;        ///< largest indentation of any sphere
+  double most_turned_rad = 0.0;  ///< largest turn of any lateral bond
+
+  [[nodiscard]] const ValidityBreach& of(ValidityLimit limit) const {
+    return breach[static_cast<std::size_t>(limit)];
+  }
+  [[nodiscard]] bool whole() const;
+};
+
+/// Judges the positions of a network against the limits. The indentation of a sphere is its
+/// displacement along the probe's direction.
+class ValidityWatch {
+ public:
+  /// @param network must live as long as this
+  ValidityWatch(const Network& network, const Probe& probe);
+
+  /// For each sphere the sum of 1 (indentation), 2 (damage) and 4 (an end of a turned bond).
+  [[nodiscard]] std::vector<std::int32_t> flags(const Positions& position) const;
+  /// Takes one more state into account; times do not fall.
+  void see(double time_s, const Positions& position);
+  [[nodiscard]] const Validity& seen() const { return seen_; }
+  /// Goes on from what an earlier run has seen.
+  void restore(Validity earlier) { seen_ = std::move(earlier); }
+
+ private:
+  /// The angle by which a bond has turned since rest.
+  [[nodiscard]] double turned_rad(const Bond& bond, const Positions& position) const;
+  [[nodiscard]] double indentation_m(Eigen::Index sphere, const Positions& position) const;
+
+  const Network& network_;
+  Probe probe_;
+  Validity seen_;
+};
+
+}  // namespace tpm

@@ -1,0 +1,275 @@
+// tpm simulate: what a scene says is done to a tissue, runs that are stopped and go on, limits of
+// validity, the mass-spring model beside it.
+#include <catch2/catch.hpp>
+#include <limits>
+
+#include "refusal.hpp"
+#include "simulated_scene.hpp"
+#include "temp_folder.hpp"
+#include "tpm/network/mass_spring.hpp"
+#include "tpm/simulate/smoothness.hpp"
+
+using namespace tpm;
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using test::experiment;
+using test::refusal_of;
+using test::run_of;
+using test::small_scene;
+using test::TempFolder;
+
+namespace {
+
+const std::string kPush = R"("protocol": {"kind": "ramp_hold", "depth": "6 mm", "rate": "4 mm/s",
+  "hold": "5 s"})";
+const std::string kLoad = R"("protocol": {"kind": "knots", "knots": [
+  {"time": "0 s", "load": "0 N"}, {"time": "1 s", "load": "0 N"}, {"time": "2 s", "load": "0.2 N"},
+  {"time": "4 s", "load": "0.2 N"}, {"time": "4 s", "load": "0.1 N"}, {"time": "6 s", "load": "0.1 N"}]})";
+const std::string kStatic = R"("formulation": {"kind": "static"}, )";
+const std::string kMoving = R"("formulation": {"kind": "inertial"}, )";
+
+void check_same(const SimulationRecord& a, const SimulationRecord& b) {
+  REQUIRE(a.curve.size() == b.curve.size());
+  for (std::size_t i = 0; i < a.curve.size(); ++i) {
+    CAPTURE(i, a.curve[i].time_s);
+    CHECK(a.curve[i].time_s == b.curve[i].time_s);
+    CHECK(a.curve[i].response == b.curve[i].response);
+    CHECK(a.curve[i].energy.work_J == b.curve[i].energy.work_J);
+    CHECK(a.curve[i].energy.dissipated_J == b.curve[i].energy.dissipated_J);
+  }
+  REQUIRE(a.outputs.size() == b.outputs.size());
+  for (std::size_t i = 0; i < a.outputs.size(); ++i) {
+    CHECK(a.outputs[i].position == b.outputs[i].position);
+    CHECK(a.outputs[i].remembered == b.outputs[i].remembered);
+  }
+  CHECK(a.error_estimate == b.error_estimate);
+  CHECK(a.validity.deepest_m == b.validity.deepest_m);
+  for (std::size_t k = 0; k < kValidityLimits; ++k) {
+    CHECK(a.validity.breach[k].first_time_s == b.validity.breach[k].first_time_s);
+    CHECK(a.validity.breach[k].spheres == b.validity.breach[k].spheres);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("every block of a scene reaches the experiment") {
+  const ExperimentScene scene = experiment(R"({"organ": {"kind": "liver", "count": 60},
+    "contacts": [{"kind": "sphere", "number": 7, "direction": [0, 0, 2]}],
+    "protocol": {"kind": "creep", "load": "30 mN", "duration": "2 s"},
+    "formulation": {"kind": "inertial", "damping_ratio": 0.3, "density_kg_per_m3": 1000,
+                    "comparison": "mass_spring", "springs": "equal"},
+    "outputs": {"times": ["2 s", "1 s"], "fields": ["remembered"]}, "tolerance": 1e-4})");
+  CHECK(scene.probe.sphere == 6);
+  CHECK(scene.probe.direction == Eigen::Vector3d::UnitZ());
+  CHECK(scene.protocol.drive() == Drive::force);
+  CHECK_THAT(scene.protocol.peak(), WithinRel(0.03, 1e-12));
+  CHECK(scene.formulation.kind == FormulationKind::inertial);
+  CHECK(scene.formulation.damping_ratio == 0.3);
+  CHECK(scene.formulation.density_kg_m3 == 1000.0);
+  CHECK(scene.formulation.mass_spring);
+  CHECK(scene.formulation.springs == SpringRule::equal);
+  CHECK(scene.formulation.tolerance == 1e-4);
+  CHECK(scene.outputs.times_s == std::vector<double>{1.0, 2.0});
+  CHECK_FALSE(scene.outputs.force);
+  CHECK(scene.outputs.remembered);
+  CHECK(scene.tissue.unused_blocks.empty());
+}
+
+TEST_CASE("a contact is found by its place") {
+  const std::string at = R"("contacts": [{"kind": "sphere", "at": ["2 mm", "136 mm", "57 mm"]}], )";
+  const std::string push = R"("protocol": {"kind": "step_hold", "depth": "1 mm", "hold": "1 s"}})";
+  CHECK(experiment(R"({"organ": {"kind": "liver"}, )" + at + push).probe.sphere == 70);
+}
+
+TEST_CASE("outputs by number and by spacing, the ends among them") {
+  const auto times = [](const std::string& outputs) {
+    return small_scene(kPush + ", \"outputs\": {" + outputs + "}").outputs.times_s;
+  };
+  CHECK(times(R"("count": 3)") == std::vector<double>{0.0, 3.25, 6.5});
+  CHECK(times(R"("count": 1)") == std::vector<double>{6.5});
+  CHECK(times(R"("spacing": "2 s")") == std::vector<double>{0.0, 2.0, 4.0, 6.0, 6.5});
+  CHECK(small_scene(kPush).outputs.times_s.size() == 61);
+}
+
+TEST_CASE("a run in parts is the run of the whole, within its tolerance") {
+  for (const std::string& protocol : {kPush, kLoad}) {
+    const ExperimentScene scene = small_scene(protocol);
+    const SimulationRecord record = run_of(scene).record;
+    std::vector<double> times;
+    for (const CurvePoint& p : record.curve) times.push_back(p.time_s);
+    const BondSystem bonds = scene.tissue.bonds();
+    const QuasiStaticRun whole =
+        QuasiStatic(bonds, scene.tissue.network.organ.position, scene.tissue.freedom(), scene.probe,
+                    {.tolerance = scene.formulation.tolerance})
+            .run(scene.protocol, times);
+    const double peak = whole.response.cwiseAbs().maxCoeff();
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      CAPTURE(times[i]);
+      CHECK_THAT(record.curve[i].response, WithinAbs(whole.response[static_cast<Eigen::Index>(i)],
+                                                     3 * scene.formulation.tolerance * peak));
+      CHECK_THAT(record.curve[i].imposed, WithinAbs(value_at(scene.protocol, times[i]), 1e-15));
+    }
+    CHECK(record.error_estimate < 2 * scene.formulation.tolerance * peak);
+  }
+}
+
+TEST_CASE("an interrupted run goes on to the same result, to the bit") {
+  for (const std::string& protocol :
+       {kPush, kLoad, kStatic + kPush, kMoving + kPush, kMoving + kLoad}) {
+    const ExperimentScene scene = small_scene(protocol);
+    const SimulationRecord whole = run_of(scene).record;
+    for (const std::size_t stop_at : {3UL, 100UL, whole.curve.size() - 1}) {
+      const TempFolder folder;
+      CAPTURE(protocol, stop_at);
+      SimulationControls controls;
+      controls.checkpoint = folder / "c";
+      std::size_t seen = 0;
+      controls.interrupted = [&] { return ++seen == stop_at; };
+      std::string message;
+      try {
+        (void)simulate(scene, network_to_run(scene), controls);
+      } catch (const Interrupted& stop) {
+        message = stop.what();
+      }
+      CHECK_THAT(message, Contains("interrupted at t = "));
+      // Too early for a checkpoint, there is none; the run then starts anew.
+      CHECK(std::filesystem::exists(controls.checkpoint) == (stop_at > 3));
+      const SimulationRun rest = simulate(scene, network_to_run(scene), controls);
+      CHECK(rest.resumed_at_s.has_value() == (stop_at > 3));
+      check_same(rest.record, whole);
+    }
+  }
+}
+
+TEST_CASE("a checkpoint of a whole run is answered without running again") {
+  const ExperimentScene scene = small_scene(kPush);
+  const TempFolder folder;
+  SimulationControls controls;
+  controls.checkpoint = folder / "c";
+  controls.checkpoint_every_s = 0.0;
+  const SimulationRun first = simulate(scene, network_to_run(scene), controls);
+  int points = 0;
+  controls.progress = [&](std::size_t, std::size_t) { ++points; };
+  const SimulationRun again = simulate(scene, network_to_run(scene), controls);
+  CHECK(points == 0);
+  CHECK(again.resumed_at_s == 6.5);
+  check_same(again.record, first.record);
+}
+
+TEST_CASE("the checkpoint of another scene is not used, and that is said") {
+  const TempFolder folder;
+  SimulationControls controls;
+  controls.checkpoint = folder / "c";
+  controls.checkpoint_every_s = 0.0;
+  const ExperimentScene scene = small_scene(kPush);
+  (void)simulate(scene, network_to_run(scene), controls);
+  std::string note;
+  controls.note = [&](const std::string& text) { note = text; };
+  const ExperimentScene other = small_scene(kPush + R"(, "tolerance": 1e-5)");
+  const SimulationRun run = simulate(other, network_to_run(other), controls);
+  CHECK_FALSE(run.resumed_at_s);
+  CHECK_THAT(note, Contains("of another scene"));
+  ExperimentScene springs = other;
+  springs.formulation.mass_spring = true;
+  note.clear();
+  CHECK_FALSE(simulate(springs, network_to_run(springs), controls).resumed_at_s);
+  CHECK_THAT(note, Contains("of another scene"));
+}
+
+TEST_CASE("limits of validity are dated and name their spheres") {
+  const auto deep = [](const std::string& depth) {
+    return run_of(small_scene(R"("protocol": {"kind": "ramp_hold", "depth": ")" + depth +
+                              R"(", "rate": "1 mm/s", "hold": "1 s"})"))
+        .record.validity;
+  };
+  CHECK(deep("9.9 mm").whole());
+  const Validity seen = deep("13 mm");
+  CHECK_THAT(seen.deepest_m, WithinRel(0.013, 1e-12));
+  const double step_s = 14.0 / 200;  // a run is watched that often
+  for (const auto& [limit, depth_mm] :
+       {std::pair{ValidityLimit::indentation, 10.0}, {ValidityLimit::damage, 12.0}}) {
+    const ValidityBreach& breach = seen.of(limit);
+    REQUIRE(breach.first_time_s);
+    CHECK(*breach.first_time_s > depth_mm);
+    CHECK(*breach.first_time_s <= depth_mm + step_s);
+    CHECK(breach.spheres == std::vector<std::size_t>{small_scene(kPush).probe.sphere});
+  }
+  CHECK_FALSE(deep("12 mm").of(ValidityLimit::damage).first_time_s);
+}
+
+TEST_CASE("a lateral bond of the star turns as the paper's angle says") {
+  // tan(theta) = e/x: 30 degrees at e = 10 mm are reached where x = 17.32 mm.
+  const auto turned = [](const std::string& spacing) {
+    const ExperimentScene scene =
+        experiment(R"({"organ": {"kind": "star", "length": "40 mm", "spacing": ")" + spacing +
+                   R"("}, "contacts": [{"kind": "sphere", "number": 2, "direction": [0, 0, -1]}],
+           "protocol": {"kind": "ramp_hold", "depth": "10 mm", "rate": "4 mm/s", "hold": "1 s"}})");
+    return run_of(scene).record.validity;
+  };
+  CHECK_THAT(turned("30 mm").most_turned_rad, WithinRel(std::atan(1.0 / 3.0), 1e-9));
+  CHECK_FALSE(turned("17.4 mm").of(ValidityLimit::turning).first_time_s);
+  const ValidityBreach breach = turned("17.3 mm").of(ValidityLimit::turning);
+  REQUIRE(breach.first_time_s);
+  CHECK(breach.spheres == std::vector<std::size_t>{0, 1, 2});
+}
+
+TEST_CASE("static states are those that a load held for ever reaches") {
+  const ExperimentScene scene = small_scene(kStatic + kLoad);
+  const SimulationRecord record = run_of(scene).record;
+  const double forever = std::numeric_limits<double>::infinity();
+  const BondSystem bonds = scene.tissue.bonds();
+  const QuasiStatic equations(bonds, scene.tissue.network.organ.position, scene.tissue.freedom(),
+                              scene.probe, {.tolerance = 1e-8});
+  for (const double load : {0.1, 0.2}) {
+    const double depth = equations.run(creep(load, forever), {&forever, 1}).response[0];
+    for (const CurvePoint& p : record.curve) {
+      if (p.imposed == load) CHECK_THAT(p.response, WithinRel(depth, 1e-6));
+    }
+  }
+  CHECK(record.curve.front().response == 0.0);
+  CHECK_THAT(record.curve.back().energy.work_J,
+             WithinRel(record.curve.back().energy.stored_J, 1e-9));
+}
+
+TEST_CASE("the mass-spring model meets a small depth with the tissue's relaxed force") {
+  const std::string push = R"("protocol": {"kind": "step_hold", "depth": "1 um", "hold": "1 s"}, )";
+  const ExperimentScene tissue = small_scene(push + kStatic + R"("title": "t")");
+  ExperimentScene springs = tissue;
+  springs.formulation.mass_spring = true;
+  const double force = run_of(tissue).record.curve.back().response;
+  CHECK(force > 0.0);
+  CHECK_THAT(run_of(springs).record.curve.back().response, WithinRel(force, 1e-4));
+}
+
+TEST_CASE("a slow push of spheres with mass is the quasi-static one, and its energy closes") {
+  const std::string slow =
+      R"("protocol": {"kind": "ramp_hold", "depth": "2 mm", "rate": "1 mm/s", "hold": "8 s"})";
+  const SimulationRun moving =
+      run_of(small_scene(slow + R"(, "formulation": {"kind": "inertial"})"));
+  const SimulationRun still = run_of(small_scene(slow));
+  const double force = still.record.curve.back().response;
+  CHECK_THAT(moving.record.curve.back().response, WithinAbs(force, 2e-3 * force));
+  CHECK(moving.record.outputs.size() == still.record.outputs.size());
+  const std::optional<InertialEnergy> energy = moving.record.inertial_energy;
+  REQUIRE(energy);
+  CHECK(std::abs(energy->missing()) < 1e-2 * energy->work);
+}
+
+TEST_CASE("roughness is stated where something has moved") {
+  const ExperimentScene scene = small_scene(kPush);
+  const SimulationRecord record = run_of(scene).record;
+  CHECK_FALSE(smoothness_of(scene, record.outputs.front().position));
+  const auto found = smoothness_of(scene, record.outputs.back().position);
+  REQUIRE(found);
+  CHECK(found->near_contact > 0.0);
+  CHECK(found->near_contact < 1.0);
+}
+
+TEST_CASE("a load that nothing carries is refused with its time") {
+  CHECK_THAT(refusal_of([] {
+               (void)run_of(small_scene(
+                   R"("protocol": {"kind": "creep", "load": "1e6 N", "duration": "1 s"})"));
+             }),
+             Contains("at t = 0 s a load of 1e+06 N is") && Contains("through the "));
+}
