@@ -1,5 +1,7 @@
 #pragma once
 // An organ with its far side held, pushed at its contact sphere: for tests and measurements.
+#include <utility>
+
 #include "tpm/network/freedom.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
@@ -25,7 +27,7 @@ struct OrganScene {
                                    std::span<const double> times_s,
                                    QuasiStaticOptions options) const {
     const BondSystem bonds(network, material);
-    return QuasiStatic(bonds, network.organ.position, freedom, probe, options)
+    return QuasiStatic(bonds, network.organ.position, freedom, probe, std::move(options))
         .run(protocol, times_s);
   }
 

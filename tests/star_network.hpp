@@ -36,7 +36,7 @@ struct Star {
   [[nodiscard]] tpm::QuasiStaticRun run(const tpm::Protocol& protocol,
                                         std::span<const double> times,
                                         tpm::QuasiStaticOptions options) const {
-    return tpm::QuasiStatic(bonds, network.organ.position, freedom, probe(), options)
+    return tpm::QuasiStatic(bonds, network.organ.position, freedom, probe(), std::move(options))
         .run(protocol, times);
   }
   [[nodiscard]] static tpm::Probe probe() { return {0, Eigen::Vector3d::UnitZ()}; }

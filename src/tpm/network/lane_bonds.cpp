@@ -10,6 +10,7 @@ namespace tpm {
 namespace {
 
 constexpr std::size_t kSphere = std::size_t{3} * kLanes;
+constexpr std::size_t kDown = std::size_t{2} * kLanes;  // from x to z of a sphere
 
 /// The vector from one end of a bond to the other.
 struct Span {
@@ -22,7 +23,7 @@ struct Span {
   for (std::size_t s = 0; s < kLanes; ++s) {
     span.x[s] = to[s] - from[s];
     span.y[s] = to[kLanes + s] - from[kLanes + s];
-    span.z[s] = to[2 * kLanes + s] - from[2 * kLanes + s];
+    span.z[s] = to[kDown + s] - from[kDown + s];
     square[s] = span.x[s] * span.x[s] + span.y[s] * span.y[s] + span.z[s] * span.z[s];
   }
 #pragma omp simd
@@ -36,7 +37,7 @@ struct Span {
 [[gnu::always_inline]] inline double along(const Span& span, const double* ua, const double* ub,
                                            std::size_t s) {
   return span.x[s] * (ub[s] - ua[s]) + span.y[s] * (ub[kLanes + s] - ua[kLanes + s]) +
-         span.z[s] * (ub[2 * kLanes + s] - ua[2 * kLanes + s]);
+         span.z[s] * (ub[kDown + s] - ua[kDown + s]);
 }
 
 }  // namespace
@@ -122,10 +123,10 @@ void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
         const double pz = share[s] * span.z[s];
         fa[s] += px;
         fa[kLanes + s] += py;
-        fa[2 * kLanes + s] += pz;
+        fa[kDown + s] += pz;
         fb[s] -= px;
         fb[kLanes + s] -= py;
-        fb[2 * kLanes + s] -= pz;
+        fb[kDown + s] -= pz;
       }
     }
   });
@@ -190,7 +191,7 @@ void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& 
 #pragma omp simd
       for (std::size_t s = 0; s < kLanes; ++s) {
         const std::size_t sy = kLanes + s;
-        const std::size_t sz = 2 * kLanes + s;
+        const std::size_t sz = kDown + s;
         const double px = with_span[s] * span.x[s] + with_change[s] * (ub[s] - ua[s]);
         const double py = with_span[s] * span.y[s] + with_change[s] * (ub[sy] - ua[sy]);
         const double pz = with_span[s] * span.z[s] + with_change[s] * (ub[sz] - ua[sz]);

@@ -155,9 +155,8 @@ void StageBalance::predict(const TissueState& state, double h, double rate) {
 
 void StageBalance::update_memory() {
   bonds_.elongations(x_, elongation_);
-  memory_.noalias() = weights_ * elongation_;
-  memory_.noalias() += start_weight_ * start_elongation_;
-  memory_.noalias() += decay_ * start_memory_;
+  advance_memory(weights_, start_weight_, decay_, elongation_, start_elongation_, start_memory_,
+                 memory_);
 }
 
 void StageBalance::residuals() {
@@ -286,9 +285,8 @@ StageBalance::Within StageBalance::within(const TissueState& state,
   states.position.noalias() = at.interpolation * (x_.rowwise() - start_);
   states.position.rowwise() += start_;
   bonds_.elongations(states.position, states.elongation);
-  states.memory.noalias() = at.weights * elongation_;
-  states.memory.noalias() += at.start_weight * start_elongation_;
-  states.memory.noalias() += at.decay * start_memory_;
+  advance_memory(at.weights, at.start_weight, at.decay, elongation_, start_elongation_,
+                 start_memory_, states.memory);
   return states;
 }
 

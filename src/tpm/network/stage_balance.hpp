@@ -60,8 +60,8 @@ class StageBalance {
 
   /// How states at fractions of a step follow from its stages, lane by lane.
   struct Shapes {
-    Eigen::Matrix<double, kLanes, kLanes> interpolation;  ///< of the way from the start
-    Eigen::Matrix<double, kLanes, kLanes> weights;        ///< of a stage's l in a lane's y
+    LaneSquare interpolation;  ///< of the way from the start
+    LaneSquare weights;        ///< of a stage's l in a lane's y
     LaneVector start_weight, decay;
   };
   [[nodiscard]] Shapes shapes(std::span<const double> fractions, double z) const;
@@ -122,8 +122,7 @@ class StageBalance {
   Eigen::RowVectorXd start_elongation_, start_memory_;  ///< of relaxing bonds
   LaneMatrix x_, d_, force_;
   LaneMatrix elongation_, memory_;  ///< of relaxing bonds
-  Eigen::Matrix<double, kLanes, kLanes>
-      weights_;  ///< of a stage's l in a lane's y, by (lane, stage)
+  LaneSquare weights_;              ///< of a stage's l in a lane's y, by (lane, stage)
   LaneVector start_weight_, decay_, imposed_;
   /// What tells the two collocations apart, by (place judged, start and stages).
   Eigen::Matrix<double, Eigen::Dynamic, kLanes> judge_;

@@ -68,9 +68,8 @@ StageTangents::Stages StageTangents::at_once(const TissueState& state, bool rela
 
 void StageTangents::update_memory(Tangent& tangent, const Stages& stages) const {
   balance_.bonds_.elongation_changes(stages.position, tangent.position, tangent.elongation);
-  tangent.memory.noalias() = stages.weights * tangent.elongation;
-  tangent.memory.noalias() += stages.start_weight * tangent.start_elongation;
-  tangent.memory.noalias() += stages.decay * tangent.start_memory;
+  advance_memory(stages.weights, stages.start_weight, stages.decay, tangent.elongation,
+                 tangent.start_elongation, tangent.start_memory, tangent.memory);
   tangent.memory += tangent.log_relaxation_time * stages.aging;
 }
 
@@ -154,9 +153,9 @@ Eigen::MatrixXd StageTangents::responses_within(const TissueState& state,
     const Tangent& tangent = tangent_[static_cast<std::size_t>(i)];
     LaneMatrix position = shapes.interpolation * (tangent.position.rowwise() - tangent.start);
     position.rowwise() += tangent.start;
-    LaneMatrix memory = shapes.weights * tangent.elongation;
-    memory.noalias() += shapes.start_weight * tangent.start_elongation;
-    memory.noalias() += shapes.decay * tangent.start_memory;
+    LaneMatrix memory;
+    advance_memory(shapes.weights, shapes.start_weight, shapes.decay, tangent.elongation,
+                   tangent.start_elongation, tangent.start_memory, memory);
     memory += tangent.log_relaxation_time * aging;
     force_changes(tangent, stages, position, memory);
     answer.col(i) = response_changes(position).head(answer.rows());

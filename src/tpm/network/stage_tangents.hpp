@@ -39,7 +39,7 @@ class StageTangents {
   struct Stages {
     LaneMatrix position, memory;
     LaneVector imposed;
-    Eigen::Matrix<double, kLanes, kLanes> weights;  ///< of a stage's l in a lane's y
+    LaneSquare weights;  ///< of a stage's l in a lane's y
     LaneVector start_weight, decay;
     LaneMatrix aging;  ///< change of y per change of ln tau, elongations held
   };

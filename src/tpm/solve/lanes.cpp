@@ -1,0 +1,38 @@
+#include "tpm/solve/lanes.hpp"
+
+#include <array>
+
+#include "tpm/core/wide_vectors.hpp"
+
+namespace tpm {
+
+void advance_memory(const LaneSquare& of_stages, const LaneVector& of_start,
+                    const LaneVector& of_memory, const LaneMatrix& stages,
+                    const Eigen::RowVectorXd& start, const Eigen::RowVectorXd& memory,
+                    LaneMatrix& out) {
+  out.resize(kLanes, stages.cols());
+  const double* const weight = of_stages.data();
+  const double* const from_start = of_start.data();
+  const double* const from_memory = of_memory.data();
+  const double* const at_start = start.data();
+  const double* const remembered = memory.data();
+  const double* const in = stages.data();
+  double* const to = out.data();
+  const auto bonds = static_cast<std::size_t>(start.size());
+  run_wide([=]() __attribute__((always_inline)) {
+    for (std::size_t i = 0; i < bonds; ++i) {
+      std::array<double, kLanes> sum;
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        double lane = from_start[s] * at_start[i] + from_memory[s] * remembered[i];
+        for (std::size_t j = 0; j < kLanes; ++j)
+          lane += weight[kLanes * j + s] * in[kLanes * i + j];
+        sum[s] = lane;
+      }
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) to[kLanes * i + s] = sum[s];
+    }
+  });
+}
+
+}  // namespace tpm
