@@ -44,9 +44,8 @@ void check_star(const Protocol& protocol, const std::vector<double>& times) {
   for (const double tau : {1e-3, 0.5, 20.0}) {
     const TpmParameters p = unequal(tau);
     const Star star(p);
-    const QuasiStaticRun run =
-        star.run(protocol, times,
-                 {.tolerance = 1e-10, .directions = all_directions(star.network, p)});
+    const QuasiStaticRun run = star.run(
+        protocol, times, {.tolerance = 1e-10, .directions = all_directions(star.network, p)});
     const Response exact =
         make_model("closed_form")
             ->respond(protocol, times, to_vector(p), Want::values_and_sensitivity);
@@ -89,9 +88,8 @@ TEST_CASE("an organ's derivatives are the limits of its differences") {
        {Protocol(Drive::displacement, {{0.0, 0.0}, {0.0, 1e-3}, {2.0, 6e-3}, {3.0, 4e-3}}, "d",
                  true),
         Protocol(Drive::force, {{0.0, 0.0}, {0.0, 0.02}, {2.0, 0.15}, {3.0, 0.1}}, "f", true)}) {
-    const QuasiStaticRun run =
-        scene.run(p, protocol, times,
-                  {.tolerance = 1e-10, .directions = all_directions(scene.network, p)});
+    const QuasiStaticRun run = scene.run(
+        p, protocol, times, {.tolerance = 1e-10, .directions = all_directions(scene.network, p)});
     const double scale = run.response.cwiseAbs().maxCoeff();
     constexpr double kChange = 1e-4;
     const auto value = [&](int direction, double sign) {

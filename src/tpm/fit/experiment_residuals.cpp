@@ -197,8 +197,8 @@ Eigen::VectorXd ExperimentResiduals::answers(const std::vector<Experiment>& expe
 }
 
 Eigen::MatrixXd ExperimentResiduals::changes_for(std::size_t choice) const {
-  Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(std::ssize(model_->parameters()),
-                                                  std::ssize(config_.parameters));
+  Eigen::MatrixXd changes =
+      Eigen::MatrixXd::Zero(std::ssize(model_->parameters()), std::ssize(config_.parameters));
   for (Eigen::Index j = 0; j < changes.cols(); ++j) {
     for (const Target& target : config_.parameters[static_cast<std::size_t>(j)].sets) {
       if (!target.applies_to(choice)) continue;

@@ -52,7 +52,6 @@ class ExperimentResiduals final : public ResidualFunction {
   /// from the response: to look for starts, not to judge.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> thinned(std::size_t most) const;
 
-
   /// Scale of the noise law of a value, given the model's answer to it.
   [[nodiscard]] double noise_scale(std::size_t datum, double answer,
                                    std::span<const double> natural) const;

@@ -45,7 +45,8 @@ Approach scouted_approach(const ExperimentResiduals& scout,
 /// all of them.
 Approach approach_to(const ExperimentResiduals& function,
                      std::span<const FitParameter> parameters) {
-  if (const ExperimentResiduals* scout = function.scout()) return scouted_approach(*scout, parameters);
+  if (const ExperimentResiduals* scout = function.scout())
+    return scouted_approach(*scout, parameters);
   if (function.residual_count() <= kMostSearched) {
     return {fit_starts(function, parameters), start_kind(function)};
   }

@@ -235,8 +235,7 @@ class ProfileWalk {
     if (f_low == 0.0) return low.theta;
     if (f_high == 0.0) return high.theta;
     const double width =
-        accuracy_ *
-        std::abs(outside.theta - parameters_[index_].theta(minimum_.natural[index_]));
+        accuracy_ * std::abs(outside.theta - parameters_[index_].theta(minimum_.natural[index_]));
     std::uintmax_t iterations = 60;
     const auto bracket = boost::math::tools::toms748_solve(
         excess, low.theta, high.theta, f_low, f_high,
