@@ -159,7 +159,7 @@ Response ExperimentResiduals::respond_to(const Experiment& experiment,
     return respond(*oscillation, parameters, want);
   }
   const auto& course = std::get<TimeCourse>(experiment.imposed);
-  if (scout_ && want == Want::values_and_sensitivity) {
+  if (asks_along() && want == Want::values_and_sensitivity) {
     return model_->respond_along(course.protocol, course.times_s, parameters,
                                  changes_for(experiment.choice));
   }
@@ -211,7 +211,7 @@ Eigen::MatrixXd ExperimentResiduals::changes_for(std::size_t choice) const {
 std::vector<std::pair<Eigen::Index, Eigen::Index>> ExperimentResiduals::columns_for(
     std::size_t choice) const {
   std::vector<std::pair<Eigen::Index, Eigen::Index>> columns;
-  if (scout_) {  // respond_along() answers by the estimated parameters
+  if (asks_along()) {
     for (Eigen::Index j = 0; j < std::ssize(config_.parameters); ++j) columns.emplace_back(j, j);
     return columns;
   }

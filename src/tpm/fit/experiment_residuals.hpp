@@ -102,6 +102,8 @@ class ExperimentResiduals final : public ResidualFunction {
   /// Fills fitted_.
   void leave_out_held_out();
   void set_up_scout();
+  /// A costly model is asked for derivatives by the estimated parameters only.
+  [[nodiscard]] bool asks_along() const { return scout_ != nullptr; }
   /// Changes of the model parameters with each of the estimated ones.
   [[nodiscard]] Eigen::MatrixXd changes_for(std::size_t choice) const;
   /// Columns of a response's sensitivity and the estimated parameters that they belong to.

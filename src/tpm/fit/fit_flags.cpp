@@ -77,11 +77,11 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
                                          data.protocol.rate_m_per_s * 1e3, data.dataset));
     }
   }
-  if (function.scout() != nullptr) {
+  if (const ExperimentResiduals* scout = function.scout()) {
     result.flags.push_back(fmt::format(
-        "the search began at the configured start and at the {} best minima that {} starts of the "
-        "closed form have",
-        result.starts_run - 1, result.config.starts));
+        "the search began at the configured start and at the best minima ({}) that {} starts of "
+        "the model '{}' have",
+        result.starts_run - 1, result.config.starts, scout->model().name()));
   }
   if (result.band_count > 0) {
     result.flags.push_back(fmt::format(

@@ -77,7 +77,6 @@ class CorrectedScout final : public ResidualFunction {
                               RowMatrix* jacobian) const override {
     if (!scout_.evaluate(natural, residual, jacobian)) return false;
     const Eigen::VectorXd moved = theta_of(parameters_, natural) - theta_;
-    const Eigen::Index own = residual.size();
     const Eigen::VectorXd pull = root_pull_ * unit_;
     const RowMatrix bend = bend_along(moved);
     residual += lacking_ + slope_lacking_ * moved + 0.5 * bend * moved;
@@ -88,7 +87,7 @@ class CorrectedScout final : public ResidualFunction {
     *jacobian += (slope_lacking_ + bend) * per_natural.asDiagonal();
     jacobian->conservativeResize(residual_count(), Eigen::NoChange);
     jacobian->bottomRows(moved.size()) = RowMatrix(pull.cwiseProduct(per_natural).asDiagonal());
-    return own + moved.size() == residual_count();
+    return true;
   }
 
   /// Sum of squares without the pull.
@@ -156,10 +155,9 @@ Minimum minimise_by_scout(const ResidualFunction& function, const ResidualFuncti
     next.natural = minimise_near(corrected, parameters, here.natural, fixed).natural;
     const double promised = here.cost() - corrected.cost_at(next.natural);
     const auto count = static_cast<double>(here.residual.size());
-    if (promised <= kSmallGain * here.cost() / count || pull > kMostPull) {
-      minimum.converged = true;
-      break;
-    }
+    // A pull of this many times the curvature hides up to as many times what is promised.
+    minimum.converged = promised * (1.0 + pull) <= kSmallGain * here.cost() / count;
+    if (minimum.converged || pull > kMostPull) break;
     const bool known = evaluate(function, parameters, next);
     const double gained = known ? here.cost() - next.cost() : -1.0;
     if (gained < kGoodShare * promised) {

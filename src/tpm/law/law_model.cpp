@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include "tpm/core/error.hpp"
@@ -17,15 +16,6 @@
 
 namespace tpm {
 namespace {
-
-std::vector<std::size_t> rising_order(std::span<const double> times_s) {
-  std::vector<std::size_t> order(times_s.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  if (std::is_sorted(times_s.begin(), times_s.end())) return order;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
-  return order;
-}
 
 /// Value of the imposed history inside a piece.
 double between(const Knot& from, const Knot& to, double time) {

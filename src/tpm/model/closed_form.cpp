@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 
 #include "tpm/core/error.hpp"
 #include "tpm/solve/creep_exact.hpp"
@@ -11,14 +10,6 @@
 
 namespace tpm {
 namespace {
-
-std::vector<std::size_t> rising_order(std::span<const double> times_s) {
-  std::vector<std::size_t> order(times_s.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
-  return order;
-}
 
 Response make_response(std::size_t n, Want want) {
   Response response;

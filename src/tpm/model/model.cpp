@@ -11,6 +11,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/model/cvodes_element.hpp"
+#include "tpm/model/validity_limits.hpp"
 
 namespace tpm {
 
@@ -34,19 +35,16 @@ std::unique_ptr<Model> make_model(std::string_view name, const ModelOptions& opt
 }
 
 std::vector<std::string> validity_flags(const TpmParameters& p, double peak_depth_m) {
-  constexpr double kValid_m = 0.010;   // Sec. 3.1: "should remain within 10mm"
-  constexpr double kDamage_m = 0.012;  // Sec. 3.1, ref. [11]
-  constexpr double kMaximumAngle = std::numbers::pi / 6.0;
   std::vector<std::string> flags;
-  if (peak_depth_m > kDamage_m) {
+  if (peak_depth_m > kDamageIndentation_m) {
     flags.push_back(fmt::format("indentation of {:.4g} mm is over 12 mm, where liver is damaged",
                                 peak_depth_m * 1e3));
-  } else if (peak_depth_m > kValid_m) {
+  } else if (peak_depth_m > kValidIndentation_m) {
     flags.push_back(fmt::format("indentation of {:.4g} mm is over the paper's validity of 10 mm",
                                 peak_depth_m * 1e3));
   }
   const double angle = std::atan(peak_depth_m / p.spacing_m);
-  if (angle > kMaximumAngle) {
+  if (angle > kValidTurning_rad) {
     flags.push_back(fmt::format("bonds turn by {:.4g} degrees, over the paper's 30",
                                 angle * 180.0 / std::numbers::pi));
   }
@@ -65,6 +63,7 @@ void require_times_within(const Protocol& protocol, std::span<const double> time
 std::vector<std::size_t> rising_order(std::span<const double> times_s) {
   std::vector<std::size_t> order(times_s.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
+  if (std::is_sorted(times_s.begin(), times_s.end())) return order;
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return times_s[a] < times_s[b]; });
   return order;

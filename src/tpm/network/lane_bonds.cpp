@@ -40,6 +40,17 @@ struct Span {
          span.z[s] * (ub[kDown + s] - ua[kDown + s]);
 }
 
+/// What a bond pulls its ends with: the first along it, the other against.
+using Pull = std::array<double, kSphere>;
+
+[[gnu::always_inline]] inline void pull_ends(const Pull& pull, double* a, double* b) {
+#pragma omp simd
+  for (std::size_t s = 0; s < kSphere; ++s) {
+    a[s] += pull[s];
+    b[s] -= pull[s];
+  }
+}
+
 }  // namespace
 
 LaneBonds::LaneBonds(const BondSystem& bonds) {
@@ -64,19 +75,11 @@ LaneBonds::LaneBonds(const BondSystem& bonds) {
 }
 
 Eigen::VectorXd LaneBonds::in_order(const Eigen::VectorXd& all) const {
-  Eigen::VectorXd ordered(static_cast<Eigen::Index>(number_.size()));
-  for (std::size_t i = 0; i < number_.size(); ++i) {
-    ordered[static_cast<Eigen::Index>(i)] = all[static_cast<Eigen::Index>(number_[i])];
-  }
-  return ordered;
+  return all(number_);
 }
 
 Eigen::VectorXd LaneBonds::of_relaxing(const Eigen::VectorXd& all) const {
-  Eigen::VectorXd part(static_cast<Eigen::Index>(relaxing_.size()));
-  for (std::size_t i = 0; i < relaxing_.size(); ++i) {
-    part[static_cast<Eigen::Index>(i)] = all[static_cast<Eigen::Index>(relaxing_[i])];
-  }
-  return part;
+  return all(relaxing_);
 }
 
 void LaneBonds::elongations(const LaneMatrix& position, LaneMatrix& elongation) const {
@@ -114,20 +117,14 @@ void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
         const double taut = l >= bond.least ? 1.0 : 0.0;
         share[s] = taut * (bond.k * l - bond.g * remembered[s]) * span.inverse[s];
       }
-      double* const fa = f + kSphere * bond.a;
-      double* const fb = f + kSphere * bond.b;
+      Pull pull;
 #pragma omp simd
       for (std::size_t s = 0; s < kLanes; ++s) {
-        const double px = share[s] * span.x[s];
-        const double py = share[s] * span.y[s];
-        const double pz = share[s] * span.z[s];
-        fa[s] += px;
-        fa[kLanes + s] += py;
-        fa[kDown + s] += pz;
-        fb[s] -= px;
-        fb[kLanes + s] -= py;
-        fb[kDown + s] -= pz;
+        pull[s] = share[s] * span.x[s];
+        pull[kLanes + s] = share[s] * span.y[s];
+        pull[kDown + s] = share[s] * span.z[s];
       }
+      pull_ends(pull, f + kSphere * bond.a, f + kSphere * bond.b);
     }
   });
 }
@@ -186,22 +183,16 @@ void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& 
         with_span[s] = span.inverse[s] * (taut * dn - share * dl);
         with_change[s] = share;
       }
-      double* const fa = f + kSphere * bond.a;
-      double* const fb = f + kSphere * bond.b;
+      Pull pull;
 #pragma omp simd
       for (std::size_t s = 0; s < kLanes; ++s) {
         const std::size_t sy = kLanes + s;
         const std::size_t sz = kDown + s;
-        const double px = with_span[s] * span.x[s] + with_change[s] * (ub[s] - ua[s]);
-        const double py = with_span[s] * span.y[s] + with_change[s] * (ub[sy] - ua[sy]);
-        const double pz = with_span[s] * span.z[s] + with_change[s] * (ub[sz] - ua[sz]);
-        fa[s] += px;
-        fa[sy] += py;
-        fa[sz] += pz;
-        fb[s] -= px;
-        fb[sy] -= py;
-        fb[sz] -= pz;
+        pull[s] = with_span[s] * span.x[s] + with_change[s] * (ub[s] - ua[s]);
+        pull[sy] = with_span[s] * span.y[s] + with_change[s] * (ub[sy] - ua[sy]);
+        pull[sz] = with_span[s] * span.z[s] + with_change[s] * (ub[sz] - ua[sz]);
       }
+      pull_ends(pull, f + kSphere * bond.a, f + kSphere * bond.b);
     }
   });
 }

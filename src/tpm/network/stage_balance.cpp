@@ -76,12 +76,12 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
 }
 
 void StageBalance::set_weights(double z) {
-  weights_.setZero();
+  weights_.of_stages.setZero();
   for (int lane = 0; lane < kLanes; ++lane) {
     const Eigen::VectorXd weight = full_.weights(node(lane), z);
-    start_weight_[lane] = weight[0];
-    weights_.row(lane).head(stages_) = weight.tail(stages_).transpose();
-    decay_[lane] = std::exp(-z * node(lane));
+    weights_.of_start[lane] = weight[0];
+    weights_.of_stages.row(lane).head(stages_) = weight.tail(stages_).transpose();
+    weights_.of_memory[lane] = std::exp(-z * node(lane));
   }
   // The error is judged where outputs are taken from: at the stages, of which the last is more
   // accurate than the others, and before the first of them, where a step that is long against the
@@ -155,8 +155,7 @@ void StageBalance::predict(const TissueState& state, double h, double rate) {
 
 void StageBalance::update_memory() {
   bonds_.elongations(x_, elongation_);
-  advance_memory(weights_, start_weight_, decay_, elongation_, start_elongation_, start_memory_,
-                 memory_);
+  weights_.apply(elongation_, start_elongation_, start_memory_, memory_);
 }
 
 void StageBalance::residuals() {
@@ -209,7 +208,7 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
                                    double tolerance) {
   set_weights(h / tissue_.bonds().relaxation_time_s());
   StepOutcome outcome;
-  const double following = weights_.diagonal().head(stages_).mean();
+  const double following = weights_.of_stages.diagonal().head(stages_).mean();
   const bool stale = !factorised_ || last_iterations_ > kTooManyIterations ||
                      std::abs(following - following_) > kFollowingChange;
   if (stale && !refactorise(state, following)) {
@@ -237,14 +236,14 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
 StageBalance::Shapes StageBalance::shapes(std::span<const double> fractions, double z) const {
   Shapes shapes;
   shapes.interpolation.setZero();
-  shapes.weights.setZero();
+  shapes.memory.of_stages.setZero();
   for (int lane = 0; lane < kLanes; ++lane) {
     const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
     const Eigen::VectorXd weight = full_.weights(c, z);
     shapes.interpolation.row(lane).head(stages_) = full_.interpolation(c).tail(stages_).transpose();
-    shapes.start_weight[lane] = weight[0];
-    shapes.weights.row(lane).head(stages_) = weight.tail(stages_).transpose();
-    shapes.decay[lane] = std::exp(-z * c);
+    shapes.memory.of_start[lane] = weight[0];
+    shapes.memory.of_stages.row(lane).head(stages_) = weight.tail(stages_).transpose();
+    shapes.memory.of_memory[lane] = std::exp(-z * c);
   }
   return shapes;
 }
@@ -285,8 +284,7 @@ StageBalance::Within StageBalance::within(const TissueState& state,
   states.position.noalias() = at.interpolation * (x_.rowwise() - start_);
   states.position.rowwise() += start_;
   bonds_.elongations(states.position, states.elongation);
-  advance_memory(at.weights, at.start_weight, at.decay, elongation_, start_elongation_,
-                 start_memory_, states.memory);
+  at.memory.apply(elongation_, start_elongation_, start_memory_, states.memory);
   return states;
 }
 

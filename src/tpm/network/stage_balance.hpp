@@ -61,8 +61,7 @@ class StageBalance {
   /// How states at fractions of a step follow from its stages, lane by lane.
   struct Shapes {
     LaneSquare interpolation;  ///< of the way from the start
-    LaneSquare weights;        ///< of a stage's l in a lane's y
-    LaneVector start_weight, decay;
+    MemoryWeights memory;
   };
   [[nodiscard]] Shapes shapes(std::span<const double> fractions, double z) const;
   /// Change of y of the relaxing bonds at fractions of a step per change of ln tau, with
@@ -122,8 +121,8 @@ class StageBalance {
   Eigen::RowVectorXd start_elongation_, start_memory_;  ///< of relaxing bonds
   LaneMatrix x_, d_, force_;
   LaneMatrix elongation_, memory_;  ///< of relaxing bonds
-  LaneSquare weights_;              ///< of a stage's l in a lane's y, by (lane, stage)
-  LaneVector start_weight_, decay_, imposed_;
+  MemoryWeights weights_;
+  LaneVector imposed_;
   /// What tells the two collocations apart, by (place judged, start and stages).
   Eigen::Matrix<double, Eigen::Dynamic, kLanes> judge_;
   Eigen::VectorXd judge_start_;

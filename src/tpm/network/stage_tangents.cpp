@@ -45,8 +45,6 @@ StageTangents::Stages StageTangents::stages_of_step(double h) const {
   stages.memory = balance_.memory_;
   stages.imposed = balance_.imposed_;
   stages.weights = balance_.weights_;
-  stages.start_weight = balance_.start_weight_;
-  stages.decay = balance_.decay_;
   stages.aging = balance_.aging(balance_.lane_nodes(), z);
   return stages;
 }
@@ -58,18 +56,18 @@ StageTangents::Stages StageTangents::at_once(const TissueState& state, bool rela
   const Eigen::RowVectorXd memory = balance_.bonds_.of_relaxing(state.remembered).transpose();
   stages.memory = memory.replicate(kLanes, 1);
   stages.imposed.setConstant(state.imposed);
-  stages.weights.setZero();
-  if (relaxed) stages.weights.setIdentity();
-  stages.start_weight.setZero();
-  stages.decay.setConstant(relaxed ? 0.0 : 1.0);
+  stages.weights.of_stages.setZero();
+  if (relaxed) stages.weights.of_stages.setIdentity();
+  stages.weights.of_start.setZero();
+  stages.weights.of_memory.setConstant(relaxed ? 0.0 : 1.0);
   stages.aging.setZero(kLanes, memory.size());
   return stages;
 }
 
 void StageTangents::update_memory(Tangent& tangent, const Stages& stages) const {
   balance_.bonds_.elongation_changes(stages.position, tangent.position, tangent.elongation);
-  advance_memory(stages.weights, stages.start_weight, stages.decay, tangent.elongation,
-                 tangent.start_elongation, tangent.start_memory, tangent.memory);
+  stages.weights.apply(tangent.elongation, tangent.start_elongation, tangent.start_memory,
+                       tangent.memory);
   tangent.memory += tangent.log_relaxation_time * stages.aging;
 }
 
@@ -154,8 +152,7 @@ Eigen::MatrixXd StageTangents::responses_within(const TissueState& state,
     LaneMatrix position = shapes.interpolation * (tangent.position.rowwise() - tangent.start);
     position.rowwise() += tangent.start;
     LaneMatrix memory;
-    advance_memory(shapes.weights, shapes.start_weight, shapes.decay, tangent.elongation,
-                   tangent.start_elongation, tangent.start_memory, memory);
+    shapes.memory.apply(tangent.elongation, tangent.start_elongation, tangent.start_memory, memory);
     memory += tangent.log_relaxation_time * aging;
     force_changes(tangent, stages, position, memory);
     answer.col(i) = response_changes(position).head(answer.rows());

@@ -39,8 +39,7 @@ class StageTangents {
   struct Stages {
     LaneMatrix position, memory;
     LaneVector imposed;
-    LaneSquare weights;  ///< of a stage's l in a lane's y
-    LaneVector start_weight, decay;
+    MemoryWeights weights;
     LaneMatrix aging;  ///< change of y per change of ln tau, elongations held
   };
   /// The derivatives by one direction.

@@ -5,21 +5,19 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/model/validity_limits.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
 
 namespace tpm {
 
-/// Bounds beyond which a result is a picture rather than tissue (MODEL.md, section 4).
+/// The limits of model/validity_limits.hpp.
 enum class ValidityLimit : std::size_t {
   indentation,  ///< beyond kValidIndentation_m: the paper vouches for no more
   damage,       ///< beyond kDamageIndentation_m: liver is damaged
   turning,      ///< a lateral bond has turned by more than kValidTurning_rad from rest
 };
 inline constexpr std::size_t kValidityLimits = 3;
-inline constexpr double kValidIndentation_m = 0.010;
-inline constexpr double kDamageIndentation_m = 0.012;
-inline constexpr double kValidTurning_rad = 0.52359877559829887;  // pi/6
 
 [[nodiscard]] std::string_view key_of(ValidityLimit limit);
 [[nodiscard]] std::string_view words_of(ValidityLimit limit);

@@ -6,10 +6,8 @@
 
 namespace tpm {
 
-void advance_memory(const LaneSquare& of_stages, const LaneVector& of_start,
-                    const LaneVector& of_memory, const LaneMatrix& stages,
-                    const Eigen::RowVectorXd& start, const Eigen::RowVectorXd& memory,
-                    LaneMatrix& out) {
+void MemoryWeights::apply(const LaneMatrix& stages, const Eigen::RowVectorXd& start,
+                          const Eigen::RowVectorXd& memory, LaneMatrix& out) const {
   out.resize(kLanes, stages.cols());
   const double* const weight = of_stages.data();
   const double* const from_start = of_start.data();

@@ -13,12 +13,16 @@ using LaneMatrix = Eigen::Matrix<double, kLanes, Eigen::Dynamic>;
 using LaneVector = Eigen::Matrix<double, kLanes, 1>;
 using LaneSquare = Eigen::Matrix<double, kLanes, kLanes>;
 
-/// out = of_stages stages + of_start start + of_memory memory: what is remembered in every lane,
-/// one column per bond. The stages are no part of out.
-void advance_memory(const LaneSquare& of_stages, const LaneVector& of_start,
-                    const LaneVector& of_memory, const LaneMatrix& stages,
-                    const Eigen::RowVectorXd& start, const Eigen::RowVectorXd& memory,
-                    LaneMatrix& out);
+/// How memories follow, lane by lane, from those at the start of a step and from elongations at its
+/// start and its stages.
+struct MemoryWeights {
+  LaneSquare of_stages;  ///< by (lane, stage)
+  LaneVector of_start, of_memory;
+
+  /// What is remembered in every lane, one column per bond; `stages` is no part of `out`.
+  void apply(const LaneMatrix& stages, const Eigen::RowVectorXd& start,
+             const Eigen::RowVectorXd& memory, LaneMatrix& out) const;
+};
 
 /// All numbers of all states as one vector.
 [[nodiscard]] inline Eigen::Map<Eigen::VectorXd> flat(LaneMatrix& lanes) {
