@@ -21,6 +21,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Polygon
 
 # Inches.
 WIDTH, LEFT, GAP, RIGHT, ABOVE, BELOW, LEGEND_ROW = 13.0, 0.65, 0.6, 0.95, 0.9, 0.7, 0.22
@@ -119,7 +120,25 @@ def frame_of(picture, view):
     return np.minimum(rest.min(axis=0), tip) - margin, np.maximum(rest.max(axis=0), tip) + margin
 
 
-def draw_view(axes, picture, position_m, colouring, view, title=None):
+def draw_tools(axes, tools, view):
+    """Outlines of balls, and of punches from the side; the far ends of punches are left open."""
+    across, up = view[:2]
+    style = {"fc": "#B0B0B0", "ec": net.CONTACT, "alpha": 0.55, "lw": 1.2, "zorder": 92}
+    for tool in tools:
+        at, radius = 1e3 * np.array(tool["position_m"])[[across, up]], 1e3 * tool["radius_m"]
+        if tool["kind"] == "ball":
+            axes.add_patch(Circle(at, radius, **style))
+            continue
+        along = np.array(tool["direction"])[[across, up]]
+        seen = np.linalg.norm(along)
+        if seen < 0.2:  # from behind: its face
+            axes.add_patch(Circle(at, radius, **style))
+            continue
+        back, beside = -2 * radius * along / seen, radius * np.array([-along[1], along[0]]) / seen
+        axes.add_patch(Polygon([at + beside + back, at + beside, at - beside, at - beside + back], closed=False, **style))
+
+
+def draw_view(axes, picture, position_m, tools, colouring, view, title=None):
     across, up, towards, sign = view[:4]
     position = 1e3 * np.array(position_m)
     at = position[:, [across, up]]
@@ -134,6 +153,7 @@ def draw_view(axes, picture, position_m, colouring, view, title=None):
             draw_bonds(axes, at, bonds, depth, slab, colouring)
         net.draw_spheres(axes, at, depth, picture, colouring.face, anchored, slab, colouring.bar is None,
                          colouring.share)
+    draw_tools(axes, tools, view)
     net.draw_contact(axes, at, picture, view, ARROW, named=False)
     low, high = frame_of(picture, view)
     scale_bar(axes, low, high)
@@ -157,7 +177,7 @@ def slice_frame(picture, view):
     return (np.maximum(centre - [0.75 * width, width], least), np.minimum(centre + [0.75 * width, width], most))
 
 
-def draw_slice(axes, picture, position_m, colouring, view, title=None):
+def draw_slice(axes, picture, position_m, tools, colouring, view, title=None):
     """The spheres that the plane through the contact meets at rest: where they are, and dashed where they were."""
     across, up, towards = view[:3]
     rest, position = 1e3 * np.array(picture["position_m"]), 1e3 * np.array(position_m)
@@ -178,6 +198,8 @@ def draw_slice(axes, picture, position_m, colouring, view, title=None):
     axes.add_collection(EllipseCollection(
         size, size, 0 * size, offsets=at[inside], facecolors=colouring.face[inside], zorder=4,
         edgecolors=[net.ANCHOR if a else "#333333" for a in anchored], linewidths=np.where(anchored, 1.8, 0.6), **common))
+    cut = 1e3 * picture["position_m"][picture["contact"]][towards]
+    draw_tools(axes, [t for t in tools if abs(1e3 * t["position_m"][towards] - cut) < 1e3 * t["radius_m"]], view)
     contact = picture["contact"]
     into = np.array(picture["direction"])[[across, up]]
     axes.annotate("", at[contact] - 0.55 * radius * into, at[contact] - 2.6 * radius * into, zorder=90,
@@ -194,7 +216,9 @@ def legend_of(picture, colouring):
     handles = [dot(text, mfc=colour, mec="#444444") for colour, text in colouring.flags or []]
     return [*handles, dot(f"probe on sphere {picture['contact'] + 1}", 6, mfc=net.CONTACT, mec="white"),
             dot(f"anchored ({len(picture['anchors'])} spheres)", mfc="white", mec=net.ANCHOR, mew=1.8),
-            dot("slice: where it was at rest", mfc="none", mec=REST, mew=0.9)]
+            dot("slice: where it was at rest", mfc="none", mec=REST, mew=0.9),
+            *([dot(f"tool, at its size (spheres at {colouring.share:.0%} of theirs)", 10, mfc="#B0B0B0",
+                   mec=net.CONTACT)] if picture["tools"] else [])]
 
 
 def place(page, row, sizes, legend_rows):
@@ -232,13 +256,13 @@ def size_of(frame):
     return frame[1] - frame[0]
 
 
-def draw_one(picture, position_m, colouring, words):
+def draw_one(picture, position_m, tools, colouring, words):
     page, axes = plt.subplots(1, 3)
     front, side = net.VIEWS
     for one, view in zip(axes, (front, side)):
-        draw_view(one, picture, position_m, colouring, view)
+        draw_view(one, picture, position_m, tools, colouring, view)
     cut = slice_view(picture)
-    draw_slice(axes[2], picture, position_m, colouring, cut, "Slice through the contact")
+    draw_slice(axes[2], picture, position_m, tools, colouring, cut, "Slice through the contact")
     whole, enlarged = [size_of(frame_of(picture, view)) for view in (front, side)], size_of(slice_frame(picture, cut))
     sizes = [*whole, enlarged * min(whole[0] / enlarged)]  # as high or as wide as the view from the front
     decorate(page, axes, sizes, picture, colouring, words)
@@ -273,7 +297,7 @@ def draw_two(picture):
     sizes = [size_of(slice_frame(picture, cut))] * 3
     for one, state, value in zip(axes[1:], states, values):
         colouring = by_number(value, "displacement [mm]", "Both models on the same spheres", scale)
-        draw_slice(one, picture, state["position_m"], colouring, cut, f"{state['name']}, {state['words']}")
+        draw_slice(one, picture, state["position_m"], state["tools"], colouring, cut, f"{state['name']}, {state['words']}")
     decorate(page, axes, sizes, picture, colouring, "; ".join(f"{s['name']}: {s['roughness']}" for s in states))
     return page
 
@@ -281,12 +305,12 @@ def draw_two(picture):
 def pages(picture):
     state = picture["states"][0]
     words = f"{state['name']}, {state['words']}"
-    yield "undeformed", draw_one(picture, picture["position_m"], by_layer(picture, "Undeformed"), "at rest")
+    yield "undeformed", draw_one(picture, picture["position_m"], picture["tools"], by_layer(picture, "Undeformed"), "at rest")
     for name, colouring in [
             ("deformed", by_layer(picture, "Deformed, not magnified")),
             ("displacement", by_number(np.array(state["displacement_mm"]), "displacement [mm]", "Displacement")),
             ("force", by_force(state)), ("validity", by_validity(state))]:
-        yield name, draw_one(picture, state["position_m"], colouring, words)
+        yield name, draw_one(picture, state["position_m"], state["tools"], colouring, words)
     if len(picture["states"]) > 1:
         yield "side_by_side", draw_two(picture)
 

@@ -93,7 +93,7 @@ TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rul
   // The same as a force, after an indentation by 10 nm in ten picoseconds and in a second.
   const double depth = 1e-8;
   const QuasiStatic tissue(bonds, network.organ.position, only_contact_guided(network),
-                           {kContact, Vector3d::UnitZ()}, {1e-9});
+                           Probe{kContact, Vector3d::UnitZ()}, {1e-9});
   const auto force = [&](double rate, double hold) {
     const Protocol protocol = ramp_and_hold(depth, rate, hold);
     return tissue.run(protocol, std::vector<double>{depth / rate + hold}).response(0);

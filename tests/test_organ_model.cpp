@@ -186,6 +186,8 @@ TEST_CASE("a fit with an organ needs its scene, and one that stands") {
       Catch::Contains("tension"));
   CHECK_THROWS_WITH(parse(R"("model": "organ", "scene": "nowhere.json")"),
                     Catch::Contains("nowhere.json: no such file"));
+  CHECK_THROWS_WITH(make_model(parse(R"("model": "organ", "scene": "liver_poke.json")")),
+                    Catch::Contains("contacts"));
   const FitConfig good = parse(R"("model": "organ", "scene": "liver_scene.json")");
   CHECK(make_model(good)->name() == "organ");
 }

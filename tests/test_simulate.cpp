@@ -60,8 +60,8 @@ TEST_CASE("every block of a scene reaches the experiment") {
     "formulation": {"kind": "inertial", "damping_ratio": 0.3, "density_kg_per_m3": 1000,
                     "comparison": "mass_spring", "springs": "equal"},
     "outputs": {"times": ["2 s", "1 s"], "fields": ["remembered"]}, "tolerance": 1e-4})");
-  CHECK(scene.probe.sphere == 6);
-  CHECK(scene.probe.direction == Eigen::Vector3d::UnitZ());
+  CHECK(scene.probe().sphere == 6);
+  CHECK(scene.probe().direction == Eigen::Vector3d::UnitZ());
   CHECK(scene.protocol.drive() == Drive::force);
   CHECK_THAT(scene.protocol.peak(), WithinRel(0.03, 1e-12));
   CHECK(scene.formulation.kind == FormulationKind::inertial);
@@ -79,7 +79,7 @@ TEST_CASE("every block of a scene reaches the experiment") {
 TEST_CASE("a contact is found by its place") {
   const std::string at = R"("contacts": [{"kind": "sphere", "at": ["2 mm", "136 mm", "57 mm"]}], )";
   const std::string push = R"("protocol": {"kind": "step_hold", "depth": "1 mm", "hold": "1 s"}})";
-  CHECK(experiment(R"({"organ": {"kind": "liver"}, )" + at + push).probe.sphere == 70);
+  CHECK(experiment(R"({"organ": {"kind": "liver"}, )" + at + push).probe().sphere == 70);
 }
 
 TEST_CASE("outputs by number and by spacing, the ends among them") {
@@ -100,8 +100,8 @@ TEST_CASE("a run in parts is the run of the whole, within its tolerance") {
     for (const CurvePoint& p : record.curve) times.push_back(p.time_s);
     const BondSystem bonds = scene.tissue.bonds();
     const QuasiStaticRun whole =
-        QuasiStatic(bonds, scene.tissue.network.organ.position, scene.tissue.freedom(), scene.probe,
-                    {.tolerance = scene.formulation.tolerance})
+        QuasiStatic(bonds, scene.tissue.network.organ.position, scene.tissue.freedom(),
+                    scene.probe(), {.tolerance = scene.formulation.tolerance})
             .run(scene.protocol, times);
     const double peak = whole.response.cwiseAbs().maxCoeff();
     for (std::size_t i = 0; i < times.size(); ++i) {
@@ -193,7 +193,7 @@ TEST_CASE("limits of validity are dated and name their spheres") {
     REQUIRE(breach.first_time_s);
     CHECK(*breach.first_time_s > depth_mm);
     CHECK(*breach.first_time_s <= depth_mm + step_s);
-    CHECK(breach.spheres == std::vector<std::size_t>{small_scene(kPush).probe.sphere});
+    CHECK(breach.spheres == std::vector<std::size_t>{small_scene(kPush).probe().sphere});
   }
   CHECK_FALSE(deep("12 mm").of(ValidityLimit::damage).first_time_s);
 }
@@ -220,7 +220,7 @@ TEST_CASE("static states are those that a load held for ever reaches") {
   const double forever = std::numeric_limits<double>::infinity();
   const BondSystem bonds = scene.tissue.bonds();
   const QuasiStatic equations(bonds, scene.tissue.network.organ.position, scene.tissue.freedom(),
-                              scene.probe, {.tolerance = 1e-8});
+                              scene.probe(), {.tolerance = 1e-8});
   for (const double load : {0.1, 0.2}) {
     const double depth = equations.run(creep(load, forever), {&forever, 1}).response[0];
     for (const CurvePoint& p : record.curve) {

@@ -93,8 +93,8 @@ TEST_CASE("the file of a run holds its scene, version, tolerance, and what was f
   const Freedom freedom = scene.tissue.freedom();
   for (std::size_t i = 0; i < freedom.size(); ++i) {
     const Eigen::Vector3d on_sphere(&force[3 * i]);
-    if (i == scene.probe.sphere) {
-      CHECK_THAT(-on_sphere.dot(scene.probe.direction),
+    if (i == scene.probe().sphere) {
+      CHECK_THAT(-on_sphere.dot(scene.probe().direction),
                  WithinAbs(run.record.curve.back().response, 1e-6));
     } else if (freedom.is_free(i)) {
       CHECK(on_sphere.norm() < 1e-6);
@@ -118,7 +118,8 @@ TEST_CASE("every key of the JSON answer is described in docs/simulate.md") {
   const std::string page = read_file(std::string(TPM_TEST_SOURCE_DIR) + "/docs/simulate.md");
   const ExperimentScene deep = small_scene(
       R"("protocol": {"kind": "ramp_hold", "depth": "13 mm", "rate": "4 mm/s", "hold": "1 s"})");
-  for (const std::string& key : keys_of(simulation_json(deep, run_of(deep)))) {
+  for (const std::string& key :
+       keys_of(simulation_json(deep, network_to_run(deep), run_of(deep)))) {
     CAPTURE(key);
     CHECK(page.find("`" + key + "`") != std::string::npos);
   }

@@ -150,13 +150,14 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   const std::vector<Simulated> all = simulate_all(choice);
   const std::vector<std::string> files = write_all(choice, all);
   if (session.json()) {
-    Json json = simulation_json(all.front().scene, all.front().run);
-    if (all.size() > 1) json["mass_spring"] = simulation_json(all[1].scene, all[1].run);
+    Json json = simulation_json(all.front().scene, all.front().network, all.front().run);
+    if (all.size() > 1)
+      json["mass_spring"] = simulation_json(all[1].scene, all[1].network, all[1].run);
     json["files"] = files;
     fmt::print("{}", to_text(json));
     return 0;
   }
-  for (const Simulated& s : all) fmt::print("{}", simulation_text(s.scene, s.run));
+  for (const Simulated& s : all) fmt::print("{}", simulation_text(s.scene, s.network, s.run));
   fmt::print("wrote {}\n", fmt::join(files, ", "));
   return 0;
 }

@@ -3,6 +3,11 @@
 #include <cmath>
 
 namespace tpm {
+namespace {
+
+constexpr double kTouch_m = 1e-14;  // a gap that is none: above the rounding of positions
+
+}  // namespace
 
 BondSystem::BondSystem(const Network& network, const TpmParameters& material, LateralBond lateral)
     : spheres_(network.organ.size()),
@@ -47,31 +52,83 @@ const BondSystem::Graph& BondSystem::graph() const {
   return *graph_->graph;
 }
 
+BondSystem BondSystem::with_tools(std::size_t tools, std::span<const ToolContact> contacts) const {
+  BondSystem other = *this;
+  other.spheres_ += tools;
+  other.contacts_.assign(contacts.begin(), contacts.end());
+  other.graph_ = std::make_shared<LazyGraph>();
+  const auto before = static_cast<Eigen::Index>(size());
+  const auto added = static_cast<Eigen::Index>(contacts.size());
+  other.rest_length_.conservativeResize(before + added);
+  other.stiffness_.conservativeResize(before + added);
+  other.relaxing_.conservativeResize(before + added);
+  other.relaxing_.tail(added).setZero();
+  for (const ToolContact& contact : contacts) {
+    const auto row = static_cast<Eigen::Index>(other.end_a_.size());
+    other.end_a_.push_back(contact.sphere);
+    other.end_b_.push_back(contact.tool);
+    other.rope_.push_back(false);
+    other.rest_length_[row] = contact.reach_m;
+    other.stiffness_[row] = contact.stiffness_N_per_m;
+  }
+  return other;
+}
+
+BondSystem::Line BondSystem::line(std::size_t bond, const Positions& position) const {
+  const Eigen::Vector3d along = position.col(end_b_[bond]) - position.col(end_a_[bond]);
+  const double rest = rest_length_[static_cast<Eigen::Index>(bond)];
+  if (bond >= first_contact()) {
+    if (const auto& normal = contacts_[bond - first_contact()].normal) {
+      return {*normal, along.dot(*normal) - rest, 0.0};
+    }
+  }
+  const double length = along.norm();
+  return {along / length, length - rest, 1.0 / length};
+}
+
+bool BondSystem::carries(std::size_t bond, double elongation, std::span<const char> closed) const {
+  if (rope_[bond]) return elongation >= 0.0;
+  if (bond < first_contact()) return true;
+  return closed.empty() ? elongation <= kTouch_m : closed[bond - first_contact()] != 0;
+}
+
 BondSystem::Pull BondSystem::pull(std::size_t bond, double elongation,
                                   const BondMemory& memory) const {
-  if (rope_[bond] && elongation < 0.0) return {0.0, 0.0};
+  if (!carries(bond, elongation, memory.closed)) return {0.0, 0.0};
   const auto i = static_cast<Eigen::Index>(bond);
   const double slope = stiffness_[i] - relaxing_[i] * memory.following;
   return {slope * elongation - relaxing_[i] * memory.offset[i], slope};
 }
 
+std::vector<char> BondSystem::closed_contacts(const Positions& position) const {
+  std::vector<char> closed;
+  for (std::size_t i = first_contact(); i < size(); ++i) {
+    closed.push_back(carries(i, line(i, position).elongation, {}) ? 1 : 0);
+  }
+  return closed;
+}
+
 void BondSystem::elongations(const Positions& position, Eigen::VectorXd& elongation) const {
   elongation.resize(rest_length_.size());
   for (std::size_t i = 0; i < size(); ++i) {
-    const double length = (position.col(end_b_[i]) - position.col(end_a_[i])).norm();
-    const auto row = static_cast<Eigen::Index>(i);
-    elongation[row] = length - rest_length_[row];
+    elongation[static_cast<Eigen::Index>(i)] = line(i, position).elongation;
+  }
+}
+
+void BondSystem::tensions(const Positions& position, const BondMemory& memory,
+                          Eigen::VectorXd& tension) const {
+  elongations(position, tension);
+  for (std::size_t i = 0; i < size(); ++i) {
+    double& n = tension[static_cast<Eigen::Index>(i)];
+    n = pull(i, n, memory).force;
   }
 }
 
 void BondSystem::add_forces(const Positions& position, const BondMemory& memory,
                             Eigen::Matrix3Xd& force) const {
   for (std::size_t i = 0; i < size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const Eigen::Vector3d along = position.col(end_b_[i]) - position.col(end_a_[i]);
-    const double length = along.norm();
-    const double n = pull(i, length - rest_length_[row], memory).force;
-    const Eigen::Vector3d f = (n / length) * along;
+    const Line lies = line(i, position);
+    const Eigen::Vector3d f = pull(i, lies.elongation, memory).force * lies.direction;
     force.col(end_a_[i]) += f;
     force.col(end_b_[i]) -= f;
   }
@@ -79,13 +136,10 @@ void BondSystem::add_forces(const Positions& position, const BondMemory& memory,
 
 Eigen::Matrix3d BondSystem::stiffness_block(std::size_t bond, const Positions& position,
                                             const BondMemory& memory) const {
-  const Eigen::Vector3d along = position.col(end_b_[bond]) - position.col(end_a_[bond]);
-  const double length = along.norm();
-  const Eigen::Vector3d direction = along / length;
-  const double rest = rest_length_[static_cast<Eigen::Index>(bond)];
-  const auto [force, slope] = pull(bond, length - rest, memory);
-  const double across = force / length;
-  Eigen::Matrix3d block = (slope - across) * direction * direction.transpose();
+  const Line lies = line(bond, position);
+  const auto [force, slope] = pull(bond, lies.elongation, memory);
+  const double across = force * lies.per_length;
+  Eigen::Matrix3d block = (slope - across) * lies.direction * lies.direction.transpose();
   block.diagonal().array() += across;
   return block;
 }
@@ -105,9 +159,8 @@ void BondSystem::elongation_changes(const Positions& position, const Eigen::Matr
                                     Eigen::VectorXd& change) const {
   change.resize(rest_length_.size());
   for (std::size_t i = 0; i < size(); ++i) {
-    const Eigen::Vector3d along = position.col(end_b_[i]) - position.col(end_a_[i]);
     change[static_cast<Eigen::Index>(i)] =
-        along.dot(displacement.col(end_b_[i]) - displacement.col(end_a_[i])) / along.norm();
+        line(i, position).direction.dot(displacement.col(end_b_[i]) - displacement.col(end_a_[i]));
   }
 }
 
@@ -115,14 +168,12 @@ void BondSystem::add_stiffness_times(const Positions& position, const BondMemory
                                      const Eigen::Matrix3Xd& displacement,
                                      Eigen::Matrix3Xd& force) const {
   for (std::size_t i = 0; i < size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const Eigen::Vector3d along = position.col(end_b_[i]) - position.col(end_a_[i]);
-    const double length = along.norm();
-    const auto [n, slope] = pull(i, length - rest_length_[row], memory);
-    const double across = n / length;
+    const Line lies = line(i, position);
+    const auto [n, slope] = pull(i, lies.elongation, memory);
+    const double across = n * lies.per_length;
     const Eigen::Vector3d apart = displacement.col(end_b_[i]) - displacement.col(end_a_[i]);
     const Eigen::Vector3d f =
-        across * apart + (slope - across) * along.dot(apart) / (length * length) * along;
+        across * apart + (slope - across) * lies.direction.dot(apart) * lies.direction;
     force.col(end_b_[i]) += f;
     force.col(end_a_[i]) -= f;
   }
@@ -132,8 +183,8 @@ double BondSystem::potential_J(const Positions& position, const BondMemory& memo
   double energy = 0.0;
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    const double l = (position.col(end_b_[i]) - position.col(end_a_[i])).norm() - rest_length_[row];
-    if (rope_[i] && l < 0.0) continue;
+    const double l = line(i, position).elongation;
+    if (!carries(i, l, memory.closed)) continue;
     const double k = stiffness_[row] - relaxing_[row] * memory.following;
     energy += l * (0.5 * k * l - relaxing_[row] * memory.offset[row]);
   }
@@ -147,8 +198,8 @@ double BondSystem::stored_energy_J(const Positions& position,
   double energy = 0.0;
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    const double l = (position.col(end_b_[i]) - position.col(end_a_[i])).norm() - rest_length_[row];
-    if (rope_[i] && l < 0.0) continue;
+    const double l = line(i, position).elongation;
+    if (!carries(i, l, {})) continue;
     const double y = remembered[row];
     energy += 0.5 * stiffness_[row] * l * l - relaxing_[row] * y * (l - 0.5 * y);
   }

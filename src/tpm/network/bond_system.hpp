@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/network/network.hpp"
+#include "tpm/network/tool.hpp"
 #include "tpm/solve/block_ldlt.hpp"
 
 namespace tpm {
@@ -20,6 +21,8 @@ enum class LateralBond {
 struct BondMemory {
   Eigen::VectorXd offset;  ///< m, one per bond
   double following = 0.0;  ///< 0 to 1
+  /// Which tool contacts are closed, one entry each; none: those that overlap or just touch.
+  std::span<const char> closed = {};
 };
 
 /// The bonds of a network with the stiffness of a material, as one large nonlinear spring with
@@ -31,6 +34,9 @@ struct BondMemory {
 /// E2)/E2 is the elongation that the Kelvin-Voigt unit has caught up with (MODEL.md, section 1),
 /// and for a lateral bond k = w E' A0/l0 and g = 0; w is the bond's factor. The force acts along
 /// the bond as it lies now.
+///
+/// Contacts with tools are the last bonds of a system: springs without memory that push only, along
+/// the line of centres or a fixed normal. Tools are the last columns of positions.
 class BondSystem {
  public:
   BondSystem(const Network& network, const TpmParameters& material,
@@ -40,7 +46,18 @@ class BondSystem {
   [[nodiscard]] BondSystem with_material(const Network& network,
                                          const TpmParameters& material) const;
 
+  /// The same bonds and contacts with tools.
+  /// @param tools how many columns of positions follow those of the spheres
+  [[nodiscard]] BondSystem with_tools(std::size_t tools,
+                                      std::span<const ToolContact> contacts) const;
+
+  /// Bonds and contacts.
   [[nodiscard]] std::size_t size() const { return end_a_.size(); }
+  [[nodiscard]] std::size_t contact_count() const { return contacts_.size(); }
+  /// The number of the first contact among the bonds.
+  [[nodiscard]] std::size_t first_contact() const { return size() - contacts_.size(); }
+  [[nodiscard]] const std::vector<ToolContact>& contacts() const { return contacts_; }
+  /// Columns of positions: spheres and tools.
   [[nodiscard]] std::size_t spheres() const { return spheres_; }
   [[nodiscard]] double relaxation_time_s() const { return relaxation_time_s_; }
   [[nodiscard]] std::span<const std::uint32_t> end_a() const { return end_a_; }
@@ -53,8 +70,15 @@ class BondSystem {
   /// g of each bond, N/m, 0 <= g <= k.
   [[nodiscard]] const Eigen::VectorXd& relaxing() const { return relaxing_; }
 
-  /// l of each bond, m.
+  /// The contacts that overlap or just touch, as BondMemory::closed.
+  [[nodiscard]] std::vector<char> closed_contacts(const Positions& position) const;
+
+  /// l of each bond, m; of a contact its gap, negative where it overlaps.
   void elongations(const Positions& position, Eigen::VectorXd& elongation) const;
+
+  /// What each bond pulls with, N: positive in tension.
+  void tensions(const Positions& position, const BondMemory& memory,
+                Eigen::VectorXd& tension) const;
 
   /// Adds to `force` what the bonds pull their spheres with, N, where y = memory.offset +
   /// memory.following l: with following = 0 the offset is what is remembered now; with 1 and no
@@ -96,11 +120,22 @@ class BondSystem {
   [[nodiscard]] BlockPattern::Place place(std::size_t bond) const { return graph().place[bond]; }
 
  private:
-  /// N and dN/dl of a bond; a slack rope has neither.
+  /// How a bond lies.
+  struct Line {
+    Eigen::Vector3d direction;  ///< unit vector from a to b
+    double elongation;          ///< l, m
+    double per_length;          ///< 1/length, 1/m: how it turns; 0 for a contact with a flat face
+  };
+  [[nodiscard]] Line line(std::size_t bond, const Positions& position) const;
+
+  /// N and dN/dl of a bond; a slack rope and an open contact have neither.
   struct Pull {
     double force, slope;
   };
   [[nodiscard]] Pull pull(std::size_t bond, double elongation, const BondMemory& memory) const;
+  /// False for a slack rope and an open contact.
+  [[nodiscard]] bool carries(std::size_t bond, double elongation,
+                             std::span<const char> closed) const;
 
   void set_material(const Network& network, const TpmParameters& material);
 
@@ -119,6 +154,7 @@ class BondSystem {
   std::vector<std::uint32_t> end_a_, end_b_;
   Eigen::VectorXd rest_length_, stiffness_, relaxing_;
   std::vector<bool> rope_;
+  std::vector<ToolContact> contacts_;
   double relaxation_time_s_ = 0.0;
   std::shared_ptr<LazyGraph> graph_ = std::make_shared<LazyGraph>();
 };

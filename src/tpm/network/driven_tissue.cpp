@@ -1,16 +1,26 @@
 #include "tpm/network/driven_tissue.hpp"
 
+#include "tpm/core/error.hpp"
+
 namespace tpm {
 
 DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom,
-                           const Probe& probe, Drive drive)
+                           const Probes& probes, Drive drive)
     : bonds_(bonds),
       rest_(std::move(rest)),
       freedom_(std::move(freedom)),
-      probe_(probe),
       drive_(drive),
       equilibrium_(bonds_, freedom_) {
-  if (depth_driven()) freedom_.impose(probe.sphere, probe.direction);
+  double shares = 0.0;
+  for (const Probe& probe : probes) shares += probe.share;
+  for (const Probe& probe : probes) {
+    driven_.push_back({static_cast<Eigen::Index>(probe.sphere), probe.direction,
+                       depth_driven() ? probe.share : probe.share / shares});
+    if (depth_driven()) freedom_.impose(probe.sphere, probe.direction);
+  }
+  const TissueState start = at_rest(0.0);
+  if (held_stiffness(start.position, start.memory()) > 0.0) return;
+  throw bad_input("probe", "touches nothing at rest", "a sphere with bonds, or a tool at one");
 }
 
 TissueState DrivenTissue::at_rest(double time_s) const {
@@ -19,109 +29,163 @@ TissueState DrivenTissue::at_rest(double time_s) const {
   state.position = rest_;
   bonds_.elongations(rest_, state.elongation);
   state.remembered = Eigen::VectorXd::Zero(state.elongation.size());
+  state.closed = bonds_.closed_contacts(rest_);
   return state;
 }
 
 void DrivenTissue::impose(Positions& position, double imposed) const {
   if (!depth_driven()) return;
-  const auto column = static_cast<Eigen::Index>(probe_.sphere);
-  const double depth = (position.col(column) - rest_.col(column)).dot(probe_.direction);
-  position.col(column) += (imposed - depth) * probe_.direction;
+  for (const Driven& d : driven_) {
+    const double depth = (position.col(d.column) - rest_.col(d.column)).dot(d.direction);
+    position.col(d.column) += (d.weight * imposed - depth) * d.direction;
+  }
 }
 
 void DrivenTissue::load(double imposed, Eigen::Matrix3Xd& force) const {
   force.setZero(3, rest_.cols());
   if (depth_driven()) return;
-  force.col(static_cast<Eigen::Index>(probe_.sphere)) = imposed * probe_.direction;
+  for (const Driven& d : driven_) force.col(d.column) += d.weight * imposed * d.direction;
 }
 
 void DrivenTissue::impose(LaneMatrix& position, const LaneVector& imposed) const {
   if (!depth_driven()) return;
-  const auto first = 3 * static_cast<Eigen::Index>(probe_.sphere);
-  auto of_probe = position.middleCols<3>(first);
-  const Eigen::RowVector3d rest = rest_.col(first / 3).transpose();
-  const LaneVector further = imposed - (of_probe.rowwise() - rest) * probe_.direction;
-  of_probe += further * probe_.direction.transpose();
+  for (const Driven& d : driven_) {
+    auto place = position.middleCols<3>(3 * d.column);
+    const Eigen::RowVector3d rest = rest_.col(d.column).transpose();
+    const LaneVector further = d.weight * imposed - (place.rowwise() - rest) * d.direction;
+    place += further * d.direction.transpose();
+  }
 }
 
 void DrivenTissue::add_load(const LaneVector& imposed, LaneMatrix& force) const {
   if (depth_driven()) return;
-  force.middleCols<3>(3 * static_cast<Eigen::Index>(probe_.sphere)) +=
-      imposed * probe_.direction.transpose();
+  for (const Driven& d : driven_) {
+    force.middleCols<3>(3 * d.column) += d.weight * imposed * d.direction.transpose();
+  }
 }
 
 void DrivenTissue::impose_change(LaneMatrix& displacement, const LaneVector& change) const {
   if (!depth_driven()) return;
-  auto of_probe = displacement.middleCols<3>(3 * static_cast<Eigen::Index>(probe_.sphere));
-  const LaneVector further = change - of_probe * probe_.direction;
-  of_probe += further * probe_.direction.transpose();
+  for (const Driven& d : driven_) {
+    auto moved = displacement.middleCols<3>(3 * d.column);
+    const LaneVector further = d.weight * change - moved * d.direction;
+    moved += further * d.direction.transpose();
+  }
 }
 
 LaneVector DrivenTissue::response_change(const LaneMatrix& displacement,
                                          const LaneMatrix& force) const {
-  const auto first = 3 * static_cast<Eigen::Index>(probe_.sphere);
-  if (depth_driven()) return -force.middleCols<3>(first) * probe_.direction;
-  return displacement.middleCols<3>(first) * probe_.direction;
+  const double sign = depth_driven() ? -1.0 : 1.0;
+  const LaneMatrix& of = depth_driven() ? force : displacement;
+  LaneVector change = LaneVector::Zero();
+  for (const Driven& d : driven_) {
+    change += sign * d.weight * (of.middleCols<3>(3 * d.column) * d.direction);
+  }
+  return change;
 }
 
 LaneVector DrivenTissue::response(const LaneMatrix& position, const LaneMatrix& force) const {
-  const auto first = 3 * static_cast<Eigen::Index>(probe_.sphere);
-  if (depth_driven()) return -force.middleCols<3>(first) * probe_.direction;
-  const Eigen::RowVector3d rest = rest_.col(first / 3).transpose();
-  return (position.middleCols<3>(first).rowwise() - rest) * probe_.direction;
+  if (depth_driven()) return response_change(position, force);
+  LaneVector depth = LaneVector::Zero();
+  for (const Driven& d : driven_) {
+    const Eigen::RowVector3d rest = rest_.col(d.column).transpose();
+    depth += d.weight * ((position.middleCols<3>(3 * d.column).rowwise() - rest) * d.direction);
+  }
+  return depth;
+}
+
+double DrivenTissue::depth_of(const Eigen::Matrix3Xd& displacement) const {
+  double weights = 0.0;
+  for (const Driven& d : driven_) weights += depth_driven() ? d.weight * d.weight : d.weight;
+  return along(displacement) / weights;
+}
+
+double DrivenTissue::along(const Eigen::Matrix3Xd& vectors) const {
+  double sum = 0.0;
+  for (const Driven& d : driven_) sum += d.weight * vectors.col(d.column).dot(d.direction);
+  return sum;
 }
 
 double DrivenTissue::response(const Positions& position, const Eigen::Matrix3Xd& force) const {
-  const auto column = static_cast<Eigen::Index>(probe_.sphere);
-  if (depth_driven()) return -force.col(column).dot(probe_.direction);
-  return (position.col(column) - rest_.col(column)).dot(probe_.direction);
+  return depth_driven() ? 0.0 - along(force) : depth_of(position - rest_);
 }
 
 double DrivenTissue::response(const TissueState& state) const {
   Eigen::Matrix3Xd force;
   load(state.imposed, force);
-  bonds_.add_forces(state.position, {state.remembered, 0.0}, force);
+  bonds_.add_forces(state.position, state.memory(), force);
   return response(state.position, force);
 }
 
-void DrivenTissue::unit_field(const TissueState& state, const BondMemory& memory,
-                              Eigen::Matrix3Xd& field, double& stiffness) const {
-  const auto column = static_cast<Eigen::Index>(probe_.sphere);
+Eigen::Matrix3Xd DrivenTissue::unit() const {
   Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  unit.col(column) = probe_.direction;
+  for (const Driven& d : driven_) unit.col(d.column) = d.weight * d.direction;
+  return unit;
+}
+
+Eigen::Matrix3Xd DrivenTissue::unit_on_touched() const {
+  const Eigen::Matrix3Xd of_tools = unit();
+  const std::vector<char> closed = bonds_.closed_contacts(rest_);
+  Eigen::Matrix3Xd on_touched = Eigen::Matrix3Xd::Zero(3, rest_.cols());
+  for (std::size_t i = 0; i < closed.size(); ++i) {
+    const ToolContact& contact = bonds_.contacts()[i];
+    if (closed[i] != 0) on_touched.col(contact.sphere) += of_tools.col(contact.tool);
+  }
+  return on_touched;
+}
+
+DrivenTissue::UnitField DrivenTissue::unit_field(const TissueState& state,
+                                                 const BondMemory& memory) const {
+  UnitField field;
+  const Eigen::Matrix3Xd unit = this->unit();
   if (!depth_driven()) {
-    field = unit;
-    equilibrium_.displace(field);
-    stiffness = field.col(column).dot(probe_.direction);
-    return;
+    field.displacement = unit;
+    equilibrium_.displace(field.displacement);
+    field.stiffness = along(field.displacement);
+    field.judge = field.displacement;
+    return field;
   }
   Eigen::Matrix3Xd pushed = Eigen::Matrix3Xd::Zero(3, rest_.cols());
   bonds_.add_stiffness_times(state.position, memory, unit, pushed);
-  field = -pushed;
-  equilibrium_.displace(field);
-  stiffness = -pushed.cwiseProduct(field).sum();
-  field += unit;
+  field.displacement = -pushed;
+  equilibrium_.displace(field.displacement);
+  field.stiffness = -pushed.cwiseProduct(field.displacement).sum();
+  field.displacement += unit;
+  field.judge = field.displacement;
+  if (!pushed.isZero(0.0)) return field;
+  const Eigen::Matrix3Xd push = unit_on_touched();
+  field.judge = push;
+  equilibrium_.displace(field.judge);
+  field.stiffness = 1.0 / push.cwiseProduct(field.judge).sum();
+  field.judge *= field.stiffness;
+  return field;
 }
 
 double DrivenTissue::held_stiffness(const Positions& position, const BondMemory& memory) const {
-  const auto column = static_cast<Eigen::Index>(probe_.sphere);
-  Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  unit.col(column) = probe_.direction;
   Eigen::Matrix3Xd pushed = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  bonds_.add_stiffness_times(position, memory, unit, pushed);
-  return pushed.col(column).dot(probe_.direction);
+  bonds_.add_stiffness_times(position, memory, unit(), pushed);
+  return along(pushed);
 }
 
 double DrivenTissue::linear_response(const TissueState& rest, double peak) {
   const BondMemory relaxed{Eigen::VectorXd::Zero(rest.elongation.size()), 1.0};
-  Eigen::Matrix3Xd field;
-  double path = 0.0;
   if (!equilibrium_.factorise(rest.position, relaxed)) return 0.0;
-  unit_field(rest, relaxed, field, path);
-  if (!depth_driven()) return path * peak;
+  const UnitField field = unit_field(rest, relaxed);
+  if (!depth_driven()) return field.stiffness * peak;
   Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  bonds_.add_stiffness_times(rest.position, relaxed, field, force);
-  return force.col(static_cast<Eigen::Index>(probe_.sphere)).dot(probe_.direction) * peak;
+  bonds_.add_stiffness_times(rest.position, relaxed, field.displacement, force);
+  return along(force) * peak;
+}
+
+void DrivenTissue::add_imposed_velocity(double rate, Eigen::Matrix3Xd& velocity) const {
+  if (!depth_driven()) return;
+  for (const Driven& d : driven_) velocity.col(d.column) += d.weight * rate * d.direction;
+}
+
+double DrivenTissue::driven_mass_kg(const Eigen::VectorXd& mass_kg) const {
+  double mass = 0.0;
+  for (const Driven& d : driven_) mass += d.weight * d.weight * mass_kg[d.column];
+  return mass;
 }
 
 }  // namespace tpm

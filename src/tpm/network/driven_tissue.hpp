@@ -12,13 +12,18 @@ struct TissueState {
   Positions position;
   Eigen::VectorXd elongation;  ///< l of each bond, m
   Eigen::VectorXd remembered;  ///< y of each bond, m
+  std::vector<char> closed;    ///< contacts, as BondMemory::closed
+
+  /// What the bonds remember at this instant.
+  [[nodiscard]] BondMemory memory() const { return {remembered, 0.0, closed}; }
 };
 
-/// A network with one sphere driven: by an imposed depth, whose response is the contact force, or
-/// by a load, whose response is the depth.
+/// A network with spheres or tools driven: by an imposed depth, whose response is the contact
+/// force, or by a load, whose response is the depth; see Probes.
 class DrivenTissue {
  public:
-  DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom, const Probe& probe,
+  /// Throws Error(bad_input) if what an imposed depth drives touches nothing at rest.
+  DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom, const Probes& probes,
                Drive drive);
   DrivenTissue(const DrivenTissue&) = delete;
   DrivenTissue& operator=(const DrivenTissue&) = delete;
@@ -26,11 +31,12 @@ class DrivenTissue {
   [[nodiscard]] TissueState at_rest(double time_s) const;
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Freedom& freedom() const { return freedom_; }
-  [[nodiscard]] const Probe& probe() const { return probe_; }
+  /// The depth, or its rate, that belongs to displacements, or velocities, of spheres and tools.
+  [[nodiscard]] double depth_of(const Eigen::Matrix3Xd& displacement) const;
   [[nodiscard]] bool depth_driven() const { return drive_ == Drive::displacement; }
   [[nodiscard]] Equilibrium& equilibrium() { return equilibrium_; }
 
-  /// Puts the driven sphere where an imposed depth wants it; under a load there is nothing to do.
+  /// Puts what is driven where an imposed depth wants it; under a load there is nothing to do.
   void impose(Positions& position, double imposed) const;
   /// Forces from outside, N.
   void load(double imposed, Eigen::Matrix3Xd& force) const;
@@ -38,7 +44,7 @@ class DrivenTissue {
   /// The same for states side by side, one imposed value each; loads are added.
   void impose(LaneMatrix& position, const LaneVector& imposed) const;
   void add_load(const LaneVector& imposed, LaneMatrix& force) const;
-  /// Puts the displacement of the driven sphere to a change of an imposed depth.
+  /// Puts the displacement of what is driven to a change of an imposed depth.
   void impose_change(LaneMatrix& displacement, const LaneVector& change) const;
 
   /// Contact force or depth, given the forces on all spheres.
@@ -49,24 +55,50 @@ class DrivenTissue {
   [[nodiscard]] LaneVector response_change(const LaneMatrix& displacement,
                                            const LaneMatrix& force) const;
 
-  /// The displacements per unit of what is imposed (probe included), from the last factorisation;
-  /// with the sign that makes them the adjoint of the response: a force R left on the free spheres
-  /// changes it by -(+) their product under an imposed depth (load).
-  void unit_field(const TissueState& state, const BondMemory& memory, Eigen::Matrix3Xd& field,
-                  double& stiffness) const;
+  /// How depths and loads lead to each other at a state.
+  struct UnitField {
+    /// The displacements per unit of what is imposed, probe included; with adjoint_sign() they are
+    /// the adjoint of the response: a force R left on the free spheres changes it by that sign
+    /// times their product.
+    Eigen::Matrix3Xd displacement;
+    /// By which errors are judged: `displacement`; where the probe touches nothing and its response
+    /// is nothing, that of a unit depth imposed on the spheres that it touched first.
+    Eigen::Matrix3Xd judge;
+    double stiffness = 0.0;  ///< work of `judge`: N/m under an imposed depth, m/N under a load
+  };
+  /// From the last factorisation, which was at this state and memory.
+  [[nodiscard]] UnitField unit_field(const TissueState& state, const BondMemory& memory) const;
   [[nodiscard]] double adjoint_sign() const { return depth_driven() ? -1.0 : 1.0; }
 
-  /// Force on the driven sphere per displacement along the probe while all others stand still, N/m.
+  /// Force on what is driven per displacement along the probe while all else stands still, N/m.
   [[nodiscard]] double held_stiffness(const Positions& position, const BondMemory& memory) const;
 
   /// Size of the response to a peak of what is imposed, with the relaxed stiffness at rest.
   [[nodiscard]] double linear_response(const TissueState& rest, double peak);
 
+  /// Speeds of what is driven where the imposed depth changes at a rate, added to velocities.
+  void add_imposed_velocity(double rate, Eigen::Matrix3Xd& velocity) const;
+  /// What the masses driven weigh in the force of a probe that moves them, kg.
+  [[nodiscard]] double driven_mass_kg(const Eigen::VectorXd& mass_kg) const;
+
  private:
+  /// A sphere or tool driven.
+  struct Driven {
+    Eigen::Index column;
+    Eigen::Vector3d direction;
+    double weight;  ///< of what is imposed
+  };
+  /// The parts of forces or displacements along what is driven, weighted and summed.
+  [[nodiscard]] double along(const Eigen::Matrix3Xd& vectors) const;
+  /// The displacements, or loads, of what is driven per unit of what is imposed.
+  [[nodiscard]] Eigen::Matrix3Xd unit() const;
+  /// The same on the spheres that are touched at rest.
+  [[nodiscard]] Eigen::Matrix3Xd unit_on_touched() const;
+
   const BondSystem& bonds_;
   Positions rest_;
   Freedom freedom_;
-  Probe probe_;
+  std::vector<Driven> driven_;
   Drive drive_;
   Equilibrium equilibrium_;
 };

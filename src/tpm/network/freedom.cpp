@@ -7,6 +7,13 @@ namespace tpm {
 Freedom::Freedom(std::size_t spheres)
     : state_(spheres, State::free), projector_(spheres, Eigen::Matrix3d::Identity()) {}
 
+Freedom Freedom::extended(std::size_t more) const {
+  Freedom all = *this;
+  all.state_.resize(size() + more, State::free);
+  all.projector_.resize(size() + more, Eigen::Matrix3d::Identity());
+  return all;
+}
+
 void Freedom::hold(std::size_t sphere) {
   state_.at(sphere) = State::held;
   projector_[sphere].setZero();

@@ -14,6 +14,9 @@ class Freedom {
   /// All spheres free.
   explicit Freedom(std::size_t spheres);
 
+  /// With more spheres after those there are, all free.
+  [[nodiscard]] Freedom extended(std::size_t more) const;
+
   /// Nothing is free any more.
   void hold(std::size_t sphere);
   /// Only the motion along a unit direction stays free.

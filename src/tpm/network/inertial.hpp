@@ -102,7 +102,7 @@ class Inertial {
   /// @param bonds must live as long as this
   /// Throws Error(bad_input) for options out of range, masses that are not positive, a probe that
   /// cannot move, and a network with zero-energy modes.
-  Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Probe probe,
+  Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Probes probes,
            Eigen::VectorXd mass_kg, InertialOptions options = {});
 
   /// @param times_s any order, finite, within the protocol; at a jump the value just after it
@@ -123,7 +123,7 @@ class Inertial {
   const BondSystem& bonds_;
   Positions rest_;
   Freedom freedom_;
-  Probe probe_;
+  Probes probes_;
   Eigen::VectorXd mass_kg_;
   InertialOptions options_;
   LowestMode lowest_;

@@ -30,7 +30,7 @@ Eigen::Index InertialEquation::size() const {
 }
 
 double InertialEquation::driven_mass_kg() const {
-  return inertia_.mass_kg[static_cast<Eigen::Index>(tissue_.probe().sphere)];
+  return tissue_.driven_mass_kg(inertia_.mass_kg);
 }
 
 void InertialEquation::set_piece(const Knot& from, const Knot& to) {
@@ -63,8 +63,7 @@ const TissueMotion& InertialEquation::unpack(double time_s, const ConstVector& s
   motion_.position = rest_ + ConstSpheres(state.data(), 3, n);
   motion_.velocity = ConstSpheres(state.data() + coordinates(), 3, n);
   tissue_.impose(motion_.position, imposed(time_s));
-  motion_.velocity.col(static_cast<Eigen::Index>(tissue_.probe().sphere)) +=
-      imposed_speed() * tissue_.probe().direction;
+  tissue_.add_imposed_velocity(imposed_speed(), motion_.velocity);
   for (const std::size_t bond : relaxing_) {
     motion_.remembered[static_cast<Eigen::Index>(bond)] = state[memory_of_[bond]];
   }
@@ -130,9 +129,7 @@ double InertialEquation::response(double time_s, const ConstVector& state) {
 Eigen::Vector3d InertialEquation::powers_W(double time_s, const ConstVector& state) {
   const double answer = response(time_s, state);  // unpacks
   const TissueMotion& now = motion_;
-  const Probe& probe = tissue_.probe();
-  const double speed =
-      now.velocity.col(static_cast<Eigen::Index>(probe.sphere)).dot(probe.direction);
+  const double speed = tissue_.depth_of(now.velocity);
   const double push = tissue_.depth_driven() ? answer : imposed(time_s);
   force_.setZero();
   add_dashpot_forces(now.position, now.velocity, force_);

@@ -12,6 +12,14 @@ namespace {
 constexpr std::size_t kSphere = std::size_t{3} * kLanes;
 constexpr std::size_t kDown = std::size_t{2} * kLanes;  // from x to z of a sphere
 
+/// The place or force of a sphere, a row a lane.
+auto columns_of(const LaneMatrix& vectors, std::uint32_t sphere) {
+  return vectors.middleCols<3>(3 * static_cast<Eigen::Index>(sphere));
+}
+auto columns_of(LaneMatrix& vectors, std::uint32_t sphere) {
+  return vectors.middleCols<3>(3 * static_cast<Eigen::Index>(sphere));
+}
+
 /// The vector from one end of a bond to the other.
 struct Span {
   std::array<double, kLanes> x, y, z, length, inverse;
@@ -53,10 +61,10 @@ using Pull = std::array<double, kSphere>;
 
 }  // namespace
 
-LaneBonds::LaneBonds(const BondSystem& bonds) {
+LaneBonds::LaneBonds(const BondSystem& bonds) : contacts_(bonds.contacts()) {
   std::vector<Data> lasting;
   std::vector<std::size_t> lasting_number;
-  for (std::size_t i = 0; i < bonds.size(); ++i) {
+  for (std::size_t i = 0; i < bonds.first_contact(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     constexpr double kNever = -std::numeric_limits<double>::infinity();
     const Data data{bonds.end_a()[i],       bonds.end_b()[i],      bonds.rest_length_m()[row],
@@ -72,6 +80,31 @@ LaneBonds::LaneBonds(const BondSystem& bonds) {
   bond_.insert(bond_.end(), lasting.begin(), lasting.end());
   number_ = relaxing_;
   number_.insert(number_.end(), lasting_number.begin(), lasting_number.end());
+}
+
+void LaneBonds::close_contacts(std::span<const char> closed) {
+  closed_.clear();
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    if (closed[i] != 0) closed_.push_back(contacts_[i]);
+  }
+}
+
+LaneBonds::Lie LaneBonds::lie(const ToolContact& contact, const LaneMatrix& position) const {
+  Lie lie;
+  const Eigen::Matrix<double, kLanes, 3> apart =
+      columns_of(position, contact.tool) - columns_of(position, contact.sphere);
+  if (contact.normal) {
+    lie.direction.rowwise() = contact.normal->transpose();
+    lie.overlap_force =
+        contact.stiffness_N_per_m * ((apart * *contact.normal).array() - contact.reach_m);
+    lie.turning.setZero();
+    return lie;
+  }
+  const LaneVector length = apart.rowwise().norm();
+  lie.direction = apart.array().colwise() / length.array();
+  lie.overlap_force = contact.stiffness_N_per_m * (length.array() - contact.reach_m);
+  lie.turning = lie.overlap_force.cwiseQuotient(length);
+  return lie;
 }
 
 Eigen::VectorXd LaneBonds::in_order(const Eigen::VectorXd& all) const {
@@ -127,6 +160,13 @@ void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
       pull_ends(pull, f + kSphere * bond.a, f + kSphere * bond.b);
     }
   });
+  for (const ToolContact& contact : closed_) {
+    const Lie now = lie(contact, position);
+    const Eigen::Matrix<double, kLanes, 3> pull =
+        now.direction.array().colwise() * now.overlap_force.array();
+    columns_of(force, contact.sphere) += pull;
+    columns_of(force, contact.tool) -= pull;
+  }
 }
 
 void LaneBonds::elongation_changes(const LaneMatrix& position, const LaneMatrix& displacement,
@@ -195,6 +235,19 @@ void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& 
       pull_ends(pull, f + kSphere * bond.a, f + kSphere * bond.b);
     }
   });
+  for (const ToolContact& contact : closed_) {
+    const Lie now = lie(contact, position);
+    const Eigen::Matrix<double, kLanes, 3> apart =
+        columns_of(displacement, contact.tool) - columns_of(displacement, contact.sphere);
+    const LaneVector along = now.direction.cwiseProduct(apart).rowwise().sum();
+    const LaneVector straight =
+        along.cwiseProduct(LaneVector::Constant(contact.stiffness_N_per_m) - now.turning);
+    const Eigen::Matrix<double, kLanes, 3> change =
+        (now.direction.array().colwise() * straight.array() +
+         apart.array().colwise() * now.turning.array());
+    columns_of(force, contact.sphere) += change;
+    columns_of(force, contact.tool) -= change;
+  }
 }
 
 }  // namespace tpm

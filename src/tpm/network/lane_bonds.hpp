@@ -6,12 +6,16 @@
 
 namespace tpm {
 
-/// The bonds of a system, working on several states of the network at once. Positions and forces
+/// The bonds of a system, working on several states of the network at once, over which the same
+/// contacts with tools are closed. Positions and forces
 /// have three columns per sphere; elongations and memories have one column per bond that relaxes,
 /// in the order of relaxing_bonds().
 class LaneBonds {
  public:
   explicit LaneBonds(const BondSystem& bonds);
+
+  /// Says which contacts are closed, as BondMemory::closed; at first none is.
+  void close_contacts(std::span<const char> closed);
 
   /// The bonds with g > 0, by their number in the system.
   [[nodiscard]] const std::vector<std::size_t>& relaxing_bonds() const { return relaxing_; }
@@ -19,7 +23,7 @@ class LaneBonds {
   /// The values that belong to relaxing bonds.
   [[nodiscard]] Eigen::VectorXd of_relaxing(const Eigen::VectorXd& all) const;
 
-  /// Values of all bonds in the order in which this works: the relaxing ones first.
+  /// Values of all bonds but contacts in the order in which this works: the relaxing ones first.
   [[nodiscard]] Eigen::VectorXd in_order(const Eigen::VectorXd& all) const;
 
   /// l of the relaxing bonds.
@@ -46,6 +50,14 @@ class LaneBonds {
     double rest_length_m, k, g;
     double least;  ///< elongation below which the bond is slack, m
   };
+  /// How a contact lies in every lane.
+  struct Lie {
+    Eigen::Matrix<double, kLanes, 3> direction;
+    LaneVector overlap_force, turning;  ///< N (negative), N/m
+  };
+  [[nodiscard]] Lie lie(const ToolContact& contact, const LaneMatrix& position) const;
+
+  std::vector<ToolContact> contacts_, closed_;
   std::vector<std::size_t> relaxing_;
   std::vector<Data> bond_;           ///< the relaxing ones first
   std::vector<std::size_t> number_;  ///< of each in the system

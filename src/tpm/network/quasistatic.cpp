@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <set>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -19,7 +21,9 @@ constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
 constexpr double kLeastMove = 1e-5;  // of a jump
 constexpr double kFirstStep = 3.0;   // after a change of rate, in relaxation times
 constexpr double kSafety = 0.8;
-constexpr double kMostGrowth = 30.0;  // from one step to the next
+constexpr double kMostGrowth = 30.0;           // from one step to the next
+constexpr double kLanded = 1.0 - 1e-6;         // of a step that was to end where a contact changes
+constexpr std::size_t kMostChangesAtOnce = 4;  // of a contact at one time
 
 /// By how much the next step may be longer. The error of smooth motion goes with a high power of
 /// the step, but behind a change of rate the motion itself calms down while steps grow: the power
@@ -47,14 +51,14 @@ class StepGrowth {
 /// One run: the state and how it is carried through the protocol.
 class Run {
  public:
-  Run(const BondSystem& bonds, const Positions& rest, const Freedom& freedom, const Probe& probe,
+  Run(const BondSystem& bonds, const Positions& rest, const Freedom& freedom, const Probes& probes,
       const QuasiStaticOptions& options, const Protocol& protocol, std::span<const double> times_s,
       const QuasiStaticObserver& observer)
       : protocol_(protocol),
         options_(options),
         times_s_(times_s),
         observer_(observer),
-        tissue_(bonds, rest, freedom, probe, protocol.drive()),
+        tissue_(bonds, rest, freedom, probes, protocol.drive()),
         stages_(tissue_, options.stages, !options.step_s) {
     order_ = rising_order(times_s);
     const auto asked = static_cast<Eigen::Index>(times_s.size());
@@ -99,10 +103,17 @@ class Run {
                     depth ? "mm" : "N", what));
   }
 
+  /// Puts the tissue at rest and sets what tolerances refer to.
+  void set_scales(double time_s) {
+    state_ = tissue_.at_rest(time_s);
+    const double unit = tissue_.linear_response(state_, 1.0);
+    stages_.set_unit_response(unit);
+    stages_.set_scale(unit * protocol_.peak());
+  }
+
   void start() {
     const Knot& first = protocol_.knots().front();
-    state_ = tissue_.at_rest(first.time_s);
-    stages_.set_scale(tissue_.linear_response(state_, protocol_.peak()));
+    set_scales(first.time_s);
     if (protocol_.relaxed_at_start()) {
       move_to(first.value, true);
     } else if (first.value != 0.0) {
@@ -112,8 +123,7 @@ class Run {
 
   /// A state is known up to the tolerance of the run that found it; its forces are balanced here.
   void start_from(const QuasiStaticState& begin) {
-    state_ = tissue_.at_rest(begin.time_s);
-    stages_.set_scale(tissue_.linear_response(state_, protocol_.peak()));
+    set_scales(begin.time_s);
     stages_.see(begin.response);
     state_.position = begin.position;
     state_.remembered = begin.remembered;
@@ -197,12 +207,14 @@ class Run {
       const bool kept = outcome.accepted || (options_.step_s && outcome.balanced);
       if (!kept) {
         ++result_.work.rejected;
+        landing_.reset();
         h *= outcome.balanced ? std::clamp(factor, 0.05, 0.9) : 0.25;
         if (h > kLeastStep * length) continue;
         throw failed(state_.imposed, outcome.unstable
                                          ? "the tissue buckles: its stiffness is no longer positive"
                                          : "the forces cannot be balanced: it may snap through");
       }
+      if (!lands_on_contact(h, length)) continue;
       if (tangents_) tangents_->follow_step(h);
       report_within(h, rate);
       if (options_.energies) {
@@ -215,8 +227,41 @@ class Run {
       if (tangents_) tangents_->accept();
       if (last) state_.time_s = to.time_s;
       state_.imposed = last ? to.value : state_.imposed;
-      h = options_.step_s ? *options_.step_s : h * std::clamp(factor, 0.2, kMostGrowth);
+      if (landing_) {
+        change_contact(landing_->contact);
+        h = landing_->step_s;
+        landing_.reset();
+        growth = StepGrowth(options_.stages + 1);
+      } else {
+        h = options_.step_s ? *options_.step_s : h * std::clamp(factor, 0.2, kMostGrowth);
+      }
     }
+  }
+
+  /// A step within which a contact with a tool closes or opens is cut to end there. False if it has
+  /// to be found again.
+  /// @param h of the step just balanced, s; of the next one to try
+  /// @param length of the piece, s
+  [[nodiscard]] bool lands_on_contact(double& h, double length) {
+    const auto change = stages_.contact_change(kStepShare * options_.tolerance);
+    if (!change) return true;
+    if (change->fraction * h <= kLeastStep * length) {
+      landing_.reset();
+      change_contact(change->contact);
+      return false;
+    }
+    if (landing_ && landing_->contact == change->contact && change->fraction > kLanded) return true;
+    landing_ = Landing{change->contact, landing_ ? landing_->step_s : h};
+    h *= change->fraction;
+    return false;
+  }
+
+  void change_contact(std::size_t contact) {
+    stages_.change_contact(state_, contact);
+    changes_at_once_ = state_.time_s == changed_at_s_ ? changes_at_once_ + 1 : 1;
+    changed_at_s_ = state_.time_s;
+    if (changes_at_once_ <= kMostChangesAtOnce * state_.closed.size()) return;
+    throw failed(state_.imposed, "contacts with a tool open and close without end");
   }
 
   [[nodiscard]] bool is_relaxed() const { return state_.remembered.isZero(0.0); }
@@ -317,6 +362,14 @@ class Run {
   DrivenTissue tissue_;
   StageBalance stages_;
   std::optional<StageTangents> tangents_;
+  /// A step that is to end where a contact closes or opens, and the length of the one before it.
+  struct Landing {
+    std::size_t contact;
+    double step_s;
+  };
+  std::optional<Landing> landing_;
+  double changed_at_s_ = -std::numeric_limits<double>::infinity();
+  std::size_t changes_at_once_ = 0;
   TissueState state_;
   QuasiStaticEnergy energy_;
   QuasiStaticRun result_;
@@ -340,7 +393,14 @@ void require_later(std::span<const double> times_s, double from_s) {
 
 }  // namespace
 
+Probes::Probes(std::vector<Probe> all) : all_(std::move(all)) {
+  if (all_.empty()) throw bad_input("probe", "there is none", "a sphere or a tool to be driven");
+}
+
 void require_valid(const Probe& probe, const Freedom& freedom) {
+  if (!(probe.share > 0.0 && std::isfinite(probe.share))) {
+    throw bad_input("probe", fmt::format("a share of {}", shortest(probe.share)), "above 0");
+  }
   if (probe.sphere >= freedom.size()) {
     throw bad_input("probe", fmt::format("sphere {}", probe.sphere + 1),
                     fmt::format("a sphere from 1 to {}", freedom.size()));
@@ -352,12 +412,22 @@ void require_valid(const Probe& probe, const Freedom& freedom) {
   }
 }
 
-QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probe probe,
+void require_valid(const Probes& probes, const Freedom& freedom) {
+  std::set<std::size_t> driven;
+  for (const Probe& probe : probes) {
+    require_valid(probe, freedom);
+    if (driven.insert(probe.sphere).second) continue;
+    throw bad_input("probe", fmt::format("sphere {} is driven twice", probe.sphere + 1),
+                    "each sphere once");
+  }
+}
+
+QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probes probes,
                          QuasiStaticOptions options)
     : bonds_(bonds),
       rest_(std::move(rest)),
       freedom_(std::move(freedom)),
-      probe_(std::move(probe)),
+      probes_(std::move(probes)),
       options_(options) {
   if (!(options.tolerance >= 1e-12 && options.tolerance <= 0.1)) {
     throw bad_input("tolerance", shortest(options.tolerance), "1e-12 to 0.1");
@@ -374,7 +444,7 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedo
   if (options.step_s && !(*options.step_s > 0.0 && std::isfinite(*options.step_s))) {
     throw bad_input("step", shortest(*options.step_s) + " s", "a time above 0");
   }
-  require_valid(probe_, freedom_);
+  require_valid(probes_, freedom_);
 }
 
 QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s,
@@ -390,7 +460,7 @@ QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double
     require_same_network(*from, bonds_);
     require_later(times_s, from->time_s);
   }
-  return Run(bonds_, rest_, freedom_, probe_, options_, protocol, times_s, observer).go(from);
+  return Run(bonds_, rest_, freedom_, probes_, options_, protocol, times_s, observer).go(from);
 }
 
 }  // namespace tpm

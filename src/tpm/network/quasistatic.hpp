@@ -2,6 +2,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/protocol/protocol.hpp"
@@ -9,15 +10,38 @@
 
 namespace tpm {
 
-/// The sphere that the protocol drives, and where to.
+/// A sphere or tool that the protocol drives, and where to.
 struct Probe {
-  std::size_t sphere = 0;
+  std::size_t sphere = 0;                                ///< column of positions
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector into the tissue
+  double share = 1.0;                                    ///< of what is imposed; see Probes
+};
+
+/// What a protocol drives, one or several at once. An imposed depth D moves each by share D, and
+/// the response is the sum of share times contact force. A load F pushes each with share F / (sum
+/// of shares), and the response is the mean depth, weighted by the shares. Either way what is
+/// imposed and the response are conjugate: their product is the work.
+class Probes {
+ public:
+  // NOLINTNEXTLINE(google-explicit-constructor): one is the usual case
+  Probes(Probe probe) : all_{std::move(probe)} {}
+  /// Throws Error(bad_input) if there is none.
+  explicit Probes(std::vector<Probe> all);
+
+  [[nodiscard]] auto begin() const { return all_.begin(); }
+  [[nodiscard]] auto end() const { return all_.end(); }
+  [[nodiscard]] const Probe& front() const { return all_.front(); }
+  [[nodiscard]] std::size_t size() const { return all_.size(); }
+
+ private:
+  std::vector<Probe> all_;
 };
 
 /// Throws Error(bad_input) unless the probe's sphere exists and is free to move along its
-/// direction.
+/// direction, and its share is above 0.
 void require_valid(const Probe& probe, const Freedom& freedom);
+/// The same for each, and none may be driven twice.
+void require_valid(const Probes& probes, const Freedom& freedom);
 
 /// A direction in which material and imposed history may change: a run can answer derivatives. They
 /// are found to an accuracy in parts of the response: choose units that make them of its size.
@@ -47,6 +71,7 @@ struct QuasiStaticWork {
   int iterations = 0;  ///< of all stages of a step at once
   int factorisations = 0;
   int back_solves = 0;
+  int contact_changes = 0;  ///< contacts with tools that closed or opened between steps
 };
 
 /// Where the energy went. In exact arithmetic work = stored + dissipated.
@@ -84,12 +109,16 @@ struct QuasiStaticRun {
 /// which what the bonds remember is advanced exactly; the stages are balanced together with one
 /// factorisation, that many steps share. Steps follow an estimate of the error of the response,
 /// found with the displacement field of the probe as its own adjoint.
+///
+/// Over a step the same contacts with tools are closed; a step in which one would change ends
+/// there.
 class QuasiStatic {
  public:
+  /// @param rest of spheres and tools
   /// @param freedom of the network without the probe: what is held and guided
   /// @param bonds must live as long as this
   /// Throws Error(bad_input) for options out of range or a probe that cannot move.
-  QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probe probe,
+  QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probes probes,
               QuasiStaticOptions options = {});
 
   /// @param times_s any order, within the protocol
@@ -107,7 +136,7 @@ class QuasiStatic {
   const BondSystem& bonds_;
   Positions rest_;
   Freedom freedom_;
-  Probe probe_;
+  Probes probes_;
   QuasiStaticOptions options_;
 };
 

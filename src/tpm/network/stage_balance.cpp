@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/math/quadrature/gauss.hpp>
+#include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <limits>
 
@@ -23,6 +24,15 @@ constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the f
 std::vector<double> with_start(std::vector<double> nodes) {
   nodes.insert(nodes.begin(), 0.0);
   return nodes;
+}
+
+/// Where a function that is below 0 at `from` and above at `to` crosses it.
+template <class Function>
+double root_between(const Function& function, double from, double to) {
+  std::uintmax_t most = 100;
+  return boost::math::tools::toms748_solve(function, from, to,
+                                           boost::math::tools::eps_tolerance<double>(), most)
+      .first;
 }
 
 Eigen::Map<const Eigen::RowVectorXd> by_coordinate(const Eigen::Matrix3Xd& vectors) {
@@ -72,6 +82,7 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   state.position = std::move(position);
   tissue_.bonds().elongations(state.position, state.elongation);
   if (relaxed) state.remembered = state.elongation;
+  state.closed = tissue_.bonds().closed_contacts(state.position);
   return TissueMove::done;
 }
 
@@ -103,17 +114,18 @@ void StageBalance::set_weights(double z) {
 bool StageBalance::refactorise(const TissueState& state, double following) {
   following_ = following;
   // The same memory at this instant, of which a share follows.
-  const BondMemory memory{state.remembered - following * state.elongation, following};
+  const BondMemory memory{state.remembered - following * state.elongation, following, state.closed};
   ++work_.factorisations;
   Equilibrium& equilibrium = tissue_.equilibrium();
   factorised_ = equilibrium.factorise(state.position, memory) && equilibrium.is_stable();
   if (!factorised_) return false;
   factor_.copy(equilibrium.factor());
-  tissue_.unit_field(state, memory, field_, path_stiffness_);
-  lane_field_ = by_coordinate(field_);
+  const DrivenTissue::UnitField field = tissue_.unit_field(state, memory);
+  path_stiffness_ = field.stiffness;
+  lane_field_ = by_coordinate(field.displacement);
   ++work_.back_solves;
   Eigen::VectorXd change;
-  tissue_.bonds().elongation_changes(state.position, field_, change);
+  tissue_.bonds().elongation_changes(state.position, field.judge, change);
   goal_ =
       tissue_.adjoint_sign() * bonds_.of_relaxing(change.cwiseProduct(tissue_.bonds().relaxing()));
   grain_ = kGrains * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
@@ -215,6 +227,8 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
     outcome.unstable = true;
     return outcome;
   }
+  closed_ = state.closed;
+  bonds_.close_contacts(closed_);
   start_ = by_coordinate(state.position);
   start_elongation_ = bonds_.of_relaxing(state.elongation).transpose();
   start_memory_ = bonds_.of_relaxing(state.remembered).transpose();
@@ -231,6 +245,54 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   outcome.accepted =
       balanced == Balance::found && outcome.error <= std::max(outcome.allowed, grain_);
   return outcome;
+}
+
+double StageBalance::gap_m(const ToolContact& contact, double fraction) const {
+  const Eigen::RowVectorXd shape = full_.interpolation(fraction).tail(stages_).transpose();
+  const auto place = [&](std::uint32_t column) -> Eigen::RowVector3d {
+    const Eigen::Index first = 3 * static_cast<Eigen::Index>(column);
+    const Eigen::RowVector3d start = start_.segment<3>(first);
+    return start + shape * (x_.middleCols<3>(first).topRows(stages_).rowwise() - start);
+  };
+  return contact_gap_m(contact, place(contact.sphere).transpose(), place(contact.tool).transpose());
+}
+
+std::optional<ContactChange> StageBalance::contact_change(double tolerance) const {
+  const auto& contacts = tissue_.bonds().contacts();
+  // Errors of force and length that change the response by the tolerance.
+  const double of_response = tolerance * scale_;
+  const double of_imposed = of_response / unit_response_;
+  const double length = tissue_.depth_driven() ? of_imposed : of_response;
+  const double force = tissue_.depth_driven() ? of_response : of_imposed;
+  std::optional<ContactChange> first;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const bool closed = closed_[i] != 0;
+    // How far on the wrong side it is: a closed contact that pulls, an open one that overlaps.
+    const auto wrong = [&](double fraction) {
+      const double gap = gap_m(contacts[i], fraction);
+      return closed ? gap : -gap;
+    };
+    const double allowed = closed ? force / contacts[i].stiffness_N_per_m : length;
+    double before = 0.0;
+    for (int stage = 0; stage < stages_; ++stage) {
+      const double at = node(stage);
+      if (first && before >= first->fraction) break;
+      if (wrong(at) > allowed) {
+        const double crossing = wrong(before) < 0.0 ? root_between(wrong, before, at) : before;
+        if (!first || crossing < first->fraction) first = ContactChange{i, crossing};
+        break;
+      }
+      before = at;
+    }
+  }
+  return first;
+}
+
+void StageBalance::change_contact(TissueState& state, std::size_t contact) {
+  state.closed[contact] = state.closed[contact] != 0 ? 0 : 1;
+  ++work_.contact_changes;
+  factorised_ = false;
+  has_last_ = false;
 }
 
 StageBalance::Shapes StageBalance::shapes(std::span<const double> fractions, double z) const {

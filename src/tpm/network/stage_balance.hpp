@@ -1,6 +1,7 @@
 #pragma once
 // The inside of QuasiStatic: the balance of the stages of a step.
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "tpm/network/driven_tissue.hpp"
@@ -21,6 +22,12 @@ struct StepOutcome {
   double allowed = 0.0;  ///< in the same unit
 };
 
+/// Where in a step a contact with a tool closes or opens.
+struct ContactChange {
+  std::size_t contact = 0;
+  double fraction = 0.0;  ///< of the step, 0 to 1
+};
+
 /// Balances the stages of a step together, side by side in lanes: a fixed-point iteration with one
 /// factorisation, with Anderson acceleration. Lanes beyond the last stage repeat it.
 class StageBalance {
@@ -32,6 +39,8 @@ class StageBalance {
   /// Size of the response that tolerances are parts of: at least `least`, N or m.
   void set_scale(double least) { scale_ = std::abs(least); }
   void see(double response) { scale_ = std::max(scale_, std::abs(response)); }
+  /// Response per unit of what is imposed: turns tolerances of forces into such of lengths.
+  void set_unit_response(double response) { unit_response_ = std::abs(response); }
   [[nodiscard]] const QuasiStaticWork& work() const { return work_; }
 
   /// An equilibrium at another imposed value, at once or relaxed; the state moves if it is done.
@@ -41,6 +50,11 @@ class StageBalance {
   /// @param tolerance of its error, in parts of the scale
   [[nodiscard]] StepOutcome try_step(const TissueState& state, double h, double rate,
                                      double tolerance);
+  /// The first contact that was not, in the step just balanced, what it is at the step's start.
+  /// @param tolerance of the response, in parts of the scale
+  [[nodiscard]] std::optional<ContactChange> contact_change(double tolerance) const;
+  /// Closes an open contact or opens a closed one.
+  void change_contact(TissueState& state, std::size_t contact);
   /// The responses at fractions of the step just balanced.
   /// @param fractions in [0, 1], at most kLanes of them
   [[nodiscard]] LaneVector responses_within(const TissueState& state,
@@ -91,6 +105,8 @@ class StageBalance {
   /// The forces left on the free spheres of every stage, and from them the next correction.
   void residuals();
   void update_memory();
+  /// Gap of a contact at a fraction of the step just balanced, m.
+  [[nodiscard]] double gap_m(const ToolContact& contact, double fraction) const;
   /// Estimate for the stages as they are, in the unit of the response.
   [[nodiscard]] double error() const;
 
@@ -105,18 +121,19 @@ class StageBalance {
   Anderson anderson_;
   QuasiStaticWork work_;
   double scale_ = 0.0;
+  double unit_response_ = 0.0;
 
   // The factorisation in use.
   bool factorised_ = false;
   double following_ = 0.0;
   int last_iterations_ = 0;
-  Eigen::Matrix3Xd field_;         ///< displacement per unit imposed
-  Eigen::RowVectorXd lane_field_;  ///< the same, by coordinate
+  Eigen::RowVectorXd lane_field_;  ///< displacement per unit imposed, by coordinate
   Eigen::VectorXd goal_;           ///< change of the response per change of each bond's y
   double path_stiffness_ = 0.0;    ///< bounds a response by the energy of an imbalance
   double grain_ = 0.0;             ///< what rounding of positions does to the response, N or m
 
   // The step being balanced, stages in lanes.
+  std::vector<char> closed_;  ///< contacts
   Eigen::RowVectorXd start_;  ///< positions where it begins, by coordinate
   Eigen::RowVectorXd start_elongation_, start_memory_;  ///< of relaxing bonds
   LaneMatrix x_, d_, force_;

@@ -113,6 +113,7 @@ void StageTangents::end_at(Tangent& tangent, Eigen::Index lane) const {
 
 void StageTangents::follow_move(const TissueState& state, bool relaxed) {
   balance_.require_factor(state, relaxed ? 1.0 : 0.0);
+  balance_.bonds_.close_contacts(state.closed);
   const Stages stages = at_once(state, relaxed);
   for (Tangent& tangent : tangent_) {
     solve(tangent, stages);

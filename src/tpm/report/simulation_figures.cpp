@@ -48,21 +48,40 @@ std::string roughness_words(const std::optional<Smoothness>& found) {
   return fmt::format("{}, {} at the rim", near, significant(*found->at_rim, 4));
 }
 
+/// The tools of a network where they stand.
+/// @param position of spheres and tools
+Json tools_json(const DrivenNetwork& network, const Positions& position) {
+  const auto list_of = [](const Eigen::Vector3d& v) {
+    return Json{rounded(v.x(), kDigits), rounded(v.y(), kDigits), rounded(v.z(), kDigits)};
+  };
+  Json tools = Json::array();
+  for (std::size_t i = 0; i < network.tools.size(); ++i) {
+    const Tool& tool = network.tools[i].tool;
+    tools.push_back({{"kind", tool.shape.kind == ToolKind::sphere ? "ball" : "punch"},
+                     {"radius_m", tool.shape.radius_m},
+                     {"direction", list_of(tool.direction)},
+                     {"position_m", list_of(position.col(network.column_of_tool(i)))}});
+  }
+  return tools;
+}
+
 /// The network as it is at the last output.
 Json state_json(const FiguredRun& figured) {
   const QuasiStaticState& state = figured.run->record.outputs.back();
-  const Eigen::Matrix3Xd moved = displacements_m(figured.network->network.organ, state);
+  const Positions position = figured.network->spheres(state.position);
+  const Eigen::Matrix3Xd moved = displacements_m(*figured.network, state);
   const Eigen::VectorXd lengths = moved.colwise().norm();
-  const Eigen::VectorXd force = bond_forces_N(figured.network->bonds, state);
+  const Eigen::VectorXd force = bond_forces_N(figured.network->driven.bonds, state);
   Json json{{"name", name_of(figured)},
             {"time_s", rounded(state.time_s, kDigits)},
-            {"position_m", rows_json(state.position)},
+            {"position_m", rows_json(position)},
+            {"tools", tools_json(figured.network->driven, state.position)},
             {"displacement_mm", list_json(lengths, 1e-3)},
             {"bond_force_mN", list_json(force, 1e-3)}};
   json["largest_bond_force_mN"] =
       list_json(largest_bond_forces_N(figured.network->network, force), 1e-3);
   json["validity"] =
-      ValidityWatch(figured.scene->tissue.network, figured.scene->probe).flags(state.position);
+      ValidityWatch(figured.scene->tissue.network, figured.scene->probe()).flags(state.position);
   const bool depth = figured.scene->protocol.drive() == Drive::displacement;
   const double depth_m = depth ? state.imposed : state.response;
   const double force_N = depth ? state.response : state.imposed;
@@ -100,7 +119,7 @@ Figure response_figure(const std::vector<FiguredRun>& runs) {
   figure.id = "response";
   figure.title = runs.front().scene->tissue.title;
   figure.caption =
-      fmt::format("Sphere {} of {}, computed by tpm {}", runs.front().scene->probe.sphere + 1,
+      fmt::format("Sphere {} of {}, computed by tpm {}", runs.front().scene->probe().sphere + 1,
                   runs.front().scene->tissue.network.organ.size(), version());
   figure.panels = {panel_of(runs, true), panel_of(runs, false)};
   return figure;
@@ -113,8 +132,9 @@ Json deformation_pictures(const std::vector<FiguredRun>& runs) {
       "model: computed by tpm {}, scene {}; {} spheres, {} bonds, deformation not magnified",
       version(), sha256_hex(scene.text).substr(0, 12), scene.tissue.network.organ.size(),
       scene.tissue.network.bonds.size());
-  const Eigen::Vector3d& d = scene.probe.direction;
-  json["contact"] = scene.probe.sphere;
+  const Eigen::Vector3d& d = scene.probe().direction;
+  json["contact"] = scene.probe().sphere;
+  json["tools"] = tools_json(runs.front().network->driven, runs.front().network->driven.rest);
   json["direction"] = {d.x(), d.y(), d.z()};
   json["states"] = Json::array();
   for (const FiguredRun& figured : runs) json["states"].push_back(state_json(figured));

@@ -62,6 +62,75 @@ Json energy_json(const SimulationRun& run) {
           {"dissipated_J", rounded(e.dissipated_J, kDigits)}};
 }
 
+/// What the contacts are, and the state of the tools among them at the last output.
+Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
+                   const SimulationRun& run) {
+  const auto states = tool_states(network.driven, run.record.outputs.back().position);
+  std::size_t tool = 0;
+  Json list = Json::array();
+  for (const SceneContact& contact : scene.contacts) {
+    const Eigen::Vector3d& d = contact.probe.direction;
+    Json json{{"kind", word_of(contact.kind)},
+              {"sphere", contact.probe.sphere + 1},
+              {"direction", {rounded(d.x(), 9), rounded(d.y(), 9), rounded(d.z(), 9)}},
+              {"share", contact.probe.share}};
+    if (contact.kind != ContactKind::sphere) json["radius_m"] = contact.radius_m;
+    if (contact.kind == ContactKind::patch) {
+      json["spheres"] = spheres_of(contact, scene.tissue.network.organ).size();
+    }
+    if (contact.is_tool()) {
+      const ToolState& state = states[tool];
+      const auto list_of = [](const Eigen::Vector3d& v) {
+        return Json{rounded(v.x(), kDigits), rounded(v.y(), kDigits), rounded(v.z(), kDigits)};
+      };
+      json["contact_stiffness_N_per_m"] =
+          rounded(network.driven.tools[tool].stiffness_N_per_m, kDigits);
+      json["last"] = {{"position_m", list_of(state.position)},
+                      {"force_on_tissue_N", list_of(state.force)},
+                      {"touching", state.touching},
+                      {"overlap_m", rounded(state.overlap_m, 3)}};
+      ++tool;
+    }
+    list.push_back(json);
+  }
+  return list;
+}
+
+std::string contacts_text(const ExperimentScene& scene, const RunNetwork& network,
+                          const SimulationRun& run) {
+  const auto states = tool_states(network.driven, run.record.outputs.back().position);
+  std::size_t tool = 0;
+  std::string text;
+  for (const SceneContact& contact : scene.contacts) {
+    if (contact.kind == ContactKind::sphere && scene.contacts.size() == 1) continue;
+    text += fmt::format("{}", word_of(contact.kind));
+    if (contact.kind != ContactKind::sphere) {
+      text += fmt::format(" of {} mm radius", significant(1e3 * contact.radius_m, 4));
+    }
+    text += fmt::format(" at sphere {}", contact.probe.sphere + 1);
+    if (contact.probe.share != 1.0) {
+      text += contact.probe.share == 0.0 ? std::string(", standing still")
+                                         : fmt::format(", share {}", shortest(contact.probe.share));
+    }
+    if (contact.kind == ContactKind::patch) {
+      text += fmt::format(": {} spheres", spheres_of(contact, scene.tissue.network.organ).size());
+    }
+    if (contact.is_tool()) {
+      const ToolState& state = states[tool++];
+      text += fmt::format(": at the end it touches {} sphere{} with {} N", state.touching,
+                          state.touching == 1 ? "" : "s", significant(state.force.norm(), 6));
+    }
+    text += "\n";
+  }
+  double overlap = 0.0;
+  for (const CurvePoint& p : run.record.curve) overlap = std::max(overlap, p.overlap_m);
+  if (tool > 0) {
+    text += fmt::format("tools come into spheres by at most {} um: contacts are stiff, not rigid\n",
+                        significant(1e6 * overlap, 3));
+  }
+  return text;
+}
+
 Json smoothness_json(const std::optional<Smoothness>& smoothness) {
   if (!smoothness) return nullptr;
   Json json{{"near_contact", rounded(smoothness->near_contact, kDigits)},
@@ -126,11 +195,11 @@ std::string equations_text(const ExperimentScene& scene, const SimulationRun& ru
 
 }  // namespace
 
-Json simulation_json(const ExperimentScene& scene, const SimulationRun& run) {
+Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
+                     const SimulationRun& run) {
   const Formulation& f = scene.formulation;
   const SimulationRecord& record = run.record;
   const bool depth = by_depth(scene);
-  const Eigen::Vector3d& d = scene.probe.direction;
   Json json{{"title", scene.tissue.title},
             {"version", version()},
             {"scene_sha256", sha256_hex(scene.text)},
@@ -139,9 +208,7 @@ Json simulation_json(const ExperimentScene& scene, const SimulationRun& run) {
             {"tolerance", f.tolerance},
             {"spheres", scene.tissue.network.organ.size()},
             {"bonds", scene.tissue.network.bonds.size()},
-            {"contact",
-             {{"sphere", scene.probe.sphere + 1},
-              {"direction", {rounded(d.x(), 9), rounded(d.y(), 9), rounded(d.z(), 9)}}}},
+            {"contacts", contacts_json(scene, network, run)},
             {"imposed", depth ? "depth_m" : "load_N"},
             {"response", depth ? "force_N" : "depth_m"}};
   const auto point = [](const CurvePoint& p) {
@@ -162,7 +229,8 @@ Json simulation_json(const ExperimentScene& scene, const SimulationRun& run) {
   return json;
 }
 
-std::string simulation_text(const ExperimentScene& scene, const SimulationRun& run) {
+std::string simulation_text(const ExperimentScene& scene, const RunNetwork& network,
+                            const SimulationRun& run) {
   const SimulationRecord& record = run.record;
   const bool depth = by_depth(scene);
   const auto response = [&](const CurvePoint& p) {
@@ -172,8 +240,9 @@ std::string simulation_text(const ExperimentScene& scene, const SimulationRun& r
                                significant(p.imposed, 4));
   };
   std::string text =
-      fmt::format("{}: sphere {} of {} is {}\n", scene.tissue.title, scene.probe.sphere + 1,
+      fmt::format("{}: sphere {} of {} is {}\n", scene.tissue.title, scene.probe().sphere + 1,
                   scene.tissue.network.organ.size(), depth ? "pushed to a depth" : "loaded");
+  text += contacts_text(scene, network, run);
   text += equations_text(scene, run);
   if (run.resumed_at_s) {
     text += fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -17,19 +16,12 @@ namespace {
 
 enum class ProtocolKind { ramp_hold, step_hold, creep, knots };
 
-/// A kind of protocol and the keys that speak of it.
-struct ProtocolKeys {
-  ProtocolKind meaning;
-  std::string_view text;
-  std::vector<std::string_view> keys;
-};
-
-const std::array<ProtocolKeys, 4>& protocol_kinds() {
-  static const std::array<ProtocolKeys, 4> kinds{{
-      {ProtocolKind::ramp_hold, "ramp_hold", {"depth", "rate", "hold"}},
-      {ProtocolKind::step_hold, "step_hold", {"depth", "hold"}},
-      {ProtocolKind::creep, "creep", {"load", "duration"}},
-      {ProtocolKind::knots, "knots", {"knots"}},
+const std::array<KindKeys<ProtocolKind>, 4>& protocol_kinds() {
+  static const std::array<KindKeys<ProtocolKind>, 4> kinds{{
+      {ProtocolKind::ramp_hold, "ramp_hold", {"depth", "rate", "hold"}, {}},
+      {ProtocolKind::step_hold, "step_hold", {"depth", "hold"}, {}},
+      {ProtocolKind::creep, "creep", {"load", "duration"}, {}},
+      {ProtocolKind::knots, "knots", {"knots"}, {}},
   }};
   return kinds;
 }
@@ -43,29 +35,6 @@ constexpr auto kSpringWords = std::to_array<Word<SpringRule>>(
 
 constexpr int kUsualOutputs = 61;
 constexpr double kMostOutputs = 100'000;
-
-void require_keys_of(const Json& block, const ProtocolKeys& kind, const DocumentPlace& place) {
-  for (const auto& [key, value] : block.items()) {
-    if (key == "kind" || std::find(kind.keys.begin(), kind.keys.end(), key) != kind.keys.end()) {
-      continue;
-    }
-    throw bad_input(place.key(key).where, fmt::format("is no key of the kind '{}'", kind.text),
-                    fmt::format("{}", fmt::join(kind.keys, ", ")));
-  }
-  for (const std::string_view key : kind.keys) {
-    if (block.contains(key)) continue;
-    throw bad_input(place.key(key).where, "is missing",
-                    fmt::format("'{}' needs {}", kind.text, fmt::join(kind.keys, ", ")));
-  }
-}
-
-double positive_at(const Json& block, const char* key, Dimension dimension,
-                   const DocumentPlace& place) {
-  const double value = quantity_at(block, key, dimension, place);
-  if (value > 0.0) return value;
-  throw bad_input(place.key(key).where, fmt::format("{} {}", shortest(value), si_symbol(dimension)),
-                  "a value above 0");
-}
 
 double hold_at(const Json& block, const DocumentPlace& place) {
   const double hold = quantity_at(block, "hold", Dimension::time, place);
@@ -140,66 +109,16 @@ std::vector<double> spaced_times(double spacing, const Protocol& protocol,
   return times;
 }
 
-/// The sphere nearest to a point that lies on or in the organ.
-std::size_t sphere_at(const Json& point, const Organ& organ, const DocumentPlace& place) {
-  const Eigen::Vector3d at = parse_point(point, place);
-  std::size_t nearest = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < organ.size(); ++i) {
-    const double away = (organ.position.col(static_cast<Eigen::Index>(i)) - at).norm();
-    if (!(away < least)) continue;
-    nearest = i;
-    least = away;
-  }
-  if (least <= organ.spacing) return nearest;
-  throw bad_input(place.where,
-                  fmt::format("lies outside the organ, {} mm from its nearest sphere ({})",
-                              significant(1e3 * least, 4), nearest + 1),
-                  fmt::format("a point within a spacing, {} mm, of a sphere",
-                              significant(1e3 * organ.spacing, 4)));
-}
-
-std::size_t driven_sphere(const Json& contact, const Organ& organ, const DocumentPlace& place) {
-  if (contact.contains("number") && contact.contains("at")) {
-    throw bad_input(place.where, "says where twice", "either 'number' or 'at'");
-  }
-  if (contact.contains("number")) {
-    return parse_sphere(contact.at("number"), organ, place.key("number"));
-  }
-  if (contact.contains("at")) return sphere_at(contact.at("at"), organ, place.key("at"));
-  if (organ.contact) return *organ.contact;
-  throw bad_input(place.where, "names no sphere, and the organ has no contact",
-                  "a key 'number', such as 71");
-}
-
 }  // namespace
 
 std::string_view word_of(FormulationKind kind) {
   return entry_of(kFormulationWords, kind).text;
 }
 
-Probe parse_contacts(const Json& contacts, const Tissue& tissue, const DocumentPlace& place) {
-  const DocumentPlace here = place.key("0");
-  const Json& contact = contacts.front();
-  const Organ& organ = tissue.network.organ;
-  Probe probe;
-  probe.sphere = driven_sphere(contact, organ, here);
-  probe.direction = -organ.normal.col(static_cast<Eigen::Index>(probe.sphere));
-  if (contact.contains("direction")) {
-    const auto d = contact.at("direction").get<std::array<double, 3>>();
-    probe.direction = Eigen::Vector3d(d[0], d[1], d[2]).stableNormalized();
-    if (probe.direction.norm() < 0.5) {
-      throw bad_input(here.key("direction").where, "has no length", "a direction");
-    }
-  }
-  require_loadable(tissue, probe.sphere, probe.direction, here.where);
-  return probe;
-}
-
 Protocol parse_scene_protocol(const Json& block, const DocumentPlace& place) {
   const auto name = block.at("kind").get<std::string>();
-  const ProtocolKeys& kind = *find_entry(protocol_kinds(), name);  // one of the schema's
-  require_keys_of(block, kind, place);
+  const KindKeys<ProtocolKind>& kind = *find_entry(protocol_kinds(), name);  // the schema knows it
+  require_keys_of(block, kind.text, kind.needed, kind.allowed, place);
   switch (kind.meaning) {
     case ProtocolKind::ramp_hold:
       return ramp_and_hold(positive_at(block, "depth", Dimension::length, place),
@@ -215,23 +134,6 @@ Protocol parse_scene_protocol(const Json& block, const DocumentPlace& place) {
       break;
   }
   return protocol_of_knots(block.at("knots"), place.key("knots"));
-}
-
-double tissue_behind_m(const Organ& organ, const Probe& probe) {
-  const Eigen::VectorXd along = organ.position.transpose() * probe.direction;
-  const double room = along.maxCoeff() - along[static_cast<Eigen::Index>(probe.sphere)];
-  return room > 0.0 ? room : std::numeric_limits<double>::infinity();
-}
-
-void require_within(const Protocol& protocol, const Probe& probe, const Tissue& tissue,
-                    const DocumentPlace& place) {
-  if (protocol.drive() == Drive::force) return;
-  const double room = tissue_behind_m(tissue.network.organ, probe);
-  if (protocol.peak() < room) return;
-  throw bad_input(place.where,
-                  fmt::format("a depth of {} mm", significant(1e3 * protocol.peak(), 4)),
-                  fmt::format("less than the {} mm of tissue behind sphere {}",
-                              significant(1e3 * room, 4), probe.sphere + 1));
 }
 
 Formulation parse_formulation(const Json& block, const DocumentPlace& place) {

@@ -1,21 +1,40 @@
 #pragma once
 // Parts of parse_experiment, one per block of a scene that says what is done to the tissue.
 // All throw Error(bad_input) with the key; all are given blocks that the schema has accepted.
+#include "tpm/core/units.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/store/document_place.hpp"
 
 namespace tpm {
 
-/// Block `contacts`: the sphere that is driven, and its direction.
-[[nodiscard]] Probe parse_contacts(const Json& contacts, const Tissue& tissue,
-                                   const DocumentPlace& place);
+/// A kind of block, and the keys that go with it.
+template <class Kind>
+struct KindKeys {
+  Kind meaning;
+  std::string_view text;
+  std::vector<std::string_view> needed, allowed;
+};
+
+/// Throws unless a block has the keys that its kind needs, and no others but `kind` and those
+/// allowed.
+void require_keys_of(const Json& block, std::string_view kind,
+                     const std::vector<std::string_view>& needed,
+                     const std::vector<std::string_view>& allowed, const DocumentPlace& place);
+
+/// A quantity that is above 0.
+[[nodiscard]] double positive_at(const Json& block, const char* key, Dimension dimension,
+                                 const DocumentPlace& place);
+
+/// Block `contacts`. At least one of them is driven.
+[[nodiscard]] std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tissue,
+                                                       const DocumentPlace& place);
 
 /// Block `protocol`. The kinds and keys are those of fit configurations, with depth and duration.
 [[nodiscard]] Protocol parse_scene_protocol(const Json& block, const DocumentPlace& place);
 
-/// Throws unless what is imposed leaves the probe inside the organ.
-void require_within(const Protocol& protocol, const Probe& probe, const Tissue& tissue,
-                    const DocumentPlace& place);
+/// Throws unless what is imposed leaves every contact inside the organ and no tool pulls.
+void require_possible(const Protocol& protocol, const std::vector<SceneContact>& contacts,
+                      const Tissue& tissue, const DocumentPlace& place);
 
 /// Block `formulation`, without the tolerance.
 [[nodiscard]] Formulation parse_formulation(const Json& block, const DocumentPlace& place);

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,14 +39,46 @@ struct Outputs {
   bool remembered = false;
 };
 
+/// How something meets the tissue.
+enum class ContactKind {
+  sphere,  ///< one sphere is driven itself, as in the paper
+  patch,   ///< those of its layer within a radius are driven together
+  ball,    ///< a rigid ball presses
+  punch,   ///< a rigid flat punch presses
+};
+
+/// One of the contacts of a scene.
+struct SceneContact {
+  ContactKind kind = ContactKind::sphere;
+  /// The sphere that is driven or aimed at, the direction, and the share of what is imposed (0: a
+  /// tool that stands still).
+  Probe probe;
+  double radius_m = 0.0;                    ///< of patch, ball or punch
+  std::optional<double> stiffness_N_per_m;  ///< of a tool's contacts
+  std::optional<double> mass_kg;            ///< of a tool
+
+  [[nodiscard]] bool is_tool() const {
+    return kind == ContactKind::ball || kind == ContactKind::punch;
+  }
+};
+
+/// The word for it in scenes and results.
+[[nodiscard]] std::string_view word_of(ContactKind kind);
+
+/// The spheres that a contact of the kinds `sphere` and `patch` drives, rising.
+[[nodiscard]] std::vector<std::size_t> spheres_of(const SceneContact& contact, const Organ& organ);
+
 /// A tissue and what is done to it.
 struct ExperimentScene {
   Tissue tissue;
-  Probe probe;
+  std::vector<SceneContact> contacts;  ///< the first is driven; results are shown from there
   Protocol protocol;
   Formulation formulation;
   Outputs outputs;
   std::string text;  ///< of the scene, for the record
+
+  /// The sphere that the first contact drives or aims at, and where to.
+  [[nodiscard]] const Probe& probe() const { return contacts.front().probe; }
 };
 
 /// How far the organ reaches behind the probe, along its direction, m; infinite where the probe

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -75,6 +76,11 @@ std::array<TangentDirection, kBasis> basis_directions(const Network& network,
 
 Probe probe_of(const Tissue& tissue) {
   const Organ& organ = tissue.network.organ;
+  const auto& unused = tissue.unused_blocks;
+  if (std::find(unused.begin(), unused.end(), "contacts") != unused.end()) {
+    throw bad_input("scene", "has a block 'contacts'",
+                    "none: as a model the organ is driven at its contact sphere");
+  }
   if (!organ.contact) {
     throw bad_input("scene", "the organ has no contact sphere",
                     "one where the probe of the experiments stands");

@@ -146,8 +146,9 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
   file.numbers("/bonds", {static_cast<double>(latest.remembered.size())});
   std::vector<double> curve;
   for (const CurvePoint& p : record.curve) {
-    curve.insert(curve.end(), {p.time_s, p.imposed, p.response, p.energy.work_J,
-                               p.energy.dissipated_J, p.energy.stored_J});
+    curve.insert(curve.end(),
+                 {p.time_s, p.imposed, p.response, p.energy.work_J, p.energy.dissipated_J,
+                  p.energy.stored_J, static_cast<double>(p.touching), p.overlap_m});
   }
   file.numbers("/curve", curve);
   file.numbers("/error_estimate", {record.error_estimate});
@@ -176,10 +177,12 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   const auto spheres = static_cast<std::size_t>(lists.list("/spheres", 0).front());
   const auto bonds = static_cast<std::size_t>(lists.list("/bonds", 0).front());
   Checkpoint checkpoint;
-  const std::vector<double> curve = lists.list("/curve", 6);
-  for (std::size_t i = 0; i + 6 <= curve.size(); i += 6) {
+  constexpr std::size_t kColumns = 8;
+  const std::vector<double> curve = lists.list("/curve", kColumns);
+  for (std::size_t i = 0; i + kColumns <= curve.size(); i += kColumns) {
     const double* p = &curve[i];
-    checkpoint.record.curve.push_back({p[0], p[1], p[2], {p[3], p[4], p[5]}});
+    checkpoint.record.curve.push_back(
+        {p[0], p[1], p[2], {p[3], p[4], p[5]}, static_cast<int>(p[6]), p[7]});
   }
   checkpoint.record.outputs = lists.states("/outputs", spheres, bonds);
   checkpoint.record.validity = read_validity(lists);

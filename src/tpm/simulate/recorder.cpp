@@ -26,13 +26,14 @@ std::vector<double> times_to_watch(const ExperimentScene& scene) {
   return times;
 }
 
-Recorder::Recorder(const ExperimentScene& scene, const SimulationControls& controls,
-                   std::size_t parts)
+Recorder::Recorder(const ExperimentScene& scene, const RunNetwork& network,
+                   const SimulationControls& controls, std::size_t parts)
     : scene_(scene),
+      network_(network),
       controls_(controls),
       parts_(parts),
       identity_(checkpoint_identity(scene)),
-      watch_(scene.tissue.network, scene.probe),
+      watch_(scene.tissue.network, scene.probe()),
       times_(times_to_watch(scene)),
       saved_(Clock::now()) {}
 
@@ -59,8 +60,15 @@ std::span<const double> Recorder::next_part() const {
 
 void Recorder::see(const QuasiStaticState& state) {
   require_within(state);
-  record_.curve.push_back(
-      {state.time_s, state.imposed, state.response, state.energy.value_or(QuasiStaticEnergy{})});
+  require_expected_contacts(network_.driven, state.position, network_.network.organ.radius,
+                            state.time_s);
+  CurvePoint point{state.time_s, state.imposed, state.response,
+                   state.energy.value_or(QuasiStaticEnergy{})};
+  for (const ToolState& tool : tool_states(network_.driven, state.position)) {
+    point.touching += tool.touching;
+    point.overlap_m = std::max(point.overlap_m, tool.overlap_m);
+  }
+  record_.curve.push_back(point);
   const std::vector<double>& wanted = scene_.outputs.times_s;
   if (std::binary_search(wanted.begin(), wanted.end(), state.time_s)) {
     record_.outputs.push_back(state);
@@ -75,14 +83,14 @@ void Recorder::see(const QuasiStaticState& state) {
 /// Linear springs carry any load, somewhere.
 void Recorder::require_within(const QuasiStaticState& state) const {
   if (scene_.protocol.drive() == Drive::displacement) return;
-  const double room = tissue_behind_m(scene_.tissue.network.organ, scene_.probe);
+  const double room = tissue_behind_m(scene_.tissue.network.organ, scene_.probe());
   if (state.response < room) return;
   throw Error(ExitCode::numerical, "network",
               fmt::format("at t = {} s a load of {} N is {} mm deep, through the {} mm of tissue "
                           "behind sphere {}",
                           significant(state.time_s, 5), significant(state.imposed, 4),
                           significant(1e3 * state.response, 4), significant(1e3 * room, 4),
-                          scene_.probe.sphere + 1));
+                          scene_.probe().sphere + 1));
 }
 
 void Recorder::close_part(double error_estimate) {

@@ -15,8 +15,9 @@ namespace tpm {
 /// checkpoint computes what one that was never stopped computes, to the bit.
 class Recorder {
  public:
-  /// @param scene, controls must live as long as this
-  Recorder(const ExperimentScene& scene, const SimulationControls& controls, std::size_t parts);
+  /// @param scene, network, controls must live as long as this
+  Recorder(const ExperimentScene& scene, const RunNetwork& network,
+           const SimulationControls& controls, std::size_t parts);
 
   /// True if an earlier run has left a state to go on from: latest(), and motion() if it was one
   /// of spheres with mass.
@@ -60,6 +61,7 @@ class Recorder {
   [[noreturn]] void stop(double time_s);
 
   const ExperimentScene& scene_;
+  const RunNetwork& network_;
   const SimulationControls& controls_;
   std::size_t parts_;
   std::string identity_;

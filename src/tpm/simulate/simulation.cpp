@@ -11,12 +11,34 @@ namespace {
 
 constexpr std::size_t kParts = 16;  // of a run; a checkpoint can be written after each
 
+/// A network with the contacts of a scene; tools in their order.
+DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bonds) {
+  const Organ& organ = scene.tissue.network.organ;
+  const double usual = usual_contact_stiffness_N_per_m(bonds);
+  std::vector<Probe> driven;
+  std::vector<PressedTool> tools;
+  for (const SceneContact& contact : scene.contacts) {
+    const Probe& probe = contact.probe;
+    if (contact.is_tool()) {
+      const ToolKind kind = contact.kind == ContactKind::ball ? ToolKind::sphere : ToolKind::punch;
+      tools.push_back(
+          {touching_tool({kind, contact.radius_m}, organ, probe.sphere, probe.direction),
+           probe.share, contact.stiffness_N_per_m.value_or(usual)});
+      continue;
+    }
+    for (const std::size_t sphere : spheres_of(contact, organ)) {
+      driven.push_back({sphere, probe.direction, probe.share});
+    }
+  }
+  return driven_network(bonds, organ, scene.tissue.freedom(), std::move(driven), std::move(tools));
+}
+
 /// Runs that go part by part. `run_part` shows the recorder the states at some times, and closes
 /// the part.
 template <class RunPart>
-SimulationRun run_in_parts(const ExperimentScene& scene, const SimulationControls& controls,
-                           RunPart&& run_part) {
-  Recorder recorder(scene, controls, kParts);
+SimulationRun run_in_parts(const ExperimentScene& scene, const RunNetwork& network,
+                           const SimulationControls& controls, RunPart&& run_part) {
+  Recorder recorder(scene, network, controls, kParts);
   SimulationRun result;
   if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
   for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {
@@ -42,19 +64,21 @@ SimulationRun run_quasi_static(const ExperimentScene& scene, const RunNetwork& n
                                const SimulationControls& controls) {
   const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
     const PartOfProtocol part(scene, times.back());
-    const QuasiStatic equations(network.bonds, network.network.organ.position,
-                                scene.tissue.freedom(), scene.probe,
+    const DrivenNetwork& driven = network.driven;
+    const QuasiStatic equations(driven.bonds, driven.rest, driven.freedom, driven.probes,
                                 {.tolerance = part.tolerance, .energies = true});
     const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
     recorder.close_part(equations.run(part.protocol, times, see, recorder.latest()).error_estimate);
   };
-  return run_in_parts(scene, controls, run_part);
+  return run_in_parts(scene, network, controls, run_part);
 }
 
 SimulationRun run_static(const ExperimentScene& scene, const RunNetwork& network,
                          const SimulationControls& controls) {
-  StaticPath path(network.bonds, network.network.organ, scene.tissue.freedom(), scene.probe,
-                  scene.protocol.drive(), scene.protocol.peak(), scene.formulation.tolerance);
+  const DrivenNetwork& driven = network.driven;
+  StaticPath path(driven.bonds, driven.rest, network.network.organ.spacing, driven.freedom,
+                  driven.probes, scene.protocol.drive(), scene.protocol.peak(),
+                  scene.formulation.tolerance);
   const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
     if (recorder.latest()) path.start_from(*recorder.latest());
     for (const double time : times) {
@@ -62,13 +86,25 @@ SimulationRun run_static(const ExperimentScene& scene, const RunNetwork& network
     }
     recorder.close_part(0.0);
   };
-  return run_in_parts(scene, controls, run_part);
+  return run_in_parts(scene, network, controls, run_part);
+}
+
+/// kg, of spheres and tools.
+Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network) {
+  const Organ& organ = network.network.organ;
+  Eigen::VectorXd mass(network.driven.rest.cols());
+  mass.head(organ.position.cols()) = sphere_masses_kg(organ, scene.formulation.density_kg_m3);
+  Eigen::Index column = organ.position.cols();
+  for (const SceneContact& contact : scene.contacts) {
+    if (contact.is_tool()) mass[column++] = contact.mass_kg.value();
+  }
+  return mass;
 }
 
 SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& network,
                            const SimulationControls& controls) {
-  const Organ& organ = network.network.organ;
-  const Eigen::VectorXd mass_kg = sphere_masses_kg(organ, scene.formulation.density_kg_m3);
+  const DrivenNetwork& driven = network.driven;
+  const Eigen::VectorXd mass_kg = masses_kg(scene, network);
   InertialOptions options;
   options.damping_ratio = scene.formulation.damping_ratio;
   // The mass-spring model has a damper beside each spring.
@@ -77,15 +113,15 @@ SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& netwo
   const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
     const PartOfProtocol part(scene, times.back());
     options.tolerance = part.tolerance;
-    const Inertial equations(network.bonds, organ.position, scene.tissue.freedom(), scene.probe,
-                             mass_kg, options);
+    const Inertial equations(driven.bonds, driven.rest, driven.freedom, driven.probes, mass_kg,
+                             options);
     const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
     const InertialRun run = equations.run(part.protocol, times, see, recorder.motion());
     recorder.close_part(run.end, run.energy.value());
   };
-  SimulationRun result = run_in_parts(scene, controls, run_part);
+  SimulationRun result = run_in_parts(scene, network, controls, run_part);
   result.lowest_frequency_Hz =
-      lowest_mode(network.bonds, organ.position, scene.tissue.freedom(), mass_kg).frequency_Hz;
+      lowest_mode(driven.bonds, driven.rest, driven.freedom, mass_kg).frequency_Hz;
   return result;
 }
 
@@ -93,15 +129,17 @@ SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& netwo
 
 RunNetwork network_to_run(const ExperimentScene& scene) {
   const Tissue& tissue = scene.tissue;
-  if (!scene.formulation.mass_spring) return {tissue.network, tissue.material, tissue.bonds()};
+  if (!scene.formulation.mass_spring) {
+    return {tissue.network, tissue.material, with_contacts(scene, tissue.bonds())};
+  }
   const Freedom freedom = tissue.freedom();
   const double stiffness = contact_stiffness_N_per_m(tissue.bonds(), tissue.network.organ.position,
-                                                     freedom, scene.probe, 1.0);
+                                                     freedom, scene.probe(), 1.0);
   Network msm = msm_network(tissue.network, scene.formulation.springs);
   const TpmParameters material =
-      msm_material(msm, tissue.material, freedom, scene.probe, stiffness);
-  BondSystem bonds(msm, material);
-  return {std::move(msm), material, std::move(bonds)};
+      msm_material(msm, tissue.material, freedom, scene.probe(), stiffness);
+  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, material));
+  return {std::move(msm), material, std::move(driven)};
 }
 
 SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,

@@ -2,17 +2,24 @@
 #include <functional>
 #include <stdexcept>
 
+#include "tpm/network/driven_network.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/simulate/validity.hpp"
 
 namespace tpm {
 
-/// The network that is run: the tissue, or the mass-spring model that takes its place.
+/// The network that is run: the tissue, or the mass-spring model that takes its place, with what
+/// touches it.
 struct RunNetwork {
-  Network network;
+  Network network;  ///< without tools
   TpmParameters material;
-  BondSystem bonds;
+  DrivenNetwork driven;
+
+  /// The spheres of positions that tools follow.
+  [[nodiscard]] Positions spheres(const Positions& position) const {
+    return position.leftCols(network.organ.position.cols());
+  }
 };
 
 /// The mass-spring model is matched to the tissue's relaxed stiffness under the probe.
@@ -26,6 +33,8 @@ struct CurvePoint {
   double imposed = 0.0;      ///< depth, m, or load, N
   double response = 0.0;     ///< contact force, N, or depth, m
   QuasiStaticEnergy energy;  ///< of a quasi-static run
+  int touching = 0;          ///< spheres that tools touch
+  double overlap_m = 0.0;    ///< the largest of their contacts
 };
 
 /// What a run has found so far, rising in time.

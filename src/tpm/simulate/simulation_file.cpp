@@ -21,6 +21,12 @@ std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
   return {numbers.data(), numbers.data() + numbers.size()};
 }
 
+std::size_t tool_count(const ExperimentScene& scene) {
+  return static_cast<std::size_t>(
+      std::count_if(scene.contacts.begin(), scene.contacts.end(),
+                    [](const SceneContact& contact) { return contact.is_tool(); }));
+}
+
 std::string step_group(std::size_t step) {
   return fmt::format("/steps/{:05}", step);
 }
@@ -37,12 +43,51 @@ void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hd
     file.attribute("/", "damping_ratio", shortest(f.damping_ratio));
     file.attribute("/", "lowest_frequency_Hz", significant(run.lowest_frequency_Hz, 6));
   }
-  file.numbers("/probe/sphere", {static_cast<double>(scene.probe.sphere + 1)});
-  file.numbers("/probe/direction", list_of(scene.probe.direction));
+  file.numbers("/probe/sphere", {static_cast<double>(scene.probe().sphere + 1)});
+  file.numbers("/probe/direction", list_of(scene.probe().direction));
+}
+
+/// What does not change of the tools, one row each.
+void write_tools(const DrivenNetwork& network, Hdf5Writer& file) {
+  if (network.tools.empty()) return;
+  std::vector<std::int32_t> kind;
+  std::vector<double> radius, share, stiffness, direction;
+  for (const PressedTool& pressed : network.tools) {
+    kind.push_back(pressed.tool.shape.kind == ToolKind::sphere ? 0 : 1);
+    radius.push_back(pressed.tool.shape.radius_m);
+    share.push_back(pressed.share);
+    stiffness.push_back(pressed.stiffness_N_per_m);
+    for (const double d : pressed.tool.direction) direction.push_back(d);
+  }
+  file.integers("/tools/kind", kind, 1);
+  file.attribute("/tools/kind", "meaning", "0: ball, placed by its centre; 1: punch, by its face");
+  file.numbers("/tools/radius_m", radius);
+  file.numbers("/tools/share", share);
+  file.numbers("/tools/contact_stiffness_N_per_m", stiffness);
+  file.table("/tools/direction", direction, 3);
+}
+
+/// Where the tools are at an output and what they do, one row each.
+void write_tool_states(const DrivenNetwork& network, const QuasiStaticState& state,
+                       const std::string& group, Hdf5Writer& file) {
+  if (network.tools.empty()) return;
+  std::vector<double> position, force, overlap;
+  std::vector<std::int32_t> touching;
+  for (const ToolState& tool : tool_states(network, state.position)) {
+    position.insert(position.end(), tool.position.begin(), tool.position.end());
+    force.insert(force.end(), tool.force.begin(), tool.force.end());
+    overlap.push_back(tool.overlap_m);
+    touching.push_back(tool.touching);
+  }
+  file.table(group + "/tools/position_m", position, 3);
+  file.table(group + "/tools/force_on_tissue_N", force, 3);
+  file.numbers(group + "/tools/overlap_m", overlap);
+  file.integers(group + "/tools/touching", touching, 1);
 }
 
 void write_curve(const ExperimentScene& scene, const SimulationRecord& record, Hdf5Writer& file) {
-  std::vector<double> time, imposed, response, work, heat, stored;
+  std::vector<double> time, imposed, response, work, heat, stored, overlap;
+  std::vector<std::int32_t> touching;
   for (const CurvePoint& p : record.curve) {
     time.push_back(p.time_s);
     imposed.push_back(p.imposed);
@@ -50,11 +95,17 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
     work.push_back(p.energy.work_J);
     heat.push_back(p.energy.dissipated_J);
     stored.push_back(p.energy.stored_J);
+    touching.push_back(p.touching);
+    overlap.push_back(p.overlap_m);
   }
   const bool depth = scene.protocol.drive() == Drive::displacement;
   file.numbers("/curve/time_s", time);
   file.numbers(depth ? "/curve/depth_m" : "/curve/load_N", imposed);
   file.numbers(depth ? "/curve/force_N" : "/curve/depth_m", response);
+  if (tool_count(scene) > 0) {
+    file.integers("/curve/touching", touching, 1);
+    file.numbers("/curve/overlap_m", overlap);
+  }
   if (scene.formulation.inertial()) return;
   file.numbers("/curve/work_J", work);
   file.numbers("/curve/dissipated_J", heat);
@@ -105,14 +156,15 @@ void write_field(const StepField& field, const std::string& group, Hdf5Writer& f
 
 void write_step(const ExperimentScene& scene, const RunNetwork& network,
                 const QuasiStaticState& state, const std::string& group, Hdf5Writer& file) {
-  file.table(group + "/position_m", list_of(state.position), 3);
+  file.table(group + "/position_m", list_of(network.spheres(state.position)), 3);
+  write_tool_states(network.driven, state, group, file);
   const StepFields fields = fields_of(scene, network, state);
   for (const StepField& field : fields.of_spheres) write_field(field, group, file);
   file.integers(group + "/validity", fields.validity, 1);
   for (const StepField& field : fields.of_bonds) write_field(field, group, file);
 }
 
-/// Spheres and bonds at one time.
+/// Spheres, bonds and tools at one time.
 std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
                       const std::string& group, double time_s, std::size_t n, std::size_t m) {
   using Number = XdmfSource::Number;
@@ -145,7 +197,16 @@ std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
   if (scene.outputs.remembered) {
     text += source.scalar("remembered_m", group + "/remembered_m", Centre::cell, m, Number::real);
   }
-  return text + "    </Grid>\n   </Grid>\n";
+  text += "    </Grid>\n";
+  if (const std::size_t tools = tool_count(scene); tools > 0) {
+    text += "    <Grid Name=\"tools\" GridType=\"Uniform\">\n";
+    text += source.points(group + "/tools/position_m", tools);
+    text += source.scalar("kind", "/tools/kind", Centre::node, tools, Number::whole);
+    text += source.scalar("radius_m", "/tools/radius_m", Centre::node, tools, Number::real);
+    text += source.vector("force_on_tissue_N", group + "/tools/force_on_tissue_N", tools);
+    text += "    </Grid>\n";
+  }
+  return text + "   </Grid>\n";
 }
 
 std::string xdmf(const ExperimentScene& scene, const SimulationRecord& record,
@@ -169,6 +230,7 @@ fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& networ
   Hdf5Writer file(path);
   write_network_datasets(scene.tissue, file);
   write_provenance(scene, run, file);
+  write_tools(network.driven, file);
   write_curve(scene, run.record, file);
   write_validity(run.record.validity, file);
   write_roughness(scene, run.record, file);

@@ -19,12 +19,13 @@ constexpr double kLeastBalance = 1e-13;  // of the force: below, rounding decide
 
 }  // namespace
 
-StaticPath::StaticPath(const BondSystem& bonds, const Organ& organ, const Freedom& freedom,
-                       const Probe& probe, Drive drive, double peak, double tolerance)
-    : tissue_(bonds, organ.position, freedom, probe, drive),
+StaticPath::StaticPath(const BondSystem& bonds, Positions rest, double spacing_m,
+                       const Freedom& freedom, const Probes& probes, Drive drive, double peak,
+                       double tolerance)
+    : tissue_(bonds, std::move(rest), freedom, probes, drive),
       state_(tissue_.at_rest(0.0)),
-      longest_move_m_(kLongestMove * organ.spacing) {
-  require_valid(probe, freedom);
+      longest_move_m_(kLongestMove * spacing_m) {
+  require_valid(probes, freedom);
   const double force =
       drive == Drive::force ? peak : std::abs(tissue_.linear_response(state_, peak));
   tolerance_N_ = std::max(kBalanceShare * tolerance, kLeastBalance) * force;
@@ -34,32 +35,31 @@ void StaticPath::start_from(const QuasiStaticState& state) {
   state_.position = state.position;
   state_.remembered = state.remembered;
   state_.elongation = state.remembered;
+  state_.closed = tissue_.bonds().closed_contacts(state.position);
   state_.imposed = state.imposed;
-}
-
-double StaticPath::probe_depth(const Positions& position) const {
-  const Probe& probe = tissue_.probe();
-  return position.col(static_cast<Eigen::Index>(probe.sphere)).dot(probe.direction);
 }
 
 bool StaticPath::stride_to(double imposed) {
   const BondMemory relaxed{Eigen::VectorXd::Zero(state_.remembered.size()), 1.0};
   Positions position = state_.position;
   tissue_.impose(position, imposed);
-  const double before = probe_depth(state_.position);
+  const auto moved_far = [&] {
+    return std::abs(tissue_.depth_of(position - state_.position)) > longest_move_m_;
+  };
   unstable_ = false;
-  if (std::abs(probe_depth(position) - before) > longest_move_m_) return false;
+  if (moved_far()) return false;
   Eigen::Matrix3Xd load;
   tissue_.load(imposed, load);
   const EquilibriumSearch search =
       tissue_.equilibrium().find(position, relaxed, load, tolerance_N_);
   unstable_ = !search.stable;
   if (!search.stable || !search.converged) return false;
-  if (std::abs(probe_depth(position) - before) > longest_move_m_) return false;
+  if (moved_far()) return false;
   state_.imposed = imposed;
   state_.position = std::move(position);
   tissue_.bonds().elongations(state_.position, state_.elongation);
   state_.remembered = state_.elongation;
+  state_.closed = tissue_.bonds().closed_contacts(state_.position);
   return true;
 }
 

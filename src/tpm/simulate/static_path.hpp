@@ -9,10 +9,11 @@ namespace tpm {
 class StaticPath {
  public:
   /// @param bonds must live as long as this
+  /// @param rest of spheres and tools
   /// @param peak of what will be imposed, m or N: the force left on a sphere is a thousandth of the
   ///        tolerance, in parts of the load or of the force that the peak meets at small depth
-  StaticPath(const BondSystem& bonds, const Organ& organ, const Freedom& freedom,
-             const Probe& probe, Drive drive, double peak, double tolerance);
+  StaticPath(const BondSystem& bonds, Positions rest, double spacing_m, const Freedom& freedom,
+             const Probes& probes, Drive drive, double peak, double tolerance);
 
   /// Goes on from a state of an earlier path instead of from rest.
   void start_from(const QuasiStaticState& state);
@@ -24,7 +25,6 @@ class StaticPath {
 
  private:
   [[nodiscard]] bool stride_to(double imposed);
-  [[nodiscard]] double probe_depth(const Positions& position) const;
 
   DrivenTissue tissue_;
   TissueState state_;

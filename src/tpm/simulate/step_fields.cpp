@@ -15,15 +15,16 @@ std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
 StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
                      const QuasiStaticState& state) {
   StepFields fields;
-  const Eigen::Matrix3Xd moved = displacements_m(network.network.organ, state);
+  const Eigen::Matrix3Xd moved = displacements_m(network, state);
   fields.of_spheres = {{"displacement_m", 3, list_of(moved)},
                        {"displacement_magnitude_m", 1, list_of(moved.colwise().norm())}};
-  fields.validity = ValidityWatch(scene.tissue.network, scene.probe).flags(state.position);
-  const Eigen::VectorXd bond_force = bond_forces_N(network.bonds, state);
+  fields.validity = ValidityWatch(scene.tissue.network, scene.probe()).flags(state.position);
+  const Eigen::VectorXd bond_force = bond_forces_N(network.driven.bonds, state);
   if (scene.outputs.force) {
+    const std::vector<char> open(network.driven.bonds.contact_count(), 0);
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, state.position.cols());
-    network.bonds.add_forces(state.position, {state.remembered, 0.0}, force);
-    fields.of_spheres.push_back({"force_N", 3, list_of(force)});
+    network.driven.bonds.add_forces(state.position, {state.remembered, 0.0, open}, force);
+    fields.of_spheres.push_back({"force_N", 3, list_of(network.spheres(force))});
     fields.of_spheres.push_back(
         {"largest_bond_force_N", 1, largest_bond_forces_N(network.network, bond_force)});
   }
@@ -31,21 +32,16 @@ StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
     fields.of_bonds.push_back({"bond_force_N", 1, list_of(bond_force)});
   }
   if (scene.outputs.remembered) {
-    fields.of_bonds.push_back({"remembered_m", 1, list_of(state.remembered)});
+    const auto bonds = static_cast<Eigen::Index>(network.network.bonds.size());
+    fields.of_bonds.push_back({"remembered_m", 1, list_of(state.remembered.head(bonds))});
   }
   return fields;
 }
 
 Eigen::VectorXd bond_forces_N(const BondSystem& bonds, const QuasiStaticState& state) {
-  Eigen::VectorXd elongation;
-  bonds.elongations(state.position, elongation);
-  Eigen::VectorXd force =
-      bonds.stiffness().cwiseProduct(elongation) - bonds.relaxing().cwiseProduct(state.remembered);
-  for (std::size_t i = 0; i < bonds.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    if (bonds.is_rope(i) && elongation[row] < 0.0) force[row] = 0.0;
-  }
-  return force;
+  Eigen::VectorXd tension;
+  bonds.tensions(state.position, {state.remembered, 0.0}, tension);
+  return tension.head(static_cast<Eigen::Index>(bonds.first_contact()));
 }
 
 std::vector<double> largest_bond_forces_N(const Network& network,
@@ -60,8 +56,8 @@ std::vector<double> largest_bond_forces_N(const Network& network,
   return largest;
 }
 
-Eigen::Matrix3Xd displacements_m(const Organ& organ, const QuasiStaticState& state) {
-  return state.position - organ.position;
+Eigen::Matrix3Xd displacements_m(const RunNetwork& network, const QuasiStaticState& state) {
+  return network.spheres(state.position) - network.network.organ.position;
 }
 
 }  // namespace tpm

@@ -31,7 +31,8 @@ struct StepFields {
 [[nodiscard]] std::vector<double> largest_bond_forces_N(const Network& network,
                                                         const Eigen::VectorXd& bond_force_N);
 
-/// The displacements from rest, m.
-[[nodiscard]] Eigen::Matrix3Xd displacements_m(const Organ& organ, const QuasiStaticState& state);
+/// The displacements of the spheres from rest, m.
+[[nodiscard]] Eigen::Matrix3Xd displacements_m(const RunNetwork& network,
+                                               const QuasiStaticState& state);
 
 }  // namespace tpm

@@ -85,8 +85,8 @@ void write_moving_fields(const ExperimentScene& scene, const RunNetwork& network
   std::vector<std::int32_t> validity;
   StepFields all;
   for (const QuasiStaticState& state : outputs) {
-    points.insert(points.end(), state.position.data(),
-                  state.position.data() + state.position.size());
+    const Positions spheres = network.spheres(state.position);
+    points.insert(points.end(), spheres.data(), spheres.data() + spheres.size());
     const StepFields fields = fields_of(scene, network, state);
     append(all.of_spheres, fields.of_spheres);
     append(all.of_bonds, fields.of_bonds);

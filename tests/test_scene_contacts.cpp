@@ -1,0 +1,146 @@
+// Contacts of scenes: tools, patches and several at once, from JSON to files.
+#include <catch2/catch.hpp>
+
+#include "simulated_scene.hpp"
+#include "temp_folder.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/simulate/simulation_file.hpp"
+#include "tpm/store/hdf5.hpp"
+
+using namespace tpm;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using test::experiment;
+using test::run_of;
+using test::small_scene;
+using test::TempFolder;
+
+namespace {
+
+/// Pressed, pulled off and left alone.
+const std::string kPoke = R"("protocol": {"kind": "knots", "knots": [
+  {"time": "0 s", "depth": "0 mm"}, {"time": "1 s", "depth": "5 mm"}, {"time": "3 s", "depth": "5 mm"},
+  {"time": "4 s", "depth": "-2 mm"}, {"time": "6 s", "depth": "-2 mm"}]}, "outputs": {"count": 7})";
+const std::string kBall = R"("contacts": [{"kind": "ball", "radius": "8 mm", "mass_kg": 0.01}], )";
+const std::string kThree = R"("contacts": [{"kind": "ball", "radius": "30 mm"},
+  {"kind": "punch", "radius": "35 mm", "number": 12, "share": 0.5},
+  {"kind": "punch", "radius": "1 mm", "number": 20, "share": 0}], )";
+
+}  // namespace
+
+TEST_CASE("a scene says what meets the tissue") {
+  const ExperimentScene scene = experiment(R"({"organ": {"kind": "liver"}, "contacts": [
+      {"kind": "ball", "radius": "2 mm", "stiffness": "10 N/mm"},
+      {"kind": "punch", "radius": "5 mm", "number": 9, "share": 0, "mass_kg": 0.2},
+      {"kind": "patch", "radius": "25 mm", "number": 30, "share": 2}], )" +
+                                           kPoke + "}");
+  REQUIRE(scene.contacts.size() == 3);
+  CHECK(scene.probe().sphere == 70);
+  CHECK(scene.contacts[0].kind == ContactKind::ball);
+  CHECK_THAT(scene.contacts[0].stiffness_N_per_m.value(), WithinRel(1e4, 1e-12));
+  CHECK(scene.contacts[1].kind == ContactKind::punch);
+  CHECK(scene.contacts[1].probe.share == 0.0);
+  CHECK(scene.contacts[1].mass_kg == 0.2);
+  const std::vector<std::size_t> patch = spheres_of(scene.contacts[2], scene.tissue.network.organ);
+  CHECK(patch.size() > 3);
+  for (const std::size_t i : patch) CHECK(scene.tissue.network.organ.layer[i] == 0);
+  const DrivenNetwork driven = network_to_run(scene).driven;
+  CHECK(driven.tools.size() == 2);
+  CHECK(driven.spheres() == 424);
+  CHECK(driven.rest.cols() == 426);
+  CHECK(driven.probes.size() == 1 + patch.size());
+}
+
+TEST_CASE("a poked liver lets go of the tool and recovers") {
+  const SimulationRecord record = run_of(small_scene(kBall + kPoke)).record;
+  const double peak = record.curve[33].response;
+  CHECK(peak > 0.05);
+  for (const CurvePoint& p : record.curve) {
+    CHECK(p.response >= 0.0);
+    if (p.time_s >= 4.0) {
+      CHECK(p.response == 0.0);
+      CHECK(p.touching == 0);
+    }
+    CHECK(p.overlap_m < 1e-6);
+  }
+  const Organ organ = small_scene(kPoke).tissue.network.organ;
+  const auto moved = [&](std::size_t output) {
+    return (record.outputs[output].position.leftCols(organ.position.cols()) - organ.position)
+        .colwise()
+        .norm()
+        .maxCoeff();
+  };
+  CHECK(moved(3) > 4e-3);
+  CHECK(moved(6) < 0.25 * moved(4));  // 2 s on: exp(-2 s/1.4 s), the time in which a bond recovers
+}
+
+TEST_CASE("formulations agree on a tool where time does not matter") {
+  const auto end_of = [](const std::string& hold, const std::string& formulation) {
+    return run_of(small_scene(kBall + R"("protocol": {"kind": "ramp_hold", "depth": "2 mm",
+                    "rate": "1 mm/s", "hold": ")" +
+                              hold + R"("}, "formulation": {"kind": ")" + formulation + R"("})"))
+        .record.curve.back()
+        .response;
+  };
+  CHECK_THAT(end_of("25 s", "static"), WithinRel(end_of("25 s", "quasi_static"), 1e-6));
+  CHECK_THAT(end_of("1 s", "inertial"), WithinRel(end_of("1 s", "quasi_static"), 1e-3));
+}
+
+TEST_CASE("runs with tools are resumed to the bit") {
+  const std::string still = R"("formulation": {"kind": "static"}, )";
+  for (const std::string& blocks : {kThree + kPoke, kThree + still + kPoke}) {
+    const ExperimentScene scene = small_scene(blocks);
+    const SimulationRecord whole = run_of(scene).record;
+    const TempFolder folder;
+    SimulationControls controls;
+    controls.checkpoint = folder / "c";
+    int seen = 0;
+    controls.interrupted = [&] { return ++seen == 120; };
+    CHECK_THROWS_AS(simulate(scene, network_to_run(scene), controls), Interrupted);
+    controls.interrupted = {};
+    const SimulationRun rest = simulate(scene, network_to_run(scene), controls);
+    CHECK(rest.resumed_at_s.has_value());
+    REQUIRE(rest.record.curve.size() == whole.curve.size());
+    for (std::size_t i = 0; i < whole.curve.size(); ++i) {
+      CHECK(rest.record.curve[i].response == whole.curve[i].response);
+      CHECK(rest.record.curve[i].touching == whole.curve[i].touching);
+      CHECK(rest.record.curve[i].overlap_m == whole.curve[i].overlap_m);
+    }
+  }
+}
+
+TEST_CASE("the file of a run holds its tools and what they did") {
+  const TempFolder folder;
+  const ExperimentScene scene = small_scene(kThree + kPoke);
+  const RunNetwork network = network_to_run(scene);
+  const SimulationRun run = simulate(scene, network);
+  (void)write_simulation(scene, network, run, folder / "a.h5");
+  const Hdf5Reader file(folder / "a.h5");
+  CHECK(file.numbers("/tools/share") == std::vector<double>{1.0, 0.5, 0.0});
+  CHECK(file.numbers("/curve/overlap_m").size() == run.record.curve.size());
+  CHECK(file.table("/steps/00002/position_m").size() == 3 * 60);
+  const std::vector<double> force = file.table("/steps/00002/tools/force_on_tissue_N");
+  double conjugate = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    conjugate += network.driven.tools[i].share *
+                 Eigen::Vector3d(&force[3 * i]).dot(network.driven.tools[i].tool.direction);
+  }
+  CHECK_THAT(conjugate, WithinAbs(run.record.outputs[2].response, 1e-6));
+  CHECK(run.record.outputs[2].response > 0.1);
+}
+
+TEST_CASE("contacts that cannot be are refused") {
+  const auto refused = [](const std::string& contacts, const std::string& more = kPoke) {
+    CHECK_THROWS_AS(small_scene("\"contacts\": [" + contacts + "], " + more), Error);
+  };
+  refused(R"({"kind": "ball"})");
+  refused(R"({"kind": "ball", "radius": "0 mm"})");
+  refused(R"({"kind": "sphere", "radius": "2 mm"})");
+  refused(R"({"kind": "ball", "radius": "2 mm", "share": 0})");
+  refused(R"({"kind": "sphere", "share": -1})");
+  refused(R"({"kind": "ball", "radius": "2 mm", "mass_kg": 0})");
+  refused(R"({"kind": "ball", "radius": "2 mm"})",
+          R"("formulation": {"kind": "inertial"}, )" + kPoke);
+  refused(R"({"kind": "ball", "radius": "2 mm"})", R"("protocol": {"kind": "knots", "knots": [
+    {"time": "0 s", "load": "0 N"}, {"time": "1 s", "load": "-0.1 N"}]})");
+}
