@@ -525,6 +525,45 @@ TEST_CASE("thresholds grow with the inflation and are untouched without") {
   CHECK_THAT(*p.upper - *p.lower, WithinRel(2.0 * 1.959963984540054 * wide.theta_sd[0], 1e-6));
 }
 
+namespace {
+
+/// One reading of 1 with a standard deviation of 1, by a model that ends below 0.9.
+class EndingModel final : public ResidualFunction {
+ public:
+  Eigen::Index residual_count() const override { return 1; }
+  bool evaluate(std::span<const double> p, Eigen::VectorXd& r, RowMatrix* j) const override {
+    if (p[0] < 0.9) return false;
+    r = Eigen::VectorXd::Constant(1, p[0] - 1.0);
+    if (j != nullptr) *j = RowMatrix::Ones(1, 1);
+    return true;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("an interval ends where the model does, soon and said in words") {
+  const EndingModel function;
+  const std::vector<FitParameter> parameters{{"p", {}, Scale::linear, 1.0, -10.0, 10.0}};
+  const std::vector<Minimum> minima{minimise(function, parameters, std::vector<double>{1.2})};
+  const Threshold threshold{0.95, true, 1, 1};
+  const Profile profile = profile_likelihood(
+      function, parameters, minima, 0,
+      linear_covariance(function, parameters, minima.front(), threshold), threshold);
+  CHECK(profile.cut_short);
+  CHECK(profile.failures < 20);
+  CHECK_THAT(profile.lower.value(), WithinAbs(0.9, 2e-3));
+  CHECK_THAT(profile.upper.value(), WithinAbs(2.95996, 1e-4));
+  ParameterResult result;
+  result.parameter = parameters.front();
+  result.estimate = 1.0;
+  result.lower = profile.lower;
+  result.upper = profile.upper;
+  result.profile = profile;
+  result.verdict = verdict_of(result);
+  CHECK_THAT(parameter_words(result, 0.95),
+             Contains("a limit is where the model can no longer be evaluated"));
+}
+
 TEST_CASE("fewer residuals than parameters are rank-deficient, not undefined") {
   const CurveResiduals function(straight_line, {{2.0}, {5.0}, 1.0, {}});
   Minimum m;

@@ -93,6 +93,14 @@ std::vector<double> model_parameters(const FitConfig& config, std::span<const do
   return values;
 }
 
+TpmParameters element_parameters(const FitConfig& config, std::span<const double> natural,
+                                 std::size_t choice) {
+  const std::vector<double> values = model_parameters(config, natural, choice);
+  TpmVector vector{};
+  std::copy(values.begin(), values.end(), vector.begin());
+  return from_vector(vector);
+}
+
 FitConfig parse_fit_config(const Json& document, std::string_view where,
                            const std::filesystem::path& folder) {
   check_schema(document, "fit", where);

@@ -123,6 +123,10 @@ struct FitConfig {
                                                    std::span<const double> natural,
                                                    std::size_t choice);
 
+/// The same as parameters of the paper's element; not for a law of the family.
+[[nodiscard]] TpmParameters element_parameters(const FitConfig& config,
+                                               std::span<const double> natural, std::size_t choice);
+
 /// Reads and checks a configuration. Throws Error(bad_input) with the file and the key.
 /// @param folder that paths in the document are relative to
 [[nodiscard]] FitConfig read_fit_config(const std::filesystem::path& path);

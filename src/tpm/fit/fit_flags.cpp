@@ -55,6 +55,14 @@ void flag_noise(FitResult& result) {
   }
 }
 
+/// Bands alone: where all are met there is no best point.
+void flag_plateau(FitResult& result) {
+  if (result.value_count > 0 || result.best.deviance > 0.0) return;
+  result.flags.push_back(
+      "every reading lies within its band: a whole region of parameters fits alike, and the "
+      "estimates are one point of it; the intervals say how far it reaches");
+}
+
 void flag_not_predicted(FitResult& result) {
   for (const RecordingFit& r : result.recordings) {
     if (r.not_predicted == 0) continue;
@@ -87,6 +95,7 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
     result.flags.push_back(fmt::format(
         "{} bands are penalised only outside and are not counted as data", result.band_count));
   }
+  flag_plateau(result);
   if (result.config.loss.kind != Loss::none) {
     result.flags.push_back(
         fmt::format("the {} loss has no exact likelihood: the intervals' level is only approximate",
@@ -104,10 +113,8 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
     }
   }
   if (result.config.law) return;  // the limits are those of the paper's element
-  TpmVector vector{};
-  const auto values = model_parameters(result.config, result.best.natural, 0);
-  std::copy(values.begin(), values.end(), vector.begin());
-  for (std::string& flag : validity_flags(from_vector(vector), deepest)) {
+  const TpmParameters element = element_parameters(result.config, result.best.natural, 0);
+  for (std::string& flag : validity_flags(element, deepest)) {
     result.flags.push_back(std::move(flag));
   }
 }

@@ -92,6 +92,7 @@ Json parameter_json(const ParameterResult& p) {
   }
   j["profile_SI_and_deviance"] = std::move(points);
   j["profile_failures"] = p.profile.failures;
+  if (p.profile.cut_short) j["interval_cut_short"] = true;
   return j;
 }
 

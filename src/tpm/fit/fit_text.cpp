@@ -124,7 +124,8 @@ std::string to_terminal_text(const FitResult& result) {
   std::string text = result.config.title + "\n\n" + parameter_table(result) + "\n";
   text += fmt::format("chi-square {} from {} values and {} bands, {} degrees of freedom",
                       significant(result.chi_square, 6), result.value_count, result.band_count,
-                      result.degrees_of_freedom);
+                      result.degrees_of_freedom > 0 ? std::to_string(result.degrees_of_freedom)
+                                                    : std::string("no"));
   if (result.chi_square_p) text += fmt::format(", p = {}", significant(*result.chi_square_p, 2));
   text += "\n";
   if (result.likelihood) text += likelihood_line(*result.likelihood);

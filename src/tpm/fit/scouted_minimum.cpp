@@ -9,6 +9,8 @@ namespace {
 
 constexpr int kMostSteps = 60;
 constexpr double kSmallGain = 1e-6;  // of the mean squared residual
+/// The same with parameters held: points of a profile, which rises by more than 1.
+constexpr double kSmallHeldGain = 1e-4;
 constexpr double kFirstPull = 0.02;  // of the residuals' own curvature
 constexpr double kRaise = 8.0;
 constexpr double kMostPull = 1e8;
@@ -147,6 +149,8 @@ Minimum minimise_by_scout(const ResidualFunction& function, const ResidualFuncti
   if (!evaluate(function, parameters, here) || !corrected.correct_at(here)) {
     return minimum;
   }
+  const bool held = std::find(fixed.begin(), fixed.end(), true) != fixed.end();
+  const double small = held ? kSmallHeldGain : kSmallGain;
   double pull = 0.0;
   while (!minimum.converged && minimum.iterations < kMostSteps) {
     ++minimum.iterations;
@@ -156,7 +160,7 @@ Minimum minimise_by_scout(const ResidualFunction& function, const ResidualFuncti
     const double promised = here.cost() - corrected.cost_at(next.natural);
     const auto count = static_cast<double>(here.residual.size());
     // A pull of this many times the curvature hides up to as many times what is promised.
-    minimum.converged = promised * (1.0 + pull) <= kSmallGain * here.cost() / count;
+    minimum.converged = promised * (1.0 + pull) <= small * here.cost() / count;
     if (minimum.converged || pull > kMostPull) break;
     const bool known = evaluate(function, parameters, next);
     const double gained = known ? here.cost() - next.cost() : -1.0;

@@ -136,7 +136,9 @@ class ProfileWalk {
       if (!m.usable) {
         ++profile.failures;
         step *= 0.25;
-        continue;
+        if (step > kLeastStep * first_step) continue;
+        profile.cut_short = true;
+        return last_.theta;
       }
       const double risen_next = m.deviance - best_deviance_;
       if (risen_next < -kBetterBy * (1.0 + best_deviance_)) {
@@ -160,6 +162,7 @@ class ProfileWalk {
 
  private:
   static constexpr double kBetterBy = 1e-7;
+  static constexpr double kLeastStep = 1e-3;  ///< of the first one, towards where the model ends
 
   /// A point of the profile.
   struct Place {

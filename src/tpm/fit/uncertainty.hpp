@@ -66,11 +66,13 @@ struct Profile {
   std::optional<Minimum> better;  ///< a deeper minimum met on the way; the profile is then void
   std::vector<Minimum> inside;    ///< ends of the constrained fits below the threshold
   int failures = 0;               ///< constrained fits that could not be evaluated
+  bool cut_short = false;  ///< a limit is where the model ends (a tissue that snaps through, say)
 };
 
 /// Walks outwards from each minimum in theta with adaptive steps until the deviance has risen by
 /// the threshold above the best one (then the limit is found to 1e-7 of its distance from the
-/// minimum, in theta) or the bound is reached. Several minima within the threshold may give
+/// minimum, in theta) or the bound is reached. Where the model can no longer be evaluated the range
+/// ends, too: what cannot carry the load does not fit. Several minima within the threshold may give
 /// separate ranges: the limits then enclose them all and `connected` is false.
 /// @param minima rising deviance, the best first
 [[nodiscard]] Profile profile_likelihood(const ResidualFunction& function,

@@ -56,7 +56,9 @@ Verdict verdict_of(const ParameterResult& p) {
   return Verdict::flat;
 }
 
-std::string parameter_words(const ParameterResult& p, double level) {
+namespace {
+
+std::string range_words(const ParameterResult& p, double level) {
   const FitParameter& f = p.parameter;
   switch (p.verdict) {
     case Verdict::identified: {
@@ -80,6 +82,13 @@ std::string parameter_words(const ParameterResult& p, double level) {
   }
   return fmt::format("{} = {} (no interval: profiles were switched off)", f.name,
                      in_unit(f, p.estimate));
+}
+
+}  // namespace
+
+std::string parameter_words(const ParameterResult& p, double level) {
+  return range_words(p, level) +
+         (p.profile.cut_short ? "; a limit is where the model can no longer be evaluated" : "");
 }
 
 std::string hypothesis_words(const HypothesisResult& result, double level) {

@@ -117,6 +117,18 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
   run_script(python, "draw_figures.py", words);
 }
 
+std::map<std::string, std::string> draw_into(const std::filesystem::path& folder,
+                                             const std::vector<Figure>& figures,
+                                             const std::string& python) {
+  write_file(folder / "figures.json", to_text(to_json(figures)));
+  draw_figures(python, folder / "figures.json", folder / "figures");
+  std::map<std::string, std::string> drawings;
+  for (const Figure& figure : figures) {
+    drawings[figure.id] = read_file(folder / "figures" / (figure.id + ".svg"));
+  }
+  return drawings;
+}
+
 void draw_network(const std::string& python, const std::filesystem::path& picture_json,
                   const std::filesystem::path& stem) {
   run_script(python, "draw_network.py", {picture_json.string(), stem.string()});

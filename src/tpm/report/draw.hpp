@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,12 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
 /// of the files. Throws Error(environment) if drawing is not possible; figures.json is then there.
 [[nodiscard]] std::vector<std::string> write_figures(const std::filesystem::path& folder,
                                                      const std::vector<Figure>& figures);
+
+/// Writes figures.json into `folder` and draws its figures as figures/ID.svg below. Returns the
+/// text of each drawing by id, as to_html wants it. Throws as draw_figures does.
+[[nodiscard]] std::map<std::string, std::string> draw_into(const std::filesystem::path& folder,
+                                                           const std::vector<Figure>& figures,
+                                                           const std::string& python);
 
 /// Draws a network_picture() as STEM.svg and STEM.png with scripts/draw_network.py. Throws as
 /// draw_figures does.

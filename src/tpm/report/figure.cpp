@@ -28,10 +28,12 @@ std::string_view kind_name(Series::Kind kind) {
   return "";
 }
 
-/// Six digits are more than a drawing shows, and the same on every machine.
+/// More than a drawing shows, and the same on every machine.
+constexpr int kDigits = 6;
+
 Json numbers(const std::vector<double>& values) {
   Json list = Json::array();
-  for (const double v : values) list.push_back(rounded(v, 6));
+  for (const double v : values) list.push_back(rounded(v, kDigits));
   return list;
 }
 
@@ -51,8 +53,8 @@ void require_drawable(const Series& s, const std::string& where) {
 
 Json axis_json(const Axis& axis) {
   Json json{{"quantity", axis.quantity}, {"unit", axis.unit}, {"logarithmic", axis.logarithmic}};
-  if (axis.lower) json["lower"] = *axis.lower;
-  if (axis.upper) json["upper"] = *axis.upper;
+  if (axis.lower) json["lower"] = rounded(*axis.lower, kDigits);
+  if (axis.upper) json["upper"] = rounded(*axis.upper, kDigits);
   return json;
 }
 

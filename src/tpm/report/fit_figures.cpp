@@ -101,10 +101,7 @@ const ParameterResult& parameter_of(const FitResult& fit, const std::string& nam
 }
 
 TpmParameters fitted_element(const FitResult& fit) {
-  const std::vector<double> values = model_parameters(fit.config, fit.best.natural, 0);
-  TpmVector vector{};
-  std::copy(values.begin(), values.end(), vector.begin());
-  return from_vector(vector);
+  return element_parameters(fit.config, fit.best.natural, 0);
 }
 
 std::string estimate_words(const FitResult& fit) {

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <utility>
 
 #include "tpm/core/error.hpp"
@@ -20,15 +19,6 @@ namespace tpm {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Wall time of a call, noted under a name.
-template <class Work>
-auto timed(std::map<std::string, double>& seconds, const char* part, Work work) {
-  const auto start = std::chrono::steady_clock::now();
-  auto result = work();
-  seconds[part] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return result;
-}
 
 /// The two creep experiments of Sec. 4.2, by the names that data/paper_claims.json gives them.
 std::vector<PrintedCreep> printed_creep(const ClaimSet& claims) {
@@ -79,17 +69,6 @@ void write_json(const fs::path& path, Json value) {
   write_file(path, to_text(value));
 }
 
-std::map<std::string, std::string> draw(const PaperReport& report, const fs::path& folder,
-                                        const std::string& python) {
-  write_json(folder / "figures.json", to_json(report.figures));
-  draw_figures(python, folder / "figures.json", folder / "figures");
-  std::map<std::string, std::string> drawings;
-  for (const Figure& figure : report.figures) {
-    drawings[figure.id] = read_file(folder / "figures" / (figure.id + ".svg"));
-  }
-  return drawings;
-}
-
 }  // namespace
 
 PaperReport make_paper_report() {
@@ -134,7 +113,8 @@ Document paper_document(const PaperReport& report) {
 void write_paper_report(const PaperReport& report, const fs::path& folder,
                         const std::string& python) {
   std::map<std::string, double> seconds = report.seconds;
-  const auto drawings = timed(seconds, "drawing", [&] { return draw(report, folder, python); });
+  const auto drawings =
+      timed(seconds, "drawing", [&] { return draw_into(folder, report.figures, python); });
   const Document document = paper_document(report);
   write_file(folder / "report.md", to_markdown(document));
   write_file(folder / "report.html", to_html(document, drawings));

@@ -1,0 +1,60 @@
+// tpm experiments: the paper's experiments on the star and on organs, fitted and compared.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/organ_study_report.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct ExperimentsOptions {
+  std::string config;
+  std::string folder = "out/experiments";
+};
+
+int experiments(const ExperimentsOptions& options, const Session& session) {
+  const std::string python = find_drawing_python();  // before minutes of work, not after
+  const std::filesystem::path path = options.config.empty()
+                                         ? share_dir() / "configs" / "organ_experiments.json"
+                                         : std::filesystem::path(options.config);
+  const OrganStudyConfig config = read_organ_study(path);
+  const auto start = std::chrono::steady_clock::now();
+  const OrganStudy study = run_organ_study(config);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  write_organ_study(study, options.folder, python, took.count());
+  if (session.json()) {
+    fmt::print("{}", to_text(to_json(study)));
+    return 0;
+  }
+  for (const std::string& sentence : cost_sentences(study)) fmt::print("- {}\n", sentence);
+  fmt::print(
+      "written to {}: report.html, report.md, experiments.json, readings.csv, fits.csv, "
+      "curves.csv, figures\n",
+      options.folder);
+  return 0;
+}
+
+}  // namespace
+
+void add_experiments_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "experiments", "The paper's experiments on the star and on organs: fits, curves, one report");
+  auto options = std::make_shared<ExperimentsOptions>();
+  command->add_option("CONFIG", options->config,
+                      "Tissues, data and experiments (schemas/organ_experiments.schema.json; "
+                      "default: configs/organ_experiments.json)");
+  command->add_option("-o,--output", options->folder, "Folder to write into")
+      ->capture_default_str();
+  add_format_option(*command, session);
+  command->footer("Example:\n  tpm experiments --output out/experiments");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return experiments(*options, session); };
+  });
+}
+
+}  // namespace tpm::app
