@@ -87,25 +87,22 @@ TEST_CASE("formulations agree on a tool where time does not matter") {
 }
 
 TEST_CASE("runs with tools are resumed to the bit") {
-  const std::string still = R"("formulation": {"kind": "static"}, )";
-  for (const std::string& blocks : {kThree + kPoke, kThree + still + kPoke}) {
-    const ExperimentScene scene = small_scene(blocks);
-    const SimulationRecord whole = run_of(scene).record;
-    const TempFolder folder;
-    SimulationControls controls;
-    controls.checkpoint = folder / "c";
-    int seen = 0;
-    controls.interrupted = [&] { return ++seen == 120; };
-    CHECK_THROWS_AS(simulate(scene, network_to_run(scene), controls), Interrupted);
-    controls.interrupted = {};
-    const SimulationRun rest = simulate(scene, network_to_run(scene), controls);
-    CHECK(rest.resumed_at_s.has_value());
-    REQUIRE(rest.record.curve.size() == whole.curve.size());
-    for (std::size_t i = 0; i < whole.curve.size(); ++i) {
-      CHECK(rest.record.curve[i].response == whole.curve[i].response);
-      CHECK(rest.record.curve[i].touching == whole.curve[i].touching);
-      CHECK(rest.record.curve[i].overlap_m == whole.curve[i].overlap_m);
-    }
+  const ExperimentScene scene = small_scene(kThree + kPoke);
+  const SimulationRecord whole = run_of(scene).record;
+  const TempFolder folder;
+  SimulationControls controls;
+  controls.checkpoint = folder / "c";
+  int seen = 0;
+  controls.interrupted = [&] { return ++seen == 120; };
+  CHECK_THROWS_AS(simulate(scene, network_to_run(scene), controls), Interrupted);
+  controls.interrupted = {};
+  const SimulationRun rest = simulate(scene, network_to_run(scene), controls);
+  CHECK(rest.resumed_at_s.has_value());
+  REQUIRE(rest.record.curve.size() == whole.curve.size());
+  for (std::size_t i = 0; i < whole.curve.size(); ++i) {
+    CHECK(rest.record.curve[i].response == whole.curve[i].response);
+    CHECK(rest.record.curve[i].touching == whole.curve[i].touching);
+    CHECK(rest.record.curve[i].overlap_m == whole.curve[i].overlap_m);
   }
 }
 
