@@ -31,6 +31,8 @@ inline std::vector<ErrorCase> simulation_error_cases() {
       {type, "contact said twice", simulate,
        contact(R"("number": 71, "at": ["2 mm", "136 mm", "57 mm"])")},
       {type, "tool without a size", simulate, pushed(R"("contacts": [{"kind": "ball"}])")},
+      {type, "tool wider than the organ", simulate,
+       pushed(R"("contacts": [{"kind": "ball", "radius": "2 m"}])")},
       {type, "key of another contact", simulate, contact(R"("radius": "2 mm")")},
       {type, "nothing driven", simulate,
        pushed(R"("contacts": [{"kind": "punch", "radius": "2 mm", "share": 0}])")},

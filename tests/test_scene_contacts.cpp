@@ -115,7 +115,7 @@ TEST_CASE("the file of a run holds its tools and what they did") {
   const Hdf5Reader file(folder / "a.h5");
   CHECK(file.numbers("/tools/share") == std::vector<double>{1.0, 0.5, 0.0});
   CHECK(file.numbers("/curve/overlap_m").size() == run.record.curve.size());
-  CHECK(file.table("/steps/00002/position_m").size() == 3 * 60);
+  CHECK(file.table("/steps/00002/position_m").size() == std::size_t{3} * 60);
   const std::vector<double> force = file.table("/steps/00002/tools/force_on_tissue_N");
   double conjugate = 0.0;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "tpm/core/error.hpp"
-#include "tpm/core/text.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 
 namespace tpm {
@@ -26,14 +25,6 @@ void require_keys_of(const Json& block, std::string_view kind,
     throw bad_input(place.key(key).where, "is missing",
                     fmt::format("'{}' needs {}", kind, fmt::join(needed, ", ")));
   }
-}
-
-double positive_at(const Json& block, const char* key, Dimension dimension,
-                   const DocumentPlace& place) {
-  const double value = quantity_at(block, key, dimension, place);
-  if (value > 0.0) return value;
-  throw bad_input(place.key(key).where, fmt::format("{} {}", shortest(value), si_symbol(dimension)),
-                  "a value above 0");
 }
 
 }  // namespace tpm

@@ -82,6 +82,18 @@ double share_of(const Json& contact, bool tool, const DocumentPlace& place) {
                   tool ? "0 (a tool that stands still) to 1000" : "above 0, at most 1000");
 }
 
+/// What is wider than the organ acts like what is as wide: such a size is a slip of the unit.
+double radius_of(const Json& contact, const Organ& organ, const DocumentPlace& place) {
+  const double radius = positive_at(contact, "radius", Dimension::length, place);
+  const double extent =
+      (organ.position.rowwise().maxCoeff() - organ.position.rowwise().minCoeff()).norm() +
+      2.0 * organ.radius;
+  if (radius <= extent) return radius;
+  throw bad_input(
+      place.key("radius").where, fmt::format("{} mm", significant(1e3 * radius, 4)),
+      fmt::format("at most the extent of the organ, {} mm", significant(1e3 * extent, 4)));
+}
+
 SceneContact parse_contact(const Json& block, const Tissue& tissue, const DocumentPlace& place) {
   const Organ& organ = tissue.network.organ;
   const auto name = block.at("kind").get<std::string>();
@@ -93,7 +105,7 @@ SceneContact parse_contact(const Json& block, const Tissue& tissue, const Docume
   contact.probe.direction = direction_of(block, organ, contact.probe.sphere, place);
   contact.probe.share = share_of(block, contact.is_tool(), place);
   if (block.contains("radius")) {
-    contact.radius_m = positive_at(block, "radius", Dimension::length, place);
+    contact.radius_m = radius_of(block, organ, place);
   }
   if (block.contains("stiffness")) {
     contact.stiffness_N_per_m = positive_at(block, "stiffness", Dimension::stiffness, place);

@@ -1,7 +1,6 @@
 #pragma once
 // Parts of parse_experiment, one per block of a scene that says what is done to the tissue.
 // All throw Error(bad_input) with the key; all are given blocks that the schema has accepted.
-#include "tpm/core/units.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/store/document_place.hpp"
 
@@ -20,10 +19,6 @@ struct KindKeys {
 void require_keys_of(const Json& block, std::string_view kind,
                      const std::vector<std::string_view>& needed,
                      const std::vector<std::string_view>& allowed, const DocumentPlace& place);
-
-/// A quantity that is above 0.
-[[nodiscard]] double positive_at(const Json& block, const char* key, Dimension dimension,
-                                 const DocumentPlace& place);
 
 /// Block `contacts`. At least one of them is driven.
 [[nodiscard]] std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tissue,

@@ -17,5 +17,8 @@ struct DocumentPlace {
 /// @param object of which the schema has said that the key stands for a text
 [[nodiscard]] double quantity_at(const Json& object, std::string_view key, Dimension dimension,
                                  const DocumentPlace& place);
+/// The same; throws too unless it is above 0.
+[[nodiscard]] double positive_at(const Json& object, std::string_view key, Dimension dimension,
+                                 const DocumentPlace& place);
 
 }  // namespace tpm

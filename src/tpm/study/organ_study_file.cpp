@@ -14,14 +14,6 @@ namespace {
 
 using Kind = ProtocolChoice::Kind;
 
-/// Throws unless the value is finite and above 0.
-double positive_at(const Json& object, std::string_view key, Dimension dimension,
-                   const DocumentPlace& place) {
-  const double value = quantity_at(object, key, dimension, place);
-  if (value > 0.0) return value;
-  throw bad_input(place.key(key).where, "not above 0", "a value above 0");
-}
-
 std::vector<double> positive_list(const Json& object, std::string_view key, Dimension dimension,
                                   const DocumentPlace& place) {
   std::vector<double> values;
