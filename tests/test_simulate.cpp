@@ -1,11 +1,14 @@
 // tpm simulate: what a scene says is done to a tissue, runs that are stopped and go on, limits of
 // validity, the mass-spring model beside it.
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <limits>
 
 #include "refusal.hpp"
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
+#include "tpm/core/error.hpp"
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/simulate/smoothness.hpp"
 
@@ -175,6 +178,26 @@ TEST_CASE("the checkpoint of another scene is not used, and that is said") {
   note.clear();
   CHECK_FALSE(simulate(springs, network_to_run(springs), controls).resumed_at_s);
   CHECK_THAT(note, Contains("of another scene"));
+}
+
+TEST_CASE("a load put on at once does not step over an instability") {
+  const auto end_of = [](double load_N) -> std::string {
+    const ExperimentScene scene = small_scene(
+        fmt::format(R"("protocol": {{"kind": "knots", "knots": [{{"time": "0 s", "load": "0 N"}},
+          {{"time": "1 s", "load": "0 N"}}, {{"time": "1 s", "load": "{} N"}},
+          {{"time": "1.001 s", "load": "{} N"}}]}})",
+                    load_N, load_N));
+    try {
+      return fmt::format("{:.6f}", run_of(scene).record.curve.back().response);
+    } catch (const Error& stop) {
+      return stop.what();
+    }
+  };
+  CHECK_THAT(end_of(0.9), !Contains("buckles"));
+  for (const double load : {1.0, 1.2, 1.6, 1.8, 2.4, 3.5}) {
+    CAPTURE(load);
+    CHECK_THAT(end_of(load), Contains("a load of 0.9359 N the tissue buckles"));
+  }
 }
 
 TEST_CASE("limits of validity are dated and name their spheres") {

@@ -18,6 +18,10 @@ constexpr double kHopeless = 10.0;         // times the tolerance: an error that
 constexpr int kLastHopeless = 2;           // iterations after which only the balance decides
 constexpr double kFurthestExtrapolation = 1.0;  // of the step before
 constexpr Eigen::Index kMemoryDepth = 6;
+// How far what is driven may go at one step of a load: beyond, it may have snapped to another
+// place.
+constexpr double kLongestMove = 0.25;    // of a bond
+constexpr double kSnap = 2.0;            // times what the stiffness says
 constexpr double kGrains = 8.0;          // roundings of a coordinate that no balance gets below
 constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the force
 
@@ -65,6 +69,8 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
       relaxed ? 1.0 : 0.0};
   Positions position = state.position;
   tissue_.impose(position, imposed);
+  const std::optional<double> furthest_m = furthest_depth_change_m(state, memory, imposed);
+  if (!furthest_m) return TissueMove::unbalanced;
   Eigen::Matrix3Xd load;
   tissue_.load(imposed, load);
   // A force error of this size is within the tolerance whatever it acts on; below the least one
@@ -78,12 +84,30 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   has_last_ = false;
   if (!search.stable) return TissueMove::unstable;
   if (!search.converged) return TissueMove::unbalanced;
+  const double change_m = std::abs(tissue_.depth_of(position - state.position));
+  if (change_m > *furthest_m) return TissueMove::unbalanced;
   state.imposed = imposed;
   state.position = std::move(position);
   tissue_.bonds().elongations(state.position, state.elongation);
   if (relaxed) state.remembered = state.elongation;
   state.closed = tissue_.bonds().closed_contacts(state.position);
   return TissueMove::done;
+}
+
+std::optional<double> StageBalance::furthest_depth_change_m(const TissueState& state,
+                                                            const BondMemory& memory,
+                                                            double imposed) {
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  if (tissue_.depth_driven() || imposed == state.imposed) return kAny;
+  ++work_.factorisations;
+  if (!tissue_.equilibrium().factorise(state.position, memory)) return kAny;
+  const double expected =
+      std::abs((imposed - state.imposed) * tissue_.unit_field(state, memory).stiffness);
+  const BondSystem& bonds = tissue_.bonds();
+  const auto joined = static_cast<Eigen::Index>(bonds.first_contact());
+  const double longest = kLongestMove * bonds.rest_length_m().head(joined).mean();
+  if (expected > longest) return std::nullopt;
+  return std::min(kSnap * expected, longest);
 }
 
 void StageBalance::set_weights(double z) {

@@ -44,6 +44,8 @@ class StageBalance {
   [[nodiscard]] const QuasiStaticWork& work() const { return work_; }
 
   /// An equilibrium at another imposed value, at once or relaxed; the state moves if it is done.
+  /// One that gives way to a load by far, or by much more than the stiffness says, is not taken: it
+  /// may lie behind an instability, and the load has to be changed in smaller steps.
   [[nodiscard]] TissueMove move(TissueState& state, double imposed, bool relaxed, double tolerance);
 
   /// Balances a step of length h in which the imposed value moves at `rate`; see accept().
@@ -94,6 +96,13 @@ class StageBalance {
   [[nodiscard]] Within within(const TissueState& state, std::span<const double> fractions, double h,
                               double rate) const;
   [[nodiscard]] LaneVector responses(const Within& states);
+
+  /// By how much the depth may change with a load before it is suspected that the tissue has
+  /// snapped to another place; infinite where the depth is imposed or the load stays, none if the
+  /// stiffness says already that it would go too far.
+  [[nodiscard]] std::optional<double> furthest_depth_change_m(const TissueState& state,
+                                                              const BondMemory& memory,
+                                                              double imposed);
 
   enum class Balance { found, hopeless, failed };
 
