@@ -289,10 +289,10 @@ TEST_CASE("roughness is stated where something has moved") {
   CHECK(found->near_contact < 1.0);
 }
 
-TEST_CASE("a load that nothing carries is refused with its time") {
+TEST_CASE("a load that nothing carries is refused where the tissue gives way") {
   CHECK_THAT(refusal_of([] {
                (void)run_of(small_scene(
                    R"("protocol": {"kind": "creep", "load": "1e6 N", "duration": "1 s"})"));
              }),
-             Contains("at t = 0 s a load of 1e+06 N is") && Contains("through the "));
+             Contains("at t = 0 s and a load of 0.93") && Contains("buckles"));
 }

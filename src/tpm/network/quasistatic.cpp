@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kStepShare = 0.1;   // of the tolerance, for one step
 constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
-constexpr double kLeastMove = 1e-5;  // of a jump
+constexpr double kLeastMove = 1e-9;  // of a jump
 constexpr double kFirstStep = 3.0;   // after a change of rate, in relaxation times
 constexpr double kSafety = 0.8;
 constexpr double kMostGrowth = 30.0;           // from one step to the next

@@ -67,7 +67,7 @@ Eigen::Vector3d direction_of(const Json& contact, const Organ& organ, std::size_
     return -organ.normal.col(static_cast<Eigen::Index>(sphere));
   }
   const auto d = contact.at("direction").get<std::array<double, 3>>();
-  const Eigen::Vector3d direction = Eigen::Vector3d(d[0], d[1], d[2]).stableNormalized();
+  Eigen::Vector3d direction = Eigen::Vector3d(d[0], d[1], d[2]).stableNormalized();
   if (direction.norm() < 0.5) {
     throw bad_input(place.key("direction").where, "has no length", "a direction");
   }
