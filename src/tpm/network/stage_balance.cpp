@@ -100,7 +100,7 @@ std::optional<double> StageBalance::furthest_depth_change_m(const TissueState& s
   constexpr double kAny = std::numeric_limits<double>::infinity();
   if (tissue_.depth_driven() || imposed == state.imposed) return kAny;
   ++work_.factorisations;
-  if (!tissue_.equilibrium().factorise(state.position, memory)) return kAny;
+  if (!tissue_.equilibrium().factorise(state.position, memory)) return std::nullopt;
   const double expected =
       std::abs((imposed - state.imposed) * tissue_.unit_field(state, memory).stiffness);
   const BondSystem& bonds = tissue_.bonds();

@@ -99,7 +99,7 @@ class StageBalance {
 
   /// By how much the depth may change with a load before it is suspected that the tissue has
   /// snapped to another place; infinite where the depth is imposed or the load stays, none if the
-  /// stiffness says already that it would go too far.
+  /// stiffness says already that it would go too far, or has no inverse and says nothing.
   [[nodiscard]] std::optional<double> furthest_depth_change_m(const TissueState& state,
                                                               const BondMemory& memory,
                                                               double imposed);
