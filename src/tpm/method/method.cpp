@@ -18,6 +18,7 @@ using Vector = Eigen::VectorXd;
 constexpr auto kDone = MethodEnd::completed;
 constexpr double kDivergedTimes = 1e3;  // what is to be expected
 constexpr double kSameTime = 1e-9;      // of a step
+constexpr double kBeyondReach = 3.0;    // of what is to be expected: no balance leads there
 
 void require_valid(const MethodSettings& settings) {
   const auto require = [](bool good, std::string_view what, double got, std::string_view expected) {
@@ -112,6 +113,13 @@ class MethodDriver {
     return system_.work().rates > settings_.most_rates ? MethodEnd::too_much_work : kDone;
   }
 
+  /// Forces that cannot be balanced because a memory has run away are not the tissue's failure.
+  [[nodiscard]] MethodEnd cause(MethodEnd end, const Vector& state) const {
+    const Eigen::Index m = system_.remembered();
+    const auto reach = kBeyondReach / kDivergedTimes * bound_.tail(m).array();
+    return (state.tail(m).cwiseAbs().array() <= reach).all() ? end : MethodEnd::diverged;
+  }
+
   StepSystem& system_;
   const Protocol& protocol_;
   const MethodSettings& settings_;
@@ -181,7 +189,9 @@ class FixedDriver final : public MethodDriver {
       const double until = last ? to.time_s : from.time_s + length * ((i + 1.0) / count);
       if (const auto end = answer_before(until, h); end != kDone) return end;
       if (all_answered()) return kDone;
-      if (const auto end = rule_->step(system_, time_s_, h, state_); end != kDone) return end;
+      if (const auto end = rule_->step(system_, time_s_, h, state_); end != kDone) {
+        return cause(end, state_);
+      }
       ++steps_;
       if (const auto end = judge(state_); end != kDone) return end;
       time_s_ = until;
@@ -203,7 +213,9 @@ class FixedDriver final : public MethodDriver {
       }
       Vector there = state_;
       const StepSystem::Place place = system_.place();
-      if (const auto end = rule_->step(system_, time_s_, part, there); end != kDone) return end;
+      if (const auto end = rule_->step(system_, time_s_, part, there); end != kDone) {
+        return cause(end, there);
+      }
       ++steps_;
       if (const auto end = judge(there); end != kDone) return end;
       if (const auto end = answer(time_s_ + part, there); end != kDone) return end;

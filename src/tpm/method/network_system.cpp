@@ -28,7 +28,8 @@ class NetworkSystem : public StepSystem {
         balance_(bonds_, tissue_.freedom(), work()),
         projection_(bonds_, tissue_.freedom()),
         position_(rest_),
-        memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0} {
+        memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0},
+        peak_(protocol.peak()) {
     for (std::size_t i = 0; i < bonds_.size(); ++i) {
       if (bonds_.relaxing()[static_cast<Eigen::Index>(i)] > 0.0) relaxing_.push_back(i);
     }
@@ -49,6 +50,12 @@ class NetworkSystem : public StepSystem {
       memory_.offset[static_cast<Eigen::Index>(relaxing_[i])] = y[static_cast<Eigen::Index>(i)];
     }
     memory_.following = following;
+  }
+
+  /// What is imposed at one time, found in two ways.
+  [[nodiscard]] bool is_same(double a, double b) const {
+    constexpr double kRounding = 1e-13;
+    return std::abs(a - b) <= kRounding * peak_;
   }
 
   /// l of the bonds that relax.
@@ -110,6 +117,7 @@ class NetworkSystem : public StepSystem {
   Positions position_;
   BondMemory memory_;
   std::vector<std::size_t> relaxing_;  ///< bond of each y
+  double peak_;                        ///< of what is imposed
   double depth_scale_ = 0.0;
   Eigen::Matrix3Xd load_, force_;
   Eigen::VectorXd all_;
@@ -294,7 +302,7 @@ class RestingNetwork final : public NetworkSystem {
   }
 
   MethodEnd balance_at(double imposed, const ConstVector& y) {
-    if (known_.imposed == imposed && known_.y == y) return kDone;
+    if (is_same(known_.imposed, imposed) && known_.y == y) return kDone;
     set_memory(y);
     const MethodEnd end = follow(known_.imposed, imposed);
     if (end == kDone) known_ = {imposed, y};

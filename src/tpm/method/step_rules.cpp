@@ -88,7 +88,10 @@ class RungeKutta4 final : public FixedRule {
     sum_.setZero(state.size());
     for (std::size_t i = 0; i < 4; ++i) {
       at_ = state + kNode[i] * h * rate_;
-      if (const auto end = system.rate(time_s + kNode[i] * h, at_, rate_); end != kDone) return end;
+      if (const auto end = system.rate(time_s + kNode[i] * h, at_, rate_); end != kDone) {
+        state = at_;  // what it failed at
+        return end;
+      }
       sum_ += kWeight[i] * h * rate_;
     }
     state += sum_;
