@@ -19,7 +19,7 @@ tpm_find(fmt 9)
 
 # --- linked by the library ----------------------------------------------------------------------
 tpm_find(Ceres 2.1)
-tpm_find(SUNDIALS 6.4 COMPONENTS cvodes sunmatrixdense sunlinsoldense sunmatrixsparse sunlinsolklu
+tpm_find(SUNDIALS 6.4 COMPONENTS cvodes ida sunmatrixdense sunlinsoldense sunmatrixsparse sunlinsolklu
          nvecserial)
 tpm_find(muparser 2.3)
 tpm_find(OpenSSL 3 COMPONENTS Crypto)
@@ -43,7 +43,7 @@ mark_as_advanced(TPM_CSV_INCLUDE TPM_CSV_LIBRARY)
 add_library(tpm_ceres INTERFACE IMPORTED)
 target_link_libraries(tpm_ceres INTERFACE Ceres::ceres)
 add_library(tpm_sundials INTERFACE IMPORTED)
-target_link_libraries(tpm_sundials INTERFACE SUNDIALS::cvodes SUNDIALS::nvecserial
+target_link_libraries(tpm_sundials INTERFACE SUNDIALS::cvodes SUNDIALS::ida SUNDIALS::nvecserial
   SUNDIALS::sunmatrixdense SUNDIALS::sunlinsoldense SUNDIALS::sunmatrixsparse
   SUNDIALS::sunlinsolklu)
 add_library(tpm_hdf5 INTERFACE IMPORTED)

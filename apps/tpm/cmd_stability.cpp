@@ -1,0 +1,46 @@
+// tpm stability: where each step rule fails.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/stability_report.hpp"
+
+namespace tpm::app {
+namespace {
+
+int stability(const std::string& folder, const Session& session) {
+  const std::string python = find_drawing_python();  // before the work, not after
+  const auto start = std::chrono::steady_clock::now();
+  const StabilityStudy study = run_stability_study();
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  write_stability(study, folder, python, took.count());
+  if (session.json()) {
+    fmt::print("{}", to_text(to_json(study)));
+    return 0;
+  }
+  for (const std::string& sentence : stability_sentences(study)) fmt::print("- {}\n", sentence);
+  fmt::print(
+      "written to {}: report.html, report.md, stability.json, limits.csv, corners.csv, servo.csv, "
+      "map_*.csv, figures\n",
+      folder);
+  return 0;
+}
+
+}  // namespace
+
+void add_stability_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "stability", "Where each step rule fails: maps, limits against theory, degenerate corners");
+  auto folder = std::make_shared<std::string>("out/stability");
+  command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
+  add_format_option(*command, session);
+  command->footer("Example:\n  tpm stability --output out/stability");
+  command->callback([folder, &session] {
+    session.run = [folder, &session] { return stability(*folder, session); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,375 @@
+#include "tpm/method/adaptive_rules.hpp"
+
+#include <ida/ida.h>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tpm/solve/sundials.hpp"
+
+namespace tpm {
+namespace {
+
+using sundials::check;
+using Vector = Eigen::VectorXd;
+constexpr auto kDone = MethodEnd::completed;
+constexpr long kMostSteps = std::numeric_limits<long>::max();
+
+Eigen::Map<Vector> view(N_Vector v) {
+  return {NV_DATA_S(v), static_cast<Eigen::Index>(NV_LENGTH_S(v))};
+}
+
+struct FreeNonlinearSolver {
+  void operator()(SUNNonlinearSolver s) const { SUNNonlinSolFree(s); }
+};
+struct FreeIda {
+  void operator()(void* memory) const { IDAFree(&memory); }
+};
+
+/// What the callbacks of an integrator reach.
+struct Side {
+  StepSystem& system;
+  long most_rates;
+  MethodEnd last = kDone;  ///< the latest failure of the problem itself
+  double at_s = 0.0;       ///< its time
+  bool exhausted = false;
+  double gamma = 0.0;  ///< of IDA's matrix with masses
+
+  /// 0, or what SUNDIALS takes for "try a shorter step" or "stop".
+  int answer(MethodEnd end, double time_s) {
+    at_s = time_s;
+    exhausted = system.work().rates > most_rates;
+    if (exhausted) return -1;
+    if (end != kDone) last = end;
+    return end == kDone ? 0 : 1;
+  }
+};
+
+Side& side(void* user_data) {
+  return *static_cast<Side*>(user_data);
+}
+
+/// How a run ended whose integrator gave up.
+MethodEnd end_of(const Side& side, bool newton) {
+  if (side.exhausted) return MethodEnd::too_much_work;
+  if (side.last != kDone) return side.last;
+  return newton ? MethodEnd::newton_failed : MethodEnd::diverged;
+}
+
+extern "C" {
+int method_rate(sunrealtype t, N_Vector z, N_Vector z_dot, void* user_data) {
+  auto rate = view(z_dot);
+  const MethodEnd end = side(user_data).system.rate(t, view(z), rate);
+  return side(user_data).answer(end == kDone && !rate.allFinite() ? MethodEnd::diverged : end, t);
+}
+
+int method_setup(sunrealtype t, N_Vector z, N_Vector, SUNMatrix, sunbooleantype,
+                 sunbooleantype* is_new, sunrealtype gamma, void* user_data, N_Vector, N_Vector,
+                 N_Vector) {
+  *is_new = SUNTRUE;
+  return side(user_data).answer(side(user_data).system.factorise(t, view(z), gamma), t);
+}
+
+int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* user_data);
+int dae_setup(sunrealtype t, sunrealtype c, N_Vector z, N_Vector, N_Vector, SUNMatrix,
+              void* user_data, N_Vector, N_Vector, N_Vector);
+
+SUNLinearSolver_Type method_solver_type(SUNLinearSolver) {
+  // Its matrix is its own: SUNDIALS only hands it on.
+  return SUNLINEARSOLVER_DIRECT;
+}
+
+int method_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
+  auto solution = view(x);
+  solution = view(b);
+  static_cast<StepSystem*>(solver->content)->solve(solution);
+  return 0;
+}
+
+int method_solver_free(SUNLinearSolver solver) {
+  SUNLinSolFreeEmpty(solver);
+  return 0;
+}
+
+SUNMatrix_ID method_matrix_id(SUNMatrix) {
+  return SUNMATRIX_CUSTOM;
+}
+
+void method_matrix_destroy(SUNMatrix matrix) {
+  SUNMatFreeEmpty(matrix);
+}
+
+int method_matrix_zero(SUNMatrix) {
+  return 0;
+}
+}
+
+/// A matrix that stands for the factorisation inside the problem.
+sundials::Matrix custom_matrix(SUNContext context) {
+  sundials::Matrix matrix(SUNMatNewEmpty(context));
+  matrix->ops->getid = method_matrix_id;
+  matrix->ops->destroy = method_matrix_destroy;
+  matrix->ops->zero = method_matrix_zero;
+  return matrix;
+}
+
+sundials::LinearSolver custom_solver(SUNContext context, void* content,
+                                     int (*solve)(SUNLinearSolver, SUNMatrix, N_Vector, N_Vector,
+                                                  sunrealtype)) {
+  sundials::LinearSolver solver(SUNLinSolNewEmpty(context));
+  solver->content = content;
+  solver->ops->gettype = method_solver_type;
+  solver->ops->solve = solve;
+  solver->ops->free = method_solver_free;
+  return solver;
+}
+
+class CvodeRule final : public AdaptiveRule {
+ public:
+  CvodeRule(StepSystem& system, const MethodSettings& settings)
+      : side_{system, settings.most_rates},
+        context_(sundials::make_context()),
+        state_(N_VNew_Serial(system.size(), context_.get())),
+        error_(N_VClone(state_.get())),
+        memory_(CVodeCreate(settings.rule == StepRule::cvode_adams ? CV_ADAMS : CV_BDF,
+                            context_.get())) {
+    view(state_.get()).setZero();
+    view(error_.get()) = settings.tolerance * system.scales();
+    void* m = memory_.get();
+    check(CVodeInit(m, method_rate, 0.0, state_.get()), "CVodeInit");
+    check(CVodeSetUserData(m, &side_), "CVodeSetUserData");
+    check(CVodeSVtolerances(m, 0.0, error_.get()), "CVodeSVtolerances");
+    check(CVodeSetMaxNumSteps(m, kMostSteps), "CVodeSetMaxNumSteps");
+    sundials::mute(m);
+    if (settings.rule == StepRule::cvode_adams) {
+      nonlinear_.reset(SUNNonlinSol_FixedPoint(state_.get(), 0, context_.get()));
+      check(CVodeSetNonlinearSolver(m, nonlinear_.get()), "CVodeSetNonlinearSolver");
+      return;
+    }
+    matrix_ = custom_matrix(context_.get());
+    solver_ = custom_solver(context_.get(), &system, method_solve);
+    check(CVodeSetLinearSolver(m, solver_.get(), matrix_.get()), "CVodeSetLinearSolver");
+    check(CVodeSetLinSysFn(m, method_setup), "CVodeSetLinSysFn");
+  }
+
+  MethodEnd restart(double time_s, double stop_s, const Vector& state) override {
+    before_ += steps_of_piece();
+    started_ = true;
+    view(state_.get()) = state;
+    check(CVodeReInit(memory_.get(), time_s, state_.get()), "CVodeReInit");
+    check(CVodeSetStopTime(memory_.get(), stop_s), "CVodeSetStopTime");
+    return kDone;
+  }
+
+  MethodEnd advance_to(double time_s, Vector& state) override {
+    double reached = 0.0;
+    side_.last = kDone;
+    const int flag = CVode(memory_.get(), time_s, state_.get(), &reached, CV_NORMAL);
+    if (flag < 0) {
+      given_up_ = {side_.at_s, sundials::flag_name(flag)};
+      return end_of(side_, flag == CV_CONV_FAILURE);
+    }
+    state = view(state_.get());
+    return kDone;
+  }
+
+  [[nodiscard]] GivenUp given_up() const override { return given_up_; }
+  [[nodiscard]] long steps() const override { return before_ + steps_of_piece(); }
+
+ private:
+  [[nodiscard]] long steps_of_piece() const {
+    long steps = 0;
+    if (started_) check(CVodeGetNumSteps(memory_.get(), &steps), "CVodeGetNumSteps");
+    return steps;
+  }
+
+  Side side_;
+  sundials::Context context_;
+  sundials::Vector state_, error_;
+  sundials::Matrix matrix_;
+  sundials::LinearSolver solver_;
+  std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeNonlinearSolver> nonlinear_;
+  sundials::Cvodes memory_;
+  bool started_ = false;
+  long before_ = 0;
+  GivenUp given_up_;
+};
+
+extern "C" {
+int dae_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
+  auto solution = view(x);
+  solution = view(b);
+  StepSystem& system = side(solver->content).system;
+  if (system.coordinates() > 0) {
+    solution *= side(solver->content).gamma;
+    system.solve(solution);
+  } else {
+    const Eigen::Index n = system.places();
+    auto place = solution.head(n);
+    auto y = solution.tail(system.remembered());
+    system.solve_pair(place, y);
+  }
+  return 0;
+}
+}
+
+/// The unknowns are (x, v, y) with masses, and (positions, y) without.
+class IdaRule final : public AdaptiveRule {
+ public:
+  IdaRule(StepSystem& system, const MethodSettings& settings)
+      : side_{system, settings.most_rates},
+        places_(system.coordinates() > 0 ? 0 : system.places()),
+        context_(sundials::make_context()),
+        state_(N_VNew_Serial(places_ + system.size(), context_.get())),
+        rate_(N_VClone(state_.get())),
+        error_(N_VClone(state_.get())),
+        memory_(IDACreate(context_.get())) {
+    const Vector scales = system.scales();
+    view(state_.get()).setZero();
+    view(rate_.get()).setZero();
+    view(error_.get()).head(places_).setConstant(settings.tolerance * scales[0]);
+    view(error_.get()).tail(scales.size()) = settings.tolerance * scales;
+    void* m = memory_.get();
+    check(IDAInit(m, dae_residual, 0.0, state_.get(), rate_.get()), "IDAInit");
+    check(IDASetUserData(m, &side_), "IDASetUserData");
+    check(IDASVtolerances(m, 0.0, error_.get()), "IDASVtolerances");
+    check(IDASetMaxNumSteps(m, kMostSteps), "IDASetMaxNumSteps");
+    mute();
+    matrix_ = custom_matrix(context_.get());
+    solver_ = custom_solver(context_.get(), &side_, dae_solve);
+    check(IDASetLinearSolver(m, solver_.get(), matrix_.get()), "IDASetLinearSolver");
+    check(IDASetJacFn(m, dae_setup), "IDASetJacFn");
+  }
+
+  MethodEnd restart(double time_s, double stop_s, const Vector& state) override {
+    StepSystem& system = side_.system;
+    before_ += steps_of_piece();
+    started_ = true;
+    auto z = view(state_.get());
+    auto z_dot = view(rate_.get());
+    Vector rate(state.size());
+    if (const auto end = system.rate(time_s, state, rate); end != kDone) return end;
+    z.tail(state.size()) = state;
+    z_dot.tail(state.size()) = rate;
+    if (places_ > 0) {
+      z.head(places_) = system.placed();
+      Vector moving;
+      if (const auto end = place_rate(time_s, stop_s, state, rate, moving); end != kDone) {
+        return end;
+      }
+      z_dot.head(places_) = moving;
+    }
+    check(IDAReInit(memory_.get(), time_s, state_.get(), rate_.get()), "IDAReInit");
+    check(IDASetStopTime(memory_.get(), stop_s), "IDASetStopTime");
+    return kDone;
+  }
+
+  MethodEnd advance_to(double time_s, Vector& state) override {
+    double reached = 0.0;
+    side_.last = kDone;
+    const int flag =
+        IDASolve(memory_.get(), time_s, &reached, state_.get(), rate_.get(), IDA_NORMAL);
+    if (flag < 0) {
+      char* name = IDAGetReturnFlagName(flag);
+      given_up_ = {side_.at_s, name};
+      std::free(name);  // NOLINT(cppcoreguidelines-no-malloc): SUNDIALS allocates it with malloc
+      return end_of(side_, flag == IDA_CONV_FAIL);
+    }
+    state = view(state_.get()).tail(state.size());
+    return kDone;
+  }
+
+  [[nodiscard]] GivenUp given_up() const override { return given_up_; }
+  [[nodiscard]] long steps() const override { return before_ + steps_of_piece(); }
+
+ private:
+  /// The rate of the positions along the solution, from two balances close to each other.
+  MethodEnd place_rate(double time_s, double stop_s, const Vector& state, const Vector& rate,
+                       Vector& moving) {
+    StepSystem& system = side_.system;
+    const StepSystem::Place here = system.place();
+    const double apart = 1e-4 * std::min(stop_s - time_s, system.relaxation_time_s());
+    const Vector from = system.placed();
+    Vector there = state + apart * rate;
+    Vector unused(state.size());
+    const MethodEnd end = system.rate(time_s + apart, there, unused);
+    moving = (system.placed() - from) / apart;
+    system.set_place(here);
+    return end;
+  }
+
+  void mute() {
+#if SUNDIALS_VERSION_MAJOR < 7
+    const IDAErrHandlerFn nothing = [](int, const char*, const char*, char*, void*) {};
+    check(IDASetErrHandlerFn(memory_.get(), nothing, nullptr), "IDASetErrHandlerFn");
+#endif
+  }
+
+  [[nodiscard]] long steps_of_piece() const {
+    long steps = 0;
+    if (started_) check(IDAGetNumSteps(memory_.get(), &steps), "IDAGetNumSteps");
+    return steps;
+  }
+
+  Side side_;
+  Eigen::Index places_;
+  sundials::Context context_;
+  sundials::Vector state_, rate_, error_;
+  sundials::Matrix matrix_;
+  sundials::LinearSolver solver_;
+  std::unique_ptr<void, FreeIda> memory_;
+  bool started_ = false;
+  long before_ = 0;
+  GivenUp given_up_;
+};
+
+extern "C" {
+int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* user_data) {
+  StepSystem& system = side(user_data).system;
+  auto left = view(r);
+  MethodEnd end = kDone;
+  if (system.coordinates() > 0) {
+    end = system.rate(t, view(z), left);
+    left = view(z_dot) - left;
+  } else {
+    const Eigen::Index n = system.places();
+    const Eigen::Index m = system.remembered();
+    Vector elongation;
+    auto imbalance = left.head(n);
+    system.imbalance(t, view(z).head(n), view(z).tail(m), imbalance, elongation);
+    left.tail(m) =
+        view(z_dot).tail(m) - (elongation - view(z).tail(m)) / system.relaxation_time_s();
+  }
+  return side(user_data).answer(end == kDone && !left.allFinite() ? MethodEnd::diverged : end, t);
+}
+
+int dae_setup(sunrealtype t, sunrealtype c, N_Vector z, N_Vector, N_Vector, SUNMatrix,
+              void* user_data, N_Vector, N_Vector, N_Vector) {
+  StepSystem& system = side(user_data).system;
+  if (system.coordinates() > 0) {
+    side(user_data).gamma = 1.0 / c;
+    return side(user_data).answer(system.factorise(t, view(z), 1.0 / c), t);
+  }
+  const Eigen::Index n = system.places();
+  const MethodEnd end =
+      system.factorise_pair(t, view(z).head(n), view(z).tail(system.remembered()), c);
+  return side(user_data).answer(end, t);
+}
+}
+
+}  // namespace
+
+std::unique_ptr<AdaptiveRule> adaptive_rule(StepSystem& system, const MethodSettings& settings) {
+  switch (settings.rule) {
+    case StepRule::cvode_adams:
+    case StepRule::cvode_bdf:
+      return std::make_unique<CvodeRule>(system, settings);
+    case StepRule::ida:
+      return std::make_unique<IdaRule>(system, settings);
+    default:
+      return nullptr;
+  }
+}
+
+}  // namespace tpm

@@ -1,0 +1,34 @@
+#include "tpm/method/bond_projection.hpp"
+
+namespace tpm {
+
+BondProjection::BondProjection(const BondSystem& bonds, const Freedom& freedom)
+    : bonds_(bonds),
+      freedom_(freedom),
+      tension_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size()))) {}
+
+void BondProjection::sweep(Positions& position, const BondMemory& memory,
+                           const Eigen::VectorXd& give_m_per_N) {
+  for (std::size_t i = 0; i < bonds_.first_contact(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const std::uint32_t a = bonds_.end_a()[i];
+    const std::uint32_t b = bonds_.end_b()[i];
+    const Eigen::Vector3d apart = position.col(b) - position.col(a);
+    const double length = apart.norm();
+    const Eigen::Vector3d n = apart / length;
+    const double l = length - bonds_.rest_length_m()[row];
+    const bool slack = bonds_.is_rope(i) && l < 0.0;
+    const double g = bonds_.relaxing()[row];
+    const double slope = slack ? 0.0 : bonds_.stiffness()[row] - memory.following * g;
+    const double pull = slack ? 0.0 : slope * l - g * memory.offset[row];
+    const Eigen::Vector3d move_a = give_m_per_N[a] * (freedom_.projector(a) * n);
+    const Eigen::Vector3d move_b = give_m_per_N[b] * (freedom_.projector(b) * n);
+    const double give = n.dot(move_a + move_b);
+    const double more = (pull - tension_[row]) / (1.0 + slope * give);
+    tension_[row] += more;
+    position.col(a) += more * move_a;
+    position.col(b) -= more * move_b;
+  }
+}
+
+}  // namespace tpm

@@ -1,0 +1,36 @@
+#pragma once
+// Position-based dynamics with compliance on the bonds of a network.
+#include <vector>
+
+#include "tpm/network/bond_system.hpp"
+#include "tpm/network/freedom.hpp"
+
+namespace tpm {
+
+/// Bonds with memory as compliant constraints (Macklin, Mueller, Chentanez: XPBD, 2016). What a
+/// bond remembers at the end of a step is y = offset + following l, so that it pulls with
+/// N = (k - following g) l - g offset: a constraint on l of compliance 1/(k - following g) about
+/// a rest elongation. The multiplier is N itself here, which leaves bonds without stiffness in.
+class BondProjection {
+ public:
+  /// @param bonds, freedom must live as long as this; contacts with tools are not projected
+  BondProjection(const BondSystem& bonds, const Freedom& freedom);
+
+  /// Multipliers start at 0.
+  void forget() { tension_.setZero(); }
+  /// Multipliers start at what the bonds pull with.
+  void remember(const Positions& position, const BondMemory& memory) {
+    bonds_.tensions(position, memory, tension_);
+  }
+
+  /// One sweep over the bonds in their order (Gauss-Seidel).
+  /// @param give_m_per_N how far each sphere goes under a force
+  void sweep(Positions& position, const BondMemory& memory, const Eigen::VectorXd& give_m_per_N);
+
+ private:
+  const BondSystem& bonds_;
+  const Freedom& freedom_;
+  Eigen::VectorXd tension_;  ///< N
+};
+
+}  // namespace tpm

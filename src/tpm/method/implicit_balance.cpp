@@ -1,0 +1,112 @@
+#include "tpm/method/implicit_balance.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace tpm {
+namespace {
+
+constexpr int kMostNewtonSteps = 60;
+constexpr int kMostHalvings = 30;
+constexpr double kShareOfDepth = 1e-12;
+constexpr double kNear = 1e-5;  // of the depth: Newton's steps are not checked any more
+constexpr double kGrain = 8.0 * std::numeric_limits<double>::epsilon();
+
+}  // namespace
+
+ImplicitBalance::ImplicitBalance(const BondSystem& bonds, const Freedom& freedom, MethodWork& work)
+    : bonds_(bonds),
+      freedom_(freedom),
+      work_(work),
+      matrix_(bonds.pattern()),
+      factor_(bonds.pattern()) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.spheres()));
+  for (std::size_t i = 0; i < bonds.size(); ++i) {
+    const double k = bonds.stiffness()[static_cast<Eigen::Index>(i)];
+    sum[bonds.end_a()[i]] += k;
+    sum[bonds.end_b()[i]] += k;
+  }
+  stiffest_ = sum.maxCoeff();
+}
+
+double ImplicitBalance::potential(const Positions& position, const BondMemory& memory,
+                                  const Eigen::Matrix3Xd& load,
+                                  const SphereAnchors* anchors) const {
+  const double bonds = bonds_.potential_J(position, memory) - position.cwiseProduct(load).sum();
+  if (anchors == nullptr) return bonds;
+  return bonds +
+         0.5 * (position - anchors->to).colwise().squaredNorm().dot(anchors->stiffness.transpose());
+}
+
+double ImplicitBalance::tolerance_N(const Positions& position, double depth_m,
+                                    const SphereAnchors* anchors) const {
+  double stiffness = stiffest_;
+  if (anchors != nullptr) stiffness += anchors->stiffness.maxCoeff();
+  return stiffness * (kShareOfDepth * depth_m + kGrain * position.cwiseAbs().maxCoeff());
+}
+
+bool ImplicitBalance::factorise_matrix(const Positions& position, const BondMemory& memory,
+                                       const SphereAnchors* anchors) {
+  ++work_.factorisations;
+  matrix_.set_zero();
+  bonds_.add_stiffness(position, memory, matrix_);
+  if (anchors != nullptr) {
+    for (std::size_t i = 0; i < matrix_.diagonal.size(); ++i) {
+      matrix_.diagonal[i].diagonal().array() += anchors->stiffness[static_cast<Eigen::Index>(i)];
+    }
+  }
+  freedom_.constrain(bonds_, matrix_);
+  return factor_.factorise(matrix_);
+}
+
+MethodEnd ImplicitBalance::factorise(const Positions& position, const BondMemory& memory) {
+  if (!factorise_matrix(position, memory, nullptr)) return MethodEnd::newton_failed;
+  return factor_.negative_count() == 0 ? MethodEnd::completed : MethodEnd::buckled;
+}
+
+void ImplicitBalance::displace(Eigen::Matrix3Xd& vectors) {
+  ++work_.solves;
+  freedom_.project(vectors);
+  factor_.solve(vectors);
+  freedom_.project(vectors);
+}
+
+MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
+                                const Eigen::Matrix3Xd& load, double depth_m,
+                                const SphereAnchors* anchors) {
+  const double tolerance = tolerance_N(position, depth_m, anchors);
+  double energy = potential(position, memory, load, anchors);
+  for (int iteration = 0;; ++iteration) {
+    ++work_.rates;
+    balance_forces(bonds_, position, memory, load, force_);
+    if (anchors != nullptr) {
+      force_ -= (position - anchors->to) * anchors->stiffness.asDiagonal();
+    }
+    freedom_.project(force_);
+    const double left = force_.colwise().norm().maxCoeff();
+    if (!std::isfinite(left)) return MethodEnd::newton_failed;
+    if (left <= tolerance && iteration > 0) return MethodEnd::completed;
+    if (iteration == kMostNewtonSteps) return MethodEnd::newton_failed;
+    if (!factorise_matrix(position, memory, anchors)) return MethodEnd::newton_failed;
+    if (factor_.negative_count() > 0) {
+      return anchors == nullptr ? MethodEnd::buckled : MethodEnd::newton_failed;
+    }
+    step_ = force_;
+    displace(step_);
+    const double slope = -force_.cwiseProduct(step_).sum();
+    // There the potential has no digits left to judge by.
+    const bool near = step_.colwise().norm().maxCoeff() <= kNear * depth_m;
+    double length = 1.0;
+    for (int halvings = 0;; ++halvings, length *= 0.5) {
+      if (halvings == kMostHalvings) return MethodEnd::newton_failed;
+      const Positions next = position + length * step_;
+      const double there = potential(next, memory, load, anchors);
+      if (!(near || there <= energy + 1e-4 * length * slope)) continue;
+      position = next;
+      energy = there;
+      break;
+    }
+  }
+}
+
+}  // namespace tpm

@@ -1,0 +1,373 @@
+#include "tpm/method/method.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/method/adaptive_rules.hpp"
+#include "tpm/method/step_rules.hpp"
+#include "tpm/model/model.hpp"
+
+namespace tpm {
+namespace {
+
+using Vector = Eigen::VectorXd;
+constexpr auto kDone = MethodEnd::completed;
+constexpr double kDivergedTimes = 1e3;  // what is to be expected
+constexpr double kSameTime = 1e-9;      // of a step
+constexpr double kBeyondReach = 3.0;    // of what is to be expected: no balance leads there
+
+void require_valid(const MethodSettings& settings) {
+  const auto require = [](bool good, std::string_view what, double got, std::string_view expected) {
+    if (!good) throw bad_input(what, shortest(got), expected);
+  };
+  require(settings.step_s > 0.0 && std::isfinite(settings.step_s), "step", settings.step_s,
+          "a time above 0");
+  require(settings.tolerance >= 1e-13 && settings.tolerance <= 0.1, "tolerance", settings.tolerance,
+          "1e-13 to 0.1");
+  require(settings.sweeps >= 1, "sweeps", settings.sweeps, "at least 1");
+  require(settings.most_rates >= 1, "most rates", static_cast<double>(settings.most_rates),
+          "at least 1");
+}
+
+std::string_view words(MethodEnd end) {
+  switch (end) {
+    case MethodEnd::completed:
+      return "";
+    case MethodEnd::diverged:
+      return "a value is not finite or grew beyond 1000 times its scale";
+    case MethodEnd::newton_failed:
+      return "Newton's method found no solution";
+    case MethodEnd::buckled:
+      return "the tangent stiffness is no longer positive definite";
+    case MethodEnd::too_much_work:
+      return "more evaluations of the forces than allowed";
+    case MethodEnd::not_applicable:
+      return "the rule has no meaning here";
+  }
+  return "";
+}
+
+/// One run through the protocol.
+class MethodDriver {
+ public:
+  MethodDriver(StepSystem& system, const Protocol& protocol, const MethodSettings& settings,
+               std::span<const double> times_s)
+      : system_(system), protocol_(protocol), settings_(settings), times_s_(times_s) {
+    run_.response = Vector::Constant(static_cast<Eigen::Index>(times_s.size()),
+                                     std::numeric_limits<double>::quiet_NaN());
+    knots_.assign(protocol.knots().begin(), protocol.knots().end());
+    if (!times_s.empty() && times_s.back() > knots_.back().time_s) {
+      knots_.push_back({times_s.back(), knots_.back().value});
+    }
+    bound_ = kDivergedTimes * system.scales();
+    // Velocities have to be finite only: a short step may make them large for a while.
+    const Eigen::Index n = system.coordinates();
+    bound_.segment(n, n).setConstant(std::numeric_limits<double>::infinity());
+  }
+  virtual ~MethodDriver() = default;
+  MethodDriver(const MethodDriver&) = delete;
+  MethodDriver& operator=(const MethodDriver&) = delete;
+
+  MethodRun go() {
+    time_s_ = knots_.front().time_s;
+    const MethodEnd end = cross_all();
+    run_.end = end;
+    run_.end_time_s = time_s_;
+    run_.work = system_.work();
+    run_.work.steps = steps();
+    if (end != kDone) {
+      run_.reason = fmt::format("at t = {} s: {}", significant(time_s_, 5), words(end));
+      const std::string more = detail();
+      if (!more.empty()) run_.reason += " (" + more + ")";
+    }
+    return std::move(run_);
+  }
+
+ protected:
+  [[nodiscard]] virtual MethodEnd jump() = 0;
+  /// Crosses a piece and answers what is asked for before its end.
+  [[nodiscard]] virtual MethodEnd cross(const Knot& from, const Knot& to) = 0;
+  [[nodiscard]] virtual long steps() const = 0;
+  [[nodiscard]] virtual std::string detail() const { return {}; }
+
+  [[nodiscard]] bool all_answered() const { return next_ == times_s_.size(); }
+  [[nodiscard]] double asked_s() const { return times_s_[next_]; }
+
+  [[nodiscard]] MethodEnd answer(double time_s, const Vector& state) {
+    double response = 0.0;
+    if (const auto end = system_.response(time_s, state, response); end != kDone) return end;
+    if (!std::isfinite(response)) return MethodEnd::diverged;
+    run_.response[static_cast<Eigen::Index>(next_++)] = response;
+    return kDone;
+  }
+
+  [[nodiscard]] MethodEnd judge(const Vector& state) const {
+    // Written so that what is not a number fails.
+    if (!(state.cwiseAbs().array() <= bound_.array()).all() || !state.allFinite()) {
+      return MethodEnd::diverged;
+    }
+    return system_.work().rates > settings_.most_rates ? MethodEnd::too_much_work : kDone;
+  }
+
+  /// Forces that cannot be balanced because a memory has run away are not the tissue's failure.
+  [[nodiscard]] MethodEnd cause(MethodEnd end, const Vector& state) const {
+    const Eigen::Index m = system_.remembered();
+    const auto reach = kBeyondReach / kDivergedTimes * bound_.tail(m).array();
+    return (state.tail(m).cwiseAbs().array() <= reach).all() ? end : MethodEnd::diverged;
+  }
+
+  StepSystem& system_;
+  const Protocol& protocol_;
+  const MethodSettings& settings_;
+  Vector state_;
+  double time_s_ = 0.0;
+
+ private:
+  [[nodiscard]] MethodEnd cross_all() {
+    const Knot& first = knots_.front();
+    system_.set_piece({first.time_s, 0.0}, {first.time_s + 1.0, 0.0});
+    const bool relaxed = protocol_.relaxed_at_start();
+    if (const auto end = system_.start(first, relaxed, state_); end != kDone) return end;
+    if (first.value != 0.0) {
+      stand_at(first);
+      const MethodEnd end = relaxed ? kDone : jump();
+      if (end != kDone) return end;
+    }
+    for (std::size_t k = 0; k + 1 < knots_.size() && !all_answered(); ++k) {
+      const Knot& from = knots_[k];
+      const Knot& to = knots_[k + 1];
+      MethodEnd end = kDone;
+      if (from.time_s < to.time_s) {
+        system_.set_piece(from, to);
+        end = cross(from, to);
+      } else if (from.value != to.value) {
+        stand_at(to);
+        end = jump();
+      }
+      if (end != kDone) return end;
+    }
+    if (knots_.size() == 1) stand_at(first);
+    while (!all_answered()) {
+      if (const auto end = answer(knots_.back().time_s, state_); end != kDone) return end;
+    }
+    return kDone;
+  }
+
+  void stand_at(const Knot& knot) { system_.set_piece(knot, {knot.time_s + 1.0, knot.value}); }
+
+  std::span<const double> times_s_;
+  std::vector<Knot> knots_;
+  std::size_t next_ = 0;
+  Vector bound_;
+  MethodRun run_;
+};
+
+/// With given steps: pieces are divided evenly. A time within a step is answered by a shorter step
+/// to it, which is then forgotten.
+class FixedDriver final : public MethodDriver {
+ public:
+  FixedDriver(StepSystem& system, const Protocol& protocol, const MethodSettings& settings,
+              std::span<const double> times_s)
+      : MethodDriver(system, protocol, settings, times_s), rule_(fixed_rule(settings)) {}
+
+ private:
+  MethodEnd jump() override { return rule_->jump(system_, time_s_, state_); }
+
+  MethodEnd cross(const Knot& from, const Knot& to) override {
+    const double length = to.time_s - from.time_s;
+    const double count = std::max(1.0, std::ceil(length / settings_.step_s * (1.0 - 1e-12)));
+    // Each step takes an evaluation at least.
+    if (!(count <= static_cast<double>(settings_.most_rates))) return MethodEnd::too_much_work;
+    const double h = length / count;
+    for (double i = 0.0; i < count; ++i) {
+      time_s_ = from.time_s + length * (i / count);
+      const bool last = i + 1.0 == count;
+      const double until = last ? to.time_s : from.time_s + length * ((i + 1.0) / count);
+      if (const auto end = answer_before(until, h); end != kDone) return end;
+      if (all_answered()) return kDone;
+      if (const auto end = rule_->step(system_, time_s_, h, state_); end != kDone) {
+        return cause(end, state_);
+      }
+      ++steps_;
+      if (const auto end = judge(state_); end != kDone) return end;
+      time_s_ = until;
+    }
+    // Just before a jump at the end.
+    while (!all_answered() && asked_s() < to.time_s) {
+      if (const auto end = answer(to.time_s, state_); end != kDone) return end;
+    }
+    return kDone;
+  }
+
+  /// Answers what is asked for from here to the end of the step, that end left out.
+  MethodEnd answer_before(double until_s, double h) {
+    while (!all_answered() && asked_s() < until_s - kSameTime * h) {
+      const double part = asked_s() - time_s_;
+      if (part <= kSameTime * h) {
+        if (const auto end = answer(time_s_, state_); end != kDone) return end;
+        continue;
+      }
+      Vector there = state_;
+      const StepSystem::Place place = system_.place();
+      if (const auto end = rule_->step(system_, time_s_, part, there); end != kDone) {
+        return cause(end, there);
+      }
+      ++steps_;
+      if (const auto end = judge(there); end != kDone) return end;
+      if (const auto end = answer(time_s_ + part, there); end != kDone) return end;
+      system_.set_place(place);
+    }
+    return kDone;
+  }
+
+  [[nodiscard]] long steps() const override { return steps_; }
+
+  std::unique_ptr<FixedRule> rule_;
+  long steps_ = 0;
+};
+
+class AdaptiveDriver final : public MethodDriver {
+ public:
+  AdaptiveDriver(StepSystem& system, const Protocol& protocol, const MethodSettings& settings,
+                 std::span<const double> times_s)
+      : MethodDriver(system, protocol, settings, times_s), rule_(adaptive_rule(system, settings)) {}
+
+ private:
+  MethodEnd jump() override { return system_.jump(system_.imposed(time_s_), state_); }
+
+  MethodEnd cross(const Knot& from, const Knot& to) override {
+    time_s_ = from.time_s;
+    while (!all_answered() && asked_s() <= from.time_s) {
+      if (const auto end = answer(from.time_s, state_); end != kDone) return end;
+    }
+    if (all_answered()) return kDone;
+    if (const auto end = rule_->restart(from.time_s, to.time_s, state_); end != kDone) return end;
+    while (!all_answered() && asked_s() < to.time_s) {
+      if (const auto end = advance(asked_s()); end != kDone) return end;
+      if (const auto end = answer(time_s_, state_); end != kDone) return end;
+    }
+    return all_answered() ? kDone : advance(to.time_s);
+  }
+
+  MethodEnd advance(double time_s) {
+    if (const auto end = rule_->advance_to(time_s, state_); end != kDone) {
+      const AdaptiveRule::GivenUp gave_up = rule_->given_up();
+      time_s_ = gave_up.time_s;
+      flag_ = gave_up.flag;
+      return end;
+    }
+    time_s_ = time_s;
+    return judge(state_);
+  }
+
+  [[nodiscard]] long steps() const override { return rule_->steps(); }
+  [[nodiscard]] std::string detail() const override { return flag_; }
+
+  std::unique_ptr<AdaptiveRule> rule_;
+  std::string flag_;
+};
+
+MethodRun run_method(StepSystem& system, const Protocol& protocol, const MethodSettings& settings,
+                     std::span<const double> times_s) {
+  const bool adaptive = kStepRules[static_cast<std::size_t>(settings.rule)].adaptive;
+  if (adaptive) return AdaptiveDriver(system, protocol, settings, times_s).go();
+  return FixedDriver(system, protocol, settings, times_s).go();
+}
+
+void require_times(const Protocol& protocol, std::span<const double> times_s) {
+  require_times_within(protocol, times_s);
+  double before = protocol.start_s();
+  for (const double t : times_s) {
+    if (std::isinf(t)) {
+      throw bad_input(protocol.name(), "no step leads to t = infinity", "finite times");
+    }
+    if (t < before) throw bad_input("times", shortest(t) + " s", "rising times");
+    before = t;
+  }
+}
+
+void require_valid(const MethodMasses& mass, std::size_t spheres) {
+  if (static_cast<std::size_t>(mass.mass_kg.size()) != spheres) {
+    throw bad_input("masses", fmt::format("{} of them", mass.mass_kg.size()),
+                    fmt::format("one for each of {} spheres", spheres));
+  }
+  if (!(mass.mass_kg.array() > 0.0).all() || !mass.mass_kg.allFinite()) {
+    throw bad_input("masses", "one that is not positive", "kg above 0");
+  }
+  if (!(mass.drag_per_s >= 0.0 && std::isfinite(mass.drag_per_s))) {
+    throw bad_input("drag", shortest(mass.drag_per_s) + " 1/s", "at least 0");
+  }
+}
+
+class ElementProblem final : public MethodProblem {
+ public:
+  ElementProblem(const TpmParameters& material, Protocol protocol, std::optional<MethodMasses> mass)
+      : material_(material), protocol_(std::move(protocol)), mass_(std::move(mass)) {
+    tpm::require_valid(material_, "element");
+    if (mass_) require_valid(*mass_, 1);
+  }
+
+  [[nodiscard]] const Protocol& protocol() const override { return protocol_; }
+  [[nodiscard]] double relaxation_time_s() const override { return material_.relaxation_time_s(); }
+  [[nodiscard]] bool has_masses() const override { return mass_.has_value(); }
+  [[nodiscard]] MethodRun run(const MethodSettings& settings,
+                              std::span<const double> times_s) const override {
+    require_valid(settings);
+    require_times(protocol_, times_s);
+    const auto system = element_system(material_, protocol_, mass_);
+    return run_method(*system, protocol_, settings, times_s);
+  }
+
+ private:
+  TpmParameters material_;
+  Protocol protocol_;
+  std::optional<MethodMasses> mass_;
+};
+
+class NetworkProblem final : public MethodProblem {
+ public:
+  NetworkProblem(const DrivenNetwork& network, Protocol protocol, std::optional<MethodMasses> mass)
+      : network_(network), protocol_(std::move(protocol)), mass_(std::move(mass)) {
+    if (!network_.tools.empty() || network_.bonds.contact_count() > 0) {
+      throw bad_input("network", "contacts with tools", "spheres that are driven themselves");
+    }
+    require_valid(network_.probes, network_.freedom);
+    if (mass_) require_valid(*mass_, network_.spheres());
+  }
+
+  [[nodiscard]] const Protocol& protocol() const override { return protocol_; }
+  [[nodiscard]] double relaxation_time_s() const override {
+    return network_.bonds.relaxation_time_s();
+  }
+  [[nodiscard]] bool has_masses() const override { return mass_.has_value(); }
+  [[nodiscard]] MethodRun run(const MethodSettings& settings,
+                              std::span<const double> times_s) const override {
+    require_valid(settings);
+    require_times(protocol_, times_s);
+    const auto system = network_system(network_, protocol_, mass_);
+    return run_method(*system, protocol_, settings, times_s);
+  }
+
+ private:
+  const DrivenNetwork& network_;
+  Protocol protocol_;
+  std::optional<MethodMasses> mass_;
+};
+
+}  // namespace
+
+std::unique_ptr<MethodProblem> element_problem(const TpmParameters& material, Protocol protocol,
+                                               std::optional<MethodMasses> mass) {
+  return std::make_unique<ElementProblem>(material, std::move(protocol), std::move(mass));
+}
+
+std::unique_ptr<MethodProblem> network_problem(const DrivenNetwork& network, Protocol protocol,
+                                               std::optional<MethodMasses> mass) {
+  return std::make_unique<NetworkProblem>(network, std::move(protocol), std::move(mass));
+}
+
+}  // namespace tpm

@@ -1,0 +1,495 @@
+// A network under its probe, for the step rules.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/method/bond_projection.hpp"
+#include "tpm/method/implicit_balance.hpp"
+#include "tpm/method/step_system.hpp"
+#include "tpm/network/inertial_equation.hpp"
+#include "tpm/network/lowest_mode.hpp"
+
+namespace tpm {
+namespace {
+
+using Spheres = Eigen::Map<Eigen::Matrix3Xd>;
+using ConstSpheres = Eigen::Map<const Eigen::Matrix3Xd>;
+constexpr auto kDone = MethodEnd::completed;
+
+/// What networks with and without masses have in common.
+class NetworkSystem : public StepSystem {
+ public:
+  NetworkSystem(const DrivenNetwork& network, const Protocol& protocol)
+      : bonds_(network.bonds),
+        rest_(network.rest),
+        tissue_(bonds_, rest_, network.freedom, network.probes, protocol.drive()),
+        balance_(bonds_, tissue_.freedom(), work()),
+        projection_(bonds_, tissue_.freedom()),
+        position_(rest_),
+        memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0},
+        peak_(protocol.peak()) {
+    for (std::size_t i = 0; i < bonds_.size(); ++i) {
+      if (bonds_.relaxing()[static_cast<Eigen::Index>(i)] > 0.0) relaxing_.push_back(i);
+    }
+    depth_scale_ = depth_scale(protocol);
+  }
+
+  [[nodiscard]] Eigen::Index remembered() const override {
+    return static_cast<Eigen::Index>(relaxing_.size());
+  }
+  [[nodiscard]] double relaxation_time_s() const override { return bonds_.relaxation_time_s(); }
+
+ protected:
+  [[nodiscard]] Eigen::Index columns() const { return rest_.cols(); }
+
+  /// y of the bonds that relax.
+  void set_memory(const ConstVector& y, double following = 0.0) {
+    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+      memory_.offset[static_cast<Eigen::Index>(relaxing_[i])] = y[static_cast<Eigen::Index>(i)];
+    }
+    memory_.following = following;
+  }
+
+  /// What is imposed at one time, found in two ways.
+  [[nodiscard]] bool is_same(double a, double b) const {
+    constexpr double kRounding = 1e-13;
+    return std::abs(a - b) <= kRounding * peak_;
+  }
+
+  /// l of the bonds that relax.
+  void find_elongations(const Positions& position, Vector& elongation) {
+    bonds_.elongations(position, all_);
+    elongation.resize(remembered());
+    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+      elongation[static_cast<Eigen::Index>(i)] = all_[static_cast<Eigen::Index>(relaxing_[i])];
+    }
+  }
+
+  /// Balances `position_`, in memory_, under an imposed value.
+  MethodEnd balance(double imposed) {
+    Positions next = position_;
+    tissue_.impose(next, imposed);
+    tissue_.load(imposed, load_);
+    const MethodEnd end = balance_.find(next, memory_, load_, depth_scale_);
+    if (end == kDone) position_ = next;
+    return end;
+  }
+
+  /// The same from the balance at another value, in parts where it takes them.
+  MethodEnd follow(double from, double to) {
+    constexpr double kLeastPart = 1.0 / 4096.0;
+    double done = 0.0;
+    double part = 1.0;
+    while (done < 1.0) {
+      const double aim = std::min(1.0, done + part);
+      const MethodEnd end = balance(aim == 1.0 ? to : from + aim * (to - from));
+      if (end == kDone) {
+        done = aim;
+        part *= 2.0;
+      } else if ((part *= 0.5) < kLeastPart || from == to) {
+        return end;
+      }
+    }
+    return kDone;
+  }
+
+  /// Positions with everything relaxed under an imposed value.
+  MethodEnd relax_under(double imposed, Vector& y) {
+    set_memory(Vector::Zero(remembered()), 1.0);
+    const MethodEnd end = follow(0.0, imposed);
+    find_elongations(position_, y);
+    return end;
+  }
+
+  /// Bonds pulled sphere by sphere towards what they want, `memory_` in place.
+  void sweep(Positions& position, const Eigen::VectorXd& give_m_per_N) {
+    ++work().rates;
+    projection_.sweep(position, memory_, give_m_per_N);
+  }
+
+  const BondSystem& bonds_;
+  const Positions& rest_;
+  DrivenTissue tissue_;
+  ImplicitBalance balance_;
+  BondProjection projection_;
+  Positions position_;
+  BondMemory memory_;
+  std::vector<std::size_t> relaxing_;  ///< bond of each y
+  double peak_;                        ///< of what is imposed
+  double depth_scale_ = 0.0;
+  Eigen::Matrix3Xd load_, force_;
+  Eigen::VectorXd all_;
+
+ private:
+  /// Depth that may be expected.
+  [[nodiscard]] double depth_scale(const Protocol& protocol) {
+    const double peak = protocol.peak();
+    if (tissue_.depth_driven()) return peak;
+    const double relaxed = std::abs(tissue_.linear_response(tissue_.at_rest(0.0), peak));
+    // What flows has no end: it is judged by what it does at once and how long it lasts.
+    const TissueState rest = tissue_.at_rest(0.0);
+    if (!tissue_.equilibrium().factorise(rest.position, rest.memory())) return relaxed;
+    const double at_once = std::abs(tissue_.unit_field(rest, rest.memory()).stiffness) * peak;
+    const double lasts = protocol.knots().back().time_s - protocol.start_s();
+    const double most = at_once * (1.0 + lasts / bonds_.relaxation_time_s());
+    return relaxed > 0.0 ? std::min(relaxed, most) : most;
+  }
+};
+
+/// Without masses: forces balance at each instant.
+class RestingNetwork final : public NetworkSystem {
+ public:
+  using NetworkSystem::NetworkSystem;
+
+  [[nodiscard]] Eigen::Index coordinates() const override { return 0; }
+  [[nodiscard]] double drag_per_s() const override { return 0.0; }
+  [[nodiscard]] Vector scales() const override {
+    return Vector::Constant(remembered(), depth_scale_);
+  }
+
+  MethodEnd start(const Knot& first, bool relaxed, Vector& state) override {
+    state.setZero(remembered());
+    position_ = rest_;
+    known_ = {0.0, state};
+    if (!relaxed) return kDone;
+    const MethodEnd end = relax_under(first.value, state);
+    known_ = {first.value, state};
+    return end;
+  }
+
+  MethodEnd jump(double imposed, const ConstVector& state) override {
+    return balance_at(imposed, state);
+  }
+
+  MethodEnd rate(double t, const ConstVector& state, Eigen::Ref<Vector> rate) override {
+    const MethodEnd end = elongations(t, state, elongation_);
+    rate = (elongation_ - state) / relaxation_time_s();
+    return end;
+  }
+
+  MethodEnd elongations(double t, const ConstVector& state, Vector& elongation) override {
+    const MethodEnd end = balance_at(imposed(t), state);
+    find_elongations(position_, elongation);
+    return end;
+  }
+
+  MethodEnd stage(double t, const ImplicitStage& stage, Vector& state) override {
+    set_memory(stage.known, stage.following);
+    if (const auto end = follow(known_.imposed, imposed(t)); end != kDone) return end;
+    follow_memory(stage.known, stage.following, imposed(t), state);
+    return kDone;
+  }
+
+  MethodEnd response(double t, const ConstVector& state, double& response) override {
+    const MethodEnd end = balance_at(imposed(t), state);
+    ++work().rates;
+    set_memory(state);
+    tissue_.load(imposed(t), force_);
+    bonds_.add_forces(position_, memory_, force_);
+    response = tissue_.response(position_, force_);
+    return end;
+  }
+
+  /// Spheres have no mass: each sweep is a step of a motion that forgets its velocity, of spheres
+  /// as heavy as the bonds at them are stiff. Bonds begin with what they pull with, so that what
+  /// balances stays.
+  MethodEnd project(double t, double h, int sweeps, Vector& state) override {
+    const double ratio = h / relaxation_time_s();
+    const double following = ratio / (1.0 + ratio);
+    const Vector offset = state / (1.0 + ratio);
+    if (give_.size() == 0) set_give();
+    set_memory(offset, following);
+    tissue_.impose(position_, imposed(t));
+    tissue_.load(imposed(t), load_);
+    for (int i = 0; i < sweeps; ++i) {
+      ++work().rates;
+      balance_forces(bonds_, position_, memory_, load_, force_);
+      tissue_.freedom().project(force_);
+      projection_.remember(position_, memory_);
+      position_ += force_ * give_.asDiagonal();
+      sweep(position_, give_);
+    }
+    follow_memory(offset, following, imposed(t), state);
+    return kDone;
+  }
+
+  MethodEnd factorise(double t, const ConstVector& state, double gamma) override {
+    if (const auto end = balance_at(imposed(t), state); end != kDone) return end;
+    return factorise_here(state, 1.0 / gamma);
+  }
+
+  void solve(Eigen::Ref<Vector> x) override {
+    Vector place = Vector::Zero(places());
+    x *= per_y_;
+    solve_pair(place, x);
+  }
+
+  [[nodiscard]] Eigen::Index places() const override { return 3 * columns(); }
+  [[nodiscard]] Vector placed() const override {
+    Eigen::Matrix3Xd displacement = position_ - rest_;
+    tissue_.freedom().project(displacement);
+    return displacement.reshaped();
+  }
+
+  void imbalance(double t, const ConstVector& place, const ConstVector& y,
+                 Eigen::Ref<Vector> imbalance, Vector& elongation) override {
+    ++work().rates;
+    put(place, t);
+    set_memory(y);
+    tissue_.load(imposed(t), load_);
+    balance_forces(bonds_, put_, memory_, load_, force_);
+    tissue_.freedom().project(force_);
+    // What is not free has to stay 0.
+    Eigen::Matrix3Xd bound = ConstSpheres(place.data(), 3, columns());
+    tissue_.freedom().project(bound);
+    Spheres left(imbalance.data(), 3, columns());
+    left = ConstSpheres(place.data(), 3, columns()) - bound - force_;
+    find_elongations(put_, elongation);
+  }
+
+  MethodEnd factorise_pair(double t, const ConstVector& place, const ConstVector& y,
+                           double per_y) override {
+    put(place, t);
+    return factorise_at(put_, y, per_y);
+  }
+
+  void solve_pair(Eigen::Ref<Vector> place, Eigen::Ref<Vector> y) override {
+    // K dx + G dy = rx, per_y dy + (dy - B dx)/tau = ry, with dy eliminated.
+    const double sum = per_y_ + 1.0 / relaxation_time_s();
+    Spheres x(place.data(), 3, columns());
+    Eigen::Matrix3Xd right = x;
+    Eigen::Matrix3Xd bound = x;
+    tissue_.freedom().project(bound);
+    bound = x - bound;
+    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+      const std::uint32_t a = bonds_.end_a()[relaxing_[i]];
+      const std::uint32_t b = bonds_.end_b()[relaxing_[i]];
+      const double g = bonds_.relaxing()[static_cast<Eigen::Index>(relaxing_[i])];
+      const Eigen::Vector3d pull = g * y[static_cast<Eigen::Index>(i)] / sum *
+                                   (factorised_at_.col(b) - factorised_at_.col(a)).normalized();
+      right.col(a) -= pull;
+      right.col(b) += pull;
+    }
+    balance_.displace(right);
+    bonds_.elongation_changes(factorised_at_, right, all_);
+    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+      double& of_bond = y[static_cast<Eigen::Index>(i)];
+      const double l = all_[static_cast<Eigen::Index>(relaxing_[i])];
+      of_bond = (of_bond + l / relaxation_time_s()) / sum;
+    }
+    x = right + bound;
+  }
+
+  [[nodiscard]] Place place() const override {
+    return {position_.reshaped(), known_.imposed, known_.y};
+  }
+  void set_place(const Place& place) override {
+    position_ = ConstSpheres(place.position.data(), 3, columns());
+    known_ = {place.imposed, place.y};
+  }
+
+ private:
+  void set_give() {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(columns());
+    for (std::size_t i = 0; i < bonds_.size(); ++i) {
+      const double k = bonds_.stiffness()[static_cast<Eigen::Index>(i)];
+      sum[bonds_.end_a()[i]] += k;
+      sum[bonds_.end_b()[i]] += k;
+    }
+    give_ = (sum.array() > 0.0).select(sum.cwiseInverse(), 0.0);
+  }
+
+  MethodEnd balance_at(double imposed, const ConstVector& y) {
+    if (is_same(known_.imposed, imposed) && known_.y == y) return kDone;
+    set_memory(y);
+    const MethodEnd end = follow(known_.imposed, imposed);
+    if (end == kDone) known_ = {imposed, y};
+    return end;
+  }
+
+  /// y at the end of a step, where the positions are.
+  void follow_memory(const ConstVector& offset, double following, double imposed, Vector& state) {
+    find_elongations(position_, elongation_);
+    state = offset + following * elongation_;
+    known_ = {imposed, state};
+  }
+
+  void put(const ConstVector& place, double t) {
+    put_ = rest_ + ConstSpheres(place.data(), 3, columns());
+    tissue_.impose(put_, imposed(t));
+  }
+
+  MethodEnd factorise_here(const ConstVector& y, double per_y) {
+    return factorise_at(position_, y, per_y);
+  }
+
+  MethodEnd factorise_at(const Positions& position, const ConstVector& y, double per_y) {
+    per_y_ = per_y;
+    factorised_at_ = position;
+    const double following = 1.0 / (1.0 + per_y * relaxation_time_s());
+    find_elongations(position, elongation_);
+    set_memory(y - following * elongation_, following);
+    return balance_.factorise(position, memory_);
+  }
+
+  struct Known {
+    double imposed = 0.0;
+    Vector y;
+  };
+  Known known_;  ///< what position_ belongs to
+  Vector elongation_;
+  Eigen::VectorXd give_;  ///< of XPBD, m/N
+  double per_y_ = 0.0;
+  Positions put_, factorised_at_;
+};
+
+/// With masses.
+class MovingNetwork final : public NetworkSystem {
+ public:
+  MovingNetwork(const DrivenNetwork& network, const Protocol& protocol, const MethodMasses& mass)
+      : NetworkSystem(network, protocol),
+        equation_(tissue_, rest_, Inertia{mass.mass_kg, mass.drag_per_s, {}}),
+        speed_scale_(
+            depth_scale_ *
+            lowest_mode(bonds_, rest_, network.freedom, mass.mass_kg).angular_frequency()) {}
+
+  void set_piece(const Knot& from, const Knot& to) override {
+    StepSystem::set_piece(from, to);
+    equation_.set_piece(from, to);
+  }
+
+  [[nodiscard]] Eigen::Index coordinates() const override { return 3 * columns(); }
+  [[nodiscard]] double drag_per_s() const override { return equation_.inertia().drag_per_s; }
+  [[nodiscard]] Vector scales() const override {
+    Vector scales = Vector::Constant(size(), depth_scale_);
+    scales.segment(coordinates(), coordinates()).setConstant(speed_scale_);
+    return scales;
+  }
+
+  MethodEnd start(const Knot& first, bool relaxed, Vector& state) override {
+    state.setZero(size());
+    if (!relaxed) return kDone;
+    Vector y;
+    if (const auto end = relax_under(first.value, y); end != kDone) return end;
+    Spheres displacement(state.data(), 3, columns());
+    displacement = position_ - rest_;
+    tissue_.freedom().project(displacement);
+    state.tail(remembered()) = y;
+    return kDone;
+  }
+
+  MethodEnd jump(double /*imposed*/, const ConstVector& /*state*/) override { return kDone; }
+
+  MethodEnd rate(double t, const ConstVector& state, Eigen::Ref<Vector> rate) override {
+    ++work().rates;
+    equation_.rate(t, state, rate);
+    return kDone;
+  }
+
+  MethodEnd elongations(double t, const ConstVector& state, Vector& elongation) override {
+    put(t, state);
+    find_elongations(position_, elongation);
+    return kDone;
+  }
+
+  MethodEnd stage(double t, const ImplicitStage& stage, Vector& state) override {
+    const Eigen::Index n = coordinates();
+    const double held = 1.0 + stage.c * drag_per_s();
+    anchors_.stiffness = equation_.inertia().mass_kg * (held / (stage.c * stage.c));
+    const Vector to = stage.known.head(n) + stage.c / held * stage.known.segment(n, n);
+    put(t, to);
+    anchors_.to = position_;
+    put(t, state);
+    set_memory(stage.known.tail(remembered()), stage.following);
+    tissue_.load(imposed(t), load_);
+    if (const auto end = balance_.find(position_, memory_, load_, depth_scale_, &anchors_);
+        end != kDone) {
+      return end;
+    }
+    take(stage.known, stage.c, state);
+    find_elongations(position_, elongation_);
+    state.tail(remembered()) = stage.known.tail(remembered()) + stage.following * elongation_;
+    return kDone;
+  }
+
+  MethodEnd response(double t, const ConstVector& state, double& response) override {
+    ++work().rates;
+    response = equation_.response(t, state);
+    return kDone;
+  }
+
+  MethodEnd project(double t, double h, int sweeps, Vector& state) override {
+    if (h == 0.0) return kDone;
+    const Eigen::Index n = coordinates();
+    const double held = 1.0 + h * drag_per_s();
+    const Eigen::VectorXd give = h * h / held * equation_.inertia().mass_kg.cwiseInverse();
+    const double ratio = h / relaxation_time_s();
+    const double following = ratio / (1.0 + ratio);
+    const Vector offset = state.tail(remembered()) / (1.0 + ratio);
+    const Vector ahead = state.head(n) + h / held * state.segment(n, n);
+    put(t, ahead);
+    tissue_.load(imposed(t), load_);
+    tissue_.freedom().project(load_);
+    position_ += load_ * give.asDiagonal();
+    set_memory(offset, following);
+    projection_.forget();
+    for (int i = 0; i < sweeps; ++i) sweep(position_, give);
+    take(Vector(state), h, state);
+    find_elongations(position_, elongation_);
+    state.tail(remembered()) = offset + following * elongation_;
+    return kDone;
+  }
+
+  MethodEnd factorise(double t, const ConstVector& state, double gamma) override {
+    ++work().factorisations;
+    return equation_.factorise(t, state, gamma) ? kDone : MethodEnd::newton_failed;
+  }
+  void solve(Eigen::Ref<Vector> x) override {
+    ++work().solves;
+    equation_.solve(x);
+  }
+
+  [[nodiscard]] Eigen::Index places() const override { return 0; }
+  [[nodiscard]] Vector placed() const override { return {}; }
+  void imbalance(double, const ConstVector&, const ConstVector&, Eigen::Ref<Vector>,
+                 Vector&) override {}
+  MethodEnd factorise_pair(double, const ConstVector&, const ConstVector&, double) override {
+    return MethodEnd::not_applicable;
+  }
+  void solve_pair(Eigen::Ref<Vector>, Eigen::Ref<Vector>) override {}
+  [[nodiscard]] Place place() const override { return {}; }
+  void set_place(const Place&) override {}
+
+ private:
+  /// position_ of the displacements with which a vector begins.
+  void put(double t, const ConstVector& state) {
+    position_ = rest_ + ConstSpheres(state.data(), 3, columns());
+    tissue_.impose(position_, imposed(t));
+  }
+
+  /// Displacements at position_, and velocities of x = x* + c v.
+  void take(const Vector& known, double c, Vector& state) {
+    const Eigen::Index n = coordinates();
+    Eigen::Matrix3Xd displacement = position_ - rest_;
+    tissue_.freedom().project(displacement);
+    state.head(n) = displacement.reshaped();
+    state.segment(n, n) = (state.head(n) - known.head(n)) / c;
+  }
+
+  InertialEquation equation_;
+  double speed_scale_;
+  SphereAnchors anchors_;
+  Vector elongation_;
+};
+
+}  // namespace
+
+std::unique_ptr<StepSystem> network_system(const DrivenNetwork& network, const Protocol& protocol,
+                                           const std::optional<MethodMasses>& mass) {
+  if (mass) return std::make_unique<MovingNetwork>(network, protocol, *mass);
+  return std::make_unique<RestingNetwork>(network, protocol);
+}
+
+}  // namespace tpm

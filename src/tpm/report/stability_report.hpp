@@ -1,0 +1,43 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/report/document.hpp"
+#include "tpm/report/figure.hpp"
+#include "tpm/stability/study.hpp"
+
+namespace tpm {
+
+/// The maps of each rule, two to a figure, with the limit of theory drawn in.
+[[nodiscard]] std::vector<Figure> stability_figures(const StabilityStudy& study);
+
+/// @param figures of stability_figures
+[[nodiscard]] Document stability_document(const StabilityStudy& study,
+                                          const std::vector<Figure>& figures);
+
+/// One line per run of a map. SI units in the column names.
+[[nodiscard]] std::string stability_map_csv(const StabilityStudy& study, const std::string& id);
+/// One line per limit.
+[[nodiscard]] std::string stability_limits_csv(const StabilityStudy& study);
+/// One line per rule and corner.
+[[nodiscard]] std::string stability_corners_csv(const StabilityStudy& study);
+/// One line per rule and servo rate.
+[[nodiscard]] std::string stability_servo_csv(const StabilityStudy& study);
+
+/// Limits, corners and servo rates, and of each map how often each class was found.
+[[nodiscard]] Json to_json(const StabilityStudy& study);
+
+/// The sentences that matter most: limits against theory, corners that came out otherwise, what
+/// holds at 1 kHz.
+[[nodiscard]] std::vector<std::string> stability_sentences(const StabilityStudy& study);
+
+/// Writes report.md, report.html, stability.json, limits.csv, corners.csv, servo.csv, map_ID.csv
+/// for each map, figures.json and figures/*.svg into `folder`, and report.run.json, the only file
+/// that changes from run to run.
+/// @param python from find_drawing_python()
+/// @param seconds wall time of the study
+void write_stability(const StabilityStudy& study, const std::filesystem::path& folder,
+                     const std::string& python, double seconds);
+
+}  // namespace tpm

@@ -1,0 +1,304 @@
+// Degenerate cases on purpose: what every rule does, and whether that is right.
+#include <cmath>
+#include <functional>
+
+#include "tpm/core/text.hpp"
+#include "tpm/network/simple_organs.hpp"
+#include "tpm/solve/relaxation_filter.hpp"
+#include "tpm/stability/judged_problem.hpp"
+#include "tpm/stability/study.hpp"
+
+namespace tpm {
+namespace {
+
+using Expect = std::function<StabilityClass(StepRule)>;
+constexpr double kStep_s = 1e-3;
+constexpr double kDepth_m = 0.004;
+
+bool same_kind(StabilityClass a, StabilityClass b) {
+  const auto grows = [](StabilityClass c) {
+    return c == StabilityClass::diverged || c == StabilityClass::energy_grew;
+  };
+  return a == b || (grows(a) && grows(b));
+}
+
+StabilityCorner tried(std::string name, std::string setup, std::string expected,
+                      const JudgedProblem& judged, double step_s, const Expect& expect) {
+  StabilityCorner corner{std::move(name), std::move(setup), std::move(expected), {}};
+  for (const StepRuleEntry& entry : kStepRules) {
+    MethodSettings settings;
+    settings.rule = entry.meaning;
+    settings.step_s = step_s;
+    settings.most_rates = 2'000'000;
+    CornerCell cell{entry.meaning, judged.judge(settings), expect(entry.meaning), false};
+    cell.right = same_kind(cell.verdict.found, cell.expected);
+    corner.cells.push_back(std::move(cell));
+  }
+  return corner;
+}
+
+StabilityClass all_hold(StepRule) {
+  return StabilityClass::holds;
+}
+
+/// What theory says of a memory that starts at once: explicit rules beyond their limit diverge, and
+/// the rules that do not damp what is fast let it ring.
+Expect of_theory(const LinearElement& linear, double step_s, double steps) {
+  return [=](StepRule rule) {
+    const auto limit = stable_step_s(rule, linear);
+    if (limit && step_s > *limit) return StabilityClass::diverged;
+    if (rule == StepRule::implicit_midpoint || rule == StepRule::newmark) {
+      const double z = 0.5 * step_s / linear.relaxation_time_s;
+      const double left = std::pow(std::abs((1.0 - z) / (1.0 + z)), steps);
+      if (z > 1.0 && left > kHoldsWithin) return StabilityClass::oscillates;
+    }
+    return StabilityClass::holds;
+  };
+}
+
+LinearElement under_depth(const TpmParameters& p) {
+  LinearElement e = linear_element(p, 0.0);
+  e.depth_imposed = true;
+  return e;
+}
+
+StabilityCorner depth_at_once(std::string name, const TpmParameters& p, double depth_m,
+                              double step_s, std::string expected) {
+  const Protocol protocol = step_and_hold(depth_m, kStudySteps * step_s);
+  return tried(std::move(name),
+               significant(1e3 * depth_m, 3) + " mm at once and held for 300 steps of " +
+                   significant(step_s, 3) + " s",
+               std::move(expected), judged_rest(p, protocol, step_s), step_s,
+               of_theory(under_depth(p), step_s, kStudySteps - kJudgedSteps));
+}
+
+const char* const kByTheory =
+    "forward Euler and RK4 diverge beyond 2 and 2.785 tau, midpoint and Newmark ring far above "
+    "tau, all else holds";
+
+void add_relaxation_times(std::vector<StabilityCorner>& corners) {
+  TpmParameters p;
+  p.eta1_Pa_s = 1e-9;
+  corners.push_back(
+      depth_at_once("eta1 -> 0 (1e-9 Pa s)", p, kDepth_m, kStep_s,
+                    "explicit rules diverge, Adams too or is too much work, midpoint and Newmark "
+                    "ring, all else holds"));
+  // Functional iteration follows the relaxation time for as long as it runs.
+  for (CornerCell& cell : corners.back().cells) {
+    if (cell.rule == StepRule::cvode_adams) {
+      cell.expected = StabilityClass::too_much_work;
+      cell.right = cell.verdict.found == cell.expected;
+    }
+  }
+  p.eta1_Pa_s = 1e15;
+  corners.push_back(depth_at_once("eta1 -> infinity (1e15 Pa s)", p, kDepth_m, kStep_s,
+                                  "an elastic element: all hold"));
+  for (const double ratio : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
+    StabilityCorner corner =
+        depth_at_once("h/tau = " + significant(ratio, 2), with_relaxation_time(kStep_s / ratio),
+                      kDepth_m, kStep_s, kByTheory);
+    for (CornerCell& cell : corner.cells) {
+      if (cell.rule != StepRule::cvode_adams || ratio < 1e4) continue;
+      cell.expected = StabilityClass::too_much_work;
+      cell.right = cell.verdict.found == cell.expected;
+    }
+    corners.push_back(std::move(corner));
+  }
+}
+
+void add_moduli(std::vector<StabilityCorner>& corners) {
+  constexpr double kTau_s = 0.02;
+  TpmParameters maxwell = with_relaxation_time(kTau_s);
+  maxwell.E1_Pa = 0.0;
+  maxwell.eta1_Pa_s = kTau_s * maxwell.E2_Pa;
+  corners.push_back(depth_at_once("E1 = 0, a depth", maxwell, kDepth_m, kStep_s,
+                                  "a Maxwell fluid: all hold, down to the tension"));
+  maxwell.Eprime_Pa = 0.0;
+  const double end = kStudySteps * kStep_s;
+  JudgedProblem flow;
+  constexpr double kLoad_N = 0.05;
+  flow.problem = element_problem(maxwell, creep(kLoad_N, end));
+  flow.times_s = last_steps(end, kStep_s, kJudgedSteps);
+  flow.truth.resize(kJudgedSteps);
+  for (int i = 0; i < kJudgedSteps; ++i) {
+    const double t = flow.times_s[static_cast<std::size_t>(i)];
+    flow.truth[i] =
+        kLoad_N / maxwell.modulus_to_stiffness_m() * (1.0 / maxwell.E2_Pa + t / maxwell.eta1_Pa_s);
+  }
+  flow.peak = flow.truth.maxCoeff();
+  corners.push_back(tried("E1 = 0, a load", "0.05 N at once and held; no tension",
+                          "it flows for as long as it is pushed: semi-implicit Euler and XPBD too "
+                          "slowly by h/tau = 5 %, all else holds",
+                          flow, kStep_s, [](StepRule rule) {
+                            return rule == StepRule::semi_implicit_euler || rule == StepRule::xpbd
+                                       ? StabilityClass::wrong_steady_state
+                                       : StabilityClass::holds;
+                          }));
+  TpmParameters loose = with_relaxation_time(kTau_s);
+  loose.E2_Pa = 0.0;
+  loose.eta1_Pa_s = kTau_s * loose.E1_Pa;
+  corners.push_back(
+      depth_at_once("E2 = 0, a depth", loose, kDepth_m, kStep_s, "tension only: all hold"));
+  corners.push_back(
+      tried("E2 = 0, a load", "0.05 N at once and held",
+            "tension carries it: all hold but XPBD, whose made-up mass is that of the "
+            "stiffness at rest, 0",
+            judged_rest(loose, creep(0.05, end), kStep_s), kStep_s, [](StepRule rule) {
+              return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::holds;
+            }));
+  loose.Eprime_Pa = 0.0;
+  JudgedProblem nothing;
+  nothing.times_s = last_steps(end, kStep_s, kJudgedSteps);
+  nothing.truth.setZero(kJudgedSteps);
+  nothing.peak = 1.0;
+  nothing.problem = element_problem(loose, creep(0.05, end));
+  corners.push_back(tried(
+      "E2 = E' = 0, a load", "0.05 N at once and held",
+      "nothing carries it: Newton fails, and XPBD diverges", nothing, kStep_s, [](StepRule rule) {
+        return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::newton_failed;
+      }));
+}
+
+void add_depths(std::vector<StabilityCorner>& corners) {
+  const TpmParameters p = with_relaxation_time(0.02);
+  corners.push_back(depth_at_once(
+      "beyond 12 mm", p, 0.015, kStep_s,
+      "all hold: no rule fails at the depth where liver is damaged, results carry a flag"));
+  corners.push_back(depth_at_once("theta over pi/6", p, 0.020, kStep_s,
+                                  "all hold: 33.7 degrees at x = 30 mm, results carry a flag"));
+}
+
+/// A star whose sphere B is guided onto its partner D, or free.
+struct CornerStar {
+  explicit CornerStar(const TpmParameters& p, bool guided)
+      : organ(star(p.spacing_m, 0.020)),
+        network(join(organ, pairs(), {}, "star")),
+        bonds(network, p),
+        driven{bonds, organ.position, freedom_of(guided), Probes(Probe{1, down(), 1.0}), {}} {}
+  CornerStar(const CornerStar&) = delete;
+  CornerStar& operator=(const CornerStar&) = delete;
+
+  static Eigen::Vector3d down() { return -Eigen::Vector3d::UnitZ(); }
+  static const std::vector<NeighbourPair>& pairs() {
+    static const std::vector<NeighbourPair> list{{0, 1}, {1, 2}, {1, 3}};
+    return list;
+  }
+  static Freedom freedom_of(bool guided) {
+    Freedom freedom(4);
+    if (guided) freedom.guide(1, Eigen::Vector3d::UnitZ());
+    for (const std::size_t i : {0, 2, 3}) freedom.hold(i);
+    return freedom;
+  }
+
+  Organ organ;
+  Network network;
+  BondSystem bonds;
+  DrivenNetwork driven;
+};
+
+/// The guided star under a rising depth: its bond to the partner is |L0 - depth| long, and its
+/// memory is the closed form in pieces of that, linear in time.
+double star_force_N(const TpmParameters& p, double rate, double time_s) {
+  constexpr double kLength_m = 0.020;
+  const double tau = p.relaxation_time_s();
+  const double depth = rate * time_s;
+  const double meets_s = kLength_m / rate;
+  const double first = std::min(time_s, meets_s);
+  double l = -rate * first;
+  const RelaxationWeights a = relaxation_weights(first / tau);
+  double y = a.w1 * l;
+  if (time_s > meets_s) {
+    const RelaxationWeights b = relaxation_weights((time_s - meets_s) / tau);
+    const double before = l;
+    l = depth - 2.0 * kLength_m;
+    y = b.r * y + b.w0 * before + b.w1 * l;
+  }
+  const double unit = p.modulus_to_stiffness_m();
+  const double pull = unit * (p.E2_Pa * l - p.relaxing_modulus_Pa() * y);
+  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
+  return unit * tension.value(depth) - (depth < kLength_m ? pull : -pull);
+}
+
+StabilityCorner pushed_star(std::string name, std::string setup, std::string expected,
+                            double depth_m, const Expect& expect) {
+  const TpmParameters p = with_relaxation_time(0.02);
+  const CornerStar star(p, true);
+  const double end = kStudySteps * kStep_s;
+  JudgedProblem judged;
+  judged.problem =
+      network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, depth_m}}));
+  judged.times_s = last_steps(end, kStep_s, kJudgedSteps);
+  judged.truth.resize(kJudgedSteps);
+  for (int i = 0; i < kJudgedSteps; ++i) {
+    judged.truth[i] = star_force_N(p, depth_m / end, judged.times_s[static_cast<std::size_t>(i)]);
+  }
+  judged.peak = judged.truth.cwiseAbs().maxCoeff();
+  return tried(std::move(name), std::move(setup), std::move(expected), judged, kStep_s, expect);
+}
+
+void add_stars(std::vector<StabilityCorner>& corners) {
+  corners.push_back(pushed_star("bond of no length",
+                                "guided star, 0 to 20 mm in 300 steps: B ends on its partner D",
+                                "the direction of the bond is lost: diverged, in words", 0.020,
+                                [](StepRule) { return StabilityClass::diverged; }));
+  corners.push_back(pushed_star(
+      "inverted bond", "guided star, 0 to 25 mm in 300 steps: B passes D within a step",
+      "the law of the bond goes on with the other sign: fixed steps hold; a rule that controls its "
+      "error sees the jump",
+      0.025, all_hold));
+  const TpmParameters p = with_relaxation_time(0.02);
+  const CornerStar star(p, false);
+  const double end = kStudySteps * kStep_s;
+  JudgedProblem judged;
+  judged.problem =
+      network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, 0.004}}));
+  judged.times_s = last_steps(end, kStep_s, kJudgedSteps);
+  judged.truth.setZero(kJudgedSteps);
+  judged.peak = 1.0;
+  corners.push_back(tried("buckling", "star, B not guided, 0 to 4 mm in 300 steps",
+                          "its stiffness across the plane is negative at once: buckled; XPBD "
+                          "does not look and follows the straight path",
+                          judged, kStep_s, [](StepRule rule) {
+                            return rule == StepRule::xpbd ? StabilityClass::holds
+                                                          : StabilityClass::buckled;
+                          }));
+}
+
+void add_masses(std::vector<StabilityCorner>& corners) {
+  TpmParameters p = with_relaxation_time(0.02);
+  p.Eprime_Pa = 0.0;
+  for (const double mass : {1e-9, 1e3}) {
+    constexpr double kDrag_per_s = 20.0;
+    LinearElement linear = linear_element(p, 0.0);
+    linear.mass_kg = mass;
+    linear.drag_per_s = kDrag_per_s;
+    const JudgedProblem judged =
+        judged_motion(p, mass, kDrag_per_s, 0.05, kStudySteps * kStep_s, kStep_s);
+    corners.push_back(
+        tried("mass " + significant(mass, 2) + " kg", "0.05 N at once and held, drag 20 1/s",
+              mass < 1.0 ? "far above 2/omega: explicit rules grow, midpoint, Newmark and the "
+                           "exponential rule on them ring, damped rules hold"
+                         : "hardly moves: all hold",
+              judged, kStep_s, [&](StepRule rule) {
+                const auto limit = stable_step_s(rule, linear);
+                if (limit && kStep_s > *limit) return StabilityClass::diverged;
+                const bool rings = rule == StepRule::implicit_midpoint ||
+                                   rule == StepRule::newmark || rule == StepRule::exponential;
+                return rings && mass < 1.0 ? StabilityClass::oscillates : StabilityClass::holds;
+              }));
+  }
+}
+
+}  // namespace
+
+std::vector<StabilityCorner> stability_corners() {
+  std::vector<StabilityCorner> corners;
+  add_relaxation_times(corners);
+  add_moduli(corners);
+  add_depths(corners);
+  add_stars(corners);
+  add_masses(corners);
+  return corners;
+}
+
+}  // namespace tpm

@@ -1,0 +1,86 @@
+#include "tpm/stability/judged_problem.hpp"
+
+#include "tpm/model/closed_form.hpp"
+#include "tpm/network/liver.hpp"
+
+namespace tpm {
+
+StabilityVerdict JudgedProblem::judge(const MethodSettings& settings) const {
+  return judge_run(problem->run(settings, times_s), truth, peak, moves);
+}
+
+std::vector<double> last_steps(double end_s, double step_s, int count) {
+  std::vector<double> times;
+  for (int i = count - 1; i >= 0; --i) times.push_back(end_s - i * step_s);
+  return times;
+}
+
+JudgedProblem judged_rest(const TpmParameters& p, const Protocol& protocol, double step_s) {
+  JudgedProblem judged;
+  judged.times_s = last_steps(protocol.end_s(), step_s, kJudgedSteps);
+  ModelOptions options;
+  if (p.Eprime_Pa == 0.0) options.tension = TensionRule::frozen(0.0);
+  const ClosedForm exact(options);
+  judged.truth = exact.respond(protocol, judged.times_s, to_vector(p), Want::values).value;
+  // The peak of the whole protocol, not of the part that is judged.
+  const double unit = p.modulus_to_stiffness_m();
+  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
+  judged.peak = judged.truth.cwiseAbs().maxCoeff();
+  if (protocol.drive() == Drive::displacement) {
+    judged.peak = unit * ((p.E2_Pa > 0.0 ? p.E2_Pa : p.E1_Pa) * protocol.peak() +
+                          tension.value(protocol.peak()));
+  }
+  judged.problem = element_problem(p, protocol);
+  return judged;
+}
+
+JudgedProblem judged_motion(const TpmParameters& p, double mass_kg, double drag_per_s,
+                            double load_N, double end_s, double step_s) {
+  JudgedProblem judged;
+  judged.moves = true;
+  judged.times_s = last_steps(end_s, step_s, kJudgedSteps);
+  LinearElement linear = linear_element(p, 0.0);
+  linear.mass_kg = mass_kg;
+  linear.drag_per_s = drag_per_s;
+  judged.truth = linear_motion_m(linear, load_N, judged.times_s);
+  judged.peak = load_N / (linear.stiffness_N_per_m - linear.relaxing_N_per_m);
+  judged.problem = element_problem(p, creep(load_N, end_s),
+                                   MethodMasses{Eigen::VectorXd::Constant(1, mass_kg), drag_per_s});
+  return judged;
+}
+
+TpmParameters with_relaxation_time(double tau_s) {
+  TpmParameters p;
+  p.eta1_Pa_s = tau_s * (p.E1_Pa + p.E2_Pa);
+  return p;
+}
+
+namespace {
+
+Network small_liver(std::size_t spheres) {
+  LiverRequest request;
+  request.count = spheres;
+  return build_network(fill_liver(request), {}, "study");
+}
+
+DrivenNetwork pushed(const Network& network, const BondSystem& bonds) {
+  constexpr double kFarShare = 0.6;  // of the organ's extent along the push: held from there on
+  const Organ& organ = network.organ;
+  const std::size_t contact = organ.contact.value_or(0);
+  const Eigen::Vector3d direction = -organ.normal.col(static_cast<Eigen::Index>(contact));
+  const Eigen::VectorXd along = organ.position.transpose() * direction;
+  const double near = along[static_cast<Eigen::Index>(contact)];
+  Freedom freedom(organ.size());
+  for (std::size_t i = 0; i < organ.size(); ++i) {
+    const double further = along[static_cast<Eigen::Index>(i)] - near;
+    if (organ.layer[i] == 0 && further > kFarShare * (along.maxCoeff() - near)) freedom.hold(i);
+  }
+  return {bonds, organ.position, std::move(freedom), Probes(Probe{contact, direction, 1.0}), {}};
+}
+
+}  // namespace
+
+StudyOrgan::StudyOrgan(const TpmParameters& p, std::size_t spheres)
+    : network(small_liver(spheres)), bonds(network, p), driven(pushed(network, bonds)) {}
+
+}  // namespace tpm

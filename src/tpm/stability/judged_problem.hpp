@@ -1,0 +1,56 @@
+#pragma once
+// The problems of the study, each with a truth that no step rule has made.
+#include <memory>
+#include <vector>
+
+#include "tpm/network/driven_network.hpp"
+#include "tpm/network/network.hpp"
+#include "tpm/stability/theory.hpp"
+#include "tpm/stability/verdict.hpp"
+
+namespace tpm {
+
+struct JudgedProblem {
+  std::unique_ptr<MethodProblem> problem;
+  std::vector<double> times_s;
+  Eigen::VectorXd truth;
+  double peak = 0.0;
+  bool moves = false;
+
+  [[nodiscard]] StabilityVerdict judge(const MethodSettings& settings) const;
+};
+
+/// The last `count` ends of steps before a time, rising.
+[[nodiscard]] std::vector<double> last_steps(double end_s, double step_s, int count);
+
+/// Steps of a run of a map, and how many of them are judged.
+inline constexpr double kStudySteps = 300.0;
+inline constexpr int kJudgedSteps = 32;
+
+/// The element without mass; the closed form is the truth. With frozen tension (E' = 0) any
+/// history of loads, else constant ones.
+[[nodiscard]] JudgedProblem judged_rest(const TpmParameters& p, const Protocol& protocol,
+                                        double step_s);
+
+/// The element with mass and E' = 0 under a constant load from rest.
+[[nodiscard]] JudgedProblem judged_motion(const TpmParameters& p, double mass_kg, double drag_per_s,
+                                          double load_N, double end_s, double step_s);
+
+/// The paper's parameters with eta1 such that the relaxation time is this.
+[[nodiscard]] TpmParameters with_relaxation_time(double tau_s);
+
+/// kg, of a sphere of 10 mm radius and 1060 kg/m^3.
+inline constexpr double kSphereMass_kg = 1060.0 * 4.0 / 3.0 * 3.14159265358979 * 1e-6;
+
+/// A liver of few spheres, two layers, its far side held.
+struct StudyOrgan {
+  StudyOrgan(const TpmParameters& p, std::size_t spheres);
+  StudyOrgan(const StudyOrgan&) = delete;
+  StudyOrgan& operator=(const StudyOrgan&) = delete;
+
+  Network network;
+  BondSystem bonds;
+  DrivenNetwork driven;
+};
+
+}  // namespace tpm

@@ -1,0 +1,194 @@
+// Maps of each rule over a property of the problem and the step.
+#include <cmath>
+#include <functional>
+
+#include "tpm/stability/judged_problem.hpp"
+#include "tpm/stability/study.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr int kAlong = 21;  // points along each axis
+
+/// From `first` to `last`, evenly in the logarithm.
+std::vector<double> decades(double first, double last) {
+  std::vector<double> values;
+  for (int i = 0; i < kAlong; ++i) {
+    values.push_back(first * std::pow(last / first, static_cast<double>(i) / (kAlong - 1)));
+  }
+  return values;
+}
+
+/// What is varied, and how a problem follows from it.
+struct MapPlan {
+  std::string id, quantity, unit, problem;
+  std::vector<double> x, step_s;
+  std::function<JudgedProblem(double x, double step_s)> build;
+  std::function<LinearElement(double x)> linear;
+};
+
+constexpr double kDepth_m = 0.004;
+constexpr double kTau_s = 0.1;
+constexpr double kDrag_per_s = 20.0;
+
+MapPlan over_relaxation_time() {
+  return {"relaxation_time",
+          "relaxation time",
+          "s",
+          "element, a depth of 4 mm at once and held",
+          decades(1e-4, 1e2),
+          decades(1e-5, 1e3),
+          [](double tau, double h) {
+            return judged_rest(with_relaxation_time(tau), step_and_hold(kDepth_m, kStudySteps * h),
+                               h);
+          },
+          [](double tau) {
+            LinearElement e = linear_element(with_relaxation_time(tau), 0.0);
+            e.depth_imposed = true;
+            return e;
+          }};
+}
+
+TpmParameters without_tension(double tau_s) {
+  TpmParameters p = with_relaxation_time(tau_s);
+  p.Eprime_Pa = 0.0;
+  return p;
+}
+
+MapPlan over_load_rate() {
+  constexpr double kLoad_N = 0.3;
+  return {"load_rate",
+          "load rate",
+          "N/s",
+          "element without tension, tau = 0.1 s, a load rising to 0.3 N and held",
+          decades(0.1, 1e3),
+          decades(1e-3, 10.0),
+          [](double rate, double h) {
+            const double rises = kLoad_N / rate;
+            const double ends = rises + kStudySteps * h;
+            return judged_rest(
+                without_tension(kTau_s),
+                Protocol(Drive::force, {{0.0, 0.0}, {rises, kLoad_N}, {ends, kLoad_N}}), h);
+          },
+          [](double) { return linear_element(without_tension(kTau_s), 0.0); }};
+}
+
+MapPlan over_depth() {
+  const auto load = [](double depth) {
+    const TpmParameters p = with_relaxation_time(kTau_s);
+    const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
+    return p.modulus_to_stiffness_m() * (p.relaxed_modulus_Pa() * depth + tension.value(depth));
+  };
+  return {"depth",
+          "depth in the end",
+          "m",
+          "element with tension, tau = 0.1 s, a load at once and held that leads to the depth",
+          decades(1e-3, 4e-2),
+          decades(1e-3, 1e3),
+          [load](double depth, double h) {
+            return judged_rest(with_relaxation_time(kTau_s), creep(load(depth), kStudySteps * h),
+                               h);
+          },
+          [](double depth) { return linear_element(with_relaxation_time(kTau_s), depth); }};
+}
+
+/// A sphere of an element without tension, under a load that leads to 4 mm.
+MapPlan in_motion(std::string id, std::string quantity, std::string unit, std::string problem,
+                  std::vector<double> x, std::function<LinearElement(double)> linear,
+                  std::function<TpmParameters(double)> material) {
+  MapPlan plan{std::move(id),
+               std::move(quantity),
+               std::move(unit),
+               std::move(problem),
+               std::move(x),
+               decades(1e-6, 1e2),
+               {},
+               linear};
+  plan.build = [linear = std::move(linear), material = std::move(material)](double at, double h) {
+    const LinearElement e = linear(at);
+    const double load = kDepth_m * (e.stiffness_N_per_m - e.relaxing_N_per_m);
+    return judged_motion(material(at), e.mass_kg, e.drag_per_s, load, kStudySteps * h, h);
+  };
+  return plan;
+}
+
+LinearElement sphere(const TpmParameters& p, double mass_kg, double drag_per_s) {
+  LinearElement e = linear_element(p, 0.0);
+  e.mass_kg = mass_kg;
+  e.drag_per_s = drag_per_s;
+  return e;
+}
+
+MapPlan over_stiffness() {
+  const auto material = [](double modulus) {
+    TpmParameters p = without_tension(kTau_s);
+    p.E1_Pa = p.E2_Pa = modulus;
+    p.eta1_Pa_s = kTau_s * 2.0 * modulus;
+    return p;
+  };
+  return in_motion(
+      "stiffness", "E1 = E2", "Pa",
+      "sphere of 4.4 g, drag 20 1/s, tau = 0.1 s, a load at once and held that leads to 4 mm",
+      decades(1e2, 1e8),
+      [material](double x) { return sphere(material(x), kSphereMass_kg, kDrag_per_s); }, material);
+}
+
+MapPlan over_mass() {
+  return in_motion(
+      "mass", "mass", "kg",
+      "E1 = E2 = 12 kPa, drag 20 1/s, tau = 0.1 s, a load at once and held that leads to 4 mm",
+      decades(1e-8, 1e1), [](double x) { return sphere(without_tension(kTau_s), x, kDrag_per_s); },
+      [](double) { return without_tension(kTau_s); });
+}
+
+MapPlan over_damping() {
+  return in_motion(
+      "damping", "drag", "1/s",
+      "sphere of 4.4 g, E1 = E2 = 12 kPa, tau = 0.1 s, a load at once and held that leads to 4 mm",
+      decades(1e-1, 1e6),
+      [](double x) { return sphere(without_tension(kTau_s), kSphereMass_kg, x); },
+      [](double) { return without_tension(kTau_s); });
+}
+
+void add_limits(StabilityMap& map, const MapPlan& plan) {
+  for (const double x : plan.x) {
+    const auto limit = stable_step_s(map.rule, plan.linear(x));
+    if (!limit || *limit <= 0.0) continue;
+    map.limit_x.push_back(x);
+    map.limit_step_s.push_back(*limit);
+  }
+}
+
+void draw_plan(const MapPlan& plan, std::vector<StabilityMap>& maps) {
+  const std::size_t first = maps.size();
+  for (const StepRuleEntry& entry : kStepRules) {
+    if (entry.adaptive) continue;
+    StabilityMap map{plan.id, plan.quantity, plan.unit, plan.problem, entry.meaning, {}, {}, {}};
+    add_limits(map, plan);
+    maps.push_back(std::move(map));
+  }
+  for (const double x : plan.x) {
+    for (const double h : plan.step_s) {
+      const JudgedProblem judged = plan.build(x, h);
+      for (std::size_t i = first; i < maps.size(); ++i) {
+        MethodSettings settings;
+        settings.rule = maps[i].rule;
+        settings.step_s = h;
+        maps[i].points.push_back({x, h, judged.judge(settings)});
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<StabilityMap> stability_maps() {
+  std::vector<StabilityMap> maps;
+  for (const MapPlan& plan : {over_relaxation_time(), over_load_rate(), over_stiffness(),
+                              over_mass(), over_damping(), over_depth()}) {
+    draw_plan(plan, maps);
+  }
+  return maps;
+}
+
+}  // namespace tpm

@@ -1,0 +1,82 @@
+#pragma once
+// Where each step rule fails: maps, limits, degenerate corners, servo rates. See docs/stability.md.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/stability/verdict.hpp"
+
+namespace tpm {
+
+/// One run of a map.
+struct StabilityPoint {
+  double x = 0.0;       ///< in the unit of the map's axis, SI
+  double step_s = 0.0;  ///< s
+  StabilityVerdict verdict;
+};
+
+/// One rule over a plane of a property and the step.
+struct StabilityMap {
+  std::string id;        ///< "relaxation_time"
+  std::string quantity;  ///< "relaxation time"
+  std::string unit;      ///< "s", SI
+  std::string problem;   ///< what is run, in words
+  StepRule rule = StepRule::forward_euler;
+  std::vector<StabilityPoint> points;
+  /// Limits of linear theory; empty where the rule has none.
+  std::vector<double> limit_x, limit_step_s;
+};
+
+/// A limit found by bisection beside that of theory.
+struct StabilityLimit {
+  std::string problem;
+  StepRule rule = StepRule::forward_euler;
+  std::string theory;  ///< its formula
+  double theory_s = 0.0;
+  double found_s = 0.0;
+  [[nodiscard]] double ratio() const { return found_s / theory_s; }
+};
+
+struct CornerCell {
+  StepRule rule = StepRule::forward_euler;
+  StabilityVerdict verdict;
+  StabilityClass expected = StabilityClass::holds;
+  /// As expected; of two failures of one kind (diverged, energy grew) each counts for the other.
+  bool right = false;
+};
+
+/// A degenerate case and what every rule did.
+struct StabilityCorner {
+  std::string name;
+  std::string setup;
+  std::string expected;  ///< in words
+  std::vector<CornerCell> cells;
+};
+
+struct ServoCell {
+  StepRule rule = StepRule::forward_euler;
+  StabilityVerdict verdict;  ///< its error is that of the whole protocol
+};
+
+/// One servo rate at the paper's own eta1.
+struct ServoRow {
+  std::string problem;
+  double rate_Hz = 0.0;
+  std::vector<ServoCell> cells;
+};
+
+struct StabilityStudy {
+  std::vector<StabilityMap> maps;
+  std::vector<StabilityLimit> limits;
+  std::vector<StabilityCorner> corners;
+  std::vector<ServoRow> servo;
+};
+
+[[nodiscard]] std::vector<StabilityMap> stability_maps();
+[[nodiscard]] std::vector<StabilityLimit> stability_limits();
+[[nodiscard]] std::vector<StabilityCorner> stability_corners();
+[[nodiscard]] std::vector<ServoRow> stability_at_servo_rates();
+/// All of it; deterministic.
+[[nodiscard]] StabilityStudy run_stability_study();
+
+}  // namespace tpm

@@ -1,0 +1,153 @@
+#pragma once
+// Problems for the step rules, each with a reference that no rule under test has made.
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "organ_scene.hpp"
+#include "star_network.hpp"
+#include "tpm/method/method.hpp"
+#include "tpm/model/closed_form.hpp"
+#include "tpm/network/inertial.hpp"
+#include "tpm/network/liver.hpp"
+#include "tpm/network/lowest_mode.hpp"
+
+namespace tpm_test {
+
+using namespace tpm;
+
+inline TpmParameters with_tau(double tau_s) {
+  TpmParameters p;
+  p.eta1_Pa_s = tau_s * (p.E1_Pa + p.E2_Pa);
+  return p;
+}
+
+/// A problem with its true answers.
+struct Judged {
+  std::string name;
+  std::unique_ptr<MethodProblem> problem;
+  std::vector<double> times;
+  Eigen::VectorXd truth;
+
+  [[nodiscard]] MethodRun run(MethodSettings settings) const {
+    return problem->run(settings, times);
+  }
+  /// The largest difference in parts of the peak.
+  [[nodiscard]] double error(const MethodRun& run) const {
+    return (run.response - truth).cwiseAbs().maxCoeff() / truth.cwiseAbs().maxCoeff();
+  }
+  [[nodiscard]] double error(StepRule rule, double step_s) const {
+    MethodSettings settings;
+    settings.rule = rule;
+    settings.step_s = step_s;
+    return error(run(settings));
+  }
+};
+
+inline Judged judged_element(std::string name, const TpmParameters& p, const Protocol& protocol,
+                             std::vector<double> times) {
+  const ClosedForm exact{ModelOptions{}};
+  Eigen::VectorXd truth = exact.respond(protocol, times, to_vector(p), Want::values).value;
+  return {std::move(name), element_problem(p, protocol), std::move(times), std::move(truth)};
+}
+
+/// Without tension the sphere under a load is linear: x'' = (F - k x + g y)/m - drag x',
+/// y' = (x - y)/tau, from rest under a load F at once. The modes of its matrix are the solution.
+inline Eigen::VectorXd linear_motion(const TpmParameters& p, double mass_kg, double drag_per_s,
+                                     double load_N, std::span<const double> times) {
+  const double k = p.E2_Pa * p.modulus_to_stiffness_m();
+  const double g = p.relaxing_modulus_Pa() * p.modulus_to_stiffness_m();
+  Eigen::Matrix3d a;
+  a << 0, 1, 0, -k / mass_kg, -drag_per_s, g / mass_kg, 1 / p.relaxation_time_s(), 0,
+      -1 / p.relaxation_time_s();
+  const Eigen::EigenSolver<Eigen::Matrix3d> modes(a);
+  const double end = load_N / (k - g);
+  const Eigen::Vector3cd start =
+      modes.eigenvectors().partialPivLu().solve(Eigen::Vector3cd(-end, 0.0, -end));
+  Eigen::VectorXd depth(static_cast<Eigen::Index>(times.size()));
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const Eigen::Vector3cd then =
+        modes.eigenvectors() *
+        ((modes.eigenvalues() * times[i]).array().exp() * start.array()).matrix();
+    depth[static_cast<Eigen::Index>(i)] = end + then[0].real();
+  }
+  return depth;
+}
+
+inline MethodMasses one_mass(double mass_kg, double drag_per_s) {
+  return {Eigen::VectorXd::Constant(1, mass_kg), drag_per_s};
+}
+
+inline Judged judged_moving_element(const TpmParameters& p, double mass_kg, double drag_per_s,
+                                    double load_N, std::vector<double> times) {
+  Eigen::VectorXd truth = linear_motion(p, mass_kg, drag_per_s, load_N, times);
+  return {"element with mass",
+          element_problem(p, creep(load_N, times.back()), one_mass(mass_kg, drag_per_s)),
+          std::move(times), std::move(truth)};
+}
+
+/// A small organ of two layers.
+struct SmallOrgan {
+  explicit SmallOrgan(const TpmParameters& p, std::size_t spheres = 24)
+      : scene(fill_liver(request(spheres))),
+        bonds(scene.network, p),
+        driven{bonds, scene.network.organ.position, scene.freedom, Probes(scene.probe), {}},
+        mass{sphere_masses_kg(scene.network.organ), 0.0} {}
+  SmallOrgan(const SmallOrgan&) = delete;
+  SmallOrgan& operator=(const SmallOrgan&) = delete;
+
+  [[nodiscard]] Judged resting(std::string name, const Protocol& protocol,
+                               std::vector<double> times) const {
+    QuasiStaticOptions options;
+    options.tolerance = 1e-11;
+    Eigen::VectorXd truth = QuasiStatic(bonds, driven.rest, driven.freedom, driven.probes, options)
+                                .run(protocol, times)
+                                .response;
+    return {std::move(name), network_problem(driven, protocol), std::move(times), std::move(truth)};
+  }
+
+  [[nodiscard]] Judged moving(std::string name, const Protocol& protocol, std::vector<double> times,
+                              double damping_ratio) const {
+    InertialOptions options;
+    options.tolerance = 1e-11;
+    options.highest_order = 5;
+    options.damping_ratio = damping_ratio;
+    const Inertial inertial(bonds, driven.rest, driven.freedom, driven.probes, mass.mass_kg,
+                            options);
+    MethodMasses damped = mass;
+    damped.drag_per_s = 2.0 * damping_ratio * inertial.lowest().angular_frequency();
+    Eigen::VectorXd truth = inertial.run(protocol, times).response;
+    return {std::move(name), network_problem(driven, protocol, damped), std::move(times),
+            std::move(truth)};
+  }
+
+  static LiverRequest request(std::size_t spheres) {
+    LiverRequest liver;
+    liver.count = spheres;
+    return liver;
+  }
+
+  tpm::testing::OrganScene scene;
+  BondSystem bonds;
+  DrivenNetwork driven;
+  MethodMasses mass;
+};
+
+/// log2 of the error at a step over that at half of it.
+inline double observed_order(const Judged& judged, StepRule rule, double step_s) {
+  return std::log2(judged.error(rule, step_s) / judged.error(rule, 0.5 * step_s));
+}
+
+/// The step at which a property is lost, found between one at which it holds and one at which it
+/// does not, to a share of itself.
+template <class Holds>
+double bisected_limit(double holds_s, double fails_s, double share, Holds holds) {
+  while (fails_s > holds_s * (1.0 + share)) {
+    const double middle = std::sqrt(holds_s * fails_s);
+    (holds(middle) ? holds_s : fails_s) = middle;
+  }
+  return std::sqrt(holds_s * fails_s);
+}
+
+}  // namespace tpm_test

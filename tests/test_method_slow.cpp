@@ -1,0 +1,135 @@
+// The step rules on a small organ, judged by QuasiStatic and Inertial; the stability study.
+#include <catch2/catch.hpp>
+#include <map>
+
+#include "method_problems.hpp"
+#include "tpm/stability/study.hpp"
+
+using namespace tpm;
+using namespace tpm_test;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+std::vector<double> eighths(double end) {
+  std::vector<double> times;
+  for (int i = 1; i <= 8; ++i) times.push_back(end * i / 8.0);
+  return times;
+}
+
+void check_orders(const Judged& judged, const std::map<int, double>& step_s, double least_error) {
+  for (const StepRuleEntry& entry : kStepRules) {
+    if (entry.meaning == StepRule::xpbd) continue;  // below
+    INFO(judged.name << ", " << entry.text);
+    if (entry.adaptive) {
+      MethodSettings settings;
+      settings.rule = entry.meaning;
+      settings.tolerance = 1e-7;
+      CHECK(judged.error(judged.run(settings)) < std::max(100.0 * 1e-7, least_error));
+    } else {
+      CHECK_THAT(observed_order(judged, entry.meaning, step_s.at(entry.order)),
+                 WithinAbs(entry.order, 0.1));
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("method on an organ: orders without masses") {
+  const SmallOrgan organ(with_tau(0.1));
+  const std::map<int, double> steps{{1, 0.003125}, {2, 0.0125}, {4, 0.0125}};
+  check_orders(organ.resting("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4)), steps, 0.0);
+  const Protocol load(Drive::force, {{0.0, 0.0}, {0.2, 0.1}, {0.5, 0.1}});
+  check_orders(organ.resting("load", load, eighths(0.5)), steps, 0.0);
+}
+
+TEST_CASE("method on an organ: orders with masses") {
+  const SmallOrgan organ(with_tau(0.1));
+  const std::map<int, double> steps{{1, 1.25e-4}, {2, 5e-4}, {4, 5e-4}};
+  // The judge itself is good to some 1e-9.
+  check_orders(organ.moving("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4), 0.5), steps,
+               1e-8);
+}
+
+TEST_CASE("method on an organ: XPBD lags without masses, and less the more it sweeps") {
+  const SmallOrgan organ(with_tau(0.1));
+  const Judged judged = organ.resting("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4));
+  MethodSettings settings;
+  settings.rule = StepRule::xpbd;
+  settings.step_s = 1e-3;
+  double before = 1.0;
+  for (const int sweeps : {1, 4, 16, 64}) {
+    settings.sweeps = sweeps;
+    const MethodRun run = judged.run(settings);
+    REQUIRE(run.end == MethodEnd::completed);
+    const double error = judged.error(run);
+    CHECK(error < before);
+    before = error;
+  }
+  CHECK(before < 0.01);
+  settings.sweeps = 1;
+  settings.step_s = 1e-5;
+  const double coarse = judged.error(judged.run(settings));
+  settings.step_s = 0.5e-5;
+  CHECK_THAT(std::log2(coarse / judged.error(judged.run(settings))), WithinAbs(1.0, 0.1));
+}
+
+TEST_CASE("method on an organ: a tissue that buckles says so") {
+  const TpmParameters p = with_tau(0.02);
+  const Star star(p);
+  Freedom unguided(4);
+  for (const std::size_t i : {1, 2, 3}) unguided.hold(i);
+  const DrivenNetwork network{
+      star.bonds, star.network.organ.position, unguided, Probes(Star::probe()), {}};
+  const auto problem = network_problem(network, ramp_and_hold(0.004, 0.02, 0.2));
+  const std::vector<double> times{0.4};
+  for (const StepRuleEntry& entry : kStepRules) {
+    if (entry.meaning == StepRule::xpbd) continue;  // it does not look at the tangent
+    INFO(entry.text);
+    MethodSettings settings;
+    settings.rule = entry.meaning;
+    settings.step_s = 0.01;
+    CHECK(problem->run(settings, times).end == MethodEnd::buckled);
+  }
+}
+
+TEST_CASE("stability study: limits are found within 2 % of theory") {
+  const std::vector<StabilityLimit> limits = stability_limits();
+  CHECK(limits.size() >= 15);
+  for (const StabilityLimit& limit : limits) {
+    INFO(limit.problem << ", " << kStepRules[static_cast<std::size_t>(limit.rule)].text);
+    CHECK_THAT(limit.ratio(), WithinAbs(1.0, 0.02));
+  }
+}
+
+TEST_CASE("stability study: what is above the limit fails and what is below does not") {
+  std::size_t cells = 0;
+  for (const StabilityMap& map : stability_maps()) {
+    if (map.id != "relaxation_time") continue;
+    INFO(kStepRules[static_cast<std::size_t>(map.rule)].text);
+    for (const StabilityPoint& point : map.points) {
+      const double ratio = point.step_s / point.x;
+      const bool failed = point.verdict.found == StabilityClass::diverged;
+      ++cells;
+      if (map.rule == StepRule::forward_euler && std::abs(ratio / 2.0 - 1.0) > 0.1) {
+        CHECK(failed == (ratio > 2.0));
+      } else if (map.rule == StepRule::rk4 && std::abs(ratio / 2.785 - 1.0) > 0.1) {
+        CHECK(failed == (ratio > 2.785));
+      } else if (map.limit_x.empty()) {
+        CHECK_FALSE(failed);
+      }
+    }
+  }
+  CHECK(cells == 9 * 21 * 21);
+}
+
+TEST_CASE("stability study: every corner is as expected") {
+  for (const StabilityCorner& corner : stability_corners()) {
+    for (const CornerCell& cell : corner.cells) {
+      INFO(corner.name << ", " << kStepRules[static_cast<std::size_t>(cell.rule)].text << ": "
+                       << stability_class_name(cell.verdict.found) << " " << cell.verdict.reason);
+      CHECK(cell.right);
+    }
+  }
+}
