@@ -25,6 +25,18 @@ double rest_share(double y) {
   return second_phi(y) / first_phi(y);
 }
 
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using State6 = Eigen::Matrix<double, 6, 1>;
+using Packed = Eigen::Matrix<double, 8, 1>;
+
+/// Columns of states, w and q each filled up with a 0.
+template <class Columns>
+void pack(const Columns& columns, double (*packed)[8]) {
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+    for (Eigen::Index i = 0; i < 6; ++i) packed[k][i < 3 ? i : i + 1] = columns(i, k);
+  }
+}
+
 double positive(double value, std::string_view name) {
   if (value > 0.0 && std::isfinite(value)) return value;
   throw Error(ExitCode::bad_input, "condensed model",
@@ -39,6 +51,7 @@ CondensedContact::CondensedContact(std::shared_ptr<const CondensedFit> fit,
       relaxation_time_s_(positive(relaxation_time_s, "relaxation time")),
       period_s_(positive(period_s, "period")) {
   set_rates();
+  settle_condensed(fit_->tables, state_);
 }
 
 CondensedContact CondensedContact::with_relaxation_time(double relaxation_time_s) const {
@@ -62,75 +75,64 @@ void CondensedContact::set_rates() {
   const Matrix6 right = modes.eigenvectors();
   const Matrix6 left = right.transpose() * metric;
   const auto of_rate = [&](const auto& f) {
-    State values;
+    State6 values;
     for (Eigen::Index k = 0; k < 6; ++k) values[k] = f(modes.eigenvalues()[k] * x);
     return Matrix6(right * values.asDiagonal() * left);
   };
-  rate_ = of_rate([&](double y) { return y / x; });
-  first_ = of_rate([&](double y) { return x * first_phi(y); });
-  second_ = of_rate([&](double y) { return x * second_phi(y); });
+  const Matrix6 rate = of_rate([&](double y) { return y / x; });
+  pack(rate, rates_.rate);
+  pack(of_rate([&](double y) { return x * first_phi(y); }), rates_.first);
+  pack(of_rate([&](double y) { return x * second_phi(y); }), rates_.second);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    for (Eigen::Index i = 0; i < 3; ++i) rates_.of_second[k][i] = rate(3 + i, 3 + k);
+  }
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> of_w(fit_->mean_energy,
                                                                        fit_->mean_metric);
-  resting_share_ = rest_share(of_w.eigenvalues().mean() * x);
-  // Of a linear tissue that moves straight, resting_share_ leaves this out: with r = exp(-y) the
-  // state relative to the contact ends at phi1, not at 1 + (r - 1) share, per step of the contact.
+  const double share = rest_share(of_w.eigenvalues().mean() * x);
+  // Of a linear tissue that moves straight, resting for that share of the way leaves this out: with
+  // r = exp(-y) the state relative to the contact ends at phi1, not at 1 + (r - 1) share, per step
+  // of the contact.
   const Matrix6 left_out =
-      of_rate([&](double y) { return 1.0 + std::expm1(-y) * resting_share_ - first_phi(y); });
-  drift_ = left_out.leftCols<3>();
+      of_rate([&](double y) { return 1.0 + std::expm1(-y) * share - first_phi(y); });
+  pack(left_out.leftCols<3>(), rates_.drift);
+  rates_.resting_share = share;
 }
 
 void CondensedContact::reset() noexcept {
-  u_.setZero();
-  memory_ = {};
+  state_ = {};
+  settle_condensed(fit_->tables, state_);
   kept_ = 0;
+}
+
+CondensedMemory CondensedContact::memory() const noexcept {
+  return {Eigen::Vector3d::Map(&state_.memory[0]), Eigen::Vector3d::Map(&state_.memory[4])};
 }
 
 double CondensedContact::stored_energy_J(const Eigen::Vector3d& displacement_m,
                                          const CondensedMemory& memory) const noexcept {
-  const Eigen::Vector3d u = fit_->frame.local(displacement_m);
-  const auto m = fit_->matrices.at(memory.w_m);
-  return fit_->potential.gradient(u, memory.w_m).value_J -
-         (u - memory.w_m).dot(m.coupling * memory.q_m) +
-         0.5 * memory.q_m.dot(m.second * memory.q_m);
+  return value_of(displacement_m, memory).energy_J;
 }
 
 Eigen::Vector3d CondensedContact::force_N(const Eigen::Vector3d& displacement_m,
                                           const CondensedMemory& memory) const noexcept {
+  return fit_->frame.axes * value_of(displacement_m, memory).force_N;
+}
+
+CondensedValue CondensedContact::value_of(const Eigen::Vector3d& displacement_m,
+                                          const CondensedMemory& memory) const noexcept {
   const Eigen::Vector3d u = fit_->frame.local(displacement_m);
-  const auto m = fit_->matrices.at(memory.w_m);
-  return fit_->frame.axes *
-         (m.coupling * memory.q_m - fit_->potential.gradient(u, memory.w_m).by_u_N);
+  Packed packed = Packed::Zero();
+  packed.head<3>() = memory.w_m;
+  packed.segment<3>(4) = memory.q_m;
+  return value_of_condensed(fit_->tables, u.data(), packed.data());
 }
 
 ContactAnswer CondensedContact::step(const Eigen::Vector3d& displacement_m) noexcept {
   const Eigen::Vector3d u = fit_->frame.local(displacement_m);
-  const Eigen::Vector3d moved = u - u_;
-  const Eigen::Vector3d resting = u_ + resting_share_ * moved;
-  const Eigen::Matrix3d of_second = rate_.bottomRightCorner<3, 3>();
-  const auto velocity = [&](const State& s) {
-    const auto m = fit_->matrices.at(s.head<3>());
-    State v;
-    v.head<3>() = -m.mobility * (fit_->potential.gradient(resting, s.head<3>()).by_w_N +
-                                 m.coupling * s.tail<3>());
-    v.tail<3>() = resting - s.head<3>() - of_second * s.tail<3>();
-    return v;
-  };
-  State before;
-  before << memory_.w_m, memory_.q_m;
-  const State v0 = velocity(before);
-  const State ahead = before + first_ * v0;
-  const State v1 = velocity(ahead);
-  const State after = ahead + second_ * (v1 - v0 + rate_ * (ahead - before)) + drift_ * moved;
-  const CondensedMemory next{after.head<3>(), after.tail<3>()};
-  const Eigen::Vector3d at = fit_->frame.axes * resting;
-  if (stored_energy_J(at, next) <= stored_energy_J(at, memory_)) {
-    memory_ = next;
-  } else {
-    ++kept_;
-  }
-  u_ = u;
+  step_condensed(fit_->tables, rates_, state_, u.data());
+  kept_ += state_.kept ? 1 : 0;
   ContactAnswer answer;
-  answer.force_N = force_N(displacement_m, memory_);
+  answer.force_N = fit_->frame.axes * Eigen::Vector3d::Map(&state_.force[0]);
   return answer;
 }
 

@@ -4,6 +4,7 @@
 
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/freedom.hpp"
+#include "tpm/reduce/condensed_tables.hpp"
 #include "tpm/reduce/contact_model.hpp"
 
 namespace tpm {
@@ -47,33 +48,30 @@ class CondensedContact final : public ContactModel {
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
 
   [[nodiscard]] double relaxation_time_s() const noexcept { return relaxation_time_s_; }
-  [[nodiscard]] const CondensedMemory& memory() const noexcept { return memory_; }
+  [[nodiscard]] CondensedMemory memory() const noexcept;
   /// Energy stored with the contact at a displacement and a memory, J: the force of step() is minus
   /// its gradient by the displacement.
   [[nodiscard]] double stored_energy_J(const Eigen::Vector3d& displacement_m,
                                        const CondensedMemory& memory) const noexcept;
-  /// Force on what is in contact, N, with the memory as it is after the latest step.
+  /// Force on what is in contact, N, with a memory.
   [[nodiscard]] Eigen::Vector3d force_N(const Eigen::Vector3d& displacement_m,
                                         const CondensedMemory& memory) const noexcept;
   /// Within a step the contact moves straight, and the memory relaxes while it is at this share of
   /// the way (docs/reduction.md), 0.5 to 1.
-  [[nodiscard]] double resting_share() const noexcept { return resting_share_; }
+  [[nodiscard]] double resting_share() const noexcept { return rates_.resting_share; }
   /// Steps since reset() in which the memory was left as it was, for to relax it as computed would
   /// not have lowered the energy.
   [[nodiscard]] long long kept_memories() const noexcept { return kept_; }
 
  private:
-  using State = Eigen::Matrix<double, 6, 1>;
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
   void set_rates();
+  [[nodiscard]] CondensedValue value_of(const Eigen::Vector3d& displacement_m,
+                                        const CondensedMemory& memory) const noexcept;
 
   std::shared_ptr<const CondensedFit> fit_;
   double relaxation_time_s_, period_s_;
-  double resting_share_ = 1.0;
-  Matrix6 rate_ = Matrix6::Zero(), first_ = Matrix6::Zero(), second_ = Matrix6::Zero();
-  Eigen::Matrix<double, 6, 3> drift_ = Eigen::Matrix<double, 6, 3>::Zero();
-  Eigen::Vector3d u_ = Eigen::Vector3d::Zero();  ///< of the contact, in its axes, m
-  CondensedMemory memory_;
+  CondensedRates rates_;
+  CondensedState state_;
   long long kept_ = 0;
 };
 

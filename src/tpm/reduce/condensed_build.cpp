@@ -126,8 +126,8 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
       samples.push_back(sampler.sample_at(places.next()));
     }
   }
-  fit->potential = CondensedPotential(fit->frame, samples);
-  fit->matrices = CondensedMatrices(fit->frame, metrics);
+  fit->tables = condensed_tables(fit->frame, CondensedPotential(fit->frame, samples),
+                                 CondensedMatrices(fit->frame, metrics));
   return {fit, bonds.relaxation_time_s(), options.period_s};
 }
 

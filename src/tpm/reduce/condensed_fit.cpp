@@ -6,8 +6,8 @@
 namespace tpm {
 namespace {
 
-constexpr std::array<int, 3> kDegrees{4, 3, 1};  // in the depth, by degree in the tangents
-constexpr int kTerms = 5 + 2 * 4 + 3 * 2;
+constexpr std::array<int, 3> kDegrees{4, 2, 0};  // in the depth, by degree in the tangents
+constexpr int kTerms = CondensedMatrices::kTerms;
 
 using Terms = Eigen::Matrix<double, kTerms, 1>;
 

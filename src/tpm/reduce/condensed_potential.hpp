@@ -46,6 +46,9 @@ class CondensedPotential {
 
   [[nodiscard]] Gradient gradient(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m) const;
 
+  /// Of condensed_monomials().
+  [[nodiscard]] const std::vector<double>& coefficients() const { return coefficients_; }
+
  private:
   CondensedFrame frame_;
   std::vector<double> coefficients_;
