@@ -12,6 +12,10 @@
 namespace tpm {
 namespace {
 
+/// The share of the second mode's force, were it coupled as strongly everywhere as where it is
+/// strongest, that further modes and its own nonlinearity are taken to make.
+constexpr double kSecondModeError = 0.35;
+
 /// (1 - exp(-y))/y, and the next one: (1 - that)/y.
 double first_phi(double y) {
   return y == 0.0 ? 1.0 : -std::expm1(-y) / y;
@@ -133,6 +137,12 @@ ContactAnswer CondensedContact::step(const Eigen::Vector3d& displacement_m) noex
   kept_ += state_.kept ? 1 : 0;
   ContactAnswer answer;
   answer.force_N = fit_->frame.axes * Eigen::Vector3d::Map(&state_.force[0]);
+  const Eigen::Vector3d q = Eigen::Vector3d::Map(&state_.memory[4]);
+  answer.error_N =
+      fit_->fit_error_N + kSecondModeError * (fit_->coupling_along * std::abs(q[0]) +
+                                              fit_->coupling_across * std::hypot(q[1], q[2]));
+  answer.trusted = u[0] >= fit_->least_depth_m && u[0] <= fit_->most_depth_m &&
+                   std::hypot(u[1], u[2]) <= fit_->most_tangential_m;
   return answer;
 }
 
@@ -145,11 +155,15 @@ Eigen::Matrix3d CondensedContact::relaxed_stiffness() const noexcept {
 }
 
 Eigen::Index CondensedContact::spheres() const noexcept {
-  return 0;
+  return fit_->field.spheres();
 }
 
+// A Ref is a view: what it shows is changed.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
 void CondensedContact::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
-  all.setZero();
+  const Eigen::Vector3d u = Eigen::Vector3d::Map(&state_.u[0]);
+  fit_->field.displacements(u, Eigen::Vector3d::Map(&state_.memory[0]), all);
+  all.col(fit_->contact) = fit_->frame.axes * u;
 }
 
 }  // namespace tpm

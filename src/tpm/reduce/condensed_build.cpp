@@ -96,8 +96,10 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   held.hold(contact);
   const auto fit = std::make_shared<CondensedFit>();
   fit->frame = frame_of(into_tissue, options);
-  fit->depth_m = options.depth_m;
-  fit->tangential_m = options.tangential_m;
+  fit->contact = static_cast<Eigen::Index>(contact);
+  fit->least_depth_m = -kDepthMargin * options.depth_m;
+  fit->most_depth_m = (1.0 + kDepthMargin) * options.depth_m;
+  fit->most_tangential_m = (1.0 + kTangentialMargin) * options.tangential_m;
 
   CondensedSampler sampler(bonds, rest, held, contact, kStride * options.depth_m);
   SpreadPlaces memories(fit->frame, options, {2, 3, 5});
@@ -120,14 +122,19 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
     fit->mean_energy -= local(relaxed.by_wu);
     fit->mean_coupling += local(metric.second_metric);
     fit->mean_second += local(metric.second_energy);
+    const Eigen::Matrix3d coupling = local(kMemories * metric.second_metric);
+    fit->coupling_along = std::max(fit->coupling_along, coupling(0, 0));
+    fit->coupling_across = std::max({fit->coupling_across, coupling(1, 1), coupling(2, 2)});
     metrics.push_back(metric);
     samples.push_back(relaxed);
     for (int j = 0; j < (i == 0 ? kPlacesAtRest : kPlacesEach); ++j) {
       samples.push_back(sampler.sample_at(places.next()));
     }
   }
-  fit->tables = condensed_tables(fit->frame, CondensedPotential(fit->frame, samples),
-                                 CondensedMatrices(fit->frame, metrics));
+  const CondensedPotential potential(fit->frame, samples);
+  fit->tables = condensed_tables(fit->frame, potential, CondensedMatrices(fit->frame, metrics));
+  fit->fit_error_N = potential.worst_N();
+  fit->field = CondensedField(fit->frame, rest, samples);
   return {fit, bonds.relaxation_time_s(), options.period_s};
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include "tpm/reduce/condensed_field.hpp"
 #include "tpm/reduce/condensed_potential.hpp"
 #include "tpm/reduce/condensed_tables.hpp"
 
@@ -40,8 +41,13 @@ class CondensedMatrices {
 /// All that does not depend on relaxation time and period.
 struct CondensedFit {
   CondensedFrame frame;
-  double depth_m = 0.0, tangential_m = 0.0;
+  double least_depth_m = 0.0, most_depth_m = 0.0, most_tangential_m = 0.0;  ///< sampled
   CondensedTables tables;
+  CondensedField field;
+  Eigen::Index contact = 0;
+  double fit_error_N = 0.0;  ///< largest difference of force from a sample
+  /// Largest coupling to the second mode over the range, N/m: along the push and across.
+  double coupling_along = 0.0, coupling_across = 0.0;
   Eigen::Matrix3d mean_metric = Eigen::Matrix3d::Zero();    ///< of w over the samples
   Eigen::Matrix3d mean_energy = Eigen::Matrix3d::Zero();    ///< -d2Psi/dw du at u = w
   Eigen::Matrix3d mean_coupling = Eigen::Matrix3d::Zero();  ///< CondensedMatrices

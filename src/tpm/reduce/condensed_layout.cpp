@@ -14,7 +14,7 @@ CondensedTables condensed_tables(const CondensedFrame& frame, const CondensedPot
   tables.middle_depth_m = frame.middle_depth_m;
   tables.per_half_depth = 1.0 / frame.half_depth_m;
   tables.per_tangential = 1.0 / frame.tangential_m;
-  const auto monomials = condensed_monomials();
+  const auto monomials = condensed_monomials(kCondensedDegrees);
   for (std::size_t m = 0; m < monomials.size(); ++m) {
     const CondensedExponents& e = monomials[m];
     const double c = potential.coefficients()[m];

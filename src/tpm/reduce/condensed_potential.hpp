@@ -4,35 +4,18 @@
 #include <span>
 #include <vector>
 
+#include "tpm/reduce/condensed_monomials.hpp"
 #include "tpm/reduce/condensed_samples.hpp"
 
 namespace tpm {
 
-/// Axes and scales of the contact: p along the push, scaled to -1..1 over the depths of the fit,
-/// and two tangential coordinates in units of the largest tangential displacement.
-struct CondensedFrame {
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< columns: into the tissue, two tangents
-  double middle_depth_m = 0.0, half_depth_m = 1.0;
-  double tangential_m = 1.0;
-
-  /// In the axes, m, from a displacement in the coordinates of the organ.
-  [[nodiscard]] Eigen::Vector3d local(const Eigen::Vector3d& displacement_m) const {
-    return axes.transpose() * displacement_m;
-  }
-};
-
-/// How the potential is expanded: of the monomials in the four tangential coordinates of u and w
-/// of degree b, those times the monomials in the two depths up to degree depth_degree[b].
+/// How the potential is expanded, see condensed_monomials().
 inline constexpr std::array<int, 4> kCondensedDegrees{7, 5, 3, 1};
 
 /// Psi(u, w) as a polynomial, fitted to values, gradients and second derivatives of samples.
 /// Displacements are local (CondensedFrame).
 class CondensedPotential {
  public:
-  static constexpr int kDepthPower = kCondensedDegrees[0];
-  /// Monomials in the two depths up to a degree.
-  static constexpr int depth_terms(int degree) { return (degree + 1) * (degree + 2) / 2; }
-
   /// Value and gradient.
   struct Gradient {
     double value_J = 0.0;
@@ -44,18 +27,18 @@ class CondensedPotential {
   /// @param samples in the coordinates of the organ
   CondensedPotential(const CondensedFrame& frame, std::span<const CondensedSample> samples);
 
+  /// Largest difference of force from a sample, N.
+  [[nodiscard]] double worst_N() const { return worst_N_; }
   [[nodiscard]] Gradient gradient(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m) const;
 
-  /// Of condensed_monomials().
+  /// Of condensed_monomials(kCondensedDegrees).
   [[nodiscard]] const std::vector<double>& coefficients() const { return coefficients_; }
 
  private:
   CondensedFrame frame_;
+  std::vector<CondensedExponents> monomials_;
   std::vector<double> coefficients_;
+  double worst_N_ = 0.0;
 };
-
-/// Exponents of the six coordinates: depths of u and w, tangents of u, tangents of w.
-using CondensedExponents = std::array<int, 6>;
-[[nodiscard]] std::vector<CondensedExponents> condensed_monomials();
 
 }  // namespace tpm
