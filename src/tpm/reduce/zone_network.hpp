@@ -1,0 +1,112 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "tpm/reduce/contact_model.hpp"
+#include "tpm/reduce/servo_bonds.hpp"
+#include "tpm/reduce/step_error.hpp"
+#include "tpm/reduce/zone_surroundings.hpp"
+#include "tpm/solve/aligned_floats.hpp"
+#include "tpm/solve/panel_kernels.hpp"
+
+namespace tpm {
+
+struct ZoneNetworkOptions {
+  double period_s = 1e-3;           ///< > 0
+  int rings = 3;                    ///< bonds from the contact to the edge of the zone, >= 1
+  double linear_depth_m = 3.25e-3;  ///< where what surrounds the zone is linearised, >= 0
+  double frozen_depth_m = 4e-3;     ///< where the zone's own stiffness is taken, >= 0
+  double deepest_m = 10e-3;         ///< answers beyond are not trusted, > 0
+  double aside_m = 5e-3;            ///< the same across the normal, > 0
+  bool portable = false;            ///< as ServoNetworkOptions
+};
+
+/// The network near a contact, and what surrounds it as a linear tissue (MODEL.md, section 4,
+/// formulation 4). Bonds of which every movable end lies within some rings of the contact are kept
+/// as they are; all others have the stiffness that they have at a depth, and no force at rest.
+///
+/// The spheres outside follow those at the edge of the zone as they do in a step of the linear
+/// tissue, and have a few displacements of their own beside that: those by which the fields of the
+/// contact, at once and relaxed, differ from it. On these the linear tissue is projected
+/// symmetrically, its viscous part with the same memory as every bond has, so that it stores and
+/// dissipates as a tissue does (docs/reduction_servo.md).
+///
+/// `error_N` estimates what the linear surroundings cost, by the forces that they miss at
+/// equilibria of the whole network; what linear elongations cost (StepError); and what is left
+/// unbalanced.
+class ZoneNetwork final : public ContactModel {
+ public:
+  /// As ServoNetwork. Throws Error(bad_input) for guided spheres as well.
+  ZoneNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+              std::size_t contact, const Eigen::Vector3d& into_tissue,
+              const ZoneNetworkOptions& options = {});
+
+  void reset() noexcept override;
+  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  [[nodiscard]] double period_s() const noexcept override { return options_.period_s; }
+  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
+    return at_once_;
+  }
+  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
+  [[nodiscard]] Eigen::Index spheres() const noexcept override {
+    return static_cast<Eigen::Index>(held_or_free_.size());
+  }
+  void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
+
+  /// Spheres of the zone that move, the contact left out.
+  [[nodiscard]] std::size_t zone_spheres() const noexcept { return zone_.size(); }
+  /// Displacements of the surroundings beside those that follow the edge.
+  [[nodiscard]] Eigen::Index own_displacements() const noexcept { return own_; }
+  /// The least eigenvalue of the relaxed stiffness of the surroundings before negative ones were
+  /// taken out, over the largest.
+  [[nodiscard]] double softest() const noexcept { return softest_; }
+
+ private:
+  /// A dense matrix for PanelKernels.
+  struct Dense {
+    AlignedFloats numbers;
+    std::size_t stride = 0, columns = 0;
+    void put(const Eigen::MatrixXd& matrix);
+    [[nodiscard]] Panel panel() const { return {numbers.data(), stride, columns}; }
+  };
+  void choose_zone(const PushedContact& tissue);
+  void build(PushedContact& tissue);
+  void build_errors(PushedContact& tissue, const LinearBonds& around,
+                    const std::vector<char>& linear);
+  void add_surroundings() noexcept;
+  void gather(std::size_t first) noexcept;
+
+  ZoneNetworkOptions options_;
+  Eigen::Vector3d into_;
+  ServoWeights weights_;
+  const PanelKernels& kernels_;
+  std::size_t contact_ = 0;
+  std::vector<std::size_t> zone_;      ///< movable spheres of the zone, those at its edge last
+  std::size_t edge_ = 0;               ///< how many of them are at the edge
+  std::vector<std::uint32_t> column_;  ///< of each sphere among displacements
+  std::vector<char> held_or_free_;     ///< of each sphere: 0 held, 1 outside, 2 in the zone
+  std::vector<std::size_t> outside_;
+  Eigen::Index own_ = 0;
+  double softest_ = 0.0;
+  Eigen::Matrix3d at_once_, relaxed_;
+
+  ServoBonds at_contact_, elsewhere_;
+  Dense inverse_;   ///< of the frozen stiffness, by coordinates of zone and own displacements
+  Dense stiff_;     ///< of the surroundings in a step, by coordinates of edge and own ones
+  Dense relaxing_;  ///< what relaxes of it
+  Dense outer_;     ///< displacements outside by those coordinates
+  std::array<AlignedFloats, 3> field_;
+  std::unique_ptr<StepError> step_error_;
+  /// Force missed at even depths from rest on, and per metre across the normal, N and N/m.
+  std::vector<double> missed_N_;
+  double missed_stride_m_ = 0.0, missed_aside_N_per_m_ = 0.0;
+
+  AlignedFloats displacement_, force_;
+  AlignedFloats right_, change_;        ///< by coordinates of zone and own displacements
+  AlignedFloats moved_;                 ///< edge and own displacements
+  AlignedFloats offset_, next_offset_;  ///< as of bonds, of edge and own displacements
+  AlignedFloats pull_, offset_pull_, next_pull_;
+  double largest_N_ = 0.0;
+};
+
+}  // namespace tpm

@@ -1,0 +1,33 @@
+#pragma once
+#include <vector>
+
+#include "tpm/reduce/pushed_contact.hpp"
+
+namespace tpm {
+
+/// Some bonds of a tissue as linear springs with memory, about an equilibrium.
+class LinearBonds {
+ public:
+  /// @param chosen one entry a bond: it takes part
+  LinearBonds(const PushedContact& tissue, const Positions& position, double relaxed,
+              const std::vector<char>& chosen);
+
+  /// Adds what they resist displacements with, N: at once less `following` times what relaxes.
+  void add_resistance(const Eigen::Matrix3Xd& displacement, double following,
+                      Eigen::Matrix3Xd& force) const;
+  /// What relaxes of it.
+  void add_relaxing(const Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& force) const;
+  /// The stiffness matrix of the system's spheres.
+  [[nodiscard]] BlockMatrix matrix(double following) const;
+
+ private:
+  struct Linear {
+    std::size_t bond;
+    std::uint32_t a, b;
+    Eigen::Matrix3d at_once, relaxing;
+  };
+  const BondSystem& bonds_;
+  std::vector<Linear> linear_;
+};
+
+}  // namespace tpm

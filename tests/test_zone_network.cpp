@@ -1,0 +1,134 @@
+// The zone model on a small organ.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "organ_scene.hpp"
+#include "tpm/benchmark/contact_reference.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/network/liver.hpp"
+#include "tpm/reduce/servo_network.hpp"
+#include "tpm/reduce/zone_network.hpp"
+
+using namespace tpm;
+using tpm::testing::OrganScene;
+
+namespace {
+
+const OrganScene& small_liver() {
+  static const OrganScene scene = [] {
+    LiverRequest request;
+    request.count = 80;
+    return OrganScene(fill_liver(request));
+  }();
+  return scene;
+}
+
+TpmParameters material_with(double relaxation_time_s) {
+  TpmParameters material;
+  material.eta1_Pa_s = relaxation_time_s * (material.E1_Pa + material.E2_Pa);
+  return material;
+}
+
+struct Followed {
+  Eigen::Matrix3Xd force_N;
+  double estimate_N = 0.0;
+};
+
+Followed follow(ContactModel& model, const ContactMotion& motion) {
+  Followed followed;
+  followed.force_N.resize(3, motion.steps());
+  model.reset();
+  for (Eigen::Index i = 0; i < motion.steps(); ++i) {
+    const ContactAnswer answer = model.step(motion.displacement_m.col(i));
+    followed.force_N.col(i) = answer.force_N;
+    followed.estimate_N = std::max(followed.estimate_N, answer.error_N);
+  }
+  return followed;
+}
+
+}  // namespace
+
+TEST_CASE("a zone that holds the whole organ is the servo network", "[zone]") {
+  const OrganScene& scene = small_liver();
+  const Positions& rest = scene.network.organ.position;
+  const BondSystem bonds(scene.network, material_with(0.02));
+  const Eigen::Vector3d into = scene.probe.direction;
+  ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, into, {.rings = 50});
+  ServoNetwork whole(bonds, rest, scene.freedom, scene.probe.sphere, into);
+  const ContactMotion motion = random_motion_in_space(contact_axes(into), 4e-3, 1e-3, 200, 5, 1e-3);
+  const Followed some = follow(zone, motion);
+  const Followed all = follow(whole, motion);
+  const double peak_N = all.force_N.colwise().norm().maxCoeff();
+  CHECK((some.force_N - all.force_N).colwise().norm().maxCoeff() < 1e-3 * peak_N);
+  Eigen::Matrix3Xd of_zone(3, zone.spheres());
+  Eigen::Matrix3Xd of_whole(3, whole.spheres());
+  zone.displacements(of_zone);
+  whole.displacements(of_whole);
+  CHECK((of_zone - of_whole).cwiseAbs().maxCoeff() < 2e-2 * of_whole.cwiseAbs().maxCoeff());
+}
+
+TEST_CASE("the surroundings of a zone are exact where the network is linear", "[zone]") {
+  const OrganScene& scene = small_liver();
+  const Positions& rest = scene.network.organ.position;
+  const Eigen::Vector3d into = scene.probe.direction;
+  for (const double tau : {2e-3, 10.0}) {
+    const BondSystem bonds(scene.network, material_with(tau));
+    const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
+    ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, into,
+                     {.rings = 1, .linear_depth_m = 0.0, .frozen_depth_m = 0.0});
+    REQUIRE(zone.own_displacements() > 0);
+    // So small that nothing is nonlinear; the zone's edge is a few spheres away.
+    const ContactMotion motion = ramp_motion(into, 1e-5, 1e-3, 0.03, 1e-3);
+    FineContact exact(tissue, 1e-3);
+    zone.reset();
+    double worst_N = 0.0;
+    double peak_N = 0.0;
+    for (Eigen::Index i = 0; i < motion.steps(); ++i) {
+      const Eigen::Vector3d force_N = exact.step(motion.displacement_m.col(i));
+      const Eigen::Vector3d answered_N = zone.step(motion.displacement_m.col(i)).force_N;
+      worst_N = std::max(worst_N, (answered_N - force_N).norm());
+      peak_N = std::max(peak_N, force_N.norm());
+    }
+    CAPTURE(tau, worst_N / peak_N);
+    CHECK(worst_N < 5e-4 * peak_N);
+    Eigen::Matrix3Xd all(3, zone.spheres());
+    zone.displacements(all);
+    CHECK((all - (exact.position() - rest)).cwiseAbs().maxCoeff() < 5e-3 * 1e-5);
+  }
+}
+
+TEST_CASE("a zone's error falls with its rings, and the estimate follows", "[zone]") {
+  const OrganScene& scene = small_liver();
+  const Positions& rest = scene.network.organ.position;
+  const Eigen::Vector3d into = scene.probe.direction;
+  const BondSystem bonds(scene.network, material_with(0.02));
+  const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
+  const ContactMotion ramp = ramp_motion(into, 6e-3, 0.05, 0.05, 1e-3);
+  const Eigen::VectorXd exact = line_reference(tissue, ramp, 1e-9);
+  const double peak_N = exact.cwiseAbs().maxCoeff();
+  std::vector<double> error;
+  for (const int rings : {1, 2}) {
+    ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, into, {.rings = rings});
+    const Followed followed = follow(zone, ramp);
+    error.push_back((followed.force_N.transpose() * into - exact).cwiseAbs().maxCoeff() / peak_N);
+    CAPTURE(rings, error.back(), followed.estimate_N / (error.back() * peak_N));
+    CHECK(followed.estimate_N > 0.3 * error.back() * peak_N);
+    CHECK(followed.estimate_N < 10.0 * error.back() * peak_N);
+  }
+  CHECK(error[1] < error[0]);
+  CHECK(error[1] < 0.02);
+}
+
+TEST_CASE("a zone refuses what it cannot do", "[zone]") {
+  const OrganScene& scene = small_liver();
+  const Positions& rest = scene.network.organ.position;
+  const BondSystem bonds(scene.network, material_with(0.02));
+  const Eigen::Vector3d into = scene.probe.direction;
+  CHECK_THROWS_AS(ZoneNetwork(bonds, rest, scene.freedom, scene.probe.sphere, into, {.rings = 0}),
+                  Error);
+  Freedom guided = scene.freedom;
+  std::size_t some = 0;
+  while (!scene.freedom.is_free(some) || some == scene.probe.sphere) ++some;
+  guided.guide(some, into);
+  CHECK_THROWS_AS(ZoneNetwork(bonds, rest, guided, scene.probe.sphere, into), Error);
+}
