@@ -1,0 +1,155 @@
+#include "tpm/reduce/condensed.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/reduce/condensed_fit.hpp"
+
+namespace tpm {
+namespace {
+
+/// (1 - exp(-y))/y, and the next one: (1 - that)/y.
+double first_phi(double y) {
+  return y == 0.0 ? 1.0 : -std::expm1(-y) / y;
+}
+double second_phi(double y) {
+  if (y > 0.05) return (1.0 - first_phi(y)) / y;
+  return 0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0 - y / 720.0)));
+}
+/// 1/(1 - exp(-y)) - 1/y: where a straight motion must rest for the exact end value.
+double rest_share(double y) {
+  return second_phi(y) / first_phi(y);
+}
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using State6 = Eigen::Matrix<double, 6, 1>;
+using Packed = Eigen::Matrix<double, 8, 1>;
+
+/// Columns of states, w and q each filled up with a 0.
+template <class Columns>
+void pack(const Columns& columns, double (*packed)[8]) {
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+    for (Eigen::Index i = 0; i < 6; ++i) packed[k][i < 3 ? i : i + 1] = columns(i, k);
+  }
+}
+
+double positive(double value, std::string_view name) {
+  if (value > 0.0 && std::isfinite(value)) return value;
+  throw Error(ExitCode::bad_input, "condensed model",
+              fmt::format("the {} is {} s; expected a number above 0", name, value));
+}
+
+}  // namespace
+
+CondensedContact::CondensedContact(std::shared_ptr<const CondensedFit> fit,
+                                   double relaxation_time_s, double period_s)
+    : fit_(std::move(fit)),
+      relaxation_time_s_(positive(relaxation_time_s, "relaxation time")),
+      period_s_(positive(period_s, "period")) {
+  set_rates();
+  settle_condensed(fit_->tables, state_);
+}
+
+CondensedContact CondensedContact::with_relaxation_time(double relaxation_time_s) const {
+  return {fit_, relaxation_time_s, period_s_};
+}
+
+CondensedContact CondensedContact::with_period(double period_s) const {
+  return {fit_, relaxation_time_s_, period_s};
+}
+
+void CondensedContact::set_rates() {
+  const double x = period_s_ / relaxation_time_s_;
+  // A mode that hardly exists is kept from dividing by zero.
+  const Eigen::Matrix3d grain = 1e-9 * fit_->mean_metric.trace() * Eigen::Matrix3d::Identity();
+  Matrix6 metric = Matrix6::Zero();
+  metric.topLeftCorner<3, 3>() = fit_->mean_metric;
+  metric.bottomRightCorner<3, 3>() = fit_->mean_coupling + grain;
+  Matrix6 energy;
+  energy << fit_->mean_energy, fit_->mean_coupling, fit_->mean_coupling, fit_->mean_second + grain;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6> modes(energy, metric);
+  const Matrix6 right = modes.eigenvectors();
+  const Matrix6 left = right.transpose() * metric;
+  const auto of_rate = [&](const auto& f) {
+    State6 values;
+    for (Eigen::Index k = 0; k < 6; ++k) values[k] = f(modes.eigenvalues()[k] * x);
+    return Matrix6(right * values.asDiagonal() * left);
+  };
+  const Matrix6 rate = of_rate([&](double y) { return y / x; });
+  pack(rate, rates_.rate);
+  pack(of_rate([&](double y) { return x * first_phi(y); }), rates_.first);
+  pack(of_rate([&](double y) { return x * second_phi(y); }), rates_.second);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    for (Eigen::Index i = 0; i < 3; ++i) rates_.of_second[k][i] = rate(3 + i, 3 + k);
+  }
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> of_w(fit_->mean_energy,
+                                                                       fit_->mean_metric);
+  const double share = rest_share(of_w.eigenvalues().mean() * x);
+  // Of a linear tissue that moves straight, resting for that share of the way leaves this out: with
+  // r = exp(-y) the state relative to the contact ends at phi1, not at 1 + (r - 1) share, per step
+  // of the contact.
+  const Matrix6 left_out =
+      of_rate([&](double y) { return 1.0 + std::expm1(-y) * share - first_phi(y); });
+  pack(left_out.leftCols<3>(), rates_.drift);
+  rates_.resting_share = share;
+}
+
+void CondensedContact::reset() noexcept {
+  state_ = {};
+  settle_condensed(fit_->tables, state_);
+  kept_ = 0;
+}
+
+CondensedMemory CondensedContact::memory() const noexcept {
+  return {Eigen::Vector3d::Map(&state_.memory[0]), Eigen::Vector3d::Map(&state_.memory[4])};
+}
+
+double CondensedContact::stored_energy_J(const Eigen::Vector3d& displacement_m,
+                                         const CondensedMemory& memory) const noexcept {
+  return value_of(displacement_m, memory).energy_J;
+}
+
+Eigen::Vector3d CondensedContact::force_N(const Eigen::Vector3d& displacement_m,
+                                          const CondensedMemory& memory) const noexcept {
+  return fit_->frame.axes * value_of(displacement_m, memory).force_N;
+}
+
+CondensedValue CondensedContact::value_of(const Eigen::Vector3d& displacement_m,
+                                          const CondensedMemory& memory) const noexcept {
+  const Eigen::Vector3d u = fit_->frame.local(displacement_m);
+  Packed packed = Packed::Zero();
+  packed.head<3>() = memory.w_m;
+  packed.segment<3>(4) = memory.q_m;
+  return value_of_condensed(fit_->tables, u.data(), packed.data());
+}
+
+ContactAnswer CondensedContact::step(const Eigen::Vector3d& displacement_m) noexcept {
+  const Eigen::Vector3d u = fit_->frame.local(displacement_m);
+  step_condensed(fit_->tables, rates_, state_, u.data());
+  kept_ += state_.kept ? 1 : 0;
+  ContactAnswer answer;
+  answer.force_N = fit_->frame.axes * Eigen::Vector3d::Map(&state_.force[0]);
+  return answer;
+}
+
+Eigen::Matrix3d CondensedContact::instantaneous_stiffness() const noexcept {
+  return fit_->instantaneous;
+}
+
+Eigen::Matrix3d CondensedContact::relaxed_stiffness() const noexcept {
+  return fit_->relaxed;
+}
+
+Eigen::Index CondensedContact::spheres() const noexcept {
+  return 0;
+}
+
+void CondensedContact::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
+  all.setZero();
+}
+
+}  // namespace tpm

@@ -1,0 +1,69 @@
+#pragma once
+#include <Eigen/Core>
+
+namespace tpm {
+
+/// The polynomials of a condensed model as its step reads them. With p and s the scaled depths of
+/// u and w, and t the four scaled tangential coordinates (u, u, w, w), column (i, n) stands for
+/// p^i s^n; a column of at most degree a has
+///
+///     constant + linear t + t' square t/2 + cube(t, t, t)/6
+///
+/// where the square is there up to degree 3, the cube up to 1 (kCondensedDegrees). Arrays are read
+/// as vectors of the processor.
+struct alignas(32) CondensedTables {
+  // NOLINTBEGIN(*-avoid-c-arrays): read in code compiled for several processors, which must not
+  // instantiate inline functions
+  static constexpr int kDepths = 8;
+  static constexpr int kPairs = 10;  ///< of tangential coordinates
+  static constexpr int kMatrixTerms = 14;
+  static constexpr int kMatrixEntries = 20;  ///< three symmetric matrices, two zeros
+
+  double constant[kDepths][8] = {};   ///< by n, then i
+  double linear[6][6][4] = {};        ///< by i, then n
+  double square[4][4][4][4] = {};     ///< by i, n, column of the matrix
+  double cube[2][2][kPairs][4] = {};  ///< by i, n, pair of coordinates
+  double matrices[kMatrixTerms][kMatrixEntries] = {};
+  double middle_depth_m = 0.0, per_half_depth = 0.0, per_tangential = 0.0;
+  // NOLINTEND(*-avoid-c-arrays)
+};
+
+/// What a step needs that depends on period and relaxation time. States are w (3), 0, q (3), 0.
+struct alignas(32) CondensedRates {
+  // NOLINTBEGIN(*-avoid-c-arrays)
+  double first[6][8] = {}, second[6][8] = {}, rate[6][8] = {};  ///< columns
+  double drift[3][8] = {};
+  double of_second[3][4] = {};  ///< rate of q by q
+  double resting_share = 1.0;
+  // NOLINTEND(*-avoid-c-arrays)
+};
+
+/// The state of a condensed model between steps, and its answer; in the axes of the contact.
+struct alignas(32) CondensedState {
+  // NOLINTBEGIN(*-avoid-c-arrays)
+  double memory[8] = {};                                  ///< w (3), 0, q (3), 0; m
+  double matrices[CondensedTables::kMatrixEntries] = {};  ///< at w
+  double pending[8] = {};                                 ///< to be added to the memory; m
+  double u[4] = {};                                       ///< m
+  double force[4] = {};                                   ///< on what is in contact, N
+  double second_force[4] = {};                            ///< the part of q in it, N
+  bool kept = false;                                      ///< the latest step left the memory
+  // NOLINTEND(*-avoid-c-arrays)
+};
+
+/// Sets what follows from the memory: for the start.
+void settle_condensed(const CondensedTables& tables, CondensedState& state) noexcept;
+
+/// One step to state.u -> to (m, in the axes of the contact).
+void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
+                    CondensedState& state, const double* to) noexcept;
+
+/// Energy and force with the contact at u, whatever was remembered.
+struct CondensedValue {
+  double energy_J = 0.0;
+  Eigen::Vector3d force_N = Eigen::Vector3d::Zero();  ///< minus its gradient by u
+};
+[[nodiscard]] CondensedValue value_of_condensed(const CondensedTables& tables, const double* u,
+                                                const double* memory) noexcept;
+
+}  // namespace tpm
