@@ -24,6 +24,7 @@ tpm_find(SUNDIALS 6.4 COMPONENTS cvodes ida sunmatrixdense sunlinsoldense sunmat
 tpm_find(muparser 2.3)
 tpm_find(OpenSSL 3 COMPONENTS Crypto)
 tpm_find(assimp 5.2)
+tpm_find(Threads)
 
 # libsundials-dev brings the MPI build of HDF5 along, which is not thread safe: the serial one is
 # asked for by name, and an MPI one is refused rather than linked silently.
@@ -63,7 +64,10 @@ if(NOT TPM_CONSUMER)
   find_package(utf8cpp 3.2 REQUIRED)
   find_package(valijson REQUIRED)
   find_package(nanoflann 1.4 REQUIRED)  # neighbours within a radius
+  find_path(TPM_READERWRITERQUEUE_INCLUDE readerwriterqueue/readerwriterqueue.h REQUIRED)
+  mark_as_advanced(TPM_READERWRITERQUEUE_INCLUDE)
   add_library(tpm_header_only INTERFACE IMPORTED)
   target_link_libraries(tpm_header_only INTERFACE Boost::headers utf8::cpp valijson nanoflann::nanoflann)
+  target_include_directories(tpm_header_only INTERFACE ${TPM_READERWRITERQUEUE_INCLUDE})
   find_package(CLI11 2.1 REQUIRED)
 endif()

@@ -1,11 +1,11 @@
 // tpm simulate: run what a scene says is done to its tissue.
 #include <fmt/format.h>
 
-#include <csignal>
 #include <filesystem>
 #include <memory>
 
 #include "command.hpp"
+#include "interrupt_watch.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/units.hpp"
@@ -26,32 +26,6 @@ struct SimulateChoice {
   bool beside_mass_spring = false;
   bool vtkhdf = false;
   std::string checkpoint_every = "5 s";
-};
-
-/// What a signal handler may touch has to be of static storage.
-volatile std::sig_atomic_t stop_signal = 0;
-
-/// While this lives, the first SIGINT or SIGTERM is remembered and a second one kills.
-class InterruptWatch {
- public:
-  InterruptWatch() {
-    struct sigaction action {};
-    action.sa_handler = [](int signal) { stop_signal = signal; };
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
-    sigaction(SIGINT, &action, &before_interrupt_);
-    sigaction(SIGTERM, &action, &before_terminate_);
-  }
-  ~InterruptWatch() {
-    sigaction(SIGINT, &before_interrupt_, nullptr);
-    sigaction(SIGTERM, &before_terminate_, nullptr);
-  }
-  InterruptWatch(const InterruptWatch&) = delete;
-  InterruptWatch& operator=(const InterruptWatch&) = delete;
-  [[nodiscard]] static bool seen() { return stop_signal != 0; }
-
- private:
-  struct sigaction before_interrupt_ {};
-  struct sigaction before_terminate_ {};
 };
 
 /// A scene, the network it is run on, and what came of it.
@@ -169,7 +143,7 @@ int run_command(const SimulateChoice& choice, const Session& session) {
   } catch (const Interrupted& stop) {
     constexpr int kStoppedBySignal = 128;
     fmt::print(stderr, "tpm: {}\n", stop.what());
-    return kStoppedBySignal + stop_signal;
+    return kStoppedBySignal + InterruptWatch::signal();
   }
 }
 

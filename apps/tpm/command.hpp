@@ -45,6 +45,10 @@ void add_simulate_command(CLI::App& app, Session& session);
 void add_report_command(CLI::App& app, Session& session);
 void add_experiments_command(CLI::App& app, Session& session);
 void add_stability_command(CLI::App& app, Session& session);
-void add_data_import_command(CLI::App& data, Session& session);  // below `tpm data`
+void add_hil_command(CLI::App& app, Session& session);
+void add_hil_check_command(CLI::App& hil, Session& session);      // below `tpm hil`
+void add_hil_verify_commands(CLI::App& hil, Session& session);    // below `tpm hil`
+void add_hil_stability_command(CLI::App& hil, Session& session);  // below `tpm hil`
+void add_data_import_command(CLI::App& data, Session& session);   // below `tpm data`
 
 }  // namespace tpm::app

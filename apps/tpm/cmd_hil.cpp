@@ -1,0 +1,170 @@
+// tpm hil devices, tpm hil run: a session through a haptic device.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "hil_options.hpp"
+#include "interrupt_watch.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/device/omega7.hpp"
+#include "tpm/report/hil_report.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct RunChoice {
+  std::string session;
+  DeviceOptions device;
+  std::string time;
+  std::string output = "session.tpmrec";
+};
+
+int list_devices(const DeviceOptions& options, const Session& session) {
+  std::string omega7;
+  int count = 0;
+  try {
+    count = count_omega7(options.library);
+    omega7 = count > 0 ? fmt::format("{} found", count)
+                       : std::string("the library is there, and sees no device");
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::environment) throw;
+    omega7 = error.what();
+  }
+  if (session.json()) {
+    fmt::print("{}", to_text(Json{{"omega7", {{"available", count > 0}, {"reason", omega7}}},
+                                  {"virtual", {{"available", true}, {"simulated_device", true}}},
+                                  {"replay", {{"available", true}, {"simulated_device", true}}}}));
+  } else {
+    fmt::print(
+        "omega7   {}\nvirtual  always there: a simulated Omega.7 and operator, no hardware\nreplay "
+        "  "
+        "always there: the motion of a recording, no hardware\n",
+        omega7);
+  }
+  return 0;
+}
+
+/// Tells the operator what to do, or how far a simulated session is.
+class Guide {
+ public:
+  Guide(const HilSession& session, bool real_time) : session_(session), real_time_(real_time) {
+    if (!real_time) progress_.emplace("session", session.phases.size());
+  }
+  void see(const ServoRecord& row) {
+    if (row.phase == phase_ || row.phase >= static_cast<std::int32_t>(session_.phases.size()))
+      return;
+    phase_ = row.phase;
+    if (progress_) progress_->advance();
+    if (!real_time_ || isatty(STDERR_FILENO) == 0) return;
+    fmt::print(stderr, "{:8.1f} s  {}\n", static_cast<double>(row.cycle) * session_.servo.period_s,
+               session_.phases[static_cast<std::size_t>(phase_)].name);
+  }
+
+ private:
+  const HilSession& session_;
+  bool real_time_;
+  std::int32_t phase_ = -1;
+  std::optional<Progress> progress_;
+};
+
+int exit_code_of(const ServoOutcome& outcome) {
+  if (outcome.cause == StopCause::finished) return 0;
+  constexpr int kStoppedBySignal = 128;
+  if (outcome.cause == StopCause::signal) return kStoppedBySignal + InterruptWatch::signal();
+  fmt::print(stderr, "tpm: session stopped: {}{}{}\n", word_of(outcome.cause),
+             outcome.detail.empty() ? "" : ": ", outcome.detail);
+  return static_cast<int>(ExitCode::environment);
+}
+
+int run_hil(const RunChoice& choice, const Session& session) {
+  const HilSession hil = read_session(choice.session);
+  const DeviceChoice device = chosen_device(choice.device);
+  SessionRunOptions options;
+  options.real_time = choice.time.empty() ? device.kind == "omega7" : choice.time == "real";
+  options.wish = chosen_wish(choice.device);
+  options.recording = choice.output;
+  const InterruptWatch interrupts;
+  options.interrupted = InterruptWatch::seen;
+  auto guide = std::make_unique<Guide>(hil, options.real_time);
+  options.watcher = [&guide](const ServoRecord& row) { guide->see(row); };
+  const SessionRun run = run_session(hil, device, options);
+  guide.reset();
+  if (session.json()) {
+    Json json = run_json(hil, run);
+    json["recording"] = choice.output;
+    fmt::print("{}", to_text(json));
+  } else {
+    fmt::print("{}wrote {}\n", run_text(hil, run), choice.output);
+  }
+  return exit_code_of(run.outcome);
+}
+
+}  // namespace
+
+void add_device_options(CLI::App& command, DeviceOptions& options) {
+  command.add_option("--device", options.choice.kind, "virtual, omega7 or replay")
+      ->check(CLI::IsMember({"virtual", "omega7", "replay"}))
+      ->capture_default_str();
+  command.add_option("--dhd-library", options.library,
+                     "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
+  command.add_option("--recording", options.replay, "What --device replay plays");
+  command.add_flag("--may-move", options.choice.may_move,
+                   "The device may move by itself to initialise");
+  command.add_flag("--take-as-ready", options.choice.take_as_ready,
+                   "The device is initialised, where the library cannot tell");
+  command
+      .add_option("--real-time", options.real_time,
+                  "Real-time scheduling that is refused is an error, or said and ignored")
+      ->check(CLI::IsMember({"enforce", "ignore"}))
+      ->capture_default_str();
+}
+
+DeviceChoice chosen_device(const DeviceOptions& options) {
+  DeviceChoice choice = options.choice;
+  choice.library = options.library;
+  choice.replay = options.replay;
+  return choice;
+}
+
+RealTimeWish chosen_wish(const DeviceOptions& options) {
+  return options.real_time == "enforce" ? RealTimeWish::enforce : RealTimeWish::ignore;
+}
+
+void add_hil_command(CLI::App& app, Session& session) {
+  CLI::App* hil = app.add_subcommand("hil", "A tissue felt through a haptic device");
+  hil->require_subcommand(1);
+
+  CLI::App* devices = hil->add_subcommand("devices", "What devices are there, and why one is not");
+  auto listed = std::make_shared<DeviceOptions>();
+  devices->add_option("--dhd-library", listed->library,
+                      "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
+  add_format_option(*devices, session);
+  devices->footer("Example:\n  tpm hil devices");
+  devices->callback([listed, &session] {
+    session.run = [listed, &session] { return list_devices(*listed, session); };
+  });
+
+  CLI::App* run = hil->add_subcommand("run", "Run a session and record it");
+  auto choice = std::make_shared<RunChoice>();
+  run->add_option("SESSION", choice->session, "JSON session (schemas/hil.schema.json)")->required();
+  add_device_options(*run, choice->device);
+  run->add_option("--time", choice->time,
+                  "real: on the clock; virtual: as fast as it goes, the same bits each time; "
+                  "default: real with omega7, else virtual")
+      ->check(CLI::IsMember({"real", "virtual"}));
+  run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
+  add_format_option(*run, session);
+  run->footer("Example:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec");
+  run->callback([choice, &session] {
+    session.run = [choice, &session] { return run_hil(*choice, session); };
+  });
+
+  add_hil_check_command(*hil, session);
+  add_hil_verify_commands(*hil, session);
+  add_hil_stability_command(*hil, session);
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,59 @@
+// tpm hil check: communication and jitter test before a session.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "hil_options.hpp"
+#include "interrupt_watch.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/report/hil_report.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct CheckChoice {
+  DeviceOptions device;
+  std::string rate = "1 kHz", duration = "5 s";
+};
+
+double within(const std::string& text, Dimension dimension, const char* option, double least,
+              double most) {
+  const double value = parse_quantity(text, dimension, option);
+  if (value >= least && value <= most) return value;
+  throw Error(ExitCode::usage, option, text,
+              fmt::format("{} to {} {}", shortest(least), shortest(most), si_symbol(dimension)));
+}
+
+int check_hil(const CheckChoice& choice, const Session& session) {
+  constexpr double kLeast_Hz = 100.0, kMost_Hz = 4000.0, kLeast_s = 0.1, kMost_s = 86400.0;
+  const double rate = within(choice.rate, Dimension::frequency, "--rate", kLeast_Hz, kMost_Hz);
+  const double duration = within(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
+  const InterruptWatch interrupts;
+  const JitterCheck check = check_jitter(chosen_device(choice.device), rate, duration,
+                                         chosen_wish(choice.device), InterruptWatch::seen);
+  fmt::print("{}", session.json() ? to_text(check_json(check)) : check_text(check));
+  return static_cast<int>(check.fit ? ExitCode::success : ExitCode::answer_is_no);
+}
+
+}  // namespace
+
+void add_hil_check_command(CLI::App& hil, Session& session) {
+  CLI::App* command = hil.add_subcommand(
+      "check", "Is this machine, with this device, up to a session? Jitter, verdict");
+  auto choice = std::make_shared<CheckChoice>();
+  add_device_options(*command, choice->device);
+  command->add_option("--rate", choice->rate, "Of the loop, 100 Hz to 4 kHz")
+      ->capture_default_str();
+  command->add_option("--duration", choice->duration, "Of the test")->capture_default_str();
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm hil check --device virtual --rate \"4 kHz\" --duration \"10 s\"");
+  command->callback([choice, &session] {
+    session.run = [choice, &session] { return check_hil(*choice, session); };
+  });
+}
+
+}  // namespace tpm::app

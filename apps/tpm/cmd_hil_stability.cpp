@@ -1,0 +1,32 @@
+// tpm hil stability: what can be rendered passively, and what stays stable.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/report/border_report.hpp"
+#include "tpm/report/draw.hpp"
+
+namespace tpm::app {
+
+void add_hil_stability_command(CLI::App& hil, Session& session) {
+  CLI::App* command = hil.add_subcommand(
+      "stability", "Largest stiffness that is passive, and stable, against rate, delay, friction");
+  auto figures = std::make_shared<std::string>();
+  command->add_option("--figures", *figures, "Folder for figures (SVG, PNG)");
+  add_format_option(*command, session);
+  command->footer("Example:\n  tpm hil stability --figures hil_borders");
+  command->callback([figures, &session] {
+    session.run = [figures, &session] {
+      const BorderStudy study = study_borders({});
+      std::vector<std::string> files;
+      if (!figures->empty()) files = write_figures(*figures, border_figures(study));
+      Json json = border_json(study);
+      json["files"] = files;
+      fmt::print("{}", session.json() ? to_text(json) : border_text(study));
+      return 0;
+    };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,92 @@
+// tpm hil verify, tpm hil report: was what the operator felt the model?
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/hil_report.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct VerifyChoice {
+  std::string recording;
+  std::string output = "hil_report";
+  std::string motion_tolerance = "5 um", spacing = "10 ms", window = "10 s";
+};
+
+VerifyOptions options_of(const VerifyChoice& choice) {
+  VerifyOptions options;
+  options.motion_tolerance_m =
+      parse_quantity(choice.motion_tolerance, Dimension::length, "--motion-tolerance");
+  options.spacing_s = parse_quantity(choice.spacing, Dimension::time, "--spacing");
+  options.window_s = parse_quantity(choice.window, Dimension::time, "--window");
+  if (options.motion_tolerance_m > 0.0 && options.spacing_s > 0.0 && options.window_s >= 0.0) {
+    return options;
+  }
+  throw Error(ExitCode::usage, "tpm hil", "an option is out of range",
+              "a tolerance and a spacing above 0, a window of 0 or more");
+}
+
+int verify_hil(const VerifyChoice& choice, const Session& session) {
+  const HilRecording recording = read_recording(choice.recording);
+  const Verification v = verify(recording, options_of(choice));
+  fmt::print("{}", session.json() ? to_text(verification_json(recording, v))
+                                  : verification_text(recording, v));
+  return 0;
+}
+
+int report_hil(const VerifyChoice& choice, const Session& session) {
+  const std::string python = find_drawing_python();
+  const HilRecording recording = read_recording(choice.recording);
+  const Verification v = verify(recording, options_of(choice));
+  write_hil_report(recording, v, choice.output, python);
+  if (session.json()) {
+    fmt::print("{}", to_text(verification_json(recording, v)));
+  } else {
+    fmt::print("{}wrote {}/report.html, report.md and report.json\n",
+               verification_text(recording, v), choice.output);
+  }
+  return 0;
+}
+
+std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {
+  auto choice = std::make_shared<VerifyChoice>();
+  command.add_option("RECORDING", choice->recording, "What tpm hil run has written")->required();
+  command
+      .add_option("--motion-tolerance", choice->motion_tolerance,
+                  "Of the recorded motion, which is thinned out for the reference")
+      ->capture_default_str();
+  command.add_option("--spacing", choice->spacing, "Of the instants that are compared")
+      ->capture_default_str();
+  command.add_option("--window", choice->window, "From the start, of the second opinion by CVODES")
+      ->capture_default_str();
+  add_format_option(command, session);
+  return choice;
+}
+
+}  // namespace
+
+void add_hil_verify_commands(CLI::App& hil, Session& session) {
+  CLI::App* verify_command = hil.add_subcommand(
+      "verify", "Compare the forces of a recording with the full network under the same motion");
+  const auto to_verify = add_choice(*verify_command, session);
+  verify_command->footer("Example:\n  tpm hil verify session.tpmrec");
+  verify_command->callback([to_verify, &session] {
+    session.run = [to_verify, &session] { return verify_hil(*to_verify, session); };
+  });
+
+  CLI::App* report = hil.add_subcommand("report", "One page on a session, with figures");
+  const auto to_report = add_choice(*report, session);
+  report->add_option("-o,--output", to_report->output, "Folder")->capture_default_str();
+  report->footer("Example:\n  tpm hil report session.tpmrec -o hil_report");
+  report->callback([to_report, &session] {
+    session.run = [to_report, &session] { return report_hil(*to_report, session); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,21 @@
+#pragma once
+#include "command.hpp"
+#include "tpm/haptics/session_run.hpp"
+
+namespace tpm::app {
+
+/// Options that every command with a device has.
+struct DeviceOptions {
+  DeviceChoice choice;
+  std::string library, replay;
+  std::string real_time = "ignore";
+};
+
+/// Adds --device, --dhd-library, --recording, --may-move and --take-as-ready.
+void add_device_options(CLI::App& command, DeviceOptions& options);
+
+/// What was chosen; call when the command runs.
+[[nodiscard]] DeviceChoice chosen_device(const DeviceOptions& options);
+[[nodiscard]] RealTimeWish chosen_wish(const DeviceOptions& options);
+
+}  // namespace tpm::app

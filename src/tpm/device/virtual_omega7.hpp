@@ -1,0 +1,35 @@
+#pragma once
+#include <atomic>
+
+#include "tpm/device/haptic_device.hpp"
+#include "tpm/device/virtual_plant.hpp"
+
+namespace tpm {
+
+/// A simulated Omega.7 held by a simulated arm. Its time passes in advance() only.
+class VirtualOmega7 final : public HapticDevice {
+ public:
+  VirtualOmega7(const PlantSettings& settings, OperatorScript script);
+
+  const DeviceIdentity& open() override;
+  void prepare(const DevicePreparation& preparation) override;
+  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override;
+  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
+  DeviceStatus status() noexcept override;
+  void advance(double seconds) noexcept override;
+  void stop() noexcept override;
+  void cut_forces() noexcept override;
+
+  [[nodiscard]] const VirtualPlant& plant() const { return plant_; }
+
+ private:
+  PlantSettings settings_;
+  OperatorScript script_;
+  VirtualPlant plant_;
+  DeviceIdentity identity_;
+  double owed_s_ = 0.0;  ///< time that has passed and is no whole period yet
+  std::uint64_t saturations_ = 0;
+  std::atomic<bool> forces_on_{false};
+};
+
+}  // namespace tpm

@@ -1,0 +1,42 @@
+#pragma once
+#include "tpm/material/tpm_element.hpp"
+#include "tpm/reduce/contact_model.hpp"
+#include "tpm/solve/relaxation_filter.hpp"
+
+namespace tpm {
+
+/// How the relaxing spring of an element is advanced over a period.
+enum class ElementRule {
+  exact,          ///< under linear motion; stable for every relaxation time
+  forward_euler,  ///< diverges for periods above twice the relaxation time
+  mass_spring,    ///< no relaxing spring: the relaxed stiffness and a dashpot, the MSM of the paper
+};
+
+/// One sphere on the paper's element (Eqs. 1 to 9): the four-sphere star, guided along its normal.
+/// Across it there is no force. Coordinates: the push is along +z.
+class ElementContact final : public ContactModel {
+ public:
+  /// @param dashpot_N_s_per_m of the rule mass_spring, >= 0
+  /// Throws Error(bad_input) for a material or a period out of range.
+  ElementContact(const TpmParameters& material, double period_s,
+                 ElementRule rule = ElementRule::exact, double dashpot_N_s_per_m = 0.0);
+
+  void reset() noexcept override { depth_m_ = followed_m_ = 0.0; }
+  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  [[nodiscard]] double period_s() const noexcept override { return period_s_; }
+  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
+  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override;
+  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
+  void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
+
+ private:
+  TpmParameters material_;
+  TensionLaw tension_;
+  RelaxationWeights weights_;
+  double period_s_, dashpot_N_s_per_m_;
+  ElementRule rule_;
+  double depth_m_ = 0.0;
+  double followed_m_ = 0.0;  ///< w: what the relaxing spring has relaxed to, dw/dt = (e - w)/tau
+};
+
+}  // namespace tpm

@@ -1,0 +1,122 @@
+#include "tpm/haptics/recording.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/store/row_log.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr const char* kFormat = "tpm hil recording 1";
+
+Json counts_json(const ServoCounts& counts) {
+  return {{"time_guards", counts.time_guards},
+          {"saturations", counts.saturations},
+          {"force_limited", counts.force_limited},
+          {"slew_limited", counts.slew_limited},
+          {"damped", counts.damped},
+          {"beyond_model", counts.beyond_model},
+          {"late", counts.late},
+          {"missed", counts.missed}};
+}
+
+Json times_json(const TimeHistogram& times) {
+  return {{"p50_s", times.quantile_s(0.5)},
+          {"p99_s", times.quantile_s(0.99)},
+          {"p999_s", times.quantile_s(0.999)},
+          {"max_s", times.max_s()}};
+}
+
+}  // namespace
+
+Json to_json(const DeviceIdentity& device) {
+  return {{"kind", device.kind},
+          {"name", device.name},
+          {"serial", device.serial},
+          {"firmware", device.firmware},
+          {"library_version", device.library_version},
+          {"communication_mode", word_of(device.link)},
+          {"left_handed", device.left_handed},
+          {"hardware", device.hardware},
+          {"assumptions", device.assumptions}};
+}
+
+Json recording_header(const HilSession& session, const DeviceIdentity& device,
+                      const LoopModel& model, bool real_time) {
+  Json said = parse_json(session.text, "session");
+  said["model"]["scene"] = session.scene;
+  return {{"format", kFormat},
+          {"version", version()},
+          {"simulated_device", !device.hardware},
+          {"device", to_json(device)},
+          {"time", real_time ? "real" : "virtual"},
+          {"model", {{"name", model.name}, {"error_bound", model.error_bound}}},
+          {"session", std::move(said)}};
+}
+
+Json recording_closing(const ServoOutcome& outcome) {
+  Json json{{"cause", word_of(outcome.cause)},
+            {"detail", outcome.detail},
+            {"cycles", outcome.cycles},
+            {"counts", counts_json(outcome.counts)},
+            {"dropped_records", outcome.dropped_records},
+            {"device_error", outcome.device.error},
+            {"device_error_text", std::string(outcome.device.error_text)},
+            {"forces_off", word_of(outcome.device.forces_off)}};
+  if (!outcome.real_time) return json;
+  json["host"] = host_line();
+  json["scheduling"] = outcome.scheduling;
+  json["woke_late"] = times_json(outcome.woke_late);
+  json["busy"] = times_json(outcome.busy);
+  json["stop_took_s"] = outcome.stop_took_s;
+  return json;
+}
+
+bool HilRecording::simulated() const {
+  return header.value("simulated_device", true);
+}
+
+double HilRecording::time_s(const ServoRecord& row) const {
+  return static_cast<double>(row.cycle) * session.servo.period_s;
+}
+
+double HilRecording::commanded_N(const ServoRecord& row) const {
+  return -session.servo.push.dot(
+      Eigen::Vector3d(row.commanded_N[0], row.commanded_N[1], row.commanded_N[2]));
+}
+
+HilRecording read_recording(const std::filesystem::path& file) {
+  const RowLog log = read_row_log(file);
+  HilRecording recording;
+  recording.name = file.filename().string();
+  recording.header = parse_json(log.header, file.string());
+  if (recording.header.value("format", "") != kFormat || log.row_bytes != sizeof(ServoRecord)) {
+    throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
+  }
+  recording.session = parse_session(recording.header.at("session"), file.string(), {});
+  recording.rows.resize(log.rows);
+  if (log.rows > 0) std::memcpy(recording.rows.data(), log.bytes.data(), log.bytes.size());
+  recording.closed = log.closed;
+  if (log.closed) recording.closing = parse_json(log.closing, file.string());
+  return recording;
+}
+
+std::string device_line(const HilRecording& recording) {
+  const Json& device = recording.header.at("device");
+  const std::string name = device.at("name").get<std::string>();
+  const std::string mode = device.at("communication_mode").get<std::string>();
+  if (!recording.simulated()) {
+    return fmt::format("{}, serial {}, firmware {}, library {}, communication {}", name,
+                       device.at("serial").get<std::string>(),
+                       device.at("firmware").get<std::string>(),
+                       device.at("library_version").get<std::string>(), mode);
+  }
+  return fmt::format("SIMULATED DEVICE, no hardware: {} ({}, communication {})", name,
+                     device.at("kind").get<std::string>(), mode);
+}
+
+}  // namespace tpm

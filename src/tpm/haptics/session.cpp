@@ -1,0 +1,143 @@
+#include "tpm/haptics/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/haptics/session_phases.hpp"
+#include "tpm/scene/blocks.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+double in_range(const Json& block, const char* key, Dimension dimension, double usual, double least,
+                double most, const DocumentPlace& place) {
+  const double value = block.contains(key) ? quantity_at(block, key, dimension, place) : usual;
+  if (value >= least && value <= most) return value;
+  const std::string_view unit = si_symbol(dimension);
+  throw bad_input(place.key(key).where, fmt::format("{} {}", shortest(value), unit),
+                  fmt::format("{} to {} {}", shortest(least), shortest(most), unit));
+}
+
+Eigen::Vector3d push_of(const Json& session, const DocumentPlace& place) {
+  if (!session.contains("push")) return -Eigen::Vector3d::UnitZ();
+  const Json& list = session.at("push");
+  const Eigen::Vector3d push(list[0].get<double>(), list[1].get<double>(), list[2].get<double>());
+  if (push.allFinite() && push.norm() > 0.0) return push.normalized();
+  throw bad_input(place.key("push").where, "has no direction", "three numbers that are not all 0");
+}
+
+void parse_limits(HilSession& session, const Json& limits, const DocumentPlace& place) {
+  ServoSettings& servo = session.servo;
+  constexpr double kMotor_N = 12.0, kLongest_s = 60.0;
+  servo.force_limit_N =
+      in_range(limits, "force", Dimension::force, servo.force_limit_N, 1e-3, kMotor_N, place);
+  servo.slew_limit_N_per_s = limits.value("slew_N_per_s", servo.slew_limit_N_per_s);
+  servo.ramp_in_s =
+      in_range(limits, "ramp_in", Dimension::time, servo.ramp_in_s, 0.0, kLongest_s, place);
+  servo.most_damping_N_s_per_m = limits.value("damping_N_s_per_m", servo.most_damping_N_s_per_m);
+  servo.most_late = limits.value("late_cycles", servo.most_late);
+  session.preparation.watchdog_s =
+      in_range(limits, "watchdog", Dimension::time, 0.008, 0.004, 0.016, place);
+  session.hang_limit_s = in_range(limits, "hang", Dimension::time, 0.008, 0.002, 1.0, place);
+}
+
+void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& place) {
+  plant.mass_kg = block.value("mass_kg", plant.mass_kg);
+  plant.damping_N_s_per_m = block.value("damping_N_s_per_m", plant.damping_N_s_per_m);
+  plant.encoder_step_m =
+      in_range(block, "encoder_step", Dimension::length, plant.encoder_step_m, 0.0, 1e-3, place);
+  plant.delay_periods = block.value("delay_periods", plant.delay_periods);
+  plant.motor_limit_N =
+      in_range(block, "motor_limit", Dimension::force, plant.motor_limit_N, 1e-3, 1e3, place);
+  plant.arm.mass_kg = block.value("arm_mass_kg", plant.arm.mass_kg);
+  plant.arm.damping_N_s_per_m = block.value("arm_damping_N_s_per_m", plant.arm.damping_N_s_per_m);
+  plant.arm.stiffness_N_per_m = in_range(block, "arm_stiffness", Dimension::stiffness,
+                                         plant.arm.stiffness_N_per_m, 0.0, 1e5, place);
+  plant.arm.correction_per_s = block.value("correction_per_s", plant.arm.correction_per_s);
+}
+
+std::vector<std::uint64_t> ends_of(const std::vector<SessionPhase>& phases, double period_s) {
+  std::vector<std::uint64_t> ends;
+  for (const SessionPhase& phase : phases) {
+    ends.push_back(static_cast<std::uint64_t>(std::llround(phase.end_s / period_s)));
+  }
+  return ends;
+}
+
+}  // namespace
+
+std::string_view word_of(PhaseKind kind) {
+  switch (kind) {
+    case PhaseKind::approach:
+      return "approach";
+    case PhaseKind::indent:
+      return "indent";
+    case PhaseKind::hold:
+      return "hold";
+    case PhaseKind::release:
+      return "release";
+    case PhaseKind::rest:
+      return "rest";
+    case PhaseKind::load:
+      return "load";
+    case PhaseKind::creep:
+      break;
+  }
+  return "creep";
+}
+
+OperatorScript HilSession::operator_script() const {
+  std::vector<OperatorPiece> pieces;
+  for (const SessionPhase& phase : phases) {
+    const bool pushes = phase.kind == PhaseKind::load || phase.kind == PhaseKind::creep;
+    pieces.push_back({pushes ? OperatorPiece::Aim::force : OperatorPiece::Aim::place, phase.end_s,
+                      phase.from, phase.to});
+  }
+  return OperatorScript(std::move(pieces));
+}
+
+HilSession parse_session(const Json& json, std::string_view where,
+                         const std::filesystem::path& folder) {
+  check_schema(json, "hil", where);
+  const DocumentPlace place{std::string(where)};
+  HilSession session;
+  session.title = json.value("title", std::string("session"));
+  session.text = to_text(json);
+  session.folder = folder;
+  const Json& scene = json.at("model").at("scene");
+  if (scene.is_string()) {
+    const std::filesystem::path file = folder / scene.get<std::string>();
+    session.scene = read_json(file);
+    session.folder = file.parent_path();
+  } else {
+    session.scene = scene;
+  }
+  constexpr double kSlowest_Hz = 500.0, kUsual_Hz = 1000.0, kFastest_Hz = 4000.0;
+  session.servo.period_s = 1.0 / in_range(json, "rate", Dimension::frequency, kUsual_Hz,
+                                          kSlowest_Hz, kFastest_Hz, place);
+  session.servo.push = push_of(json, place);
+  if (json.contains("surface")) {
+    session.servo.surface_m = parse_point(json.at("surface"), place.key("surface"));
+  }
+  parse_limits(session, json.value("limits", Json::object()), place.key("limits"));
+  session.phases = parse_phases(json, place);
+  session.servo.phase_ends = ends_of(session.phases, session.servo.period_s);
+  session.plant.period_s = session.servo.period_s;
+  session.plant.watchdog_s = session.preparation.watchdog_s;
+  session.plant.push = session.servo.push;
+  session.plant.origin_m = session.servo.surface_m;
+  parse_plant(session.plant, json.value("virtual_device", Json::object()),
+              place.key("virtual_device"));
+  return session;
+}
+
+HilSession read_session(const std::filesystem::path& file) {
+  return parse_session(read_json(file), file.string(), file.parent_path());
+}
+
+}  // namespace tpm

@@ -1,0 +1,67 @@
+#pragma once
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/device/haptic_device.hpp"
+#include "tpm/device/virtual_plant.hpp"
+#include "tpm/reduce/contact_model.hpp"
+#include "tpm/servo/servo_step.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// A stretch of a session.
+enum class PhaseKind { approach, indent, hold, release, rest, load, creep };
+
+[[nodiscard]] std::string_view word_of(PhaseKind kind);
+
+/// What the operator is asked to do, and for how long.
+struct SessionPhase {
+  PhaseKind kind = PhaseKind::approach;
+  std::string name;             ///< "indent to 4 mm at 2 mm/s"
+  double end_s = 0.0;           ///< begins where the one before ends
+  double from = 0.0, to = 0.0;  ///< depth, m; of `load` and `creep` the push, N
+  double depth_m = 0.0;         ///< of the indentation it belongs to; 0 if none
+  double rate_m_per_s = 0.0;
+};
+
+/// What is stepped in the loop.
+enum class LoopModelKind { element };
+
+/// A session as its file says.
+struct HilSession {
+  std::string title;
+  LoopModelKind model = LoopModelKind::element;
+  Json scene;                    ///< of the tissue, a mesh's path made absolute is not asked for
+  std::filesystem::path folder;  ///< that paths in the scene are relative to
+  std::vector<SessionPhase> phases;
+  ServoSettings servo;
+  DevicePreparation preparation;
+  PlantSettings plant;
+  double hang_limit_s = 0.008;
+  std::string text;  ///< of the file, for the record
+
+  [[nodiscard]] OperatorScript operator_script() const;
+  [[nodiscard]] double duration_s() const { return phases.back().end_s; }
+};
+
+/// Reads a session (schemas/hil.schema.json). Throws Error(bad_input) with the key.
+[[nodiscard]] HilSession parse_session(const Json& json, std::string_view where,
+                                       const std::filesystem::path& folder);
+[[nodiscard]] HilSession read_session(const std::filesystem::path& file);
+
+/// The model of a session, with what is known of it.
+struct LoopModel {
+  std::unique_ptr<ContactModel> model;
+  Eigen::Vector3d push = Eigen::Vector3d::UnitZ();  ///< into the tissue, in its coordinates
+  std::string name;                                 ///< for people
+  std::string error_bound;  ///< what is known of its distance from the reference, in words
+};
+
+/// Throws Error(bad_input) if the scene is not one that the model can stand for.
+[[nodiscard]] LoopModel make_loop_model(const HilSession& session);
+
+}  // namespace tpm

@@ -1,0 +1,103 @@
+#include "tpm/haptics/session_phases.hpp"
+
+#include <fmt/format.h>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kClearance_m = 0.002;  // in the air, before and after each touch
+constexpr double kApproach_s = 1.0;
+constexpr double kLoading_s = 1.0;
+constexpr double kUsualRest_s = 5.0;
+constexpr double kLongest_s = 12.0 * 3600.0;
+
+/// Puts phases behind each other.
+class PhaseList {
+ public:
+  void add(PhaseKind kind, std::string name, double length_s, double from, double to) {
+    time_s_ += length_s;
+    phases_.push_back({kind, std::move(name), time_s_, from, to, depth_m, rate_m_per_s});
+  }
+  double depth_m = 0.0, rate_m_per_s = 0.0;
+  [[nodiscard]] std::vector<SessionPhase> take() { return std::move(phases_); }
+  [[nodiscard]] double time_s() const { return time_s_; }
+
+ private:
+  std::vector<SessionPhase> phases_;
+  double time_s_ = 0.0;
+};
+
+std::vector<double> positive_list(const Json& block, const char* key, Dimension dimension,
+                                  const DocumentPlace& place) {
+  std::vector<double> values;
+  for (const Json& text : block.at(key)) {
+    const DocumentPlace at = place.key(key).key(std::to_string(values.size()));
+    values.push_back(parse_quantity(text.get<std::string>(), dimension, at.where));
+    if (!(values.back() > 0.0)) throw bad_input(at.where, text.get<std::string>(), "above 0");
+  }
+  return values;
+}
+
+double rest_of(const Json& block, const DocumentPlace& place) {
+  return block.contains("rest") ? positive_at(block, "rest", Dimension::time, place) : kUsualRest_s;
+}
+
+void add_approach(PhaseList& list) {
+  list.add(PhaseKind::approach, "approach", kApproach_s, -kClearance_m, 0.0);
+}
+
+void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& place) {
+  const double hold = positive_at(block, "hold", Dimension::time, place);
+  const double rest = rest_of(block, place);
+  for (const double depth : positive_list(block, "depths", Dimension::length, place)) {
+    for (const double rate : positive_list(block, "rates", Dimension::speed, place)) {
+      const std::string mm = significant(1e3 * depth, 4), speed = significant(1e3 * rate, 4);
+      list.depth_m = depth;
+      list.rate_m_per_s = rate;
+      add_approach(list);
+      list.add(PhaseKind::indent, fmt::format("indent to {} mm at {} mm/s", mm, speed),
+               depth / rate, 0.0, depth);
+      list.add(PhaseKind::hold, fmt::format("hold {} mm after {} mm/s", mm, speed), hold, depth,
+               depth);
+      list.add(PhaseKind::release, fmt::format("release from {} mm at {} mm/s", mm, speed),
+               (depth + kClearance_m) / rate, depth, -kClearance_m);
+      list.add(PhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+    }
+  }
+  list.depth_m = list.rate_m_per_s = 0.0;
+}
+
+void add_creep(PhaseList& list, const Json& block, const DocumentPlace& place) {
+  const double hold = positive_at(block, "hold", Dimension::time, place);
+  const double rest = rest_of(block, place);
+  for (const double load : positive_list(block, "loads", Dimension::force, place)) {
+    const std::string newton = significant(load, 4);
+    add_approach(list);
+    list.add(PhaseKind::load, fmt::format("load to {} N", newton), kLoading_s, 0.0, load);
+    list.add(PhaseKind::creep, fmt::format("creep under {} N", newton), hold, load, load);
+    list.add(PhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+  }
+}
+
+}  // namespace
+
+std::vector<SessionPhase> parse_phases(const Json& session, const DocumentPlace& place) {
+  PhaseList list;
+  if (session.contains("indentations")) {
+    add_indentations(list, session.at("indentations"), place.key("indentations"));
+  }
+  if (session.contains("creep")) add_creep(list, session.at("creep"), place.key("creep"));
+  if (list.time_s() == 0.0) {
+    throw bad_input(place.where, "nothing is done in it", "indentations, creep, or both");
+  }
+  if (list.time_s() > kLongest_s) {
+    throw bad_input(place.where, fmt::format("takes {} s", significant(list.time_s(), 4)),
+                    "12 hours at most");
+  }
+  return list.take();
+}
+
+}  // namespace tpm

@@ -1,0 +1,91 @@
+#include "tpm/haptics/session_run.hpp"
+
+#include "tpm/core/error.hpp"
+#include "tpm/device/omega7.hpp"
+#include "tpm/device/replay_device.hpp"
+#include "tpm/device/virtual_omega7.hpp"
+#include "tpm/store/row_log.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::int64_t kPassOnEvery_ns = 50'000'000;
+
+Eigen::Matrix3Xd motion_of(const HilRecording& recording) {
+  Eigen::Matrix3Xd motion(3, static_cast<Eigen::Index>(recording.rows.size()));
+  for (Eigen::Index i = 0; i < motion.cols(); ++i) {
+    motion.col(i) =
+        Eigen::Map<const Eigen::Vector3d>(recording.rows[static_cast<std::size_t>(i)].position_m);
+  }
+  return motion;
+}
+
+ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
+                      const LoopModel& model, const std::shared_ptr<ContactModel>& stepped,
+                      const SessionRunOptions& options, RowLogWriter& log) {
+  ServoSettings servo = session.servo;
+  servo.model_push = model.push;
+  const RecordSink sink = [&](const ServoRecord& row) {
+    log.append(&row);
+    if (options.watcher) options.watcher(row);
+  };
+  if (!options.real_time) {
+    return run_in_virtual_time(*device, *stepped, servo, sink, options.interrupted);
+  }
+  RealTimeOptions real;
+  real.wish = options.wish;
+  real.hang_limit_s = session.hang_limit_s;
+  real.interrupted = options.interrupted;
+  std::int64_t passed_on_ns = now_ns();
+  real.idle = [&log, &passed_on_ns] {
+    if (now_ns() - passed_on_ns < kPassOnEvery_ns) return;
+    log.flush();
+    passed_on_ns = now_ns();
+  };
+  return run_in_real_time(device, stepped, servo, sink, real);
+}
+
+}  // namespace
+
+std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilSession& session) {
+  if (choice.kind == "virtual") {
+    return std::make_shared<VirtualOmega7>(session.plant, session.operator_script());
+  }
+  if (choice.kind == "omega7") return std::make_shared<Omega7>(choice.library);
+  if (choice.kind != "replay") {
+    throw Error(ExitCode::usage, "--device", "'" + printable(choice.kind) + "'",
+                "virtual, omega7 or replay");
+  }
+  if (choice.replay.empty()) {
+    throw Error(ExitCode::usage, "--device replay", "has nothing to replay",
+                "--recording FILE beside it");
+  }
+  const HilRecording recording = read_recording(choice.replay);
+  return std::make_shared<ReplayDevice>(motion_of(recording), recording.name);
+}
+
+SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
+                       const SessionRunOptions& options) {
+  SessionRun run;
+  run.model = make_loop_model(session);
+  const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
+  const std::shared_ptr<HapticDevice> device = make_device(choice, session);
+  DevicePreparation preparation = session.preparation;
+  preparation.may_move = choice.may_move;
+  preparation.take_as_ready = choice.take_as_ready;
+  try {
+    run.device = device->open();
+    RowLogWriter log(options.recording,
+                     to_text(recording_header(session, run.device, run.model, options.real_time)),
+                     sizeof(ServoRecord));
+    device->prepare(preparation);
+    run.outcome = run_loop(session, device, run.model, stepped, options, log);
+    log.close(to_text(recording_closing(run.outcome)));
+  } catch (...) {
+    device->stop();
+    throw;
+  }
+  return run;
+}
+
+}  // namespace tpm

@@ -1,0 +1,43 @@
+#pragma once
+#include <functional>
+#include <memory>
+
+#include "tpm/haptics/recording.hpp"
+
+namespace tpm {
+
+/// Which device, and what it may do.
+struct DeviceChoice {
+  std::string kind = "virtual";   ///< virtual, omega7, replay
+  std::filesystem::path library;  ///< of the vendor; empty: looked for
+  std::filesystem::path replay;   ///< recording to be replayed
+  bool may_move = false;
+  bool take_as_ready = false;
+};
+
+/// Throws Error(usage) for an unknown kind, Error(environment) if it cannot be had.
+[[nodiscard]] std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice,
+                                                        const HilSession& session);
+
+struct SessionRunOptions {
+  bool real_time = false;
+  RealTimeWish wish = RealTimeWish::ignore;
+  std::filesystem::path recording;
+  std::function<bool()> interrupted;
+  /// Sees every record, on the thread that writes them.
+  std::function<void(const ServoRecord&)> watcher;
+};
+
+struct SessionRun {
+  DeviceIdentity device;
+  LoopModel model;  ///< its `model` is with the run
+  ServoOutcome outcome;
+};
+
+/// Runs a session and records it. In real time the rows written by now are passed to the system
+/// every 50 ms.
+/// Throws Error(environment) before the loop begins; what happens later is in the outcome.
+[[nodiscard]] SessionRun run_session(const HilSession& session, const DeviceChoice& device,
+                                     const SessionRunOptions& options);
+
+}  // namespace tpm

@@ -1,0 +1,211 @@
+#include "tpm/haptics/verify.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/curve/load.hpp"
+#include "tpm/model/model.hpp"
+#include "tpm/network/quasistatic.hpp"
+#include "tpm/scene/experiment_blocks.hpp"
+#include "tpm/scene/scene.hpp"
+
+namespace tpm {
+namespace {
+
+/// Adds up errors of instants.
+class FidelitySum {
+ public:
+  void add(double commanded_N, double reference_N) {
+    const double error = commanded_N - reference_N;
+    squares_ += error * error;
+    result_.max_N = std::max(result_.max_N, std::abs(error));
+    result_.peak_N = std::max(result_.peak_N, std::abs(reference_N));
+    ++result_.instants;
+  }
+  [[nodiscard]] ForceFidelity take() const {
+    ForceFidelity result = result_;
+    if (result.instants > 0) {
+      result.rms_N = std::sqrt(squares_ / static_cast<double>(result.instants));
+    }
+    return result;
+  }
+
+ private:
+  ForceFidelity result_;
+  double squares_ = 0.0;
+};
+
+/// The rows that hold a motion: not the last one of a session that stopped, which moved nothing.
+std::vector<const ServoRecord*> moved_rows(const HilRecording& recording) {
+  std::vector<const ServoRecord*> rows;
+  for (const ServoRecord& row : recording.rows) {
+    if (row.stop == StopCause::none) rows.push_back(&row);
+  }
+  if (rows.size() < 2) {
+    throw bad_input(recording.name, "holds no motion", "a session of at least two cycles");
+  }
+  return rows;
+}
+
+struct Motion {
+  std::vector<double> time_s, surface_m;
+};
+
+Motion motion_of(const HilRecording& recording, const std::vector<const ServoRecord*>& rows) {
+  Motion motion;
+  for (const ServoRecord* row : rows) {
+    motion.time_s.push_back(recording.time_s(*row));
+    motion.surface_m.push_back(row->surface_depth_m);
+  }
+  return motion;
+}
+
+Protocol protocol_of(const Motion& motion, const std::vector<std::size_t>& kept) {
+  std::vector<double> time, depth;
+  for (const std::size_t i : kept) {
+    time.push_back(motion.time_s[i]);
+    depth.push_back(motion.surface_m[i]);
+  }
+  return measured_history(Drive::displacement, time, depth);
+}
+
+std::vector<std::size_t> compared_rows(const HilRecording& recording, std::size_t rows,
+                                       double spacing_s) {
+  const auto stride = static_cast<std::size_t>(
+      std::max(1.0, std::round(spacing_s / recording.session.servo.period_s)));
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < rows; i += stride) chosen.push_back(i);
+  return chosen;
+}
+
+/// Depth asked for at a time of a phase; none in phases that ask for a push.
+std::optional<double> asked_depth_m(const SessionPhase& phase, double start_s, double time_s) {
+  if (phase.kind == PhaseKind::load || phase.kind == PhaseKind::creep) return std::nullopt;
+  const double part = (time_s - start_s) / (phase.end_s - start_s);
+  return phase.from + std::clamp(part, 0.0, 1.0) * (phase.to - phase.from);
+}
+
+void judge_phases(Verification& v, const HilRecording& recording,
+                  const std::vector<const ServoRecord*>& rows,
+                  const std::vector<std::size_t>& compared) {
+  const std::vector<SessionPhase>& phases = recording.session.phases;
+  std::vector<FidelitySum> sums(phases.size());
+  std::vector<double> depth_squares(phases.size(), 0.0);
+  FidelitySum all;
+  for (std::size_t k = 0; k < compared.size(); ++k) {
+    const ServoRecord& row = *rows[compared[k]];
+    const auto p = std::min(static_cast<std::size_t>(row.phase), phases.size() - 1);
+    sums[p].add(v.commanded_N[k], v.reference_N[k]);
+    all.add(v.commanded_N[k], v.reference_N[k]);
+    const double start = p == 0 ? 0.0 : phases[p - 1].end_s;
+    const double asked = asked_depth_m(phases[p], start, v.time_s[k]).value_or(row.tool_depth_m);
+    depth_squares[p] += (row.tool_depth_m - asked) * (row.tool_depth_m - asked);
+  }
+  v.all = all.take();
+  for (std::size_t p = 0; p < phases.size(); ++p) {
+    const ForceFidelity force = sums[p].take();
+    if (force.instants == 0) continue;
+    v.phases.push_back({phases[p], p == 0 ? 0.0 : phases[p - 1].end_s, force,
+                        std::sqrt(depth_squares[p] / static_cast<double>(force.instants))});
+  }
+}
+
+/// The star's own models on the same motion: the closed form at every sample, and CVODES.
+void ask_others(Verification& v, const HilRecording& recording, const Motion& motion,
+                const std::vector<const ServoRecord*>& rows, const TpmParameters& material,
+                const VerifyOptions& options) {
+  const TpmVector parameters = to_vector(material);
+  const auto ask = [&](const char* model, const std::string& name, std::size_t count,
+                       double tolerance_m) {
+    Motion part{
+        {motion.time_s.begin(), motion.time_s.begin() + static_cast<std::ptrdiff_t>(count)},
+        {motion.surface_m.begin(), motion.surface_m.begin() + static_cast<std::ptrdiff_t>(count)}};
+    const Protocol protocol =
+        protocol_of(part, decimated(part.time_s, part.surface_m, tolerance_m));
+    const Response response =
+        make_model(model)->respond(protocol, part.time_s, parameters, Want::values);
+    FidelitySum sum;
+    for (std::size_t i = 0; i < count; ++i) {
+      sum.add(recording.commanded_N(*rows[i]), response.value[static_cast<Eigen::Index>(i)]);
+    }
+    v.others.push_back({name, part.time_s.back(), sum.take()});
+  };
+  ask("closed_form", "closed form of the star at every sample", rows.size(), 0.0);
+  const auto past = std::upper_bound(motion.time_s.begin(), motion.time_s.end(), options.window_s);
+  const auto count = static_cast<std::size_t>(past - motion.time_s.begin());
+  if (options.window_s > 0.0 && count >= 2) {
+    ask("cvodes", "CVODES on the element's differential equation", count,
+        options.motion_tolerance_m);
+  }
+}
+
+/// Commanded force at the end of the ramp and of the hold, beside the readings of the same depth.
+void put_beside_experiment(Verification& v, const HilRecording& recording,
+                           const std::vector<const ServoRecord*>& rows) {
+  const PointSet readings = load_points("evren_relaxation");
+  const std::vector<SessionPhase>& phases = recording.session.phases;
+  for (std::size_t p = 0; p < phases.size(); ++p) {
+    const bool ramp = phases[p].kind == PhaseKind::indent;
+    if (!ramp && phases[p].kind != PhaseKind::hold) continue;
+    const auto past = std::partition_point(rows.begin(), rows.end(), [&](const ServoRecord* row) {
+      return row->phase <= static_cast<std::int32_t>(p);
+    });
+    if (past == rows.begin() || past == rows.end()) continue;  // cut off before its end
+    for (const Datum& datum : readings.data) {
+      if (datum.label != (ramp ? "peak" : "end") || !datum.value || !datum.depth_m) continue;
+      if (std::abs(*datum.depth_m - phases[p].depth_m) > 1e-9) continue;
+      v.experiment.push_back({phases[p].depth_m, phases[p].rate_m_per_s, datum.label, *datum.value,
+                              recording.commanded_N(**(past - 1))});
+    }
+  }
+}
+
+}  // namespace
+
+Verification verify(const HilRecording& recording, const VerifyOptions& options) {
+  const std::vector<const ServoRecord*> rows = moved_rows(recording);
+  const Motion motion = motion_of(recording, rows);
+  const Tissue tissue = parse_tissue(recording.session.scene, recording.name, {});
+  const Probe probe =
+      parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{recording.name})
+          .front()
+          .probe;
+  const BondSystem bonds = tissue.bonds();
+  QuasiStaticOptions settings;
+  settings.tolerance = options.tolerance;
+  const QuasiStatic network(bonds, tissue.network.organ.position, tissue.freedom(), probe,
+                            settings);
+
+  Verification v;
+  v.reference = "full nonlinear quasi-static network of " +
+                std::to_string(tissue.network.organ.size()) + " spheres, exact exponential update";
+  v.whole = recording.closed;
+  v.end_s = motion.time_s.back();
+  v.motion_tolerance_m = options.motion_tolerance_m;
+  const std::vector<std::size_t> kept =
+      decimated(motion.time_s, motion.surface_m, options.motion_tolerance_m);
+  v.knots = kept.size();
+  const std::vector<std::size_t> compared =
+      compared_rows(recording, rows.size(), options.spacing_s);
+  for (const std::size_t i : compared) {
+    v.time_s.push_back(motion.time_s[i]);
+    v.depth_m.push_back(rows[i]->tool_depth_m);
+    v.commanded_N.push_back(recording.commanded_N(*rows[i]));
+    v.model_error_N = std::max(v.model_error_N, rows[i]->model_error_N);
+  }
+  const QuasiStaticRun run = network.run(protocol_of(motion, kept), v.time_s);
+  v.reference_N.assign(run.response.begin(), run.response.end());
+  v.reference_error_N = run.error_estimate;
+  judge_phases(v, recording, rows, compared);
+  if (recording.session.model == LoopModelKind::element) {
+    ask_others(v, recording, motion, rows, tissue.material, options);
+    v.motion_error_N = options.motion_tolerance_m *
+                       make_loop_model(recording.session).model->instantaneous_stiffness()(2, 2);
+  }
+  put_beside_experiment(v, recording, rows);
+  return v;
+}
+
+}  // namespace tpm

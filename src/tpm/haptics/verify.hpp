@@ -1,0 +1,71 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/haptics/recording.hpp"
+
+namespace tpm {
+
+struct VerifyOptions {
+  double motion_tolerance_m = 5e-6;  ///< of the decimated motion, > 0
+  double spacing_s = 0.01;           ///< of the instants compared, >= the period
+  double tolerance = 1e-9;           ///< of the reference run, see QuasiStaticOptions
+  double window_s = 10.0;            ///< from the start, of the second opinion; 0: none
+};
+
+/// How far the forces commanded are from the reference over some stretch.
+struct ForceFidelity {
+  std::size_t instants = 0;
+  double rms_N = 0.0, max_N = 0.0, peak_N = 0.0;
+};
+
+struct PhaseFidelity {
+  SessionPhase phase;
+  double start_s = 0.0;
+  ForceFidelity force;
+  double depth_rms_m = 0.0;  ///< of the tool from the depth asked for; says how well it was guided
+};
+
+/// A second opinion on the same motion.
+struct OtherOpinion {
+  std::string name;
+  double end_s = 0.0;
+  ForceFidelity commanded;  ///< against this opinion
+};
+
+/// A reading of the experiment beside the session's.
+struct BesideExperiment {
+  double depth_m = 0.0, rate_m_per_s = 0.0;
+  std::string label;  ///< "peak", "end"
+  double measured_N = 0.0, commanded_N = 0.0;
+};
+
+struct Verification {
+  std::string reference;
+  double end_s = 0.0;
+  bool whole = true;  ///< false: the recording is cut off; verified up to there
+  ForceFidelity all;
+  std::vector<PhaseFidelity> phases;
+  std::vector<OtherOpinion> others;
+  std::vector<BesideExperiment> experiment;
+  std::size_t knots = 0;  ///< of the decimated motion
+  double motion_tolerance_m = 0.0;
+  double motion_error_N = 0.0;     ///< what that tolerance can cost: times the stiffness at once
+  double reference_error_N = 0.0;  ///< as the reference run estimates
+  double model_error_N = 0.0;      ///< largest estimate of the model itself
+  std::vector<double> time_s, reference_N, commanded_N, depth_m;  ///< at the instants compared
+};
+
+/// A motion through few of its samples, each other within the tolerance of the straight line
+/// between its neighbours kept. Returns the indices kept, first and last among them.
+[[nodiscard]] std::vector<std::size_t> decimated(const std::vector<double>& time,
+                                                 const std::vector<double>& value,
+                                                 double tolerance);
+
+/// Feeds the recorded motion of the surface to the full nonlinear quasi-static network of the
+/// session's scene and compares its force with the forces commanded.
+/// Throws Error(bad_input) for an empty recording, Error(numerical) if the reference run fails.
+[[nodiscard]] Verification verify(const HilRecording& recording, const VerifyOptions& options = {});
+
+}  // namespace tpm

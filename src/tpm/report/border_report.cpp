@@ -1,0 +1,214 @@
+#include "tpm/report/border_report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr int kDigits = 6;
+const Axis kRate{"rate", "Hz", true, std::nullopt, std::nullopt};
+
+std::string_view word_of_rule(ElementRule rule) {
+  switch (rule) {
+    case ElementRule::exact:
+      return "TPM, exact update";
+    case ElementRule::forward_euler:
+      return "TPM, forward Euler";
+    case ElementRule::mass_spring:
+      break;
+  }
+  return "MSM";
+}
+
+Json number_or_null(double value) {
+  return std::isfinite(value) ? Json(rounded(value, kDigits)) : Json(nullptr);
+}
+
+Json points_json(const std::vector<BorderPoint>& points, const char* measured,
+                 const char* predicted) {
+  Json list = Json::array();
+  for (const BorderPoint& p : points) {
+    list.push_back({{"rate_Hz", rounded(p.rate_Hz, kDigits)},
+                    {"delay_s", rounded(p.delay_periods / p.rate_Hz, kDigits)},
+                    {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kDigits)},
+                    {measured, number_or_null(p.measured)},
+                    {predicted, number_or_null(p.predicted)}});
+  }
+  return list;
+}
+
+double worst_difference(const std::vector<BorderPoint>& points) {
+  double worst = 0.0;
+  for (const BorderPoint& p : points) {
+    if (p.predicted > 0.0) worst = std::max(worst, std::abs(p.measured / p.predicted - 1.0));
+  }
+  return worst;
+}
+
+std::string value(double v) {
+  return std::isfinite(v) ? significant(v, 4) : "diverges";
+}
+
+/// One curve and its measured points, over the rate, for one delay.
+void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int delay,
+                    double damping) {
+  Series predicted, measured;
+  measured.kind = Series::Kind::points;
+  predicted.label = delay == 0 ? "no delay" : fmt::format("delay {} periods", delay);
+  measured.label = predicted.label;
+  for (const BorderPoint& p : points) {
+    if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
+    predicted.x.push_back(p.rate_Hz);
+    predicted.y.push_back(p.predicted);
+    measured.x.push_back(p.rate_Hz);
+    measured.y.push_back(p.measured);
+  }
+  panel.series.push_back(std::move(predicted));
+  panel.series.push_back(std::move(measured));
+}
+
+Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
+  Series s;
+  s.label = "Colgate-Schenkel 2b/T, all taut";
+  for (const BorderPoint& p : points) {
+    if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
+    s.x.push_back(p.rate_Hz);
+    s.y.push_back(2.0 * damping * p.rate_Hz);
+  }
+  return s;
+}
+
+Figure border_figure(const BorderStudy& study) {
+  const double damping = study.plant.damping_N_s_per_m;
+  const Axis stiffness{"largest stiffness at once", "N/m", true, std::nullopt, std::nullopt};
+  Panel passive{
+      fmt::format("passive, device with {} N s/m", significant(damping, 3)), kRate, stiffness, {}};
+  Panel stable{"stable with the arm of one operator", kRate, stiffness, {}};
+  for (const int delay : {0, 1, 2, 5}) {
+    add_rate_curve(passive, study.passive, delay, damping);
+    add_rate_curve(stable, study.stable, delay, damping);
+  }
+  passive.series.push_back(colgate_line(study.passive, damping));
+  Figure figure;
+  figure.id = "borders";
+  figure.title = "Passivity and stability of the contact (simulated device)";
+  figure.caption =
+      "Lines: passivity by the condition of Colgate and Schenkel with the discrete transfer "
+      "function "
+      "of the exactly updated Zener contact, stability by the spectral radius of the loop. Points: "
+      "measured on the simulated device by bisection. Passivity is safe with every passive "
+      "operator "
+      "and found at the worst frequency; stability belongs to one operator, and asks for less.";
+  figure.panels = {std::move(passive), std::move(stable)};
+  return figure;
+}
+
+Figure rule_figure(const BorderStudy& study) {
+  Panel panel{"friction that the device needs at 1 kHz",
+              {"relaxation time over period", "", true, std::nullopt, std::nullopt},
+              {"friction over T/2", "N/m", true, std::nullopt, std::nullopt},
+              {}};
+  constexpr double kHalfPeriod_s = 0.5e-3, kPeriod_s = 1e-3;
+  for (const ElementRule rule :
+       {ElementRule::exact, ElementRule::forward_euler, ElementRule::mass_spring}) {
+    Series predicted, measured;
+    measured.kind = Series::Kind::points;
+    predicted.label = measured.label = std::string(word_of_rule(rule));
+    for (const RulePoint& p : study.rules) {
+      if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
+      predicted.x.push_back(p.relaxation_time_s / kPeriod_s);
+      predicted.y.push_back(p.predicted_N_s_per_m / kHalfPeriod_s);
+      measured.x.push_back(p.relaxation_time_s / kPeriod_s);
+      measured.y.push_back(p.measured_N_s_per_m / kHalfPeriod_s);
+    }
+    panel.series.push_back(std::move(predicted));
+    panel.series.push_back(std::move(measured));
+  }
+  Figure figure;
+  figure.id = "rules";
+  figure.title = "Three ways to advance the contact (simulated device)";
+  figure.caption = fmt::format(
+      "A contact of {0} N/m at once and {1} N/m relaxed. The exact update needs between {1} T/2 "
+      "and "
+      "{0} T/2 at every relaxation time; forward Euler diverges below T/2, to the left of where "
+      "its "
+      "curve ends, at the paper's parameters (0.208 ms) too; the mass-spring model has nothing "
+      "that "
+      "relaxes.",
+      significant(study.stiffness_N_per_m, 3), significant(0.5 * study.stiffness_N_per_m, 3));
+  figure.panels = {std::move(panel)};
+  return figure;
+}
+
+}  // namespace
+
+Json border_json(const BorderStudy& study) {
+  Json rules = Json::array();
+  for (const RulePoint& p : study.rules) {
+    rules.push_back({{"rule", word_of_rule(p.rule)},
+                     {"relaxation_time_s", rounded(p.relaxation_time_s, kDigits)},
+                     {"measured_N_s_per_m", number_or_null(p.measured_N_s_per_m)},
+                     {"predicted_N_s_per_m", number_or_null(p.predicted_N_s_per_m)}});
+  }
+  return {{"simulated_device", true},
+          {"assumptions", assumptions_of(study.plant)},
+          {"relaxation_time_s", rounded(study.relaxation_time_s, kDigits)},
+          {"stiffness_N_per_m", rounded(study.stiffness_N_per_m, kDigits)},
+          {"passive", points_json(study.passive, "measured_N_per_m", "predicted_N_per_m")},
+          {"stable", points_json(study.stable, "measured_N_per_m", "predicted_N_per_m")},
+          {"rules", rules},
+          {"shortest_forward_euler", points_json(study.shortest, "measured_s", "predicted_s")},
+          {"shortest_exact", points_json(study.shortest_exact, "measured_s", "predicted_s")},
+          {"worst_passive", rounded(worst_difference(study.passive), kDigits)},
+          {"worst_stable", rounded(worst_difference(study.stable), kDigits)}};
+}
+
+std::string border_text(const BorderStudy& study) {
+  std::string text = fmt::format(
+      "SIMULATED DEVICE\nlargest stiffness at once, N/m, relaxed half of it, relaxation time {} "
+      "ms\n"
+      "{:>7} {:>6} {:>9} {:>22} {:>22}\n",
+      significant(1e3 * study.relaxation_time_s, 3), "Hz", "delay", "b N s/m",
+      "passive: measured/theory", "stable: measured/theory");
+  for (const BorderPoint& p : study.passive) {
+    std::string stable;
+    for (const BorderPoint& s : study.stable) {
+      if (s.rate_Hz == p.rate_Hz && s.delay_periods == p.delay_periods &&
+          s.damping_N_s_per_m == p.damping_N_s_per_m) {
+        stable = value(s.measured) + " / " + value(s.predicted);
+      }
+    }
+    text += fmt::format("{:>7} {:>6} {:>9} {:>22} {:>22}\n", significant(p.rate_Hz, 4),
+                        p.delay_periods, significant(p.damping_N_s_per_m, 3),
+                        value(p.measured) + " / " + value(p.predicted), stable);
+  }
+  text += fmt::format(
+      "worst difference: passivity {} %, stability {} %\nfriction needed at 1 kHz for {} N/m at "
+      "once, N s/m (measured/theory)\n",
+      significant(100.0 * worst_difference(study.passive), 3),
+      significant(100.0 * worst_difference(study.stable), 3),
+      significant(study.stiffness_N_per_m, 3));
+  for (const RulePoint& p : study.rules) {
+    text += fmt::format("{:>7} ms  {:<20} {} / {}\n", significant(1e3 * p.relaxation_time_s, 3),
+                        word_of_rule(p.rule), value(p.measured_N_s_per_m),
+                        value(p.predicted_N_s_per_m));
+  }
+  for (std::size_t i = 0; i < study.shortest.size(); ++i) {
+    const BorderPoint& euler = study.shortest[i];
+    text += fmt::format(
+        "{:>7} Hz: shortest passive relaxation time: forward Euler {} / {} ms, exact update {}\n",
+        significant(euler.rate_Hz, 4), value(1e3 * euler.measured), value(1e3 * euler.predicted),
+        study.shortest_exact[i].measured == 0.0 ? "any" : value(study.shortest_exact[i].measured));
+  }
+  return text;
+}
+
+std::vector<Figure> border_figures(const BorderStudy& study) {
+  return {border_figure(study), rule_figure(study)};
+}
+
+}  // namespace tpm

@@ -1,0 +1,273 @@
+#include "tpm/report/hil_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/text.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/run_record.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kMostError = 0.005;  // of the session's peak force
+
+std::string mN(double force_N) {
+  return significant(1e3 * force_N, 3);
+}
+
+std::string percent(double part, double whole) {
+  return whole > 0.0 ? significant(100.0 * part / whole, 3) + " %" : "-";
+}
+
+/// Every `stride`-th value, so that a curve has at most some thousand points.
+std::vector<double> thinned(const std::vector<double>& values, double scale = 1.0) {
+  constexpr std::size_t kPoints = 4000;
+  const std::size_t stride = std::max<std::size_t>(1, values.size() / kPoints);
+  std::vector<double> result;
+  for (std::size_t i = 0; i < values.size(); i += stride) result.push_back(scale * values[i]);
+  return result;
+}
+
+Figure session_figure(const HilRecording& recording, const Verification& v) {
+  std::vector<double> error(v.time_s.size());
+  for (std::size_t i = 0; i < error.size(); ++i) error[i] = v.commanded_N[i] - v.reference_N[i];
+  const std::vector<double> time = thinned(v.time_s);
+  const Axis seconds{"time", "s", false, std::nullopt, std::nullopt};
+  Figure figure;
+  figure.id = "session";
+  figure.title = recording.simulated() ? "The session, on a simulated device" : "The session";
+  figure.caption =
+      "Depth of the tool below the surface at rest, force sent to the device, and its "
+      "difference from the reference under the recorded motion.";
+  figure.panels = {{"motion",
+                    seconds,
+                    {"depth", "mm", false, std::nullopt, std::nullopt},
+                    {line("tool", time, thinned(v.depth_m, 1e3))}},
+                   {"force",
+                    seconds,
+                    {"contact force", "N", false, std::nullopt, std::nullopt},
+                    {line("reference", time, thinned(v.reference_N)),
+                     line("commanded", time, thinned(v.commanded_N))}},
+                   {"commanded less reference",
+                    seconds,
+                    {"force error", "mN", false, std::nullopt, std::nullopt},
+                    {line("error", time, thinned(error, 1e3))}}};
+  return figure;
+}
+
+Figure energy_figure(const HilRecording& recording) {
+  std::vector<double> time, observed, leak;
+  for (const ServoRecord& row : recording.rows) {
+    time.push_back(recording.time_s(row));
+    observed.push_back(1e3 * row.observed_J);
+    leak.push_back(1e3 * row.leak_J);
+  }
+  Figure figure;
+  figure.id = "energy";
+  figure.title = "Energy";
+  figure.caption =
+      "Work of the hand on what is rendered, which must not fall below zero but for "
+      "what the held force leaks, and the leak as predicted, K dx^2/2 a period.";
+  figure.panels = {{"energy",
+                    {"time", "s", false, std::nullopt, std::nullopt},
+                    {"energy", "mJ", false, std::nullopt, std::nullopt},
+                    {line("observed", thinned(time), thinned(observed)),
+                     line("predicted leak", thinned(time), thinned(leak))}}};
+  return figure;
+}
+
+void add_identity(Document& d, const HilRecording& r) {
+  const Json& device = r.header.at("device");
+  if (r.simulated()) {
+    d.bullets(
+        {{"SIMULATED DEVICE: no motor moved and no hand felt these forces. What is verified "
+          "is the path from motion to command, not the hardware.",
+          Tone::bad}});
+  }
+  Table table{"", {{"what"}, {"value"}}, {}};
+  const auto row = [&](const char* what, std::string value) {
+    table.rows.push_back({{what}, {value.empty() ? "not known" : std::move(value)}});
+  };
+  row("device", device.at("name").get<std::string>());
+  row("kind", device.at("kind").get<std::string>());
+  row("communication mode", device.at("communication_mode").get<std::string>());
+  row("serial", device.at("serial").get<std::string>());
+  row("firmware", device.at("firmware").get<std::string>());
+  row("library", device.at("library_version").get<std::string>());
+  row("model in the loop", r.header.at("model").at("name").get<std::string>());
+  row("its error", r.header.at("model").at("error_bound").get<std::string>());
+  row("rate", significant(1.0 / r.session.servo.period_s, 4) + " Hz");
+  row("time", r.header.at("time").get<std::string>());
+  row("tpm", r.header.at("version").get<std::string>());
+  d.heading(2, "Device and model");
+  d.table(std::move(table));
+  std::vector<Cell> assumed;
+  for (const Json& line : device.at("assumptions")) assumed.push_back({line.get<std::string>()});
+  if (!assumed.empty()) d.bullets(std::move(assumed));
+}
+
+void add_fidelity(Document& d, const Verification& v) {
+  d.heading(2, "Fidelity");
+  d.paragraph(fmt::format(
+      "Reference: {}, under the motion of the surface as recorded ({} knots within {} um, which "
+      "can cost {} mN; its own error estimate is {} mN). Over {} instants the commanded force is "
+      "off by {} mN rms and {} mN at most, {} of the session's peak of {} N.",
+      v.reference, v.knots, significant(1e6 * v.motion_tolerance_m, 3), mN(v.motion_error_N),
+      mN(v.reference_error_N), v.all.instants, mN(v.all.rms_N), mN(v.all.max_N),
+      percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)));
+  std::vector<Cell> others;
+  for (const OtherOpinion& o : v.others) {
+    others.push_back(
+        {fmt::format("{}, first {} s: {} mN rms, {} mN at most", o.name, significant(o.end_s, 4),
+                     mN(o.commanded.rms_N), mN(o.commanded.max_N))});
+  }
+  if (!others.empty()) d.bullets(std::move(others));
+  d.picture({"session", "The session", ""});
+  Table table{"Force error by phase; depth: how well the operator followed, rms",
+              {{"phase"},
+               {"start s", true},
+               {"rms mN", true},
+               {"max mN", true},
+               {"max of peak", true},
+               {"depth um", true}},
+              {}};
+  for (const PhaseFidelity& p : v.phases) {
+    const bool good = p.force.max_N <= kMostError * v.all.peak_N;
+    table.rows.push_back({{p.phase.name},
+                          {significant(p.start_s, 5)},
+                          {mN(p.force.rms_N)},
+                          {mN(p.force.max_N)},
+                          {percent(p.force.max_N, v.all.peak_N), good ? Tone::good : Tone::bad},
+                          {significant(1e6 * p.depth_rms_m, 3)}});
+  }
+  d.table(std::move(table));
+}
+
+void add_experiment(Document& d, const Verification& v) {
+  if (v.experiment.empty()) return;
+  d.heading(2, "Beside the experiment");
+  d.paragraph(
+      "Readings of pig liver (Samur et al. 2007, as printed) at the same depths, without "
+      "error bars and with a rate that is not stated; the difference says how well the "
+      "material of the session is chosen, not how well it is rendered.");
+  Table table{"",
+              {{"depth mm", true},
+               {"rate mm/s", true},
+               {"reading"},
+               {"measured N", true},
+               {"felt N", true},
+               {"difference", true}},
+              {}};
+  for (const BesideExperiment& e : v.experiment) {
+    table.rows.push_back(
+        {{significant(1e3 * e.depth_m, 3)},
+         {significant(1e3 * e.rate_m_per_s, 3)},
+         {e.label},
+         {significant(e.measured_N, 3)},
+         {significant(e.commanded_N, 3)},
+         {fmt::format("{:+.1f} %", 100.0 * (e.commanded_N / e.measured_N - 1.0))}});
+  }
+  d.table(std::move(table));
+}
+
+void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
+  d.heading(2, "Timing, limits, end");
+  std::vector<Cell> lines;
+  lines.push_back(
+      {fmt::format("end: {}", s.cause), s.cause == "finished" ? Tone::good : Tone::bad});
+  if (!r.closed) {
+    lines.push_back(
+        {"the recording has no closing record: the process was killed; all rows up to "
+         "then are whole",
+         Tone::bad});
+  } else if (r.closing.contains("scheduling")) {
+    lines.push_back({r.closing.at("host").get<std::string>()});
+    lines.push_back({r.closing.at("scheduling").get<std::string>()});
+    for (const char* key : {"woke_late", "busy"}) {
+      const Json& t = r.closing.at(key);
+      const auto us = [&](const char* q) { return significant(1e6 * t.at(q).get<double>(), 3); };
+      lines.push_back(
+          {fmt::format("{}: p50 {} us, p99 {} us, p99.9 {} us, max {} us",
+                       std::string(key) == "busy" ? "work of a cycle" : "woke after the deadline",
+                       us("p50_s"), us("p99_s"), us("p999_s"), us("max_s"))});
+    }
+    lines.push_back(
+        {fmt::format("records dropped: {}", r.closing.at("dropped_records").get<std::uint64_t>())});
+  } else {
+    lines.push_back({"virtual time: deadlines are met by definition, nothing is said of timing"});
+  }
+  if (r.closed && r.closing.at("device_error").get<int>() != 0) {
+    lines.push_back(
+        {fmt::format("the device said: error {} ({})", r.closing.at("device_error").get<int>(),
+                     r.closing.at("device_error_text").get<std::string>()),
+         Tone::bad});
+  }
+  lines.push_back({fmt::format(
+      "{} cycles; missed periods {}; time guards {}; saturations {}; limited by force {}, by slew "
+      "{}; damped {}; beyond the model {}",
+      s.cycles, s.missed, s.time_guards, s.saturations, s.force_limited, s.slew_limited, s.damped,
+      s.beyond_model)});
+  d.bullets(std::move(lines));
+  d.heading(2, "Energy");
+  d.paragraph(fmt::format(
+      "Work of the hand on what was rendered: {} mJ at the end, {} mJ at the least. Holding the "
+      "force within a period gives energy away, {} mJ in all by K dx^2/2 a period, which the "
+      "friction of the device has to take up.",
+      significant(1e3 * s.observed_end_J, 4), significant(1e3 * s.observed_least_J, 3),
+      significant(1e3 * s.leak_J, 3)));
+  d.picture({"energy", "Energy", ""});
+}
+
+}  // namespace
+
+RecordingSummary summary_of(const HilRecording& recording) {
+  RecordingSummary s;
+  s.cause = recording.closed ? recording.closing.at("cause").get<std::string>() : "cut off";
+  for (const ServoRecord& row : recording.rows) {
+    const auto has = [&](ServoFlag flag) -> std::uint64_t {
+      return (row.flags & flag) != 0 ? 1 : 0;
+    };
+    ++s.cycles;
+    s.missed += static_cast<std::uint64_t>(row.missed);
+    s.time_guards += has(kTimeGuarded);
+    s.saturations += has(kSaturated);
+    s.force_limited += has(kForceLimited);
+    s.slew_limited += has(kSlewLimited);
+    s.damped += has(kDamped);
+    s.beyond_model += has(kBeyondModel);
+    if (row.stop != StopCause::none) continue;  // nothing was rendered in the last one
+    s.observed_end_J = row.observed_J;
+    s.observed_least_J = std::min(s.observed_least_J, row.observed_J);
+    s.leak_J = row.leak_J;
+  }
+  return s;
+}
+
+void write_hil_report(const HilRecording& recording, const Verification& v,
+                      const std::filesystem::path& folder, const std::string& python) {
+  const RecordingSummary summary = summary_of(recording);
+  const auto drawings =
+      draw_into(folder, {session_figure(recording, v), energy_figure(recording)}, python);
+  Document d;
+  d.title = recording.session.title;
+  d.subtitle = device_line(recording);
+  add_identity(d, recording);
+  add_fidelity(d, v);
+  add_experiment(d, v);
+  add_timing(d, recording, summary);
+  typeset(d);
+  write_file(folder / "report.md", to_markdown(d));
+  write_file(folder / "report.html", to_html(d, drawings));
+  Json json = verification_json(recording, v);
+  json["end"] = summary.cause;
+  json["closing"] = recording.closing;
+  json["observed_end_J"] = rounded(summary.observed_end_J, 6);
+  json["observed_least_J"] = rounded(summary.observed_least_J, 6);
+  json["leak_J"] = rounded(summary.leak_J, 6);
+  write_file(folder / "report.json", to_text(json));
+}
+
+}  // namespace tpm

@@ -1,0 +1,38 @@
+#pragma once
+#include "tpm/reduce/contact_model.hpp"
+
+namespace tpm {
+
+/// A tool without friction on a contact model: it pushes and never pulls. When the force reaches
+/// zero the surface lets go and recovers by itself, kept free of force by one Newton step a period;
+/// the tool meets it again wherever it then is. What the tool feels is zero in between, so that
+/// nothing is given to it.
+class OneSidedContact {
+ public:
+  struct Answer {
+    double force_N = 0.0;    ///< against the push, >= 0
+    double surface_m = 0.0;  ///< depth of the surface
+    bool touching = false;
+    double error_N = 0.0;
+    bool trusted = true;
+  };
+
+  /// @param push unit vector into the tissue, in the coordinates of the model
+  /// @param model must live as long as this
+  OneSidedContact(ContactModel& model, const Eigen::Vector3d& push);
+
+  void reset() noexcept;
+  /// One period. @param tool_m depth of the tool at its end, moving linearly
+  Answer step(double tool_m) noexcept;
+  /// Stiffness against the push at once, at rest, N/m.
+  [[nodiscard]] double stiffness_N_per_m() const noexcept { return stiffness_N_per_m_; }
+
+ private:
+  ContactModel& model_;
+  Eigen::Vector3d push_;
+  double stiffness_N_per_m_;
+  double surface_m_ = 0.0, left_N_ = 0.0;
+  bool touching_ = false;
+};
+
+}  // namespace tpm

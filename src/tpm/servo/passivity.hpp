@@ -1,0 +1,27 @@
+#pragma once
+#include <Eigen/Core>
+
+namespace tpm {
+
+/// Counts the work that the hand does on what is rendered, and adds damping while the count is
+/// negative, so that what was given away too much is taken back (time-domain passivity control,
+/// Hannaford and Ryu 2002). A held force gives energy away in each period even if the tissue does
+/// not: the count alone falls below zero, the device's own friction makes up for it.
+class PassivityControl {
+ public:
+  /// @param most_damping_N_s_per_m 0: observe only
+  PassivityControl(double period_s, double most_damping_N_s_per_m) noexcept
+      : period_s_(period_s), most_damping_(most_damping_N_s_per_m) {}
+
+  /// The hand moved by `moved_m` while `held_N` pushed on it.
+  void observe(const Eigen::Vector3d& held_N, const Eigen::Vector3d& moved_m) noexcept;
+  /// What to add to the next force on the hand. @param moved_m in the last period
+  [[nodiscard]] Eigen::Vector3d damping_N(const Eigen::Vector3d& moved_m) const noexcept;
+  [[nodiscard]] double observed_J() const noexcept { return observed_J_; }
+
+ private:
+  double period_s_, most_damping_;
+  double observed_J_ = 0.0;
+};
+
+}  // namespace tpm

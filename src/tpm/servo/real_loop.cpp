@@ -1,0 +1,204 @@
+#include <readerwriterqueue/readerwriterqueue.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <thread>
+
+#include "tpm/core/error.hpp"
+#include "tpm/servo/servo_loop.hpp"
+
+namespace tpm {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t kRingRows = 1U << 16U;  // 16 s at 4 kHz
+
+/// What the threads of a session share. The stuck thread of a hang keeps it alive.
+struct Shared {
+  Shared(std::shared_ptr<HapticDevice> d, std::shared_ptr<ContactModel> m, const ServoSettings& s)
+      : device(std::move(d)), model(std::move(m)), settings(s), step(*device, *model, s) {}
+
+  std::shared_ptr<HapticDevice> device;
+  std::shared_ptr<ContactModel> model;
+  ServoSettings settings;
+  ServoStep step;
+  moodycamel::ReaderWriterQueue<ServoRecord> ring{kRingRows};
+  std::atomic<std::uint64_t> dropped{0};
+  std::atomic<std::uint64_t> cycle{0};
+  std::atomic<std::int64_t> busy_since_ns{0};  ///< 0: sleeping, or over
+  std::atomic<StopCause> wanted{StopCause::none};
+  std::atomic<bool> scheduled{false}, begin{false}, over{false};
+  // Written by the loop before `over`, read after it.
+  std::string scheduling;
+  std::exception_ptr refused;
+  TimeHistogram woke_late, busy;
+  std::int64_t stop_took_ns = 0;
+};
+
+/// The loop proper: nothing in here allocates, locks or throws.
+void serve(Shared& s) noexcept {
+  const auto period_ns = static_cast<std::int64_t>(std::llround(s.settings.period_s * 1e9));
+  const double period_s = s.settings.period_s;
+  std::int64_t deadline = now_ns() + period_ns;
+  ServoRecord row;
+  StopCause cause = StopCause::none;
+  while (cause == StopCause::none) {
+    sleep_until_ns(deadline);
+    const std::int64_t woke = now_ns();
+    s.busy_since_ns.store(woke, std::memory_order_release);
+    const std::int64_t missed = std::max<std::int64_t>((woke - deadline) / period_ns, 0);
+    deadline += missed * period_ns;
+    const StopCause wanted = s.wanted.load(std::memory_order_acquire);
+    if (wanted != StopCause::none) {
+      s.step.stop(wanted);
+      cause = wanted;
+    } else {
+      s.device->advance(static_cast<double>(missed) * period_s);
+      cause = s.step.cycle(static_cast<int>(std::min<std::int64_t>(missed, 1'000'000)), row);
+      s.device->advance(period_s);
+      const std::int64_t done = now_ns();
+      row.woke_late_s = static_cast<float>(static_cast<double>(woke - deadline) * 1e-9);
+      row.busy_s = static_cast<float>(static_cast<double>(done - woke) * 1e-9);
+      s.woke_late.note(woke - (deadline - missed * period_ns));
+      s.busy.note(done - woke);
+      if (!s.ring.try_enqueue(row)) s.dropped.fetch_add(1, std::memory_order_relaxed);
+      s.cycle.store(row.cycle, std::memory_order_release);
+    }
+    if (cause != StopCause::none) s.stop_took_ns = now_ns() - woke;
+    s.busy_since_ns.store(0, std::memory_order_release);
+    deadline += period_ns;
+  }
+}
+
+/// Takes what the loop has written; ends when told so and the ring is empty.
+class RecordThread {
+ public:
+  RecordThread(std::shared_ptr<Shared> shared, const RecordSink& sink,
+               const std::function<void()>& idle)
+      : shared_(std::move(shared)), thread_([this, sink, idle] { drain(sink, idle); }) {}
+
+  /// The last rows are written when this returns.
+  void finish() {
+    ending_ = true;
+    thread_.join();
+    if (fault_) std::rethrow_exception(fault_);
+  }
+
+ private:
+  void drain(const RecordSink& sink, const std::function<void()>& idle) noexcept {
+    try {
+      for (;;) {
+        const bool last = ending_;
+        ServoRecord row;
+        while (shared_->ring.try_dequeue(row)) sink(row);
+        if (idle) idle();
+        if (last) return;
+        std::this_thread::sleep_for(10ms);
+      }
+    } catch (...) {
+      fault_ = std::current_exception();
+      shared_->wanted.store(StopCause::exception, std::memory_order_release);
+    }
+  }
+
+  std::shared_ptr<Shared> shared_;
+  std::atomic<bool> ending_{false};
+  std::exception_ptr fault_;
+  std::thread thread_;
+};
+
+/// Cuts the forces from a thread that may itself get stuck, and waits for it a little.
+void cut_forces_from_outside(const std::shared_ptr<Shared>& shared) {
+  auto cut = std::make_shared<std::atomic<bool>>(false);
+  std::thread([shared, cut] {
+    shared->device->cut_forces();
+    *cut = true;
+  }).detach();
+  for (int i = 0; i < 20 && !*cut; ++i) std::this_thread::sleep_for(100us);
+}
+
+/// Waits for the loop; true if a cycle did not end in time.
+bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
+           std::int64_t& stop_took_ns) {
+  const auto limit_ns = static_cast<std::int64_t>(options.hang_limit_s * 1e9);
+  while (!s->over.load(std::memory_order_acquire)) {
+    std::this_thread::sleep_for(500us);
+    if (options.interrupted && options.interrupted()) {
+      s->wanted.store(StopCause::signal, std::memory_order_release);
+    }
+    const std::int64_t since = s->busy_since_ns.load(std::memory_order_acquire);
+    if (since != 0 && now_ns() - since > limit_ns) {
+      cut_forces_from_outside(s);
+      stop_took_ns = now_ns() - since;
+      return true;
+    }
+  }
+  return false;
+}
+
+void fill(ServoOutcome& outcome, const Shared& s) {
+  outcome.cause = s.step.cause();
+  outcome.cycles = s.step.cycles();
+  outcome.counts = s.step.counts();
+  outcome.device = s.step.device_status();
+  outcome.woke_late = s.woke_late;
+  outcome.busy = s.busy;
+  outcome.stop_took_s = static_cast<double>(s.stop_took_ns) * 1e-9;
+}
+
+}  // namespace
+
+ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
+                              const std::shared_ptr<ContactModel>& model,
+                              const ServoSettings& settings, const RecordSink& sink,
+                              const RealTimeOptions& options) {
+  auto shared = std::make_shared<Shared>(device, model, settings);
+  std::thread loop([shared, wish = options.wish] {
+    try {
+      shared->scheduling = become_real_time(wish);
+    } catch (...) {
+      shared->refused = std::current_exception();
+    }
+    shared->scheduled.store(true, std::memory_order_release);
+    while (!shared->begin.load(std::memory_order_acquire)) std::this_thread::sleep_for(100us);
+    if (!shared->refused) serve(*shared);
+    shared->over.store(true, std::memory_order_release);
+  });
+  while (!shared->scheduled.load(std::memory_order_acquire)) std::this_thread::sleep_for(100us);
+
+  ServoOutcome outcome;
+  outcome.real_time = true;
+  outcome.scheduling = shared->scheduling;
+  RecordThread records(shared, sink, options.idle);
+  shared->begin.store(true, std::memory_order_release);
+  std::int64_t stop_took_ns = 0;
+  const bool hang = watch(shared, options, stop_took_ns);
+  if (hang) {
+    loop.detach();
+    outcome.cause = StopCause::hang;
+    outcome.cycles = shared->cycle.load(std::memory_order_acquire) + 1;
+    outcome.stop_took_s = static_cast<double>(stop_took_ns) * 1e-9;
+    outcome.detail = "a cycle did not end within the limit; its thread was left behind";
+  } else {
+    loop.join();
+  }
+  try {
+    records.finish();
+  } catch (const std::exception& error) {
+    outcome.detail = error.what();
+  }
+  outcome.dropped_records = shared->dropped;
+  if (hang) return outcome;
+  if (shared->refused) {
+    device->stop();
+    std::rethrow_exception(shared->refused);
+  }
+  fill(outcome, *shared);
+  return outcome;
+}
+
+}  // namespace tpm

@@ -1,0 +1,64 @@
+#pragma once
+#include <cstdint>
+#include <string_view>
+
+namespace tpm {
+
+/// Why a session ended.
+enum class StopCause : std::int32_t {
+  none,
+  finished,  ///< the plan came to its end
+  signal,
+  exception,
+  communication,  ///< a call of the device failed
+  unplugged,
+  watchdog,  ///< the device cut its forces, as the next four
+  velocity,
+  button,
+  software,
+  dead_man,
+  forces_off,  ///< the same for a reason that no list has
+  position_not_finite,
+  force_not_finite,
+  overrun_storm,  ///< too many cycles were late
+  hang,           ///< a cycle did not end
+};
+
+[[nodiscard]] std::string_view word_of(StopCause cause);
+
+/// What happened in a cycle.
+enum ServoFlag : std::uint32_t {
+  kTouching = 1U << 0U,
+  kTimeGuarded = 1U << 1U,   ///< position of an earlier call
+  kSaturated = 1U << 2U,     ///< clipped by the motors
+  kForceLimited = 1U << 3U,  ///< clipped by the session's limit
+  kSlewLimited = 1U << 4U,
+  kRampingIn = 1U << 5U,
+  kDamped = 1U << 6U,       ///< by the passivity controller
+  kBeyondModel = 1U << 7U,  ///< the model does not trust its answer
+  kLate = 1U << 8U,         ///< woke after the next deadline
+};
+
+/// One cycle of the servo loop. Plain data, written as it stands. Depths are along the push, from
+/// the surface at rest, positive into the tissue.
+struct ServoRecord {
+  std::uint64_t cycle = 0;       ///< periods since the start, missed ones included
+  double position_m[3] = {};     ///< as the device read it
+  double tool_depth_m = 0.0;     ///< of the tool, negative in the air
+  double surface_depth_m = 0.0;  ///< of the tissue, given to the model
+  double model_force_N = 0.0;    ///< of the tissue against the push, after one-sidedness
+  double model_error_N = 0.0;    ///< as the model estimates
+  double commanded_N[3] = {};    ///< sent to the device, on the hand
+  double observed_J = 0.0;       ///< work of the hand on what is rendered, since the start
+  double leak_J = 0.0;           ///< what holding the force within periods has given away so far
+  float woke_late_s = 0.0F;      ///< after the deadline; 0 in virtual time
+  float busy_s = 0.0F;           ///< the cycle's work; 0 in virtual time
+  std::uint32_t flags = 0;       ///< ServoFlag
+  std::int32_t phase = 0;
+  std::int32_t missed = 0;  ///< periods before this one that went by without a command
+  StopCause stop = StopCause::none;
+};
+
+static_assert(sizeof(ServoRecord) == 128);
+
+}  // namespace tpm

@@ -1,0 +1,40 @@
+#include <exception>
+
+#include "tpm/servo/servo_loop.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::uint64_t kAskEvery = 1024;
+
+}  // namespace
+
+ServoOutcome run_in_virtual_time(HapticDevice& device, ContactModel& model,
+                                 const ServoSettings& settings, const RecordSink& sink,
+                                 const std::function<bool()>& interrupted) {
+  ServoOutcome outcome;
+  ServoStep step(device, model, settings);
+  ServoRecord row;
+  try {
+    StopCause cause = StopCause::none;
+    for (std::uint64_t i = 0; cause == StopCause::none; ++i) {
+      if (i % kAskEvery == 0 && interrupted && interrupted()) {
+        step.stop(StopCause::signal);
+        break;
+      }
+      cause = step.cycle(0, row);
+      sink(row);
+      device.advance(settings.period_s);
+    }
+  } catch (const std::exception& error) {
+    step.stop(StopCause::exception);
+    outcome.detail = error.what();
+  }
+  outcome.cause = step.cause();
+  outcome.cycles = step.cycles();
+  outcome.counts = step.counts();
+  outcome.device = step.device_status();
+  return outcome;
+}
+
+}  // namespace tpm

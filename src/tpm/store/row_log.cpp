@@ -1,0 +1,154 @@
+#include "tpm/store/row_log.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <bit>
+#include <boost/crc.hpp>
+#include <cerrno>
+#include <cstring>
+
+#include "tpm/core/error.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "row logs hold little-endian numbers");
+
+constexpr std::string_view kMagic = "TPMROWS1";
+constexpr std::uint32_t kClosing = 0xffffffffU;  // in place of a row's number
+constexpr std::size_t kBlock = 1U << 16U;
+
+std::uint32_t crc_of(const void* bytes, std::size_t size, std::uint32_t number = 0) {
+  boost::crc_32_type crc;
+  crc.process_bytes(&number, sizeof number);
+  crc.process_bytes(bytes, size);
+  return crc.checksum();
+}
+
+void put(std::vector<std::byte>& to, const void* bytes, std::size_t size) {
+  const auto* first = static_cast<const std::byte*>(bytes);
+  to.insert(to.end(), first, first + size);
+}
+
+void put_number(std::vector<std::byte>& to, std::uint32_t number) {
+  put(to, &number, sizeof number);
+}
+
+/// A text with its length before and its check sum behind.
+void put_text(std::vector<std::byte>& to, std::string_view text) {
+  put_number(to, static_cast<std::uint32_t>(text.size()));
+  put(to, text.data(), text.size());
+  put_number(to, crc_of(text.data(), text.size()));
+}
+
+/// Reads on from a place in the bytes; false where they end.
+class Cursor {
+ public:
+  explicit Cursor(std::string_view bytes) : bytes_(bytes) {}
+  bool take(void* to, std::size_t size) {
+    if (bytes_.size() - at_ < size) return false;
+    std::memcpy(to, bytes_.data() + at_, size);
+    at_ += size;
+    return true;
+  }
+  bool take_text(std::string& text) {
+    std::uint32_t size = 0, crc = 0;
+    if (!take(&size, sizeof size) || bytes_.size() - at_ < size) return false;
+    text.assign(bytes_.substr(at_, size));
+    at_ += size;
+    return take(&crc, sizeof crc) && crc == crc_of(text.data(), text.size());
+  }
+
+ private:
+  std::string_view bytes_;
+  std::size_t at_ = 0;
+};
+
+Error cannot_write(const std::filesystem::path& path, const char* what) {
+  return {ExitCode::environment, path.string(), fmt::format("{}: {}", what, std::strerror(errno))};
+}
+
+}  // namespace
+
+RowLogWriter::RowLogWriter(std::filesystem::path path, std::string_view header,
+                           std::size_t row_bytes)
+    : path_(std::move(path)), row_bytes_(row_bytes) {
+  std::error_code ignored;
+  if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), ignored);
+  file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file_ < 0) throw cannot_write(path_, "cannot be written");
+  kept_.reserve(2 * kBlock);
+  put(kept_, kMagic.data(), kMagic.size());
+  put_number(kept_, static_cast<std::uint32_t>(row_bytes));
+  put_text(kept_, header);
+  flush();
+}
+
+RowLogWriter::~RowLogWriter() {
+  if (file_ >= 0) (void)::close(file_);
+}
+
+void RowLogWriter::append(const void* row) {
+  put_number(kept_, rows_);
+  put(kept_, row, row_bytes_);
+  put_number(kept_, crc_of(row, row_bytes_, rows_));
+  ++rows_;
+  if (kept_.size() >= kBlock) flush();
+}
+
+void RowLogWriter::flush() {
+  std::size_t done = 0;
+  while (done < kept_.size()) {
+    const ssize_t written = ::write(file_, kept_.data() + done, kept_.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) throw cannot_write(path_, "cannot be written on");
+    done += static_cast<std::size_t>(written);
+  }
+  kept_.clear();
+}
+
+void RowLogWriter::close(std::string_view closing) {
+  put_number(kept_, kClosing);
+  put_text(kept_, closing);
+  flush();
+  if (::fsync(file_) != 0) throw cannot_write(path_, "cannot be brought to the disk");
+  (void)::close(file_);
+  file_ = -1;
+}
+
+RowLog read_row_log(const std::filesystem::path& path) {
+  const std::string bytes = read_file(path);
+  Cursor cursor(bytes);
+  RowLog log;
+  std::string magic(kMagic.size(), '\0');
+  std::uint32_t row_bytes = 0;
+  constexpr std::uint32_t kMostRowBytes = 1U << 20U;
+  if (!cursor.take(magic.data(), magic.size()) || magic != kMagic ||
+      !cursor.take(&row_bytes, sizeof row_bytes) || row_bytes == 0 || row_bytes > kMostRowBytes ||
+      !cursor.take_text(log.header)) {
+    throw bad_input(path.string(), "is no recording", "a file that tpm hil run has written");
+  }
+  log.row_bytes = row_bytes;
+  log.bytes.reserve(bytes.size());
+  std::vector<std::byte> row(row_bytes);
+  std::uint32_t number = 0, crc = 0;
+  while (cursor.take(&number, sizeof number)) {
+    if (number == kClosing) {
+      log.closed = cursor.take_text(log.closing);
+      if (!log.closed) log.closing.clear();
+      break;
+    }
+    if (number != log.rows || !cursor.take(row.data(), row_bytes) ||
+        !cursor.take(&crc, sizeof crc) || crc != crc_of(row.data(), row_bytes, number)) {
+      break;
+    }
+    log.bytes.insert(log.bytes.end(), row.begin(), row.end());
+    ++log.rows;
+  }
+  return log;
+}
+
+}  // namespace tpm

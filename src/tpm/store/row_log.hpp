@@ -1,0 +1,52 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tpm {
+
+/// Appends rows of one size to a file, each with its number and a check sum, so that what was
+/// written stands even if the process is killed. After the rows a closing text says that the
+/// file is whole. Bytes are those of the machine that writes (little endian is asked for).
+/// Writing begins under the final name: an unfinished file is meant to be found.
+class RowLogWriter {
+ public:
+  /// Throws Error(environment) if the file cannot be written.
+  RowLogWriter(std::filesystem::path path, std::string_view header, std::size_t row_bytes);
+  ~RowLogWriter();
+  RowLogWriter(const RowLogWriter&) = delete;
+  RowLogWriter& operator=(const RowLogWriter&) = delete;
+
+  /// Keeps the row; passes all kept ones to the system once they fill a block.
+  void append(const void* row);
+  /// Passes everything to the system: from here on it survives the process.
+  void flush();
+  void close(std::string_view closing);
+  [[nodiscard]] std::uint32_t rows() const noexcept { return rows_; }
+
+ private:
+  std::filesystem::path path_;
+  int file_ = -1;
+  std::size_t row_bytes_;
+  std::uint32_t rows_ = 0;
+  std::vector<std::byte> kept_;
+};
+
+/// What a file of rows holds.
+struct RowLog {
+  std::string header;
+  std::size_t row_bytes = 0;
+  std::size_t rows = 0;
+  std::vector<std::byte> bytes;  ///< the rows, one after the other
+  bool closed = false;           ///< the writer came to its end
+  std::string closing;           ///< empty unless closed
+};
+
+/// Reads all rows up to the end, or up to the first that is incomplete or damaged.
+/// Throws Error(bad_input) if the beginning is no such file.
+[[nodiscard]] RowLog read_row_log(const std::filesystem::path& path);
+
+}  // namespace tpm

@@ -1,0 +1,28 @@
+#pragma once
+#include <string>
+
+#include "tpm/haptics/session.hpp"
+
+namespace tpm::test {
+
+/// A short session on the paper's star: one indentation to 4 mm and one load.
+inline Json short_session() {
+  return Json::parse(R"({
+    "title": "short",
+    "model": {"kind": "element", "scene": {
+      "organ": {"kind": "star", "spacing": "30 mm"},
+      "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"}}},
+    "indentations": {"depths": ["4 mm"], "rates": ["4 mm/s"], "hold": "2 s", "rest": "1 s"},
+    "creep": {"loads": ["0.2 N"], "hold": "1 s", "rest": "1 s"}})");
+}
+
+inline HilSession parsed(const Json& json) {
+  return parse_session(json, "session", {});
+}
+
+inline Json with(Json json, const char* pointer, const Json& value) {
+  json[Json::json_pointer(pointer)] = value;
+  return json;
+}
+
+}  // namespace tpm::test

@@ -1,0 +1,299 @@
+// A stand-in for the vendor's library: the same C interface, an Omega.7 that is simulated, and
+// faults on demand. The file named in $TPM_STAND_IN_SCRIPT is read at dhdOpenID; its lines are
+//   version|com_mode|entries|devices|type|initialised|period|delay_periods|encoder_step NUMBER
+//   operator FILE     pieces as written by to_lines(OperatorScript)
+//   events FILE       what happened, with the time of the clock: "NAME NANOSECONDS"
+//   fault NAME FIRST COUNT   at the calls of dhdGetPosition (dhdSetForce for saturated) numbered
+//                            FIRST to FIRST + COUNT - 1, from 0
+// Faults: time_guard, saturated, communication, nan, and those that stay: watchdog, velocity,
+// unplugged; hang sleeps COUNT milliseconds.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tpm/device/virtual_plant.hpp"
+
+namespace {
+
+struct Fault {
+  std::string name;
+  long first = 0, count = 1;
+};
+
+struct StandIn {
+  tpm::PlantSettings plant_settings;
+  std::unique_ptr<tpm::VirtualPlant> plant;
+  std::string operator_file, events_file;
+  std::vector<Fault> faults;
+  int version = 3, com_mode = 0, entries = 17, devices = 1, type = 35;
+  bool initialised = true, read_once = false;
+  long reads = 0, writes = 0;
+  int watchdog_ticks = 0;
+  std::atomic<bool> expert{false}, unplugged{false};
+  std::atomic<int> cause{0};
+};
+
+std::unique_ptr<StandIn> device;
+thread_local int last_error = 0;
+
+StandIn& here() {
+  if (!device) device = std::make_unique<StandIn>();
+  return *device;
+}
+
+void event(const char* name) {
+  if (here().events_file.empty()) return;
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  if (std::FILE* file = std::fopen(here().events_file.c_str(), "a")) {
+    (void)std::fprintf(file, "%s %lld\n", name,
+                       static_cast<long long>(now.tv_sec) * 1'000'000'000LL + now.tv_nsec);
+    (void)std::fclose(file);
+  }
+}
+
+void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
+  if (key == "operator") {
+    words >> s.operator_file;
+  } else if (key == "events") {
+    words >> s.events_file;
+  } else if (key == "fault") {
+    Fault fault;
+    words >> fault.name >> fault.first >> fault.count;
+    s.faults.push_back(fault);
+  } else {
+    double value = 0.0;
+    words >> value;
+    const int whole = static_cast<int>(value);
+    if (key == "version") s.version = whole;
+    if (key == "com_mode") s.com_mode = whole;
+    if (key == "entries") s.entries = whole;
+    if (key == "devices") s.devices = whole;
+    if (key == "type") s.type = whole;
+    if (key == "initialised") s.initialised = whole != 0;
+    if (key == "period") s.plant_settings.period_s = value;
+    if (key == "delay_periods") s.plant_settings.delay_periods = whole;
+    if (key == "encoder_step") s.plant_settings.encoder_step_m = value;
+  }
+}
+
+/// A library of its own is loaded for each session, and forgets nothing of what it was told.
+void read_script() {
+  device = std::make_unique<StandIn>();
+  const char* script = std::getenv("TPM_STAND_IN_SCRIPT");
+  if (script == nullptr) return;
+  std::ifstream lines(script);
+  std::string line;
+  while (std::getline(lines, line)) {
+    std::istringstream words(line);
+    std::string key;
+    if (words >> key) read_line(here(), words, key);
+  }
+}
+
+bool due(const char* name, long call) {
+  return std::any_of(here().faults.begin(), here().faults.end(), [&](const Fault& f) {
+    return f.name == name && call >= f.first && call < f.first + f.count;
+  });
+}
+
+int failed(int error) {
+  last_error = error;
+  return -1;
+}
+
+void fall(int cause, const char* name) {
+  if (here().cause.exchange(cause) == 0) event(name);
+}
+
+void hang_if_due(long call) {
+  for (const Fault& f : here().faults) {
+    if (f.name != "hang" || f.first != call) continue;
+    event("hang");
+    std::this_thread::sleep_for(std::chrono::milliseconds(f.count));
+    event("hang_over");
+  }
+}
+
+}  // namespace
+
+extern "C" {
+
+int dhdGetDeviceCount() {
+  read_script();
+  return here().devices;
+}
+
+int dhdOpenID(char /*index*/) {
+  StandIn& s = here();
+  tpm::OperatorScript script;
+  if (!s.operator_file.empty()) script = tpm::read_operator_script(s.operator_file);
+  s.plant = std::make_unique<tpm::VirtualPlant>(s.plant_settings, std::move(script));
+  event("open");
+  return 0;
+}
+
+int dhdClose(char) {
+  event("close");
+  return here().unplugged ? failed(5) : 0;
+}
+
+int dhdGetSystemType(char) {
+  return here().type;
+}
+const char* dhdGetSystemName(char) {
+  return "omega.7";
+}
+
+int dhdGetSerialNumber(unsigned short* number, char) {
+  *number = 4711;
+  return 0;
+}
+
+int dhdGetVersion(double* firmware, char) {
+  *firmware = 2.5;
+  return 0;
+}
+
+void dhdGetSDKVersion(int* major, int* minor, int* release, int* revision) {
+  read_script();
+  *major = here().version;
+  *minor = 14;
+  *release = *revision = 0;
+}
+
+bool dhdIsLeftHanded(char) {
+  return here().type == 37;
+}
+int dhdGetComMode(char) {
+  return here().com_mode;
+}
+int dhdSetGravityCompensation(int, char) {
+  return 0;
+}
+int dhdSetMaxForce(double, char) {
+  return 0;
+}
+int dhdSetBrakes(int, char) {
+  return 0;
+}
+
+int dhdEnableForce(unsigned char on, char) {
+  if (on == 0) event("forces_off");
+  if (here().unplugged) return failed(5);
+  here().plant->forces(on != 0);
+  return 0;
+}
+
+int dhdEnableExpertMode() {
+  here().expert = true;
+  return 0;
+}
+
+int dhdDisableExpertMode() {
+  here().expert = false;
+  return 0;
+}
+
+int dhdSetWatchdog(unsigned char ticks, char) {
+  if (!here().expert) return failed(9);
+  here().watchdog_ticks = ticks;
+  return 0;
+}
+
+int dhdGetPosition(double* x, double* y, double* z, char) {
+  StandIn& s = here();
+  const long call = s.reads++;
+  s.read_once = true;
+  hang_if_due(call);
+  if (due("unplugged", call)) {
+    s.unplugged = true;
+    fall(5, "unplugged");
+  }
+  if (s.unplugged) return failed(5);
+  if (due("communication", call)) {
+    event("communication");
+    return failed(2);
+  }
+  if (due("watchdog", call)) fall(3, "watchdog");
+  if (due("velocity", call)) fall(2, "velocity");
+  const Eigen::Vector3d at = s.plant->measured_m();
+  *x = at.x();
+  *y = at.y();
+  *z = due("nan", call) ? std::numeric_limits<double>::quiet_NaN() : at.z();
+  if (due("nan", call)) event("nan");
+  return due("time_guard", call) ? 1 : 0;
+}
+
+int dhdSetForce(double x, double y, double z, char) {
+  StandIn& s = here();
+  if (s.unplugged) return failed(5);
+  const bool clipped = s.plant->command({x, y, z});
+  if (!s.read_once) return 0;  // still being prepared
+  const long call = s.writes++;
+  s.plant->forces(s.cause == 0);
+  s.plant->advance();
+  return clipped || due("saturated", call) ? 2 : 0;
+}
+
+int dhdGetStatus(int* status, char) {
+  StandIn& s = here();
+  if (s.unplugged) return failed(5);
+  std::fill(status, status + s.entries, 0);
+  if (s.entries > 14) status[14] = s.cause;
+  return 0;
+}
+
+int dhdStop(char) {
+  event("stop");
+  return here().unplugged ? failed(5) : 0;
+}
+
+int dhdErrorGetLast() {
+  return last_error;
+}
+
+const char* dhdErrorGetLastStr() {
+  switch (last_error) {
+    case 0:
+      return "no error";
+    case 2:
+      return "communication error";
+    case 5:
+      return "no device";
+    case 9:
+      return "expert mode disabled";
+    default:
+      return nullptr;
+  }
+}
+
+#ifndef STAND_IN_WITHOUT_DRD
+bool drdIsInitialized(char) {
+  return here().initialised;
+}
+
+int drdAutoInit(char) {
+  event("moved");
+  here().initialised = true;
+  return 0;
+}
+
+#ifndef STAND_IN_WITHOUT_A_SYMBOL
+int drdStop(bool, char) {
+  return 0;
+}
+#endif
+#endif
+
+}  // extern "C"

@@ -1,0 +1,188 @@
+// Sessions: what a file leads to, bad files, verification and its honesty, borders of rendering.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "hil_scenes.hpp"
+#include "temp_folder.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/haptics/rendering_border.hpp"
+#include "tpm/haptics/session_run.hpp"
+#include "tpm/haptics/verify.hpp"
+#include "tpm/report/hil_report.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using test::parsed;
+using test::short_session;
+using test::with;
+
+TEST_CASE("A session's phases follow each other as its file says") {
+  const HilSession session = parsed(short_session());
+  std::vector<std::string> names;
+  for (const SessionPhase& phase : session.phases) names.push_back(phase.name);
+  CHECK(names == std::vector<std::string>{"approach", "indent to 4 mm at 4 mm/s",
+                                          "hold 4 mm after 4 mm/s", "release from 4 mm at 4 mm/s",
+                                          "rest", "approach", "load to 0.2 N", "creep under 0.2 N",
+                                          "rest"});
+  CHECK_THAT(session.duration_s(), WithinAbs(1 + 1 + 2 + 1.5 + 1 + 1 + 1 + 1 + 1, 1e-12));
+}
+
+TEST_CASE("Bad sessions: one line each, with the key") {
+  struct Case {
+    const char* pointer;
+    Json value;
+    const char* message;
+  };
+  const Case bad = GENERATE(
+      Case{"/rate", "5 kHz", "key /rate: 5000 Hz; expected 500 to 4000 Hz"},
+      Case{"/rate", "1 kg", "key /rate"}, Case{"/limits/force", "20 N", "key /limits/force: 20 N"},
+      Case{"/limits/watchdog", "32 ms", "expected 0.004 to 0.016 s"},
+      Case{"/push", Json::array({0, 0, 0}), "has no direction"},
+      Case{"/indentations/depths", Json::array({"0 mm"}), "key /indentations/depths/0"},
+      Case{"/indentations/hold", "13 h", "takes 4.681e+04 s; expected 12 hours"},
+      Case{"/model/kind", "magic", "/model/kind"}, Case{"/phase", 1, "phase"});
+  CAPTURE(bad.pointer, bad.value.dump());
+  CHECK_THROWS_WITH(parsed(with(short_session(), bad.pointer, bad.value)), Contains(bad.message));
+}
+
+TEST_CASE("The element refuses a scene that is no star") {
+  const HilSession session = parsed(
+      with(short_session(), "/model/scene",
+           Json{{"organ", {{"kind", "block"}, {"cells", {2, 2, 2}}, {"spacing", "20 mm"}}}}));
+  CHECK_THROWS_AS(make_loop_model(session), Error);
+}
+
+HilRecording recorded(const test::TempFolder& folder, const Json& json = short_session()) {
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  (void)run_session(parsed(json), {}, options);
+  return read_recording(folder / "r");
+}
+
+TEST_CASE("A session of the element verifies against the network, the closed form and CVODES") {
+  const test::TempFolder folder;
+  const HilRecording recording = recorded(folder);
+  const Verification v = verify(recording);
+  CHECK(v.whole);
+  CHECK(v.all.peak_N > 0.4);
+  CHECK(v.all.max_N < 0.005 * v.all.peak_N);
+  REQUIRE(v.others.size() == 2);
+  // At every sample and undecimated: what is left comes from letting go within a period, at most
+  // the force of one encoder step.
+  constexpr double kStep_N = 150.72 * 1e-5;
+  CHECK(v.others[0].commanded.max_N < kStep_N);
+  CHECK(v.others[0].commanded.rms_N < 0.02 * kStep_N);
+  CHECK(v.others[1].commanded.max_N < 0.005 * v.all.peak_N);
+  CHECK(v.phases.size() == recording.session.phases.size());
+}
+
+TEST_CASE("Verification finds a force that is wrong by one percent of the peak in one phase") {
+  const test::TempFolder folder;
+  HilRecording recording = recorded(folder);
+  const Verification before = verify(recording);
+  for (ServoRecord& row : recording.rows) {
+    if (row.phase == 2) row.commanded_N[2] += 0.01 * before.all.peak_N;
+  }
+  const Verification v = verify(recording);
+  CHECK(v.phases[2].force.max_N > 0.009 * v.all.peak_N);
+  CHECK(v.phases[1].force.max_N < 0.005 * v.all.peak_N);
+}
+
+TEST_CASE("A thinned motion stays within its tolerance, and keeps its ends") {
+  std::vector<double> time, value;
+  for (int i = 0; i < 5000; ++i) {
+    time.push_back(1e-3 * i);
+    value.push_back(std::round(1e5 * 4e-3 * std::sin(3e-3 * i)) * 1e-5);
+  }
+  const std::vector<std::size_t> kept = decimated(time, value, 5e-6);
+  CHECK(kept.front() == 0);
+  CHECK(kept.back() == 4999);
+  CHECK(kept.size() < 2500);
+  for (std::size_t k = 1; k < kept.size(); ++k) {
+    const std::size_t a = kept[k - 1], b = kept[k];
+    for (std::size_t i = a; i <= b; ++i) {
+      const double line =
+          value[a] + (value[b] - value[a]) * (time[i] - time[a]) / (time[b] - time[a]);
+      REQUIRE(std::abs(value[i] - line) <= 5e-6 * (1.0 + 1e-9));
+    }
+  }
+}
+
+TEST_CASE("Every output of a simulated device says so") {
+  const test::TempFolder folder;
+  const HilRecording recording = recorded(folder);
+  const Verification v = verify(recording);
+  CHECK_THAT(verification_text(recording, v), Contains("SIMULATED DEVICE"));
+  CHECK(verification_json(recording, v).at("simulated_device") == true);
+}
+
+TEST_CASE("The border of the exact update is the closed form, at every relaxation time") {
+  for (const double periods : {1e-3, 0.1, 1.0, 10.0, 1e3}) {
+    RenderedContact contact;
+    contact.relaxation_time_s = periods * contact.period_s;
+    const double half = 0.5 * contact.stiffness_N_per_m;
+    CHECK_THAT(
+        predicted_passive_damping(contact),
+        WithinRel(exact_update_damping(half, half, contact.relaxation_time_s, contact.period_s),
+                  1e-9));
+  }
+  // Its limits: relaxed stiffness and the relaxing spring's dashpot, or all taut.
+  CHECK_THAT(exact_update_damping(100.0, 50.0, 1e-7, 1e-3),
+             WithinRel(100 * 5e-4 + 50 * 1e-7, 1e-9));
+  CHECK_THAT(exact_update_damping(100.0, 50.0, 1e3, 1e-3), WithinRel(150.0 * 5e-4, 1e-6));
+}
+
+TEST_CASE("The measured border of passivity is the predicted one") {
+  for (const int delay : {0, 1, 4}) {
+    for (const ElementRule rule :
+         {ElementRule::exact, ElementRule::forward_euler, ElementRule::mass_spring}) {
+      RenderedContact contact;
+      contact.rule = rule;
+      contact.delay_periods = delay;
+      contact.relaxation_time_s = 2e-3;
+      CAPTURE(delay, static_cast<int>(rule));
+      CHECK_THAT(measured_passive_damping(contact),
+                 WithinRel(predicted_passive_damping(contact), 0.05));
+    }
+  }
+}
+
+TEST_CASE("A spring with a delay follows Colgate and Schenkel's line") {
+  RenderedContact spring;
+  spring.relaxation_time_s = 1e3;  // all taut
+  spring.delay_periods = 3;
+  CHECK_THAT(predicted_passive_damping(spring), WithinRel(spring.stiffness_N_per_m * 3.5e-3, 0.01));
+}
+
+TEST_CASE("Forward Euler diverges below half a period, the exact update does not") {
+  RenderedContact contact;
+  contact.relaxation_time_s = 0.208e-3;  // the paper's
+  contact.rule = ElementRule::forward_euler;
+  CHECK(std::isinf(measured_passive_damping(contact)));
+  CHECK(std::isinf(predicted_passive_damping(contact)));
+  contact.rule = ElementRule::exact;
+  CHECK(measured_passive_damping(contact) < 0.5e-3 * contact.stiffness_N_per_m);
+}
+
+TEST_CASE("Device and arm are stable up to the stiffness that the spectral radius says") {
+  for (const int delay : {0, 2}) {
+    RenderedContact contact;
+    contact.delay_periods = delay;
+    CAPTURE(delay);
+    const double predicted = largest_stable_stiffness(contact, {}, BorderBy::prediction);
+    CHECK_THAT(largest_stable_stiffness(contact, {}, BorderBy::measurement),
+               WithinRel(predicted, 0.02));
+    contact.stiffness_N_per_m = 0.9 * predicted;
+    CHECK(loop_spectral_radius(contact, {}) < 1.0);
+    contact.stiffness_N_per_m = 1.1 * predicted;
+    CHECK(loop_spectral_radius(contact, {}) > 1.0);
+  }
+}
+
+}  // namespace
+}  // namespace tpm

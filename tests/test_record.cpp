@@ -1,0 +1,86 @@
+// Recordings: what is read back, and what survives damage.
+#include <catch2/catch.hpp>
+#include <cstring>
+
+#include "temp_folder.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/row_log.hpp"
+
+namespace tpm {
+namespace {
+
+struct Row {
+  double a, b;
+};
+
+std::string written(const test::TempFolder& folder, int rows, bool closed) {
+  const std::string path = folder / "rows";
+  RowLogWriter log(path, "{\"header\": 1}", sizeof(Row));
+  for (int i = 0; i < rows; ++i) {
+    const Row row{0.1 * i, -1.0 * i};
+    log.append(&row);
+  }
+  if (closed) {
+    log.close("{\"end\": true}");
+  } else {
+    log.flush();
+  }
+  return path;
+}
+
+Row row_of(const RowLog& log, std::size_t i) {
+  Row row{};
+  std::memcpy(&row, log.bytes.data() + i * sizeof(Row), sizeof(Row));
+  return row;
+}
+
+TEST_CASE("A closed log gives back header, rows and closing") {
+  const test::TempFolder folder;
+  const RowLog log = read_row_log(written(folder, 10'000, true));
+  CHECK(log.header == "{\"header\": 1}");
+  CHECK(log.closed);
+  CHECK(log.closing == "{\"end\": true}");
+  REQUIRE(log.rows == 10'000);
+  CHECK(row_of(log, 9'999).a == 0.1 * 9'999);
+}
+
+TEST_CASE("A log cut at any byte gives all rows before the cut, and is not whole") {
+  const test::TempFolder folder;
+  const std::string bytes = read_file(written(folder, 20, true));
+  const std::size_t header = 8 + 4 + 4 + 13 + 4, stride = 4 + sizeof(Row) + 4;
+  for (std::size_t size = header; size < bytes.size(); ++size) {
+    const std::string path = folder / "cut";
+    write_file(path, bytes.substr(0, size));
+    const RowLog log = read_row_log(path);
+    REQUIRE(log.rows == std::min<std::size_t>(20, (size - header) / stride));
+    REQUIRE_FALSE(log.closed);
+  }
+}
+
+TEST_CASE("A damaged row ends what is read: no wrong number comes through") {
+  const test::TempFolder folder;
+  const std::string bytes = read_file(written(folder, 20, true));
+  const std::size_t header = 8 + 4 + 4 + 13 + 4, stride = 4 + sizeof(Row) + 4;
+  for (std::size_t at = header; at < header + 20 * stride; at += 7) {
+    std::string damaged = bytes;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+    const std::string path = folder / "damaged";
+    write_file(path, damaged);
+    const RowLog log = read_row_log(path);
+    REQUIRE(log.rows == (at - header) / stride);
+    for (std::size_t i = 0; i < log.rows; ++i)
+      REQUIRE(row_of(log, i).a == 0.1 * static_cast<double>(i));
+  }
+}
+
+TEST_CASE("What is no log is refused in one line") {
+  const test::TempFolder folder;
+  const std::string path = folder / "text";
+  write_file(path, "time,force\n0,1\n");
+  CHECK_THROWS_WITH(read_row_log(path), Catch::Matchers::Contains("is no recording; expected"));
+  CHECK_THROWS_AS(RowLogWriter("/proc/no/such", "{}", 8), Error);
+}
+
+}  // namespace
+}  // namespace tpm

@@ -1,0 +1,174 @@
+// The servo loop on the clock, with its threads: hang, signal, kill -9. Times are those of a shared
+// machine: what is asserted leaves room for it, and what must be quick is tried more than once.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <thread>
+
+#include "hil_scenes.hpp"
+#include "temp_folder.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/haptics/jitter_check.hpp"
+#include "tpm/haptics/session_run.hpp"
+#include "tpm/haptics/verify.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Loads of other programs must not stop what is not about them.
+HilSession patient_session() {
+  HilSession session = test::parsed(test::short_session());
+  session.servo.most_late = 1001;
+  session.servo.most_missed = 1'000'000;
+  session.hang_limit_s = 1.0;
+  return session;
+}
+
+SessionRunOptions on_the_clock(const std::string& file) {
+  SessionRunOptions options;
+  options.real_time = true;
+  options.recording = file;
+  return options;
+}
+
+TEST_CASE("On the clock a session takes its time, and every cycle is recorded or counted") {
+  const test::TempFolder folder;
+  Json json = test::short_session();
+  json.erase("creep");
+  json["indentations"]["hold"] = "0.2 s";
+  json["indentations"]["rest"] = "0.1 s";
+  HilSession session = test::parsed(json);
+  session.servo.most_late = 1001;
+  session.servo.most_missed = 1'000'000;
+  session.hang_limit_s = 1.0;
+  session.plant.watchdog_s = session.preparation.watchdog_s = 0.016;
+  const auto start = std::chrono::steady_clock::now();
+  const SessionRun run = run_session(session, {}, on_the_clock(folder / "r"));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  const HilRecording recording = read_recording(folder / "r");
+  CHECK(took.count() > 0.99 * session.duration_s());
+  CHECK_FALSE(run.outcome.scheduling.empty());
+  CHECK(run.outcome.dropped_records == 0);
+  // Missed periods are time too: rows and missed ones together are the cycles.
+  std::uint64_t lived = 0;
+  for (const ServoRecord& row : recording.rows) lived += 1 + static_cast<std::uint64_t>(row.missed);
+  CHECK(lived == run.outcome.cycles + 1);
+  CHECK((run.outcome.cause == StopCause::finished || run.outcome.cause == StopCause::watchdog));
+}
+
+TEST_CASE("A session on the clock that is interrupted stops safely and is whole") {
+  const test::TempFolder folder;
+  std::atomic<bool> stop{false};
+  SessionRunOptions options = on_the_clock(folder / "r");
+  options.interrupted = [&] { return stop.load(); };
+  std::thread later([&] {
+    std::this_thread::sleep_for(200ms);
+    stop = true;
+  });
+  const SessionRun run = run_session(patient_session(), {}, options);
+  later.join();
+  const bool cut_by_load = run.outcome.cause == StopCause::watchdog;  // the machine was stalled
+  CHECK((run.outcome.cause == StopCause::signal || cut_by_load));
+  CHECK(read_recording(folder / "r").closed);
+}
+
+long long event_ns(const std::string& file, const std::string& event) {
+  std::ifstream events(file);
+  std::string name;
+  long long time = 0;
+  while (events >> name >> time) {
+    if (name == event) return time;
+  }
+  return -1;
+}
+
+TEST_CASE(
+    "A call that hangs: forces are off within 10 ms, the cause is told, nobody waits for it") {
+  double best_ms = 1e9;
+  for (int attempt = 0; attempt < 10 && best_ms > 10.0; ++attempt) {
+    const test::TempFolder folder;
+    const std::string events = folder / "events";
+    write_file(folder / "script", "events " + events + "\nfault hang 100 1500\n");
+    (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+    HilSession session = patient_session();
+    session.hang_limit_s = 0.006;
+    DeviceChoice device;
+    device.kind = "omega7";
+    device.library = TPM_STAND_IN_DHD;
+    const auto start = std::chrono::steady_clock::now();
+    const SessionRun run = run_session(session, device, on_the_clock(folder / "r"));
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    (void)unsetenv("TPM_STAND_IN_SCRIPT");
+    REQUIRE(run.outcome.cause == StopCause::hang);
+    const HilRecording recording = read_recording(folder / "r");
+    CHECK(recording.closed);
+    CHECK(recording.closing.at("cause") == "hang");
+    CHECK(took.count() < 1.5);
+    const long long hung = event_ns(events, "hang"), off = event_ns(events, "forces_off");
+    if (hung > 0 && off > 0) {
+      best_ms = std::min(best_ms, 1e-6 * static_cast<double>(off - hung));
+      CHECK(recording.rows.size() >= 90);  // nothing before it is lost
+    }
+    std::this_thread::sleep_for(1600ms);  // the stuck thread ends before its script is removed
+  }
+  CHECK(best_ms <= 10.0);
+}
+
+TEST_CASE("kill -9 at random moments: every recording opens and verifies up to the last second") {
+  const test::TempFolder folder;
+  write_file(folder / "session.json", test::short_session().dump());
+  int verified = 0;
+  for (int i = 0; i < 12; ++i) {
+    const std::string file = folder / ("r" + std::to_string(i));
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      (void)!freopen("/dev/null", "w", stdout);
+      (void)!freopen("/dev/null", "w", stderr);
+      execl(TPM_TEST_PROGRAM, "tpm", "hil", "run", (folder / "session.json").c_str(), "--time",
+            "real", "-o", file.c_str(), static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(150 + 97 * i));
+    const auto alive_until = std::filesystem::file_time_type::clock::now();
+    (void)kill(child, SIGKILL);
+    int status = 0;
+    (void)waitpid(child, &status, 0);
+    if (!std::filesystem::exists(file)) continue;  // killed before it began
+    const HilRecording recording = read_recording(file);
+    if (!WIFSIGNALED(status)) continue;  // stopped by itself before: the machine was stalled
+    CHECK_FALSE(recording.closed);
+    // What is missing is what the last 50 ms and a stall of the machine can hold.
+    const std::chrono::duration<double> unwritten =
+        alive_until - std::filesystem::last_write_time(file);
+    CHECK(unwritten.count() < 1.0);
+    if (recording.rows.size() < 2) continue;
+    VerifyOptions options;
+    options.window_s = 0.0;
+    const Verification v = verify(recording, options);
+    CHECK_FALSE(v.whole);
+    CHECK(v.end_s > 0.0);
+    ++verified;
+  }
+  CHECK(verified >= 3);
+}
+
+TEST_CASE("The jitter check counts and judges") {
+  DeviceChoice device;
+  const JitterCheck check = check_jitter(device, 500.0, 0.5, RealTimeWish::ignore);
+  CHECK(check.outcome.woke_late.count() > 0);
+  CHECK_FALSE(check.verdict.empty());
+  CHECK(check.outcome.woke_late.quantile_s(0.5) <= check.outcome.woke_late.quantile_s(0.99));
+}
+
+}  // namespace
+}  // namespace tpm

@@ -1,0 +1,241 @@
+// The vendor's library, stood in for by one with the same C interface and loaded in the same way.
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <fstream>
+
+#include "hil_scenes.hpp"
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/device/omega7.hpp"
+#include "tpm/haptics/recording.hpp"
+#include "tpm/haptics/session_run.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+using Catch::Matchers::Contains;
+
+/// A script for the stand-in library, for as long as this lives.
+class Script {
+ public:
+  explicit Script(const std::string& lines) {
+    write_file(folder_ / "script", lines + "events " + (folder_ / "events") + "\n");
+    (void)setenv("TPM_STAND_IN_SCRIPT", (folder_ / "script").c_str(), 1);
+  }
+  ~Script() { (void)unsetenv("TPM_STAND_IN_SCRIPT"); }
+  Script(const Script&) = delete;
+  Script& operator=(const Script&) = delete;
+
+  [[nodiscard]] bool happened(const std::string& event) const {
+    std::ifstream events(folder_ / "events");
+    std::string name;
+    long long time = 0;
+    while (events >> name >> time) {
+      if (name == event) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] std::string file(const char* name) const { return folder_ / name; }
+
+ private:
+  test::TempFolder folder_;
+};
+
+std::string message_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const Error& error) {
+    CHECK(error.code() == ExitCode::environment);
+    return error.what();
+  }
+  FAIL("nothing was refused");
+  return {};
+}
+
+DeviceChoice stand_in() {
+  DeviceChoice choice;
+  choice.kind = "omega7";
+  choice.library = TPM_STAND_IN_DHD;
+  return choice;
+}
+
+struct Ran {
+  SessionRun run;
+  HilRecording recording;
+};
+
+Ran ran(const HilSession& session, const DeviceChoice& device, const std::string& file) {
+  SessionRunOptions options;
+  options.recording = file;
+  SessionRun run = run_session(session, device, options);
+  return {std::move(run), read_recording(file)};
+}
+
+std::string operator_lines(const HilSession& session, const test::TempFolder& folder) {
+  write_file(folder / "operator", to_lines(session.operator_script()));
+  return "operator " + (folder / "operator") + "\n";
+}
+
+TEST_CASE("A missing library is told with all that was tried") {
+  (void)setenv("FDSDK", "/no/sdk", 1);
+  const std::string message = message_of([] { Omega7 device(""); });
+  (void)unsetenv("FDSDK");
+  CHECK_THAT(message, Contains("/no/sdk/lib/release/lin-x86_64-gcc/libdrd.so.3"));
+  CHECK_THAT(message, Contains("libdhd.so.3") && Contains("--dhd-library"));
+  CHECK_THAT(message_of([] { Omega7 device("/no/such.so"); }), Contains("/no/such.so"));
+}
+
+TEST_CASE("A library without a symbol, or of another version, is refused by name") {
+  const Script script("");
+  CHECK_THAT(message_of([] { Omega7 device(TPM_STAND_IN_DHD_WITHOUT_A_SYMBOL); }),
+             Contains("has no drdStop;"));
+  const Script old("version 2\n");
+  CHECK_THAT(message_of([] { Omega7 device(TPM_STAND_IN_DHD); }), Contains("is version 2.14.0.0"));
+}
+
+TEST_CASE("No device, and a device of another type, are told") {
+  {
+    const Script none("devices 0\n");
+    CHECK_THAT(message_of([] { (void)Omega7(TPM_STAND_IN_DHD).open(); }),
+               Contains("no device found"));
+  }
+  const Script other("type 33\n");
+  CHECK_THAT(message_of([] { (void)Omega7(TPM_STAND_IN_DHD).open(); }), Contains("of type 33"));
+}
+
+TEST_CASE("The device says what it is; a link behind which a simulator may be is no hardware") {
+  const auto identity = [](const std::string& lines) {
+    const Script script(lines);
+    Omega7 device(TPM_STAND_IN_DHD);
+    return device.open();
+  };
+  const DeviceIdentity real = identity("com_mode 0\n");
+  CHECK(real.hardware);
+  CHECK(real.serial == "4711");
+  CHECK(real.firmware == "2.50");
+  CHECK(real.library_version == "3.14.0.0");
+  CHECK(identity("com_mode 1\n").hardware);
+  for (const char* mode : {"com_mode 3\n", "com_mode 4\n", "com_mode 2\n"}) {
+    CHECK_FALSE(identity(mode).hardware);
+  }
+  CHECK(word_of(identity("com_mode 3\n").link) == "simulated");
+  CHECK(word_of(identity("com_mode 4\n").link) == "network");
+  CHECK(identity("type 37\n").left_handed);
+}
+
+TEST_CASE("A device that is not initialised does not move unasked") {
+  const Script script("initialised 0\n");
+  DevicePreparation preparation;
+  {
+    Omega7 device(TPM_STAND_IN_DHD);
+    (void)device.open();
+    CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("--may-move"));
+  }
+  CHECK_FALSE(script.happened("moved"));
+  preparation.may_move = true;
+  Omega7 device(TPM_STAND_IN_DHD);
+  (void)device.open();
+  device.prepare(preparation);
+  CHECK(script.happened("moved"));
+}
+
+TEST_CASE("Without libdrd nobody can tell whether a device is initialised") {
+  const Script script("");
+  DevicePreparation preparation;
+  Omega7 device(TPM_STAND_IN_DHD_WITHOUT_DRD);
+  (void)device.open();
+  CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("cannot tell"));
+  preparation.take_as_ready = true;
+  device.prepare(preparation);
+}
+
+TEST_CASE("A session through the library gives the forces of the simulated device, bit for bit") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  const Ran direct = ran(session, {}, folder / "direct");
+  const Script script(operator_lines(session, folder) + "period 0.001\n");
+  const Ran loaded = ran(session, stand_in(), folder / "loaded");
+  CHECK(loaded.run.outcome.cause == StopCause::finished);
+  CHECK(direct.recording.simulated());
+  CHECK_FALSE(loaded.recording.simulated());
+  REQUIRE(loaded.recording.rows.size() == direct.recording.rows.size());
+  double peak = 0.0;
+  for (std::size_t i = 0; i < direct.recording.rows.size(); ++i) {
+    const ServoRecord& a = direct.recording.rows[i];
+    const ServoRecord& b = loaded.recording.rows[i];
+    REQUIRE(a.commanded_N[2] == b.commanded_N[2]);
+    REQUIRE(a.position_m[2] == b.position_m[2]);
+    peak = std::max(peak, a.commanded_N[2]);
+  }
+  CHECK(peak > 0.4);
+  CHECK(script.happened("stop"));
+  CHECK(script.happened("forces_off"));
+  CHECK(script.happened("close"));
+}
+
+TEST_CASE("An older status with 16 entries is read") {
+  const HilSession session = test::parsed(test::short_session());
+  const Script script("entries 16\n");
+  const test::TempFolder folder;
+  CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
+}
+
+TEST_CASE("Time guards and saturation are counted and the session goes on") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  const Script script(operator_lines(session, folder) +
+                      "fault time_guard 100 40\nfault time_guard 500 3\nfault saturated 200 7\n");
+  const Ran r = ran(session, stand_in(), folder / "r");
+  CHECK(r.run.outcome.cause == StopCause::finished);
+  CHECK(r.run.outcome.counts.time_guards == 43);
+  CHECK(r.run.outcome.counts.saturations == 7);
+  int flagged = 0;
+  for (const ServoRecord& row : r.recording.rows)
+    flagged += (row.flags & kTimeGuarded) != 0 ? 1 : 0;
+  CHECK(flagged == 43);
+}
+
+TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its cause") {
+  struct Case {
+    const char* fault;
+    StopCause cause;
+    const char* event;
+  };
+  const Case fault = GENERATE(Case{"unplugged", StopCause::unplugged, "unplugged"},
+                              Case{"watchdog", StopCause::watchdog, "watchdog"},
+                              Case{"velocity", StopCause::velocity, "velocity"},
+                              Case{"communication", StopCause::communication, "communication"},
+                              Case{"nan", StopCause::position_not_finite, "nan"});
+  CAPTURE(fault.fault);
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  constexpr std::uint64_t kAt = 1777;
+  const Script script(operator_lines(session, folder) + "fault " + fault.fault + " " +
+                      std::to_string(kAt) + " 1\n");
+  const Ran r = ran(session, stand_in(), folder / "r");
+  CHECK(script.happened(fault.event));
+  CHECK(r.run.outcome.cause == fault.cause);
+  // Nothing is lost before it, and the last row tells the cause.
+  REQUIRE(r.recording.rows.size() == r.run.outcome.cycles + 1);
+  CHECK(r.recording.rows.back().stop == fault.cause);
+  CHECK(r.recording.rows.back().cycle >= kAt);
+  CHECK(r.recording.rows.back().cycle <= kAt + 10);
+  CHECK(r.recording.closed);
+  CHECK(r.recording.closing.at("cause") == word_of(fault.cause));
+  CHECK(script.happened("stop"));
+  CHECK(script.happened("forces_off"));
+}
+
+TEST_CASE("A recording of the stand-in behind a network is labelled as simulated") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  const Script script("com_mode 4\n");
+  const Ran r = ran(session, stand_in(), folder / "r");
+  CHECK(r.recording.simulated());
+  CHECK_THAT(device_line(r.recording), Contains("SIMULATED DEVICE"));
+}
+
+}  // namespace
+}  // namespace tpm
