@@ -1,0 +1,71 @@
+#include "tpm/reduce/condensed_fit.hpp"
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+
+namespace tpm {
+namespace {
+
+constexpr std::array<int, 3> kDegrees{4, 3, 1};  // in the depth, by degree in the tangents
+constexpr int kTerms = 5 + 2 * 4 + 3 * 2;
+
+using Terms = Eigen::Matrix<double, kTerms, 1>;
+
+Terms terms(const CondensedFrame& frame, const Eigen::Vector3d& w) {
+  const double p = (w[0] - frame.middle_depth_m) / frame.half_depth_m;
+  const double s = w[1] / frame.tangential_m;
+  const double t = w[2] / frame.tangential_m;
+  Terms result;
+  Eigen::Index k = 0;
+  const auto add = [&](double factor, int degree) {
+    for (int n = 0; n <= degree; ++n, factor *= p) result[k++] = factor;
+  };
+  add(1.0, kDegrees[0]);
+  add(s, kDegrees[1]);
+  add(t, kDegrees[1]);
+  add(s * s, kDegrees[2]);
+  add(s * t, kDegrees[2]);
+  add(t * t, kDegrees[2]);
+  return result;
+}
+
+constexpr std::array<std::array<Eigen::Index, 2>, 6> kEntries{
+    {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+
+void put(const Eigen::Matrix3d& matrix, const CondensedFrame& frame,
+         Eigen::Ref<Eigen::Matrix<double, 6, 1>> row) {
+  const Eigen::Matrix3d local = frame.axes.transpose() * matrix * frame.axes;
+  Eigen::Index k = 0;
+  for (const auto& [i, j] : kEntries) row[k++] = 0.5 * (local(i, j) + local(j, i));
+}
+
+Eigen::Matrix3d taken(const Eigen::Matrix<double, 18, 1>& values, Eigen::Index from) {
+  Eigen::Matrix3d matrix;
+  for (const auto& [i, j] : kEntries) matrix(i, j) = matrix(j, i) = values[from++];
+  return matrix;
+}
+
+}  // namespace
+
+CondensedMatrices::CondensedMatrices(const CondensedFrame& frame,
+                                     std::span<const CondensedMetric> metrics)
+    : frame_(frame) {
+  const auto count = static_cast<Eigen::Index>(metrics.size());
+  Eigen::MatrixXd rows(count, kTerms);
+  Eigen::Matrix<double, 18, Eigen::Dynamic> values(18, count);
+  for (Eigen::Index m = 0; m < count; ++m) {
+    const CondensedMetric& at = metrics[static_cast<std::size_t>(m)];
+    rows.row(m) = terms(frame, frame.local(at.w_m));
+    put(at.metric.inverse(), frame, values.col(m).segment<6>(0));
+    put(at.second_metric, frame, values.col(m).segment<6>(6));
+    put(at.second_energy, frame, values.col(m).segment<6>(12));
+  }
+  coefficients_ = rows.colPivHouseholderQr().solve(values.transpose()).transpose();
+}
+
+CondensedMatrices::Values CondensedMatrices::at(const Eigen::Vector3d& w_m) const {
+  const Eigen::Matrix<double, 18, 1> values = coefficients_ * terms(frame_, w_m);
+  return {taken(values, 0), taken(values, 6), taken(values, 12)};
+}
+
+}  // namespace tpm
