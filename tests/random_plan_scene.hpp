@@ -14,9 +14,9 @@ namespace tpm::test {
 /// or three layers (one in ten a star); E1, E2, E' from 3 to 30 kPa, relaxation time from 1 ms to
 /// 30 s, evenly in the logarithm; one sphere (three in four), a patch, or a ball (one in eight);
 /// 0.05 to 8 mm deep in 0.1 to 3 s (one in eight: 20 to 200 mm/s), held, then let halfway back and
-/// pushed again, or not; one in six under a load of 0.02 to 0.2 N that rises in 1 s. Tolerances from
-/// 0.2 to 5 %, at a rate of 1 kHz (one in three), a wall budget of 1 s per s (one in three), or
-/// without budget; one in six asks for the field.
+/// pushed again, or not; one in six under a load of 0.02 to 0.2 N that rises in 1 s. Tolerances
+/// from 0.2 to 5 %, at a rate of 1 kHz (one in three), a wall budget of 1 s per s (one in three),
+/// or without budget; one in six asks for the field.
 class RandomPlan {
  public:
   RandomPlan(std::uint64_t seed, int number)
@@ -60,8 +60,9 @@ class RandomPlan {
   [[nodiscard]] std::string text() const {
     std::string text = "{";
     text += star_ ? std::string(R"("organ": {"kind": "star", "spacing": "30 mm"})")
-                  : fmt::format(R"("organ": {{"kind": "liver", "count": {}, "layers": {}, "seed": {}}})",
-                                count_, layers_, organ_seed_);
+                  : fmt::format(
+                        R"("organ": {{"kind": "liver", "count": {}, "layers": {}, "seed": {}}})",
+                        count_, layers_, organ_seed_);
     text += fmt::format(
         R"(, "material": {{"E1": "{} kPa", "E2": "{} kPa", "Eprime": "{} kPa", "eta1": "{} kPa s"}})",
         modulus_[0], modulus_[1], modulus_[2], eta_);

@@ -15,17 +15,20 @@ namespace tpm::app {
 namespace fs = std::filesystem;
 
 void add_plan_options(CLI::App& command, PlanChoice& choice) {
-  command.add_option("--tolerance", choice.tolerance,
-                     "Error in parts of the peak, such as 1% or 0.01, or jnd: what a hand can feel")
+  command
+      .add_option("--tolerance", choice.tolerance,
+                  "Error in parts of the peak, such as 1% or 0.01, or jnd: what a hand can feel")
       ->capture_default_str();
-  command.add_option("--outputs", choice.outputs,
-                     "What the tolerance is about: force (the response) or field (displacements)")
+  command
+      .add_option("--outputs", choice.outputs,
+                  "What the tolerance is about: force (the response) or field (displacements)")
       ->check(CLI::IsMember({"force", "field"}))
       ->capture_default_str();
   command.add_option("--rate", choice.rate, "Servo rate in Hz: every period needs its answer");
   command.add_option("--wall", choice.wall, "Computing time, such as \"0.1 s per s\"");
-  command.add_option("--costs", choice.costs,
-                     "File of --calibrate, or nominal; default: this machine's, if it was calibrated");
+  command.add_option(
+      "--costs", choice.costs,
+      "File of --calibrate, or nominal; default: this machine's, if it was calibrated");
 }
 
 PlanRequest plan_request(const PlanChoice& choice) {
@@ -108,7 +111,8 @@ void add_plan_command(CLI::App& app, Session& session) {
   auto choice = std::make_shared<PlanCommand>();
   command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
   add_plan_options(*command, choice->choice);
-  command->add_flag("--brief", choice->brief, "Leave out what does not matter and what would break");
+  command->add_flag("--brief", choice->brief,
+                    "Leave out what does not matter and what would break");
   command->add_flag("--calibrate", choice->calibrate,
                     "Measure what operations cost on this machine, and keep it");
   add_format_option(*command, session);

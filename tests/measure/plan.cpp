@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
   for (const auto& [name, tally] : by_formulation) row(name, tally);
   row("all", all);
   row("picks", picks);
-  fmt::print("scenes {}, without a pick {}, failed {}, picks rejected by verification {}\n", scenes, none,
-             failed, rejected);
+  fmt::print("scenes {}, without a pick {}, failed {}, picks rejected by verification {}\n", scenes,
+             none, failed, rejected);
   return 0;
 }

@@ -81,7 +81,8 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
   ContactSpectrum spectrum;
   spectrum.tau_s = material.relaxation_time_s();
   // A bond under a constant force creeps in (E1 + E2)/E1 tau; one without E1 creeps for ever.
-  spectrum.longest = std::min((material.E1_Pa + material.E2_Pa) / std::max(material.E1_Pa, 1e-3), 1e3);
+  spectrum.longest =
+      std::min((material.E1_Pa + material.E2_Pa) / std::max(material.E1_Pa, 1e-3), 1e3);
   for (int i = 0; i < kThetas; ++i) {
     const double theta = 0.5 * (1.0 - std::cos(std::numbers::pi * i / (kThetas - 1)));
     const BondMemory memory{rest.remembered, theta, rest.closed};
@@ -91,7 +92,8 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
     }
     const DrivenTissue::UnitField unit = tissue.unit_field(rest, memory);
     double per_depth = 1.0;
-    double stiffness = 1.0 / unit.stiffness;  // under a load the work of the unit field is the compliance
+    double stiffness =
+        1.0 / unit.stiffness;  // under a load the work of the unit field is the compliance
     if (tissue.depth_driven()) {
       Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.position.cols());
       driven.bonds.add_stiffness_times(rest.position, memory, unit.displacement, force);
@@ -101,7 +103,8 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
     }
     spectrum.theta.push_back(theta);
     spectrum.stiffness_N_per_m.push_back(stiffness);
-    const auto field = per_depth * unit.displacement.leftCols(scene.network().organ.position.cols());
+    const auto field =
+        per_depth * unit.displacement.leftCols(scene.network().organ.position.cols());
     if (i == 0) spectrum.field_at_once = field;
     if (i == kThetas - 1) spectrum.field_relaxed = field;
   }

@@ -10,9 +10,9 @@ namespace tpm {
 /// of all that can relax has relaxed. In the frequency domain theta = 1/(1 + s tau), so these
 /// numbers are the whole relaxation of the contact.
 struct ContactSpectrum {
-  std::vector<double> theta;            ///< rising, from 0 to 1
+  std::vector<double> theta;              ///< rising, from 0 to 1
   std::vector<double> stiffness_N_per_m;  ///< falling
-  double tau_s = 0.0;  ///< of the bonds
+  double tau_s = 0.0;                     ///< of the bonds
   double longest = 1.0;  ///< the longest relaxation time of the contact, in tau: (E1 + E2)/E1
   /// Displacements of the spheres per unit of depth, at once and relaxed.
   Eigen::Matrix3Xd field_at_once, field_relaxed;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kLanczosSteps = 24;
 constexpr std::size_t kMostKinks = 200;
-constexpr int kSamples = 400;      // after each change of rate
+constexpr int kSamples = 400;     // after each change of rate
 constexpr double kPeriods = 3.0;  // of the lowest mode that they span
 
 /// A mode as the contact sees it.
@@ -57,9 +57,8 @@ class Lanczos {
     }
     beside.resize(diagonal.size() - 1);
     Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
-    ritz.computeFromTridiagonal(
-        Eigen::Map<Eigen::VectorXd>(diagonal.data(), std::ssize(diagonal)),
-        Eigen::Map<Eigen::VectorXd>(beside.data(), std::ssize(beside)));
+    ritz.computeFromTridiagonal(Eigen::Map<Eigen::VectorXd>(diagonal.data(), std::ssize(diagonal)),
+                                Eigen::Map<Eigen::VectorXd>(beside.data(), std::ssize(beside)));
     std::vector<SeenMode> modes;
     for (Eigen::Index i = 0; i < ritz.eigenvalues().size(); ++i) {
       const double first = size * ritz.eigenvectors()(0, i);
@@ -194,8 +193,7 @@ InertiaEstimate estimate_inertia(const PlanScene& scene) {
         std::max(estimate.highest_Hz, std::sqrt(mode.omega2) / (2.0 * std::numbers::pi));
   }
   const double span_s = kPeriods / lowest.frequency_Hz;
-  const double own_drag =
-      tissue.depth_driven() ? alpha * tissue.driven_mass_kg(mass) : 0.0;
+  const double own_drag = tissue.depth_driven() ? alpha * tissue.driven_mass_kg(mass) : 0.0;
   estimate.of_rates = of_rates(rate_kinks(scene.protocol()), modes, alpha, own_drag, span_s,
                                scene.protocol().knots().back().time_s);
   const double jump = largest_jump(scene.protocol());

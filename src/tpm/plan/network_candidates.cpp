@@ -204,6 +204,7 @@ void add_inertial_models(PlanModels& models) {
 PlanModels plan_models(const PlanScene& scene) {
   PlanModels models;
   add_scalar_models(models);
+  add_contact_models(models);
   add_network_models(models, scene);
   add_inertial_models(models);
   return models;

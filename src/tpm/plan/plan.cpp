@@ -115,7 +115,7 @@ class Planning {
       try {
         judge(model, candidate);
       } catch (const Error& error) {
-        if (error.code() != ExitCode::numerical) throw;
+        if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
         candidate.reason = fmt::format("fails: {}", error.what());
       }
     }
@@ -145,7 +145,8 @@ class Planning {
   void sort() {
     std::stable_sort(plan_.candidates.begin(), plan_.candidates.end(),
                      [](const PlannedCandidate& a, const PlannedCandidate& b) {
-                       if (!a.cost_s_per_s || !b.cost_s_per_s) return a.cost_s_per_s && !b.cost_s_per_s;
+                       if (!a.cost_s_per_s || !b.cost_s_per_s)
+                         return a.cost_s_per_s && !b.cost_s_per_s;
                        return *a.cost_s_per_s < *b.cost_s_per_s;
                      });
   }
@@ -154,16 +155,17 @@ class Planning {
   void verify(PlannedCandidate& candidate) {
     const PlanTrajectory answer =
         model_of(candidate).run(*scout_, plan_.request.budget, truth_.times_s);
-    candidate.verified_error =
-        trajectory_error(answer, truth_.trajectory, plan_.request.measure) +
-        truth_.reference.difference;
+    candidate.verified_error = trajectory_error(answer, truth_.trajectory, plan_.request.measure) +
+                               truth_.reference.difference;
   }
 
   /// All that take less than the reference, so that the frontier shows how far claims are off.
   void verify_cheap() {
     for (PlannedCandidate& candidate : plan_.candidates) {
-      const bool reduced = candidate.reach == ModelReach::reduced && candidate.formulation != "network_step";
-      if (candidate.claimed_error && (reduced || candidate.formulation == "collocation")) verify(candidate);
+      const bool reduced =
+          candidate.reach == ModelReach::reduced && candidate.formulation != "network_step";
+      if (candidate.claimed_error && (reduced || candidate.formulation == "collocation"))
+        verify(candidate);
     }
   }
 
@@ -201,9 +203,9 @@ void set_tolerance(PlanRequest& request, const std::string& text) {
   if (text == "jnd") {
     request.tolerance = kForceJnd;
     request.measure.relative_weight = kForceJnd / kStiffnessJnd;
-    request.tolerance_source = fmt::format(
-        "just noticeable differences: force {} %, stiffness {} %", shortest(100.0 * kForceJnd),
-        shortest(100.0 * kStiffnessJnd));
+    request.tolerance_source =
+        fmt::format("just noticeable differences: force {} %, stiffness {} %",
+                    shortest(100.0 * kForceJnd), shortest(100.0 * kStiffnessJnd));
     return;
   }
   const bool percent = !text.empty() && text.back() == '%';
@@ -220,8 +222,8 @@ double parse_wall_budget(const std::string& text) {
   constexpr std::string_view kPer = " per s";
   const bool per = text.size() > kPer.size() && text.ends_with(kPer);
   if (per) {
-    const double value = parse_quantity(text.substr(0, text.size() - kPer.size()), Dimension::time,
-                                        "--wall");
+    const double value =
+        parse_quantity(text.substr(0, text.size() - kPer.size()), Dimension::time, "--wall");
     if (value > 0.0) return value;
   }
   throw Error(ExitCode::usage, "--wall", fmt::format("'{}'", printable(text)),
@@ -255,7 +257,8 @@ Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
     knots.push_back({knots.back().time_s + length, depth_m});
   };
   const auto rest = [&] {
-    if (range.hold_s > 0.0) knots.push_back({knots.back().time_s + range.hold_s, knots.back().value});
+    if (range.hold_s > 0.0)
+      knots.push_back({knots.back().time_s + range.hold_s, knots.back().value});
   };
   go(range.depth_m, range.speed_m_per_s);
   rest();

@@ -15,8 +15,8 @@ struct PlanRequest {
   std::string tolerance_source;  ///< in words, if it is not a number that was given
   PlanBudget budget;
   OperationCosts costs = nominal_costs();
-  bool relevance = true;  ///< find out what does not matter
-  bool changes = true;    ///< find out what would break first
+  bool relevance = true;                                  ///< find out what does not matter
+  bool changes = true;                                    ///< find out what would break first
   std::function<void(const std::string& what)> progress;  ///< told what is being done
 };
 
@@ -72,7 +72,8 @@ struct Plan {
   std::size_t spheres = 0, bonds = 0;
   std::vector<PlannedCandidate> candidates;  ///< by rising cost, those without one last
   std::optional<std::size_t> choice;         ///< none: nothing meets tolerance and budget
-  std::optional<std::size_t> without_budget;  ///< the cheapest that meets the tolerance, if no choice
+  std::optional<std::size_t>
+      without_budget;       ///< the cheapest that meets the tolerance, if no choice
   bool needs_full = false;  ///< no reduced model meets the tolerance
   PlanReference reference;
   std::vector<PlanRelevance> relevance;
@@ -82,8 +83,8 @@ struct Plan {
   [[nodiscard]] const PlannedCandidate& chosen() const { return candidates.at(choice.value()); }
 };
 
-/// The least model for a scene. Throws Error(bad_input) for scenes and requests that no plan is made
-/// for, Error(numerical) where the reference itself cannot be computed or its judge disagrees.
+/// The least model for a scene. Throws Error(bad_input) for scenes and requests that no plan is
+/// made for, Error(numerical) where the reference itself cannot be computed or its judge disagrees.
 [[nodiscard]] Plan make_plan(const ExperimentScene& scene, const PlanRequest& request);
 
 /// The planned model's answer over the scene's protocol, at the times given.
@@ -93,13 +94,13 @@ struct Plan {
 
 /// How a hand will move a contact: what a session knows before it begins.
 struct ContactRange {
-  double depth_m = 0.0;         ///< deepest, > 0
-  double speed_m_per_s = 0.0;   ///< fastest, > 0
-  double hold_s = 1.0;          ///< longest rest at a depth, >= 0
+  double depth_m = 0.0;        ///< deepest, > 0
+  double speed_m_per_s = 0.0;  ///< fastest, > 0
+  double hold_s = 1.0;         ///< longest rest at a depth, >= 0
 };
 
-/// A plan for a contact that is moved as a hand likes: the protocol it is made for goes to the whole
-/// and to half of the depth at full and at a fifth of the speed, rests there, and comes back.
+/// A plan for a contact that is moved as a hand likes: the protocol it is made for goes to the
+/// whole and to half of the depth at full and at a fifth of the speed, rests there, and comes back.
 /// @param scene of which organ, material and contacts are used
 [[nodiscard]] Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
                                     const PlanRequest& request);

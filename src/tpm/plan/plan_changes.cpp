@@ -12,8 +12,8 @@
 namespace tpm {
 namespace {
 
-constexpr double kStride = 1.5;      // between factors tried
-constexpr double kFoundTo = 1.02;    // by bisection
+constexpr double kStride = 1.5;    // between factors tried
+constexpr double kFoundTo = 1.02;  // by bisection
 constexpr double kValidityTolerance = 1e-3;
 
 Validity validity_of(const PlanScene& scene) {
@@ -29,7 +29,10 @@ Validity validity_of(const PlanScene& scene) {
 class Survival {
  public:
   Survival(const PlanScout& scout, const PlanModel& model, const PlanRequest& request)
-      : scout_(scout), model_(model), request_(request), valid_(passed_limits(scout.scene()).empty()) {}
+      : scout_(scout),
+        model_(model),
+        request_(request),
+        valid_(passed_limits(scout.scene()).empty()) {}
 
   /// What breaks in a changed scene; none if nothing does.
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
@@ -88,7 +91,8 @@ class Survival {
 
  private:
   [[nodiscard]] bool masses_known() const {
-    return std::all_of(scout_.scene().scene().contacts.begin(), scout_.scene().scene().contacts.end(),
+    return std::all_of(scout_.scene().scene().contacts.begin(),
+                       scout_.scene().scene().contacts.end(),
                        [](const SceneContact& c) { return !c.is_tool() || c.mass_kg; });
   }
 

@@ -11,8 +11,8 @@ namespace tpm {
 
 /// What a model answers a period late at most, and how fast it has to be.
 struct PlanBudget {
-  std::optional<double> rate_Hz;        ///< of a servo loop: every period needs its answer
-  std::optional<double> wall_s_per_s;   ///< computing time per simulated second
+  std::optional<double> rate_Hz;       ///< of a servo loop: every period needs its answer
+  std::optional<double> wall_s_per_s;  ///< computing time per simulated second
   [[nodiscard]] std::optional<double> period_s() const {
     if (!rate_Hz) return std::nullopt;
     return 1.0 / *rate_Hz;
@@ -21,8 +21,8 @@ struct PlanBudget {
 
 /// What a model says of itself before it is verified.
 struct ModelClaim {
-  double error = 0.0;  ///< bound, in parts of the peak
-  OperationCount work;  ///< of the whole protocol; at a servo rate of all its periods
+  double error = 0.0;        ///< bound, in parts of the peak
+  OperationCount work;       ///< of the whole protocol; at a servo rate of all its periods
   OperationCount of_period;  ///< the costliest period, where the model can be stepped by a servo
 };
 
@@ -68,6 +68,7 @@ using PlanModels = std::vector<std::unique_ptr<PlanModel>>;
 
 // The families.
 void add_scalar_models(PlanModels& models);
+void add_contact_models(PlanModels& models);
 void add_network_models(PlanModels& models, const PlanScene& scene);
 void add_inertial_models(PlanModels& models);
 

@@ -35,10 +35,10 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
     other.newton = NewtonSolver::klu;
     other.highest_order = kJudgeOrder;
     judge = scene.inertial(other, truth.times_s, field);
-    truth.reference.method =
-        fmt::format("network with masses, BDF of order 2, tolerance {}", shortest(kInertialTolerance));
-    truth.reference.judge = fmt::format("BDF of order 3 with KLU, tolerance {}",
-                                        shortest(kInertialJudgeTolerance));
+    truth.reference.method = fmt::format("network with masses, BDF of order 2, tolerance {}",
+                                         shortest(kInertialTolerance));
+    truth.reference.judge =
+        fmt::format("BDF of order 3 with KLU, tolerance {}", shortest(kInertialJudgeTolerance));
   } else {
     truth.times_s = sampled_times(scene.protocol(), kTimesOfPiece, kMostTimes);
     QuasiStaticOptions options;
@@ -50,8 +50,8 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
     truth.reference.method =
         fmt::format("nonlinear network, Radau collocation of {} stages, tolerance {}", kLanes,
                     shortest(kTolerance));
-    truth.reference.judge = fmt::format("Radau collocation of {} stages, tolerance {}", kJudgeStages,
-                                        shortest(kJudgeTolerance));
+    truth.reference.judge = fmt::format("Radau collocation of {} stages, tolerance {}",
+                                        kJudgeStages, shortest(kJudgeTolerance));
   }
   truth.reference.peak = truth.trajectory.response.cwiseAbs().maxCoeff();
   if (!(truth.reference.peak > 0.0)) {
@@ -59,10 +59,11 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
   }
   truth.reference.difference = trajectory_error(judge, truth.trajectory, measure);
   if (truth.reference.difference <= kAgreement * tolerance) return truth;
-  throw Error(ExitCode::numerical, "reference",
-              fmt::format("it and its judge differ by {} of the peak",
-                          significant(truth.reference.difference, 2)),
-              fmt::format("at most {}: a looser tolerance", significant(kAgreement * tolerance, 2)));
+  throw Error(
+      ExitCode::numerical, "reference",
+      fmt::format("it and its judge differ by {} of the peak",
+                  significant(truth.reference.difference, 2)),
+      fmt::format("at most {}: a looser tolerance", significant(kAgreement * tolerance, 2)));
 }
 
 }  // namespace tpm

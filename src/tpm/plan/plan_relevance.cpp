@@ -84,7 +84,8 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
   try {
     if (scout.inertial()) {
       PlanTrajectory massless = scout.coarse();
-      result.error = trajectory_error(massless, scout.with_masses(kInertiaTolerance), scout.measure());
+      result.error =
+          trajectory_error(massless, scout.with_masses(kInertiaTolerance), scout.measure());
       return result;
     }
     const InertiaEstimate& estimate = scout.inertia();
@@ -102,7 +103,8 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
       return result;
     }
     const double steps = 10.0 * estimate.highest_Hz * scout.scene().duration_s();
-    if (steps * static_cast<double>(scout.scene().network().organ.size()) > kAffordable) return result;
+    if (steps * static_cast<double>(scout.scene().network().organ.size()) > kAffordable)
+      return result;
     const PlanScout moving(scout.scene(), scout.measure(), true);
     const PlanTrajectory& truth = moving.with_masses(kInertiaTolerance);
     result.error = trajectory_error(moving.coarse(), truth, scout.measure());
@@ -121,7 +123,8 @@ std::optional<std::string> over_budget(const PlanModel& model, const ModelClaim&
                                        double duration_s, const PlanBudget& budget,
                                        const OperationCosts& costs) {
   if (budget.rate_Hz) {
-    if (const auto reason = model.why_no_servo()) return fmt::format("not for a servo: {}", *reason);
+    if (const auto reason = model.why_no_servo())
+      return fmt::format("not for a servo: {}", *reason);
     const double period = costs.seconds_of(claim.of_period);
     const double allowed = kServoShare / *budget.rate_Hz;
     if (!(period <= allowed)) {

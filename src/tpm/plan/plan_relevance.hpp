@@ -16,8 +16,9 @@ namespace tpm {
 [[nodiscard]] std::vector<std::string> passed_limits(const PlanScene& scene);
 
 /// Why a model does not fit a budget; none if it does.
-[[nodiscard]] std::optional<std::string> over_budget(const PlanModel& model, const ModelClaim& claim,
-                                                     double duration_s, const PlanBudget& budget,
+[[nodiscard]] std::optional<std::string> over_budget(const PlanModel& model,
+                                                     const ModelClaim& claim, double duration_s,
+                                                     const PlanBudget& budget,
                                                      const OperationCosts& costs);
 
 }  // namespace tpm

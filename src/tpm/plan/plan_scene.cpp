@@ -37,7 +37,8 @@ double trajectory_error(const PlanTrajectory& model, const PlanTrajectory& truth
     double error = difference.maxCoeff() / peak;
     for (Eigen::Index i = 0; i < difference.size() && measure.relative_weight > 0.0; ++i) {
       const double size = std::abs(truth.response[i]);
-      if (size > kFelt * peak) error = std::max(error, measure.relative_weight * difference[i] / size);
+      if (size > kFelt * peak)
+        error = std::max(error, measure.relative_weight * difference[i] / size);
     }
     return error;
   }
@@ -83,8 +84,8 @@ bool PlanScene::jumps() const {
   const auto knots = protocol().knots();
   bool jumps = knots.front().value != 0.0 && !protocol().relaxed_at_start();
   for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
-    jumps = jumps ||
-            (knots[k].time_s == knots[k + 1].time_s && knots[k].value != knots[k + 1].value);
+    jumps =
+        jumps || (knots[k].time_s == knots[k + 1].time_s && knots[k].value != knots[k + 1].value);
   }
   return jumps;
 }
@@ -186,7 +187,9 @@ PlanScene PlanScene::with_protocol(Protocol protocol) const {
   return PlanScene(std::move(scene));
 }
 
-PlanScene PlanScene::deeper(double factor) const { return with_protocol(protocol().scaled(factor)); }
+PlanScene PlanScene::deeper(double factor) const {
+  return with_protocol(protocol().scaled(factor));
+}
 
 PlanScene PlanScene::faster(double factor) const {
   std::vector<Knot> knots(protocol().knots().begin(), protocol().knots().end());

@@ -10,10 +10,10 @@ constexpr int kTimesOfPiece = 20;
 constexpr int kMostTimes = 160;
 constexpr int kCurvePoints = 33;
 constexpr double kCurveTolerance = 1e-5;
-constexpr double kRamp_s = 1.0;      // in which static curves are followed
-constexpr double kNever_s = 1e9;     // relaxation times against that
+constexpr double kRamp_s = 1.0;   // in which static curves are followed
+constexpr double kNever_s = 1e9;  // relaxation times against that
 constexpr double kAtOnce_s = 1e-7;
-constexpr double kMargin = 1.02;     // of the depths of curves
+constexpr double kMargin = 1.02;  // of the depths of curves
 
 PlanScene with_relaxation_time(const PlanScene& scene, double tau_s) {
   TpmParameters material = scene.scene().tissue.material;
@@ -38,7 +38,8 @@ DepthCurve static_curve(const PlanScene& scene, double least_m, double most_m, d
   DepthCurve curve;
   const double spacing = (most_m - least_m) / (kCurvePoints - 1);
   // Even points of which one is at rest.
-  const int below = least_m < 0.0 ? std::max(1, static_cast<int>(std::ceil(-least_m / spacing))) : 0;
+  const int below =
+      least_m < 0.0 ? std::max(1, static_cast<int>(std::ceil(-least_m / spacing))) : 0;
   const int above = most_m > 0.0 ? std::max(1, static_cast<int>(std::ceil(most_m / spacing))) : 0;
   curve.first_m = -below * spacing;
   curve.last_m = above * spacing;
@@ -79,7 +80,9 @@ const PlanTrajectory& PlanScout::collocation(double tolerance) const {
       .first->second;
 }
 
-const PlanTrajectory& PlanScout::coarse() const { return collocation(kTolerance); }
+const PlanTrajectory& PlanScout::coarse() const {
+  return collocation(kTolerance);
+}
 
 double PlanScout::coarse_error() const {
   return trajectory_error(collocation(10.0 * kTolerance), coarse(), measure_);

@@ -39,7 +39,8 @@ class ScalarCandidate : public PlanModel {
     step.add(Operation::scalar_step, 1.0).add(Operation::scalar_term, terms());
     if (!scout.scene().by_depth()) step = step.times(kSearch);
     if (scout.wants_field()) {
-      step.add(Operation::dense_flop, 6.0 * static_cast<double>(scout.scene().network().organ.size()));
+      step.add(Operation::dense_flop,
+               6.0 * static_cast<double>(scout.scene().network().organ.size()));
     }
     return step;
   }

@@ -84,10 +84,11 @@ std::string choice_text(const Plan& plan) {
   if (plan.choice) {
     const PlannedCandidate& c = plan.chosen();
     std::string text = fmt::format(
-        "pick: {} ({}{}{})\n  claimed error at most {}, verified {}; margin {} times\n  costs {} per "
+        "pick: {} ({}{}{})\n  claimed error at most {}, verified {}; margin {} times\n  costs {} "
+        "per "
         "simulated second{}\n",
-        c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings, percent(*c.claimed_error),
-        percent(*c.verified_error),
+        c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings,
+        percent(*c.claimed_error), percent(*c.verified_error),
         significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
         time_text(*c.cost_s_per_s),
         c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
@@ -141,10 +142,10 @@ Json plan_json(const Plan& plan) {
             {"costs", request.costs.source},
             {"response", plan.by_depth ? "force_N" : "depth_m"}};
   json["choice"] = plan.choice ? candidate_json(plan.chosen()) : Json(nullptr);
-  json["margin"] = plan.choice ? Json(rounded(request.tolerance /
-                                                  std::max(*plan.chosen().verified_error, 1e-12),
-                                              kDigits))
-                               : Json(nullptr);
+  json["margin"] =
+      plan.choice ? Json(rounded(request.tolerance / std::max(*plan.chosen().verified_error, 1e-12),
+                                 kDigits))
+                  : Json(nullptr);
   json["without_budget"] =
       plan.without_budget ? candidate_json(plan.candidates[*plan.without_budget]) : Json(nullptr);
   json["needs_full_model"] = plan.needs_full;
@@ -163,32 +164,31 @@ Json plan_json(const Plan& plan) {
 
 std::string plan_text(const Plan& plan) {
   const PlanRequest& request = plan.request;
-  std::string text = fmt::format(
-      "{}: {} spheres, {} bonds, {} s\n", plan.title, plan.spheres, plan.bonds,
-      significant(plan.duration_s, 4));
-  text += fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
-                      request.measure.output == PlanOutput::field ? "displacements" : "response",
-                      percent(request.tolerance),
-                      request.tolerance_source.empty()
-                          ? std::string()
-                          : fmt::format(" ({})", request.tolerance_source),
-                      budget_text(request.budget),
-                      request.costs.source == "nominal"
-                          ? "a usual machine has (nominal; tpm plan --calibrate measures this one)"
-                          : request.costs.source);
+  std::string text = fmt::format("{}: {} spheres, {} bonds, {} s\n", plan.title, plan.spheres,
+                                 plan.bonds, significant(plan.duration_s, 4));
+  text +=
+      fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
+                  request.measure.output == PlanOutput::field ? "displacements" : "response",
+                  percent(request.tolerance),
+                  request.tolerance_source.empty() ? std::string()
+                                                   : fmt::format(" ({})", request.tolerance_source),
+                  budget_text(request.budget),
+                  request.costs.source == "nominal"
+                      ? "a usual machine has (nominal; tpm plan --calibrate measures this one)"
+                      : request.costs.source);
   text += choice_text(plan);
   text += "\n" + frontier_text(plan);
-  text += fmt::format("\nreference: {}; peak {} {}; differs from its judge ({}) by {}\n",
-                      plan.reference.method,
-                      significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
-                      plan.by_depth ? "N" : "mm", plan.reference.judge,
-                      percent(plan.reference.difference));
+  text += fmt::format(
+      "\nreference: {}; peak {} {}; differs from its judge ({}) by {}\n", plan.reference.method,
+      significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
+      plan.by_depth ? "N" : "mm", plan.reference.judge, percent(plan.reference.difference));
   if (!plan.relevance.empty()) text += "what matters:\n";
   for (const PlanRelevance& r : plan.relevance) text += relevance_text(r);
   if (!plan.changes.empty()) text += "what would break first:\n";
   for (const PlanChange& c : plan.changes) {
-    text += c.factor ? fmt::format("  {} by {}: {}\n", c.change, significant(*c.factor, 3), c.breaks)
-                     : fmt::format("  {}: nothing up to {} times\n", c.change, shortest(kMostChange));
+    text += c.factor
+                ? fmt::format("  {} by {}: {}\n", c.change, significant(*c.factor, 3), c.breaks)
+                : fmt::format("  {}: nothing up to {} times\n", c.change, shortest(kMostChange));
   }
   for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
   return text;

@@ -19,7 +19,8 @@ Eigen::Index largest_of(const PlanTrajectory& answer) {
 }
 
 std::string model_words(const PlannedCandidate& c) {
-  return fmt::format("{} ({}{}{})", c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings);
+  return fmt::format("{} ({}{}{})", c.name, c.formulation, c.settings.empty() ? "" : ", ",
+                     c.settings);
 }
 
 }  // namespace
@@ -60,7 +61,8 @@ std::string planned_run_text(const Plan& plan, const std::vector<double>& times_
                        significant(times_s[static_cast<std::size_t>(i)], 4));
   };
   std::string text = fmt::format(
-      "{}: planned model {}\nclaimed error at most {} % of the peak, verified {} %\nlargest {}: {}; at "
+      "{}: planned model {}\nclaimed error at most {} % of the peak, verified {} %\nlargest {}: "
+      "{}; at "
       "the end: {}\n",
       plan.title, model_words(c), significant(100.0 * *c.claimed_error, 3),
       significant(100.0 * *c.verified_error, 3), plan.by_depth ? "force" : "depth",
