@@ -178,7 +178,7 @@ class InertialCandidate final : public PlanModel {
   }
 
  private:
-  static constexpr double kSafety = 2.0;
+  static constexpr double kSafety = 4.0;  // errors gather over many periods of ringing
   double tolerance_;
 };
 

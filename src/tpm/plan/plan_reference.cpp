@@ -16,7 +16,7 @@ constexpr int kTimesOfPieceWithMasses = 640;
 constexpr int kMostTimesWithMasses = 3000;
 constexpr double kTolerance = 1e-10, kJudgeTolerance = 1e-9;
 constexpr int kJudgeStages = 3;
-constexpr double kInertialTolerance = 1e-6, kInertialJudgeTolerance = 1e-5;
+constexpr double kInertialTolerance = 1e-6, kInertialJudgeTolerance = 1e-6;
 constexpr int kJudgeOrder = 3;
 constexpr double kAgreement = 0.1;  // of the tolerance
 
