@@ -1,0 +1,109 @@
+#include "tpm/reduce/pushed_contact.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kStride_m = 0.5e-3;
+constexpr double kLeastStride_m = 1e-6;
+constexpr double kBalance = 1e-11;  // of the stiffest bond times a stride
+constexpr double kRestLength = 1e-9;
+
+Freedom with_contact_held(Freedom freedom, std::size_t contact) {
+  if (contact >= freedom.size() || !freedom.is_free(contact)) {
+    throw bad_input("contact", fmt::format("sphere {} is not free", contact + 1),
+                    "a sphere that nothing holds or guides");
+  }
+  freedom.hold(contact);
+  return freedom;
+}
+
+void require_at_rest(const BondSystem& bonds, const Positions& rest) {
+  if (bonds.contact_count() > 0) {
+    throw bad_input("bonds", "there are tools among them", "a tissue touched at one sphere");
+  }
+  Eigen::VectorXd elongation;
+  bonds.elongations(rest, elongation);
+  if ((elongation.cwiseAbs().array() <= kRestLength * bonds.rest_length_m().array()).all()) return;
+  throw bad_input("rest", "bonds do not have their rest length there", "a tissue without tension");
+}
+
+}  // namespace
+
+PushedContact::PushedContact(const BondSystem& bonds, Positions rest, Freedom freedom,
+                             std::size_t contact)
+    : bonds_(bonds),
+      rest_(std::move(rest)),
+      freedom_(with_contact_held(std::move(freedom), contact)),
+      contact_(contact),
+      equilibrium_(bonds_, freedom_) {
+  require_at_rest(bonds_, rest_);
+}
+
+BondMemory PushedContact::memory(const Positions& position, double relaxed,
+                                 double following) const {
+  BondMemory memory;
+  bonds_.elongations(position, memory.offset);
+  memory.offset *= relaxed - following;
+  memory.following = following;
+  return memory;
+}
+
+Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxed) {
+  const double way = displacement_m.norm();
+  const double tolerance_N = kBalance * kStride_m * bonds_.stiffness().maxCoeff();
+  const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, rest_.cols());
+  const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), relaxed};
+  const auto column = static_cast<Eigen::Index>(contact_);
+  Positions position = rest_;
+  double done = 0.0;
+  double stride = kStride_m;
+  while (done < way) {
+    const double aim = std::min(done + stride, way);
+    Positions next = position;
+    next.col(column) = rest_.col(column) + aim / way * displacement_m;
+    const EquilibriumSearch search = equilibrium_.find(next, memory, load, tolerance_N);
+    if (search.converged && search.stable) {
+      position = std::move(next);
+      done = aim;
+      stride = kStride_m;
+      continue;
+    }
+    stride *= 0.5;
+    if (stride > kLeastStride_m) continue;
+    throw Error(ExitCode::numerical, "contact",
+                fmt::format("no stable equilibrium at {} mm from rest", significant(1e3 * aim, 4)));
+  }
+  return position;
+}
+
+ContactFields PushedContact::fields(const Positions& position, const BondMemory& memory) {
+  if (!equilibrium_.factorise(position, memory) || !equilibrium_.is_stable()) {
+    throw Error(ExitCode::numerical, "contact", "the tissue has no stiffness there");
+  }
+  ContactFields fields;
+  const auto column = static_cast<Eigen::Index>(contact_);
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, rest_.cols());
+    unit(axis, column) = 1.0;
+    Eigen::Matrix3Xd pull = Eigen::Matrix3Xd::Zero(3, rest_.cols());
+    bonds_.add_stiffness_times(position, memory, unit, pull);
+    Eigen::Matrix3Xd& field = fields.displacement[static_cast<std::size_t>(axis)];
+    field = -pull;
+    equilibrium_.displace(field);
+    field += unit;
+    pull.setZero();
+    bonds_.add_stiffness_times(position, memory, field, pull);
+    fields.stiffness.col(axis) = pull.col(column);
+  }
+  fields.stiffness = (0.5 * (fields.stiffness + fields.stiffness.transpose())).eval();
+  return fields;
+}
+
+}  // namespace tpm

@@ -1,0 +1,55 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+
+#include "tpm/network/equilibrium.hpp"
+
+namespace tpm {
+
+/// How a tissue answers small displacements of its contact sphere.
+struct ContactFields {
+  /// Of every sphere per displacement of the contact along x, y and z.
+  std::array<Eigen::Matrix3Xd, 3> displacement;
+  Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();  ///< at the contact, N/m
+};
+
+/// A tissue pushed at one of its spheres to given places: what reduced models are built from.
+class PushedContact {
+ public:
+  /// @param freedom of the tissue without the probe
+  /// @param contact a sphere that is free
+  /// Throws Error(bad_input) for tools among the bonds, a contact that is not free, or bonds that
+  /// do not have their rest length.
+  PushedContact(const BondSystem& bonds, Positions rest, Freedom freedom, std::size_t contact);
+  PushedContact(const PushedContact&) = delete;
+  PushedContact& operator=(const PushedContact&) = delete;
+
+  [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
+  [[nodiscard]] const Positions& rest() const { return rest_; }
+  /// With the contact held.
+  [[nodiscard]] const Freedom& freedom() const { return freedom_; }
+  [[nodiscard]] std::size_t contact() const { return contact_; }
+
+  /// The equilibrium with the contact displaced, found along a straight line from rest.
+  /// @param relaxed how far what bonds remember has caught up: 0 at once, 1 relaxed
+  /// Throws Error(numerical) where the tissue buckles or none is found.
+  [[nodiscard]] Positions at(const Eigen::Vector3d& displacement_m, double relaxed);
+  /// What bonds remember at such an equilibrium, told so that changes are felt with a given
+  /// stiffness: 0 that at once, 1 the relaxed one.
+  [[nodiscard]] BondMemory memory(const Positions& position, double relaxed,
+                                  double following) const;
+  /// About such an equilibrium. Throws Error(numerical) if the tissue is not stiff there.
+  [[nodiscard]] ContactFields fields(const Positions& position, const BondMemory& memory);
+  /// Replaces forces by the displacements of what is free under them, with the stiffness of the
+  /// last fields().
+  void displace(Eigen::Matrix3Xd& forces) const { equilibrium_.displace(forces); }
+
+ private:
+  const BondSystem& bonds_;
+  Positions rest_;
+  Freedom freedom_;
+  std::size_t contact_;
+  Equilibrium equilibrium_;
+};
+
+}  // namespace tpm

@@ -1,0 +1,295 @@
+#include "tpm/reduce/servo_bonds.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/solve/relaxation_filter.hpp"
+
+#if defined(__x86_64__) && defined(__GNUC__)
+#include <immintrin.h>
+#define TPM_HAS_AVX2 1
+#endif
+
+namespace tpm {
+
+ServoWeights servo_weights(double period_over_tau) {
+  const RelaxationWeights weights = relaxation_weights(period_over_tau);
+  return {static_cast<float>(weights.r), static_cast<float>(weights.w0),
+          static_cast<float>(weights.w1)};
+}
+
+/// What a sweep adds up.
+enum class Sweep { both, now, next };
+
+struct ServoBondKernels {
+  using Group = ServoBonds::Group;
+
+  /// @param group its memory moves on unless only what comes next is asked for
+  template <Sweep kSweep>
+  static void plain(Group& group, std::size_t latest, const float* u, const ServoWeights& w,
+                    float* force) {
+    for (std::size_t i = 0; i < ServoBonds::kWide; ++i) {
+      const float* const ua = u + std::size_t{4} * group.a[i];
+      const float* const ub = u + std::size_t{4} * group.b[i];
+      const float ux = ub[0] - ua[0];
+      const float uy = ub[1] - ua[1];
+      const float uz = ub[2] - ua[2];
+      const float x = group.x[i] + ux;
+      const float y = group.y[i] + uy;
+      const float z = group.z[i] + uz;
+      const float length = std::sqrt(x * x + y * y + z * z);
+      const float l = (ux * (group.x[i] + x) + uy * (group.y[i] + y) + uz * (group.z[i] + z)) /
+                      (length + group.rest[i]);
+      const float remembered = group.offset[latest][i] + w.of_end * l;
+      const float taut = l >= group.least[i] ? 1.0F / length : 0.0F;
+      float now = taut * (group.k[i] * l - group.g[i] * remembered);
+      float next = now;
+      if constexpr (kSweep != Sweep::next) {
+        const float offset = w.keep * remembered + w.of_start * l;
+        group.offset[1 - latest][i] = offset;
+        next = taut * (group.k[i] * l - group.g[i] * (offset + w.of_end * l));
+      }
+      float* const fa = force + std::size_t{8} * group.a[i];
+      float* const fb = force + std::size_t{8} * group.b[i];
+      const float direction[3] = {x, y, z};
+      for (std::size_t c = 0; c < 3; ++c) {
+        if constexpr (kSweep != Sweep::next) {
+          fa[c] += now * direction[c];
+          fb[c] -= now * direction[c];
+        }
+        if constexpr (kSweep != Sweep::now) {
+          fa[4 + c] += next * direction[c];
+          fb[4 + c] -= next * direction[c];
+        }
+      }
+    }
+  }
+
+#ifdef TPM_HAS_AVX2
+  /// Eight vectors of three side by side, as [0|4] [1|5] [2|6] [3|7].
+  struct Four {
+    __m256 of[4];
+  };
+
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void to_lanes(const Four& v,
+                                                                              __m256& x, __m256& y,
+                                                                              __m256& z) {
+    const __m256 a = _mm256_unpacklo_ps(v.of[0], v.of[1]);
+    const __m256 b = _mm256_unpackhi_ps(v.of[0], v.of[1]);
+    const __m256 c = _mm256_unpacklo_ps(v.of[2], v.of[3]);
+    const __m256 d = _mm256_unpackhi_ps(v.of[2], v.of[3]);
+    x = _mm256_shuffle_ps(a, c, 0x44);
+    y = _mm256_shuffle_ps(a, c, 0xEE);
+    z = _mm256_shuffle_ps(b, d, 0x44);
+  }
+
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline Four from_lanes(__m256 x, __m256 y,
+                                                                                __m256 z) {
+    const __m256 zero = _mm256_setzero_ps();
+    const __m256 a = _mm256_unpacklo_ps(x, y);
+    const __m256 b = _mm256_unpackhi_ps(x, y);
+    const __m256 c = _mm256_unpacklo_ps(z, zero);
+    const __m256 d = _mm256_unpackhi_ps(z, zero);
+    return {{_mm256_shuffle_ps(a, c, 0x44), _mm256_shuffle_ps(a, c, 0xEE),
+             _mm256_shuffle_ps(b, d, 0x44), _mm256_shuffle_ps(b, d, 0xEE)}};
+  }
+
+  template <Sweep kSweep>
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void group_avx2(
+      Group& group, std::size_t latest, const float* u, const ServoWeights& w, float* force) {
+    Four apart;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const __m128 low = _mm_sub_ps(_mm_load_ps(u + std::size_t{4} * group.b[i]),
+                                    _mm_load_ps(u + std::size_t{4} * group.a[i]));
+      const __m128 high = _mm_sub_ps(_mm_load_ps(u + std::size_t{4} * group.b[i + 4]),
+                                     _mm_load_ps(u + std::size_t{4} * group.a[i + 4]));
+      apart.of[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1);
+    }
+    __m256 ux, uy, uz;
+    to_lanes(apart, ux, uy, uz);
+    const __m256 x0 = _mm256_load_ps(group.x.data());
+    const __m256 y0 = _mm256_load_ps(group.y.data());
+    const __m256 z0 = _mm256_load_ps(group.z.data());
+    const __m256 x = _mm256_add_ps(x0, ux);
+    const __m256 y = _mm256_add_ps(y0, uy);
+    const __m256 z = _mm256_add_ps(z0, uz);
+    const __m256 square = _mm256_fmadd_ps(z, z, _mm256_fmadd_ps(y, y, _mm256_mul_ps(x, x)));
+    const __m256 length = _mm256_sqrt_ps(square);
+    const __m256 change = _mm256_fmadd_ps(
+        uz, _mm256_add_ps(z0, z),
+        _mm256_fmadd_ps(uy, _mm256_add_ps(y0, y), _mm256_mul_ps(ux, _mm256_add_ps(x0, x))));
+    const __m256 sum = _mm256_add_ps(length, _mm256_load_ps(group.rest.data()));
+    const __m256 inverse = _mm256_div_ps(_mm256_set1_ps(1.0F), _mm256_mul_ps(length, sum));
+    const __m256 l = _mm256_mul_ps(_mm256_mul_ps(change, inverse), length);
+    const __m256 carries = _mm256_cmp_ps(l, _mm256_load_ps(group.least.data()), _CMP_GE_OQ);
+    const __m256 taut = _mm256_and_ps(_mm256_mul_ps(inverse, sum), carries);
+    const __m256 k = _mm256_load_ps(group.k.data());
+    const __m256 g = _mm256_load_ps(group.g.data());
+    const __m256 of_end = _mm256_set1_ps(w.of_end);
+    const __m256 elastic = _mm256_mul_ps(k, l);
+    const __m256 remembered =
+        _mm256_fmadd_ps(of_end, l, _mm256_load_ps(group.offset[latest].data()));
+    const __m256 now = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, remembered, elastic));
+    __m256 next = now;
+    if constexpr (kSweep != Sweep::next) {
+      const __m256 offset = _mm256_fmadd_ps(_mm256_set1_ps(w.keep), remembered,
+                                            _mm256_mul_ps(_mm256_set1_ps(w.of_start), l));
+      _mm256_store_ps(group.offset[1 - latest].data(), offset);
+      next = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, _mm256_fmadd_ps(of_end, l, offset), elastic));
+    }
+    const Four first =
+        from_lanes(_mm256_mul_ps(now, x), _mm256_mul_ps(now, y), _mm256_mul_ps(now, z));
+    if constexpr (kSweep == Sweep::both) {
+      const Four second =
+          from_lanes(_mm256_mul_ps(next, x), _mm256_mul_ps(next, y), _mm256_mul_ps(next, z));
+      for (std::size_t i = 0; i < 4; ++i) {
+        pull(group, i, _mm256_permute2f128_ps(first.of[i], second.of[i], 0x20), force);
+      }
+      for (std::size_t i = 0; i < 4; ++i) {
+        pull(group, i + 4, _mm256_permute2f128_ps(first.of[i], second.of[i], 0x31), force);
+      }
+    } else {
+      constexpr std::size_t kAt = kSweep == Sweep::next ? 4 : 0;
+      for (std::size_t i = 0; i < 4; ++i) {
+        pull_half(group, i, _mm256_castps256_ps128(first.of[i]), force + kAt);
+        pull_half(group, i + 4, _mm256_extractf128_ps(first.of[i], 1), force + kAt);
+      }
+    }
+  }
+
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void pull(const Group& group,
+                                                                          std::size_t i, __m256 f,
+                                                                          float* force) {
+    float* const fa = force + std::size_t{8} * group.a[i];
+    float* const fb = force + std::size_t{8} * group.b[i];
+    _mm256_store_ps(fa, _mm256_add_ps(_mm256_load_ps(fa), f));
+    _mm256_store_ps(fb, _mm256_sub_ps(_mm256_load_ps(fb), f));
+  }
+
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void pull_half(const Group& group,
+                                                                               std::size_t i,
+                                                                               __m128 f,
+                                                                               float* force) {
+    float* const fa = force + std::size_t{8} * group.a[i];
+    float* const fb = force + std::size_t{8} * group.b[i];
+    _mm_store_ps(fa, _mm_add_ps(_mm_load_ps(fa), f));
+    _mm_store_ps(fb, _mm_sub_ps(_mm_load_ps(fb), f));
+  }
+
+  template <Sweep kSweep>
+  [[gnu::target("avx2,fma")]] static void sweep_avx2(Group* group, std::size_t count,
+                                                     std::size_t latest, const float* u,
+                                                     const ServoWeights& w, float* force) {
+    for (std::size_t i = 0; i < count; ++i) group_avx2<kSweep>(group[i], latest, u, w, force);
+  }
+#endif
+
+  template <Sweep kSweep>
+  static void sweep(Group* group, std::size_t count, std::size_t latest, bool vectors,
+                    const float* u, const ServoWeights& w, float* force) {
+#ifdef TPM_HAS_AVX2
+    if (vectors) return sweep_avx2<kSweep>(group, count, latest, u, w, force);
+#else
+    static_cast<void>(vectors);
+#endif
+    for (std::size_t i = 0; i < count; ++i) plain<kSweep>(group[i], latest, u, w, force);
+  }
+};
+
+namespace {
+
+/// The order in which bonds fill lanes: side by side such that share no sphere, so that sums do
+/// not wait for each other, as far as there are any.
+std::vector<std::size_t> order_in_lanes(std::span<const ServoBonds::Choice> chosen) {
+  std::vector<std::size_t> left(chosen.size());
+  for (std::size_t i = 0; i < left.size(); ++i) left[i] = i;
+  std::vector<std::size_t> order;
+  std::vector<std::uint32_t> used;
+  const auto is_used = [&](std::uint32_t sphere) {
+    return std::find(used.begin(), used.end(), sphere) != used.end();
+  };
+  while (!left.empty()) {
+    std::vector<std::size_t> later;
+    std::size_t filled = 0;
+    used.clear();
+    for (const std::size_t i : left) {
+      if (filled == ServoBonds::kWide || is_used(chosen[i].a) || is_used(chosen[i].b)) {
+        later.push_back(i);
+        continue;
+      }
+      used.insert(used.end(), {chosen[i].a, chosen[i].b});
+      order.push_back(i);
+      ++filled;
+    }
+    for (std::size_t i = 0; i < later.size() && filled < ServoBonds::kWide; ++filled) {
+      order.push_back(later[i]);
+      later.erase(later.begin());
+    }
+    left = std::move(later);
+  }
+  return order;
+}
+
+}  // namespace
+
+ServoBonds::ServoBonds(const BondSystem& bonds, const Positions& rest,
+                       std::span<const Choice> chosen, std::uint32_t filler, bool portable) {
+#ifdef TPM_HAS_AVX2
+  vectors_ = !portable && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#else
+  static_cast<void>(portable);
+#endif
+  constexpr float kNever = -std::numeric_limits<float>::infinity();
+  const std::vector<std::size_t> order = order_in_lanes(chosen);
+  group_.resize((order.size() + kWide - 1) / kWide);
+  for (std::size_t n = 0; n < kWide * group_.size(); ++n) {
+    Group& group = group_[n / kWide];
+    const std::size_t i = n % kWide;
+    group.offset[0][i] = group.offset[1][i] = 0.0F;
+    if (n >= order.size()) {
+      group.a[i] = group.b[i] = filler;
+      group.x[i] = group.rest[i] = 1.0F;
+      group.y[i] = group.z[i] = group.k[i] = group.g[i] = 0.0F;
+      group.least[i] = kNever;
+      continue;
+    }
+    const Choice& choice = chosen[order[n]];
+    const auto row = static_cast<Eigen::Index>(choice.bond);
+    const Eigen::Vector3f apart =
+        (rest.col(bonds.end_b()[choice.bond]) - rest.col(bonds.end_a()[choice.bond])).cast<float>();
+    group.a[i] = choice.a;
+    group.b[i] = choice.b;
+    group.x[i] = apart.x();
+    group.y[i] = apart.y();
+    group.z[i] = apart.z();
+    group.rest[i] = static_cast<float>(bonds.rest_length_m()[row]);
+    group.k[i] = static_cast<float>(bonds.stiffness()[row]);
+    group.g[i] = static_cast<float>(bonds.relaxing()[row]);
+    group.least[i] = bonds.is_rope(choice.bond) ? 0.0F : kNever;
+  }
+}
+
+void ServoBonds::forget() noexcept {
+  for (Group& group : group_) group.offset = {};
+}
+
+void ServoBonds::advance(const float* displacement, const ServoWeights& weights,
+                         float* force) noexcept {
+  ServoBondKernels::sweep<Sweep::both>(group_.data(), group_.size(), latest_, vectors_,
+                                       displacement, weights, force);
+}
+
+void ServoBonds::advance_now(const float* displacement, const ServoWeights& weights,
+                             float* force) noexcept {
+  ServoBondKernels::sweep<Sweep::now>(group_.data(), group_.size(), latest_, vectors_, displacement,
+                                      weights, force);
+}
+
+void ServoBonds::add_next(const float* displacement, const ServoWeights& weights,
+                          float* force) noexcept {
+  ServoBondKernels::sweep<Sweep::next>(group_.data(), group_.size(), latest_, vectors_,
+                                       displacement, weights, force);
+}
+
+}  // namespace tpm

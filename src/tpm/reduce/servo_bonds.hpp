@@ -1,0 +1,78 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "tpm/network/bond_system.hpp"
+
+namespace tpm {
+
+/// Weights of the exact update over a servo period in which elongations are linear:
+/// y_new = keep y + of_start l_old + of_end l_new.
+struct ServoWeights {
+  float keep = 0.0F, of_start = 0.0F, of_end = 0.0F;
+};
+
+/// @param period_over_tau > 0
+[[nodiscard]] ServoWeights servo_weights(double period_over_tau);
+
+/// Bonds of a network in single precision, eight side by side, with what they remember at the end
+/// of the next period if nothing moves apart from its own end. The vector from one end to the
+/// other is kept as that at rest and a small displacement, so that elongations lose no digits.
+///
+/// Displacements have four floats per sphere and forces eight: the first four are what bonds pull
+/// with now, the other four what they will pull with at the end of the next period if nothing
+/// moves. The fourth of each four has no meaning. One sphere more than there are takes what fills
+/// up the lanes.
+class ServoBonds {
+ public:
+  static constexpr std::size_t kWide = 8;
+
+  /// A bond of the system, and where its ends stand.
+  struct Choice {
+    std::size_t bond;    ///< of the system
+    std::uint32_t a, b;  ///< columns of displacements
+  };
+
+  ServoBonds() = default;
+  /// @param rest m, of the system's spheres
+  /// @param filler column that takes what fills up the lanes
+  ServoBonds(const BondSystem& bonds, const Positions& rest, std::span<const Choice> chosen,
+             std::uint32_t filler, bool portable = false);
+
+  /// Nothing is remembered, as at rest.
+  void forget() noexcept;
+
+  /// Adds what bonds pull with under displacements, now and at the end of the next period. What
+  /// they remember moves on with accept().
+  void advance(const float* displacement, const ServoWeights& weights, float* force) noexcept;
+  /// The same, now only.
+  void advance_now(const float* displacement, const ServoWeights& weights, float* force) noexcept;
+  /// A period is over, as it was advanced last.
+  void accept() noexcept { latest_ = 1 - latest_; }
+  /// Adds what bonds will pull with at the end of the next period, to the other four.
+  void add_next(const float* displacement, const ServoWeights& weights, float* force) noexcept;
+
+  [[nodiscard]] std::size_t groups() const { return group_.size(); }
+
+ private:
+  struct alignas(32) Group {
+    using Lane = std::array<float, kWide>;
+    Lane x, y, z;  ///< at rest, m
+    Lane rest;     ///< length, m
+    Lane k, g;     ///< N/m
+    Lane least;    ///< elongation below which the bond is slack, m
+    /// y at the end of the next period less its part that follows, m: that in use, and the next.
+    std::array<Lane, 2> offset;
+    std::array<std::uint32_t, kWide> a, b;
+  };
+  friend struct ServoBondKernels;
+
+  std::vector<Group> group_;
+  std::size_t latest_ = 0;  ///< of each group's offsets
+  bool vectors_ = false;
+};
+
+}  // namespace tpm

@@ -1,0 +1,319 @@
+#include "tpm/reduce/servo_network.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/reduce/flush_denormals.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kFieldStride_m = 2e-3;
+/// How far the fields in use may be from the true ones, beside the distance from the normal, m.
+constexpr double kFieldSlack_m = 0.3e-3;
+constexpr double kHold = 0.7;           // of an error, from one step to the next
+constexpr double kTrusted = 0.02;       // error over the largest force
+constexpr double kScaleDepth_m = 1e-4;  // at which forces begin to count
+constexpr double kAside = 2.0;  // how much faster the fields change across the normal than along it
+// Rounding, of the largest force: at once, and of what is remembered, a step.
+constexpr double kRounding = 3e-7;
+constexpr double kRememberedRounding = 6e-9;
+constexpr double kLongestMemory = 1e3;  // steps
+//      // of the largest force
+constexpr std::size_t kNow = 0, kNext = 4;
+
+void require(const ServoNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
+  const auto refuse = [](std::string_view key, double value, std::string_view expected) {
+    throw bad_input(key, significant(value, 6), expected);
+  };
+  if (!(options.period_s > 0.0 && std::isfinite(options.period_s))) {
+    refuse("period_s", options.period_s, "a time above 0");
+  }
+  if (!(options.deepest_m > 0.0 && std::isfinite(options.deepest_m))) {
+    refuse("deepest_m", options.deepest_m, "a depth above 0");
+  }
+  if (!(options.frozen_depth_m >= 0.0 && options.frozen_depth_m <= options.deepest_m)) {
+    refuse("frozen_depth_m", options.frozen_depth_m, "from 0 to deepest_m");
+  }
+  if (!(options.aside_m > 0.0)) refuse("aside_m", options.aside_m, "above 0");
+  if (!(options.balance_again_above > 0.0)) {
+    refuse("balance_again_above", options.balance_again_above, "above 0");
+  }
+  if (options.most_balances < 1) refuse("most_balances", options.most_balances, "1 or more");
+  if (std::abs(into_tissue.norm() - 1.0) > 1e-9) {
+    refuse("into_tissue", into_tissue.norm(), "a unit vector");
+  }
+}
+
+bool moves(const PushedContact& tissue, std::size_t sphere) {
+  return !tissue.freedom().projector(sphere).isZero(0.0);
+}
+
+}  // namespace
+
+ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+                           std::size_t contact, const Eigen::Vector3d& into_tissue,
+                           const ServoNetworkOptions& options)
+    : options_(options), into_(into_tissue) {
+  require(options, into_tissue);
+  PushedContact tissue(bonds, rest, freedom, contact);
+  weights_ = servo_weights(options.period_s / bonds.relaxation_time_s());
+  at_once_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
+  relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
+  const double forgotten = 1.0 - static_cast<double>(weights_.keep);
+  rounding_ = kRounding + kRememberedRounding / std::max(forgotten, 1.0 / kLongestMemory);
+  number_spheres(tissue);
+  choose_bonds(tissue);
+  const auto relaxed = static_cast<double>(weights_.of_end);
+  const auto count = static_cast<int>(std::ceil(options.deepest_m / kFieldStride_m));
+  for (int i = 0; i <= count; ++i) {
+    const double depth_m = options.deepest_m * i / count;
+    add_field(tissue, tissue.at(depth_m * into_, relaxed), depth_m);
+  }
+  const Positions frozen = tissue.at(options.frozen_depth_m * into_, relaxed);
+  factorise(tissue, frozen);
+  add_remembering(tissue, frozen);
+  step_error_ = std::make_unique<StepError>(tissue, frozen, relaxed, options.period_s);
+}
+
+void ServoNetwork::number_spheres(const PushedContact& tissue) {
+  const BondSystem& bonds = tissue.bonds();
+  std::vector<std::uint32_t> rank(bonds.spheres(), 0);
+  for (std::size_t i = 0; i < bonds.spheres(); ++i) {
+    if (!moves(tissue, i)) continue;
+    rank[i] = static_cast<std::uint32_t>(free_.size());
+    free_.push_back(i);
+  }
+  Eigen::Matrix3Xd places(3, static_cast<Eigen::Index>(free_.size()));
+  for (std::size_t i = 0; i < free_.size(); ++i) {
+    places.col(static_cast<Eigen::Index>(i)) =
+        tissue.rest().col(static_cast<Eigen::Index>(free_[i]));
+  }
+  std::vector<FrontalPattern::Edge> edges;
+  for (std::size_t b = 0; b < bonds.size(); ++b) {
+    const std::uint32_t from = bonds.end_a()[b];
+    const std::uint32_t to = bonds.end_b()[b];
+    if (moves(tissue, from) && moves(tissue, to)) edges.push_back({rank[from], rank[to]});
+  }
+  pattern_ = std::make_shared<const FrontalPattern>(places, edges);
+  column_.assign(bonds.spheres(), 0);
+  auto next = static_cast<std::uint32_t>(free_.size());
+  column_[tissue.contact()] = next++;
+  for (std::size_t i = 0; i < bonds.spheres(); ++i) {
+    if (i == tissue.contact()) continue;
+    column_[i] = moves(tissue, i) ? pattern_->place()[rank[i]] : next++;
+    if (!moves(tissue, i) || tissue.freedom().is_free(i)) continue;
+    partly_.push_back({column_[i], tissue.freedom().projector(i).cast<float>()});
+  }
+}
+
+void ServoNetwork::choose_bonds(const PushedContact& tissue) {
+  const BondSystem& bonds = tissue.bonds();
+  std::vector<ServoBonds::Choice> near, far;
+  for (std::size_t b = 0; b < bonds.size(); ++b) {
+    const std::uint32_t from = bonds.end_a()[b];
+    const std::uint32_t to = bonds.end_b()[b];
+    const ServoBonds::Choice choice{b, column_[from], column_[to]};
+    if (from == tissue.contact() || to == tissue.contact()) {
+      near.push_back(choice);
+    } else if (moves(tissue, from) || moves(tissue, to)) {
+      far.push_back(choice);
+    }
+  }
+  const auto filler = static_cast<std::uint32_t>(column_.size());
+  at_contact_ = ServoBonds(bonds, tissue.rest(), near, filler, options_.portable);
+  elsewhere_ = ServoBonds(bonds, tissue.rest(), far, filler, options_.portable);
+  displacement_.assign(4 * (column_.size() + 1), 0.0F);
+  force_.assign(8 * (column_.size() + 1), 0.0F);
+  change_.assign(4 * (free_.size() + 1), 0.0F);
+}
+
+void ServoNetwork::factorise(PushedContact& tissue, const Positions& position) {
+  const BondSystem& bonds = tissue.bonds();
+  const Freedom& freedom = tissue.freedom();
+  const auto relaxed = static_cast<double>(weights_.of_end);
+  const BondMemory memory = tissue.memory(position, relaxed, relaxed);
+  std::vector<Eigen::Matrix3d> diagonal(column_.size(), Eigen::Matrix3d::Zero());
+  std::vector<Eigen::Matrix3d> across;
+  for (std::size_t b = 0; b < bonds.size(); ++b) {
+    const std::uint32_t from = bonds.end_a()[b];
+    const std::uint32_t to = bonds.end_b()[b];
+    const Eigen::Matrix3d block = bonds.stiffness_block(b, position, memory);
+    diagonal[from] += block;
+    diagonal[to] += block;
+    if (!moves(tissue, from) || !moves(tissue, to)) continue;
+    across.emplace_back(-freedom.projector(from) * block * freedom.projector(to));
+  }
+  std::vector<Eigen::Matrix3d> of_free;
+  for (const std::size_t i : free_) {
+    const Eigen::Matrix3d& p = freedom.projector(i);
+    of_free.emplace_back(p * diagonal[i] * p +
+                         diagonal[i].trace() * (Eigen::Matrix3d::Identity() - p));
+  }
+  factor_ = std::make_unique<FrontalFactor>(pattern_, options_.portable);
+  if (factor_->factorise(of_free, across)) return;
+  throw Error(ExitCode::numerical, "contact",
+              fmt::format("the tissue is not stiff at {} mm of depth",
+                          significant(1e3 * options_.frozen_depth_m, 4)));
+}
+
+ServoNetwork::Field ServoNetwork::field_of(const std::array<Eigen::Matrix3Xd, 3>& displacement,
+                                           double depth_m) const {
+  Field field{depth_m, {}};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    field.along[axis].assign(4 * free_.size(), 0.0F);
+    for (const std::size_t i : free_) {
+      const Eigen::Vector3f at = displacement[axis].col(static_cast<Eigen::Index>(i)).cast<float>();
+      std::copy_n(at.data(), 3, field.along[axis].data() + std::size_t{4} * column_[i]);
+    }
+  }
+  return field;
+}
+
+void ServoNetwork::add_field(PushedContact& tissue, const Positions& position, double depth_m) {
+  const auto relaxed = static_cast<double>(weights_.of_end);
+  const BondMemory memory = tissue.memory(position, relaxed, relaxed);
+  fields_.push_back(field_of(tissue.fields(position, memory).displacement, depth_m));
+}
+
+void ServoNetwork::add_remembering(PushedContact& tissue, const Positions& position) {
+  const auto relaxed = static_cast<double>(weights_.of_end);
+  ContactFields fields = tissue.fields(position, tissue.memory(position, relaxed, relaxed));
+  for (Eigen::Matrix3Xd& field : fields.displacement) {
+    Eigen::Matrix3Xd at_once = Eigen::Matrix3Xd::Zero(3, position.cols());
+    Eigen::Matrix3Xd in_the_end = at_once;
+    tissue.bonds().add_stiffness_times(position, tissue.memory(position, relaxed, 0.0), field,
+                                       at_once);
+    tissue.bonds().add_stiffness_times(position, tissue.memory(position, relaxed, 1.0), field,
+                                       in_the_end);
+    field = at_once - in_the_end;
+    tissue.displace(field);
+  }
+  remembering_ = field_of(fields.displacement, options_.frozen_depth_m);
+}
+
+void ServoNetwork::reset() noexcept {
+  at_contact_.forget();
+  elsewhere_.forget();
+  step_error_->reset();
+  std::fill(displacement_.begin(), displacement_.end(), 0.0F);
+  std::fill(force_.begin(), force_.end(), 0.0F);
+  largest_N_ = held_error_N_ = 0.0;
+  remembered_error_.setZero();
+  remembered_source_.setZero();
+}
+
+void ServoNetwork::project(float* four_per_sphere) const noexcept {
+  for (const Partly& partly : partly_) {
+    Eigen::Map<Eigen::Vector3f> v(four_per_sphere + 4 * partly.column);
+    v = (partly.projector * v).eval();
+  }
+}
+
+void ServoNetwork::balance(std::size_t first) noexcept {
+  for (std::size_t i = 0; i < free_.size(); ++i) {
+    std::copy_n(force_.data() + 8 * i + first, 4, change_.data() + 4 * i);
+  }
+  project(change_.data());
+  factor_->solve(change_.data());
+  project(change_.data());
+  for (std::size_t i = 0; i < 4 * free_.size(); ++i) displacement_[i] += change_[i];
+  std::fill(force_.begin(), force_.end(), 0.0F);
+  at_contact_.advance_now(displacement_.data(), weights_, force_.data());
+  elsewhere_.advance(displacement_.data(), weights_, force_.data());
+}
+
+Eigen::Vector3d ServoNetwork::weighed(const Field& field) const noexcept {
+  Eigen::Vector3d sum;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float* const along = field.along[axis].data();
+    std::array<float, 8> part{};
+    for (std::size_t i = 0; i + 1 < free_.size(); i += 2) {
+      const float* const first = force_.data() + 8 * i;
+      for (std::size_t c = 0; c < 4; ++c) part[c] += along[4 * i + c] * first[c];
+      for (std::size_t c = 0; c < 4; ++c) part[4 + c] += along[4 * i + 4 + c] * first[8 + c];
+    }
+    if (free_.size() % 2 == 1) {
+      const std::size_t last = free_.size() - 1;
+      for (std::size_t c = 0; c < 4; ++c) part[c] += along[4 * last + c] * force_[8 * last + c];
+    }
+    sum[static_cast<Eigen::Index>(axis)] =
+        static_cast<double>(((part[0] + part[4]) + (part[1] + part[5])) + (part[2] + part[6]));
+  }
+  return sum;
+}
+
+void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_error_N) noexcept {
+  const double depth_m = displacement_m.dot(into_);
+  const double aside_m = (displacement_m - depth_m * into_).norm();
+  const double stride_m = fields_[1].depth_m;
+  const double at = std::clamp(depth_m / stride_m, 0.0, static_cast<double>(fields_.size() - 1));
+  const std::size_t low = std::min(static_cast<std::size_t>(at), fields_.size() - 2);
+  const double share = at - static_cast<double>(low);
+  const Eigen::Vector3d above = weighed(fields_[low]);
+  const Eigen::Vector3d change = weighed(fields_[low + 1]) - above;
+  const Eigen::Vector3f at_contact =
+      Eigen::Map<const Eigen::Vector3f>(force_.data() + 8 * free_.size());
+  answer_.force_N = at_contact.cast<double>() + above + share * change;
+  largest_N_ = std::max(largest_N_, answer_.force_N.norm());
+  const double beyond_m = std::abs(depth_m - at * stride_m);
+  const double field_error_N =
+      change.norm() * (kAside * aside_m + beyond_m + kFieldSlack_m) / stride_m +
+      rounding_ * largest_N_;
+  answer_.error_N =
+      std::max(field_error_N, kHold * held_error_N_) + remembered_error_.norm() + step_error_N;
+  const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
+  answer_.trusted = depth_m <= options_.deepest_m && depth_m >= -options_.deepest_m &&
+                    aside_m <= options_.aside_m && answer_.error_N <= kTrusted * scale_N;
+}
+
+ContactAnswer ServoNetwork::step(const Eigen::Vector3d& displacement_m) noexcept {
+  const FlushDenormals flush;
+  float* const contact = displacement_.data() + 4 * free_.size();
+  for (Eigen::Index c = 0; c < 3; ++c) contact[c] = static_cast<float>(displacement_m[c]);
+  at_contact_.add_next(displacement_.data(), weights_, force_.data());
+  const double step_error_N = step_error_->advance(displacement_m).norm();
+  const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
+  balance(kNext);
+  answer(displacement_m, step_error_N);
+  const double elsewhere_N = remembered_error_.norm() + step_error_N;
+  for (balances_ = 1; balances_ < options_.most_balances; ++balances_) {
+    if (answer_.error_N - elsewhere_N <= options_.balance_again_above * scale_N) break;
+    held_error_N_ = 0.0;
+    balance(kNow);
+    answer(displacement_m, step_error_N);
+  }
+  held_error_N_ = answer_.error_N - elsewhere_N;
+  const Eigen::Vector3d source = weighed(remembering_);
+  remembered_error_ = static_cast<double>(weights_.keep) * remembered_error_ +
+                      static_cast<double>(weights_.of_start) * remembered_source_ +
+                      static_cast<double>(weights_.of_end) * source;
+  remembered_source_ = source;
+  at_contact_.accept();
+  elsewhere_.accept();
+  return answer_;
+}
+
+double ServoNetwork::residual_N() const noexcept {
+  double square = 0.0;
+  for (std::size_t i = 0; i < free_.size(); ++i) {
+    square +=
+        static_cast<double>(Eigen::Map<const Eigen::Vector3f>(force_.data() + 8 * i).squaredNorm());
+  }
+  return std::sqrt(square);
+}
+
+// A Ref is a view: what it shows is changed.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
+void ServoNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
+  for (Eigen::Index s = 0; s < spheres(); ++s) {
+    const std::size_t at = std::size_t{4} * column_[static_cast<std::size_t>(s)];
+    all.col(s) = Eigen::Map<const Eigen::Vector3f>(displacement_.data() + at).cast<double>();
+  }
+}
+
+}  // namespace tpm

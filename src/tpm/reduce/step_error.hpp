@@ -1,0 +1,37 @@
+#pragma once
+#include "tpm/reduce/pushed_contact.hpp"
+
+namespace tpm {
+
+/// What it costs to take elongations as linear within a servo period, estimated with a small linear
+/// model of the tissue: its displacements are combinations of the fields that follow the contact at
+/// once and those that follow it when relaxed (a symmetric projection of the linear network). The
+/// model is advanced both ways, exactly and as the network is; the forces differ by the estimate.
+class StepError {
+ public:
+  /// @param position, relaxed equilibrium about which the network is linearised
+  StepError(PushedContact& tissue, const Positions& position, double relaxed, double period_s);
+
+  void reset() noexcept;
+  /// Advances by a period to a displacement of the contact, m.
+  /// @returns the exact force on the tissue less that of the network as it is advanced, N
+  Eigen::Vector3d advance(const Eigen::Vector3d& displacement_m) noexcept;
+
+ private:
+  using Six = Eigen::Matrix<double, 6, 1>;
+  using SixSquare = Eigen::Matrix<double, 6, 6>;
+  using SixThree = Eigen::Matrix<double, 6, 3>;
+
+  /// One way to advance: what is remembered follows from itself and the contact's displacements.
+  struct Advance {
+    SixSquare of_memory = SixSquare::Zero();
+    SixThree of_start = SixThree::Zero(), of_end = SixThree::Zero();
+  };
+
+  Advance exact_, stepped_;
+  Eigen::Matrix<double, 3, 6> force_of_memory_ = Eigen::Matrix<double, 3, 6>::Zero();
+  Six exact_memory_ = Six::Zero(), stepped_memory_ = Six::Zero();
+  Eigen::Vector3d at_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace tpm

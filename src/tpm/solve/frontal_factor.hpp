@@ -1,0 +1,54 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "tpm/solve/aligned_floats.hpp"
+#include "tpm/solve/frontal_pattern.hpp"
+#include "tpm/solve/panel_kernels.hpp"
+
+namespace tpm {
+
+/// A positive definite matrix of 3x3 blocks, factorised in double precision (multifrontal; Duff and
+/// Reid, ACM TOMS 1983) and kept in single precision for many solutions at little cost: of every
+/// front the inverse of its pivot and what it passes on, as dense blocks. To correct iterates whose
+/// residual is known better.
+class FrontalFactor {
+ public:
+  /// @param portable without vector instructions beyond those of every processor
+  explicit FrontalFactor(std::shared_ptr<const FrontalPattern> pattern, bool portable = false);
+
+  /// False if the matrix is not positive definite; the factor is then of no use.
+  /// @param diagonal of each node, in the order of the nodes
+  /// @param across block (a, b) of each edge of the pattern; those of one pair are added
+  [[nodiscard]] bool factorise(std::span<const Eigen::Matrix3d> diagonal,
+                               std::span<const Eigen::Matrix3d> across);
+
+  /// Replaces the right-hand side by the solution, to about 1e-5 of it for matrices that are not
+  /// near singular. Allocates nothing.
+  /// @param x four floats per node, the fourth of no meaning, in the order of elimination; aligned
+  ///          to 16 bytes
+  void solve(float* x) noexcept;
+
+  [[nodiscard]] const FrontalPattern& pattern() const { return *pattern_; }
+
+ private:
+  struct Place {
+    std::uint32_t first, own;     ///< nodes
+    std::uint32_t rows, count;    ///< of row_
+    std::size_t inverse, passed;  ///< of numbers_
+  };
+  [[nodiscard]] Panel inverse(const Place& front) const;
+  [[nodiscard]] Panel passed(const Place& front) const;
+
+  std::shared_ptr<const FrontalPattern> pattern_;
+  const PanelKernels& kernels_;
+  std::vector<Place> front_;
+  std::vector<std::uint32_t> row_;
+  AlignedFloats numbers_;
+  AlignedFloats own_, reached_, sum_;  ///< of one front, three floats per node
+};
+
+}  // namespace tpm
