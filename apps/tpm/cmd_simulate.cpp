@@ -6,11 +6,14 @@
 
 #include "command.hpp"
 #include "interrupt_watch.hpp"
+#include "plan_options.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/units.hpp"
+#include "tpm/report/plan_report.hpp"
 #include "tpm/report/simulation_figures.hpp"
 #include "tpm/report/simulation_report.hpp"
+#include "tpm/simulate/recorder.hpp"
 #include "tpm/simulate/simulation_file.hpp"
 #include "tpm/simulate/vtkhdf.hpp"
 #include "tpm/store/hdf5.hpp"
@@ -26,6 +29,8 @@ struct SimulateChoice {
   bool beside_mass_spring = false;
   bool vtkhdf = false;
   std::string checkpoint_every = "5 s";
+  bool planned = false;
+  PlanChoice plan;
 };
 
 /// A scene, the network it is run on, and what came of it.
@@ -136,9 +141,38 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   return 0;
 }
 
+/// Plans the scene and runs the pick instead of the scene's formulation.
+int simulate_planned(const SimulateChoice& choice, const Session& session) {
+  if (choice.beside_mass_spring || choice.vtkhdf || !choice.figures.empty()) {
+    throw Error(ExitCode::usage, "--plan", "with figures, --vtkhdf or --beside-mass-spring",
+                "none of them: a planned model need not know the whole network");
+  }
+  (void)Hdf5Writer(choice.output);  // can the result be written?
+  const ExperimentScene scene = read_experiment(choice.scene);
+  PlanRequest request = plan_request(choice.plan);
+  request.relevance = request.changes = false;
+  const Plan plan = planned(scene, std::move(request));
+  if (!plan.choice) {
+    fmt::print("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
+    return static_cast<int>(ExitCode::answer_is_no);
+  }
+  const std::vector<double> times = times_to_watch(scene);
+  const PlanTrajectory answer = run_planned(plan, scene, times);
+  write_planned_run(plan, scene, times, answer, choice.output);
+  if (session.json()) {
+    Json json = planned_run_json(plan, scene, times, answer);
+    json["files"] = {choice.output};
+    fmt::print("{}", to_text(json));
+    return 0;
+  }
+  fmt::print("{}wrote {}\n", planned_run_text(plan, times, answer), choice.output);
+  return 0;
+}
+
 /// Being stopped is not an error of the run: its line, and the exit code that shells expect.
 int run_command(const SimulateChoice& choice, const Session& session) {
   try {
+    if (choice.planned) return simulate_planned(choice, session);
     return simulate_and_report(choice, session);
   } catch (const Interrupted& stop) {
     constexpr int kStoppedBySignal = 128;
@@ -165,6 +199,9 @@ void add_simulate_command(CLI::App& app, Session& session) {
       ->add_option("--checkpoint-every", choice->checkpoint_every,
                    "Time between checkpoints, such as \"5 s\"")
       ->capture_default_str();
+  command->add_flag("--plan", choice->planned,
+                    "Run the least model that tpm plan finds, instead of the scene's formulation");
+  add_plan_options(*command, choice->plan);
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5 --figures pictures\n"

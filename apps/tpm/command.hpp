@@ -42,6 +42,7 @@ void add_audit_command(CLI::App& app, Session& session);
 void add_data_command(CLI::App& app, Session& session);
 void add_network_command(CLI::App& app, Session& session);
 void add_simulate_command(CLI::App& app, Session& session);
+void add_plan_command(CLI::App& app, Session& session);
 void add_report_command(CLI::App& app, Session& session);
 void add_experiments_command(CLI::App& app, Session& session);
 void add_stability_command(CLI::App& app, Session& session);

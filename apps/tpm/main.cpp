@@ -60,6 +60,7 @@ int run(int argc, char** argv) {
   add_data_command(app, session);
   add_network_command(app, session);
   add_simulate_command(app, session);
+  add_plan_command(app, session);
   add_report_command(app, session);
   add_experiments_command(app, session);
   add_stability_command(app, session);

@@ -1,0 +1,127 @@
+// tpm plan: the least model for a scene.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "command.hpp"
+#include "plan_options.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/report/plan_report.hpp"
+
+namespace tpm::app {
+namespace fs = std::filesystem;
+
+void add_plan_options(CLI::App& command, PlanChoice& choice) {
+  command
+      .add_option("--tolerance", choice.tolerance,
+                  "Error in parts of the peak, such as 1% or 0.01, or jnd: what a hand can feel")
+      ->capture_default_str();
+  command
+      .add_option("--outputs", choice.outputs,
+                  "What the tolerance is about: force (the response) or field (displacements)")
+      ->check(CLI::IsMember({"force", "field"}))
+      ->capture_default_str();
+  command.add_option("--rate", choice.rate, "Servo rate in Hz: every period needs its answer");
+  command.add_option("--wall", choice.wall, "Computing time, such as \"0.1 s per s\"");
+  command.add_option(
+      "--costs", choice.costs,
+      "File of --calibrate, or nominal; default: this machine's, if it was calibrated");
+}
+
+PlanRequest plan_request(const PlanChoice& choice) {
+  PlanRequest request;
+  set_tolerance(request, choice.tolerance);
+  if (choice.outputs == "field") request.measure = {PlanOutput::field, 0.0};
+  if (!choice.rate.empty()) {
+    const auto rate = find_number(choice.rate);
+    if (!rate || !(*rate >= 1.0 && *rate <= 1e6)) {
+      throw Error(ExitCode::usage, "--rate", fmt::format("'{}'", printable(choice.rate)),
+                  "a servo rate of 1 to 1e6 Hz");
+    }
+    request.budget.rate_Hz = rate;
+  }
+  if (!choice.wall.empty()) request.budget.wall_s_per_s = parse_wall_budget(choice.wall);
+  if (choice.costs.empty()) {
+    const fs::path usual = usual_costs_file();
+    if (!usual.empty() && fs::exists(usual)) request.costs = read_costs(usual);
+  } else if (choice.costs != "nominal") {
+    request.costs = read_costs(choice.costs);
+  }
+  return request;
+}
+
+Plan planned(const ExperimentScene& scene, PlanRequest request) {
+  Progress progress("planning", 5);
+  request.progress = [&](const std::string&) { progress.advance(); };
+  return make_plan(scene, request);
+}
+
+namespace {
+
+struct PlanCommand {
+  std::string scene;
+  bool calibrate = false;
+  bool brief = false;
+  PlanChoice choice;
+};
+
+int calibrate(const PlanCommand& command, const Session& session) {
+  const bool named = !command.choice.costs.empty() && command.choice.costs != "nominal";
+  const fs::path file = named ? fs::path(command.choice.costs) : usual_costs_file();
+  if (file.empty()) {
+    throw Error(ExitCode::environment, "--calibrate", "neither HOME nor XDG_CACHE_HOME is set",
+                "a file after --costs");
+  }
+  const OperationCosts costs = measured_costs();
+  write_costs(costs, file);
+  Json seconds = Json::object();
+  for (const OperationEntry& entry : operation_table()) {
+    seconds[std::string(entry.text)] = costs.seconds[static_cast<std::size_t>(entry.meaning)];
+  }
+  if (session.json()) {
+    fmt::print("{}", to_text(Json{{"seconds_per_operation", seconds}, {"file", file.string()}}));
+    return 0;
+  }
+  for (const auto& [name, value] : seconds.items()) {
+    fmt::print("{:<16} {:>8} ns\n", name, significant(1e9 * value.get<double>(), 2));
+  }
+  fmt::print("wrote {}\n", file.string());
+  return 0;
+}
+
+int run_plan(const PlanCommand& command, const Session& session) {
+  if (command.calibrate) return calibrate(command, session);
+  if (command.scene.empty()) {
+    throw Error(ExitCode::usage, "SCENE", "is missing", "a JSON scene, or --calibrate");
+  }
+  PlanRequest request = plan_request(command.choice);
+  request.relevance = request.changes = !command.brief;
+  const Plan plan = planned(read_experiment(command.scene), std::move(request));
+  fmt::print("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
+  return plan.choice ? 0 : static_cast<int>(ExitCode::answer_is_no);
+}
+
+}  // namespace
+
+void add_plan_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand("plan", "The least model that a scene needs, verified");
+  auto choice = std::make_shared<PlanCommand>();
+  command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
+  add_plan_options(*command, choice->choice);
+  command->add_flag("--brief", choice->brief,
+                    "Leave out what does not matter and what would break");
+  command->add_flag("--calibrate", choice->calibrate,
+                    "Measure what operations cost on this machine, and keep it");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm plan configs/plan/shallow.json --tolerance 1% --rate 1000\n"
+      "Exit code 1: no model meets tolerance and budget.");
+  command->callback([choice, &session] {
+    session.run = [choice, &session] { return run_plan(*choice, session); };
+  });
+}
+
+}  // namespace tpm::app

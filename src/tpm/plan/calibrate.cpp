@@ -1,0 +1,166 @@
+// How long each operation takes on this machine.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "tpm/core/text.hpp"
+#include "tpm/network/equilibrium.hpp"
+#include "tpm/network/lane_bonds.hpp"
+#include "tpm/network/liver.hpp"
+#include "tpm/plan/operations.hpp"
+#include "tpm/plan/scalar_model.hpp"
+#include "tpm/solve/lane_factor.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr int kRepeats = 15;
+constexpr double kRepeat_s = 0.01;  // at least, for one repeat
+
+double elapsed_s(const std::function<void()>& work, int times) {
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < times; ++i) work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+/// Median time of one call, s.
+double time_of(const std::function<void()>& work) {
+  int times = 1;
+  while (elapsed_s(work, times) < kRepeat_s) times *= 2;
+  std::vector<double> each;
+  for (int i = 0; i < kRepeats; ++i) each.push_back(elapsed_s(work, times) / times);
+  std::nth_element(each.begin(), each.begin() + kRepeats / 2, each.end());
+  return each[kRepeats / 2];
+}
+
+/// The paper's liver with its far half held: what the operations of networks are tried on.
+class Bench {
+ public:
+  Bench()
+      : network_(build_network(paper_liver(), {}, "calibration")),
+        bonds_(network_, TpmParameters{}),
+        freedom_(network_.organ.size()),
+        equilibrium_(bonds_, freedom_),
+        factor_(bonds_.pattern()),
+        memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0, {}} {
+    const Eigen::RowVectorXd height = network_.organ.position.row(2);
+    const double middle = height.mean();
+    for (std::size_t i = 0; i < freedom_.size(); ++i) {
+      if (height[static_cast<Eigen::Index>(i)] > middle) freedom_.hold(i);
+    }
+  }
+
+  [[nodiscard]] double bond_force_s() {
+    Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest().cols());
+    return time_of([&] { bonds_.add_forces(rest(), memory_, force); }) / bonds();
+  }
+
+  [[nodiscard]] double bond_stiffness_s() {
+    BlockMatrix matrix(bonds_.pattern());
+    return time_of([&] {
+             matrix.set_zero();
+             bonds_.add_stiffness(rest(), memory_, matrix);
+           }) /
+           bonds();
+  }
+
+  [[nodiscard]] double factor_product_s(double stiffness_s) {
+    const double whole = time_of([&] { (void)equilibrium_.factorise(rest(), memory_); });
+    const auto products = static_cast<double>(bonds_.pattern().factor_products());
+    return std::max(whole - stiffness_s * bonds(), 0.1 * whole) / products;
+  }
+
+  [[nodiscard]] double solve_block_s() {
+    (void)equilibrium_.factorise(rest(), memory_);
+    Eigen::Matrix3Xd x = Eigen::Matrix3Xd::Ones(3, rest().cols());
+    return time_of([&] { equilibrium_.factor().solve(x); }) / solved_blocks();
+  }
+
+  [[nodiscard]] double lane_block_s() {
+    (void)equilibrium_.factorise(rest(), memory_);
+    factor_.copy(equilibrium_.factor());
+    LaneMatrix x = LaneMatrix::Ones(kLanes, 3 * rest().cols());
+    return time_of([&] { factor_.solve(x); }) / solved_blocks();
+  }
+
+  [[nodiscard]] double lane_bond_s() {
+    const LaneBonds lanes(bonds_);
+    LaneMatrix position(kLanes, 3 * rest().cols());
+    position.rowwise() = Eigen::Map<const Eigen::RowVectorXd>(rest().data(), 3 * rest().cols());
+    LaneMatrix elongation(kLanes, static_cast<Eigen::Index>(lanes.relaxing_bonds().size()));
+    LaneMatrix force = LaneMatrix::Zero(kLanes, 3 * rest().cols());
+    return time_of([&] {
+             lanes.elongations(position, elongation);
+             lanes.add_forces(position, elongation, force);
+           }) /
+           bonds();
+  }
+
+ private:
+  [[nodiscard]] const Positions& rest() const { return network_.organ.position; }
+  [[nodiscard]] double bonds() const { return static_cast<double>(bonds_.size()); }
+  [[nodiscard]] double solved_blocks() const {
+    const BlockPattern& pattern = bonds_.pattern();
+    return 2.0 * static_cast<double>(pattern.factor_blocks()) +
+           static_cast<double>(pattern.nodes());
+  }
+
+  Network network_;
+  BondSystem bonds_;
+  Freedom freedom_;
+  Equilibrium equilibrium_;
+  LaneFactor factor_;
+  BondMemory memory_;
+};
+
+double dense_flop_s() {
+  constexpr int kSize = 64;
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Constant(kSize, kSize, 1e-3);
+  Eigen::VectorXd x = Eigen::VectorXd::Ones(kSize), y(kSize);
+  return time_of([&] {
+           y.noalias() = a * x;
+           x = 0.5 * y;
+         }) /
+         (kSize * kSize);
+}
+
+/// A step of a scalar model with `branches` exponentials.
+double scalar_step_s(int branches) {
+  std::vector<ScalarBranch> list(static_cast<std::size_t>(branches), {1.0, 10.0});
+  DepthCurve relaxed, relaxing;
+  relaxed.stiffness_N_per_m = 100.0;
+  relaxing.stiffness_N_per_m = 50.0;
+  ScalarModel model(std::move(relaxed), std::move(relaxing), std::move(list), 1e-3);
+  double depth = 0.0;
+  return time_of([&] {
+    depth = depth > 1e-3 ? 0.0 : depth + 1e-6;
+    (void)model.step_to(depth);
+  });
+}
+
+}  // namespace
+
+OperationCosts measured_costs() {
+  OperationCosts costs{{}, "measured"};
+  const auto set = [&](Operation kind, double seconds) {
+    costs.seconds[static_cast<std::size_t>(kind)] = rounded(std::max(seconds, 1e-12), 2);
+  };
+  const double one = scalar_step_s(1);
+  const double per_term = (scalar_step_s(9) - one) / 8.0;
+  set(Operation::scalar_term, per_term);
+  set(Operation::scalar_step, one - per_term);
+  set(Operation::dense_flop, dense_flop_s());
+  Bench bench;
+  set(Operation::bond_force, bench.bond_force_s());
+  const double stiffness_s = bench.bond_stiffness_s();
+  set(Operation::bond_stiffness, stiffness_s);
+  set(Operation::factor_product, bench.factor_product_s(stiffness_s));
+  set(Operation::solve_block, bench.solve_block_s());
+  set(Operation::lane_block, bench.lane_block_s());
+  set(Operation::lane_bond, bench.lane_bond_s());
+  return costs;
+}
+
+}  // namespace tpm

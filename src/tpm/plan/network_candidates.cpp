@@ -1,0 +1,213 @@
+// The nonlinear network: stepped by a servo, by collocation, with fewer moving layers, with masses.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/plan/plan_model.hpp"
+
+namespace tpm {
+namespace {
+
+/// The network of a scene with deeper layers held, or as it is.
+class LayeredCandidate : public PlanModel {
+ public:
+  /// @param layers that move; 0: all
+  explicit LayeredCandidate(int layers) : layers_(layers) {}
+  [[nodiscard]] ModelReach reach() const override {
+    return layers_ == 0 ? ModelReach::full : ModelReach::reduced;
+  }
+  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+                                                   const PlanBudget& /*budget*/) const override {
+    const Organ& organ = scout.scene().network().organ;
+    for (const SceneContact& contact : scout.scene().scene().contacts) {
+      if (layers_ == 0 || organ.layer[contact.probe.sphere] < layers_) continue;
+      return "a contact lies in a layer that would be held";
+    }
+    return std::nullopt;
+  }
+
+ protected:
+  [[nodiscard]] PlanScene own(const PlanScene& scene) const {
+    return layers_ == 0 ? scene : scene.with_layers(layers_);
+  }
+  [[nodiscard]] std::string suffix() const {
+    return layers_ == 0 ? "" : fmt::format("_layers_{}", layers_);
+  }
+  [[nodiscard]] std::string words() const {
+    if (layers_ == 0) return "";
+    return fmt::format(", {} moving layer{}", layers_, layers_ == 1 ? "" : "s");
+  }
+  [[nodiscard]] int layers() const { return layers_; }
+
+ private:
+  int layers_;
+};
+
+class CollocationCandidate final : public LayeredCandidate {
+ public:
+  CollocationCandidate(double tolerance, int layers)
+      : LayeredCandidate(layers), tolerance_(tolerance) {}
+  [[nodiscard]] std::string name() const override {
+    return fmt::format("collocation_{}{}", shortest(tolerance_), suffix());
+  }
+  [[nodiscard]] std::string formulation() const override { return "collocation"; }
+  [[nodiscard]] std::string settings() const override {
+    return fmt::format("tolerance {}{}", shortest(tolerance_), words());
+  }
+  [[nodiscard]] std::optional<std::string> why_no_servo() const override {
+    return "its steps need the protocol beforehand";
+  }
+
+  [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
+    if (layers() > 0) {
+      const PlanTrajectory answer = run(scout, budget, scout.times());
+      return {scout.claim_of(answer), answer.work, {}};
+    }
+    // Against a run at a tenth of the tolerance.
+    const PlanTrajectory& answer = scout.collocation(tolerance_);
+    const PlanTrajectory& finer = scout.collocation(0.1 * tolerance_);
+    double error = kSafety * trajectory_error(answer, finer, scout.measure()) + kFloor * tolerance_;
+    if (scout.inertial()) error += PlanScout::kSafety * scout.inertia_share();
+    return {error, answer.work, {}};
+  }
+
+  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
+                                   const std::vector<double>& times_s) const override {
+    QuasiStaticOptions options;
+    options.tolerance = tolerance_;
+    return own(scout.scene()).quasi_static(options, times_s, scout.wants_field());
+  }
+
+ private:
+  static constexpr double kSafety = 3.0;  // errors between the scout's times, and of the finer run
+  static constexpr double kFloor = 1e-3;  // of the tolerance: what forces left unbalanced may hide
+  double tolerance_;
+};
+
+/// Collocation with one step a period: what a servo can do with the network as it is.
+class NetworkStepCandidate final : public LayeredCandidate {
+ public:
+  explicit NetworkStepCandidate(int layers) : LayeredCandidate(layers) {}
+  [[nodiscard]] std::string name() const override { return "network_step" + suffix(); }
+  [[nodiscard]] std::string formulation() const override { return "network_step"; }
+  [[nodiscard]] std::string settings() const override {
+    return fmt::format("a step a period, {} stages{}", kStages, words());
+  }
+  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+                                                   const PlanBudget& budget) const override {
+    if (!budget.rate_Hz) return "steps a servo's period, and there is none";
+    return LayeredCandidate::why_not(scout, budget);
+  }
+
+  [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
+    const PlanScene scene = own(scout.scene());
+    // Long protocols are tried at longer steps, of which the error is known to be larger.
+    const double period = budget.period_s().value();
+    const double step = std::max(period, scene.duration_s() / kTried);
+    const PlanTrajectory answer = stepped(scene, step, scout.times(), scout.wants_field());
+    const PlanTrajectory half = stepped(scene, 0.5 * step, scout.times(), scout.wants_field());
+    ModelClaim claim;
+    claim.of_period = answer.work.times(kWorst / answer.steps);
+    claim.work = answer.work.times(scene.duration_s() / period / answer.steps);
+    if (layers() > 0) {
+      claim.error = scout.claim_of(answer);
+      return claim;
+    }
+    const double halved = trajectory_error(answer, half, scout.measure());
+    claim.error = kSafety * halved * std::min(1.0, period / step) + kFloor * kTolerance;
+    if (scout.inertial()) claim.error += PlanScout::kSafety * scout.inertia_share();
+    return claim;
+  }
+
+  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
+                                   const std::vector<double>& times_s) const override {
+    return stepped(own(scout.scene()), budget.period_s().value(), times_s, scout.wants_field());
+  }
+
+ private:
+  static constexpr int kStages = 2;
+  static constexpr double kTolerance = 1e-4;  // of what is left unbalanced
+  static constexpr double kFloor = 0.1;
+  static constexpr double kTried = 150.0;  // steps of a protocol, for the claim
+  static constexpr double kSafety = 2.0;
+  static constexpr double kWorst = 2.0;  // iterations of the costliest step, against the mean
+
+  [[nodiscard]] static PlanTrajectory stepped(const PlanScene& scene, double step_s,
+                                              const std::vector<double>& times_s, bool with_field) {
+    QuasiStaticOptions options;
+    options.tolerance = kTolerance;
+    options.stages = kStages;
+    options.step_s = step_s;
+    return scene.quasi_static(options, times_s, with_field);
+  }
+};
+
+class InertialCandidate final : public PlanModel {
+ public:
+  explicit InertialCandidate(double tolerance) : tolerance_(tolerance) {}
+  [[nodiscard]] std::string name() const override {
+    return fmt::format("inertial_{}", shortest(tolerance_));
+  }
+  [[nodiscard]] std::string formulation() const override { return "inertial"; }
+  [[nodiscard]] std::string settings() const override {
+    return fmt::format("tolerance {}", shortest(tolerance_));
+  }
+  [[nodiscard]] ModelReach reach() const override { return ModelReach::full; }
+  [[nodiscard]] bool has_masses() const override { return true; }
+  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+                                                   const PlanBudget& /*budget*/) const override {
+    if (!scout.inertial()) return "masses do not matter here";
+    return std::nullopt;
+  }
+  [[nodiscard]] std::optional<std::string> why_no_servo() const override {
+    return "its steps follow the error: no bound on the cost of a period";
+  }
+  [[nodiscard]] ModelClaim claim(const PlanScout& scout,
+                                 const PlanBudget& /*budget*/) const override {
+    const PlanTrajectory& answer = scout.with_masses(tolerance_);
+    const PlanTrajectory& finer = scout.with_masses(0.1 * tolerance_);
+    return {kSafety * trajectory_error(answer, finer, scout.measure()), answer.work, {}};
+  }
+  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
+                                   const std::vector<double>& times_s) const override {
+    return scout.scene().inertial(inertial_options(scout.scene(), tolerance_), times_s,
+                                  scout.wants_field());
+  }
+
+ private:
+  static constexpr double kSafety = 4.0;  // errors gather over many periods of ringing
+  double tolerance_;
+};
+
+}  // namespace
+
+void add_network_models(PlanModels& models, const PlanScene& scene) {
+  for (int layers = 1; layers < scene.moving_layers(); ++layers) {
+    models.push_back(std::make_unique<NetworkStepCandidate>(layers));
+    models.push_back(std::make_unique<CollocationCandidate>(1e-3, layers));
+  }
+  models.push_back(std::make_unique<NetworkStepCandidate>(0));
+  for (const double tolerance : {1e-2, 1e-3, 1e-4, 1e-5}) {
+    models.push_back(std::make_unique<CollocationCandidate>(tolerance, 0));
+  }
+}
+
+void add_inertial_models(PlanModels& models) {
+  for (const double tolerance : {1e-3, 1e-4, 1e-5}) {
+    models.push_back(std::make_unique<InertialCandidate>(tolerance));
+  }
+}
+
+PlanModels plan_models(const PlanScene& scene) {
+  PlanModels models;
+  add_scalar_models(models);
+  add_contact_models(models);
+  add_network_models(models, scene);
+  add_inertial_models(models);
+  return models;
+}
+
+}  // namespace tpm

@@ -1,0 +1,71 @@
+#pragma once
+// What models cost, counted in operations: a machine decides only how long each takes.
+#include <array>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace tpm {
+
+/// The kinds of work that models are made of.
+enum class Operation : std::size_t {
+  scalar_step,     ///< a step of a model of one contact with no more than a few numbers, fixed part
+  scalar_term,     ///< an exponential, a curve or a root of such a step
+  dense_flop,      ///< a multiplication and addition in a dense matrix times a vector
+  lane_bond,       ///< force of a bond in all lanes of a collocation at once
+  lane_block,      ///< a 3x3 block of a factor in a back-solve of all lanes, single precision
+  bond_force,      ///< force of a bond, one state
+  bond_stiffness,  ///< stiffness of a bond put into the matrix
+  factor_product,  ///< product of two 3x3 blocks in a factorisation
+  solve_block,     ///< a 3x3 block of a factor in a back-solve, one state
+};
+inline constexpr std::size_t kOperations = 9;
+
+/// A kind of work in words and figures.
+struct OperationEntry {
+  Operation meaning;
+  std::string_view text;  ///< key in files and results
+  double nominal_s;       ///< usual time of one, where no machine was calibrated
+};
+[[nodiscard]] const std::array<OperationEntry, kOperations>& operation_table();
+
+/// How often each operation is done.
+class OperationCount {
+ public:
+  [[nodiscard]] double operator[](Operation kind) const { return n_[index(kind)]; }
+  OperationCount& add(Operation kind, double times) {
+    n_[index(kind)] += times;
+    return *this;
+  }
+  OperationCount& operator+=(const OperationCount& other);
+  [[nodiscard]] OperationCount times(double factor) const;
+
+ private:
+  [[nodiscard]] static std::size_t index(Operation kind) { return static_cast<std::size_t>(kind); }
+  std::array<double, kOperations> n_{};
+};
+
+/// The time that each operation takes on a machine, s.
+struct OperationCosts {
+  std::array<double, kOperations> seconds;
+  std::string source;  ///< "nominal", or the file it was read from
+
+  [[nodiscard]] double seconds_of(const OperationCount& count) const;
+};
+
+[[nodiscard]] OperationCosts nominal_costs();
+
+/// Measures every operation on this machine, about 2 s: the median of many short repeats, written
+/// with two digits.
+[[nodiscard]] OperationCosts measured_costs();
+
+/// The file that `tpm plan` keeps the costs of this machine in: tpmkit/operations.json in
+/// $XDG_CACHE_HOME, else in .cache of $HOME; empty if neither is set.
+[[nodiscard]] std::filesystem::path usual_costs_file();
+
+/// Throws Error(environment).
+void write_costs(const OperationCosts& costs, const std::filesystem::path& file);
+/// Throws Error(bad_input) with the key.
+[[nodiscard]] OperationCosts read_costs(const std::filesystem::path& file);
+
+}  // namespace tpm

@@ -1,0 +1,274 @@
+#include "tpm/plan/plan.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/plan/perception.hpp"
+#include "tpm/plan/plan_reference.hpp"
+#include "tpm/plan/plan_relevance.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
+constexpr double kSlowest_Hz = 1.0, kFastest_Hz = 1e6;
+
+void require_valid(const PlanRequest& request) {
+  if (!(request.tolerance >= kLeastTolerance && request.tolerance <= kMostTolerance)) {
+    throw bad_input("tolerance", shortest(request.tolerance), "1e-6 to 0.5 of the peak");
+  }
+  const PlanBudget& budget = request.budget;
+  if (budget.rate_Hz && !(*budget.rate_Hz >= kSlowest_Hz && *budget.rate_Hz <= kFastest_Hz)) {
+    throw bad_input("rate", shortest(*budget.rate_Hz) + " Hz", "1 to 1e6 Hz");
+  }
+  if (budget.wall_s_per_s && !(*budget.wall_s_per_s > 0.0 && std::isfinite(*budget.wall_s_per_s))) {
+    throw bad_input("wall", shortest(*budget.wall_s_per_s) + " s per s", "a time above 0");
+  }
+}
+
+bool masses_known(const ExperimentScene& scene) {
+  return std::all_of(scene.contacts.begin(), scene.contacts.end(),
+                     [](const SceneContact& c) { return !c.is_tool() || c.mass_kg.has_value(); });
+}
+
+/// Whether the truth has masses: the scene says so, or they would be felt at this tolerance.
+bool truth_has_masses(const ExperimentScene& scene, const PlanScout& massless, double tolerance) {
+  if (scene.formulation.inertial()) return true;
+  if (!masses_known(scene)) return false;
+  const InertiaEstimate& estimate = massless.inertia();
+  return !std::isinf(estimate.of_jumps) && massless.inertia_share() >= tolerance;
+}
+
+/// A plan being made.
+class Planning {
+ public:
+  Planning(const ExperimentScene& scene, const PlanRequest& request)
+      : scene_(scene), models_(plan_models(scene_)) {
+    plan_.title = scene.tissue.title;
+    plan_.request = request;
+    plan_.by_depth = scene_.by_depth();
+    plan_.duration_s = scene_.duration_s();
+    plan_.spheres = scene_.network().organ.size();
+    plan_.bonds = scene_.network().bonds.size();
+    tell("coarse runs of the network");
+    PlanScout massless(scene_, request.measure, false);
+    plan_.inertial = truth_has_masses(scene, massless, request.tolerance);
+    if (plan_.inertial) {
+      scout_.emplace(scene_, request.measure, true);
+    } else {
+      scout_.emplace(std::move(massless));
+    }
+  }
+
+  Plan make() {
+    tell("candidates");
+    for (const auto& model : models_) consider(*model);
+    sort();
+    tell("reference");
+    truth_ = verified_truth(scene_, plan_.request.measure, plan_.inertial, plan_.request.tolerance);
+    plan_.reference = truth_.reference;
+    verify_cheap();
+    choose();
+    plan_.needs_full = std::none_of(
+        plan_.candidates.begin(), plan_.candidates.end(),
+        [](const PlannedCandidate& c) { return c.reach == ModelReach::reduced && c.accurate; });
+    plan_.validity = passed_limits(scene_);
+    if (plan_.request.relevance) {
+      tell("what does not matter");
+      plan_.relevance = plan_relevance(*scout_, plan_.request.tolerance);
+    }
+    if (plan_.request.changes && plan_.choice) {
+      tell("what would break first");
+      plan_.changes = plan_changes(*scout_, model_of(plan_.chosen()), plan_.request);
+    }
+    return std::move(plan_);
+  }
+
+ private:
+  void tell(const std::string& what) const {
+    if (plan_.request.progress) plan_.request.progress(what);
+  }
+
+  [[nodiscard]] const PlanModel& model_of(const PlannedCandidate& candidate) const {
+    return **std::find_if(models_.begin(), models_.end(),
+                          [&](const auto& m) { return m->name() == candidate.name; });
+  }
+
+  void consider(const PlanModel& model) {
+    const PlanRequest& request = plan_.request;
+    PlannedCandidate candidate;
+    candidate.name = model.name();
+    candidate.formulation = model.formulation();
+    candidate.settings = model.settings();
+    candidate.reach = model.reach();
+    if (const auto reason = model.why_not(*scout_, request.budget)) {
+      candidate.reason = *reason;
+    } else if (model.has_masses() && with_masses_found_) {
+      candidate.reason = "not tried: a cheaper one with masses meets the tolerance";
+    } else {
+      try {
+        judge(model, candidate);
+      } catch (const Error& error) {
+        if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
+        candidate.reason = fmt::format("fails: {}", error.what());
+      }
+    }
+    plan_.candidates.push_back(std::move(candidate));
+  }
+
+  void judge(const PlanModel& model, PlannedCandidate& candidate) {
+    const PlanRequest& request = plan_.request;
+    const ModelClaim claim = model.claim(*scout_, request.budget);
+    candidate.claimed_error = claim.error;
+    candidate.cost_s_per_s = request.costs.seconds_of(claim.work) / plan_.duration_s;
+    if (request.budget.rate_Hz && !model.why_no_servo()) {
+      candidate.period_s = request.costs.seconds_of(claim.of_period);
+    }
+    candidate.accurate = claim.error <= request.tolerance;
+    if (!candidate.accurate) {
+      candidate.reason = "the claimed error is above the tolerance";
+      return;
+    }
+    with_masses_found_ = with_masses_found_ || model.has_masses();
+    const auto over = over_budget(model, claim, plan_.duration_s, request.budget, request.costs);
+    candidate.feasible = !over;
+    if (over) candidate.reason = *over;
+  }
+
+  /// By rising cost; the table's order where costs are alike.
+  void sort() {
+    std::stable_sort(plan_.candidates.begin(), plan_.candidates.end(),
+                     [](const PlannedCandidate& a, const PlannedCandidate& b) {
+                       if (!a.cost_s_per_s || !b.cost_s_per_s)
+                         return a.cost_s_per_s && !b.cost_s_per_s;
+                       return *a.cost_s_per_s < *b.cost_s_per_s;
+                     });
+  }
+
+  /// The error against the reference, whose own uncertainty is added.
+  void verify(PlannedCandidate& candidate) {
+    const PlanTrajectory answer =
+        model_of(candidate).run(*scout_, plan_.request.budget, truth_.times_s);
+    candidate.verified_error = trajectory_error(answer, truth_.trajectory, plan_.request.measure) +
+                               truth_.reference.difference;
+  }
+
+  /// All that take less than the reference, so that the frontier shows how far claims are off.
+  void verify_cheap() {
+    for (PlannedCandidate& candidate : plan_.candidates) {
+      const bool reduced =
+          candidate.reach == ModelReach::reduced && candidate.formulation != "network_step";
+      if (candidate.claimed_error && (reduced || candidate.formulation == "collocation"))
+        verify(candidate);
+    }
+  }
+
+  void choose() {
+    for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
+      PlannedCandidate& candidate = plan_.candidates[i];
+      if (!candidate.accurate) continue;
+      if (!candidate.feasible && plan_.without_budget) continue;
+      if (!candidate.verified_error) verify(candidate);
+      if (*candidate.verified_error > plan_.request.tolerance) {
+        candidate.accurate = candidate.feasible = false;
+        candidate.reason = "verified: the error is above the tolerance, and above the claim";
+        continue;
+      }
+      if (!candidate.feasible) {
+        plan_.without_budget = i;
+        continue;
+      }
+      plan_.choice = i;
+      break;
+    }
+  }
+
+  PlanScene scene_;
+  PlanModels models_;
+  Plan plan_;
+  std::optional<PlanScout> scout_;
+  VerifiedTruth truth_;
+  bool with_masses_found_ = false;
+};
+
+}  // namespace
+
+void set_tolerance(PlanRequest& request, const std::string& text) {
+  if (text == "jnd") {
+    request.tolerance = kForceJnd;
+    request.measure.relative_weight = kForceJnd / kStiffnessJnd;
+    request.tolerance_source =
+        fmt::format("just noticeable differences: force {} %, stiffness {} %",
+                    shortest(100.0 * kForceJnd), shortest(100.0 * kStiffnessJnd));
+    return;
+  }
+  const bool percent = !text.empty() && text.back() == '%';
+  const auto number = find_number(percent ? text.substr(0, text.size() - 1) : text);
+  const double value = number.value_or(0.0) * (percent ? 0.01 : 1.0);
+  if (!(value >= kLeastTolerance && value <= kMostTolerance)) {
+    throw Error(ExitCode::usage, "--tolerance", fmt::format("'{}'", printable(text)),
+                "a share of the peak such as 1% or 0.01, 1e-6 to 0.5, or jnd");
+  }
+  request.tolerance = value;
+}
+
+double parse_wall_budget(const std::string& text) {
+  constexpr std::string_view kPer = " per s";
+  const bool per = text.size() > kPer.size() && text.ends_with(kPer);
+  if (per) {
+    const double value =
+        parse_quantity(text.substr(0, text.size() - kPer.size()), Dimension::time, "--wall");
+    if (value > 0.0) return value;
+  }
+  throw Error(ExitCode::usage, "--wall", fmt::format("'{}'", printable(text)),
+              "computing time above 0 per simulated second, such as \"0.1 s per s\"");
+}
+
+Plan make_plan(const ExperimentScene& scene, const PlanRequest& request) {
+  require_valid(request);
+  return Planning(scene, request).make();
+}
+
+PlanTrajectory run_planned(const Plan& plan, const ExperimentScene& scene,
+                           const std::vector<double>& times_s) {
+  const PlanScout scout(PlanScene(scene), plan.request.measure, plan.inertial);
+  for (const auto& model : plan_models(scout.scene())) {
+    if (model->name() == plan.chosen().name) return model->run(scout, plan.request.budget, times_s);
+  }
+  throw bad_input("plan", "made for another scene", "a plan of this scene");
+}
+
+Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
+                      const PlanRequest& request) {
+  if (!(range.depth_m > 0.0 && range.speed_m_per_s > 0.0 && range.hold_s >= 0.0)) {
+    throw bad_input("contact", "a depth or speed that is not above 0, or a rest below 0",
+                    "how a hand moves it");
+  }
+  constexpr double kSlow = 0.2;
+  std::vector<Knot> knots{{0.0, 0.0}};
+  const auto go = [&](double depth_m, double speed) {
+    const double length = std::abs(depth_m - knots.back().value) / speed;
+    knots.push_back({knots.back().time_s + length, depth_m});
+  };
+  const auto rest = [&] {
+    if (range.hold_s > 0.0)
+      knots.push_back({knots.back().time_s + range.hold_s, knots.back().value});
+  };
+  go(range.depth_m, range.speed_m_per_s);
+  rest();
+  go(0.5 * range.depth_m, range.speed_m_per_s);
+  rest();
+  go(range.depth_m, kSlow * range.speed_m_per_s);
+  go(0.0, range.speed_m_per_s);
+  ExperimentScene probed = scene;
+  probed.protocol = Protocol(Drive::displacement, std::move(knots), "a hand's contact");
+  return make_plan(probed, request);
+}
+
+}  // namespace tpm

@@ -1,0 +1,108 @@
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/plan/plan_model.hpp"
+
+namespace tpm {
+
+/// What a plan is asked for.
+struct PlanRequest {
+  double tolerance = 0.01;  ///< of the error, in parts of the peak; 1e-6 to 0.5
+  PlanMeasure measure;
+  std::string tolerance_source;  ///< in words, if it is not a number that was given
+  PlanBudget budget;
+  OperationCosts costs = nominal_costs();
+  bool relevance = true;                                  ///< find out what does not matter
+  bool changes = true;                                    ///< find out what would break first
+  std::function<void(const std::string& what)> progress;  ///< told what is being done
+};
+
+/// 1e-6 to 0.5, or a threshold of perception: what `--tolerance` means. "1%", "0.01", "jnd".
+/// Throws Error(usage).
+void set_tolerance(PlanRequest& request, const std::string& text);
+/// "0.1 s per s". Throws Error(usage).
+[[nodiscard]] double parse_wall_budget(const std::string& text);
+
+/// A candidate and what came of it.
+struct PlannedCandidate {
+  std::string name, formulation, settings;
+  ModelReach reach = ModelReach::reduced;
+  std::optional<double> claimed_error;   ///< bound before verification, in parts of the peak
+  std::optional<double> verified_error;  ///< against the reference, its own uncertainty added
+  std::optional<double> cost_s_per_s;    ///< computing time per simulated second
+  std::optional<double> period_s;        ///< computing time of the costliest servo period
+  bool feasible = false;                 ///< meets tolerance and budget
+  bool accurate = false;                 ///< meets the tolerance, whatever it costs
+  std::string reason;                    ///< why it is not feasible
+};
+
+/// What the pick is verified against.
+struct PlanReference {
+  std::string method, judge;  ///< in words
+  double difference = 0.0;    ///< between the two, in parts of the peak
+  double peak = 0.0;          ///< of the response, N or m
+};
+
+/// What switching a part of the physics off would change.
+struct PlanRelevance {
+  std::string part;             ///< inertia, layers, tension, viscosity
+  std::optional<double> error;  ///< in parts of the peak; none: it cannot be switched off
+  bool estimated = false;       ///< by the linear network, not by a run
+  bool matters = true;          ///< its error is above the tolerance
+  std::string note;
+};
+
+/// By how much a scene can change before the pick no longer does.
+struct PlanChange {
+  std::string change;            ///< deeper, faster, stiffer
+  std::optional<double> factor;  ///< none: not within `kMostChange`
+  std::string breaks;            ///< what breaks there
+};
+inline constexpr double kMostChange = 16.0;
+
+struct Plan {
+  std::string title;
+  PlanRequest request;
+  bool inertial = false;  ///< the reference has masses
+  bool by_depth = true;
+  double duration_s = 0.0;
+  std::size_t spheres = 0, bonds = 0;
+  std::vector<PlannedCandidate> candidates;  ///< by rising cost, those without one last
+  std::optional<std::size_t> choice;         ///< none: nothing meets tolerance and budget
+  std::optional<std::size_t>
+      without_budget;       ///< the cheapest that meets the tolerance, if no choice
+  bool needs_full = false;  ///< no reduced model meets the tolerance
+  PlanReference reference;
+  std::vector<PlanRelevance> relevance;
+  std::vector<PlanChange> changes;
+  std::vector<std::string> validity;  ///< limits that the scene passes
+
+  [[nodiscard]] const PlannedCandidate& chosen() const { return candidates.at(choice.value()); }
+};
+
+/// The least model for a scene. Throws Error(bad_input) for scenes and requests that no plan is
+/// made for, Error(numerical) where the reference itself cannot be computed or its judge disagrees.
+[[nodiscard]] Plan make_plan(const ExperimentScene& scene, const PlanRequest& request);
+
+/// The planned model's answer over the scene's protocol, at the times given.
+/// @param plan with a choice, of the same scene
+[[nodiscard]] PlanTrajectory run_planned(const Plan& plan, const ExperimentScene& scene,
+                                         const std::vector<double>& times_s);
+
+/// How a hand will move a contact: what a session knows before it begins.
+struct ContactRange {
+  double depth_m = 0.0;        ///< deepest, > 0
+  double speed_m_per_s = 0.0;  ///< fastest, > 0
+  double hold_s = 1.0;         ///< longest rest at a depth, >= 0
+};
+
+/// A plan for a contact that is moved as a hand likes: the protocol it is made for goes to the
+/// whole and to half of the depth at full and at a fifth of the speed, rests there, and comes back.
+/// @param scene of which organ, material and contacts are used
+[[nodiscard]] Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
+                                    const PlanRequest& request);
+
+}  // namespace tpm

@@ -1,0 +1,126 @@
+// What would break first if the scene changed.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/plan/plan_relevance.hpp"
+#include "tpm/simulate/validity.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kStride = 1.5;    // between factors tried
+constexpr double kFoundTo = 1.02;  // by bisection
+constexpr double kValidityTolerance = 1e-3;
+
+Validity validity_of(const PlanScene& scene) {
+  std::vector<double> times;
+  for (const Knot& knot : scene.protocol().knots()) times.push_back(knot.time_s);
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  QuasiStaticOptions options;
+  options.tolerance = kValidityTolerance;
+  return scene.quasi_static(options, times, true).validity;
+}
+
+/// The changes of a scene, and whether a model survives them.
+class Survival {
+ public:
+  Survival(const PlanScout& scout, const PlanModel& model, const PlanRequest& request)
+      : scout_(scout),
+        model_(model),
+        request_(request),
+        valid_(passed_limits(scout.scene()).empty()) {}
+
+  /// What breaks in a changed scene; none if nothing does.
+  [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
+    try {
+      const PlanScout changed(scene, request_.measure, scout_.inertial());
+      if (const auto reason = model_.why_not(changed, request_.budget)) return reason;
+      if (valid_) {
+        const auto passed = passed_limits(scene);
+        if (!passed.empty()) return "validity: " + passed.front();
+      }
+      const ModelClaim claim = model_.claim(changed, request_.budget);
+      if (!(claim.error <= request_.tolerance)) return "tolerance: the claimed error leaves it";
+      if (!scout_.inertial() && masses_known() && changed.inertia_share() >= request_.tolerance) {
+        return "inertia: masses begin to matter";
+      }
+      if (const auto reason =
+              over_budget(model_, claim, scene.duration_s(), request_.budget, request_.costs)) {
+        return "budget: " + *reason;
+      }
+      return std::nullopt;
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
+      return std::string(error.what());
+    }
+  }
+
+  /// The least factor at which something breaks.
+  template <class Change>
+  [[nodiscard]] PlanChange first(std::string name, Change&& change) const {
+    PlanChange result{std::move(name), std::nullopt, ""};
+    double good = 1.0;
+    for (double factor = kStride;; factor *= kStride) {
+      factor = std::min(factor, kMostChange);
+      const auto broken = breaks(change(factor));
+      if (!broken) {
+        good = factor;
+        if (factor == kMostChange) return result;
+        continue;
+      }
+      double bad = factor;
+      result.breaks = *broken;
+      while (bad / good > kFoundTo) {
+        const double middle = std::sqrt(good * bad);
+        const auto there = breaks(change(middle));
+        if (there) {
+          bad = middle;
+          result.breaks = *there;
+        } else {
+          good = middle;
+        }
+      }
+      result.factor = bad;
+      return result;
+    }
+  }
+
+ private:
+  [[nodiscard]] bool masses_known() const {
+    return std::all_of(scout_.scene().scene().contacts.begin(),
+                       scout_.scene().scene().contacts.end(),
+                       [](const SceneContact& c) { return !c.is_tool() || c.mass_kg; });
+  }
+
+  const PlanScout& scout_;
+  const PlanModel& model_;
+  const PlanRequest& request_;
+  bool valid_;
+};
+
+}  // namespace
+
+std::vector<std::string> passed_limits(const PlanScene& scene) {
+  const Validity validity = validity_of(scene);
+  std::vector<std::string> words;
+  for (std::size_t k = 0; k < kValidityLimits; ++k) {
+    const auto limit = static_cast<ValidityLimit>(k);
+    if (validity.of(limit).first_time_s) words.emplace_back(words_of(limit));
+  }
+  return words;
+}
+
+std::vector<PlanChange> plan_changes(const PlanScout& scout, const PlanModel& model,
+                                     const PlanRequest& request) {
+  const Survival survival(scout, model, request);
+  const PlanScene& scene = scout.scene();
+  return {survival.first("deeper", [&](double f) { return scene.deeper(f); }),
+          survival.first("faster", [&](double f) { return scene.faster(f); }),
+          survival.first("stiffer", [&](double f) { return scene.stiffer(f); })};
+}
+
+}  // namespace tpm

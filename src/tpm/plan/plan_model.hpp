@@ -1,0 +1,75 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/plan/plan_scout.hpp"
+
+namespace tpm {
+
+/// What a model answers a period late at most, and how fast it has to be.
+struct PlanBudget {
+  std::optional<double> rate_Hz;       ///< of a servo loop: every period needs its answer
+  std::optional<double> wall_s_per_s;  ///< computing time per simulated second
+  [[nodiscard]] std::optional<double> period_s() const {
+    if (!rate_Hz) return std::nullopt;
+    return 1.0 / *rate_Hz;
+  }
+};
+
+/// What a model says of itself before it is verified.
+struct ModelClaim {
+  double error = 0.0;        ///< bound, in parts of the peak
+  OperationCount work;       ///< of the whole protocol; at a servo rate of all its periods
+  OperationCount of_period;  ///< the costliest period, where the model can be stepped by a servo
+};
+
+/// How much of the tissue a model knows.
+enum class ModelReach {
+  reduced,  ///< the contact alone
+  full,     ///< the nonlinear network
+};
+
+/// One candidate: a formulation with its settings. A new formulation is one more class and one more
+/// line in plan_models().
+class PlanModel {
+ public:
+  PlanModel() = default;
+  PlanModel(const PlanModel&) = delete;
+  PlanModel& operator=(const PlanModel&) = delete;
+  virtual ~PlanModel() = default;
+
+  [[nodiscard]] virtual std::string name() const = 0;         ///< "linear_2"
+  [[nodiscard]] virtual std::string formulation() const = 0;  ///< "linear"
+  [[nodiscard]] virtual std::string settings() const = 0;     ///< in words; may be empty
+  [[nodiscard]] virtual ModelReach reach() const { return ModelReach::reduced; }
+  /// It has masses.
+  [[nodiscard]] virtual bool has_masses() const { return false; }
+
+  /// Why the model has no answer to a scene at all; none if it has.
+  [[nodiscard]] virtual std::optional<std::string> why_not(const PlanScout& scout,
+                                                           const PlanBudget& budget) const = 0;
+  /// Why a servo cannot step it, whatever it costs; none if it can.
+  [[nodiscard]] virtual std::optional<std::string> why_no_servo() const { return std::nullopt; }
+  /// Throws Error(numerical) where the model fails.
+  [[nodiscard]] virtual ModelClaim claim(const PlanScout& scout,
+                                         const PlanBudget& budget) const = 0;
+  /// The answer over the protocol, as the model would be used under the budget.
+  [[nodiscard]] virtual PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
+                                           const std::vector<double>& times_s) const = 0;
+};
+
+using PlanModels = std::vector<std::unique_ptr<PlanModel>>;
+
+/// All candidates for a scene, each family in the order of its table.
+[[nodiscard]] PlanModels plan_models(const PlanScene& scene);
+
+// The families.
+void add_scalar_models(PlanModels& models);
+void add_contact_models(PlanModels& models);
+void add_network_models(PlanModels& models, const PlanScene& scene);
+void add_inertial_models(PlanModels& models);
+
+}  // namespace tpm

@@ -1,0 +1,69 @@
+#include "tpm/plan/plan_reference.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr int kTimesOfPiece = 64;
+constexpr int kMostTimes = 800;
+constexpr int kTimesOfPieceWithMasses = 640;
+constexpr int kMostTimesWithMasses = 3000;
+constexpr double kTolerance = 1e-10, kJudgeTolerance = 1e-9;
+constexpr int kJudgeStages = 3;
+constexpr double kInertialTolerance = 1e-6, kInertialJudgeTolerance = 1e-6;
+constexpr int kJudgeOrder = 3;
+constexpr double kAgreement = 0.1;  // of the tolerance
+
+}  // namespace
+
+VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure, bool inertial,
+                             double tolerance) {
+  VerifiedTruth truth;
+  const bool field = measure.output == PlanOutput::field;
+  PlanTrajectory judge;
+  if (inertial) {
+    truth.times_s = sampled_times(scene.protocol(), kTimesOfPieceWithMasses, kMostTimesWithMasses);
+    truth.trajectory =
+        scene.inertial(inertial_options(scene, kInertialTolerance), truth.times_s, field);
+    InertialOptions other = inertial_options(scene, kInertialJudgeTolerance);
+    other.newton = NewtonSolver::klu;
+    other.highest_order = kJudgeOrder;
+    judge = scene.inertial(other, truth.times_s, field);
+    truth.reference.method = fmt::format("network with masses, BDF of order 2, tolerance {}",
+                                         shortest(kInertialTolerance));
+    truth.reference.judge =
+        fmt::format("BDF of order 3 with KLU, tolerance {}", shortest(kInertialJudgeTolerance));
+  } else {
+    truth.times_s = sampled_times(scene.protocol(), kTimesOfPiece, kMostTimes);
+    QuasiStaticOptions options;
+    options.tolerance = kTolerance;
+    truth.trajectory = scene.quasi_static(options, truth.times_s, field);
+    options.tolerance = kJudgeTolerance;
+    options.stages = kJudgeStages;
+    judge = scene.quasi_static(options, truth.times_s, field);
+    truth.reference.method =
+        fmt::format("nonlinear network, Radau collocation of {} stages, tolerance {}", kLanes,
+                    shortest(kTolerance));
+    truth.reference.judge = fmt::format("Radau collocation of {} stages, tolerance {}",
+                                        kJudgeStages, shortest(kJudgeTolerance));
+  }
+  truth.reference.peak = truth.trajectory.response.cwiseAbs().maxCoeff();
+  if (!(truth.reference.peak > 0.0)) {
+    throw bad_input("scene", "nothing is imposed, or nothing answers", "a protocol with a peak");
+  }
+  truth.reference.difference = trajectory_error(judge, truth.trajectory, measure);
+  if (truth.reference.difference <= kAgreement * tolerance) return truth;
+  throw Error(
+      ExitCode::numerical, "reference",
+      fmt::format("it and its judge differ by {} of the peak",
+                  significant(truth.reference.difference, 2)),
+      fmt::format("at most {}: a looser tolerance", significant(kAgreement * tolerance, 2)));
+}
+
+}  // namespace tpm

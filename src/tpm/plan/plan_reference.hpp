@@ -1,0 +1,21 @@
+#pragma once
+#include "tpm/plan/plan.hpp"
+
+namespace tpm {
+
+/// The truth that a pick is verified against, and how sure it is.
+struct VerifiedTruth {
+  std::vector<double> times_s;
+  PlanTrajectory trajectory;
+  PlanReference reference;
+};
+
+/// The full nonlinear network at a tight tolerance, and beside it a second run by other formulae:
+/// without masses Radau collocation with eight stages against three (of order 15 and 5 in smooth
+/// motion); with masses BDF of order 2 with the elimination by hand against order 3 with KLU.
+/// Throws Error(numerical) as the runs do, and where the two differ by more than a tenth of the
+/// tolerance.
+[[nodiscard]] VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
+                                           bool inertial, double tolerance);
+
+}  // namespace tpm

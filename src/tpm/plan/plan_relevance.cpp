@@ -1,0 +1,154 @@
+#include "tpm/plan/plan_relevance.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kServoShare = 0.5;    // of a period: what else happens in it needs the rest
+constexpr double kAffordable = 1.2e6;  // steps times spheres of a run with masses
+constexpr double kInertiaTolerance = 1e-4;
+
+/// The tissue as the truth has it, changed in one part.
+PlanTrajectory answer_of(const PlanScene& scene, const PlanScout& like) {
+  const PlanScout changed(scene, like.measure(), false);
+  QuasiStaticOptions options;
+  options.tolerance = PlanScout::kTolerance;
+  return changed.scene().quasi_static(options, like.times(), like.wants_field());
+}
+
+/// Runs the scene with a part switched off.
+template <class Change>
+PlanRelevance switched_off(const PlanScout& scout, std::string part, std::string note,
+                           Change&& change) {
+  PlanRelevance result;
+  result.part = std::move(part);
+  result.note = std::move(note);
+  try {
+    const PlanScene without = std::forward<Change>(change)(scout.scene());
+    result.error = trajectory_error(answer_of(without, scout), scout.coarse(), scout.measure());
+  } catch (const Error& error) {
+    result.note = fmt::format("cannot be switched off: {}", error.what());
+  }
+  return result;
+}
+
+PlanRelevance relevance_of_viscosity(const PlanScout& scout) {
+  const double duration = scout.scene().duration_s();
+  const auto at = [&](double tau_s) {
+    return switched_off(scout, "viscosity", "", [&](const PlanScene& scene) {
+      TpmParameters material = scene.scene().tissue.material;
+      material.eta1_Pa_s = tau_s * (material.E1_Pa + material.E2_Pa);
+      return scene.with_material(material);
+    });
+  };
+  PlanRelevance relaxed = at(1e-7 * duration);
+  PlanRelevance elastic = at(1e7 * duration);
+  if (relaxed.error && elastic.error) {
+    const double of_relaxed = *relaxed.error, of_elastic = *elastic.error;
+    PlanRelevance& less = of_relaxed <= of_elastic ? relaxed : elastic;
+    less.note = fmt::format("everything relaxed at once: {} % of the peak; nothing relaxing: {} %",
+                            significant(100.0 * of_relaxed, 3), significant(100.0 * of_elastic, 3));
+    return less;
+  }
+  return relaxed.error ? relaxed : elastic;
+}
+
+PlanRelevance relevance_of_tension(const PlanScout& scout) {
+  return switched_off(scout, "tension", "lateral bonds without stiffness",
+                      [](const PlanScene& scene) {
+                        TpmParameters material = scene.scene().tissue.material;
+                        material.Eprime_Pa = 0.0;
+                        return scene.with_material(material);
+                      });
+}
+
+PlanRelevance relevance_of_layers(const PlanScout& scout) {
+  const int moving = scout.scene().moving_layers();
+  if (moving < 2) {
+    return {"layers", std::nullopt, false, false, "only the outer layer moves"};
+  }
+  return switched_off(scout, "layers", fmt::format("layer {} held", moving),
+                      [&](const PlanScene& scene) { return scene.with_layers(moving - 1); });
+}
+
+PlanRelevance relevance_of_inertia(const PlanScout& scout) {
+  PlanRelevance result;
+  result.part = "inertia";
+  try {
+    if (scout.inertial()) {
+      PlanTrajectory massless = scout.coarse();
+      result.error =
+          trajectory_error(massless, scout.with_masses(kInertiaTolerance), scout.measure());
+      return result;
+    }
+    const InertiaEstimate& estimate = scout.inertia();
+    result.error = scout.inertia_share();
+    result.estimated = true;
+    result.note = "by the linear network";
+    if (std::isinf(estimate.of_jumps)) {
+      result.note += "; a jump of depth has no meaning with masses and is left out";
+      return result;
+    }
+    if (estimate.of_jumps > 0.0) {
+      const double peak = scout.coarse().response.cwiseAbs().maxCoeff();
+      result.note += fmt::format("; a load put on at once would ring by {} % of the peak",
+                                 significant(100.0 * estimate.of_jumps / peak, 3));
+      return result;
+    }
+    const double steps = 10.0 * estimate.highest_Hz * scout.scene().duration_s();
+    if (steps * static_cast<double>(scout.scene().network().organ.size()) > kAffordable)
+      return result;
+    const PlanScout moving(scout.scene(), scout.measure(), true);
+    const PlanTrajectory& truth = moving.with_masses(kInertiaTolerance);
+    result.error = trajectory_error(moving.coarse(), truth, scout.measure());
+    result.estimated = false;
+    result.note.clear();
+  } catch (const Error& error) {
+    result.error.reset();
+    result.note = fmt::format("not judged: {}", error.what());
+  }
+  return result;
+}
+
+}  // namespace
+
+std::optional<std::string> over_budget(const PlanModel& model, const ModelClaim& claim,
+                                       double duration_s, const PlanBudget& budget,
+                                       const OperationCosts& costs) {
+  if (budget.rate_Hz) {
+    if (const auto reason = model.why_no_servo())
+      return fmt::format("not for a servo: {}", *reason);
+    const double period = costs.seconds_of(claim.of_period);
+    const double allowed = kServoShare / *budget.rate_Hz;
+    if (!(period <= allowed)) {
+      return fmt::format("a period takes {} us, {} are allowed", significant(1e6 * period, 3),
+                         significant(1e6 * allowed, 3));
+    }
+  }
+  if (budget.wall_s_per_s) {
+    const double cost = costs.seconds_of(claim.work) / duration_s;
+    if (!(cost <= *budget.wall_s_per_s)) {
+      return fmt::format("takes {} s per s, {} are allowed", significant(cost, 3),
+                         significant(*budget.wall_s_per_s, 3));
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<PlanRelevance> plan_relevance(const PlanScout& scout, double tolerance) {
+  std::vector<PlanRelevance> all{relevance_of_inertia(scout), relevance_of_layers(scout),
+                                 relevance_of_tension(scout), relevance_of_viscosity(scout)};
+  for (PlanRelevance& part : all) {
+    if (part.error) part.matters = *part.error > tolerance;
+  }
+  return all;
+}
+
+}  // namespace tpm

@@ -1,0 +1,24 @@
+#pragma once
+#include "tpm/plan/plan.hpp"
+
+namespace tpm {
+
+/// What switching inertia, the deepest moving layer, tension and viscosity off changes, each by a
+/// run of the reference's formulation without it.
+[[nodiscard]] std::vector<PlanRelevance> plan_relevance(const PlanScout& scout, double tolerance);
+
+/// By what factor each the scene can become deeper, faster and stiffer until the claim of a model
+/// leaves the tolerance, its cost the budget, or the scene a limit of validity.
+[[nodiscard]] std::vector<PlanChange> plan_changes(const PlanScout& scout, const PlanModel& model,
+                                                   const PlanRequest& request);
+
+/// Limits that the scene passes at the corners of its protocol, in words.
+[[nodiscard]] std::vector<std::string> passed_limits(const PlanScene& scene);
+
+/// Why a model does not fit a budget; none if it does.
+[[nodiscard]] std::optional<std::string> over_budget(const PlanModel& model,
+                                                     const ModelClaim& claim, double duration_s,
+                                                     const PlanBudget& budget,
+                                                     const OperationCosts& costs);
+
+}  // namespace tpm

@@ -1,0 +1,230 @@
+#include "tpm/plan/plan_scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+namespace {
+
+ExperimentScene plannable(ExperimentScene scene) {
+  if (scene.formulation.kind == FormulationKind::relaxed) {
+    throw bad_input("scene", "the formulation 'static' has no course in time to plan for",
+                    "quasi_static or inertial");
+  }
+  if (scene.formulation.mass_spring) {
+    throw bad_input("scene", "runs the mass-spring model", "the tissue: without a comparison");
+  }
+  return scene;
+}
+
+double blocks_of_solve(const BlockPattern& pattern) {
+  return 2.0 * static_cast<double>(pattern.factor_blocks()) + static_cast<double>(pattern.nodes());
+}
+
+}  // namespace
+
+double trajectory_error(const PlanTrajectory& model, const PlanTrajectory& truth,
+                        const PlanMeasure& measure) {
+  constexpr double kFelt = 0.1;  // of the peak: less is no stiffness to be felt
+  if (measure.output == PlanOutput::force) {
+    const double peak = truth.response.cwiseAbs().maxCoeff();
+    const Eigen::VectorXd difference = (model.response - truth.response).cwiseAbs();
+    double error = difference.maxCoeff() / peak;
+    for (Eigen::Index i = 0; i < difference.size() && measure.relative_weight > 0.0; ++i) {
+      const double size = std::abs(truth.response[i]);
+      if (size > kFelt * peak)
+        error = std::max(error, measure.relative_weight * difference[i] / size);
+    }
+    return error;
+  }
+  double peak = 0.0, worst = 0.0;
+  for (std::size_t i = 0; i < truth.displacement.size(); ++i) {
+    peak = std::max(peak, truth.displacement[i].colwise().norm().maxCoeff());
+    const Eigen::Matrix3Xd difference = model.displacement.at(i) - truth.displacement[i];
+    worst = std::max(worst, difference.colwise().norm().maxCoeff());
+  }
+  return worst / peak;
+}
+
+std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int most) {
+  const auto knots = protocol.knots();
+  const int pieces = std::max(1, static_cast<int>(knots.size()) - 1);
+  const int parts = std::clamp(most / pieces, 1, per_piece);
+  std::vector<double> times{knots.front().time_s};
+  for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+    const double length = knots[k + 1].time_s - knots[k].time_s;
+    if (!(length > 0.0)) continue;
+    for (int i = 1; i < parts; ++i) {
+      const double place = 0.5 * (1.0 - std::cos(std::numbers::pi * i / parts));
+      times.push_back(knots[k].time_s + length * place);
+    }
+    times.push_back(knots[k + 1].time_s);
+  }
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
+}
+
+PlanScene::PlanScene(ExperimentScene scene)
+    : scene_(plannable(std::move(scene))), network_(network_to_run(scene_)) {}
+
+double PlanScene::duration_s() const {
+  return protocol().knots().back().time_s - protocol().start_s();
+}
+
+bool PlanScene::single_sphere() const {
+  return scene_.contacts.size() == 1 && scene_.contacts.front().kind == ContactKind::sphere;
+}
+
+bool PlanScene::jumps() const {
+  const auto knots = protocol().knots();
+  bool jumps = knots.front().value != 0.0 && !protocol().relaxed_at_start();
+  for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+    jumps =
+        jumps || (knots[k].time_s == knots[k + 1].time_s && knots[k].value != knots[k + 1].value);
+  }
+  return jumps;
+}
+
+int PlanScene::moving_layers() const {
+  const Freedom freedom = scene_.tissue.freedom();
+  const std::vector<int>& layer = network().organ.layer;
+  int moving = 0;
+  for (std::size_t i = 0; i < layer.size(); ++i) {
+    if (!freedom.projector(i).isZero(0.0)) moving = std::max(moving, layer[i] + 1);
+  }
+  return moving;
+}
+
+Eigen::VectorXd PlanScene::masses_kg() const {
+  const Organ& organ = network().organ;
+  Eigen::VectorXd mass(driven().rest.cols());
+  mass.head(organ.position.cols()) = sphere_masses_kg(organ, scene_.formulation.density_kg_m3);
+  Eigen::Index column = organ.position.cols();
+  for (const SceneContact& contact : scene_.contacts) {
+    if (!contact.is_tool()) continue;
+    if (!contact.mass_kg) throw bad_input("scene", "a tool has no mass", "mass_kg of each tool");
+    mass[column++] = *contact.mass_kg;
+  }
+  return mass;
+}
+
+OperationCount PlanScene::iteration_work() const {
+  return OperationCount()
+      .add(Operation::lane_bond, static_cast<double>(driven().bonds.size()))
+      .add(Operation::lane_block, blocks_of_solve(driven().bonds.pattern()));
+}
+
+OperationCount PlanScene::factorisation_work() const {
+  const auto products = static_cast<double>(driven().bonds.pattern().factor_products());
+  return OperationCount()
+      .add(Operation::bond_stiffness, static_cast<double>(driven().bonds.size()))
+      .add(Operation::factor_product, products);
+}
+
+PlanTrajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
+                                       const std::vector<double>& times_s, bool with_field) const {
+  const QuasiStatic equations(driven().bonds, driven().rest, driven().freedom, driven().probes,
+                              options);
+  PlanTrajectory result;
+  ValidityWatch watch(network(), scene_.probe());
+  const Eigen::Index spheres = network().organ.position.cols();
+  const auto see = [&](const QuasiStaticState& state) {
+    watch.see(state.time_s, network_.spheres(state.position));
+    result.displacement.emplace_back(state.position.leftCols(spheres) -
+                                     driven().rest.leftCols(spheres));
+  };
+  const QuasiStaticRun run =
+      equations.run(protocol(), times_s, with_field ? QuasiStaticObserver(see) : nullptr);
+  if (!with_field) watch.see(protocol().end_s(), network_.spheres(run.position));
+  result.response = run.response;
+  result.validity = watch.seen();
+  // Back-solves are those of all lanes, one an iteration; outputs cost an evaluation per kLanes.
+  result.work += iteration_work().times(run.work.iterations);
+  result.work.add(Operation::solve_block,
+                  blocks_of_solve(driven().bonds.pattern()) * run.work.factorisations);
+  result.work += factorisation_work().times(run.work.factorisations);
+  result.steps = run.work.steps;
+  return result;
+}
+
+PlanTrajectory PlanScene::inertial(const InertialOptions& options,
+                                   const std::vector<double>& times_s, bool with_field) const {
+  const Inertial equations(driven().bonds, driven().rest, driven().freedom, driven().probes,
+                           masses_kg(), options);
+  PlanTrajectory result;
+  ValidityWatch watch(network(), scene_.probe());
+  const Eigen::Index spheres = network().organ.position.cols();
+  const auto see = [&](const QuasiStaticState& state) {
+    watch.see(state.time_s, network_.spheres(state.position));
+    if (with_field) {
+      result.displacement.emplace_back(state.position.leftCols(spheres) -
+                                       driven().rest.leftCols(spheres));
+    }
+  };
+  const InertialRun run = equations.run(protocol(), times_s, see);
+  result.response = run.response;
+  result.validity = watch.seen();
+  const auto& pattern = driven().bonds.pattern();
+  const auto bonds = static_cast<double>(driven().bonds.size());
+  const auto rates = static_cast<double>(run.work.rates);
+  result.work.add(Operation::bond_force, 2.0 * bonds * rates)
+      .add(Operation::dense_flop, 60.0 * static_cast<double>(driven().rest.cols()) * rates)
+      .add(Operation::solve_block,
+           blocks_of_solve(pattern) * static_cast<double>(run.work.newton_iterations));
+  result.work += factorisation_work().times(static_cast<double>(run.work.factorisations));
+  result.steps = static_cast<double>(run.work.steps);
+  return result;
+}
+
+PlanScene PlanScene::with_protocol(Protocol protocol) const {
+  ExperimentScene scene = scene_;
+  scene.protocol = std::move(protocol);
+  return PlanScene(std::move(scene));
+}
+
+PlanScene PlanScene::deeper(double factor) const {
+  return with_protocol(protocol().scaled(factor));
+}
+
+PlanScene PlanScene::faster(double factor) const {
+  std::vector<Knot> knots(protocol().knots().begin(), protocol().knots().end());
+  const double begin = knots.front().time_s;
+  for (Knot& knot : knots) knot.time_s = begin + (knot.time_s - begin) / factor;
+  Protocol quick(protocol().drive(), std::move(knots), protocol().name());
+  quick.set_relaxed_at_start(protocol().relaxed_at_start());
+  return with_protocol(std::move(quick));
+}
+
+PlanScene PlanScene::stiffer(double factor) const {
+  TpmParameters material = scene_.tissue.material;
+  material.E1_Pa *= factor;
+  material.E2_Pa *= factor;
+  material.Eprime_Pa *= factor;
+  return with_material(material);
+}
+
+PlanScene PlanScene::with_material(const TpmParameters& material) const {
+  ExperimentScene scene = scene_;
+  scene.tissue.material = material;
+  return PlanScene(std::move(scene));
+}
+
+PlanScene PlanScene::with_layers(int layers) const {
+  ExperimentScene scene = scene_;
+  const std::vector<int>& layer = network().organ.layer;
+  std::vector<std::size_t>& anchors = scene.tissue.anchors;
+  for (std::size_t i = 0; i < layer.size(); ++i) {
+    if (layer[i] >= layers) anchors.push_back(i);
+  }
+  std::sort(anchors.begin(), anchors.end());
+  anchors.erase(std::unique(anchors.begin(), anchors.end()), anchors.end());
+  std::erase_if(scene.tissue.guides, [&](const Guide& g) { return layer[g.sphere] >= layers; });
+  return PlanScene(std::move(scene));
+}
+
+}  // namespace tpm

@@ -1,0 +1,91 @@
+#pragma once
+#include <vector>
+
+#include "tpm/plan/operations.hpp"
+#include "tpm/simulate/simulation.hpp"
+
+namespace tpm {
+
+/// Which results a tolerance is about.
+enum class PlanOutput {
+  force,  ///< the response: contact force, or depth under a load
+  field,  ///< the displacements of all spheres
+};
+
+/// By which an error is measured.
+struct PlanMeasure {
+  PlanOutput output = PlanOutput::force;
+  /// Of the error of the response relative to itself, as a hand feels stiffness, wherever the
+  /// response is more than a tenth of its peak; 0: not asked for. Only with `force`.
+  double relative_weight = 0.0;
+};
+
+/// What a model answers over a protocol.
+struct PlanTrajectory {
+  Eigen::VectorXd response;                    ///< N or m, at each time
+  std::vector<Eigen::Matrix3Xd> displacement;  ///< of all spheres, m, at each time; if asked for
+  Validity validity;  ///< of networks: limits passed at the times asked for
+  OperationCount work;
+  double steps = 0.0;
+};
+
+/// Largest absolute difference over all times (field: and spheres), in parts of the largest
+/// absolute value of `truth`; with a relative weight, the larger of that and the weighted relative
+/// difference.
+[[nodiscard]] double trajectory_error(const PlanTrajectory& model, const PlanTrajectory& truth,
+                                      const PlanMeasure& measure);
+
+/// The protocol's pieces sampled densely near their ends, where rates change: 1 to `per_piece`
+/// times a piece of positive length, and the corners; at most about `most` in all.
+[[nodiscard]] std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int most);
+
+/// A scene with its network, and the runs of the full nonlinear network on it.
+class PlanScene {
+ public:
+  /// Throws Error(bad_input) for scenes that no plan is made for: static ones, and the mass-spring
+  /// model.
+  explicit PlanScene(ExperimentScene scene);
+
+  [[nodiscard]] const ExperimentScene& scene() const { return scene_; }
+  [[nodiscard]] const DrivenNetwork& driven() const { return network_.driven; }
+  [[nodiscard]] const Network& network() const { return network_.network; }
+  [[nodiscard]] const Protocol& protocol() const { return scene_.protocol; }
+  [[nodiscard]] double duration_s() const;
+  [[nodiscard]] bool by_depth() const { return protocol().drive() == Drive::displacement; }
+  [[nodiscard]] bool has_tools() const { return !network_.driven.tools.empty(); }
+  /// One sphere driven itself and nothing else in contact.
+  [[nodiscard]] bool single_sphere() const;
+  /// What is imposed jumps, at the start or later.
+  [[nodiscard]] bool jumps() const;
+  /// Layers of which a sphere moves.
+  [[nodiscard]] int moving_layers() const;
+  /// kg, of spheres and tools. Throws Error(bad_input) for a tool without mass.
+  [[nodiscard]] Eigen::VectorXd masses_kg() const;
+
+  /// The network without masses. Throws Error(numerical) as QuasiStatic does.
+  /// @param times_s rising
+  [[nodiscard]] PlanTrajectory quasi_static(const QuasiStaticOptions& options,
+                                            const std::vector<double>& times_s,
+                                            bool with_field) const;
+  /// The network with masses.
+  [[nodiscard]] PlanTrajectory inertial(const InertialOptions& options,
+                                        const std::vector<double>& times_s, bool with_field) const;
+  /// Operations of an evaluation of all bonds' forces with a back-solve, and of a factorisation.
+  [[nodiscard]] OperationCount iteration_work() const;
+  [[nodiscard]] OperationCount factorisation_work() const;
+
+  // The same scene changed in one respect.
+  [[nodiscard]] PlanScene deeper(double factor) const;   ///< what is imposed times a factor
+  [[nodiscard]] PlanScene faster(double factor) const;   ///< the protocol in less time
+  [[nodiscard]] PlanScene stiffer(double factor) const;  ///< E1, E2, E' times a factor
+  [[nodiscard]] PlanScene with_protocol(Protocol protocol) const;
+  [[nodiscard]] PlanScene with_material(const TpmParameters& material) const;
+  /// Spheres of deeper layers held: `layers` outer ones move.
+  [[nodiscard]] PlanScene with_layers(int layers) const;
+
+ private:
+  ExperimentScene scene_;
+  RunNetwork network_;
+};
+
+}  // namespace tpm

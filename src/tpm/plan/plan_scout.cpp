@@ -1,0 +1,142 @@
+#include "tpm/plan/plan_scout.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tpm {
+namespace {
+
+constexpr int kTimesOfPiece = 20;
+constexpr int kMostTimes = 160;
+constexpr int kCurvePoints = 33;
+constexpr double kCurveTolerance = 1e-5;
+constexpr double kRamp_s = 1.0;   // in which static curves are followed
+constexpr double kNever_s = 1e9;  // relaxation times against that
+constexpr double kAtOnce_s = 1e-7;
+constexpr double kMargin = 1.02;  // of the depths of curves
+
+PlanScene with_relaxation_time(const PlanScene& scene, double tau_s) {
+  TpmParameters material = scene.scene().tissue.material;
+  material.eta1_Pa_s = tau_s * (material.E1_Pa + material.E2_Pa);
+  return scene.with_material(material);
+}
+
+/// Forces at `points` even depths from 0 to `last_m`.
+Eigen::VectorXd static_forces(const PlanScene& scene, double last_m, int points, double tau_s) {
+  const Protocol ramp(Drive::displacement, {{0.0, 0.0}, {kRamp_s, last_m}}, "ramp");
+  std::vector<double> times;
+  for (int i = 0; i < points; ++i) times.push_back(kRamp_s * i / (points - 1));
+  QuasiStaticOptions options;
+  options.tolerance = kCurveTolerance;
+  return with_relaxation_time(scene.with_protocol(ramp), tau_s)
+      .quasi_static(options, times, false)
+      .response;
+}
+
+/// A static curve from a depth of 0 or less to one above.
+DepthCurve static_curve(const PlanScene& scene, double least_m, double most_m, double tau_s) {
+  DepthCurve curve;
+  const double spacing = (most_m - least_m) / (kCurvePoints - 1);
+  // Even points of which one is at rest.
+  const int below =
+      least_m < 0.0 ? std::max(1, static_cast<int>(std::ceil(-least_m / spacing))) : 0;
+  const int above = most_m > 0.0 ? std::max(1, static_cast<int>(std::ceil(most_m / spacing))) : 0;
+  curve.first_m = -below * spacing;
+  curve.last_m = above * spacing;
+  if (below > 0) {
+    const Eigen::VectorXd force = static_forces(scene, curve.first_m, below + 1, tau_s);
+    for (Eigen::Index i = below; i > 0; --i) curve.force_N.push_back(force[i]);
+  }
+  curve.force_N.push_back(0.0);
+  if (above > 0) {
+    const Eigen::VectorXd force = static_forces(scene, curve.last_m, above + 1, tau_s);
+    for (Eigen::Index i = 1; i <= above; ++i) curve.force_N.push_back(force[i]);
+  }
+  return curve;
+}
+
+}  // namespace
+
+InertialOptions inertial_options(const PlanScene& scene, double tolerance) {
+  InertialOptions options;
+  options.tolerance = tolerance;
+  options.damping_ratio = scene.scene().formulation.damping_ratio;
+  return options;
+}
+
+PlanScout::PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial)
+    : scene_(std::move(scene)),
+      measure_(measure),
+      inertial_(inertial),
+      times_(sampled_times(scene_.protocol(), inertial ? 8 * kTimesOfPiece : kTimesOfPiece,
+                           inertial ? 8 * kMostTimes : kMostTimes)) {}
+
+const PlanTrajectory& PlanScout::collocation(double tolerance) const {
+  const auto found = collocation_.find(tolerance);
+  if (found != collocation_.end()) return found->second;
+  QuasiStaticOptions options;
+  options.tolerance = tolerance;
+  return collocation_.emplace(tolerance, scene_.quasi_static(options, times_, wants_field()))
+      .first->second;
+}
+
+const PlanTrajectory& PlanScout::coarse() const {
+  return collocation(kTolerance);
+}
+
+double PlanScout::coarse_error() const {
+  return trajectory_error(collocation(10.0 * kTolerance), coarse(), measure_);
+}
+
+const PlanTrajectory& PlanScout::with_masses(double tolerance) const {
+  const auto found = with_masses_.find(tolerance);
+  if (found != with_masses_.end()) return found->second;
+  return with_masses_
+      .emplace(tolerance,
+               scene_.inertial(inertial_options(scene_, tolerance), times_, wants_field()))
+      .first->second;
+}
+
+const ContactSpectrum& PlanScout::spectrum() const {
+  if (!spectrum_) spectrum_ = contact_spectrum(scene_);
+  return *spectrum_;
+}
+
+const InertiaEstimate& PlanScout::inertia() const {
+  if (!inertia_) inertia_ = estimate_inertia(scene_);
+  return *inertia_;
+}
+
+double PlanScout::inertia_share() const {
+  return inertia().of_rates / coarse().response.cwiseAbs().maxCoeff();
+}
+
+const ContactCurves& PlanScout::curves() const {
+  if (curves_) return *curves_;
+  double least = 0.0, most = 0.0;
+  const auto see = [&](double depth) {
+    least = std::min(least, kMargin * depth);
+    most = std::max(most, kMargin * depth);
+  };
+  if (scene_.by_depth()) {
+    for (const Knot& knot : scene_.protocol().knots()) see(knot.value);
+  } else {
+    for (const double depth : coarse().response) see(depth);
+  }
+  ContactCurves curves;
+  curves.relaxed = static_curve(scene_, least, most, kAtOnce_s);
+  curves.relaxing = static_curve(scene_, least, most, kNever_s);
+  for (std::size_t i = 0; i < curves.relaxed.force_N.size(); ++i) {
+    curves.relaxing.force_N[i] -= curves.relaxed.force_N[i];
+  }
+  curves_ = std::move(curves);
+  return *curves_;
+}
+
+double PlanScout::claim_of(const PlanTrajectory& model) const {
+  double claim = kSafety * trajectory_error(model, coarse(), measure_) + coarse_error();
+  if (inertial_) claim += kSafety * inertia_share();
+  return claim;
+}
+
+}  // namespace tpm

@@ -1,0 +1,68 @@
+#pragma once
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "tpm/plan/contact_spectrum.hpp"
+#include "tpm/plan/inertia_estimate.hpp"
+#include "tpm/plan/plan_scene.hpp"
+
+namespace tpm {
+
+/// The static force of a contact over its depths: relaxed, and what relaxes of it.
+struct ContactCurves {
+  DepthCurve relaxed, relaxing;
+};
+
+/// What the claims about a scene are made from: coarse runs of its network at few times, its linear
+/// behaviour about rest, and what masses would do. Everything is found when first asked for. What
+/// throws Error(numerical) does so each time.
+class PlanScout {
+ public:
+  /// @param inertial what is asked for is the network with masses
+  PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial);
+
+  [[nodiscard]] const PlanScene& scene() const { return scene_; }
+  [[nodiscard]] const PlanMeasure& measure() const { return measure_; }
+  [[nodiscard]] bool wants_field() const { return measure_.output == PlanOutput::field; }
+  [[nodiscard]] bool inertial() const { return inertial_; }
+  [[nodiscard]] const std::vector<double>& times() const { return times_; }
+
+  /// The network without masses, by collocation at a tolerance, at times().
+  [[nodiscard]] const PlanTrajectory& collocation(double tolerance) const;
+  /// That at the scout's own tolerance, by which models are judged before they are verified.
+  [[nodiscard]] const PlanTrajectory& coarse() const;
+  /// Its difference from a run at ten times its tolerance.
+  [[nodiscard]] double coarse_error() const;
+  /// The network with masses.
+  [[nodiscard]] const PlanTrajectory& with_masses(double tolerance) const;
+
+  [[nodiscard]] const ContactSpectrum& spectrum() const;
+  [[nodiscard]] const InertiaEstimate& inertia() const;
+  /// InertiaEstimate::of_rates in parts of the coarse run's peak.
+  [[nodiscard]] double inertia_share() const;
+  /// Curves over the depths of the coarse run.
+  [[nodiscard]] const ContactCurves& curves() const;
+
+  /// A bound of the error of a model without masses that answers `model` at times(): `kSafety`
+  /// times its difference from the coarse run, and what that run and the masses left out may add.
+  [[nodiscard]] double claim_of(const PlanTrajectory& model) const;
+
+  static constexpr double kSafety = 1.5;
+  static constexpr double kTolerance = 1e-4;
+
+ private:
+  PlanScene scene_;
+  PlanMeasure measure_;
+  bool inertial_;
+  std::vector<double> times_;
+  mutable std::map<double, PlanTrajectory> collocation_, with_masses_;
+  mutable std::optional<ContactSpectrum> spectrum_;
+  mutable std::optional<InertiaEstimate> inertia_;
+  mutable std::optional<ContactCurves> curves_;
+};
+
+/// The tolerance of CVODES that aims at an error of the response.
+[[nodiscard]] InertialOptions inertial_options(const PlanScene& scene, double tolerance);
+
+}  // namespace tpm

@@ -1,0 +1,243 @@
+// Models of the contact alone: the element, linear and with two static curves.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/plan/plan_model.hpp"
+
+namespace tpm {
+namespace {
+
+/// What all of them share: a ScalarModel made for the scene and stepped over the protocol.
+class ScalarCandidate : public PlanModel {
+ public:
+  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+                                                   const PlanBudget& /*budget*/) const override {
+    if (scout.scene().has_tools()) return "a tool touches and leaves spheres";
+    if (scout.wants_field() && !knows_field()) return "knows the contact's force only";
+    return std::nullopt;
+  }
+
+  [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
+    const PlanTrajectory answer = run(scout, budget, scout.times());
+    return {scout.claim_of(answer), answer.work, of_step(scout)};
+  }
+
+  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
+                                   const std::vector<double>& times_s) const override;
+
+ protected:
+  [[nodiscard]] virtual ScalarModel model(const PlanScout& scout) const = 0;
+  [[nodiscard]] virtual bool knows_field() const { return true; }
+  [[nodiscard]] virtual double terms() const = 0;  ///< exponentials, curves and roots in a step
+
+  /// The operations of a step, under a load those of the search for the depth.
+  [[nodiscard]] OperationCount of_step(const PlanScout& scout) const {
+    constexpr double kSearch = 4.0;
+    OperationCount step;
+    step.add(Operation::scalar_step, 1.0).add(Operation::scalar_term, terms());
+    if (!scout.scene().by_depth()) step = step.times(kSearch);
+    if (scout.wants_field()) {
+      step.add(Operation::dense_flop,
+               6.0 * static_cast<double>(scout.scene().network().organ.size()));
+    }
+    return step;
+  }
+};
+
+/// Moves a model through a protocol.
+class ScalarRun {
+ public:
+  ScalarRun(const PlanScene& scene, ScalarModel model, double longest_step_s)
+      : protocol_(scene.protocol()),
+        by_depth_(scene.by_depth()),
+        model_(std::move(model)),
+        longest_s_(longest_step_s),
+        knots_(protocol_.knots()) {
+    time_s_ = knots_.front().time_s;
+    const double first = knots_.front().value;
+    if (protocol_.relaxed_at_start()) {
+      settle(first);
+    } else {
+      jump(first);
+    }
+    pass_jumps();
+  }
+
+  /// Goes on to a time; the response there, after all jumps.
+  double at(double time_s) {
+    while (next_ < knots_.size() && knots_[next_].time_s <= time_s) {
+      cross(knots_[next_].time_s, knots_[next_].value);
+      ++next_;
+      pass_jumps();
+    }
+    if (time_s > time_s_) cross(time_s, value_at(protocol_, time_s));
+    return response_;
+  }
+
+  [[nodiscard]] const ScalarModel& model() const { return model_; }
+  [[nodiscard]] double steps() const { return steps_; }
+
+ private:
+  void jump(double value) {
+    response_ = by_depth_ ? model_.jump_to(value) : model_.jump_under(value);
+    value_ = value;
+  }
+
+  /// Relaxed under a first value: after a very long step.
+  void settle(double value) {
+    constexpr double kForever_s = 1e12;
+    jump(value);
+    model_.set_period(kForever_s);
+    response_ = by_depth_ ? model_.step_to(value) : model_.step_under(value);
+    if (!by_depth_) {
+      for (int i = 0; i < 200; ++i) response_ = model_.step_under(value);
+    }
+  }
+
+  void pass_jumps() {
+    while (next_ < knots_.size() && knots_[next_].time_s <= time_s_) jump(knots_[next_++].value);
+  }
+
+  void cross(double time_s, double value) {
+    const double length = time_s - time_s_;
+    if (!(length > 0.0)) return;
+    const double count = std::max(1.0, std::ceil(length / longest_s_ * (1.0 - 1e-9)));
+    model_.set_period(length / count);
+    const double begin = value_;
+    for (double i = 1.0; i <= count; i += 1.0) {
+      const double now = begin + (value - begin) * i / count;
+      response_ = by_depth_ ? model_.step_to(now) : model_.step_under(now);
+    }
+    steps_ += count;
+    time_s_ = time_s;
+    value_ = value;
+  }
+
+  const Protocol& protocol_;
+  bool by_depth_;
+  ScalarModel model_;
+  double longest_s_;
+  std::span<const Knot> knots_;
+  std::size_t next_ = 1;
+  double time_s_ = 0.0, value_ = 0.0, response_ = 0.0, steps_ = 0.0;
+};
+
+PlanTrajectory ScalarCandidate::run(const PlanScout& scout, const PlanBudget& budget,
+                                    const std::vector<double>& times_s) const {
+  constexpr double kSteps = 400.0;  // of a protocol, where no rate is given
+  const PlanScene& scene = scout.scene();
+  ScalarRun run(scene, model(scout), budget.period_s().value_or(scene.duration_s() / kSteps));
+  PlanTrajectory answer;
+  answer.response.resize(std::ssize(times_s));
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    const double response = run.at(times_s[i]);
+    answer.response[static_cast<Eigen::Index>(i)] = response;
+    if (!scout.wants_field()) continue;
+    // What has not relaxed yet, as a depth.
+    const ScalarModel& at = run.model();
+    const double stiffness = at.relaxing().stiffness_N_per_m;
+    double followed = 0.0;
+    for (std::size_t k = 0; k < at.branches().size(); ++k) {
+      followed += at.branches()[k].share * at.remembered_N()[k];
+    }
+    const double fresh = stiffness > 0.0 ? at.depth_m() - followed / stiffness : 0.0;
+    const ContactSpectrum& spectrum = scout.spectrum();
+    answer.displacement.emplace_back(spectrum.field_relaxed * at.depth_m() +
+                                     (spectrum.field_at_once - spectrum.field_relaxed) * fresh);
+  }
+  answer.steps = budget.rate_Hz ? scene.duration_s() * *budget.rate_Hz : run.steps();
+  answer.work = of_step(scout).times(answer.steps);
+  return answer;
+}
+
+DepthCurve straight(double stiffness_N_per_m) {
+  DepthCurve curve;
+  curve.stiffness_N_per_m = stiffness_N_per_m;
+  return curve;
+}
+
+class LinearCandidate : public ScalarCandidate {
+ public:
+  explicit LinearCandidate(int branches) : branches_(branches) {}
+  [[nodiscard]] std::string name() const override { return fmt::format("linear_{}", branches_); }
+  [[nodiscard]] std::string formulation() const override { return "linear"; }
+  [[nodiscard]] std::string settings() const override {
+    return fmt::format("{} exponential{}", branches_, branches_ == 1 ? "" : "s");
+  }
+
+ protected:
+  [[nodiscard]] double terms() const override { return branches_; }
+  [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
+    const ContactSpectrum& spectrum = scout.spectrum();
+    return {straight(spectrum.relaxed()), straight(spectrum.at_once() - spectrum.relaxed()),
+            fitted_branches(spectrum, branches_), 1.0};
+  }
+
+ private:
+  int branches_;
+};
+
+/// The paper's element with the contact's stiffness, and the tension of its two lateral bonds.
+class ElementCandidate final : public LinearCandidate {
+ public:
+  ElementCandidate() : LinearCandidate(1) {}
+  [[nodiscard]] std::string name() const override { return "element"; }
+  [[nodiscard]] std::string formulation() const override { return "element"; }
+  [[nodiscard]] std::string settings() const override { return "with the contact's stiffness"; }
+
+ protected:
+  [[nodiscard]] double terms() const override { return 2.0; }
+  [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
+    const ContactSpectrum& spectrum = scout.spectrum();
+    const TpmParameters& material = scout.scene().scene().tissue.material;
+    DepthCurve relaxed = straight(spectrum.relaxed());
+    relaxed.tension_N_per_m = 2.0 * material.Eprime_Pa * material.modulus_to_stiffness_m();
+    relaxed.spacing_m = material.spacing_m;
+    return {std::move(relaxed), straight(spectrum.at_once() - spectrum.relaxed()),
+            fitted_branches(spectrum, 1), 1.0};
+  }
+};
+
+/// Static curves of the nonlinear network at once and relaxed, and the linear network's shares.
+class CurvesCandidate final : public ScalarCandidate {
+ public:
+  explicit CurvesCandidate(int branches) : branches_(branches) {}
+  [[nodiscard]] std::string name() const override { return fmt::format("curves_{}", branches_); }
+  [[nodiscard]] std::string formulation() const override { return "curves"; }
+  [[nodiscard]] std::string settings() const override {
+    return fmt::format("{} exponential{}", branches_, branches_ == 1 ? "" : "s");
+  }
+  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+                                                   const PlanBudget& budget) const override {
+    if (!scout.scene().by_depth() && !scout.scene().single_sphere()) {
+      return "under a load the spheres of a patch do not move alike";
+    }
+    return ScalarCandidate::why_not(scout, budget);
+  }
+
+ protected:
+  [[nodiscard]] bool knows_field() const override { return false; }
+  [[nodiscard]] double terms() const override { return branches_ + 6.0; }
+  [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
+    const ContactCurves& curves = scout.curves();
+    return {curves.relaxed, curves.relaxing, fitted_branches(scout.spectrum(), branches_), 1.0};
+  }
+
+ private:
+  int branches_;
+};
+
+}  // namespace
+
+void add_scalar_models(PlanModels& models) {
+  models.push_back(std::make_unique<LinearCandidate>(1));
+  models.push_back(std::make_unique<ElementCandidate>());
+  models.push_back(std::make_unique<LinearCandidate>(2));
+  models.push_back(std::make_unique<LinearCandidate>(3));
+  models.push_back(std::make_unique<CurvesCandidate>(1));
+  models.push_back(std::make_unique<CurvesCandidate>(2));
+}
+
+}  // namespace tpm

@@ -1,0 +1,197 @@
+#include "tpm/report/plan_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/core/version.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr int kDigits = 6;
+
+Json number(const std::optional<double>& value) {
+  return value ? Json(rounded(*value, kDigits)) : Json(nullptr);
+}
+
+std::string percent(double share) {
+  return significant(100.0 * share, 3) + " %";
+}
+
+std::string time_text(double seconds) {
+  if (seconds < 1e-6) return significant(1e9 * seconds, 3) + " ns";
+  if (seconds < 1e-3) return significant(1e6 * seconds, 3) + " us";
+  if (seconds < 1.0) return significant(1e3 * seconds, 3) + " ms";
+  return significant(seconds, 3) + " s";
+}
+
+Json candidate_json(const PlannedCandidate& c) {
+  return {{"name", c.name},
+          {"formulation", c.formulation},
+          {"settings", c.settings},
+          {"reach", c.reach == ModelReach::full ? "full" : "reduced"},
+          {"cost_s_per_s", number(c.cost_s_per_s)},
+          {"period_s", number(c.period_s)},
+          {"claimed_error", number(c.claimed_error)},
+          {"verified_error", number(c.verified_error)},
+          {"accurate", c.accurate},
+          {"feasible", c.feasible},
+          {"reason", c.reason.empty() ? Json(nullptr) : Json(c.reason)}};
+}
+
+Json relevance_json(const Plan& plan) {
+  Json list = Json::array();
+  for (const PlanRelevance& r : plan.relevance) {
+    list.push_back({{"part", r.part},
+                    {"error", number(r.error)},
+                    {"estimated", r.estimated},
+                    {"matters", r.matters},
+                    {"note", r.note}});
+  }
+  return list;
+}
+
+Json changes_json(const Plan& plan) {
+  Json list = Json::array();
+  for (const PlanChange& c : plan.changes) {
+    list.push_back({{"change", c.change},
+                    {"factor", number(c.factor)},
+                    {"breaks", c.factor ? Json(c.breaks) : Json(nullptr)}});
+  }
+  return list;
+}
+
+std::string budget_text(const PlanBudget& budget) {
+  std::string text;
+  if (budget.rate_Hz) text += fmt::format("a servo of {} Hz", shortest(*budget.rate_Hz));
+  if (budget.wall_s_per_s) {
+    text += fmt::format("{}{} s per s", text.empty() ? "" : ", ", shortest(*budget.wall_s_per_s));
+  }
+  return text.empty() ? "no budget" : text;
+}
+
+std::string relevance_text(const PlanRelevance& r) {
+  const std::string note = r.note.empty() ? "" : fmt::format(" ({})", r.note);
+  if (!r.error) return fmt::format("  {}: {}\n", r.part, r.note);
+  return fmt::format("  {} {}: without it the answer changes by {} of the peak{}\n", r.part,
+                     r.matters ? "matters" : "does not matter", percent(*r.error), note);
+}
+
+std::string choice_text(const Plan& plan) {
+  if (plan.choice) {
+    const PlannedCandidate& c = plan.chosen();
+    std::string text = fmt::format(
+        "pick: {} ({}{}{})\n  claimed error at most {}, verified {}; margin {} times\n  costs {} "
+        "per "
+        "simulated second{}\n",
+        c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings,
+        percent(*c.claimed_error), percent(*c.verified_error),
+        significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
+        time_text(*c.cost_s_per_s),
+        c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
+    if (plan.needs_full) {
+      text += "  the scene needs the full nonlinear model: no reduced one meets the tolerance\n";
+    }
+    return text;
+  }
+  std::string text = "no model meets tolerance and budget\n";
+  if (plan.without_budget) {
+    const PlannedCandidate& c = plan.candidates[*plan.without_budget];
+    text += fmt::format("  without the budget: {}, {} per simulated second, verified error {}\n",
+                        c.name, time_text(*c.cost_s_per_s), percent(*c.verified_error));
+  }
+  if (plan.needs_full) {
+    text += "  the scene needs the full nonlinear model: no reduced one meets the tolerance\n";
+  }
+  return text;
+}
+
+std::string frontier_text(const Plan& plan) {
+  std::string text = fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}\n", "candidate", "per s",
+                                 "a period", "claimed", "verified");
+  for (const PlannedCandidate& c : plan.candidates) {
+    const auto or_dash = [](const std::optional<double>& value, auto&& words) {
+      return value ? words(*value) : std::string("-");
+    };
+    text += fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}  {}\n", c.name,
+                        or_dash(c.cost_s_per_s, time_text), or_dash(c.period_s, time_text),
+                        or_dash(c.claimed_error, percent), or_dash(c.verified_error, percent),
+                        c.feasible ? "meets both" : c.reason);
+  }
+  return text;
+}
+
+}  // namespace
+
+Json plan_json(const Plan& plan) {
+  const PlanRequest& request = plan.request;
+  Json json{{"title", plan.title},
+            {"version", version()},
+            {"spheres", plan.spheres},
+            {"bonds", plan.bonds},
+            {"duration_s", rounded(plan.duration_s, kDigits)},
+            {"tolerance", request.tolerance},
+            {"tolerance_source",
+             request.tolerance_source.empty() ? Json(nullptr) : Json(request.tolerance_source)},
+            {"output", request.measure.output == PlanOutput::field ? "field" : "force"},
+            {"rate_Hz", number(request.budget.rate_Hz)},
+            {"wall_s_per_s", number(request.budget.wall_s_per_s)},
+            {"costs", request.costs.source},
+            {"response", plan.by_depth ? "force_N" : "depth_m"}};
+  json["choice"] = plan.choice ? candidate_json(plan.chosen()) : Json(nullptr);
+  json["margin"] =
+      plan.choice ? Json(rounded(request.tolerance / std::max(*plan.chosen().verified_error, 1e-12),
+                                 kDigits))
+                  : Json(nullptr);
+  json["without_budget"] =
+      plan.without_budget ? candidate_json(plan.candidates[*plan.without_budget]) : Json(nullptr);
+  json["needs_full_model"] = plan.needs_full;
+  json["masses_matter"] = plan.inertial;
+  json["reference"] = {{"method", plan.reference.method},
+                       {"judge", plan.reference.judge},
+                       {"difference", rounded(plan.reference.difference, 2)},
+                       {"peak", rounded(plan.reference.peak, kDigits)}};
+  json["frontier"] = Json::array();
+  for (const PlannedCandidate& c : plan.candidates) json["frontier"].push_back(candidate_json(c));
+  json["relevance"] = relevance_json(plan);
+  json["changes"] = changes_json(plan);
+  json["validity_passed"] = plan.validity;
+  return json;
+}
+
+std::string plan_text(const Plan& plan) {
+  const PlanRequest& request = plan.request;
+  std::string text = fmt::format("{}: {} spheres, {} bonds, {} s\n", plan.title, plan.spheres,
+                                 plan.bonds, significant(plan.duration_s, 4));
+  text +=
+      fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
+                  request.measure.output == PlanOutput::field ? "displacements" : "response",
+                  percent(request.tolerance),
+                  request.tolerance_source.empty() ? std::string()
+                                                   : fmt::format(" ({})", request.tolerance_source),
+                  budget_text(request.budget),
+                  request.costs.source == "nominal"
+                      ? "a usual machine has (nominal; tpm plan --calibrate measures this one)"
+                      : request.costs.source);
+  text += choice_text(plan);
+  text += "\n" + frontier_text(plan);
+  text += fmt::format(
+      "\nreference: {}; peak {} {}; differs from its judge ({}) by {}\n", plan.reference.method,
+      significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
+      plan.by_depth ? "N" : "mm", plan.reference.judge, percent(plan.reference.difference));
+  if (!plan.relevance.empty()) text += "what matters:\n";
+  for (const PlanRelevance& r : plan.relevance) text += relevance_text(r);
+  if (!plan.changes.empty()) text += "what would break first:\n";
+  for (const PlanChange& c : plan.changes) {
+    text += c.factor
+                ? fmt::format("  {} by {}: {}\n", c.change, significant(*c.factor, 3), c.breaks)
+                : fmt::format("  {}: nothing up to {} times\n", c.change, shortest(kMostChange));
+  }
+  for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
+  return text;
+}
+
+}  // namespace tpm

@@ -1,0 +1,26 @@
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "tpm/plan/plan.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// A plan, as docs/plan.md describes the keys.
+[[nodiscard]] Json plan_json(const Plan& plan);
+[[nodiscard]] std::string plan_text(const Plan& plan);
+
+/// What the planned model answered, and the same in words.
+[[nodiscard]] Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
+                                    const std::vector<double>& times_s,
+                                    const PlanTrajectory& answer);
+[[nodiscard]] std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
+                                           const PlanTrajectory& answer);
+
+/// HDF5 with the answer and, as attributes of /, the scene, the model and its errors.
+void write_planned_run(const Plan& plan, const ExperimentScene& scene,
+                       const std::vector<double>& times_s, const PlanTrajectory& answer,
+                       const std::filesystem::path& file);
+
+}  // namespace tpm

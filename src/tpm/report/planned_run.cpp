@@ -1,0 +1,102 @@
+// What a planned model answered.
+#include <fmt/format.h>
+
+#include "tpm/core/text.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/report/plan_report.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/hdf5.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr int kDigits = 9;
+
+Eigen::Index largest_of(const PlanTrajectory& answer) {
+  Eigen::Index at = 0;
+  answer.response.cwiseAbs().maxCoeff(&at);
+  return at;
+}
+
+std::string model_words(const PlannedCandidate& c) {
+  return fmt::format("{} ({}{}{})", c.name, c.formulation, c.settings.empty() ? "" : ", ",
+                     c.settings);
+}
+
+}  // namespace
+
+Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
+                      const std::vector<double>& times_s, const PlanTrajectory& answer) {
+  const PlannedCandidate& c = plan.chosen();
+  const auto point = [&](Eigen::Index i) {
+    const double time = times_s[static_cast<std::size_t>(i)];
+    return Json{{"time_s", rounded(time, kDigits)},
+                {"imposed", rounded(value_at(scene.protocol, time), kDigits)},
+                {"response", rounded(answer.response[i], kDigits)}};
+  };
+  return {{"title", plan.title},
+          {"version", version()},
+          {"scene_sha256", sha256_hex(scene.text)},
+          {"model", c.name},
+          {"formulation", c.formulation},
+          {"settings", c.settings},
+          {"claimed_error", rounded(c.claimed_error.value(), 6)},
+          {"verified_error", rounded(c.verified_error.value(), 6)},
+          {"tolerance", plan.request.tolerance},
+          {"imposed", plan.by_depth ? "depth_m" : "load_N"},
+          {"response", plan.by_depth ? "force_N" : "depth_m"},
+          {"largest", point(largest_of(answer))},
+          {"last", point(answer.response.size() - 1)},
+          {"outputs", answer.displacement.size()},
+          {"validity_passed", plan.validity}};
+}
+
+std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
+                             const PlanTrajectory& answer) {
+  const PlannedCandidate& c = plan.chosen();
+  const auto point = [&](Eigen::Index i) {
+    const double value = answer.response[i];
+    return fmt::format("{} {} at {} s", significant(plan.by_depth ? value : 1e3 * value, 6),
+                       plan.by_depth ? "N" : "mm",
+                       significant(times_s[static_cast<std::size_t>(i)], 4));
+  };
+  std::string text = fmt::format(
+      "{}: planned model {}\nclaimed error at most {} % of the peak, verified {} %\nlargest {}: "
+      "{}; at "
+      "the end: {}\n",
+      plan.title, model_words(c), significant(100.0 * *c.claimed_error, 3),
+      significant(100.0 * *c.verified_error, 3), plan.by_depth ? "force" : "depth",
+      point(largest_of(answer)), point(answer.response.size() - 1));
+  for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
+  return text;
+}
+
+void write_planned_run(const Plan& plan, const ExperimentScene& scene,
+                       const std::vector<double>& times_s, const PlanTrajectory& answer,
+                       const std::filesystem::path& path) {
+  const PlannedCandidate& c = plan.chosen();
+  Hdf5Writer file(path);
+  file.attribute("/", "title", plan.title);
+  file.attribute("/", "scene", scene.text);
+  file.attribute("/", "scene_sha256", sha256_hex(scene.text));
+  file.attribute("/", "written_by", fmt::format("tpm {}", version()));
+  file.attribute("/", "formulation", c.formulation);
+  file.attribute("/", "model", model_words(c));
+  file.attribute("/", "claimed_error", shortest(rounded(*c.claimed_error, 6)));
+  file.attribute("/", "verified_error", shortest(rounded(*c.verified_error, 6)));
+  file.attribute("/", "tolerance", shortest(plan.request.tolerance));
+  file.attribute("/", "provenance", "model");
+  std::vector<double> imposed;
+  for (const double time : times_s) imposed.push_back(value_at(scene.protocol, time));
+  const std::vector<double> response(answer.response.begin(), answer.response.end());
+  file.numbers("/curve/time_s", times_s);
+  file.numbers(plan.by_depth ? "/curve/depth_m" : "/curve/load_N", imposed);
+  file.numbers(plan.by_depth ? "/curve/force_N" : "/curve/depth_m", response);
+  for (std::size_t i = 0; i < answer.displacement.size(); ++i) {
+    const Eigen::Matrix3Xd& u = answer.displacement[i];
+    file.table(fmt::format("/steps/{:05}/displacement_m", i), {u.data(), u.data() + u.size()}, 3);
+  }
+  file.commit();
+}
+
+}  // namespace tpm

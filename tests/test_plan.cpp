@@ -1,0 +1,239 @@
+// tpm plan: what it picks, that it is verified, and what it says no to. On small organs.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "refusal.hpp"
+#include "simulated_scene.hpp"
+#include "temp_folder.hpp"
+#include "tpm/network/contact_stiffness.hpp"
+#include "tpm/plan/plan.hpp"
+#include "tpm/report/plan_report.hpp"
+#include "tpm/store/file.hpp"
+
+using namespace tpm;
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+using test::experiment;
+using test::refusal_of;
+
+namespace {
+
+const std::string kMaterial = R"("material": {"eta1": "16800 Pa s"}, )";  // relaxes in 0.7 s
+
+ExperimentScene liver(const std::string& blocks) {
+  return experiment(R"({"organ": {"kind": "liver", "count": 50}, )" + kMaterial + blocks + "}");
+}
+
+ExperimentScene star(const std::string& blocks) {
+  return experiment(R"({"organ": {"kind": "star", "spacing": "30 mm"}, )" + kMaterial + blocks +
+                    "}");
+}
+
+std::string ramp(const std::string& depth) {
+  return R"("protocol": {"kind": "ramp_hold", "depth": ")" + depth +
+         R"(", "rate": "2 mm/s", "hold": "2 s"})";
+}
+
+PlanRequest request(double tolerance, std::optional<double> rate_Hz = {}) {
+  PlanRequest request;
+  request.tolerance = tolerance;
+  request.budget.rate_Hz = rate_Hz;
+  request.relevance = request.changes = false;
+  return request;
+}
+
+const PlannedCandidate& named(const Plan& plan, const std::string& name) {
+  for (const PlannedCandidate& c : plan.candidates) {
+    if (c.name == name) return c;
+  }
+  FAIL("no candidate " << name);
+  return plan.candidates.front();
+}
+
+}  // namespace
+
+TEST_CASE("a scalar model is the closed form of the paper's element under any steps") {
+  DepthCurve relaxed, relaxing;
+  relaxed.stiffness_N_per_m = 75.0;
+  relaxing.stiffness_N_per_m = 50.0;
+  const double tau = 0.7, depth = 2e-3, rise = 0.5;
+  for (const int steps : {1, 7, 500}) {
+    ScalarModel model(relaxed, relaxing, {{1.0, tau}}, rise / steps);
+    double force = 0.0;
+    for (int i = 1; i <= steps; ++i) force = model.step_to(depth * i / steps);
+    // Ramp: the memory is v (t - tau (1 - exp(-t/tau))), MODEL.md, section 2.
+    const double v = depth / rise;
+    const double memory = v * (rise - tau * -std::expm1(-rise / tau));
+    CHECK_THAT(force, WithinRel(75.0 * depth + 50.0 * (depth - memory), 1e-12));
+  }
+}
+
+TEST_CASE("a scalar model under a load goes to the depth whose force it is") {
+  DepthCurve relaxed, relaxing;
+  relaxed.stiffness_N_per_m = 75.0;
+  relaxed.tension_N_per_m = 300.0;
+  relaxed.spacing_m = 0.03;
+  relaxing.stiffness_N_per_m = 50.0;
+  ScalarModel by_load(relaxed, relaxing, {{0.6, 0.3}, {0.4, 1.0}}, 0.01);
+  ScalarModel by_depth(relaxed, relaxing, {{0.6, 0.3}, {0.4, 1.0}}, 0.01);
+  for (int i = 1; i <= 100; ++i) {
+    const double load = 0.002 * i;
+    CHECK_THAT(by_depth.step_to(by_load.step_under(load)), WithinRel(load, 1e-9));
+  }
+}
+
+TEST_CASE("the spectrum of the star is its two stiffnesses and one time") {
+  const PlanScene scene(star(ramp("1 mm")));
+  const ContactSpectrum spectrum = contact_spectrum(scene);
+  const HeldStiffness exact = star_stiffness(scene.scene().tissue.material);
+  CHECK_THAT(spectrum.at_once(), WithinRel(exact.at_once, 1e-12));
+  CHECK_THAT(spectrum.relaxed(), WithinRel(exact.relaxed, 1e-12));
+  const auto branches = fitted_branches(spectrum, 1);
+  REQUIRE(branches.size() == 1);
+  CHECK_THAT(branches[0].time_s, WithinRel(0.7, 1e-9));
+}
+
+TEST_CASE("the star needs no more than its element, which is exact") {
+  const Plan plan = make_plan(star(ramp("6 mm")), request(1e-3, 1000.0));
+  REQUIRE(plan.choice);
+  CHECK(plan.chosen().name == "element");
+  CHECK(*plan.chosen().verified_error < 1e-9);
+  CHECK_FALSE(named(plan, "linear_1").accurate);  // tension
+  CHECK_FALSE(plan.needs_full);
+}
+
+TEST_CASE("a shallow push of an organ is linear, a deep one is not") {
+  const Plan shallow = make_plan(liver(ramp("0.05 mm")), request(0.02, 1000.0));
+  REQUIRE(shallow.choice);
+  CHECK(shallow.chosen().formulation == "linear");
+  CHECK(*shallow.chosen().verified_error <= *shallow.chosen().claimed_error);
+  const Plan deep = make_plan(liver(ramp("6 mm")), request(0.02, 1000.0));
+  CHECK_FALSE(named(deep, "linear_3").accurate);
+  CHECK(*named(deep, "linear_3").verified_error > 0.02);
+}
+
+TEST_CASE("a looser tolerance never costs more") {
+  const ExperimentScene scene = liver(ramp("3 mm"));
+  double cost = 0.0;
+  for (const double tolerance : {0.2, 0.03, 1e-3, 1e-4}) {
+    const Plan plan = make_plan(scene, request(tolerance));
+    REQUIRE(plan.choice);
+    CHECK(*plan.chosen().cost_s_per_s >= cost);
+    CHECK(*plan.chosen().verified_error <= tolerance);
+    cost = *plan.chosen().cost_s_per_s;
+  }
+}
+
+TEST_CASE("a budget that nothing meets has no pick, and the plan says what would do") {
+  PlanRequest narrow = request(1e-4);
+  narrow.budget.wall_s_per_s = 1e-9;
+  const Plan plan = make_plan(liver(ramp("3 mm")), narrow);
+  CHECK_FALSE(plan.choice);
+  REQUIRE(plan.without_budget);
+  CHECK_THAT(plan_text(plan), Contains("no model meets tolerance and budget"));
+  CHECK(plan_json(plan)["choice"].is_null());
+}
+
+TEST_CASE("a tool needs the full nonlinear network") {
+  const std::string poke = R"("contacts": [{"kind": "ball", "radius": "4 mm"}],
+    "protocol": {"kind": "knots", "knots": [{"time": "0 s", "depth": "0 mm"},
+    {"time": "1 s", "depth": "2 mm"}, {"time": "1.5 s", "depth": "-2 mm"}]})";
+  const Plan plan = make_plan(liver(poke), request(0.01));
+  REQUIRE(plan.choice);
+  CHECK(plan.needs_full);
+  CHECK(plan.chosen().reach == ModelReach::full);
+  CHECK_THAT(named(plan, "linear_1").reason, Contains("a tool"));
+}
+
+TEST_CASE("where masses are felt the reference has them") {
+  const std::string poke = R"("protocol": {"kind": "knots", "knots": [
+    {"time": "0 s", "depth": "0 mm"}, {"time": "0.02 s", "depth": "3 mm"},
+    {"time": "0.05 s", "depth": "3 mm"}]})";
+  const Plan plan = make_plan(liver(poke), request(0.01));
+  CHECK(plan.inertial);
+  REQUIRE(plan.choice);
+  CHECK(plan.chosen().formulation == "inertial");
+  CHECK(*named(plan, "collocation_0.001").verified_error > 0.01);
+}
+
+TEST_CASE("the estimate of what masses do is that of a run with masses") {
+  const std::string poke = R"("protocol": {"kind": "knots", "knots": [
+    {"time": "0 s", "depth": "0 mm"}, {"time": "0.02 s", "depth": "0.1 mm"},
+    {"time": "0.1 s", "depth": "0.1 mm"}]})";
+  const PlanScout scout(PlanScene(liver(poke)), {}, true);
+  const double truth = trajectory_error(scout.coarse(), scout.with_masses(1e-5), {});
+  CHECK_THAT(scout.inertia_share(), WithinRel(truth, 0.1));
+}
+
+TEST_CASE("fields are planned for by models that know them") {
+  PlanRequest field = request(0.02);
+  field.measure.output = PlanOutput::field;
+  const Plan plan = make_plan(liver(ramp("0.05 mm")), field);
+  REQUIRE(plan.choice);
+  CHECK(plan.chosen().formulation != "curves");
+  CHECK_THAT(named(plan, "curves_1").reason, Contains("force only"));
+  CHECK(*plan.chosen().verified_error <= 0.02);
+}
+
+TEST_CASE("the same plan twice, byte for byte, with every key") {
+  PlanRequest whole = request(0.01, 1000.0);
+  whole.relevance = whole.changes = true;
+  const ExperimentScene scene = star(ramp("2 mm"));
+  const Json first = plan_json(make_plan(scene, whole));
+  CHECK(to_text(first) == to_text(plan_json(make_plan(scene, whole))));
+  for (const char* key : {"choice", "frontier", "reference", "relevance", "changes", "margin",
+                          "needs_full_model", "masses_matter", "costs", "validity_passed"}) {
+    CAPTURE(key);
+    CHECK(first.contains(key));
+  }
+  CHECK(first["relevance"].size() == 4);
+  CHECK(first["changes"].size() == 3);
+  CHECK(first["changes"][0]["factor"].get<double>() > 1.0);  // 10 mm is its end
+  CHECK_THAT(first["changes"][0]["factor"].get<double>(), WithinRel(5.0, 0.03));
+  CHECK_THAT(first["changes"][0]["breaks"].get<std::string>(), Contains("10 mm"));
+}
+
+TEST_CASE("what a hand can feel is a tolerance") {
+  PlanRequest felt;
+  set_tolerance(felt, "jnd");
+  CHECK(felt.tolerance == 0.07);
+  CHECK(felt.measure.relative_weight > 0.0);
+  PlanTrajectory truth, model;
+  truth.response = Eigen::Vector3d(0.5, 1.0, 0.01);
+  model.response = Eigen::Vector3d(0.55, 1.0, 0.01);
+  // 10 % of the force there: 5 % of the peak, and above what is felt of stiffness.
+  CHECK_THAT(trajectory_error(model, truth, {}), WithinRel(0.05, 1e-12));
+  CHECK_THAT(trajectory_error(model, truth, felt.measure), WithinRel(0.1 * 0.07 / 0.08, 1e-12));
+  set_tolerance(felt, "2.5%");
+  CHECK_THAT(felt.tolerance, WithinRel(0.025, 1e-12));
+}
+
+TEST_CASE("what is asked for in other words is refused") {
+  PlanRequest any;
+  CHECK_THAT(refusal_of([&] { set_tolerance(any, "tight"); }), Contains("--tolerance"));
+  CHECK_THAT(refusal_of([&] { set_tolerance(any, "90%"); }), Contains("0.5"));
+  CHECK_THAT(refusal_of([] { (void)parse_wall_budget("0.1 s"); }), Contains("s per s"));
+  CHECK_THAT(parse_wall_budget("20 ms per s"), WithinRel(0.02, 1e-12));
+  any.budget.rate_Hz = 0.0;
+  CHECK_THAT(refusal_of([&] { (void)make_plan(star(ramp("1 mm")), any); }), Contains("rate"));
+  const ExperimentScene still = liver(R"("formulation": {"kind": "static"}, )" + ramp("1 mm"));
+  CHECK_THAT(refusal_of([&] { (void)make_plan(still, {}); }), Contains("static"));
+}
+
+TEST_CASE("costs of operations are kept in a file") {
+  const test::TempFolder folder;
+  OperationCosts costs = nominal_costs();
+  costs.seconds[2] = 1.5e-10;
+  write_costs(costs, folder / "costs.json");
+  const OperationCosts read = read_costs(folder / "costs.json");
+  CHECK(read.seconds == costs.seconds);
+  write_file(folder / "bad.json", R"({"seconds_per_operation": {"scalar_step": -1}})");
+  CHECK_THAT(refusal_of([&] { (void)read_costs(folder / "bad.json"); }), Contains("scalar_step"));
+}
+
+TEST_CASE("a contact that a hand moves is planned for") {
+  const Plan plan = plan_for_contact(star(ramp("1 mm")), {3e-3, 5e-3, 0.5}, request(0.01, 1000.0));
+  REQUIRE(plan.choice);
+  CHECK(plan.chosen().name == "element");
+}

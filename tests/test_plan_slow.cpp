@@ -1,0 +1,51 @@
+// Plans of the paper's liver, and of random scenes.
+#include <catch2/catch.hpp>
+
+#include "random_plan_scene.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/plan/plan.hpp"
+
+using namespace tpm;
+
+namespace {
+
+ExperimentScene config(const std::string& name) {
+  return read_experiment(std::string(TPM_TEST_SOURCE_DIR) + "/configs/plan/" + name + ".json");
+}
+
+}  // namespace
+
+TEST_CASE("a shallow push of the paper's liver at 1 kHz") {
+  PlanRequest request;
+  request.budget.rate_Hz = 1000.0;
+  request.relevance = false;
+  const Plan plan = make_plan(config("shallow"), request);
+  REQUIRE(plan.choice);
+  CHECK(plan.chosen().formulation == "linear");
+  CHECK(*plan.chosen().verified_error <= request.tolerance);
+  REQUIRE(plan.changes.size() == 3);
+  CHECK(plan.changes[0].factor);  // deeper is not linear
+}
+
+TEST_CASE("twenty random scenes keep their claims") {
+  int claims = 0, violated = 0;
+  for (int i = 0; i < 20; ++i) {
+    const test::RandomPlan random(1, i);
+    CAPTURE(i, random.words());
+    Plan plan;
+    try {
+      plan = make_plan(random.scene(), random.request());
+    } catch (const Error& error) {
+      CHECK(error.code() == ExitCode::numerical);  // buckles
+      continue;
+    }
+    for (const PlannedCandidate& c : plan.candidates) {
+      if (!c.claimed_error || !c.verified_error) continue;
+      ++claims;
+      if (*c.verified_error > *c.claimed_error + plan.reference.difference) ++violated;
+    }
+    if (plan.choice) CHECK(*plan.chosen().verified_error <= plan.request.tolerance);
+  }
+  CHECK(claims > 100);
+  CHECK(violated <= claims / 50);
+}
