@@ -44,6 +44,7 @@ void add_network_command(CLI::App& app, Session& session);
 void add_simulate_command(CLI::App& app, Session& session);
 void add_report_command(CLI::App& app, Session& session);
 void add_experiments_command(CLI::App& app, Session& session);
+void add_benchmark_command(CLI::App& app, Session& session);
 void add_data_import_command(CLI::App& data, Session& session);  // below `tpm data`
 
 }  // namespace tpm::app

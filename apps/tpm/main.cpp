@@ -62,6 +62,7 @@ int run(int argc, char** argv) {
   add_simulate_command(app, session);
   add_report_command(app, session);
   add_experiments_command(app, session);
+  add_benchmark_command(app, session);
 
   try {
     app.parse(argc, argv);
