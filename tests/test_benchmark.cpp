@@ -106,20 +106,17 @@ BenchmarkProblem made_up() {
 }  // namespace
 
 TEST_CASE("errors of a benchmark are those that the test computes for itself") {
-  for (const double eta1 : {5.0, kFittedEta1_Pa_s}) {
-    const BenchmarkProblem problem = eta1 == 5.0 ? bond_paper_problem() : bond_fitted_problem();
-    const BenchmarkResult result = run_benchmark(problem, counts_only());
-    const Element element(eta1);
-    for (const double step_s : eta1 == 5.0 ? std::vector{1e-4, 5e-5} : std::vector{0.1, 0.05}) {
-      CAPTURE(eta1, step_s);
-      CHECK_THAT(point_of(result, "forward_euler", step_s).error,
-                 WithinRel(euler_error(element, step_s, false), 1e-5));
-      CHECK_THAT(point_of(result, "backward_euler", step_s).error,
-                 WithinRel(euler_error(element, step_s, true), 1e-5));
-    }
-    CHECK_THAT(result.reference.peak,
-               WithinRel(Element::force(kDepth_m, element.remembered(kHoldFrom_s)), 1e-12));
+  const BenchmarkResult result = run_benchmark(bond_fitted_problem(), counts_only());
+  const Element element(kFittedEta1_Pa_s);
+  for (const double step_s : {0.1, 0.05}) {
+    CAPTURE(step_s);
+    CHECK_THAT(point_of(result, "forward_euler", step_s).error,
+               WithinRel(euler_error(element, step_s, false), 1e-5));
+    CHECK_THAT(point_of(result, "backward_euler", step_s).error,
+               WithinRel(euler_error(element, step_s, true), 1e-5));
   }
+  CHECK_THAT(result.reference.peak,
+             WithinRel(Element::force(kDepth_m, element.remembered(kHoldFrom_s)), 1e-12));
 }
 
 TEST_CASE("every rule stands in the CSV, and what failed with its reason") {
