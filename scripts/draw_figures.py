@@ -238,6 +238,9 @@ def wrap(parts, per_row):
 
 def draw_figure(figure):
     """The figure, laid out from the bottom: provenance, legend, panels."""
+    if any(s["kind"] == "trail" for panel in figure["panels"] for s in panel["series"]):
+        import work_precision  # beside this file; other figures do without
+        return work_precision.draw_figure(figure, axis_label)
     panels, look = figure["panels"], looks(figure)
     labels = {legend_text(s) for panel in panels for s in panel["series"]}
     columns = 1 if len(panels) == 1 else 2

@@ -63,6 +63,7 @@ int run(int argc, char** argv) {
   add_plan_command(app, session);
   add_report_command(app, session);
   add_experiments_command(app, session);
+  add_benchmark_command(app, session);
   add_stability_command(app, session);
   add_hil_command(app, session);
 

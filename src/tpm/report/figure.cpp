@@ -24,6 +24,14 @@ std::string_view kind_name(Series::Kind kind) {
       return "bracket";
     case Series::Kind::mark:
       return "mark";
+    case Series::Kind::trail:
+      return "trail";
+    case Series::Kind::failed:
+      return "failed";
+    case Series::Kind::upright:
+      return "upright";
+    case Series::Kind::level:
+      return "level";
   }
   return "";
 }
@@ -37,11 +45,29 @@ Json numbers(const std::vector<double>& values) {
   return list;
 }
 
-void require_drawable(const Series& s, const std::string& where) {
-  const bool range = s.kind == Series::Kind::band || s.kind == Series::Kind::bracket;
+/// The arrays that a kind needs are as long as each other.
+bool matching(const Series& s) {
   const std::size_t n = s.x.size();
-  const bool matching = range ? s.lower.size() == n && s.upper.size() == n : s.y.size() == n;
-  if (!matching || (!s.sd.empty() && s.sd.size() != n)) {
+  const bool ranges = s.lower.size() == n && s.upper.size() == n;
+  switch (s.kind) {
+    case Series::Kind::band:
+    case Series::Kind::bracket:
+      return ranges;
+    case Series::Kind::trail:
+      return s.y.size() == n && (ranges || (s.lower.empty() && s.upper.empty()));
+    case Series::Kind::failed:
+    case Series::Kind::upright:
+      return s.y.empty();
+    case Series::Kind::level:
+      return n == 0;
+    default:
+      return s.y.size() == n;
+  }
+}
+
+void require_drawable(const Series& s, const std::string& where) {
+  const std::size_t n = s.x.size();
+  if (!matching(s) || (!s.sd.empty() && s.sd.size() != n)) {
     throw Error(ExitCode::numerical, where, "the arrays of a series differ in length");
   }
   for (const auto* values : {&s.x, &s.y, &s.sd, &s.lower, &s.upper}) {

@@ -15,6 +15,10 @@ struct Series {
     band,     ///< x, lower, upper: a range over a stretch of x
     bracket,  ///< x, lower, upper: a range known at single places only; nothing is drawn between
     mark,     ///< x, y: a single value, written out beside its place as `text`
+    trail,    ///< x, y, and a range lower to upper of each x if known: points of one method, joined
+    failed,   ///< x: settings that have no y; they stand above the panel, in a row named `text`
+    upright,  ///< x: a limit, named `text`
+    level,    ///< y: a limit, named `text`
   };
   Kind kind = Kind::line;
   std::string label;       ///< for the legend; same label, same colour in all panels of a figure

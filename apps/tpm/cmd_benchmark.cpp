@@ -1,0 +1,112 @@
+// tpm benchmark: error against cost of every method on named problems.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/benchmark/runner.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/report/benchmark_report.hpp"
+#include "tpm/report/draw.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct BenchmarkChoice {
+  std::vector<std::string> problems;
+  std::string folder = "out/accuracy";
+  std::string repeats = "20";
+  bool no_timing = false;
+  bool list = false;
+};
+
+int list_problems(const Session& session) {
+  Json json = Json::array();
+  for (const BenchmarkEntry& entry : benchmark_entries()) {
+    if (session.json()) {
+      json.push_back({{"name", entry.name}, {"summary", entry.summary}});
+    } else {
+      fmt::print("{:<18} {}\n", entry.name, entry.summary);
+    }
+  }
+  if (session.json()) fmt::print("{}", to_text(Json{{"problems", std::move(json)}}));
+  return 0;
+}
+
+/// A line for each problem: which method is the cheapest within 1 %, and how much failed.
+void print_summary(const BenchmarkRecord& record) {
+  constexpr double kAim = 1e-2;
+  for (const BenchmarkResult& result : record.results) {
+    const BenchmarkPoint* best = nullptr;
+    std::size_t failed = 0;
+    for (const BenchmarkPoint& p : result.points) failed += p.failed() ? 1 : 0;
+    for (const std::string& curve : curves_of(result)) {
+      const BenchmarkPoint* point = cheapest_within(result, curve, kAim);
+      if (point == nullptr || !point->times) continue;
+      if (best == nullptr || point->times->median_s < best->times->median_s) best = point;
+    }
+    fmt::print("{}: {} settings, {} failed; reference known to {}", result.name,
+               result.points.size(), failed, significant(result.reference.floor, 2));
+    if (best != nullptr) {
+      fmt::print("; cheapest within 1 %: {} ({}), {} ms", best->curve(), setting_words(*best),
+                 significant(1e3 * best->times->median_s, 3));
+    }
+    fmt::print("\n");
+  }
+}
+
+int benchmark(const BenchmarkChoice& choice, const Session& session) {
+  if (choice.list) return list_problems(session);
+  BenchmarkRecord record;
+  record.options.repeats = static_cast<int>(parse_whole_number(choice.repeats, "--repeats", 1));
+  record.options.timing = !choice.no_timing;
+  const std::vector<BenchmarkEntry> entries = chosen_benchmarks(choice.problems);
+  const std::string python = find_drawing_python();  // before minutes of work, not after
+  std::map<std::string, double> seconds;
+  for (const BenchmarkEntry& entry : entries) {
+    const auto start = std::chrono::steady_clock::now();
+    const BenchmarkProblem problem = entry.make();
+    Progress progress(std::string(entry.name), problem.settings.size());
+    record.results.push_back(run_benchmark(problem, record.options, [&] { progress.advance(); }));
+    seconds[problem.name] =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  write_benchmark(record, choice.folder, python, std::move(seconds));
+  if (session.json()) {
+    fmt::print("{}", to_text(to_json(record)));
+    return 0;
+  }
+  print_summary(record);
+  fmt::print(
+      "written to {}: report.html, report.md, benchmark.json, a CSV for each problem, "
+      "figures\n",
+      choice.folder);
+  return 0;
+}
+
+}  // namespace
+
+void add_benchmark_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "benchmark", "Error against cost of every method at many settings, on named problems");
+  auto choice = std::make_shared<BenchmarkChoice>();
+  command->add_option("PROBLEM", choice->problems, "Names of problems (default: all; see --list)");
+  command->add_option("-o,--output", choice->folder, "Folder to write into")->capture_default_str();
+  command->add_option("--repeats", choice->repeats, "Of each run that completes")
+      ->capture_default_str();
+  command->add_flag("--no-timing", choice->no_timing,
+                    "Errors and counts only, each run once: the same bytes from run to run");
+  command->add_flag("--list", choice->list, "Name the problems and do nothing");
+  add_format_option(*command, session);
+  command->footer(
+      "Run it on an otherwise idle machine. Example:\n"
+      "  tpm benchmark -o reports/accuracy\n"
+      "  tpm benchmark bond_paper organ_poke --repeats 50");
+  command->callback([choice, &session] {
+    session.run = [choice, &session] { return benchmark(*choice, session); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,139 @@
+"""Charts of error against cost, for draw_figures.py: the series `trail`, `failed`, `upright`, `level`.
+
+A trail is one method at its settings, joined in the order given. What failed has no error: it stands
+in a band above the panel, in a row that says how, at the cost at which it did. A row "not applicable"
+lists names.
+"""
+
+import matplotlib.pyplot as plt
+from matplotlib.lines import Line2D
+
+PAGE_WIDTH, PANEL_HEIGHT, LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 8.9, 3.7, 0.95, 0.12, 0.32, 1.05, 0.50
+LEGEND_ROW, BAND_ROW, COLUMNS = 0.172, 0.165, 4
+
+# One look per method in every chart. Colours after Okabe and Ito, and two greys.
+BLUE, RED, GREEN, PINK, ORANGE, SKY, BLACK, GREY = (
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8C8C8C")
+LOOKS = {
+    "forward_euler": (RED, "v"), "semi_implicit_euler": (RED, "<"), "rk4": (RED, "D"),
+    "backward_euler": (BLUE, "o"), "implicit_midpoint": (BLUE, "s"), "newmark": (BLUE, "P"),
+    "tr_bdf2": (BLUE, "X"), "exponential": (GREEN, "o"),
+    "xpbd": (PINK, "o"), "xpbd, 1 sweep": (PINK, "o"), "xpbd, 10 sweeps": (PINK, "s"),
+    "xpbd, 100 sweeps": (PINK, "D"), "xpbd, 1000 sweeps": (PINK, "P"),
+    "cvode_adams": (ORANGE, "^"), "cvode_bdf": (ORANGE, "s"), "ida": (ORANGE, "D"),
+    "collocation": (BLACK, "*"), "closed_form": (BLACK, "x"),
+    "inertial": (SKY, "o"), "inertial, order 2": (SKY, "o"), "inertial, order 5": (SKY, "s"),
+}
+SPARE = [(colour, marker) for marker in "hp8d>" for colour in (GREY, GREEN, SKY, PINK, BLACK)]
+
+
+def curves(figure):
+    """Labels in order of appearance with their looks."""
+    found, spare = {}, iter(SPARE)
+    for series in (s for panel in figure["panels"] for s in panel["series"] if s["kind"] in ("trail", "failed")):
+        if series["label"] not in found:
+            found[series["label"]] = LOOKS[series["label"]] if series["label"] in LOOKS else next(spare)
+    return found
+
+
+def marker_style(look):
+    colour, marker = look
+    size = {"*": 9, "x": 6, "D": 4.6}.get(marker, 5.5)
+    return dict(marker=marker, markersize=size, markeredgecolor=colour, markerfacecolor=colour if marker == "x" else colour + "B0", markeredgewidth=1.2 if marker == "x" else 0.6)
+
+
+def draw_trail(axes, series, look):
+    if not series["x"]:
+        return
+    spread = None
+    if "lower" in series:
+        spread = [[max(x - low, 0) for x, low in zip(series["x"], series["lower"])],
+                  [max(high - x, 0) for x, high in zip(series["x"], series["upper"])]]
+    axes.errorbar(series["x"], series["y"], xerr=spread, color=look[0], linewidth=0.9, elinewidth=0.8, capsize=1.5, zorder=4, **marker_style(look))
+
+
+def draw_limit(axes, series):
+    if series["kind"] == "upright":
+        for x in series["x"]:
+            axes.axvline(x, color=BLACK, linewidth=1, linestyle=(0, (5, 2)), zorder=2)
+            axes.annotate(series["text"], (x, 0.02), xycoords=("data", "axes fraction"), xytext=(-2, 0), textcoords="offset points",
+                          rotation=90, ha="right", va="bottom", fontsize=7.5, color=BLACK)
+    else:
+        for y in series["y"]:
+            axes.axhline(y, color=GREY, linewidth=0.9, linestyle=":", zorder=1)
+            axes.annotate(series["text"], (0.01, y), xycoords=("axes fraction", "data"), xytext=(0, 2), textcoords="offset points",
+                          ha="left", va="bottom", fontsize=7, color="#666666")
+
+
+def failure_rows(figure):
+    """How something failed, over all panels, so that their bands are equally high."""
+    rows = []
+    for series in (s for panel in figure["panels"] for s in panel["series"] if s["kind"] == "failed"):
+        if series["text"] not in rows:
+            rows.append(series["text"])
+    return rows
+
+
+def draw_band(band, panel, rows, look):
+    band.set_ylim(-0.5, len(rows) - 0.5)
+    band.set_yticks(range(len(rows)), rows, fontsize=7)
+    band.tick_params(axis="x", which="both", bottom=False, labelbottom=False)
+    band.tick_params(axis="y", length=0)
+    band.grid(False)
+    band.set_facecolor("#F6EDED")
+    for row, name in enumerate(rows):
+        row_series = [s for s in panel["series"] if s["kind"] == "failed" and s["text"] == name]
+        for series in row_series:
+            band.plot(series["x"], [row] * len(series["x"]), linestyle="none", zorder=4, **marker_style(look[series["label"]]))
+        unplaced = [s["label"] for s in row_series if not s["x"]]
+        if unplaced:
+            band.text(0.01, row, ", ".join(unplaced), transform=band.get_yaxis_transform(), fontsize=6, va="center", color=BLACK)
+
+
+def limits(panel):
+    """Room for what is drawn and for the limits named; the same for the band above."""
+    xs = [v for s in panel["series"] if s["kind"] != "level" for key in ("x", "lower", "upper") for v in s.get(key, []) if v > 0]
+    ys = [v for s in panel["series"] if s["kind"] in ("trail", "level") for v in s.get("y", []) if v > 0]
+    return (min(xs) / 1.6, max(xs) * 1.6), (min(ys) / 3, max(max(ys), 0.3) * 3)
+
+
+def draw_panel(page, place, band_height, panel, look, rows, axis_label):
+    left, bottom, width, height = place
+    axes = page.add_axes([left, bottom, width, height])
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    x_limits, y_limits = limits(panel)
+    for series in panel["series"]:
+        if series["kind"] == "trail":
+            draw_trail(axes, series, look[series["label"]])
+        elif series["kind"] in ("upright", "level"):
+            draw_limit(axes, series)
+    axes.set_xlim(x_limits)
+    axes.set_ylim(y_limits)
+    axes.set_xlabel(axis_label(panel["x"]))
+    axes.set_ylabel(axis_label(panel["y"]))
+    top = axes
+    if rows:
+        band = page.add_axes([left, bottom + height + 0.01, width, band_height])
+        band.set_xscale("log")
+        band.set_xlim(x_limits)
+        draw_band(band, panel, rows, look)
+        top = band
+    top.set_title(panel["title"], loc="left")
+
+
+def draw_figure(figure, axis_label):
+    panels, look, rows = figure["panels"], curves(figure), failure_rows(figure)
+    legend_rows = -(-len(look) // COLUMNS)
+    below = BELOW_AXIS + legend_rows * LEGEND_ROW + 0.12
+    band = len(rows) * BAND_ROW
+    height = TOP + band + PANEL_HEIGHT + below
+    page = plt.figure(figsize=(PAGE_WIDTH, height))
+    width = (PAGE_WIDTH - LEFT - RIGHT - (len(panels) - 1) * GAP) / len(panels)
+    for i, panel in enumerate(panels):
+        place = [(LEFT + i * (width + GAP)) / PAGE_WIDTH, below / height, width / PAGE_WIDTH, PANEL_HEIGHT / height]
+        draw_panel(page, place, band / height, panel, look, rows, axis_label)
+    handles = [Line2D([], [], color=style[0], linewidth=0.9, **marker_style(style)) for style in look.values()]
+    page.legend(handles, list(look), loc="upper left", ncol=COLUMNS, frameon=False, borderaxespad=0, handlelength=2.0, labelspacing=0.4, fontsize=7.5,
+                columnspacing=1.2, bbox_to_anchor=(0.25 / PAGE_WIDTH, (below - BELOW_AXIS) / height))
+    return page

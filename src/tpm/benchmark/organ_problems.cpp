@@ -1,0 +1,182 @@
+// The liver of 424 spheres: held, poked, under a load, and with masses.
+#include "tpm/benchmark/organ_problems.hpp"
+
+#include "tpm/benchmark/element_problems.hpp"
+#include "tpm/benchmark/posed.hpp"
+#include "tpm/network/lowest_mode.hpp"
+#include "tpm/scene/scene.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+/// The scene's tissue with another dashpot, driven at its contact sphere along the normal.
+std::shared_ptr<PosedNetwork> posed_liver(const Tissue& tissue, double eta1_Pa_s,
+                                          const Protocol& protocol, std::vector<double> times_s) {
+  const Organ& organ = tissue.network.organ;
+  TpmParameters material = tissue.material;
+  material.eta1_Pa_s = eta1_Pa_s;
+  const std::size_t contact = organ.contact.value();
+  const Eigen::Vector3d into = -organ.normal.col(static_cast<Eigen::Index>(contact));
+  const BondSystem bonds(tissue.network, material, tissue.lateral);
+  return std::make_shared<PosedNetwork>(
+      driven_network(bonds, organ, tissue.freedom(), {{contact, into, 1.0}}, {}), protocol,
+      std::move(times_s));
+}
+
+constexpr double kMovingPoke_s = 0.2;
+
+Tissue liver() {
+  return read_tissue(share_dir() / "configs" / "liver_scene.json");
+}
+
+/// The setting of a rule that the collocation is held against, and how far off it may be.
+struct Referee {
+  StepRule rule;  ///< an adaptive one
+  double tolerance;
+  std::string words;
+  double worst_floor;
+};
+
+BenchmarkProblem massless_problem(const std::shared_ptr<const PosedNetwork>& posed,
+                                  const RuleSettings& rules, const Referee& referee) {
+  const std::shared_ptr<const MethodProblem> rule_problem = rules_on(posed);
+  BenchmarkProblem problem;
+  problem.response = posed->protocol.drive() == Drive::force ? "depth" : "contact force";
+  problem.simulated_s = posed->protocol.end_s();
+  problem.relaxation_time_s = posed->network.bonds.relaxation_time_s();
+  problem.settings = rule_settings(rule_problem, posed->times_s, rules);
+  add(problem.settings, collocation_settings(posed, {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}));
+  problem.settings.push_back(not_applicable("inertial", "the problem has no masses"));
+  problem.settings.push_back(not_applicable("closed_form", "a network has no closed form"));
+  problem.reference = [posed, rule_problem, referee] {
+    MethodSettings method;
+    method.rule = referee.rule;
+    method.tolerance = referee.tolerance;
+    return checked_reference(
+        answer_of(collocation_settings(posed, {1e-11}).front(), "collocation at 1e-11"),
+        answer_of(rule_setting(rule_problem, posed->times_s, method), referee.words), false,
+        referee.worst_floor, "the organ");
+  };
+  return problem;
+}
+
+/// The poke of a network with masses, 0.2 s.
+std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue) {
+  constexpr double kDampingRatio = 0.1;
+  constexpr double kSpacing_s = 5e-3;
+  std::vector<double> times_s = times_every(kSpacing_s, kMovingPoke_s);
+  times_s.pop_back();
+  // At a kink the force jumps: it is asked for between them.
+  for (double& time : times_s) time += 0.5 * kSpacing_s;
+  const auto posed = posed_liver(tissue, tissue.material.eta1_Pa_s,
+                                 ramp_and_hold(8e-3, 0.1, kMovingPoke_s - 0.08), times_s);
+  posed->set_masses(sphere_masses_kg(tissue.network.organ), kDampingRatio);
+  return posed;
+}
+
+}  // namespace
+
+BenchmarkProblem organ_hold_problem() {
+  const auto posed = posed_liver(liver(), kFittedEta1_Pa_s, ramp_and_hold(8e-3, 4e-3, 29.0),
+                                 times_every(0.5, 31.0));
+  RuleSettings rules;
+  rules.steps_s = {2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 1e-3};
+  rules.tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
+  rules.sweeps = {1, 10, 100};
+  rules.most_rates = 10'000;
+  BenchmarkProblem problem = massless_problem(
+      posed, rules, {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
+  problem.name = "organ_hold";
+  problem.title = "Organ, ramp and hold";
+  problem.text =
+      "The liver of 424 spheres (configs/liver_scene.json) with eta1 = 257.3 kPa s, pushed 8 mm "
+      "deep at sphere 71 at 4 mm/s and held to 31 s.";
+  return problem;
+}
+
+BenchmarkProblem organ_poke_problem() {
+  const Protocol protocol(Drive::displacement, {{0.0, 0.0}, {0.08, 8e-3}, {0.12, 8e-3}, {0.2, 0.0}},
+                          "poke");
+  const auto posed = posed_liver(liver(), 5.0, protocol, times_every(5e-3, 0.2));
+  RuleSettings rules;
+  rules.steps_s = {2e-2, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4};
+  rules.tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
+  rules.sweeps = {1, 10, 100};
+  rules.most_rates = 10'000;
+  BenchmarkProblem problem =
+      massless_problem(posed, rules, {StepRule::cvode_bdf, 1e-11, "CVODE, BDF, at 1e-11", 1e-6});
+  problem.name = "organ_poke";
+  problem.title = "Organ, poked at 100 mm/s";
+  problem.text =
+      "The same liver with the paper's eta1 = 5 Pa s (relaxation time 0.208 ms): 8 mm in at 100 "
+      "mm/s, held for 40 ms, and out again, 0.2 s in all.";
+  return problem;
+}
+
+BenchmarkProblem organ_creep_problem() {
+  const auto posed =
+      posed_liver(liver(), kFittedEta1_Pa_s, creep(0.196, 300.0), times_every(5.0, 300.0));
+  RuleSettings rules;
+  rules.steps_s = {20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 1e-3};
+  rules.tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
+  rules.sweeps = {1, 10, 100};
+  rules.most_rates = 10'000;
+  BenchmarkProblem problem = massless_problem(
+      posed, rules, {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
+  problem.name = "organ_creep";
+  problem.title = "Organ, 300 s of creep";
+  problem.text =
+      "The same liver with eta1 = 257.3 kPa s under the smaller of the paper's loads, 0.196 N, put "
+      "on at once and kept for 300 s.";
+  return problem;
+}
+
+BenchmarkProblem moving_poke_problem(const std::shared_ptr<const PosedNetwork>& posed) {
+  const std::shared_ptr<const MethodProblem> rule_problem = rules_on(posed);
+  RuleSettings rules;
+  rules.steps_s = {1e-2, 5e-3, 2.5e-3, 1e-3, 5e-4, 2.5e-4, 1e-4};
+  rules.tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
+  rules.sweeps = {1, 10};
+  rules.most_rates = 20'000;
+  BenchmarkProblem problem;
+  problem.response = "contact force";
+  problem.simulated_s = kMovingPoke_s;
+  problem.relaxation_time_s = posed->network.bonds.relaxation_time_s();
+  problem.settings = rule_settings(rule_problem, posed->times_s, rules);
+  add(problem.settings, collocation_settings(posed, {1e-2, 1e-4, 1e-6}));
+  add(problem.settings, inertial_settings(posed, {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}));
+  problem.settings.push_back(not_applicable("closed_form", "a network has no closed form"));
+  problem.reference = [posed, rule_problem] {
+    MethodSettings method;
+    method.rule = StepRule::rk4;
+    method.step_s = 2.5e-5;
+    return checked_reference(
+        answer_of(inertial_settings(posed, {1e-9}).back(), "CVODES (inertial), order 5, at 1e-9"),
+        answer_of(rule_setting(rule_problem, posed->times_s, method),
+                  "Runge-Kutta of order 4 with steps of 25 microseconds"),
+        false, 1e-4, "the organ with masses");
+  };
+  return problem;
+}
+
+BenchmarkProblem organ_poke_mass_problem() {
+  BenchmarkProblem problem = moving_poke_problem(posed_moving_liver(liver()));
+  problem.name = "organ_poke_mass";
+  problem.title = "Organ with masses, poked at 100 mm/s";
+  problem.text =
+      "The liver with the paper's eta1 and a mass of 4.4 g in each sphere (1060 kg/m3), damped by "
+      "a "
+      "tenth of the lowest mode: 8 mm in at 100 mm/s, held to 0.2 s. The collocation leaves the "
+      "masses out: its error is what inertia matters.";
+  return problem;
+}
+
+std::shared_ptr<const PosedNetwork> posed_elastic_poke() {
+  Tissue tissue = liver();
+  // A spring E1 that gives nothing leaves E2 alone.
+  tissue.material.E1_Pa = 1e9 * tissue.material.E2_Pa;
+  return posed_moving_liver(tissue);
+}
+
+}  // namespace tpm

@@ -1,0 +1,99 @@
+#pragma once
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/method/method.hpp"
+
+namespace tpm {
+
+/// What one run of a setting brought.
+struct BenchmarkRun {
+  MethodRun outcome;
+  /// Wall time of each step, s, where the problem measures its steps one by one (contact models at
+  /// servo rate) and was asked to; else empty.
+  std::vector<double> step_wall_s;
+};
+
+/// One setting of one method: a point of a chart.
+struct BenchmarkSetting {
+  std::string method;     ///< its word
+  std::string variant;    ///< "10 sweeps"; empty for most. Method and variant name a curve
+  std::string parameter;  ///< what changes along the curve: "step_s", "tolerance"; empty: nothing
+  double value = 0.0;     ///< of that
+  std::optional<double> step_s;  ///< where all steps are equally long: one has to fit its period
+  /// @param time_steps measure BenchmarkRun::step_wall_s, if the problem knows how
+  std::function<BenchmarkRun(bool time_steps)> run;
+
+  [[nodiscard]] std::string curve() const {
+    return variant.empty() ? method : method + ", " + variant;
+  }
+};
+
+/// An answer that others are compared with.
+struct BenchmarkAnswer {
+  std::string method;  ///< whose word a setting of the same method carries
+  std::string words;   ///< how it was found
+  Eigen::VectorXd response;
+};
+
+/// What is taken for the truth, and how well it is known.
+struct BenchmarkReference {
+  BenchmarkAnswer judge;
+  BenchmarkAnswer second;  ///< found another way; it judges the judge's own method
+  bool exact = false;      ///< the judge is a closed form
+  double peak = 0.0;       ///< largest absolute response of the judge, N or m
+  double agreement = 0.0;  ///< largest difference of the two, in parts of the peak
+  double floor = 0.0;      ///< errors below this, in parts of the peak, cannot be told
+
+  /// The answer that settings of a method are compared with: no method is its own judge.
+  [[nodiscard]] const Eigen::VectorXd& response_for(std::string_view method) const {
+    return method == judge.method ? second.response : judge.response;
+  }
+};
+
+/// What an answer of a closed form is good for: rounding.
+inline constexpr double kExactFloor = 1e-14;
+
+/// Puts two answers beside each other. The floor is ten times their difference, so that they agree
+/// to a tenth of every error that is told; of a closed form kExactFloor.
+/// @param worst_floor the largest floor to be accepted, in parts of the peak; for an exact judge
+///   ten times the difference is held against it too
+/// Throws Error(numerical) with `where` if it is larger, if the answers are not finite or differ in
+/// size, or if both come from one method.
+[[nodiscard]] BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer second,
+                                                   bool exact, double worst_floor,
+                                                   std::string_view where);
+
+/// A named problem: what is asked, in which ways, and what the answer is.
+struct BenchmarkProblem {
+  std::string name;          ///< a file name without ending
+  std::string title;         ///< a line
+  std::string text;          ///< sentences: scene, protocol, material, what counts as error
+  std::string response;      ///< "contact force" or "depth"
+  double simulated_s = 0.0;  ///< length of the protocol
+  double relaxation_time_s = 0.0;
+  std::vector<BenchmarkSetting> settings;  ///< those of a curve in a row, cheapest first
+  std::function<BenchmarkReference()> reference;
+};
+
+/// A line of the list of problems.
+struct BenchmarkEntry {
+  std::string_view name;
+  std::string_view summary;
+  BenchmarkProblem (*make)();
+};
+
+/// All problems, in the order of the report.
+[[nodiscard]] std::span<const BenchmarkEntry> benchmark_entries();
+
+/// The entries of these names, in the order of the list; all for none.
+/// Throws Error(usage) with the known names for one that is not there.
+[[nodiscard]] std::vector<BenchmarkEntry> chosen_benchmarks(std::span<const std::string> names);
+
+}  // namespace tpm

@@ -1,0 +1,39 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/benchmark/problem.hpp"
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+
+BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer second, bool exact,
+                                     double worst_floor, std::string_view where) {
+  const auto refused = [&](const std::string& what, const std::string& expected) {
+    return Error(ExitCode::numerical, fmt::format("reference of {}", where), what, expected);
+  };
+  if (judge.method == second.method) {
+    throw refused(fmt::format("both answers come from {}", judge.method), "two methods");
+  }
+  if (judge.response.size() == 0 || judge.response.size() != second.response.size() ||
+      !judge.response.allFinite() || !second.response.allFinite()) {
+    throw refused("an answer is missing or not finite", "the response at every time, twice");
+  }
+  BenchmarkReference reference;
+  reference.exact = exact;
+  reference.peak = judge.response.cwiseAbs().maxCoeff();
+  reference.agreement = (judge.response - second.response).cwiseAbs().maxCoeff() / reference.peak;
+  const double told = 10.0 * reference.agreement;
+  if (!(told <= worst_floor)) {
+    throw refused(fmt::format("{} and {} differ by {:.2g} of the peak", judge.words, second.words,
+                              reference.agreement),
+                  fmt::format("at most {:.2g}", 0.1 * worst_floor));
+  }
+  reference.floor = exact ? kExactFloor : std::max(told, kExactFloor);
+  reference.judge = std::move(judge);
+  reference.second = std::move(second);
+  return reference;
+}
+
+}  // namespace tpm

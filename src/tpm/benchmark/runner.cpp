@@ -1,0 +1,132 @@
+#include "tpm/benchmark/runner.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// An error of the whole peak is no answer.
+constexpr double kUselessError = 1.0;
+
+void judge(BenchmarkPoint& point, const MethodRun& run, const BenchmarkReference& reference) {
+  point.end = benchmark_end_word(run.end);
+  point.reason = run.reason;
+  point.end_time_s = run.end_time_s;
+  point.work = run.work;
+  point.error = std::numeric_limits<double>::quiet_NaN();
+  if (run.end != MethodEnd::completed) return;
+  const Eigen::VectorXd& truth = reference.response_for(point.method);
+  if (run.response.size() != truth.size() || !run.response.allFinite()) {
+    throw Error(ExitCode::numerical, point.curve(),
+                "a run that says it completed has not answered at every time");
+  }
+  const double error = (run.response - truth).cwiseAbs().maxCoeff() / reference.peak;
+  point.below_floor = error <= reference.floor;
+  point.error = std::max(error, reference.floor);
+  if (error <= kUselessError) return;
+  point.end = "error_above_peak";
+  point.reason = fmt::format("ran to the end with an error of {:.2g} times the peak", error);
+}
+
+BenchmarkTimes quartiles(std::vector<double> taken, long runs_per_repeat) {
+  std::sort(taken.begin(), taken.end());
+  return {static_cast<int>(taken.size()),  runs_per_repeat,
+          quantile_of_sorted(taken, 0.5),  quantile_of_sorted(taken, 0.25),
+          quantile_of_sorted(taken, 0.75), taken.front()};
+}
+
+/// @param once_s what the run took when it was made to be judged
+void time_runs(const BenchmarkSetting& setting, double once_s, const BenchmarkOptions& options,
+               BenchmarkPoint& point) {
+  if (point.failed()) {
+    point.times = quartiles({once_s}, 1);
+    return;
+  }
+  const long runs = std::max(1L, std::lround(std::ceil(options.least_repeat_s / once_s)));
+  std::vector<double> taken;
+  std::vector<double> steps;
+  for (int repeat = 0; repeat < options.repeats; ++repeat) {
+    const auto start = Clock::now();
+    for (long i = 0; i < runs; ++i) {
+      const BenchmarkRun run = setting.run(true);
+      steps.insert(steps.end(), run.step_wall_s.begin(), run.step_wall_s.end());
+    }
+    taken.push_back(seconds_since(start) / static_cast<double>(runs));
+  }
+  point.times = quartiles(std::move(taken), runs);
+  if (steps.empty()) return;
+  std::sort(steps.begin(), steps.end());
+  point.step_times = {quantile_of_sorted(steps, 0.5), quantile_of_sorted(steps, 0.99),
+                      steps.back()};
+}
+
+BenchmarkPoint point_of(const BenchmarkSetting& setting, const BenchmarkReference& reference,
+                        const BenchmarkOptions& options) {
+  BenchmarkPoint point;
+  point.method = setting.method;
+  point.variant = setting.variant;
+  point.parameter = setting.parameter;
+  point.value = setting.value;
+  point.step_s = setting.step_s;
+  const auto start = Clock::now();
+  const BenchmarkRun run = setting.run(false);
+  const double once_s = seconds_since(start);
+  judge(point, run.outcome, reference);
+  if (options.timing) time_runs(setting, once_s, options, point);
+  return point;
+}
+
+}  // namespace
+
+double quantile_of_sorted(std::span<const double> values, double share) {
+  const double place = share * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return values[below] + (place - static_cast<double>(below)) * (values[above] - values[below]);
+}
+
+std::string_view benchmark_end_word(MethodEnd end) {
+  switch (end) {
+    case MethodEnd::completed:
+      return "completed";
+    case MethodEnd::diverged:
+      return "diverged";
+    case MethodEnd::newton_failed:
+      return "newton_failed";
+    case MethodEnd::buckled:
+      return "buckled";
+    case MethodEnd::too_much_work:
+      return "too_much_work";
+    case MethodEnd::not_applicable:
+      return "not_applicable";
+  }
+  throw Error(ExitCode::numerical, "benchmark", "an end that has no word");
+}
+
+BenchmarkResult run_benchmark(const BenchmarkProblem& problem, const BenchmarkOptions& options,
+                              const std::function<void()>& progress) {
+  BenchmarkResult result{problem.name,        problem.title,
+                         problem.text,        problem.response,
+                         problem.simulated_s, problem.relaxation_time_s,
+                         problem.reference(), {}};
+  for (const BenchmarkSetting& setting : problem.settings) {
+    result.points.push_back(point_of(setting, result.reference, options));
+    if (progress) progress();
+  }
+  return result;
+}
+
+}  // namespace tpm

@@ -1,0 +1,249 @@
+#include "tpm/report/benchmark_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/run_record.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::array<double, 4> kAims{1e-2, 1e-3, 1e-4, 1e-6};
+constexpr std::array<double, 2> kServoPeriods_s{1e-3, 2.5e-4};
+
+std::string seconds_words(double seconds) {
+  const auto in = [&](double unit, const char* name) {
+    return fmt::format("{} {}", significant(seconds / unit, 3), name);
+  };
+  if (seconds < 1e-6) return in(1e-9, "ns");
+  if (seconds < 1e-3) return in(1e-6, "us");
+  return seconds < 1.0 ? in(1e-3, "ms") : in(1.0, "s");
+}
+
+std::string percent_words(double error) {
+  return fmt::format("{} %", significant(100.0 * error, 2));
+}
+
+double cost_of(const BenchmarkPoint& point) {
+  return point.times ? point.times->median_s : static_cast<double>(point.work.rates);
+}
+
+std::string reference_words(const BenchmarkResult& result) {
+  const BenchmarkReference& r = result.reference;
+  const char* unit = result.response == "depth" ? "m" : "N";
+  if (r.exact) {
+    return fmt::format(
+        "Reference: {}, exact; {} differs from it by {} of the peak of {} {} and judges it.",
+        r.judge.words, r.second.words, significant(r.agreement, 2), significant(r.peak, 4), unit);
+  }
+  return fmt::format(
+      "Reference: {}. {} judges that method itself; the two differ by {} of the peak of {} {}, so "
+      "errors are told down to {}, ten times that.",
+      r.judge.words, r.second.words, significant(r.agreement, 2), significant(r.peak, 4), unit,
+      significant(r.floor, 2));
+}
+
+/// What a cell says of the cheapest point within an error.
+std::string cheapest_words(const BenchmarkResult& result, const BenchmarkPoint& point) {
+  const std::string cost =
+      point.times ? fmt::format("{}/s", seconds_words(point.times->median_s / result.simulated_s))
+                  : fmt::format("{} evaluations", point.work.rates);
+  const std::string setting = setting_words(point);
+  return setting.empty() ? cost : fmt::format("{} ({})", cost, setting);
+}
+
+Table aims_table(const BenchmarkResult& result, bool timing) {
+  Table table{timing ? "Wall time per simulated second of the cheapest setting within an error"
+                     : "Evaluations of the cheapest setting within an error",
+              {{"method"}},
+              {}};
+  for (const double aim : kAims) table.columns.push_back({percent_words(aim), true});
+  table.columns.push_back({"least error", true});
+  for (const std::string& curve : curves_of(result)) {
+    std::vector<Cell> row{{curve}};
+    for (const double aim : kAims) {
+      const BenchmarkPoint* point = cheapest_within(result, curve, aim);
+      row.push_back(point != nullptr ? Cell{cheapest_words(result, *point)}
+                                     : Cell{"-", Tone::fair});
+    }
+    const BenchmarkPoint* best = nullptr;
+    for (const BenchmarkPoint& p : result.points) {
+      if (p.curve() != curve || p.failed()) continue;
+      if (best == nullptr || p.error < best->error) best = &p;
+    }
+    row.push_back(best == nullptr ? Cell{"fails", Tone::bad}
+                                  : Cell{fmt::format("{}{}", best->below_floor ? "< " : "",
+                                                     significant(best->error, 2))});
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+const BenchmarkPoint* with_step(const BenchmarkResult& result, const std::string& curve,
+                                double step_s) {
+  for (const BenchmarkPoint& p : result.points) {
+    if (p.curve() == curve && p.step_s && std::abs(*p.step_s - step_s) < 1e-9 * step_s) return &p;
+  }
+  return nullptr;
+}
+
+/// What a method does at one servo rate.
+void add_servo_cells(std::vector<Cell>& row, const BenchmarkPoint* point, double period_s) {
+  if (point == nullptr) {
+    row.insert(row.end(), {{"-"}, {"-"}});
+    return;
+  }
+  std::string failure = point->end;
+  std::replace(failure.begin(), failure.end(), '_', ' ');
+  row.push_back(point->failed() ? Cell{failure, Tone::bad} : Cell{percent_words(point->error)});
+  if (!point->times || point->failed() || point->work.steps == 0) {
+    row.push_back({"-"});
+    return;
+  }
+  const double step_s = point->step_times
+                            ? point->step_times->p99_s
+                            : point->times->median_s / static_cast<double>(point->work.steps);
+  const bool fits = step_s <= period_s;
+  row.push_back({fmt::format("{}{}", seconds_words(step_s), fits ? "" : ", too slow"),
+                 fits ? Tone::good : Tone::bad});
+}
+
+Table servo_table(const BenchmarkResult& result) {
+  Table table{"At servo rate: error, and wall time of a step",
+              {{"method"},
+               {"error at 1 kHz", true},
+               {"a step", true},
+               {"error at 4 kHz", true},
+               {"a step", true}},
+              {}};
+  for (const std::string& curve : curves_of(result)) {
+    std::vector<Cell> row{{curve}};
+    bool any = false;
+    for (const double period_s : kServoPeriods_s) {
+      const BenchmarkPoint* point = with_step(result, curve, period_s);
+      any = any || (point != nullptr && point->end != "not_applicable");
+      add_servo_cells(row, point, period_s);
+    }
+    if (any) table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table failure_table(const BenchmarkResult& result) {
+  Table table{"What failed", {{"method"}, {"how"}, {"settings"}, {"reason (of the first)"}}, {}};
+  for (const std::string& curve : curves_of(result)) {
+    std::vector<std::string> ends;
+    for (const BenchmarkPoint& p : result.points) {
+      const bool known = std::find(ends.begin(), ends.end(), p.end) != ends.end();
+      if (p.curve() == curve && p.failed() && !known) ends.push_back(p.end);
+    }
+    for (const std::string& end : ends) {
+      std::vector<std::string> settings;
+      std::string reason;
+      for (const BenchmarkPoint& p : result.points) {
+        if (p.curve() != curve || p.end != end) continue;
+        if (settings.empty()) reason = p.reason;
+        settings.push_back(p.parameter.empty() ? "all" : setting_words(p));
+      }
+      std::string how = end;
+      std::replace(how.begin(), how.end(), '_', ' ');
+      table.rows.push_back(
+          {{curve}, {how, Tone::bad}, {fmt::format("{}", fmt::join(settings, "; "))}, {reason}});
+    }
+  }
+  return table;
+}
+
+void add_pictures(Document& document, const std::vector<Figure>& figures, const std::string& id) {
+  for (const Figure& figure : figures) {
+    if (figure.id == id || figure.id == id + "_counts") {
+      document.picture({figure.id, figure.title, figure.caption});
+    }
+  }
+}
+
+std::string introduction(const BenchmarkOptions& options) {
+  std::string text =
+      "Every method at many settings on named problems. The error is the largest absolute "
+      "difference "
+      "of the response to the reference over the protocol, divided by the largest response; 1 % is "
+      "1e-2 in the charts. No method is its own judge.";
+  if (!options.timing) return text + " Made with `--no-timing`: counts, and no clock.";
+  return text + fmt::format(
+                    " Wall times are medians of {} repeats of each setting that completes, on one "
+                    "thread, with the model set up beforehand; runs below {} are repeated within a "
+                    "repeat. A setting that failed was run once. The machine is in "
+                    "`report.run.json`.",
+                    options.repeats, seconds_words(options.least_repeat_s));
+}
+
+}  // namespace
+
+std::vector<std::string> curves_of(const BenchmarkResult& result) {
+  std::vector<std::string> curves;
+  for (const BenchmarkPoint& point : result.points) {
+    if (std::find(curves.begin(), curves.end(), point.curve()) == curves.end()) {
+      curves.push_back(point.curve());
+    }
+  }
+  return curves;
+}
+
+std::string setting_words(const BenchmarkPoint& point) {
+  if (point.parameter == "step_s") return fmt::format("step {}", seconds_words(point.value));
+  if (point.parameter.empty()) return "";
+  return fmt::format("{} {}", point.parameter, significant(point.value, 3));
+}
+
+const BenchmarkPoint* cheapest_within(const BenchmarkResult& result, const std::string& curve,
+                                      double error) {
+  const BenchmarkPoint* cheapest = nullptr;
+  for (const BenchmarkPoint& p : result.points) {
+    if (p.curve() != curve || p.failed() || p.error > error) continue;
+    if (cheapest == nullptr || cost_of(p) < cost_of(*cheapest)) cheapest = &p;
+  }
+  return cheapest;
+}
+
+Document benchmark_document(const BenchmarkRecord& record, const std::vector<Figure>& figures) {
+  Document document{"Speed against accuracy", "What `tpm benchmark` measured", {}};
+  document.paragraph(introduction(record.options));
+  for (const BenchmarkResult& result : record.results) {
+    document.heading(2, fmt::format("{} (`{}`)", result.title, result.name));
+    document.paragraph(result.text);
+    document.paragraph(reference_words(result));
+    add_pictures(document, figures, result.name);
+    document.table(aims_table(result, record.options.timing));
+    Table servo = servo_table(result);
+    if (!servo.rows.empty()) document.table(std::move(servo));
+    document.table(failure_table(result));
+    document.paragraph(fmt::format("Every setting: `{}.csv`.", result.name));
+  }
+  typeset(document);
+  return document;
+}
+
+void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path& folder,
+                     const std::string& python, std::map<std::string, double> seconds) {
+  for (const BenchmarkResult& result : record.results) {
+    write_file(folder / (result.name + ".csv"), benchmark_csv(result, record.options.timing));
+  }
+  write_file(folder / "benchmark.json", to_text(to_json(record)));
+  const std::vector<Figure> figures = benchmark_figures(record);
+  const auto drawings =
+      timed(seconds, "drawing", [&] { return draw_into(folder, figures, python); });
+  const Document document = benchmark_document(record, figures);
+  write_file(folder / "report.md", to_markdown(document));
+  write_file(folder / "report.html", to_html(document, drawings));
+  Json run = run_record(seconds);
+  run["drawing_python"] = python;
+  write_file(folder / "report.run.json", to_text(run));
+}
+
+}  // namespace tpm
