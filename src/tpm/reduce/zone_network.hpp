@@ -67,7 +67,7 @@ class ZoneNetwork final : public ContactModel {
     AlignedFloats numbers;
     std::size_t stride = 0, columns = 0;
     void put(const Eigen::MatrixXd& matrix);
-    [[nodiscard]] Panel panel() const { return {numbers.data(), stride, columns}; }
+    [[nodiscard]] FloatPanel panel() const { return {numbers.data(), stride, columns}; }
   };
   void choose_zone(const PushedContact& tissue);
   void build(PushedContact& tissue);

@@ -141,12 +141,12 @@ FrontalFactor::FrontalFactor(std::shared_ptr<const FrontalPattern> pattern, bool
   sum_.assign(std::max(most_own, most_reached), 0.0F);
 }
 
-Panel FrontalFactor::inverse(const Place& front) const {
+FloatPanel FrontalFactor::inverse(const Place& front) const {
   const std::size_t own = std::size_t{3} * front.own;
   return {numbers_.data() + front.inverse, padded(own), own};
 }
 
-Panel FrontalFactor::passed(const Place& front) const {
+FloatPanel FrontalFactor::passed(const Place& front) const {
   return {numbers_.data() + front.passed, padded(std::size_t{3} * front.count),
           std::size_t{3} * front.own};
 }
@@ -182,7 +182,7 @@ void FrontalFactor::solve(float* x) noexcept {
     }
     kernels_.times(inverse(front), own_.data(), sum_.data());
     if (front.count > 0) {
-      const Panel down = passed(front);
+      const FloatPanel down = passed(front);
       const std::uint32_t* const row = row_.data() + front.rows;
       for (std::size_t i = 0; i < front.count; ++i) {
         std::memcpy(reached_.data() + 3 * i, x + std::size_t{4} * row[i], kNode);

@@ -40,8 +40,8 @@ class FrontalFactor {
     std::uint32_t rows, count;    ///< of row_
     std::size_t inverse, passed;  ///< of numbers_
   };
-  [[nodiscard]] Panel inverse(const Place& front) const;
-  [[nodiscard]] Panel passed(const Place& front) const;
+  [[nodiscard]] FloatPanel inverse(const Place& front) const;
+  [[nodiscard]] FloatPanel passed(const Place& front) const;
 
   std::shared_ptr<const FrontalPattern> pattern_;
   const PanelKernels& kernels_;

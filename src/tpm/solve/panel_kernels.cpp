@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kWide = 8;
 
-void times_portable(const Panel& panel, const float* x, float* out) noexcept {
+void times_portable(const FloatPanel& panel, const float* x, float* out) noexcept {
   std::fill(out, out + panel.stride, 0.0F);
   const float* column = panel.numbers;
   for (std::size_t j = 0; j < panel.columns; ++j, column += panel.stride) {
@@ -20,7 +20,7 @@ void times_portable(const Panel& panel, const float* x, float* out) noexcept {
   }
 }
 
-void subtract_transposed_portable(const Panel& panel, const float* x, float* out) noexcept {
+void subtract_transposed_portable(const FloatPanel& panel, const float* x, float* out) noexcept {
   const float* column = panel.numbers;
   for (std::size_t j = 0; j < panel.columns; ++j, column += panel.stride) {
     float sum[kWide] = {};
@@ -35,7 +35,7 @@ constexpr PanelKernels kPortable{times_portable, subtract_transposed_portable};
 
 /// `Count` vectors of the product, from row `begin` on.
 template <int Count>
-[[gnu::target("avx2,fma"), gnu::always_inline]] inline void rows_times(const Panel& panel,
+[[gnu::target("avx2,fma"), gnu::always_inline]] inline void rows_times(const FloatPanel& panel,
                                                                        std::size_t begin,
                                                                        const float* x, float* out) {
   __m256 even[Count], odd[Count];
@@ -61,7 +61,7 @@ template <int Count>
   }
 }
 
-[[gnu::target("avx2,fma")]] void times_avx2(const Panel& panel, const float* x,
+[[gnu::target("avx2,fma")]] void times_avx2(const FloatPanel& panel, const float* x,
                                             float* out) noexcept {
   std::size_t i = 0;
   for (; i + 4 * kWide <= panel.stride; i += 4 * kWide) rows_times<4>(panel, i, x, out);
@@ -80,7 +80,7 @@ template <int Count>
   }
 }
 
-[[gnu::target("avx2,fma")]] void subtract_transposed_avx2(const Panel& panel, const float* x,
+[[gnu::target("avx2,fma")]] void subtract_transposed_avx2(const FloatPanel& panel, const float* x,
                                                           float* out) noexcept {
   const float* column = panel.numbers;
   const std::size_t stride = panel.stride;
