@@ -30,9 +30,9 @@ ExperimentScene star(const std::string& blocks) {
                     "}");
 }
 
-std::string ramp(const std::string& depth) {
-  return R"("protocol": {"kind": "ramp_hold", "depth": ")" + depth +
-         R"(", "rate": "2 mm/s", "hold": "2 s"})";
+std::string ramp(const std::string& depth, const std::string& rate = "2 mm/s") {
+  return R"("protocol": {"kind": "ramp_hold", "depth": ")" + depth + R"(", "rate": ")" + rate +
+         R"(", "hold": "2 s"})";
 }
 
 PlanRequest request(double tolerance, std::optional<double> rate_Hz = {}) {
@@ -104,7 +104,7 @@ TEST_CASE("the star needs no more than its element, which is exact") {
 }
 
 TEST_CASE("a shallow push of an organ is linear, a deep one is not") {
-  const Plan shallow = make_plan(liver(ramp("0.05 mm")), request(0.02, 1000.0));
+  const Plan shallow = make_plan(liver(ramp("0.05 mm", "0.05 mm/s")), request(0.02, 1000.0));
   REQUIRE(shallow.choice);
   CHECK(shallow.chosen().formulation == "linear");
   CHECK(*shallow.chosen().verified_error <= *shallow.chosen().claimed_error);
@@ -169,7 +169,7 @@ TEST_CASE("the estimate of what masses do is that of a run with masses") {
 TEST_CASE("fields are planned for by models that know them") {
   PlanRequest field = request(0.02);
   field.measure.output = PlanOutput::field;
-  const Plan plan = make_plan(liver(ramp("0.05 mm")), field);
+  const Plan plan = make_plan(liver(ramp("0.05 mm", "0.05 mm/s")), field);
   REQUIRE(plan.choice);
   CHECK(plan.chosen().formulation != "curves");
   CHECK_THAT(named(plan, "curves_1").reason, Contains("force only"));
