@@ -30,9 +30,9 @@ ExperimentScene star(const std::string& blocks) {
                     "}");
 }
 
-std::string ramp(const std::string& depth) {
-  return R"("protocol": {"kind": "ramp_hold", "depth": ")" + depth +
-         R"(", "rate": "2 mm/s", "hold": "2 s"})";
+std::string ramp(const std::string& depth, const std::string& rate = "2 mm/s") {
+  return R"("protocol": {"kind": "ramp_hold", "depth": ")" + depth + R"(", "rate": ")" + rate +
+         R"(", "hold": "2 s"})";
 }
 
 PlanRequest request(double tolerance, std::optional<double> rate_Hz = {}) {
@@ -104,11 +104,11 @@ TEST_CASE("the star needs no more than its element, which is exact") {
 }
 
 TEST_CASE("a shallow push of an organ is linear, a deep one is not") {
-  const Plan shallow = make_plan(liver(ramp("0.05 mm")), request(0.02, 1000.0));
+  const Plan shallow = make_plan(liver(ramp("0.05 mm", "0.05 mm/s")), request(0.02));
   REQUIRE(shallow.choice);
   CHECK(shallow.chosen().formulation == "linear");
   CHECK(*shallow.chosen().verified_error <= *shallow.chosen().claimed_error);
-  const Plan deep = make_plan(liver(ramp("6 mm")), request(0.02, 1000.0));
+  const Plan deep = make_plan(liver(ramp("6 mm")), request(0.02));
   CHECK_FALSE(named(deep, "linear_3").accurate);
   CHECK(*named(deep, "linear_3").verified_error > 0.02);
 }
@@ -163,13 +163,15 @@ TEST_CASE("the estimate of what masses do is that of a run with masses") {
     {"time": "0.1 s", "depth": "0.1 mm"}]})";
   const PlanScout scout(PlanScene(liver(poke)), {}, true);
   const double truth = trajectory_error(scout.coarse(), scout.with_masses(1e-5), {});
-  CHECK_THAT(scout.inertia_share(), WithinRel(truth, 0.1));
+  // The linear network leaves out what dashpots take of the ringing.
+  CHECK(scout.inertia_share() > 0.9 * truth);
+  CHECK(scout.inertia_share() < 1.5 * truth);
 }
 
 TEST_CASE("fields are planned for by models that know them") {
   PlanRequest field = request(0.02);
   field.measure.output = PlanOutput::field;
-  const Plan plan = make_plan(liver(ramp("0.05 mm")), field);
+  const Plan plan = make_plan(liver(ramp("0.05 mm", "0.05 mm/s")), field);
   REQUIRE(plan.choice);
   CHECK(plan.chosen().formulation != "curves");
   CHECK_THAT(named(plan, "curves_1").reason, Contains("force only"));
@@ -177,7 +179,7 @@ TEST_CASE("fields are planned for by models that know them") {
 }
 
 TEST_CASE("the same plan twice, byte for byte, with every key") {
-  PlanRequest whole = request(0.01, 1000.0);
+  PlanRequest whole = request(1e-4, 1000.0);
   whole.relevance = whole.changes = true;
   const ExperimentScene scene = star(ramp("2 mm"));
   const Json first = plan_json(make_plan(scene, whole));

@@ -9,6 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/reduce/condensed.hpp"
+#include "tpm/reduce/servo_network.hpp"
 
 namespace tpm {
 namespace {
@@ -153,10 +154,39 @@ class CondensedCandidate final : public ContactCandidate {
   }
 };
 
+/// The nonlinear network with a stiffness that was factorised beforehand, in single precision.
+class ServoCandidate final : public ContactCandidate {
+ public:
+  [[nodiscard]] std::string name() const override { return "servo_network"; }
+  [[nodiscard]] std::string formulation() const override { return "servo_network"; }
+  [[nodiscard]] std::string settings() const override { return "factorised at half the depth"; }
+  [[nodiscard]] ModelReach reach() const override { return ModelReach::full; }
+
+ protected:
+  [[nodiscard]] std::unique_ptr<ContactModel> build(const PlanScene& scene,
+                                                    double period_s) const override {
+    ServoNetworkOptions options;
+    options.period_s = period_s;
+    options.frozen_depth_m = 0.5 * scene.protocol().peak();
+    options.deepest_m = 1.05 * scene.protocol().peak();
+    options.portable = true;  // the same answer on every machine
+    const DrivenNetwork& driven = scene.driven();
+    const Probe& probe = scene.scene().probe();
+    return std::make_unique<ServoNetwork>(driven.bonds, driven.rest, driven.freedom, probe.sphere,
+                                          probe.direction, options);
+  }
+  [[nodiscard]] OperationCount work_of_step(const PlanScene& scene) const override {
+    // Two balances a step; a bond and a block in single precision take about a lane's share.
+    constexpr double kBalances = 2.0;
+    return scene.iteration_work().times(kBalances / kLanes);
+  }
+};
+
 }  // namespace
 
 void add_contact_models(PlanModels& models) {
   models.push_back(std::make_unique<CondensedCandidate>());
+  models.push_back(std::make_unique<ServoCandidate>());
 }
 
 }  // namespace tpm

@@ -18,7 +18,8 @@ constexpr const char* kSeconds = "seconds_per_operation";
 }  // namespace
 
 const std::array<OperationEntry, kOperations>& operation_table() {
-  // Printed by `tpm plan --calibrate` on one core of a server of 2023 (docs/plan.md).
+  // Round figures by judgement, not measured: for a choice that repeats where nothing was
+  // calibrated.
   static constexpr std::array<OperationEntry, kOperations> kTable{{
       {Operation::scalar_step, "scalar_step", 5e-9},
       {Operation::scalar_term, "scalar_term", 3e-9},

@@ -42,7 +42,8 @@ bool truth_has_masses(const ExperimentScene& scene, const PlanScout& massless, d
   if (scene.formulation.inertial()) return true;
   if (!masses_known(scene)) return false;
   const InertiaEstimate& estimate = massless.inertia();
-  return !std::isinf(estimate.of_jumps) && massless.inertia_share() >= tolerance;
+  return !std::isinf(estimate.of_jumps) &&
+         massless.inertia_share() >= std::max(tolerance, kMassesFelt);
 }
 
 /// A plan being made.
@@ -59,6 +60,10 @@ class Planning {
     tell("coarse runs of the network");
     PlanScout massless(scene_, request.measure, false);
     plan_.inertial = truth_has_masses(scene, massless, request.tolerance);
+    if (!plan_.inertial && masses_known(scene)) {
+      const double share = massless.inertia_share();
+      if (share > request.tolerance) plan_.masses_left_out = share;
+    }
     if (plan_.inertial) {
       scout_.emplace(scene_, request.measure, true);
     } else {

@@ -63,10 +63,17 @@ struct PlanChange {
 };
 inline constexpr double kMostChange = 16.0;
 
+/// From this part of the peak on (or the tolerance, if that is larger) what masses do is not left
+/// out, whatever formulation the scene has.
+inline constexpr double kMassesFelt = 0.05;
+
 struct Plan {
   std::string title;
   PlanRequest request;
   bool inertial = false;  ///< the reference has masses
+  /// Where it has none: what they would change by the linear network, in parts of the peak, if that
+  /// is above the tolerance.
+  std::optional<double> masses_left_out;
   bool by_depth = true;
   double duration_s = 0.0;
   std::size_t spheres = 0, bonds = 0;

@@ -45,7 +45,8 @@ class Survival {
       }
       const ModelClaim claim = model_.claim(changed, request_.budget);
       if (!(claim.error <= request_.tolerance)) return "tolerance: the claimed error leaves it";
-      if (!scout_.inertial() && masses_known() && changed.inertia_share() >= request_.tolerance) {
+      if (!scout_.inertial() && masses_known() &&
+          changed.inertia_share() >= std::max(request_.tolerance, kMassesFelt)) {
         return "inertia: masses begin to matter";
       }
       if (const auto reason =

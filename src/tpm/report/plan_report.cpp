@@ -150,6 +150,7 @@ Json plan_json(const Plan& plan) {
       plan.without_budget ? candidate_json(plan.candidates[*plan.without_budget]) : Json(nullptr);
   json["needs_full_model"] = plan.needs_full;
   json["masses_matter"] = plan.inertial;
+  json["masses_left_out"] = number(plan.masses_left_out);
   json["reference"] = {{"method", plan.reference.method},
                        {"judge", plan.reference.judge},
                        {"difference", rounded(plan.reference.difference, 2)},
@@ -189,6 +190,13 @@ std::string plan_text(const Plan& plan) {
     text += c.factor
                 ? fmt::format("  {} by {}: {}\n", c.change, significant(*c.factor, 3), c.breaks)
                 : fmt::format("  {}: nothing up to {} times\n", c.change, shortest(kMostChange));
+  }
+  if (plan.masses_left_out) {
+    text += fmt::format(
+        "WARNING: masses would change the answer by {} of the peak where the rate changes; scene "
+        "and "
+        "plan leave them out\n",
+        percent(*plan.masses_left_out));
   }
   for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
   return text;
