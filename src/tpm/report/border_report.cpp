@@ -58,6 +58,8 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
                     double damping) {
   Series predicted, measured;
   measured.kind = Series::Kind::points;
+  predicted.provenance = "model";
+  measured.provenance = "measured";
   predicted.label = delay == 0 ? "no delay" : fmt::format("delay {} periods", delay);
   measured.label = predicted.label;
   for (const BorderPoint& p : points) {
@@ -74,6 +76,7 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
 Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
   Series s;
   s.label = "Colgate-Schenkel 2b/T, all taut";
+  s.provenance = "model";
   for (const BorderPoint& p : points) {
     if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
     s.x.push_back(p.rate_Hz);
@@ -117,6 +120,8 @@ Figure rule_figure(const BorderStudy& study) {
        {ElementRule::exact, ElementRule::forward_euler, ElementRule::mass_spring}) {
     Series predicted, measured;
     measured.kind = Series::Kind::points;
+    predicted.provenance = "model";
+    measured.provenance = "measured";
     predicted.label = measured.label = std::string(word_of_rule(rule));
     for (const RulePoint& p : study.rules) {
       if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
