@@ -61,7 +61,7 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
   predicted.provenance = "model";
   measured.provenance = "measured";
   predicted.label = delay == 0 ? "no delay" : fmt::format("delay {} periods", delay);
-  measured.label = predicted.label;
+  measured.label = predicted.label + ", measured";
   for (const BorderPoint& p : points) {
     if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
     predicted.x.push_back(p.rate_Hz);
@@ -122,7 +122,8 @@ Figure rule_figure(const BorderStudy& study) {
     measured.kind = Series::Kind::points;
     predicted.provenance = "model";
     measured.provenance = "measured";
-    predicted.label = measured.label = std::string(word_of_rule(rule));
+    predicted.label = std::string(word_of_rule(rule));
+    measured.label = predicted.label + ", measured";
     for (const RulePoint& p : study.rules) {
       if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
       predicted.x.push_back(p.relaxation_time_s / kPeriod_s);
