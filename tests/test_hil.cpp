@@ -76,7 +76,7 @@ TEST_CASE("A session of the element verifies against the network, the closed for
   // the force of one encoder step.
   constexpr double kStep_N = 150.72 * 1e-5;
   CHECK(v.others[0].commanded.max_N < kStep_N);
-  CHECK(v.others[0].commanded.rms_N < 0.02 * kStep_N);
+  CHECK(v.others[0].commanded.rms_N < 0.05 * kStep_N);
   CHECK(v.others[1].commanded.max_N < 0.005 * v.all.peak_N);
   CHECK(v.phases.size() == recording.session.phases.size());
 }

@@ -150,6 +150,7 @@ DeviceAnswer Omega7::judged(int answer) noexcept {
 }
 
 DeviceAnswer Omega7::read(Eigen::Vector3d& position_m) noexcept {
+  if (cut_) return DeviceAnswer::failed;
   Eigen::Vector3d at;
   const DeviceAnswer answer = judged(call_.get_position(&at.x(), &at.y(), &at.z(), id_));
   if (answer != DeviceAnswer::failed) position_m = at;
@@ -157,10 +158,12 @@ DeviceAnswer Omega7::read(Eigen::Vector3d& position_m) noexcept {
 }
 
 DeviceAnswer Omega7::write(const Eigen::Vector3d& force_N) noexcept {
+  if (cut_) return DeviceAnswer::failed;  // never again, should the stuck thread come back
   return judged(call_.set_force(force_N.x(), force_N.y(), force_N.z(), id_));
 }
 
 DeviceStatus Omega7::status() noexcept {
+  if (cut_) return status_;
   int entries[kStatusRoom] = {};
   if (judged(call_.get_status(entries, id_)) != DeviceAnswer::failed) {
     const int cause = entries[kForcesOffEntry];
@@ -173,13 +176,14 @@ DeviceStatus Omega7::status() noexcept {
 void Omega7::stop() noexcept {
   if (!open_) return;
   open_ = false;
+  if (cut_) return;
   // Each call once, whatever it answers: an unplugged device answers errors for ever.
   if (prepared_) {
     (void)call_.set_force(0.0, 0.0, 0.0, id_);
     (void)call_.stop(id_);
     (void)call_.enable_force(0, id_);
   }
-  if (!cut_) (void)call_.close(id_);
+  (void)call_.close(id_);
 }
 
 void Omega7::cut_forces() noexcept {

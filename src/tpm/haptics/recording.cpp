@@ -54,7 +54,10 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
           {"simulated_device", !device.hardware},
           {"device", to_json(device)},
           {"time", real_time ? "real" : "virtual"},
-          {"model", {{"name", model.name}, {"error_bound", model.error_bound}}},
+          {"model",
+           {{"name", model.name},
+            {"error_bound", model.error_bound},
+            {"stiffness_at_once_N_per_m", model.stiffness_N_per_m}}},
           {"session", std::move(said)}};
 }
 

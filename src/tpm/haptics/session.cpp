@@ -107,6 +107,8 @@ HilSession parse_session(const Json& json, std::string_view where,
   const DocumentPlace place{std::string(where)};
   HilSession session;
   session.title = json.value("title", std::string("session"));
+  session.model =
+      json.at("model").at("kind") == "element" ? LoopModelKind::element : LoopModelKind::condensed;
   session.text = to_text(json);
   session.folder = folder;
   const Json& scene = json.at("model").at("scene");

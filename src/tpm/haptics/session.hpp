@@ -29,7 +29,10 @@ struct SessionPhase {
 };
 
 /// What is stepped in the loop.
-enum class LoopModelKind { element };
+enum class LoopModelKind {
+  element,    ///< the paper's star
+  condensed,  ///< a network seen from its contact sphere, reduced
+};
 
 /// A session as its file says.
 struct HilSession {
@@ -58,7 +61,8 @@ struct LoopModel {
   std::unique_ptr<ContactModel> model;
   Eigen::Vector3d push = Eigen::Vector3d::UnitZ();  ///< into the tissue, in its coordinates
   std::string name;                                 ///< for people
-  std::string error_bound;  ///< what is known of its distance from the reference, in words
+  std::string error_bound;         ///< what is known of its distance from the reference, in words
+  double stiffness_N_per_m = 0.0;  ///< at once, at rest, along the push
 };
 
 /// Throws Error(bad_input) if the scene is not one that the model can stand for.

@@ -1,8 +1,13 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/element_contact.hpp"
 #include "tpm/haptics/session.hpp"
-#include "tpm/scene/scene.hpp"
+#include "tpm/reduce/condensed.hpp"
+#include "tpm/scene/experiment_blocks.hpp"
 
 namespace tpm {
 namespace {
@@ -21,14 +26,55 @@ LoopModel element_model(const HilSession& session) {
   return loop;
 }
 
-}  // namespace
+/// As deep as the session goes, with some room for an operator that goes deeper.
+double deepest_m(const HilSession& session) {
+  constexpr double kRoom = 1.1, kUnderLoads_m = 0.010;  // to the limit of the paper's validity
+  double deepest = 0.0;
+  for (const SessionPhase& phase : session.phases) {
+    deepest = std::max(deepest, kRoom * phase.depth_m);
+    if (phase.kind == PhaseKind::load) deepest = std::max(deepest, kUnderLoads_m);
+  }
+  return deepest;
+}
 
-LoopModel make_loop_model(const HilSession& session) {
+LoopModel condensed_model(const HilSession& session) {
+  const Tissue tissue = parse_tissue(session.scene, kScenePlace, session.folder);
+  require_standing(tissue, kScenePlace);
+  const Probe probe =
+      parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{kScenePlace})
+          .front()
+          .probe;
+  CondensedOptions options;
+  options.depth_m = deepest_m(session);
+  options.period_s = session.servo.period_s;
+  LoopModel loop;
+  loop.model = std::make_unique<CondensedContact>(
+      build_condensed(tissue.bonds(), tissue.network.organ.position, tissue.freedom(), probe.sphere,
+                      probe.direction, options));
+  loop.push = probe.direction;
+  loop.name = fmt::format("condensed: {} spheres seen from sphere {}", tissue.network.organ.size(),
+                          probe.sphere + 1);
+  loop.error_bound = fmt::format("fitted to {} mm of depth; what tpm hil verify measures",
+                                 significant(1e3 * options.depth_m, 4));
+  return loop;
+}
+
+LoopModel model_of(const HilSession& session) {
   switch (session.model) {
     case LoopModelKind::element:
       return element_model(session);
+    case LoopModelKind::condensed:
+      break;
   }
-  throw bad_input("model", "has no known kind");
+  return condensed_model(session);
+}
+
+}  // namespace
+
+LoopModel make_loop_model(const HilSession& session) {
+  LoopModel loop = model_of(session);
+  loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
+  return loop;
 }
 
 }  // namespace tpm

@@ -58,8 +58,10 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
                     double damping) {
   Series predicted, measured;
   measured.kind = Series::Kind::points;
+  predicted.provenance = "model";
+  measured.provenance = "measured";
   predicted.label = delay == 0 ? "no delay" : fmt::format("delay {} periods", delay);
-  measured.label = predicted.label;
+  measured.label = predicted.label + ", measured";
   for (const BorderPoint& p : points) {
     if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
     predicted.x.push_back(p.rate_Hz);
@@ -74,6 +76,7 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
 Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
   Series s;
   s.label = "Colgate-Schenkel 2b/T, all taut";
+  s.provenance = "model";
   for (const BorderPoint& p : points) {
     if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
     s.x.push_back(p.rate_Hz);
@@ -117,7 +120,10 @@ Figure rule_figure(const BorderStudy& study) {
        {ElementRule::exact, ElementRule::forward_euler, ElementRule::mass_spring}) {
     Series predicted, measured;
     measured.kind = Series::Kind::points;
-    predicted.label = measured.label = std::string(word_of_rule(rule));
+    predicted.provenance = "model";
+    measured.provenance = "measured";
+    predicted.label = std::string(word_of_rule(rule));
+    measured.label = predicted.label + ", measured";
     for (const RulePoint& p : study.rules) {
       if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
       predicted.x.push_back(p.relaxation_time_s / kPeriod_s);

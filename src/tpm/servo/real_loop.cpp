@@ -132,6 +132,8 @@ bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
     }
     const std::int64_t since = s->busy_since_ns.load(std::memory_order_acquire);
     if (since != 0 && now_ns() - since > limit_ns) {
+      // Should the stuck call come back, its thread ends there.
+      s->wanted.store(StopCause::hang, std::memory_order_release);
       cut_forces_from_outside(s);
       stop_took_ns = now_ns() - since;
       return true;
