@@ -25,15 +25,16 @@ long allocations = 0;
 }  // namespace
 
 // NOLINTBEGIN: replaced for the whole program, which is the point
-void* operator new(std::size_t size) {
+// Not inlined, or g++ sees malloc meet delete.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   if (counting) ++allocations;
   if (void* memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept {
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
   std::free(memory);
 }
-void operator delete(void* memory, std::size_t) noexcept {
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
   std::free(memory);
 }
 // NOLINTEND

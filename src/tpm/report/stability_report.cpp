@@ -59,7 +59,7 @@ Table limits_table(const StabilityStudy& study) {
 }
 
 Table servo_table(const StabilityStudy& study, const std::string& problem) {
-  Table table{fmt::format("{}, the paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 100 mm/s and "
+  Table table{fmt::format("{}, the paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 90 mm/s and "
                           "held: largest force error at the servo ticks, of the peak.",
                           problem),
               {{"rate, Hz", true}},
