@@ -1,0 +1,61 @@
+// Sessions that are killed: nothing written is lost.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <thread>
+
+#include "hil_scenes.hpp"
+#include "temp_folder.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/haptics/recording.hpp"
+#include "tpm/haptics/verify.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+
+TEST_CASE("kill -9 at random moments: every recording opens and verifies up to the last second") {
+  const test::TempFolder folder;
+  write_file(folder / "session.json", test::short_session().dump());
+  int verified = 0;
+  Random random(0);
+  for (int i = 0; i < 100; ++i) {
+    const std::string file = folder / ("r" + std::to_string(i));
+    const pid_t child = fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+      (void)!freopen("/dev/null", "w", stdout);
+      (void)!freopen("/dev/null", "w", stderr);
+      execl(TPM_TEST_PROGRAM, "tpm", "hil", "run", (folder / "session.json").c_str(), "--time",
+            "real", "-o", file.c_str(), static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    std::this_thread::sleep_for(std::chrono::duration<double>(0.05 + 0.65 * random.uniform()));
+    const auto alive_until = std::filesystem::file_time_type::clock::now();
+    (void)kill(child, SIGKILL);
+    int status = 0;
+    (void)waitpid(child, &status, 0);
+    if (!std::filesystem::exists(file)) continue;  // killed before it began
+    const HilRecording recording = read_recording(file);
+    if (!WIFSIGNALED(status)) continue;  // stopped by itself before: the machine was stalled
+    CHECK_FALSE(recording.closed);
+    // What is missing is what the last 50 ms and a stall of the machine can hold.
+    const std::chrono::duration<double> unwritten =
+        alive_until - std::filesystem::last_write_time(file);
+    CHECK(unwritten.count() < 1.0);
+    if (recording.rows.size() < 2) continue;
+    VerifyOptions options;
+    options.window_s = 0.0;
+    const Verification v = verify(recording, options);
+    CHECK_FALSE(v.whole);
+    CHECK(v.end_s > 0.0);
+    ++verified;
+  }
+  CHECK(verified >= 30);
+}
+
+}  // namespace tpm
