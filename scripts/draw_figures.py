@@ -32,7 +32,8 @@ LEGEND_ROW, NOTE_ROW = 0.172, 0.16
 # Okabe and Ito's palette: told apart by people with any of the usual colour deficiencies.
 MODEL_COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
 DATA_COLOURS = ["#222222", "#8A5A00", "#5B2A86", "#666666"]
-DATA_MARKERS = ["o", "s", "D", "^"]
+# More markers than colours, so that the fifth series does not look like the first.
+DATA_MARKERS = ["o", "s", "D", "^", "v", "X", "P"]
 # Later lines are thinner: where curves coincide, all of them show.
 LINE_WIDTHS = [2.8, 1.8, 1.1, 0.8]
 
