@@ -24,7 +24,7 @@ if(TPM_SANITIZE)
 endif()
 
 # Headers that most files include are read once. With ccache: CCACHE_SLOPPINESS=pch_defines,time_macros.
-option(TPM_COMMON_HEADERS "Read common headers once, as precompiled headers" ON)
+option(TPM_COMMON_HEADERS "Read common headers once, as precompiled headers" OFF)
 function(tpm_common_headers target)
   if(TPM_COMMON_HEADERS)
     target_precompile_headers(${target} PRIVATE ${ARGN})
