@@ -171,8 +171,8 @@ const std::vector<double>& servo_rates_Hz() {
   return rates;
 }
 
-// 4 mm at 90 mm/s. At 100 mm/s the ramp is 96 times 2 tau: just below the limit forward Euler's error
-// changes sign 96 times and cancels, and nothing is left to grow.
+// 4 mm at 90 mm/s. At 100 mm/s the ramp is 96 times 2 tau: just below the limit forward Euler's
+// error changes sign 96 times and cancels, and nothing is left to grow.
 const double kServoRamp_s = 0.004 / 0.09;
 // Long enough for what grows by 1 % a step to be seen growing.
 const double kServoEnd_s = 1.0;
