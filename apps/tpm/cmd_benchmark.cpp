@@ -10,6 +10,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/benchmark_report.hpp"
 #include "tpm/report/draw.hpp"
+#include "tpm/store/writable.hpp"
 
 namespace tpm::app {
 namespace {
@@ -64,6 +65,7 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
   record.options.timing = !choice.no_timing;
   const std::vector<BenchmarkEntry> entries = chosen_benchmarks(choice.problems);
   const std::string python = find_drawing_python();  // before minutes of work, not after
+  require_writable_folder(choice.folder);
   std::map<std::string, double> seconds;
   for (const BenchmarkEntry& entry : entries) {
     const auto start = std::chrono::steady_clock::now();

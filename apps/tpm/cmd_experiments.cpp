@@ -8,6 +8,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/report/organ_study_report.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/writable.hpp"
 
 namespace tpm::app {
 namespace {
@@ -19,6 +20,7 @@ struct ExperimentsOptions {
 
 int experiments(const ExperimentsOptions& options, const Session& session) {
   const std::string python = find_drawing_python();  // before minutes of work, not after
+  require_writable_folder(options.folder);
   const std::filesystem::path path = options.config.empty()
                                          ? share_dir() / "configs" / "organ_experiments.json"
                                          : std::filesystem::path(options.config);

@@ -7,12 +7,14 @@
 #include "command.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/stability_report.hpp"
+#include "tpm/store/writable.hpp"
 
 namespace tpm::app {
 namespace {
 
 int stability(const std::string& folder, const Session& session) {
   const std::string python = find_drawing_python();  // before the work, not after
+  require_writable_folder(folder);
   const auto start = std::chrono::steady_clock::now();
   const StabilityStudy study = run_stability_study();
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;

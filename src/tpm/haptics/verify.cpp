@@ -142,6 +142,13 @@ void ask_others(Verification& v, const HilRecording& recording, const Motion& mo
 }
 
 /// Commanded force at the end of the ramp and of the hold, beside the readings of the same depth.
+/// The first row after a phase.
+std::vector<const ServoRecord*>::const_iterator after_phase(
+    const std::vector<const ServoRecord*>& rows, std::int32_t phase) {
+  return std::partition_point(rows.begin(), rows.end(),
+                              [phase](const ServoRecord* row) { return row->phase <= phase; });
+}
+
 void put_beside_experiment(Verification& v, const HilRecording& recording,
                            const std::vector<const ServoRecord*>& rows) {
   const PointSet readings = load_points("evren_relaxation");
@@ -149,15 +156,22 @@ void put_beside_experiment(Verification& v, const HilRecording& recording,
   for (std::size_t p = 0; p < phases.size(); ++p) {
     const bool ramp = phases[p].kind == PhaseKind::indent;
     if (!ramp && phases[p].kind != PhaseKind::hold) continue;
-    const auto past = std::partition_point(rows.begin(), rows.end(), [&](const ServoRecord* row) {
-      return row->phase <= static_cast<std::int32_t>(p);
-    });
-    if (past == rows.begin() || past == rows.end()) continue;  // cut off before its end
+    const auto first = after_phase(rows, static_cast<std::int32_t>(p) - 1);
+    // The operator lags behind what is shown: the peak may come when the hold has begun.
+    const bool held = ramp && p + 1 < phases.size() && phases[p + 1].kind == PhaseKind::hold;
+    const auto past = after_phase(rows, static_cast<std::int32_t>(held ? p + 1 : p));
+    if (past == first || past == rows.end()) continue;  // cut off before its end
+    double felt_N = recording.commanded_N(**(past - 1));
+    if (ramp) {
+      for (auto row = first; row != past; ++row) {
+        felt_N = std::max(felt_N, recording.commanded_N(**row));
+      }
+    }
     for (const Datum& datum : readings.data) {
       if (datum.label != (ramp ? "peak" : "end") || !datum.value || !datum.depth_m) continue;
       if (std::abs(*datum.depth_m - phases[p].depth_m) > 1e-9) continue;
-      v.experiment.push_back({phases[p].depth_m, phases[p].rate_m_per_s, datum.label, *datum.value,
-                              recording.commanded_N(**(past - 1))});
+      v.experiment.push_back(
+          {phases[p].depth_m, phases[p].rate_m_per_s, datum.label, *datum.value, felt_N});
     }
   }
 }
