@@ -30,3 +30,14 @@ function(tpm_common_headers target)
     target_precompile_headers(${target} PRIVATE ${ARGN})
   endif()
 endfunction()
+
+# Files of one target are compiled together, a handful at a time: most of the compiler's time goes
+# into headers that they share. So names in unnamed namespaces are unique within a floor.
+option(TPM_TOGETHER "Compile the files of one floor together (unity build)" OFF)
+function(tpm_compile_together target)
+  if(TPM_TOGETHER)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE BATCH UNITY_BUILD_BATCH_SIZE 8)
+  endif()
+endfunction()
+
+option(TPM_QUICK_TO_BUILD "Do not optimise what only reads, arranges and writes, nor the tests' own code" OFF)

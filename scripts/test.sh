@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Every check of the project, from a bare machine on: formatting, a build with warnings as errors,
-# the tests, clang-tidy on what changed, the fast tests under AddressSanitizer and
-# UndefinedBehaviorSanitizer. Stops at the first failure; ends with the closing lines of the tests.
+# the tests, clang-tidy on what changed, the fast tests once more with the floors of
+# TPM_SANITIZED_FLOORS (cmake/TpmFloors.cmake) under AddressSanitizer and UndefinedBehaviorSanitizer,
+# those with threads under ThreadSanitizer. Stops at the first failure; ends with the closing lines of
+# the tests. All floors, the program and the tests' own code under sanitizers: presets asan-ubsan, tsan.
 #
-#   TPM_THREAD_SANITIZER=1  also the tests with threads under ThreadSanitizer.
 #   TPM_TIDY_BASE=COMMIT  clang-tidy checks the sources changed since COMMIT; `all` checks all.
 #                         Default: since the merge base with origin's branch, or the last commit.
 set -euo pipefail
@@ -21,6 +22,11 @@ find_python numpy matplotlib scipy h5py
 step "formatting (clang-format)"
 git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror
 
+step "one name, one type"  # two types of one name link without a word and break at run time
+twice=$(git ls-files 'src/tpm/*.hpp' | xargs grep -hoE '^(struct|class|enum class) \w+( final)?( :.*)? ?\{' |
+        awk '{print $1 == "enum" ? $3 : $2}' | sort | uniq -d)
+[[ -z "$twice" ]] || die "src/tpm defines more than one type named: $twice; expected one of a name"
+
 step "building with warnings as errors (build/ci)"
 configure ci
 build ci
@@ -30,22 +36,11 @@ main_log=build/ctest-ci.log
 ctest --preset ci --parallel "$(nproc)" --no-tests=error | tee "$main_log"
 
 step "clang-tidy on $(tidy_scope)"
-tidy_changed build/ci
+configure tidy
+tidy_changed build/tidy
 
-step "building with AddressSanitizer and UndefinedBehaviorSanitizer (build/asan-ubsan)"
-configure asan-ubsan
-build asan-ubsan
-step "fast tests under both"
-ctest --preset asan-ubsan --parallel "$(nproc)" --no-tests=error | tail -n 4
-
-if [[ "${TPM_THREAD_SANITIZER:-0}" == 1 ]]; then
-  step "tests labelled 'threads' under ThreadSanitizer (build/tsan)"
-  configure tsan
-  build tsan
-  ctest --preset tsan --no-tests=error | tail -n 4
-else
-  step "ThreadSanitizer: left out; TPM_THREAD_SANITIZER=1 runs it on the tests labelled 'threads'"
-fi
+step "fast tests with sanitized floors, tests with threads under ThreadSanitizer"
+ctest --preset sanitized --parallel "$(nproc)" --no-tests=error | tail -n 4
 
 step "all checks passed; the tests of build/ci ended with:"
 sed -n '/% tests passed/,$p' "$main_log"

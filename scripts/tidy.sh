@@ -26,19 +26,26 @@ tidy_scope() {
 }
 
 # Of a changed header, one source that includes it is checked: the one of the same name, or else the
-# first that the build knows of.
+# first that includes it, or includes a header that does.
 source_that_includes() {
-  local header=$1 build=$2
+  local header=$1 written includer
   if [ -f "${header%.hpp}.cpp" ]; then
     echo "${header%.hpp}.cpp"
     return
   fi
-  ninja -C "$build" -t deps | awk -v header="/$header" '
-    /^[^ ].*: #deps/ { getline; first = $1 }
-    index($0, header) && substr($0, length($0) - length(header) + 1) == header { print first; exit }'
+  written=${header#src/}
+  written=${written#tests/}
+  written=${written#apps/tpm/}
+  includer=$(git grep -lF "#include \"$written\"" -- '*.cpp' ':!tests/consumer' ':!tests/measure' | head -n 1 || true)
+  if [ -n "$includer" ]; then
+    echo "$includer"
+    return
+  fi
+  includer=$(git grep -lF "#include \"$written\"" -- '*.hpp' | head -n 1 || true)
+  [ -z "$includer" ] || source_that_includes "$includer"
 }
 
-# tidy_changed BUILD_FOLDER
+# tidy_changed BUILD_FOLDER: the folder of a build that compiles each file alone
 tidy_changed() {
   local build=$1 base file
   base=$(tidy_base)
@@ -48,9 +55,9 @@ tidy_changed() {
     else
       git diff --name-only --diff-filter=d "$base" -- 'src/*.cpp' 'apps/*.cpp' 'tests/*.cpp'
       git diff --name-only --diff-filter=d "$base" -- 'src/*.hpp' 'apps/*.hpp' 'tests/*.hpp' |
-        while read -r file; do source_that_includes "$file" "$build"; done
+        while read -r file; do source_that_includes "$file"; done
     fi
-  } | sed -e "s|^$PWD/||" -e '/^tests\/consumer\//d' | sort -u |
+  } | sed -e "s|^$PWD/||" -e '/^tests\/consumer\//d' -e '/^apps\/peers\//d' | sort -u |
     xargs --no-run-if-empty --max-procs="$(nproc)" --max-args=1 \
       clang-tidy --quiet -p "$build" --extra-arg=-Wno-unknown-warning-option \
       2> >(grep -v 'warnings\? generated' >&2) ||

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "loaded_oscillator.hpp"
 #include "organ_scene.hpp"
 #include "star_network.hpp"
 #include "tpm/method/method.hpp"
@@ -52,36 +53,13 @@ inline Judged judged_element(std::string name, const TpmParameters& p, const Pro
   return {std::move(name), element_problem(p, protocol), std::move(times), std::move(truth)};
 }
 
-/// Without tension the sphere under a load is linear: x'' = (F - k x + g y)/m - drag x',
-/// y' = (x - y)/tau, from rest under a load F at once. The modes of its matrix are the solution.
-inline Eigen::VectorXd linear_motion(const TpmParameters& p, double mass_kg, double drag_per_s,
-                                     double load_N, std::span<const double> times) {
-  const double k = p.E2_Pa * p.modulus_to_stiffness_m();
-  const double g = p.relaxing_modulus_Pa() * p.modulus_to_stiffness_m();
-  Eigen::Matrix3d a;
-  a << 0, 1, 0, -k / mass_kg, -drag_per_s, g / mass_kg, 1 / p.relaxation_time_s(), 0,
-      -1 / p.relaxation_time_s();
-  const Eigen::EigenSolver<Eigen::Matrix3d> modes(a);
-  const double end = load_N / (k - g);
-  const Eigen::Vector3cd start =
-      modes.eigenvectors().partialPivLu().solve(Eigen::Vector3cd(-end, 0.0, -end));
-  Eigen::VectorXd depth(static_cast<Eigen::Index>(times.size()));
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    const Eigen::Vector3cd then =
-        modes.eigenvectors() *
-        ((modes.eigenvalues() * times[i]).array().exp() * start.array()).matrix();
-    depth[static_cast<Eigen::Index>(i)] = end + then[0].real();
-  }
-  return depth;
-}
-
 inline MethodMasses one_mass(double mass_kg, double drag_per_s) {
   return {Eigen::VectorXd::Constant(1, mass_kg), drag_per_s};
 }
 
 inline Judged judged_moving_element(const TpmParameters& p, double mass_kg, double drag_per_s,
                                     double load_N, std::vector<double> times) {
-  Eigen::VectorXd truth = linear_motion(p, mass_kg, drag_per_s, load_N, times);
+  Eigen::VectorXd truth = loaded_oscillator(p, mass_kg, drag_per_s, load_N, times);
   return {"element with mass",
           element_problem(p, creep(load_N, times.back()), one_mass(mass_kg, drag_per_s)),
           std::move(times), std::move(truth)};

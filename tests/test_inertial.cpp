@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <numbers>
 #include <numeric>
 
+#include "loaded_oscillator.hpp"
 #include "star_network.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
@@ -30,29 +30,6 @@ Inertial inertial_star(const Star& star, const InertialOptions& options) {
   return {star.bonds,    star.network.organ.position,         star.freedom,
           Star::probe(), Eigen::VectorXd::Constant(4, kMass), options};
 }
-
-/// The star's sphere under small loads: depth x, speed v and memory y of m x'' + c x' + k x - g y =
-/// F, tau y' = x - y.
-struct Oscillator {
-  Oscillator(const TpmParameters& p, double drag_per_s) {
-    const double scale = p.modulus_to_stiffness_m();
-    const double k = p.E2_Pa * scale;
-    const double g = p.relaxing_modulus_Pa() * scale;
-    const double tau = p.relaxation_time_s();
-    matrix << 0, 1, 0, -k / kMass, -drag_per_s, g / kMass, 1 / tau, 0, -1 / tau;
-  }
-  /// x after a load of F has acted for a time, from rest; by eigenvalues.
-  [[nodiscard]] double depth(double load, double time) const {
-    const Eigen::EigenSolver<Eigen::Matrix3d> solver(matrix);
-    const Eigen::Vector3d end = -matrix.lu().solve(Eigen::Vector3d(0, load / kMass, 0));
-    const Eigen::Vector3cd part =
-        solver.eigenvectors().lu().solve((-end).cast<std::complex<double>>());
-    Eigen::Vector3cd now = part;
-    for (int i = 0; i < 3; ++i) now[i] *= std::exp(solver.eigenvalues()[i] * time);
-    return end[0] + (solver.eigenvectors() * now)[0].real();
-  }
-  Eigen::Matrix3d matrix;
-};
 
 /// A block of two layers, its lower layer partly held, the contact in the middle of the upper one.
 struct Block {
@@ -132,17 +109,18 @@ TEST_CASE("a guided sphere under a small load follows the damped oscillator with
     options.tolerance = 1e-10;
     options.highest_order = 5;
     const Inertial inertial = inertial_star(star, options);
-    const Oscillator exact(p, 2.0 * 0.1 * inertial.lowest().angular_frequency());
+    const double drag_per_s = 2.0 * 0.1 * inertial.lowest().angular_frequency();
     // 1e-8 N: the tension of the lateral bonds, cubic in the depth, is below rounding.
     const double load = 1e-8;
     const auto times = even_times(0.5, 25);
     const InertialRun run = inertial.run(creep(load, 0.5), times);
     const double end = load / (p.relaxed_modulus_Pa() * p.modulus_to_stiffness_m());
+    const Eigen::VectorXd exact = loaded_oscillator(p, kMass, drag_per_s, load, times);
     CAPTURE(eta1, run.work.steps);
     for (std::size_t i = 0; i < times.size(); ++i) {
       CAPTURE(times[i]);
-      CHECK_THAT(run.response[static_cast<Eigen::Index>(i)],
-                 WithinAbs(exact.depth(load, times[i]), 2e-7 * end));
+      const auto at = static_cast<Eigen::Index>(i);
+      CHECK_THAT(run.response[at], WithinAbs(exact[at], 2e-7 * end));
     }
   }
 }

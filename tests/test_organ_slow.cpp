@@ -1,4 +1,4 @@
-// Large organs: 400,000 spheres, as a solid and as a shell.
+// Large organs: 150,000 spheres, as a solid and as a shell.
 #include <algorithm>
 #include <catch2/catch.hpp>
 
@@ -17,20 +17,20 @@ double least_distance(const Organ& organ) {
 
 }  // namespace
 
-TEST_CASE("a solid liver of 400,000 spheres") {
+TEST_CASE("a solid liver of 150,000 spheres") {
   const MeshSurface surface = liver_surface({});
   SolidRequest request;
-  request.count = 400'000;
+  request.count = 150'000;
   const Organ organ = fill_solid(surface, request);
-  CHECK(organ.size() == 400'000);
+  CHECK(organ.size() == 150'000);
   CHECK(least_distance(organ) > 0.6);
 }
 
-TEST_CASE("a shell of 400,000 spheres in two layers") {
+TEST_CASE("a shell of 150,000 spheres in two layers") {
   LiverRequest request;
-  request.count = 400'000;
+  request.count = 150'000;
   request.spacing.reset();
   const Organ organ = fill_liver(request);
-  CHECK(organ.size() == 400'000);
+  CHECK(organ.size() == 150'000);
   CHECK(least_distance(organ) > 0.6);
 }

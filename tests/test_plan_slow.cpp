@@ -1,4 +1,5 @@
 // Plans of the paper's liver, and of random scenes.
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "random_plan_scene.hpp"
@@ -27,9 +28,9 @@ TEST_CASE("a shallow push of the paper's liver at 1 kHz") {
   CHECK(plan.changes[0].factor);  // deeper is not linear
 }
 
-TEST_CASE("twenty random scenes keep their claims") {
+TEST_CASE("ten random scenes keep their claims") {
   int claims = 0, violated = 0;
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 10; ++i) {
     const test::RandomPlan random(1, i);
     CAPTURE(i, random.words());
     Plan plan;
@@ -46,6 +47,6 @@ TEST_CASE("twenty random scenes keep their claims") {
     }
     if (plan.choice) CHECK(*plan.chosen().verified_error <= plan.request.tolerance);
   }
-  CHECK(claims > 100);
-  CHECK(violated <= claims / 50);
+  CHECK(claims > 50);
+  CHECK(violated <= std::max(1, claims / 50));
 }

@@ -10,7 +10,7 @@
 namespace tpm {
 namespace {
 
-const ImportedColumn* find(const ImportedSeries& series, Quantity quantity) {
+const ImportedColumn* column_of(const ImportedSeries& series, Quantity quantity) {
   const auto found =
       std::find_if(series.columns.begin(), series.columns.end(), [quantity](const auto& column) {
         return column.quantity == quantity && column.bound == Bound::value;
@@ -31,7 +31,7 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
     series.findings.push_back({"contact", "not searched for; time and depth as in the file"});
     return;
   }
-  const ImportedColumn* force = find(series, Quantity::contact_force);
+  const ImportedColumn* force = column_of(series, Quantity::contact_force);
   if (force == nullptr)
     throw bad_input(file, "has no force to find contact with", "a force column");
   const double threshold = *options.contact_force_N / force->unit.to_si;

@@ -37,7 +37,7 @@ HilSession idle_session(double rate_Hz, double duration_s) {
   session.servo.most_late = 1001;
   session.servo.most_missed = 1'000'000;
   session.plant.period_s = session.servo.period_s;
-  session.phases = {{PhaseKind::rest, "communication test", duration_s, 0.0, 0.0, 0.0, 0.0}};
+  session.phases = {{SessionPhaseKind::rest, "communication test", duration_s, 0.0, 0.0, 0.0, 0.0}};
   session.preparation.watchdog_s = 0.016;
   return session;
 }

@@ -71,21 +71,21 @@ std::vector<std::uint64_t> ends_of(const std::vector<SessionPhase>& phases, doub
 
 }  // namespace
 
-std::string_view word_of(PhaseKind kind) {
+std::string_view word_of(SessionPhaseKind kind) {
   switch (kind) {
-    case PhaseKind::approach:
+    case SessionPhaseKind::approach:
       return "approach";
-    case PhaseKind::indent:
+    case SessionPhaseKind::indent:
       return "indent";
-    case PhaseKind::hold:
+    case SessionPhaseKind::hold:
       return "hold";
-    case PhaseKind::release:
+    case SessionPhaseKind::release:
       return "release";
-    case PhaseKind::rest:
+    case SessionPhaseKind::rest:
       return "rest";
-    case PhaseKind::load:
+    case SessionPhaseKind::load:
       return "load";
-    case PhaseKind::creep:
+    case SessionPhaseKind::creep:
       break;
   }
   return "creep";
@@ -94,7 +94,8 @@ std::string_view word_of(PhaseKind kind) {
 OperatorScript HilSession::operator_script() const {
   std::vector<OperatorPiece> pieces;
   for (const SessionPhase& phase : phases) {
-    const bool pushes = phase.kind == PhaseKind::load || phase.kind == PhaseKind::creep;
+    const bool pushes =
+        phase.kind == SessionPhaseKind::load || phase.kind == SessionPhaseKind::creep;
     pieces.push_back({pushes ? OperatorPiece::Aim::force : OperatorPiece::Aim::place, phase.end_s,
                       phase.from, phase.to});
   }

@@ -14,13 +14,13 @@
 namespace tpm {
 
 /// A stretch of a session.
-enum class PhaseKind { approach, indent, hold, release, rest, load, creep };
+enum class SessionPhaseKind { approach, indent, hold, release, rest, load, creep };
 
-[[nodiscard]] std::string_view word_of(PhaseKind kind);
+[[nodiscard]] std::string_view word_of(SessionPhaseKind kind);
 
 /// What the operator is asked to do, and for how long.
 struct SessionPhase {
-  PhaseKind kind = PhaseKind::approach;
+  SessionPhaseKind kind = SessionPhaseKind::approach;
   std::string name;             ///< "indent to 4 mm at 2 mm/s"
   double end_s = 0.0;           ///< begins where the one before ends
   double from = 0.0, to = 0.0;  ///< depth, m; of `load` and `creep` the push, N

@@ -32,7 +32,7 @@ double deepest_m(const HilSession& session) {
   double deepest = 0.0;
   for (const SessionPhase& phase : session.phases) {
     deepest = std::max(deepest, kRoom * phase.depth_m);
-    if (phase.kind == PhaseKind::load) deepest = std::max(deepest, kUnderLoads_m);
+    if (phase.kind == SessionPhaseKind::load) deepest = std::max(deepest, kUnderLoads_m);
   }
   return deepest;
 }

@@ -17,7 +17,7 @@ constexpr double kLongest_s = 12.0 * 3600.0;
 /// Puts phases behind each other.
 class PhaseList {
  public:
-  void add(PhaseKind kind, std::string name, double length_s, double from, double to) {
+  void add(SessionPhaseKind kind, std::string name, double length_s, double from, double to) {
     time_s_ += length_s;
     phases_.push_back({kind, std::move(name), time_s_, from, to, depth_m, rate_m_per_s});
   }
@@ -46,7 +46,7 @@ double rest_of(const Json& block, const DocumentPlace& place) {
 }
 
 void add_approach(PhaseList& list) {
-  list.add(PhaseKind::approach, "approach", kApproach_s, -kClearance_m, 0.0);
+  list.add(SessionPhaseKind::approach, "approach", kApproach_s, -kClearance_m, 0.0);
 }
 
 void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& place) {
@@ -58,13 +58,13 @@ void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& p
       list.depth_m = depth;
       list.rate_m_per_s = rate;
       add_approach(list);
-      list.add(PhaseKind::indent, fmt::format("indent to {} mm at {} mm/s", mm, speed),
+      list.add(SessionPhaseKind::indent, fmt::format("indent to {} mm at {} mm/s", mm, speed),
                depth / rate, 0.0, depth);
-      list.add(PhaseKind::hold, fmt::format("hold {} mm after {} mm/s", mm, speed), hold, depth,
-               depth);
-      list.add(PhaseKind::release, fmt::format("release from {} mm at {} mm/s", mm, speed),
+      list.add(SessionPhaseKind::hold, fmt::format("hold {} mm after {} mm/s", mm, speed), hold,
+               depth, depth);
+      list.add(SessionPhaseKind::release, fmt::format("release from {} mm at {} mm/s", mm, speed),
                (depth + kClearance_m) / rate, depth, -kClearance_m);
-      list.add(PhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+      list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
     }
   }
   list.depth_m = list.rate_m_per_s = 0.0;
@@ -76,9 +76,9 @@ void add_creep(PhaseList& list, const Json& block, const DocumentPlace& place) {
   for (const double load : positive_list(block, "loads", Dimension::force, place)) {
     const std::string newton = significant(load, 4);
     add_approach(list);
-    list.add(PhaseKind::load, fmt::format("load to {} N", newton), kLoading_s, 0.0, load);
-    list.add(PhaseKind::creep, fmt::format("creep under {} N", newton), hold, load, load);
-    list.add(PhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+    list.add(SessionPhaseKind::load, fmt::format("load to {} N", newton), kLoading_s, 0.0, load);
+    list.add(SessionPhaseKind::creep, fmt::format("creep under {} N", newton), hold, load, load);
+    list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
   }
 }
 

@@ -82,7 +82,8 @@ std::vector<std::size_t> compared_rows(const HilRecording& recording, std::size_
 
 /// Depth asked for at a time of a phase; none in phases that ask for a push.
 std::optional<double> asked_depth_m(const SessionPhase& phase, double start_s, double time_s) {
-  if (phase.kind == PhaseKind::load || phase.kind == PhaseKind::creep) return std::nullopt;
+  if (phase.kind == SessionPhaseKind::load || phase.kind == SessionPhaseKind::creep)
+    return std::nullopt;
   const double part = (time_s - start_s) / (phase.end_s - start_s);
   return phase.from + std::clamp(part, 0.0, 1.0) * (phase.to - phase.from);
 }
@@ -154,11 +155,11 @@ void put_beside_experiment(Verification& v, const HilRecording& recording,
   const PointSet readings = load_points("evren_relaxation");
   const std::vector<SessionPhase>& phases = recording.session.phases;
   for (std::size_t p = 0; p < phases.size(); ++p) {
-    const bool ramp = phases[p].kind == PhaseKind::indent;
-    if (!ramp && phases[p].kind != PhaseKind::hold) continue;
+    const bool ramp = phases[p].kind == SessionPhaseKind::indent;
+    if (!ramp && phases[p].kind != SessionPhaseKind::hold) continue;
     const auto first = after_phase(rows, static_cast<std::int32_t>(p) - 1);
     // The operator lags behind what is shown: the peak may come when the hold has begun.
-    const bool held = ramp && p + 1 < phases.size() && phases[p + 1].kind == PhaseKind::hold;
+    const bool held = ramp && p + 1 < phases.size() && phases[p + 1].kind == SessionPhaseKind::hold;
     const auto past = after_phase(rows, static_cast<std::int32_t>(held ? p + 1 : p));
     if (past == first || past == rows.end()) continue;  // cut off before its end
     double felt_N = recording.commanded_N(**(past - 1));

@@ -13,7 +13,6 @@ namespace {
 
 using sundials::check;
 using Vector = Eigen::VectorXd;
-constexpr auto kDone = MethodEnd::completed;
 constexpr long kMostSteps = std::numeric_limits<long>::max();
 
 Eigen::Map<Vector> view(N_Vector v) {
@@ -31,8 +30,8 @@ struct FreeIda {
 struct Side {
   StepSystem& system;
   long most_rates;
-  MethodEnd last = kDone;  ///< the latest failure of the problem itself
-  double at_s = 0.0;       ///< its time
+  MethodEnd last = MethodEnd::completed;  ///< the latest failure of the problem itself
+  double at_s = 0.0;                      ///< its time
   bool exhausted = false;
   double gamma = 0.0;  ///< of IDA's matrix with masses
 
@@ -41,8 +40,8 @@ struct Side {
     at_s = time_s;
     exhausted = system.work().rates > most_rates;
     if (exhausted) return -1;
-    if (end != kDone) last = end;
-    return end == kDone ? 0 : 1;
+    if (end != MethodEnd::completed) last = end;
+    return end == MethodEnd::completed ? 0 : 1;
   }
 };
 
@@ -53,7 +52,7 @@ Side& side(void* user_data) {
 /// How a run ended whose integrator gave up.
 MethodEnd end_of(const Side& side, bool newton) {
   if (side.exhausted) return MethodEnd::too_much_work;
-  if (side.last != kDone) return side.last;
+  if (side.last != MethodEnd::completed) return side.last;
   return newton ? MethodEnd::newton_failed : MethodEnd::diverged;
 }
 
@@ -61,7 +60,8 @@ extern "C" {
 int method_rate(sunrealtype t, N_Vector z, N_Vector z_dot, void* user_data) {
   auto rate = view(z_dot);
   const MethodEnd end = side(user_data).system.rate(t, view(z), rate);
-  return side(user_data).answer(end == kDone && !rate.allFinite() ? MethodEnd::diverged : end, t);
+  return side(user_data).answer(
+      end == MethodEnd::completed && !rate.allFinite() ? MethodEnd::diverged : end, t);
 }
 
 int method_setup(sunrealtype t, N_Vector z, N_Vector, SUNMatrix, sunbooleantype,
@@ -159,19 +159,19 @@ class CvodeRule final : public AdaptiveRule {
     view(state_.get()) = state;
     check(CVodeReInit(memory_.get(), time_s, state_.get()), "CVodeReInit");
     check(CVodeSetStopTime(memory_.get(), stop_s), "CVodeSetStopTime");
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd advance_to(double time_s, Vector& state) override {
     double reached = 0.0;
-    side_.last = kDone;
+    side_.last = MethodEnd::completed;
     const int flag = CVode(memory_.get(), time_s, state_.get(), &reached, CV_NORMAL);
     if (flag < 0) {
       given_up_ = {side_.at_s, sundials::flag_name(flag)};
       return end_of(side_, flag == CV_CONV_FAILURE);
     }
     state = view(state_.get());
-    return kDone;
+    return MethodEnd::completed;
   }
 
   [[nodiscard]] GivenUp given_up() const override { return given_up_; }
@@ -249,25 +249,26 @@ class IdaRule final : public AdaptiveRule {
     auto z = view(state_.get());
     auto z_dot = view(rate_.get());
     Vector rate(state.size());
-    if (const auto end = system.rate(time_s, state, rate); end != kDone) return end;
+    if (const auto end = system.rate(time_s, state, rate); end != MethodEnd::completed) return end;
     z.tail(state.size()) = state;
     z_dot.tail(state.size()) = rate;
     if (places_ > 0) {
       z.head(places_) = system.placed();
       Vector moving;
-      if (const auto end = place_rate(time_s, stop_s, state, rate, moving); end != kDone) {
+      if (const auto end = place_rate(time_s, stop_s, state, rate, moving);
+          end != MethodEnd::completed) {
         return end;
       }
       z_dot.head(places_) = moving;
     }
     check(IDAReInit(memory_.get(), time_s, state_.get(), rate_.get()), "IDAReInit");
     check(IDASetStopTime(memory_.get(), stop_s), "IDASetStopTime");
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd advance_to(double time_s, Vector& state) override {
     double reached = 0.0;
-    side_.last = kDone;
+    side_.last = MethodEnd::completed;
     const int flag =
         IDASolve(memory_.get(), time_s, &reached, state_.get(), rate_.get(), IDA_NORMAL);
     if (flag < 0) {
@@ -277,7 +278,7 @@ class IdaRule final : public AdaptiveRule {
       return end_of(side_, flag == IDA_CONV_FAIL);
     }
     state = view(state_.get()).tail(state.size());
-    return kDone;
+    return MethodEnd::completed;
   }
 
   [[nodiscard]] GivenUp given_up() const override { return given_up_; }
@@ -328,7 +329,7 @@ extern "C" {
 int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* user_data) {
   StepSystem& system = side(user_data).system;
   auto left = view(r);
-  MethodEnd end = kDone;
+  MethodEnd end = MethodEnd::completed;
   if (system.coordinates() > 0) {
     end = system.rate(t, view(z), left);
     left = view(z_dot) - left;
@@ -341,7 +342,8 @@ int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* us
     left.tail(m) =
         view(z_dot).tail(m) - (elongation - view(z).tail(m)) / system.relaxation_time_s();
   }
-  return side(user_data).answer(end == kDone && !left.allFinite() ? MethodEnd::diverged : end, t);
+  return side(user_data).answer(
+      end == MethodEnd::completed && !left.allFinite() ? MethodEnd::diverged : end, t);
 }
 
 int dae_setup(sunrealtype t, sunrealtype c, N_Vector z, N_Vector, N_Vector, SUNMatrix,

@@ -9,8 +9,7 @@
 namespace tpm {
 namespace {
 
-constexpr auto kDone = MethodEnd::completed;
-constexpr double kGrain = 4.0 * std::numeric_limits<double>::epsilon();
+constexpr double kDepthGrain = 4.0 * std::numeric_limits<double>::epsilon();
 
 /// The force of the element along its normal, k e - g y + tension(e), N, where y = offset +
 /// following e.
@@ -73,19 +72,20 @@ class ElementSystem final : public StepSystem {
   MethodEnd start(const Knot& first, bool relaxed, Vector& state) override {
     state.setZero(size());
     e_ = 0.0;
-    if (!relaxed) return kDone;
+    if (!relaxed) return MethodEnd::completed;
     e_ = first.value;
     if (!depth_driven_) {
-      if (const auto end = balance(first.value, 0.0, 1.0, {}, e_); end != kDone) return end;
+      if (const auto end = balance(first.value, 0.0, 1.0, {}, e_); end != MethodEnd::completed)
+        return end;
     }
     if (moves_) state[0] = e_;
     state[size() - 1] = e_;
     known_ = {first.value, e_};
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd jump(double imposed, const ConstVector& state) override {
-    return moves_ ? kDone : place_at(imposed, state[0]);
+    return moves_ ? MethodEnd::completed : place_at(imposed, state[0]);
   }
 
   MethodEnd rate(double t, const ConstVector& state, Eigen::Ref<Vector> rate) override {
@@ -99,11 +99,11 @@ class ElementSystem final : public StepSystem {
     rate[0] = state[1];
     rate[1] = (imposed(t) - law_.force(state[0], state[2], 0.0)) / mass_ - drag_ * state[1];
     rate[2] = (state[0] - state[2]) / tau_;
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd elongations(double t, const ConstVector& state, Vector& elongation) override {
-    const MethodEnd end = moves_ ? kDone : place_at(imposed(t), state[0]);
+    const MethodEnd end = moves_ ? MethodEnd::completed : place_at(imposed(t), state[0]);
     elongation.setConstant(1, moves_ ? state[0] : e_);
     return end;
   }
@@ -115,28 +115,29 @@ class ElementSystem final : public StepSystem {
         ++work().rates;
         e_ = imposed(t);
       } else if (const auto end = balance(imposed(t), offset, stage.following, {}, e_);
-                 end != kDone) {
+                 end != MethodEnd::completed) {
         return end;
       }
       state[0] = offset + stage.following * e_;
       known_ = {imposed(t), state[0]};
-      return kDone;
+      return MethodEnd::completed;
     }
     const double held = 1.0 + stage.c * drag_;
     const Drawn inertia{mass_ * held / (stage.c * stage.c),
                         stage.known[0] + stage.c * stage.known[1] / held};
     double e = state[0];
-    if (const auto end = balance(imposed(t), offset, stage.following, inertia, e); end != kDone) {
+    if (const auto end = balance(imposed(t), offset, stage.following, inertia, e);
+        end != MethodEnd::completed) {
       return end;
     }
     state << e, (e - stage.known[0]) / stage.c, offset + stage.following * e;
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd response(double t, const ConstVector& state, double& response) override {
     if (moves_) {
       response = state[0];
-      return kDone;
+      return MethodEnd::completed;
     }
     const MethodEnd end = place_at(imposed(t), state[0]);
     response = depth_driven_ ? law_.force(e_, state[0], 0.0) + drag_ * mass_ * imposed_rate() : e_;
@@ -151,7 +152,7 @@ class ElementSystem final : public StepSystem {
     double force = 0.0;   // of the constraint
     double e = 0.0;
     if (moves_) {
-      if (h == 0.0) return kDone;
+      if (h == 0.0) return MethodEnd::completed;
       const double held = 1.0 + h * drag_;
       weight = h * h / (mass_ * held);
       e = state[0] + h * state[1] / held + weight * imposed(t);
@@ -176,17 +177,17 @@ class ElementSystem final : public StepSystem {
     if (moves_) {
       const double speed = (e - state[0]) / h;
       state << e, speed, offset + following * e;
-      return kDone;
+      return MethodEnd::completed;
     }
     e_ = e;
     state[0] = offset + following * e;
     known_ = {imposed(t), state[0]};
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd factorise(double t, const ConstVector& state, double gamma) override {
     if (!moves_) {
-      if (const auto end = place_at(imposed(t), state[0]); end != kDone) return end;
+      if (const auto end = place_at(imposed(t), state[0]); end != MethodEnd::completed) return end;
       const Vector place = Vector::Constant(places(), e_);
       return factorise_pair(t, place, state, 1.0 / gamma);
     }
@@ -194,7 +195,7 @@ class ElementSystem final : public StepSystem {
     gamma_ = gamma;
     following_ = gamma / tau_ / (1.0 + gamma / tau_);
     pivot_ = mass_ * (1.0 + gamma * drag_) + gamma * gamma * law_.slope(state[0], following_);
-    return pivot_ != 0.0 ? kDone : MethodEnd::newton_failed;
+    return pivot_ != 0.0 ? MethodEnd::completed : MethodEnd::newton_failed;
   }
 
   void solve(Eigen::Ref<Vector> x) override {
@@ -232,7 +233,7 @@ class ElementSystem final : public StepSystem {
     per_y_ = per_y;
     const double following = 1.0 / (1.0 + per_y * tau_);
     pivot_ = depth_driven_ ? 1.0 : law_.slope(place[0], following);
-    return pivot_ != 0.0 ? kDone : MethodEnd::newton_failed;
+    return pivot_ != 0.0 ? MethodEnd::completed : MethodEnd::newton_failed;
   }
 
   void solve_pair(Eigen::Ref<Vector> place, Eigen::Ref<Vector> y) override {
@@ -283,9 +284,9 @@ class ElementSystem final : public StepSystem {
       const double step = slope > 0.0 ? left / slope : std::copysign(depth_scale_, left);
       if (!std::isfinite(step)) return MethodEnd::newton_failed;
       e -= step;
-      if (std::abs(step) <= kGrain * std::max(std::abs(e), 1e-3 * depth_scale_)) {
+      if (std::abs(step) <= kDepthGrain * std::max(std::abs(e), 1e-3 * depth_scale_)) {
         at = e;
-        return kDone;
+        return MethodEnd::completed;
       }
     }
     return MethodEnd::newton_failed;
@@ -296,14 +297,14 @@ class ElementSystem final : public StepSystem {
     // What is imposed at one time may have been found in two ways.
     constexpr double kRounding = 1e-13;
     const bool same = std::abs(known_.imposed - imposed) <= kRounding * peak_;
-    if (same && known_.y == y) return kDone;
+    if (same && known_.y == y) return MethodEnd::completed;
     if (depth_driven_) {
       e_ = imposed;
-    } else if (const auto end = balance(imposed, y, 0.0, {}, e_); end != kDone) {
+    } else if (const auto end = balance(imposed, y, 0.0, {}, e_); end != MethodEnd::completed) {
       return end;
     }
     known_ = {imposed, y};
-    return kDone;
+    return MethodEnd::completed;
   }
 
   ElementForce law_;

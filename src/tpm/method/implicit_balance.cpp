@@ -10,7 +10,7 @@ constexpr int kMostNewtonSteps = 60;
 constexpr int kMostHalvings = 30;
 constexpr double kShareOfDepth = 1e-12;
 constexpr double kNear = 1e-5;  // of the depth: Newton's steps are not checked any more
-constexpr double kGrain = 8.0 * std::numeric_limits<double>::epsilon();
+constexpr double kForceGrain = 8.0 * std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
@@ -42,7 +42,7 @@ double ImplicitBalance::tolerance_N(const Positions& position, double depth_m,
                                     const SphereAnchors* anchors) const {
   double stiffness = stiffest_;
   if (anchors != nullptr) stiffness += anchors->stiffness.maxCoeff();
-  return stiffness * (kShareOfDepth * depth_m + kGrain * position.cwiseAbs().maxCoeff());
+  return stiffness * (kShareOfDepth * depth_m + kForceGrain * position.cwiseAbs().maxCoeff());
 }
 
 bool ImplicitBalance::factorise_matrix(const Positions& position, const BondMemory& memory,

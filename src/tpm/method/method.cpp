@@ -15,7 +15,6 @@ namespace tpm {
 namespace {
 
 using Vector = Eigen::VectorXd;
-constexpr auto kDone = MethodEnd::completed;
 constexpr double kDivergedTimes = 1e3;  // what is to be expected
 constexpr double kSameTime = 1e-9;      // of a step
 constexpr double kBeyondReach = 3.0;    // of what is to be expected: no balance leads there
@@ -79,7 +78,7 @@ class MethodDriver {
     run_.end_time_s = time_s_;
     run_.work = system_.work();
     run_.work.steps = steps();
-    if (end != kDone) {
+    if (end != MethodEnd::completed) {
       run_.reason = fmt::format("at t = {} s: {}", significant(time_s_, 5), words(end));
       const std::string more = detail();
       if (!more.empty()) run_.reason += " (" + more + ")";
@@ -99,10 +98,11 @@ class MethodDriver {
 
   [[nodiscard]] MethodEnd answer(double time_s, const Vector& state) {
     double response = 0.0;
-    if (const auto end = system_.response(time_s, state, response); end != kDone) return end;
+    if (const auto end = system_.response(time_s, state, response); end != MethodEnd::completed)
+      return end;
     if (!std::isfinite(response)) return MethodEnd::diverged;
     run_.response[static_cast<Eigen::Index>(next_++)] = response;
-    return kDone;
+    return MethodEnd::completed;
   }
 
   [[nodiscard]] MethodEnd judge(const Vector& state) const {
@@ -110,7 +110,8 @@ class MethodDriver {
     if (!(state.cwiseAbs().array() <= bound_.array()).all() || !state.allFinite()) {
       return MethodEnd::diverged;
     }
-    return system_.work().rates > settings_.most_rates ? MethodEnd::too_much_work : kDone;
+    return system_.work().rates > settings_.most_rates ? MethodEnd::too_much_work
+                                                       : MethodEnd::completed;
   }
 
   /// Forces that cannot be balanced because a memory has run away are not the tissue's failure.
@@ -131,16 +132,17 @@ class MethodDriver {
     const Knot& first = knots_.front();
     system_.set_piece({first.time_s, 0.0}, {first.time_s + 1.0, 0.0});
     const bool relaxed = protocol_.relaxed_at_start();
-    if (const auto end = system_.start(first, relaxed, state_); end != kDone) return end;
+    if (const auto end = system_.start(first, relaxed, state_); end != MethodEnd::completed)
+      return end;
     if (first.value != 0.0) {
       stand_at(first);
-      const MethodEnd end = relaxed ? kDone : jump();
-      if (end != kDone) return end;
+      const MethodEnd end = relaxed ? MethodEnd::completed : jump();
+      if (end != MethodEnd::completed) return end;
     }
     for (std::size_t k = 0; k + 1 < knots_.size() && !all_answered(); ++k) {
       const Knot& from = knots_[k];
       const Knot& to = knots_[k + 1];
-      MethodEnd end = kDone;
+      MethodEnd end = MethodEnd::completed;
       if (from.time_s < to.time_s) {
         system_.set_piece(from, to);
         end = cross(from, to);
@@ -148,13 +150,14 @@ class MethodDriver {
         stand_at(to);
         end = jump();
       }
-      if (end != kDone) return end;
+      if (end != MethodEnd::completed) return end;
     }
     if (knots_.size() == 1) stand_at(first);
     while (!all_answered()) {
-      if (const auto end = answer(knots_.back().time_s, state_); end != kDone) return end;
+      if (const auto end = answer(knots_.back().time_s, state_); end != MethodEnd::completed)
+        return end;
     }
-    return kDone;
+    return MethodEnd::completed;
   }
 
   void stand_at(const Knot& knot) { system_.set_piece(knot, {knot.time_s + 1.0, knot.value}); }
@@ -187,20 +190,20 @@ class FixedDriver final : public MethodDriver {
       time_s_ = from.time_s + length * (i / count);
       const bool last = i + 1.0 == count;
       const double until = last ? to.time_s : from.time_s + length * ((i + 1.0) / count);
-      if (const auto end = answer_before(until, h); end != kDone) return end;
-      if (all_answered()) return kDone;
-      if (const auto end = rule_->step(system_, time_s_, h, state_); end != kDone) {
+      if (const auto end = answer_before(until, h); end != MethodEnd::completed) return end;
+      if (all_answered()) return MethodEnd::completed;
+      if (const auto end = rule_->step(system_, time_s_, h, state_); end != MethodEnd::completed) {
         return cause(end, state_);
       }
       ++steps_;
-      if (const auto end = judge(state_); end != kDone) return end;
+      if (const auto end = judge(state_); end != MethodEnd::completed) return end;
       time_s_ = until;
     }
     // Just before a jump at the end.
     while (!all_answered() && asked_s() < to.time_s) {
-      if (const auto end = answer(to.time_s, state_); end != kDone) return end;
+      if (const auto end = answer(to.time_s, state_); end != MethodEnd::completed) return end;
     }
-    return kDone;
+    return MethodEnd::completed;
   }
 
   /// Answers what is asked for from here to the end of the step, that end left out.
@@ -208,20 +211,21 @@ class FixedDriver final : public MethodDriver {
     while (!all_answered() && asked_s() < until_s - kSameTime * h) {
       const double part = asked_s() - time_s_;
       if (part <= kSameTime * h) {
-        if (const auto end = answer(time_s_, state_); end != kDone) return end;
+        if (const auto end = answer(time_s_, state_); end != MethodEnd::completed) return end;
         continue;
       }
       Vector there = state_;
       const StepSystem::Place place = system_.place();
-      if (const auto end = rule_->step(system_, time_s_, part, there); end != kDone) {
+      if (const auto end = rule_->step(system_, time_s_, part, there);
+          end != MethodEnd::completed) {
         return cause(end, there);
       }
       ++steps_;
-      if (const auto end = judge(there); end != kDone) return end;
-      if (const auto end = answer(time_s_ + part, there); end != kDone) return end;
+      if (const auto end = judge(there); end != MethodEnd::completed) return end;
+      if (const auto end = answer(time_s_ + part, there); end != MethodEnd::completed) return end;
       system_.set_place(place);
     }
-    return kDone;
+    return MethodEnd::completed;
   }
 
   [[nodiscard]] long steps() const override { return steps_; }
@@ -242,21 +246,23 @@ class AdaptiveDriver final : public MethodDriver {
   MethodEnd cross(const Knot& from, const Knot& to) override {
     time_s_ = from.time_s;
     while (!all_answered() && asked_s() <= from.time_s) {
-      if (const auto end = answer(from.time_s, state_); end != kDone) return end;
+      if (const auto end = answer(from.time_s, state_); end != MethodEnd::completed) return end;
     }
-    if (all_answered()) return kDone;
-    if (const auto end = rule_->restart(from.time_s, to.time_s, state_); end != kDone) return end;
+    if (all_answered()) return MethodEnd::completed;
+    if (const auto end = rule_->restart(from.time_s, to.time_s, state_);
+        end != MethodEnd::completed)
+      return end;
     while (!all_answered() && asked_s() < to.time_s) {
-      if (const auto end = advance(asked_s()); end != kDone) return end;
-      if (const auto end = answer(time_s_, state_); end != kDone) return end;
+      if (const auto end = advance(asked_s()); end != MethodEnd::completed) return end;
+      if (const auto end = answer(time_s_, state_); end != MethodEnd::completed) return end;
     }
-    return all_answered() ? kDone : advance(to.time_s);
+    return all_answered() ? MethodEnd::completed : advance(to.time_s);
   }
 
   MethodEnd advance(double time_s) {
     // Times that should be one and differ by rounding are too close for SUNDIALS.
-    if (time_s - time_s_ <= 1e-13 * std::abs(time_s)) return kDone;
-    if (const auto end = rule_->advance_to(time_s, state_); end != kDone) {
+    if (time_s - time_s_ <= 1e-13 * std::abs(time_s)) return MethodEnd::completed;
+    if (const auto end = rule_->advance_to(time_s, state_); end != MethodEnd::completed) {
       const AdaptiveRule::GivenUp gave_up = rule_->given_up();
       time_s_ = gave_up.time_s;
       flag_ = gave_up.flag;

@@ -52,6 +52,11 @@ inline constexpr std::array<StepRuleEntry, 12> kStepRules{{
     {StepRule::ida, "ida", 0, true},
 }};
 
+/// Its word in kStepRules.
+[[nodiscard]] inline std::string step_rule_name(StepRule rule) {
+  return std::string(kStepRules[static_cast<std::size_t>(rule)].text);
+}
+
 /// How a rule is used.
 struct MethodSettings {
   StepRule rule = StepRule::exponential;

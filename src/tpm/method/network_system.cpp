@@ -16,7 +16,6 @@ namespace {
 
 using Spheres = Eigen::Map<Eigen::Matrix3Xd>;
 using ConstSpheres = Eigen::Map<const Eigen::Matrix3Xd>;
-constexpr auto kDone = MethodEnd::completed;
 
 /// What networks with and without masses have in common.
 class NetworkSystem : public StepSystem {
@@ -73,7 +72,7 @@ class NetworkSystem : public StepSystem {
     tissue_.impose(next, imposed);
     tissue_.load(imposed, load_);
     const MethodEnd end = balance_.find(next, memory_, load_, depth_scale_);
-    if (end == kDone) position_ = next;
+    if (end == MethodEnd::completed) position_ = next;
     return end;
   }
 
@@ -85,14 +84,14 @@ class NetworkSystem : public StepSystem {
     while (done < 1.0) {
       const double aim = std::min(1.0, done + part);
       const MethodEnd end = balance(aim == 1.0 ? to : from + aim * (to - from));
-      if (end == kDone) {
+      if (end == MethodEnd::completed) {
         done = aim;
         part *= 2.0;
       } else if ((part *= 0.5) < kLeastPart || from == to) {
         return end;
       }
     }
-    return kDone;
+    return MethodEnd::completed;
   }
 
   /// Positions with everything relaxed under an imposed value.
@@ -153,7 +152,7 @@ class RestingNetwork final : public NetworkSystem {
     state.setZero(remembered());
     position_ = rest_;
     known_ = {0.0, state};
-    if (!relaxed) return kDone;
+    if (!relaxed) return MethodEnd::completed;
     const MethodEnd end = relax_under(first.value, state);
     known_ = {first.value, state};
     return end;
@@ -177,9 +176,10 @@ class RestingNetwork final : public NetworkSystem {
 
   MethodEnd stage(double t, const ImplicitStage& stage, Vector& state) override {
     set_memory(stage.known, stage.following);
-    if (const auto end = follow(known_.imposed, imposed(t)); end != kDone) return end;
+    if (const auto end = follow(known_.imposed, imposed(t)); end != MethodEnd::completed)
+      return end;
     follow_memory(stage.known, stage.following, imposed(t), state);
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd response(double t, const ConstVector& state, double& response) override {
@@ -212,11 +212,11 @@ class RestingNetwork final : public NetworkSystem {
       sweep(position_, give_);
     }
     follow_memory(offset, following, imposed(t), state);
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd factorise(double t, const ConstVector& state, double gamma) override {
-    if (const auto end = balance_at(imposed(t), state); end != kDone) return end;
+    if (const auto end = balance_at(imposed(t), state); end != MethodEnd::completed) return end;
     return factorise_here(state, 1.0 / gamma);
   }
 
@@ -302,10 +302,10 @@ class RestingNetwork final : public NetworkSystem {
   }
 
   MethodEnd balance_at(double imposed, const ConstVector& y) {
-    if (is_same(known_.imposed, imposed) && known_.y == y) return kDone;
+    if (is_same(known_.imposed, imposed) && known_.y == y) return MethodEnd::completed;
     set_memory(y);
     const MethodEnd end = follow(known_.imposed, imposed);
-    if (end == kDone) known_ = {imposed, y};
+    if (end == MethodEnd::completed) known_ = {imposed, y};
     return end;
   }
 
@@ -370,28 +370,30 @@ class MovingNetwork final : public NetworkSystem {
 
   MethodEnd start(const Knot& first, bool relaxed, Vector& state) override {
     state.setZero(size());
-    if (!relaxed) return kDone;
+    if (!relaxed) return MethodEnd::completed;
     Vector y;
-    if (const auto end = relax_under(first.value, y); end != kDone) return end;
+    if (const auto end = relax_under(first.value, y); end != MethodEnd::completed) return end;
     Spheres displacement(state.data(), 3, columns());
     displacement = position_ - rest_;
     tissue_.freedom().project(displacement);
     state.tail(remembered()) = y;
-    return kDone;
+    return MethodEnd::completed;
   }
 
-  MethodEnd jump(double /*imposed*/, const ConstVector& /*state*/) override { return kDone; }
+  MethodEnd jump(double /*imposed*/, const ConstVector& /*state*/) override {
+    return MethodEnd::completed;
+  }
 
   MethodEnd rate(double t, const ConstVector& state, Eigen::Ref<Vector> rate) override {
     ++work().rates;
     equation_.rate(t, state, rate);
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd elongations(double t, const ConstVector& state, Vector& elongation) override {
     put(t, state);
     find_elongations(position_, elongation);
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd stage(double t, const ImplicitStage& stage, Vector& state) override {
@@ -405,23 +407,23 @@ class MovingNetwork final : public NetworkSystem {
     set_memory(stage.known.tail(remembered()), stage.following);
     tissue_.load(imposed(t), load_);
     if (const auto end = balance_.find(position_, memory_, load_, depth_scale_, &anchors_);
-        end != kDone) {
+        end != MethodEnd::completed) {
       return end;
     }
     take(stage.known, stage.c, state);
     find_elongations(position_, elongation_);
     state.tail(remembered()) = stage.known.tail(remembered()) + stage.following * elongation_;
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd response(double t, const ConstVector& state, double& response) override {
     ++work().rates;
     response = equation_.response(t, state);
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd project(double t, double h, int sweeps, Vector& state) override {
-    if (h == 0.0) return kDone;
+    if (h == 0.0) return MethodEnd::completed;
     const Eigen::Index n = coordinates();
     const double held = 1.0 + h * drag_per_s();
     const Eigen::VectorXd give = h * h / held * equation_.inertia().mass_kg.cwiseInverse();
@@ -439,12 +441,12 @@ class MovingNetwork final : public NetworkSystem {
     take(Vector(state), h, state);
     find_elongations(position_, elongation_);
     state.tail(remembered()) = offset + following * elongation_;
-    return kDone;
+    return MethodEnd::completed;
   }
 
   MethodEnd factorise(double t, const ConstVector& state, double gamma) override {
     ++work().factorisations;
-    return equation_.factorise(t, state, gamma) ? kDone : MethodEnd::newton_failed;
+    return equation_.factorise(t, state, gamma) ? MethodEnd::completed : MethodEnd::newton_failed;
   }
   void solve(Eigen::Ref<Vector> x) override {
     ++work().solves;

@@ -27,7 +27,6 @@ MethodEnd FixedRule::jump(StepSystem& system, double time_s, Eigen::VectorXd& st
 namespace {
 
 using Vector = Eigen::VectorXd;
-constexpr auto kDone = MethodEnd::completed;
 
 /// z = known + c rate(t, z).
 MethodEnd solve_stage(StepSystem& system, double time_s, Vector known, double c, Vector& state) {
@@ -41,9 +40,10 @@ class ForwardEuler final : public FixedRule {
  public:
   MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
     rate_.resize(state.size());
-    if (const MethodEnd end = system.rate(time_s, state, rate_); end != kDone) return end;
+    if (const MethodEnd end = system.rate(time_s, state, rate_); end != MethodEnd::completed)
+      return end;
     state += h * rate_;
-    return kDone;
+    return MethodEnd::completed;
   }
 
  private:
@@ -59,19 +59,21 @@ class SemiImplicitEuler final : public FixedRule {
     const Eigen::Index n = system.coordinates();
     if (n > 0) {
       rate_.resize(state.size());
-      if (const MethodEnd end = system.rate(time_s, state, rate_); end != kDone) return end;
+      if (const MethodEnd end = system.rate(time_s, state, rate_); end != MethodEnd::completed)
+        return end;
       auto v = state.segment(n, n);
       const double drag = system.drag_per_s();
       v = ((1.0 + h * drag) * v + h * rate_.segment(n, n)) / (1.0 + h * drag);
       state.head(n) += h * v;
     }
-    if (const MethodEnd end = system.elongations(time_s + h, state, elongation_); end != kDone) {
+    if (const MethodEnd end = system.elongations(time_s + h, state, elongation_);
+        end != MethodEnd::completed) {
       return end;
     }
     const double ratio = h / system.relaxation_time_s();
     auto y = state.tail(system.remembered());
     y = (y + ratio * elongation_) / (1.0 + ratio);
-    return kDone;
+    return MethodEnd::completed;
   }
 
  private:
@@ -88,14 +90,15 @@ class RungeKutta4 final : public FixedRule {
     sum_.setZero(state.size());
     for (std::size_t i = 0; i < 4; ++i) {
       at_ = state + kNode[i] * h * rate_;
-      if (const auto end = system.rate(time_s + kNode[i] * h, at_, rate_); end != kDone) {
+      if (const auto end = system.rate(time_s + kNode[i] * h, at_, rate_);
+          end != MethodEnd::completed) {
         state = at_;  // what it failed at
         return end;
       }
       sum_ += kWeight[i] * h * rate_;
     }
     state += sum_;
-    return kDone;
+    return MethodEnd::completed;
   }
 
  private:
@@ -114,7 +117,7 @@ class ImplicitMidpoint final : public FixedRule {
   MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
     middle_ = state;
     const MethodEnd end = solve_stage(system, time_s + 0.5 * h, state, 0.5 * h, middle_);
-    if (end == kDone) state = 2.0 * middle_ - state;
+    if (end == MethodEnd::completed) state = 2.0 * middle_ - state;
     return end;
   }
 
@@ -128,7 +131,8 @@ class Newmark final : public FixedRule {
  public:
   MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
     rate_.resize(state.size());
-    if (const MethodEnd end = system.rate(time_s, state, rate_); end != kDone) return end;
+    if (const MethodEnd end = system.rate(time_s, state, rate_); end != MethodEnd::completed)
+      return end;
     return solve_stage(system, time_s + h, state + 0.5 * h * rate_, 0.5 * h, state);
   }
 
@@ -145,11 +149,12 @@ class TrBdf2 final : public FixedRule {
     constexpr double kOfMiddle = 1.0 / (kGamma * (2.0 - kGamma));
     constexpr double kC = (1.0 - kGamma) / (2.0 - kGamma);
     rate_.resize(state.size());
-    if (const MethodEnd end = system.rate(time_s, state, rate_); end != kDone) return end;
+    if (const MethodEnd end = system.rate(time_s, state, rate_); end != MethodEnd::completed)
+      return end;
     middle_ = state;
     const double c = 0.5 * kGamma * h;
     if (const auto end = solve_stage(system, time_s + kGamma * h, state + c * rate_, c, middle_);
-        end != kDone) {
+        end != MethodEnd::completed) {
       return end;
     }
     Vector known = kOfMiddle * middle_ + (1.0 - kOfMiddle) * state;
@@ -168,14 +173,16 @@ class Exponential final : public FixedRule {
  public:
   MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
     const Eigen::Index n = system.coordinates();
-    if (const MethodEnd end = system.elongations(time_s, state, elongation_); end != kDone) {
+    if (const MethodEnd end = system.elongations(time_s, state, elongation_);
+        end != MethodEnd::completed) {
       return end;
     }
     const RelaxationWeights w = relaxation_weights(h / system.relaxation_time_s());
     ImplicitStage stage{state, 0.5 * h, w.w1};
     if (n > 0) {
       rate_.resize(state.size());
-      if (const MethodEnd end = system.rate(time_s, state, rate_); end != kDone) return end;
+      if (const MethodEnd end = system.rate(time_s, state, rate_); end != MethodEnd::completed)
+        return end;
       stage.known.head(2 * n) += 0.5 * h * rate_.head(2 * n);
     }
     const Eigen::Index m = system.remembered();

@@ -13,7 +13,7 @@ namespace tpm {
 namespace {
 
 constexpr std::size_t kVectors = 6;  // iterated at once: the lowest converges by its gap to the 7th
-constexpr int kMostIterations = 500;
+constexpr int kMostModeIterations = 500;
 constexpr double kConverged = 1e-13;  // relative change of omega^2
 
 /// Subspace iteration for the lowest eigenvalues of K against M.
@@ -40,7 +40,7 @@ class InverseIteration {
       throw Error(ExitCode::numerical, "lowest mode", "the stiffness at rest is not positive");
     }
     double last = 0.0;
-    for (int i = 0; i < kMostIterations; ++i) {
+    for (int i = 0; i < kMostModeIterations; ++i) {
       const double value = iterate();
       if (std::abs(value - last) <= kConverged * value) return value;
       last = value;
@@ -101,7 +101,7 @@ LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest, const Fre
   LowestMode mode;
   // From the unrelaxed network downwards: omega falls steadily to its own fixed point.
   double square = iteration.lowest(0.0);
-  for (int i = 0; i < kMostIterations; ++i) {
+  for (int i = 0; i < kMostModeIterations; ++i) {
     const double tau = bonds.relaxation_time_s();
     mode.following = 1.0 / (1.0 + square * tau * tau);
     const double last = square;

@@ -7,8 +7,8 @@
 namespace tpm {
 namespace {
 
-constexpr int kMostIterations = 60;
-constexpr Eigen::Index kMemoryDepth = 8;
+constexpr int kMostTangentIterations = 60;
+constexpr Eigen::Index kTangentMemoryDepth = 8;
 
 }  // namespace
 
@@ -17,7 +17,7 @@ StageTangents::StageTangents(DrivenTissue& tissue, StageBalance& balance,
     : tissue_(tissue),
       balance_(balance),
       tolerance_(tolerance),
-      anderson_(kLanes * balance.coordinates_, kMemoryDepth) {
+      anderson_(kLanes * balance.coordinates_, kTangentMemoryDepth) {
   for (const TangentDirection& direction : directions) {
     Tangent tangent;
     tangent.stiffness = balance.bonds_.in_order(direction.stiffness);
@@ -85,7 +85,7 @@ void StageTangents::solve(Tangent& tangent, const Stages& stages) {
   tissue_.impose_change(tangent.position, tangent.imposed * stages.imposed);
   anderson_.restart();
   const double allowed = std::max(tolerance_ * balance_.scale_, balance_.grain_);
-  for (int i = 0; i < kMostIterations; ++i) {
+  for (int i = 0; i < kMostTangentIterations; ++i) {
     update_memory(tangent, stages);
     force_changes(tangent, stages, tangent.position, tangent.memory);
     freedom.project(force_);

@@ -6,8 +6,8 @@
 namespace tpm {
 namespace {
 
-constexpr int kTimesOfPiece = 20;
-constexpr int kMostTimes = 160;
+constexpr int kScoutedTimesOfPiece = 20;
+constexpr int kMostScoutedTimes = 160;
 constexpr int kCurvePoints = 33;
 constexpr double kCurveTolerance = 1e-5;
 constexpr double kRamp_s = 1.0;   // in which static curves are followed
@@ -68,8 +68,9 @@ PlanScout::PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial)
     : scene_(std::move(scene)),
       measure_(measure),
       inertial_(inertial),
-      times_(sampled_times(scene_.protocol(), inertial ? 8 * kTimesOfPiece : kTimesOfPiece,
-                           inertial ? 8 * kMostTimes : kMostTimes)) {}
+      times_(sampled_times(scene_.protocol(),
+                           inertial ? 8 * kScoutedTimesOfPiece : kScoutedTimesOfPiece,
+                           inertial ? 8 * kMostScoutedTimes : kMostScoutedTimes)) {}
 
 const PlanTrajectory& PlanScout::collocation(double tolerance) const {
   const auto found = collocation_.find(tolerance);

@@ -10,8 +10,8 @@ namespace tpm {
 namespace {
 
 constexpr std::array<int, 3> kFieldDegrees{5, 4, 2};
-constexpr double kSlopeLength_m = 1e-3;  // an error of a derivative counts over it
-constexpr Eigen::Index kGroup = 48;      // numbers: of 16 spheres
+constexpr double kFieldSlopeLength_m = 1e-3;  // an error of a derivative counts over it
+constexpr Eigen::Index kGroup = 48;           // numbers: of 16 spheres
 
 std::size_t place_of(const std::vector<CondensedExponents>& all, const CondensedExponents& e) {
   return static_cast<std::size_t>(std::find(all.begin(), all.end(), e) - all.begin());
@@ -42,14 +42,14 @@ CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3
     const CondensedPowers powers(frame, frame.local(sample.u_m), frame.local(sample.w_m));
     for (int k = -1; k < 3; ++k, ++row) {
       const int by = k < 0 ? -1 : kCondensedOfU[static_cast<std::size_t>(k)];
-      const double share = k < 0 ? 1.0 : kSlopeLength_m / frame.scale_m(by);
+      const double share = k < 0 ? 1.0 : kFieldSlopeLength_m / frame.scale_m(by);
       for (Eigen::Index m = 0; m < kTerms; ++m) {
         terms(row, m) = share * powers.monomial(monomials[static_cast<std::size_t>(m)], by);
       }
       if (k < 0) {
         fields.row(row) = (sample.position_m - rest).reshaped().transpose();
       } else {
-        fields.row(row) = kSlopeLength_m * (sample.moves * frame.axes.col(k)).transpose();
+        fields.row(row) = kFieldSlopeLength_m * (sample.moves * frame.axes.col(k)).transpose();
       }
     }
   }

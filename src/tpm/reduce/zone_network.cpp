@@ -10,10 +10,10 @@
 namespace tpm {
 namespace {
 
-constexpr double kTrusted = 0.05;       // error over the largest force
-constexpr double kScaleDepth_m = 1e-4;  // at which forces begin to count
-constexpr double kUnbalanced = 0.1;     // what is left of the correction for what is unbalanced
-constexpr std::size_t kNow = 0, kNext = 4;
+constexpr double kTrustedZone = 0.05;       // error over the largest force
+constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
+constexpr double kUnbalanced = 0.1;         // what is left of the correction for what is unbalanced
+constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
 
 void require(const ZoneNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
   const auto refuse = [](std::string_view key, double value, std::string_view expected) {
@@ -132,7 +132,7 @@ void ZoneNetwork::gather(std::size_t first) noexcept {
   }
   const std::size_t inner = 3 * (zone_.size() - edge_);
   std::fill(right_.begin() + static_cast<std::ptrdiff_t>(3 * zone_.size()), right_.end(), 0.0F);
-  const AlignedFloats& pull = first == kNow ? pull_ : next_pull_;
+  const AlignedFloats& pull = first == kZoneNow ? pull_ : next_pull_;
   for (std::size_t i = 0; i < stiff_.columns; ++i) right_[inner + i] += pull[i];
 }
 
@@ -160,7 +160,7 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
         static_cast<float>(displacement_m[static_cast<Eigen::Index>(c)]);
   }
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
-  gather(kNext);
+  gather(kZoneNext);
   kernels_.times(inverse_.panel(), right_.data(), change_.data());
   for (std::size_t i = 0; i < zone_.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) displacement_[4 * i + c] += change_[3 * i + c];
@@ -173,7 +173,7 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
   add_surroundings();
   at_contact_.accept();
   elsewhere_.accept();
-  gather(kNow);
+  gather(kZoneNow);
 
   ContactAnswer answer;
   Eigen::Vector3d correction;
@@ -200,9 +200,9 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
   answer.error_N = (1.0 - share) * missed_N_[low] + share * missed_N_[low + 1] +
                    aside_m * missed_aside_N_per_m_ + kUnbalanced * correction.norm() +
                    step_error_->advance(displacement_m).norm();
-  const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
+  const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * relaxed_.norm());
   answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&
-                   answer.error_N <= kTrusted * scale_N;
+                   answer.error_N <= kTrustedZone * scale_N;
   return answer;
 }
 

@@ -13,7 +13,7 @@ namespace {
 constexpr double kMissedStride_m = 2e-3;
 constexpr double kMissedAside_m = 2e-3;
 constexpr double kAsideDepths = 2.0;  // frozen depths at which the surroundings are tried across
-constexpr double kNoMode = 1e-8;      // of the energy of a field: what it adds is nothing
+constexpr double kNoField = 1e-8;     // of the energy of a field: what it adds is nothing
 
 using Fields = std::vector<Eigen::Matrix3Xd>;
 
@@ -133,7 +133,7 @@ void ZoneNetwork::build(PushedContact& tissue) {
       const double energy = rest.cwiseProduct(pull).sum();
       Eigen::Matrix3Xd whole_pull = nothing();
       around.add_resistance(whole, relaxed, whole_pull);
-      if (!(energy > kNoMode * whole.cwiseProduct(whole_pull).sum())) continue;
+      if (!(energy > kNoField * whole.cwiseProduct(whole_pull).sum())) continue;
       own.push_back(rest / std::sqrt(energy));
       resisted.push_back(pull / std::sqrt(energy));
     }

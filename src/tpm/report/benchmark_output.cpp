@@ -10,14 +10,14 @@
 namespace tpm {
 namespace {
 
-constexpr int kDigits = 5;
+constexpr int kBenchmarkDigits = 5;
 
 std::string number(double value) {
-  return significant(value, kDigits);
+  return significant(value, kBenchmarkDigits);
 }
 
 double stored(double value) {
-  return rounded(value, kDigits);
+  return rounded(value, kBenchmarkDigits);
 }
 
 using Cells = std::vector<std::string>;

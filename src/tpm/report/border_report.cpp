@@ -9,7 +9,7 @@
 namespace tpm {
 namespace {
 
-constexpr int kDigits = 6;
+constexpr int kBorderDigits = 6;
 const Axis kRate{"rate", "Hz", true, std::nullopt, std::nullopt};
 
 std::string_view word_of_rule(ElementRule rule) {
@@ -25,16 +25,16 @@ std::string_view word_of_rule(ElementRule rule) {
 }
 
 Json number_or_null(double value) {
-  return std::isfinite(value) ? Json(rounded(value, kDigits)) : Json(nullptr);
+  return std::isfinite(value) ? Json(rounded(value, kBorderDigits)) : Json(nullptr);
 }
 
 Json points_json(const std::vector<BorderPoint>& points, const char* measured,
                  const char* predicted) {
   Json list = Json::array();
   for (const BorderPoint& p : points) {
-    list.push_back({{"rate_Hz", rounded(p.rate_Hz, kDigits)},
-                    {"delay_s", rounded(p.delay_periods / p.rate_Hz, kDigits)},
-                    {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kDigits)},
+    list.push_back({{"rate_Hz", rounded(p.rate_Hz, kBorderDigits)},
+                    {"delay_s", rounded(p.delay_periods / p.rate_Hz, kBorderDigits)},
+                    {"damping_N_s_per_m", rounded(p.damping_N_s_per_m, kBorderDigits)},
                     {measured, number_or_null(p.measured)},
                     {predicted, number_or_null(p.predicted)}});
   }
@@ -156,21 +156,21 @@ Json border_json(const BorderStudy& study) {
   Json rules = Json::array();
   for (const RulePoint& p : study.rules) {
     rules.push_back({{"rule", word_of_rule(p.rule)},
-                     {"relaxation_time_s", rounded(p.relaxation_time_s, kDigits)},
+                     {"relaxation_time_s", rounded(p.relaxation_time_s, kBorderDigits)},
                      {"measured_N_s_per_m", number_or_null(p.measured_N_s_per_m)},
                      {"predicted_N_s_per_m", number_or_null(p.predicted_N_s_per_m)}});
   }
   return {{"simulated_device", true},
           {"assumptions", assumptions_of(study.plant)},
-          {"relaxation_time_s", rounded(study.relaxation_time_s, kDigits)},
-          {"stiffness_N_per_m", rounded(study.stiffness_N_per_m, kDigits)},
+          {"relaxation_time_s", rounded(study.relaxation_time_s, kBorderDigits)},
+          {"stiffness_N_per_m", rounded(study.stiffness_N_per_m, kBorderDigits)},
           {"passive", points_json(study.passive, "measured_N_per_m", "predicted_N_per_m")},
           {"stable", points_json(study.stable, "measured_N_per_m", "predicted_N_per_m")},
           {"rules", rules},
           {"shortest_forward_euler", points_json(study.shortest, "measured_s", "predicted_s")},
           {"shortest_exact", points_json(study.shortest_exact, "measured_s", "predicted_s")},
-          {"worst_passive", rounded(worst_difference(study.passive), kDigits)},
-          {"worst_stable", rounded(worst_difference(study.stable), kDigits)}};
+          {"worst_passive", rounded(worst_difference(study.passive), kBorderDigits)},
+          {"worst_stable", rounded(worst_difference(study.stable), kBorderDigits)}};
 }
 
 std::string border_text(const BorderStudy& study) {

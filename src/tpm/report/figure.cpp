@@ -37,11 +37,11 @@ std::string_view kind_name(Series::Kind kind) {
 }
 
 /// More than a drawing shows, and the same on every machine.
-constexpr int kDigits = 6;
+constexpr int kFigureDigits = 6;
 
 Json numbers(const std::vector<double>& values) {
   Json list = Json::array();
-  for (const double v : values) list.push_back(rounded(v, kDigits));
+  for (const double v : values) list.push_back(rounded(v, kFigureDigits));
   return list;
 }
 
@@ -79,8 +79,8 @@ void require_drawable(const Series& s, const std::string& where) {
 
 Json axis_json(const Axis& axis) {
   Json json{{"quantity", axis.quantity}, {"unit", axis.unit}, {"logarithmic", axis.logarithmic}};
-  if (axis.lower) json["lower"] = rounded(*axis.lower, kDigits);
-  if (axis.upper) json["upper"] = rounded(*axis.upper, kDigits);
+  if (axis.lower) json["lower"] = rounded(*axis.lower, kFigureDigits);
+  if (axis.upper) json["upper"] = rounded(*axis.upper, kFigureDigits);
   return json;
 }
 

@@ -8,7 +8,7 @@
 namespace tpm {
 namespace {
 
-constexpr int kDigits = 6;
+constexpr int kHilDigits = 6;
 
 std::string us(double seconds) {
   return significant(1e6 * seconds, 3);
@@ -30,10 +30,10 @@ std::string times_text(const char* what, const TimeHistogram& times) {
 }
 
 Json times_json(const TimeHistogram& times) {
-  return {{"p50_s", rounded(times.quantile_s(0.5), kDigits)},
-          {"p99_s", rounded(times.quantile_s(0.99), kDigits)},
-          {"p999_s", rounded(times.quantile_s(0.999), kDigits)},
-          {"max_s", rounded(times.max_s(), kDigits)}};
+  return {{"p50_s", rounded(times.quantile_s(0.5), kHilDigits)},
+          {"p99_s", rounded(times.quantile_s(0.99), kHilDigits)},
+          {"p999_s", rounded(times.quantile_s(0.999), kHilDigits)},
+          {"max_s", rounded(times.max_s(), kHilDigits)}};
 }
 
 /// Counts in bins that double in width: up to 1 us, 2 us, 4 us, ...
@@ -53,9 +53,9 @@ std::vector<std::pair<double, std::uint64_t>> octaves(const TimeHistogram& times
 
 Json fidelity_json(const ForceFidelity& f) {
   return {{"instants", f.instants},
-          {"rms_N", rounded(f.rms_N, kDigits)},
-          {"max_N", rounded(f.max_N, kDigits)},
-          {"peak_N", rounded(f.peak_N, kDigits)}};
+          {"rms_N", rounded(f.rms_N, kHilDigits)},
+          {"max_N", rounded(f.max_N, kHilDigits)},
+          {"peak_N", rounded(f.peak_N, kHilDigits)}};
 }
 
 std::string share(double part_N, double peak_N) {
@@ -68,14 +68,14 @@ Json check_json(const JitterCheck& check) {
   const ServoOutcome& o = check.outcome;
   Json bins = Json::array();
   for (const auto& [edge, count] : octaves(o.woke_late)) {
-    bins.push_back({{"up_to_s", rounded(edge, kDigits)}, {"cycles", count}});
+    bins.push_back({{"up_to_s", rounded(edge, kHilDigits)}, {"cycles", count}});
   }
   return {{"simulated_device", !check.device.hardware},
           {"device", to_json(check.device)},
           {"host", host_line()},
           {"scheduling", o.scheduling},
-          {"rate_Hz", rounded(check.rate_Hz, kDigits)},
-          {"duration_s", rounded(check.duration_s, kDigits)},
+          {"rate_Hz", rounded(check.rate_Hz, kHilDigits)},
+          {"duration_s", rounded(check.duration_s, kHilDigits)},
           {"cycles", o.cycles},
           {"late_cycles", o.counts.late},
           {"missed_periods", o.counts.missed},
@@ -110,8 +110,8 @@ Json run_json(const HilSession& session, const SessionRun& run) {
           {"title", session.title},
           {"device", to_json(run.device)},
           {"model", {{"name", run.model.name}, {"error_bound", run.model.error_bound}}},
-          {"rate_Hz", rounded(1.0 / session.servo.period_s, kDigits)},
-          {"duration_s", rounded(session.duration_s(), kDigits)},
+          {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
+          {"duration_s", rounded(session.duration_s(), kHilDigits)},
           {"phases", session.phases.size()},
           {"time", run.outcome.real_time ? "real" : "virtual"},
           {"outcome", recording_closing(run.outcome)}};
@@ -148,22 +148,22 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
     Json json = fidelity_json(p.force);
     json["phase"] = p.phase.name;
     json["kind"] = word_of(p.phase.kind);
-    json["start_s"] = rounded(p.start_s, kDigits);
-    json["depth_rms_m"] = rounded(p.depth_rms_m, kDigits);
+    json["start_s"] = rounded(p.start_s, kHilDigits);
+    json["depth_rms_m"] = rounded(p.depth_rms_m, kHilDigits);
     phases.push_back(std::move(json));
   }
   for (const OtherOpinion& o : v.others) {
     Json json = fidelity_json(o.commanded);
     json["name"] = o.name;
-    json["end_s"] = rounded(o.end_s, kDigits);
+    json["end_s"] = rounded(o.end_s, kHilDigits);
     others.push_back(std::move(json));
   }
   for (const BesideExperiment& e : v.experiment) {
-    experiment.push_back({{"depth_m", rounded(e.depth_m, kDigits)},
-                          {"rate_m_per_s", rounded(e.rate_m_per_s, kDigits)},
+    experiment.push_back({{"depth_m", rounded(e.depth_m, kHilDigits)},
+                          {"rate_m_per_s", rounded(e.rate_m_per_s, kHilDigits)},
                           {"label", e.label},
                           {"measured_N", e.measured_N},
-                          {"commanded_N", rounded(e.commanded_N, kDigits)}});
+                          {"commanded_N", rounded(e.commanded_N, kHilDigits)}});
   }
   return {{"simulated_device", recording.simulated()},
           {"recording", recording.name},
@@ -171,12 +171,12 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
           {"model", recording.header.at("model")},
           {"reference", v.reference},
           {"whole", v.whole},
-          {"end_s", rounded(v.end_s, kDigits)},
+          {"end_s", rounded(v.end_s, kHilDigits)},
           {"knots", v.knots},
           {"motion_tolerance_m", v.motion_tolerance_m},
-          {"motion_error_N", rounded(v.motion_error_N, kDigits)},
-          {"reference_error_N", rounded(v.reference_error_N, kDigits)},
-          {"model_error_N", rounded(v.model_error_N, kDigits)},
+          {"motion_error_N", rounded(v.motion_error_N, kHilDigits)},
+          {"reference_error_N", rounded(v.reference_error_N, kHilDigits)},
+          {"model_error_N", rounded(v.model_error_N, kHilDigits)},
           {"all", fidelity_json(v.all)},
           {"phases", phases},
           {"others", others},

@@ -8,12 +8,12 @@
 namespace tpm {
 namespace {
 
-constexpr int kDigits = 6;
+constexpr int kNetworkDigits = 6;
 
 Json spread_json(const Spread& s) {
-  return {{"min", rounded(s.min, kDigits)},
-          {"mean", rounded(s.mean, kDigits)},
-          {"max", rounded(s.max, kDigits)}};
+  return {{"min", rounded(s.min, kNetworkDigits)},
+          {"mean", rounded(s.mean, kNetworkDigits)},
+          {"max", rounded(s.max, kNetworkDigits)}};
 }
 
 std::string spread_words(const Spread& s) {
@@ -44,8 +44,8 @@ Json network_json(const Tissue& tissue, const NetworkInspection& inspection) {
   const Organ& organ = tissue.network.organ;
   Json json{{"title", tissue.title},
             {"spheres", organ.size()},
-            {"spacing_m", rounded(organ.spacing, kDigits)},
-            {"radius_m", rounded(organ.radius, kDigits)},
+            {"spacing_m", rounded(organ.spacing, kNetworkDigits)},
+            {"radius_m", rounded(organ.radius, kNetworkDigits)},
             {"radial_bonds", inspection.radial_bonds},
             {"lateral_bonds", inspection.lateral_bonds},
             {"anchored_spheres", tissue.anchors.size()},
@@ -123,8 +123,8 @@ Json network_picture(const Tissue& tissue) {
     const auto& p = organ.position.col(i);
     const auto& n = organ.normal.col(i);
     json["position_m"].push_back({p.x(), p.y(), p.z()});
-    json["normal"].push_back(
-        {rounded(n.x(), kDigits), rounded(n.y(), kDigits), rounded(n.z(), kDigits)});
+    json["normal"].push_back({rounded(n.x(), kNetworkDigits), rounded(n.y(), kNetworkDigits),
+                              rounded(n.z(), kNetworkDigits)});
   }
   json["bonds"] = Json::array();
   for (const Bond& bond : tissue.network.bonds) {

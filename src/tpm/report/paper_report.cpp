@@ -54,11 +54,11 @@ std::vector<Figure> all_figures(const PaperReport& report) {
 }
 
 /// Results carry 6 significant digits, so that machines whose last bits differ write the same.
-constexpr int kDigits = 6;
+constexpr int kPaperDigits = 6;
 
 void round_numbers(Json& value) {
   if (value.is_number_float()) {
-    value = rounded(value.get<double>(), kDigits);
+    value = rounded(value.get<double>(), kPaperDigits);
   } else if (value.is_structured()) {
     for (auto& item : value) round_numbers(item);
   }

@@ -11,13 +11,13 @@
 namespace tpm {
 namespace {
 
-constexpr int kDigits = 6;
+constexpr int kPlanDigits = 6;
 
 Json number(const std::optional<double>& value) {
-  return value ? Json(rounded(*value, kDigits)) : Json(nullptr);
+  return value ? Json(rounded(*value, kPlanDigits)) : Json(nullptr);
 }
 
-std::string percent(double share) {
+std::string share_text(double share) {
   return significant(100.0 * share, 3) + " %";
 }
 
@@ -77,7 +77,7 @@ std::string relevance_text(const PlanRelevance& r) {
   const std::string note = r.note.empty() ? "" : fmt::format(" ({})", r.note);
   if (!r.error) return fmt::format("  {}: {}\n", r.part, r.note);
   return fmt::format("  {} {}: without it the answer changes by {} of the peak{}\n", r.part,
-                     r.matters ? "matters" : "does not matter", percent(*r.error), note);
+                     r.matters ? "matters" : "does not matter", share_text(*r.error), note);
 }
 
 std::string choice_text(const Plan& plan) {
@@ -88,7 +88,7 @@ std::string choice_text(const Plan& plan) {
         "per "
         "simulated second{}\n",
         c.name, c.formulation, c.settings.empty() ? "" : ", ", c.settings,
-        percent(*c.claimed_error), percent(*c.verified_error),
+        share_text(*c.claimed_error), share_text(*c.verified_error),
         significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
         time_text(*c.cost_s_per_s),
         c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
@@ -101,7 +101,7 @@ std::string choice_text(const Plan& plan) {
   if (plan.without_budget) {
     const PlannedCandidate& c = plan.candidates[*plan.without_budget];
     text += fmt::format("  without the budget: {}, {} per simulated second, verified error {}\n",
-                        c.name, time_text(*c.cost_s_per_s), percent(*c.verified_error));
+                        c.name, time_text(*c.cost_s_per_s), share_text(*c.verified_error));
   }
   if (plan.needs_full) {
     text += "  the scene needs the full nonlinear model: no reduced one meets the tolerance\n";
@@ -132,7 +132,7 @@ Json plan_json(const Plan& plan) {
             {"version", version()},
             {"spheres", plan.spheres},
             {"bonds", plan.bonds},
-            {"duration_s", rounded(plan.duration_s, kDigits)},
+            {"duration_s", rounded(plan.duration_s, kPlanDigits)},
             {"tolerance", request.tolerance},
             {"tolerance_source",
              request.tolerance_source.empty() ? Json(nullptr) : Json(request.tolerance_source)},
@@ -144,7 +144,7 @@ Json plan_json(const Plan& plan) {
   json["choice"] = plan.choice ? candidate_json(plan.chosen()) : Json(nullptr);
   json["margin"] =
       plan.choice ? Json(rounded(request.tolerance / std::max(*plan.chosen().verified_error, 1e-12),
-                                 kDigits))
+                                 kPlanDigits))
                   : Json(nullptr);
   json["without_budget"] =
       plan.without_budget ? candidate_json(plan.candidates[*plan.without_budget]) : Json(nullptr);
@@ -154,7 +154,7 @@ Json plan_json(const Plan& plan) {
   json["reference"] = {{"method", plan.reference.method},
                        {"judge", plan.reference.judge},
                        {"difference", rounded(plan.reference.difference, 2)},
-                       {"peak", rounded(plan.reference.peak, kDigits)}};
+                       {"peak", rounded(plan.reference.peak, kPlanDigits)}};
   json["frontier"] = Json::array();
   for (const PlannedCandidate& c : plan.candidates) json["frontier"].push_back(candidate_json(c));
   json["relevance"] = relevance_json(plan);
@@ -170,7 +170,7 @@ std::string plan_text(const Plan& plan) {
   text +=
       fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
                   request.measure.output == PlanOutput::field ? "displacements" : "response",
-                  percent(request.tolerance),
+                  share_text(request.tolerance),
                   request.tolerance_source.empty() ? std::string()
                                                    : fmt::format(" ({})", request.tolerance_source),
                   budget_text(request.budget),
@@ -182,7 +182,7 @@ std::string plan_text(const Plan& plan) {
   text += fmt::format(
       "\nreference: {}; peak {} {}; differs from its judge ({}) by {}\n", plan.reference.method,
       significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
-      plan.by_depth ? "N" : "mm", plan.reference.judge, percent(plan.reference.difference));
+      plan.by_depth ? "N" : "mm", plan.reference.judge, share_text(plan.reference.difference));
   if (!plan.relevance.empty()) text += "what matters:\n";
   for (const PlanRelevance& r : plan.relevance) text += relevance_text(r);
   if (!plan.changes.empty()) text += "what would break first:\n";
@@ -196,7 +196,7 @@ std::string plan_text(const Plan& plan) {
         "WARNING: masses would change the answer by {} of the peak where the rate changes; scene "
         "and "
         "plan leave them out\n",
-        percent(*plan.masses_left_out));
+        share_text(*plan.masses_left_out));
   }
   for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
   return text;

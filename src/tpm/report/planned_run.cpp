@@ -10,7 +10,7 @@
 namespace tpm {
 namespace {
 
-constexpr int kDigits = 9;
+constexpr int kPlannedDigits = 9;
 
 Eigen::Index largest_of(const PlanTrajectory& answer) {
   Eigen::Index at = 0;
@@ -30,9 +30,9 @@ Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
   const PlannedCandidate& c = plan.chosen();
   const auto point = [&](Eigen::Index i) {
     const double time = times_s[static_cast<std::size_t>(i)];
-    return Json{{"time_s", rounded(time, kDigits)},
-                {"imposed", rounded(value_at(scene.protocol, time), kDigits)},
-                {"response", rounded(answer.response[i], kDigits)}};
+    return Json{{"time_s", rounded(time, kPlannedDigits)},
+                {"imposed", rounded(value_at(scene.protocol, time), kPlannedDigits)},
+                {"response", rounded(answer.response[i], kPlannedDigits)}};
   };
   return {{"title", plan.title},
           {"version", version()},

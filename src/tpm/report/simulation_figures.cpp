@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kDigits = 7;  // of numbers that are drawn
+constexpr int kDrawnDigits = 7;  // of numbers that are drawn
 
 std::string name_of(const FiguredRun& figured) {
   return figured.scene->formulation.mass_spring ? "MSM" : "TPM";
@@ -28,7 +28,8 @@ Json rows_json(const Positions& position) {
   Json rows = Json::array();
   for (Eigen::Index i = 0; i < position.cols(); ++i) {
     const auto& p = position.col(i);
-    rows.push_back({rounded(p.x(), kDigits), rounded(p.y(), kDigits), rounded(p.z(), kDigits)});
+    rows.push_back(
+        {rounded(p.x(), kDrawnDigits), rounded(p.y(), kDrawnDigits), rounded(p.z(), kDrawnDigits)});
   }
   return rows;
 }
@@ -36,7 +37,7 @@ Json rows_json(const Positions& position) {
 template <class Numbers>
 Json list_json(const Numbers& numbers, double unit) {
   Json list = Json::array();
-  for (const double value : numbers) list.push_back(rounded(value / unit, kDigits));
+  for (const double value : numbers) list.push_back(rounded(value / unit, kDrawnDigits));
   return list;
 }
 
@@ -52,7 +53,8 @@ std::string roughness_words(const std::optional<Smoothness>& found) {
 /// @param position of spheres and tools
 Json tools_json(const DrivenNetwork& network, const Positions& position) {
   const auto list_of = [](const Eigen::Vector3d& v) {
-    return Json{rounded(v.x(), kDigits), rounded(v.y(), kDigits), rounded(v.z(), kDigits)};
+    return Json{rounded(v.x(), kDrawnDigits), rounded(v.y(), kDrawnDigits),
+                rounded(v.z(), kDrawnDigits)};
   };
   Json tools = Json::array();
   for (std::size_t i = 0; i < network.tools.size(); ++i) {
@@ -73,7 +75,7 @@ Json state_json(const FiguredRun& figured) {
   const Eigen::VectorXd lengths = moved.colwise().norm();
   const Eigen::VectorXd force = bond_forces_N(figured.network->driven.bonds, state);
   Json json{{"name", name_of(figured)},
-            {"time_s", rounded(state.time_s, kDigits)},
+            {"time_s", rounded(state.time_s, kDrawnDigits)},
             {"position_m", rows_json(position)},
             {"tools", tools_json(figured.network->driven, state.position)},
             {"displacement_mm", list_json(lengths, 1e-3)},

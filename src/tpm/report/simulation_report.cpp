@@ -14,7 +14,7 @@
 namespace tpm {
 namespace {
 
-constexpr int kDigits = 9;
+constexpr int kSimulationDigits = 9;
 constexpr std::size_t kMostNamed = 12;
 
 bool by_depth(const ExperimentScene& scene) {
@@ -32,15 +32,16 @@ const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
 
 Json validity_json(const Validity& validity) {
   Json json{{"kept", validity.whole()},
-            {"deepest_m", rounded(validity.deepest_m, kDigits)},
-            {"most_turned_rad", rounded(validity.most_turned_rad, kDigits)}};
+            {"deepest_m", rounded(validity.deepest_m, kSimulationDigits)},
+            {"most_turned_rad", rounded(validity.most_turned_rad, kSimulationDigits)}};
   json["limits"] = Json::array();
   for (std::size_t k = 0; k < kValidityLimits; ++k) {
     const auto limit = static_cast<ValidityLimit>(k);
     const ValidityBreach& breach = validity.of(limit);
     Json entry{{"limit", key_of(limit)}, {"passed", breach.first_time_s.has_value()}};
-    entry["first_time_s"] =
-        breach.first_time_s ? Json(rounded(*breach.first_time_s, kDigits)) : Json(nullptr);
+    entry["first_time_s"] = breach.first_time_s
+                                ? Json(rounded(*breach.first_time_s, kSimulationDigits))
+                                : Json(nullptr);
     entry["spheres"] = Json::array();
     for (const std::size_t sphere : breach.spheres) entry["spheres"].push_back(sphere + 1);
     json["limits"].push_back(entry);
@@ -51,15 +52,15 @@ Json validity_json(const Validity& validity) {
 Json energy_json(const SimulationRun& run) {
   if (run.record.inertial_energy) {
     const InertialEnergy& e = *run.record.inertial_energy;
-    return {{"work_J", rounded(e.work, kDigits)},
-            {"stored_J", rounded(e.stored, kDigits)},
-            {"dissipated_J", rounded(e.bond_heat + e.damping_heat, kDigits)},
-            {"kinetic_J", rounded(e.kinetic, kDigits)}};
+    return {{"work_J", rounded(e.work, kSimulationDigits)},
+            {"stored_J", rounded(e.stored, kSimulationDigits)},
+            {"dissipated_J", rounded(e.bond_heat + e.damping_heat, kSimulationDigits)},
+            {"kinetic_J", rounded(e.kinetic, kSimulationDigits)}};
   }
   const QuasiStaticEnergy& e = run.record.curve.back().energy;
-  return {{"work_J", rounded(e.work_J, kDigits)},
-          {"stored_J", rounded(e.stored_J, kDigits)},
-          {"dissipated_J", rounded(e.dissipated_J, kDigits)}};
+  return {{"work_J", rounded(e.work_J, kSimulationDigits)},
+          {"stored_J", rounded(e.stored_J, kSimulationDigits)},
+          {"dissipated_J", rounded(e.dissipated_J, kSimulationDigits)}};
 }
 
 /// What the contacts are, and the state of the tools among them at the last output.
@@ -81,10 +82,11 @@ Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
     if (contact.is_tool()) {
       const ToolState& state = states[tool];
       const auto list_of = [](const Eigen::Vector3d& v) {
-        return Json{rounded(v.x(), kDigits), rounded(v.y(), kDigits), rounded(v.z(), kDigits)};
+        return Json{rounded(v.x(), kSimulationDigits), rounded(v.y(), kSimulationDigits),
+                    rounded(v.z(), kSimulationDigits)};
       };
       json["contact_stiffness_N_per_m"] =
-          rounded(network.driven.tools[tool].stiffness_N_per_m, kDigits);
+          rounded(network.driven.tools[tool].stiffness_N_per_m, kSimulationDigits);
       json["last"] = {{"position_m", list_of(state.position)},
                       {"force_on_tissue_N", list_of(state.force)},
                       {"touching", state.touching},
@@ -133,10 +135,11 @@ std::string contacts_text(const ExperimentScene& scene, const RunNetwork& networ
 
 Json smoothness_json(const std::optional<Smoothness>& smoothness) {
   if (!smoothness) return nullptr;
-  Json json{{"near_contact", rounded(smoothness->near_contact, kDigits)},
+  Json json{{"near_contact", rounded(smoothness->near_contact, kSimulationDigits)},
             {"near_spheres", smoothness->near_spheres},
             {"rim_spheres", smoothness->rim_spheres}};
-  json["at_rim"] = smoothness->at_rim ? Json(rounded(*smoothness->at_rim, kDigits)) : Json(nullptr);
+  json["at_rim"] =
+      smoothness->at_rim ? Json(rounded(*smoothness->at_rim, kSimulationDigits)) : Json(nullptr);
   return json;
 }
 
@@ -212,9 +215,9 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
             {"imposed", depth ? "depth_m" : "load_N"},
             {"response", depth ? "force_N" : "depth_m"}};
   const auto point = [](const CurvePoint& p) {
-    return Json{{"time_s", rounded(p.time_s, kDigits)},
-                {"imposed", rounded(p.imposed, kDigits)},
-                {"response", rounded(p.response, kDigits)}};
+    return Json{{"time_s", rounded(p.time_s, kSimulationDigits)},
+                {"imposed", rounded(p.imposed, kSimulationDigits)},
+                {"response", rounded(p.response, kSimulationDigits)}};
   };
   json["largest"] = point(largest(record, f.tolerance));
   json["last"] = point(record.curve.back());

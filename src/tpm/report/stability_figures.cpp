@@ -19,10 +19,6 @@ const std::vector<MapPair>& pairs() {
   return list;
 }
 
-std::string rule_name(StepRule rule) {
-  return std::string(kStepRules[static_cast<std::size_t>(rule)].text);
-}
-
 const StabilityMap* map_of(const StabilityStudy& study, const std::string& id, StepRule rule) {
   for (const StabilityMap& map : study.maps) {
     if (map.id == id && map.rule == rule) return &map;
@@ -65,8 +61,8 @@ std::vector<Figure> stability_figures(const StabilityStudy& study) {
       if (first == nullptr || second == nullptr) continue;
       const bool limited = !first->limit_x.empty() || !second->limit_x.empty();
       Figure figure;
-      figure.id = fmt::format("{}_{}", rule_name(entry.meaning), pair.name);
-      figure.title = fmt::format("{}: where it fails", rule_name(entry.meaning));
+      figure.id = fmt::format("{}_{}", step_rule_name(entry.meaning), pair.name);
+      figure.title = fmt::format("{}: where it fails", step_rule_name(entry.meaning));
       figure.caption = fmt::format(
           "Left: {}. Right: {}. Runs of 300 steps (with a rising load: 300 after it), judged over "
           "the last 32.{}",

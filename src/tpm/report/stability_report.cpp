@@ -16,10 +16,6 @@
 namespace tpm {
 namespace {
 
-std::string rule_name(StepRule rule) {
-  return std::string(kStepRules[static_cast<std::size_t>(rule)].text);
-}
-
 std::string number(double value) {
   return std::isfinite(value) ? significant(value, 4) : "";
 }
@@ -49,7 +45,7 @@ Table limits_table(const StabilityStudy& study) {
   for (const StabilityLimit& l : study.limits) {
     const bool good = std::abs(l.ratio() - 1.0) <= 0.02;
     table.rows.push_back({{l.problem},
-                          {rule_name(l.rule)},
+                          {step_rule_name(l.rule)},
                           {l.theory},
                           {number(l.theory_s)},
                           {std::isfinite(l.found_s) ? number(l.found_s) : "not found"},
@@ -67,7 +63,8 @@ Table servo_table(const StabilityStudy& study, const std::string& problem) {
   for (const ServoRow& row : study.servo) {
     if (row.problem != problem) continue;
     if (table.columns.size() == 1) {
-      for (const ServoCell& cell : row.cells) table.columns.push_back({rule_name(cell.rule), true});
+      for (const ServoCell& cell : row.cells)
+        table.columns.push_back({step_rule_name(cell.rule), true});
     }
     std::vector<Cell> cells{{significant(row.rate_Hz, 4)}};
     for (const ServoCell& cell : row.cells) {
@@ -138,7 +135,7 @@ Table maps_table(const StabilityStudy& study) {
   table.columns.push_back({"above, no growth", true});
   table.columns.push_back({"below, growth", true});
   for (const StabilityMap& map : study.maps) {
-    std::vector<Cell> row{{map.quantity}, {rule_name(map.rule)}};
+    std::vector<Cell> row{{map.quantity}, {step_rule_name(map.rule)}};
     for (const StabilityClassEntry& entry : kStabilityClasses) {
       if (entry.meaning == StabilityClass::not_applicable) continue;
       const auto count = std::count_if(map.points.begin(), map.points.end(), [&](const auto& p) {
@@ -155,7 +152,7 @@ Table maps_table(const StabilityStudy& study) {
 }
 
 Json verdict_json(StepRule rule, const StabilityVerdict& v) {
-  Json json{{"rule", rule_name(rule)}, {"class", stability_class_name(v.found)}};
+  Json json{{"rule", step_rule_name(rule)}, {"class", stability_class_name(v.found)}};
   if (std::isfinite(v.error)) json["error_of_peak"] = v.error;
   if (!v.reason.empty()) json["reason"] = v.reason;
   return json;
@@ -177,14 +174,14 @@ std::vector<std::string> stability_sentences(const StabilityStudy& study) {
   for (const StabilityLimit& l : study.limits) {
     if (l.problem.find("paper") == std::string::npos) continue;
     sentences.push_back(fmt::format("At the paper's eta1 {} holds above {} Hz (theory {} Hz).",
-                                    rule_name(l.rule), significant(1.0 / l.found_s, 4),
+                                    step_rule_name(l.rule), significant(1.0 / l.found_s, 4),
                                     significant(1.0 / l.theory_s, 4)));
   }
   for (const ServoRow& row : study.servo) {
     if (row.rate_Hz != 1000.0) continue;
     std::vector<std::string> words;
     for (const ServoCell& cell : row.cells) {
-      words.push_back(fmt::format("{} {}", rule_name(cell.rule), verdict_words(cell.verdict)));
+      words.push_back(fmt::format("{} {}", step_rule_name(cell.rule), verdict_words(cell.verdict)));
     }
     sentences.push_back(
         fmt::format("{} at 1 kHz, paper's eta1: {}.", row.problem, fmt::join(words, "; ")));
@@ -250,7 +247,7 @@ std::string stability_map_csv(const StabilityStudy& study, const std::string& id
     }
     for (const StabilityPoint& p : map.points) {
       text +=
-          csv_line({rule_name(map.rule), significant(p.x, 6), significant(p.step_s, 6),
+          csv_line({step_rule_name(map.rule), significant(p.x, 6), significant(p.step_s, 6),
                     std::string(stability_class_name(p.verdict.found)), number(p.verdict.error)});
     }
   }
@@ -261,7 +258,7 @@ std::string stability_limits_csv(const StabilityStudy& study) {
   std::string text =
       csv_line({"problem", "rule", "theory", "theory_s", "found_s", "found_over_theory"});
   for (const StabilityLimit& l : study.limits) {
-    text += csv_line({l.problem, rule_name(l.rule), l.theory, significant(l.theory_s, 6),
+    text += csv_line({l.problem, step_rule_name(l.rule), l.theory, significant(l.theory_s, 6),
                       number(l.found_s), number(l.ratio())});
   }
   return text;
@@ -272,10 +269,11 @@ std::string stability_corners_csv(const StabilityStudy& study) {
       csv_line({"corner", "rule", "class", "error_of_peak", "expected", "right", "reason"});
   for (const StabilityCorner& corner : study.corners) {
     for (const CornerCell& cell : corner.cells) {
-      text += csv_line(
-          {corner.name, rule_name(cell.rule), std::string(stability_class_name(cell.verdict.found)),
-           number(cell.verdict.error), std::string(stability_class_name(cell.expected)),
-           cell.right ? "yes" : "no", cell.verdict.reason});
+      text +=
+          csv_line({corner.name, step_rule_name(cell.rule),
+                    std::string(stability_class_name(cell.verdict.found)),
+                    number(cell.verdict.error), std::string(stability_class_name(cell.expected)),
+                    cell.right ? "yes" : "no", cell.verdict.reason});
     }
   }
   return text;
@@ -285,7 +283,7 @@ std::string stability_servo_csv(const StabilityStudy& study) {
   std::string text = csv_line({"problem", "rate_Hz", "rule", "class", "error_of_peak"});
   for (const ServoRow& row : study.servo) {
     for (const ServoCell& cell : row.cells) {
-      text += csv_line({row.problem, significant(row.rate_Hz, 4), rule_name(cell.rule),
+      text += csv_line({row.problem, significant(row.rate_Hz, 4), step_rule_name(cell.rule),
                         std::string(stability_class_name(cell.verdict.found)),
                         number(cell.verdict.error)});
     }
@@ -298,7 +296,7 @@ Json to_json(const StabilityStudy& study) {
   json["summary"] = stability_sentences(study);
   for (const StabilityLimit& l : study.limits) {
     Json limit{{"problem", l.problem},
-               {"rule", rule_name(l.rule)},
+               {"rule", step_rule_name(l.rule)},
                {"theory", l.theory},
                {"theory_s", l.theory_s}};
     if (std::isfinite(l.found_s)) limit["found_s"] = l.found_s;
@@ -330,7 +328,7 @@ Json to_json(const StabilityStudy& study) {
                                 {"quantity", map.quantity},
                                 {"unit", map.unit},
                                 {"problem", map.problem},
-                                {"rule", rule_name(map.rule)},
+                                {"rule", step_rule_name(map.rule)},
                                 {"runs", counts}});
   }
   return json;

@@ -17,10 +17,6 @@ namespace tpm {
 namespace fs = std::filesystem;
 namespace {
 
-std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
-  return {numbers.data(), numbers.data() + numbers.size()};
-}
-
 std::size_t tool_count(const ExperimentScene& scene) {
   return static_cast<std::size_t>(
       std::count_if(scene.contacts.begin(), scene.contacts.end(),

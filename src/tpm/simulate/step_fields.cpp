@@ -4,13 +4,9 @@
 #include <cmath>
 
 namespace tpm {
-namespace {
-
 std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
   return {numbers.data(), numbers.data() + numbers.size()};
 }
-
-}  // namespace
 
 StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
                      const QuasiStaticState& state) {

@@ -20,6 +20,9 @@ struct StepFields {
   std::vector<StepField> of_bonds;
 };
 
+/// The numbers of a matrix, column after column.
+[[nodiscard]] std::vector<double> list_of(const Eigen::MatrixXd& numbers);
+
 /// Those that the scene asks for.
 [[nodiscard]] StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
                                    const QuasiStaticState& state);

@@ -10,7 +10,7 @@
 namespace tpm {
 namespace {
 
-constexpr std::size_t kWide = 8;
+constexpr std::size_t kPanelWide = 8;
 
 void times_portable(const FloatPanel& panel, const float* x, float* out) noexcept {
   std::fill(out, out + panel.stride, 0.0F);
@@ -23,8 +23,8 @@ void times_portable(const FloatPanel& panel, const float* x, float* out) noexcep
 void subtract_transposed_portable(const FloatPanel& panel, const float* x, float* out) noexcept {
   const float* column = panel.numbers;
   for (std::size_t j = 0; j < panel.columns; ++j, column += panel.stride) {
-    float sum[kWide] = {};
-    for (std::size_t i = 0; i < panel.stride; ++i) sum[i % kWide] += column[i] * x[i];
+    float sum[kPanelWide] = {};
+    for (std::size_t i = 0; i < panel.stride; ++i) sum[i % kPanelWide] += column[i] * x[i];
     for (const float part : sum) out[j] -= part;
   }
 }
@@ -64,8 +64,8 @@ template <int Count>
 [[gnu::target("avx2,fma")]] void times_avx2(const FloatPanel& panel, const float* x,
                                             float* out) noexcept {
   std::size_t i = 0;
-  for (; i + 4 * kWide <= panel.stride; i += 4 * kWide) rows_times<4>(panel, i, x, out);
-  switch ((panel.stride - i) / kWide) {
+  for (; i + 4 * kPanelWide <= panel.stride; i += 4 * kPanelWide) rows_times<4>(panel, i, x, out);
+  switch ((panel.stride - i) / kPanelWide) {
     case 3:
       rows_times<3>(panel, i, x, out);
       break;
@@ -87,7 +87,7 @@ template <int Count>
   std::size_t j = 0;
   for (; j + 4 <= panel.columns; j += 4, column += 4 * stride) {
     __m256 s0 = _mm256_setzero_ps(), s1 = s0, s2 = s0, s3 = s0;
-    for (std::size_t i = 0; i < stride; i += kWide) {
+    for (std::size_t i = 0; i < stride; i += kPanelWide) {
       const __m256 v = _mm256_load_ps(x + i);
       s0 = _mm256_fmadd_ps(_mm256_load_ps(column + i), v, s0);
       s1 = _mm256_fmadd_ps(_mm256_load_ps(column + stride + i), v, s1);
@@ -100,7 +100,7 @@ template <int Count>
   }
   for (; j < panel.columns; ++j, column += stride) {
     __m256 s0 = _mm256_setzero_ps();
-    for (std::size_t i = 0; i < stride; i += kWide) {
+    for (std::size_t i = 0; i < stride; i += kPanelWide) {
       s0 = _mm256_fmadd_ps(_mm256_load_ps(column + i), _mm256_load_ps(x + i), s0);
     }
     __m128 sum = _mm_add_ps(_mm256_castps256_ps128(s0), _mm256_extractf128_ps(s0, 1));

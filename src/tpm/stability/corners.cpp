@@ -13,7 +13,7 @@ namespace {
 
 using Expect = std::function<StabilityClass(StepRule)>;
 constexpr double kStep_s = 1e-3;
-constexpr double kDepth_m = 0.004;
+constexpr double kCornerDepth_m = 0.004;
 
 bool same_kind(StabilityClass a, StabilityClass b) {
   const auto grows = [](StabilityClass c) {
@@ -80,7 +80,7 @@ void add_relaxation_times(std::vector<StabilityCorner>& corners) {
   TpmParameters p;
   p.eta1_Pa_s = 1e-9;
   corners.push_back(
-      depth_at_once("eta1 -> 0 (1e-9 Pa s)", p, kDepth_m, kStep_s,
+      depth_at_once("eta1 -> 0 (1e-9 Pa s)", p, kCornerDepth_m, kStep_s,
                     "explicit rules diverge, Adams too or is too much work, midpoint and Newmark "
                     "ring, all else holds"));
   // Functional iteration follows the relaxation time for as long as it runs.
@@ -91,12 +91,12 @@ void add_relaxation_times(std::vector<StabilityCorner>& corners) {
     }
   }
   p.eta1_Pa_s = 1e15;
-  corners.push_back(depth_at_once("eta1 -> infinity (1e15 Pa s)", p, kDepth_m, kStep_s,
+  corners.push_back(depth_at_once("eta1 -> infinity (1e15 Pa s)", p, kCornerDepth_m, kStep_s,
                                   "an elastic element: all hold"));
   for (const double ratio : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
     StabilityCorner corner =
         depth_at_once("h/tau = " + significant(ratio, 2), with_relaxation_time(kStep_s / ratio),
-                      kDepth_m, kStep_s, kByTheory);
+                      kCornerDepth_m, kStep_s, kByTheory);
     for (CornerCell& cell : corner.cells) {
       if (cell.rule != StepRule::cvode_adams || ratio < 1e4) continue;
       cell.expected = StabilityClass::too_much_work;
@@ -111,7 +111,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
   TpmParameters maxwell = with_relaxation_time(kTau_s);
   maxwell.E1_Pa = 0.0;
   maxwell.eta1_Pa_s = kTau_s * maxwell.E2_Pa;
-  corners.push_back(depth_at_once("E1 = 0, a depth", maxwell, kDepth_m, kStep_s,
+  corners.push_back(depth_at_once("E1 = 0, a depth", maxwell, kCornerDepth_m, kStep_s,
                                   "a Maxwell fluid: all hold, down to the tension"));
   maxwell.Eprime_Pa = 0.0;
   const double end = kStudySteps * kStep_s;
@@ -138,7 +138,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
   loose.E2_Pa = 0.0;
   loose.eta1_Pa_s = kTau_s * loose.E1_Pa;
   corners.push_back(
-      depth_at_once("E2 = 0, a depth", loose, kDepth_m, kStep_s, "tension only: all hold"));
+      depth_at_once("E2 = 0, a depth", loose, kCornerDepth_m, kStep_s, "tension only: all hold"));
   corners.push_back(
       tried("E2 = 0, a load", "0.05 N at once and held",
             "tension carries it: all hold but XPBD, whose made-up mass is that of the "

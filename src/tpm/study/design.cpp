@@ -17,13 +17,13 @@
 namespace tpm {
 namespace {
 
-using Kind = PlannedExperiment::Kind;
+using ExperimentKind = PlannedExperiment::Kind;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The readings of one recording, without values.
 PointSet sampled(const PlannedExperiment& experiment) {
   PointSet points;
-  const bool creep = experiment.kind == Kind::creep;
+  const bool creep = experiment.kind == ExperimentKind::creep;
   points.observable = creep ? Observable::indentation_depth : Observable::contact_force;
   const auto n = static_cast<std::size_t>(experiment.samples());
   points.data.resize(n);
@@ -40,8 +40,8 @@ PointSet sampled(const PlannedExperiment& experiment) {
 DataChoice choice_for(const DesignProblem& problem, const PlannedExperiment& experiment) {
   DataChoice choice;
   choice.dataset = "planned";
-  choice.protocol.kind = experiment.kind == Kind::creep ? ProtocolChoice::Kind::creep
-                                                        : ProtocolChoice::Kind::ramp_hold;
+  choice.protocol.kind = experiment.kind == ExperimentKind::creep ? ProtocolChoice::Kind::creep
+                                                                  : ProtocolChoice::Kind::ramp_hold;
   choice.protocol.rate_m_per_s = experiment.rate_m_per_s;
   choice.noise.kind = NoiseKind::per_row;
   choice.noise.scale_known = problem.scale_known;
@@ -65,7 +65,7 @@ std::vector<double> starts_of(const FitConfig& config) {
 }
 
 const PlannedNoise& noise_for(const DesignProblem& problem, const PlannedExperiment& experiment) {
-  if (experiment.kind == Kind::ramp_hold) return problem.force_noise;
+  if (experiment.kind == ExperimentKind::ramp_hold) return problem.force_noise;
   if (problem.depth_noise) return *problem.depth_noise;
   throw bad_input(fmt::format("design '{}'", printable(problem.config.title)),
                   "creep without the noise of a depth", "it under /noise/depth");
@@ -252,7 +252,7 @@ void find_pair(DesignResult& result, const Knowledge& before) {
 }  // namespace
 
 double PlannedExperiment::ramp_s() const {
-  return kind == Kind::creep ? 0.0 : depth_m / rate_m_per_s;
+  return kind == ExperimentKind::creep ? 0.0 : depth_m / rate_m_per_s;
 }
 
 double PlannedExperiment::duration_s() const {
@@ -300,7 +300,7 @@ RecordingInformation recording_information(const DesignProblem& problem,
   information.fisher = seen.transpose() * seen / per_sample;
   information.effective_samples = information.samples / per_sample;
   information.peak_depth_m =
-      experiment.kind == Kind::creep ? expected.maxCoeff() : experiment.depth_m;
+      experiment.kind == ExperimentKind::creep ? expected.maxCoeff() : experiment.depth_m;
   return information;
 }
 

@@ -9,7 +9,7 @@
 namespace tpm {
 namespace {
 
-using Kind = PlannedExperiment::Kind;
+using ExperimentKind = PlannedExperiment::Kind;
 
 /// More candidates than this are a mistake of the file.
 constexpr std::size_t kMostCandidates = 20000;
@@ -82,8 +82,8 @@ void add_grid(const Json& grid, const std::string& where, std::vector<PlannedExp
       for (const double hold : holds) {
         for (const double interval : intervals) {
           for (const int repeat : repeats) {
-            list.push_back({creep ? Kind::creep : Kind::ramp_hold, creep ? 0.0 : size, rate,
-                            creep ? size : 0.0, hold, interval, repeat});
+            list.push_back({creep ? ExperimentKind::creep : ExperimentKind::ramp_hold,
+                            creep ? 0.0 : size, rate, creep ? size : 0.0, hold, interval, repeat});
           }
         }
       }
@@ -205,7 +205,7 @@ void parse_goal(const Json& document, DesignProblem& problem, std::string_view w
 
 void require_creep_noise(const DesignProblem& problem, std::string_view where) {
   if (problem.depth_noise) return;
-  const auto is_creep = [](const PlannedExperiment& e) { return e.kind == Kind::creep; };
+  const auto is_creep = [](const PlannedExperiment& e) { return e.kind == ExperimentKind::creep; };
   if (std::none_of(problem.candidates.begin(), problem.candidates.end(), is_creep) &&
       std::none_of(problem.previous.begin(), problem.previous.end(), is_creep)) {
     return;

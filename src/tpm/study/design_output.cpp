@@ -11,30 +11,30 @@
 namespace tpm {
 namespace {
 
-constexpr int kDigits = 6;
+constexpr int kDesignDigits = 6;
 
 /// null for what is not finite: an unknown parameter has an infinite error.
-Json number(double value) {
-  return std::isfinite(value) ? Json(rounded(value, kDigits)) : Json(nullptr);
+Json finite_json(double value) {
+  return std::isfinite(value) ? Json(rounded(value, kDesignDigits)) : Json(nullptr);
 }
 
-Json number(const std::optional<double>& value) {
-  return value ? number(*value) : Json(nullptr);
+Json finite_json(const std::optional<double>& value) {
+  return value ? finite_json(*value) : Json(nullptr);
 }
 
 Json to_json(const PlannedExperiment& e) {
   Json j;
   if (e.kind == PlannedExperiment::Kind::creep) {
-    j = {{"kind", "creep"}, {"load_N", number(e.load_N)}};
+    j = {{"kind", "creep"}, {"load_N", finite_json(e.load_N)}};
   } else {
     j = {{"kind", "ramp_hold"},
-         {"depth_m", number(e.depth_m)},
-         {"rate_m_per_s", number(e.rate_m_per_s)}};
+         {"depth_m", finite_json(e.depth_m)},
+         {"rate_m_per_s", finite_json(e.rate_m_per_s)}};
   }
-  j["hold_s"] = number(e.hold_s);
-  j["interval_s"] = number(e.interval_s);
+  j["hold_s"] = finite_json(e.hold_s);
+  j["interval_s"] = finite_json(e.interval_s);
   j["repeats"] = e.repeats;
-  j["total_time_s"] = number(e.total_s());
+  j["total_time_s"] = finite_json(e.total_s());
   return j;
 }
 
@@ -44,16 +44,16 @@ Json to_json(const Expectation& expected, const DesignProblem& problem) {
     const ExpectedParameter& p = expected.parameters[i];
     list.push_back({{"name", p.name},
                     {"unit", si_symbol(problem.parameter(i).unit.dimension)},
-                    {"value", number(p.value)},
-                    {"relative_standard_error", number(p.relative_error)},
-                    {"lower", number(p.lower)},
-                    {"upper", number(p.upper)},
+                    {"value", finite_json(p.value)},
+                    {"relative_standard_error", finite_json(p.relative_error)},
+                    {"lower", finite_json(p.lower)},
+                    {"upper", finite_json(p.upper)},
                     {"identified", p.identified},
                     {"rival", p.rival},
-                    {"rival_correlation", number(p.rival_correlation)}});
+                    {"rival_correlation", finite_json(p.rival_correlation)}});
   }
-  return {{"score", number(expected.score)},
-          {"effective_samples", number(expected.effective_samples)},
+  return {{"score", finite_json(expected.score)},
+          {"effective_samples", finite_json(expected.effective_samples)},
           {"parameters", std::move(list)}};
 }
 
@@ -61,12 +61,12 @@ Json to_json(const DesignCheck& check) {
   Json list = Json::array();
   for (const CheckedParameter& p : check.parameters) {
     list.push_back({{"name", p.name},
-                    {"predicted_theta_sd", number(p.predicted)},
-                    {"observed_theta_sd", number(p.observed)},
-                    {"ratio", number(p.ratio)},
-                    {"ratio_error", number(p.ratio_error)},
-                    {"bias_in_predicted_sd", number(p.bias)},
-                    {"bias_error", number(p.bias_error)},
+                    {"predicted_theta_sd", finite_json(p.predicted)},
+                    {"observed_theta_sd", finite_json(p.observed)},
+                    {"ratio", finite_json(p.ratio)},
+                    {"ratio_error", finite_json(p.ratio_error)},
+                    {"bias_in_predicted_sd", finite_json(p.bias)},
+                    {"bias_error", finite_json(p.bias_error)},
                     {"covered", p.covered},
                     {"agrees", p.agrees}});
   }
@@ -147,8 +147,8 @@ Json to_json(const DesignResult& result, const DesignCheck* check, std::size_t t
   for (std::size_t i = 0; i < std::min(top, result.ranked.size()); ++i) {
     const DesignCandidate& c = result.ranked[i];
     list.push_back({{"experiment", to_json(c.experiment)},
-                    {"samples", number(c.one.samples)},
-                    {"peak_depth_m", number(c.one.peak_depth_m)},
+                    {"samples", finite_json(c.one.samples)},
+                    {"peak_depth_m", finite_json(c.one.peak_depth_m)},
                     {"expected", to_json(c.expected, problem)}});
   }
   j["ranked"] = std::move(list);

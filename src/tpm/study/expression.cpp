@@ -15,12 +15,16 @@ namespace {
 
 constexpr int kDeepestDefinition = 50;
 
+}  // namespace
+
 /// A formula ready to run: muParser reads the variables from `values`.
-struct Compiled {
+struct CompiledFormula {
   mu::Parser parser;
   std::vector<std::string> names;
   std::vector<double> values;
 };
+
+namespace {
 
 mu::Parser new_parser() {
   mu::Parser parser;
@@ -51,9 +55,9 @@ std::string without_full_stop(std::string message) {
   return message;
 }
 
-std::unique_ptr<Compiled> compile(const std::string& text, std::string_view where) {
+std::unique_ptr<CompiledFormula> compile(const std::string& text, std::string_view where) {
   if (assigns(text)) throw broken(text, "'=' assigns", where);
-  auto compiled = std::make_unique<Compiled>();
+  auto compiled = std::make_unique<CompiledFormula>();
   compiled->parser = new_parser();
   try {
     compiled->parser.SetExpr(text);
@@ -75,10 +79,10 @@ std::unique_ptr<Compiled> compile(const std::string& text, std::string_view wher
 struct Evaluator::Impl {
   std::map<std::string, double, std::less<>> symbols;
   std::map<std::string, std::string, std::less<>> definitions;
-  std::map<std::string, std::unique_ptr<Compiled>> cache;
+  std::map<std::string, std::unique_ptr<CompiledFormula>> cache;
   mu::Parser reserved = new_parser();  ///< only asked for the names it knows
 
-  Compiled& compiled(const std::string& text, std::string_view where) {
+  CompiledFormula& compiled(const std::string& text, std::string_view where) {
     auto& slot = cache[text];
     if (!slot) slot = compile(text, where);
     return *slot;
@@ -111,7 +115,7 @@ struct Evaluator::Impl {
   }
 
   double run(const std::string& text, const Scope& scope, std::string_view where, int depth) {
-    Compiled& formula = compiled(text, where);
+    CompiledFormula& formula = compiled(text, where);
     // Looked up first: a definition may use the same formula and so the same storage.
     std::vector<double> values;
     values.reserve(formula.names.size());

@@ -9,10 +9,10 @@ namespace {
 
 using Kind = ProtocolChoice::Kind;
 
-constexpr int kDigits = 5;
+constexpr int kStudyDigits = 5;
 
 double number(double value) {
-  return rounded(value, kDigits);
+  return rounded(value, kStudyDigits);
 }
 
 Json parameters_json(const TpmParameters& p) {

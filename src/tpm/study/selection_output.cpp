@@ -6,7 +6,7 @@
 namespace tpm {
 namespace {
 
-double number(double value) {
+double kept_digits(double value) {
   return rounded(value, 6);
 }
 
@@ -14,10 +14,10 @@ Json held_out_json(const Candidate& c) {
   Json list = Json::array();
   for (const HeldOut& h : c.held_out) {
     list.push_back({{"what", h.what},
-                    {"rms_SI", number(h.rms)},
-                    {"rms_over_peak", number(h.rms_over_peak)},
-                    {"rms_over_sd", number(h.rms_standardised)},
-                    {"rms_if_fitted_SI", number(h.rms_if_fitted)},
+                    {"rms_SI", kept_digits(h.rms)},
+                    {"rms_over_peak", kept_digits(h.rms_over_peak)},
+                    {"rms_over_sd", kept_digits(h.rms_standardised)},
+                    {"rms_if_fitted_SI", kept_digits(h.rms_if_fitted)},
                     {"predicts", h.predicts}});
   }
   return list;
@@ -30,9 +30,9 @@ Json candidate_json(const Candidate& c) {
     return j;
   }
   j["parameters_estimated"] = c.parameters - 1;
-  j["rms_over_peak"] = number(c.rms_over_peak);
-  j["delta_bic"] = number(c.delta_bic);
-  j["delta_aicc"] = number(c.delta_aicc);
+  j["rms_over_peak"] = kept_digits(c.rms_over_peak);
+  j["delta_bic"] = kept_digits(c.delta_bic);
+  j["delta_aicc"] = kept_digits(c.delta_aicc);
   j["identified"] = c.identified;
   j["reason"] = c.reason;
   j["held_out"] = held_out_json(c);
@@ -55,7 +55,7 @@ Json to_json(const Selection& s) {
          {"lowest_bic", law_name(s.candidates[s.best_bic].law)},
          {"margin_bic", s.margin},
          {"samples", s.samples},
-         {"effective_readings", number(s.effective_count)}};
+         {"effective_readings", kept_digits(s.effective_count)}};
   Json laws = Json::array();
   for (const Candidate& c : s.candidates) laws.push_back(candidate_json(c));
   j["laws"] = std::move(laws);

@@ -1,0 +1,91 @@
+# The floors of src/tpm, each a library of objects, so that a library can be put together of floors
+# compiled in one way and floors compiled in another.
+set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_assimp OpenSSL::Crypto
+    Threads::Threads ${CMAKE_DL_LIBS})
+
+function(tpm_floor_options target)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_link_libraries(${target} PRIVATE Eigen3::Eigen nlohmann_json::nlohmann_json fmt::fmt
+                                          ${TPM_PRIVATE_LIBRARIES} tpm_header_only tpm_options)
+  target_compile_definitions(${target} PRIVATE TPM_VERSION="${PROJECT_VERSION}"
+    TPM_SOURCE_SHARE="${PROJECT_SOURCE_DIR}"
+    TPM_INSTALL_SHARE="${CMAKE_INSTALL_FULL_DATADIR}/tpmkit")
+  target_compile_options(${target} PRIVATE ${ARGN})
+  if(TPM_SANITIZED_TWINS OR BUILD_SHARED_LIBS)
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(${target} PRIVATE -fno-semantic-interposition)
+  endif()
+endfunction()
+
+# tpm_floors(SUFFIX FLAGS FLOOR...): targets tpm_floor_FLOOR+SUFFIX with these flags; their objects
+# are listed in TPM_FLOOR_OBJECTS.
+function(tpm_floors suffix flags)
+  # Loops over lanes become vectors: they are marked, and nobody reads errno after a square root there.
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/network/lane_bonds.cpp
+    ${PROJECT_SOURCE_DIR}/src/tpm/solve/lanes.cpp
+    PROPERTIES COMPILE_OPTIONS "-fno-math-errno;-fopenmp-simd" SKIP_PRECOMPILE_HEADERS ON
+               SKIP_UNITY_BUILD_INCLUSION ON)
+  set(objects)
+  foreach(way fast arranging)
+    set(carrier tpm_floor_headers_${way}${suffix})
+    set(own_flags ${flags})
+    if(way STREQUAL arranging AND TPM_QUICK_TO_BUILD)
+      list(APPEND own_flags -O0)
+    endif()
+    if(TPM_COMMON_HEADERS)  # headers that most files include are read once for each way
+      file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/${carrier}.cpp CONTENT "")
+      add_library(${carrier} OBJECT ${CMAKE_BINARY_DIR}/${carrier}.cpp)
+      tpm_floor_options(${carrier} ${own_flags})
+      tpm_common_headers(${carrier} <algorithm> <cmath> <filesystem> <map> <optional> <span> <string> <vector>
+                         <Eigen/Core> <fmt/format.h>)
+    endif()
+    foreach(floor IN LISTS ARGN)
+      if((floor IN_LIST TPM_ARRANGING_FLOORS AND way STREQUAL fast) OR
+         (NOT floor IN_LIST TPM_ARRANGING_FLOORS AND way STREQUAL arranging))
+        continue()
+      endif()
+      set(target tpm_floor_${floor}${suffix})
+      file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/*.cpp)
+      if(NOT sources)
+        continue()
+      endif()
+      add_library(${target} OBJECT ${sources})
+      tpm_floor_options(${target} ${own_flags})
+      tpm_compile_together(${target})
+      if(TPM_COMMON_HEADERS)
+        target_precompile_headers(${target} REUSE_FROM ${carrier})
+      endif()
+      list(APPEND objects $<TARGET_OBJECTS:${target}>)
+    endforeach()
+  endforeach()
+  set(TPM_FLOOR_OBJECTS ${objects} PARENT_SCOPE)
+endfunction()
+
+set(TPM_SANITIZED_FLOORS core store protocol material solve model law network curve scene simulate method
+    reduce device servo haptics CACHE STRING "Floors under address and undefined in sanitized twins")
+
+# A twin of the library in which the floors named run under sanitizers; the others are those of
+# tpmkit. The fast tests, compiled once, run with tpmkit and with the twin. A floor's own inline
+# functions stay its own (-Bsymbolic-functions), or those of the tests would take their place.
+function(tpm_sanitized_twin twin sanitize)
+  set(flags -fsanitize=${sanitize} -fno-omit-frame-pointer -fno-sanitize-recover=all -O1 -g1 -Wno-maybe-uninitialized)
+  if(sanitize MATCHES "address" AND sanitize MATCHES "undefined")
+    list(APPEND flags -fno-sanitize=null,alignment,object-size,vptr -DEIGEN_MALLOC_ALREADY_ALIGNED=1)
+    # for both see TpmCompileOptions.cmake
+  endif()
+  if(sanitize STREQUAL "thread")
+    list(APPEND flags -Wno-tsan)  # of readerwriterqueue's fences
+  endif()
+  tpm_floors(_${twin} "${flags}" ${ARGN})
+  set(rest ${TPM_FLOORS})
+  list(REMOVE_ITEM rest ${ARGN})
+  foreach(floor IN LISTS rest)
+    if(TARGET tpm_floor_${floor})
+      list(APPEND TPM_FLOOR_OBJECTS $<TARGET_OBJECTS:tpm_floor_${floor}>)
+    endif()
+  endforeach()
+  add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS})
+  set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX)
+  target_link_options(${twin} PUBLIC -fsanitize=${sanitize} PRIVATE -Wl,-Bsymbolic-functions)
+  target_link_libraries(${twin} PRIVATE fmt::fmt ${TPM_PRIVATE_LIBRARIES})
+endfunction()
