@@ -78,7 +78,8 @@ MeanCounts mean_counts(const Network& network, int layer) {
 
 }  // namespace
 
-TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rule normalised") {
+TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rule normalised",
+          "[heavy]") {
   const TpmParameters p = unequal_material();
   const Network network = build_network(paper_liver(), {}, "liver");
   const BondSystem bonds(network, p);

@@ -53,7 +53,7 @@ Eigen::Vector3d path(int step) {
 
 }  // namespace
 
-TEST_CASE("a condensed contact follows the full network, force and field", "[condensed]") {
+TEST_CASE("a condensed contact follows the full network, force and field", "[condensed][heavy]") {
   const double tau = GENERATE(2e-4, 0.02, 0.2, 50.0);
   CAPTURE(tau);
   const BondSystem bonds = organ().bonds(tau);
@@ -98,7 +98,7 @@ TEST_CASE("a condensed contact starts with the stiffness of the network", "[cond
   CHECK(rest.step(Eigen::Vector3d::Zero()).force_N.norm() < 1e-12);
 }
 
-TEST_CASE("another relaxation time needs no new solutions", "[condensed]") {
+TEST_CASE("another relaxation time needs no new solutions", "[condensed][heavy]") {
   CondensedContact rescaled = built().with_relaxation_time(0.02);
   CondensedContact anew = organ().build(0.02);
   for (int i = 1; i <= 200; ++i) {
@@ -117,7 +117,7 @@ TEST_CASE("another relaxation time needs no new solutions", "[condensed]") {
   CHECK(off < 2e-4 * peak);
 }
 
-TEST_CASE("a condensed contact creates no energy", "[condensed]") {
+TEST_CASE("a condensed contact creates no energy", "[condensed][heavy]") {
   const double tau = GENERATE(2e-4, 0.01, 1.0);
   CAPTURE(tau);
   CondensedContact contact = built().with_relaxation_time(tau);

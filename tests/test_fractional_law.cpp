@@ -169,7 +169,7 @@ TEST_CASE("a jump of the depth: exact stiffness at once, or refused", "[fraction
   }
 }
 
-TEST_CASE("creep under a step of load is the exact compliance", "[fractional]") {
+TEST_CASE("creep under a step of load is the exact compliance", "[fractional][heavy]") {
   const std::vector<double> times{0.0, 0.05, 0.2, 1.0, 5.0, 40.0};
   for (const Element& element : kElements) {
     LawSpec spec = parse_law_name(element.name, "test");

@@ -317,7 +317,7 @@ TEST_CASE("a run with mass in two halves is one run") {
   }
 }
 
-TEST_CASE("driven slowly, the inertial network is the quasi-static one") {
+TEST_CASE("driven slowly, the inertial network is the quasi-static one", "[heavy]") {
   const Block block(slow_tissue());
   double last = 1.0;
   for (const double slowness : {1.0, 10.0, 100.0}) {

@@ -82,7 +82,8 @@ TEST_CASE("iterative and direct equilibria of the paper's liver are the same") {
   compare_solvers({paper_liver(), 0.03, 0.05});
 }
 
-TEST_CASE("multigrid needs about as many iterations for more spheres, block Jacobi more") {
+TEST_CASE("multigrid needs about as many iterations for more spheres, block Jacobi more",
+          "[heavy]") {
   const auto iterations = [](int cells, PreconditionerKind kind) {
     const IndentedScene scene(block(cells, cells, cells, 0.1 / cells, Lattice::fcc), 0.03, 0.02,
                               -Eigen::Vector3d::UnitZ());

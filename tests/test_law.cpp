@@ -112,7 +112,7 @@ TEST_CASE("the law linear-1-elastic is the paper's element", "[law]") {
   }
 }
 
-TEST_CASE("sensitivities of every law agree with differences", "[law]") {
+TEST_CASE("sensitivities of every law agree with differences", "[law][heavy]") {
   Random random(11);
   const Protocol push(Drive::displacement,
                       {{0.0, 0.0}, {0.7, 2e-3}, {1.5, 1.8e-3}, {2.0, 3e-3}, {6.0, 3e-3}});

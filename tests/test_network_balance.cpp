@@ -60,7 +60,7 @@ Organ shuffled(const Organ& organ, Random& random) {
 
 }  // namespace
 
-TEST_CASE("work done is stored or dissipated, over random closed protocols") {
+TEST_CASE("work done is stored or dissipated, over random closed protocols", "[heavy]") {
   const OrganScene scene(small_liver());
   Random random(0);
   for (int i = 0; i < 6; ++i) {

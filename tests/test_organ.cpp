@@ -93,7 +93,7 @@ TEST_CASE("a point exactly on the support radius is a neighbour") {
   CHECK(pairs_within(points, 0.02) == std::vector<NeighbourPair>{{0, 1}});
 }
 
-TEST_CASE("the liver of the paper has what the paper prints") {
+TEST_CASE("the liver of the paper has what the paper prints", "[heavy]") {
   const Organ liver = paper_liver();
   CHECK(liver.size() == 424);
   CHECK(liver.layer_count() == 2);
@@ -158,7 +158,7 @@ TEST_CASE("the liver is of a real one's size and answers its measures") {
                     Contains("notch_depth of the liver is 0.5; expected 0.1 to 0.2"));
 }
 
-TEST_CASE("every end of the liver's ranges gives a closed smooth surface") {
+TEST_CASE("every end of the liver's ranges gives a closed smooth surface", "[heavy]") {
   for (const LiverMeasure& measure : liver_measures()) {
     if (measure.name == "width") continue;
     for (const double share : {measure.least, measure.most}) {
@@ -173,7 +173,7 @@ TEST_CASE("every end of the liver's ranges gives a closed smooth surface") {
   }
 }
 
-TEST_CASE("a liver has the number of spheres and layers asked for, exactly") {
+TEST_CASE("a liver has the number of spheres and layers asked for, exactly", "[heavy]") {
   const std::size_t count = GENERATE(2U, 3U, 7U, 424U, 4001U);
   const int layers = GENERATE(1, 2, 3);
   if (count < static_cast<std::size_t>(layers)) return;

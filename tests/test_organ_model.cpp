@@ -66,7 +66,7 @@ TEST_CASE("the star of a scene answers as the closed form, derivatives included"
   }
 }
 
-TEST_CASE("an organ scaled by its spacing answers as one built at that spacing") {
+TEST_CASE("an organ scaled by its spacing answers as one built at that spacing", "[heavy]") {
   const auto scene = [](const char* spacing, const char* law) {
     return tissue_of((std::string(R"({"organ": {"kind": "liver", "count": 60, "spacing": ")") +
                       spacing + R"("}, "bonds": {"spacing_law": ")" + law + R"("}})")
@@ -167,7 +167,7 @@ TEST_CASE("a search with a scout ends where one without does, and asks less") {
           1e-3));
 }
 
-TEST_CASE("a fit with an organ needs its scene, and one that stands") {
+TEST_CASE("a fit with an organ needs its scene, and one that stands", "[heavy]") {
   const auto config = [](const std::string& extra) {
     return parse_json(R"({"title": "t", )" + extra + R"(,
       "parameters": {"E": {"start": "12 kPa", "lower": "1 kPa", "upper": "90 kPa", "sets": ["E1", "E2", "Eprime"]}},

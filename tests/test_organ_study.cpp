@@ -183,7 +183,8 @@ TpmParameters parameters_in(const Json& j) {
 
 }  // namespace
 
-TEST_CASE("the committed readings are what the tissues answer at the committed materials") {
+TEST_CASE("the committed readings are what the tissues answer at the committed materials",
+          "[heavy]") {
   const Json report = read_json(kReport / "experiments.json");
   Json study = shipped();
   study["fits"] = {{"all", study["fits"]["all"]}};  // each fit reads the organs anew

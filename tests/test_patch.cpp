@@ -117,7 +117,7 @@ TEST_CASE("what relaxes halves with equal springs, and lateral bonds keep their 
   CHECK(relaxed(0, 0) < at_once(0, 0));
 }
 
-TEST_CASE("the continuum law keeps the modulus of a block, the paper's law does not") {
+TEST_CASE("the continuum law keeps the modulus of a block, the paper's law does not", "[heavy]") {
   for (const Cubic& entry : kCubic) {
     for (const StiffnessRule rule : {StiffnessRule::normalised, StiffnessRule::per_bond}) {
       const auto modulus = [&](SpacingLaw law, double spacing, int more_cells) {
@@ -134,7 +134,7 @@ TEST_CASE("the continuum law keeps the modulus of a block, the paper's law does 
   }
 }
 
-TEST_CASE("a block between smooth plates comes nearer to the bulk with more cells") {
+TEST_CASE("a block between smooth plates comes nearer to the bulk with more cells", "[heavy]") {
   const auto block_of = [](int cells) {
     return Block(Lattice::cubic, cells, kCoarseSpacing, options_of(StiffnessRule::per_bond));
   };

@@ -28,7 +28,7 @@ Tissue tissue_of(const char* scene) {
 
 }  // namespace
 
-TEST_CASE("the shipped scene is the liver of the paper, held on its far side") {
+TEST_CASE("the shipped scene is the liver of the paper, held on its far side", "[heavy]") {
   const Tissue tissue = read_tissue(share_dir() / "configs" / "liver_scene.json");
   CHECK(tissue.network.organ.position == paper_liver().position);
   CHECK(tissue.anchors.size() == 69);
@@ -92,7 +92,7 @@ TEST_CASE("a star in a scene is the element: B guided, the others held, three bo
   CHECK_NOTHROW(require_standing(tissue, "scene"));
 }
 
-TEST_CASE("three layers, more spheres, and a solid filling stand too") {
+TEST_CASE("three layers, more spheres, and a solid filling stand too", "[heavy]") {
   for (const char* scene :
        {R"({"organ": {"kind": "liver", "layers": 3}})",
         R"({"organ": {"kind": "liver", "count": 2000, "shape": {"width": "210 mm"}}})",

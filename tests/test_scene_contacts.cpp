@@ -51,7 +51,7 @@ TEST_CASE("a scene says what meets the tissue") {
   CHECK(driven.probes.size() == 1 + patch.size());
 }
 
-TEST_CASE("a poked liver lets go of the tool and recovers") {
+TEST_CASE("a poked liver lets go of the tool and recovers", "[heavy]") {
   const SimulationRecord record = run_of(small_scene(kBall + kPoke)).record;
   const double peak = record.curve[33].response;
   CHECK(peak > 0.05);
@@ -74,7 +74,7 @@ TEST_CASE("a poked liver lets go of the tool and recovers") {
   CHECK(moved(6) < 0.25 * moved(4));  // 2 s on: exp(-2 s/1.4 s), the time in which a bond recovers
 }
 
-TEST_CASE("formulations agree on a tool where time does not matter") {
+TEST_CASE("formulations agree on a tool where time does not matter", "[heavy]") {
   const auto end_of = [](const std::string& hold, const std::string& formulation) {
     return run_of(small_scene(kBall + R"("protocol": {"kind": "ramp_hold", "depth": "2 mm",
                     "rate": "1 mm/s", "hold": ")" +
@@ -86,7 +86,7 @@ TEST_CASE("formulations agree on a tool where time does not matter") {
   CHECK_THAT(end_of("1 s", "inertial"), WithinRel(end_of("1 s", "quasi_static"), 1e-3));
 }
 
-TEST_CASE("runs with tools are resumed to the bit") {
+TEST_CASE("runs with tools are resumed to the bit", "[heavy]") {
   const ExperimentScene scene = small_scene(kThree + kPoke);
   const SimulationRecord whole = run_of(scene).record;
   const TempFolder folder;
@@ -106,7 +106,7 @@ TEST_CASE("runs with tools are resumed to the bit") {
   }
 }
 
-TEST_CASE("the file of a run holds its tools and what they did") {
+TEST_CASE("the file of a run holds its tools and what they did", "[heavy]") {
   const TempFolder folder;
   const ExperimentScene scene = small_scene(kThree + kPoke);
   const RunNetwork network = network_to_run(scene);
@@ -126,7 +126,7 @@ TEST_CASE("the file of a run holds its tools and what they did") {
   CHECK(run.record.outputs[2].response > 0.1);
 }
 
-TEST_CASE("contacts that cannot be are refused") {
+TEST_CASE("contacts that cannot be are refused", "[heavy]") {
   const auto refused = [](const std::string& contacts, const std::string& more = kPoke) {
     CHECK_THROWS_AS(small_scene("\"contacts\": [" + contacts + "], " + more), Error);
   };

@@ -137,7 +137,7 @@ TEST_CASE("a factor in fronts solves as a dense one does", "[frontal]") {
   CHECK_FALSE(factor.factorise(diagonal, across));
 }
 
-TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo]") {
+TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const double z = 0.3;
@@ -196,7 +196,7 @@ TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo]"
   }
 }
 
-TEST_CASE("the servo network follows the network along the normal and in space", "[servo]") {
+TEST_CASE("the servo network follows the network along the normal and in space", "[servo][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
@@ -228,7 +228,7 @@ TEST_CASE("the servo network follows the network along the normal and in space",
   }
 }
 
-TEST_CASE("the fine reference is the quasi-static network", "[servo]") {
+TEST_CASE("the fine reference is the quasi-static network", "[servo][heavy]") {
   const OrganScene& scene = small_liver();
   const BondSystem bonds(scene.network, material_with(5e-3));
   const TouchedTissue tissue{bonds, scene.network.organ.position, scene.freedom,
@@ -273,7 +273,7 @@ TEST_CASE("the cost of linear elongations is what halving the step says", "[serv
   CHECK(worst < 0.2 * largest_N);
 }
 
-TEST_CASE("a step of the servo network allocates nothing, and runs repeat", "[servo]") {
+TEST_CASE("a step of the servo network allocates nothing, and runs repeat", "[servo][heavy]") {
   const OrganScene& scene = small_liver();
   const BondSystem bonds(scene.network, material_with(0.01));
   const Eigen::Vector3d into = scene.probe.direction;

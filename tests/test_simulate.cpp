@@ -85,7 +85,7 @@ TEST_CASE("a contact is found by its place") {
   CHECK(experiment(R"({"organ": {"kind": "liver"}, )" + at + push).probe().sphere == 70);
 }
 
-TEST_CASE("outputs by number and by spacing, the ends among them") {
+TEST_CASE("outputs by number and by spacing, the ends among them", "[heavy]") {
   const auto times = [](const std::string& outputs) {
     return small_scene(kPush + ", \"outputs\": {" + outputs + "}").outputs.times_s;
   };
@@ -95,7 +95,7 @@ TEST_CASE("outputs by number and by spacing, the ends among them") {
   CHECK(small_scene(kPush).outputs.times_s.size() == 61);
 }
 
-TEST_CASE("a run in parts is the run of the whole, within its tolerance") {
+TEST_CASE("a run in parts is the run of the whole, within its tolerance", "[heavy]") {
   for (const std::string& protocol : {kPush, kLoad}) {
     const ExperimentScene scene = small_scene(protocol);
     const SimulationRecord record = run_of(scene).record;
@@ -117,7 +117,7 @@ TEST_CASE("a run in parts is the run of the whole, within its tolerance") {
   }
 }
 
-TEST_CASE("an interrupted run goes on to the same result, to the bit") {
+TEST_CASE("an interrupted run goes on to the same result, to the bit", "[heavy]") {
   for (const std::string& protocol :
        {kPush, kLoad, kStatic + kPush, kMoving + kPush, kMoving + kLoad}) {
     const ExperimentScene scene = small_scene(protocol);
@@ -145,7 +145,7 @@ TEST_CASE("an interrupted run goes on to the same result, to the bit") {
   }
 }
 
-TEST_CASE("a checkpoint of a whole run is answered without running again") {
+TEST_CASE("a checkpoint of a whole run is answered without running again", "[heavy]") {
   const ExperimentScene scene = small_scene(kPush);
   const TempFolder folder;
   SimulationControls controls;
@@ -160,7 +160,7 @@ TEST_CASE("a checkpoint of a whole run is answered without running again") {
   check_same(again.record, first.record);
 }
 
-TEST_CASE("the checkpoint of another scene is not used, and that is said") {
+TEST_CASE("the checkpoint of another scene is not used, and that is said", "[heavy]") {
   const TempFolder folder;
   SimulationControls controls;
   controls.checkpoint = folder / "c";
@@ -180,7 +180,7 @@ TEST_CASE("the checkpoint of another scene is not used, and that is said") {
   CHECK_THAT(note, Contains("of another scene"));
 }
 
-TEST_CASE("a load put on at once does not step over an instability") {
+TEST_CASE("a load put on at once does not step over an instability", "[heavy]") {
   const auto end_of = [](double load_N) -> std::string {
     const ExperimentScene scene = small_scene(
         fmt::format(R"("protocol": {{"kind": "knots", "knots": [{{"time": "0 s", "load": "0 N"}},
@@ -200,7 +200,7 @@ TEST_CASE("a load put on at once does not step over an instability") {
   }
 }
 
-TEST_CASE("limits of validity are dated and name their spheres") {
+TEST_CASE("limits of validity are dated and name their spheres", "[heavy]") {
   const auto deep = [](const std::string& depth) {
     return run_of(small_scene(R"("protocol": {"kind": "ramp_hold", "depth": ")" + depth +
                               R"(", "rate": "1 mm/s", "hold": "1 s"})"))
@@ -237,7 +237,7 @@ TEST_CASE("a lateral bond of the star turns as the paper's angle says") {
   CHECK(breach.spheres == std::vector<std::size_t>{0, 1, 2});
 }
 
-TEST_CASE("static states are those that a load held for ever reaches") {
+TEST_CASE("static states are those that a load held for ever reaches", "[heavy]") {
   const ExperimentScene scene = small_scene(kStatic + kLoad);
   const SimulationRecord record = run_of(scene).record;
   const double forever = std::numeric_limits<double>::infinity();
@@ -255,7 +255,7 @@ TEST_CASE("static states are those that a load held for ever reaches") {
              WithinRel(record.curve.back().energy.stored_J, 1e-9));
 }
 
-TEST_CASE("the mass-spring model meets a small depth with the tissue's relaxed force") {
+TEST_CASE("the mass-spring model meets a small depth with the tissue's relaxed force", "[heavy]") {
   const std::string push = R"("protocol": {"kind": "step_hold", "depth": "1 um", "hold": "1 s"}, )";
   const ExperimentScene tissue = small_scene(push + kStatic + R"("title": "t")");
   ExperimentScene springs = tissue;
@@ -265,7 +265,8 @@ TEST_CASE("the mass-spring model meets a small depth with the tissue's relaxed f
   CHECK_THAT(run_of(springs).record.curve.back().response, WithinRel(force, 1e-4));
 }
 
-TEST_CASE("a slow push of spheres with mass is the quasi-static one, and its energy closes") {
+TEST_CASE("a slow push of spheres with mass is the quasi-static one, and its energy closes",
+          "[heavy]") {
   const std::string slow =
       R"("protocol": {"kind": "ramp_hold", "depth": "2 mm", "rate": "1 mm/s", "hold": "8 s"})";
   const SimulationRun moving =
@@ -279,7 +280,7 @@ TEST_CASE("a slow push of spheres with mass is the quasi-static one, and its ene
   CHECK(std::abs(energy->missing()) < 1e-2 * energy->work);
 }
 
-TEST_CASE("roughness is stated where something has moved") {
+TEST_CASE("roughness is stated where something has moved", "[heavy]") {
   const ExperimentScene scene = small_scene(kPush);
   const SimulationRecord record = run_of(scene).record;
   CHECK_FALSE(smoothness_of(scene, record.outputs.front().position));
@@ -289,7 +290,7 @@ TEST_CASE("roughness is stated where something has moved") {
   CHECK(found->near_contact < 1.0);
 }
 
-TEST_CASE("a load that nothing carries is refused where the tissue gives way") {
+TEST_CASE("a load that nothing carries is refused where the tissue gives way", "[heavy]") {
   CHECK_THAT(refusal_of([] {
                (void)run_of(small_scene(
                    R"("protocol": {"kind": "creep", "load": "1e6 N", "duration": "1 s"})"));

@@ -70,7 +70,7 @@ std::set<std::string> keys_of(const Json& json) {
 
 }  // namespace
 
-TEST_CASE("the file of a run holds its scene, version, tolerance, and what was found") {
+TEST_CASE("the file of a run holds its scene, version, tolerance, and what was found", "[heavy]") {
   const TempFolder folder;
   const ExperimentScene scene = small_scene(kPush + R"(, "title": "a push")");
   const RunNetwork network = network_to_run(scene);
@@ -114,7 +114,7 @@ TEST_CASE("the file of a run holds its scene, version, tolerance, and what was f
   CHECK(read_file(folder / "a.h5") == read_file(folder / "b.h5"));
 }
 
-TEST_CASE("every key of the JSON answer is described in docs/simulate.md") {
+TEST_CASE("every key of the JSON answer is described in docs/simulate.md", "[heavy]") {
   const std::string page = read_file(std::string(TPM_TEST_SOURCE_DIR) + "/docs/simulate.md");
   const ExperimentScene deep = small_scene(
       R"("protocol": {"kind": "ramp_hold", "depth": "13 mm", "rate": "4 mm/s", "hold": "1 s"})");
@@ -125,7 +125,7 @@ TEST_CASE("every key of the JSON answer is described in docs/simulate.md") {
   }
 }
 
-TEST_CASE("a run that is stopped, by whatever signal, ends as one that was not") {
+TEST_CASE("a run that is stopped, by whatever signal, ends as one that was not", "[heavy]") {
   const TempFolder folder;
   // Large enough for a checkpoint to be seen before the end.
   write_scene(folder / "s.json", R"({"organ": {"kind": "liver", "count": 1500},
@@ -161,7 +161,8 @@ TEST_CASE("nothing is said on standard error where that is no terminal") {
   CHECK(json.at("files").size() == 2);
 }
 
-TEST_CASE("tissue and mass-spring model are run and drawn beside each other, twice the same") {
+TEST_CASE("tissue and mass-spring model are run and drawn beside each other, twice the same",
+          "[heavy]") {
   const TempFolder folder;
   write_scene(folder / "s.json", test::small_scene_text(kPush));
   for (const std::string name : {"a", "b"}) {

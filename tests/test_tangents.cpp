@@ -77,7 +77,7 @@ TEST_CASE("the star's derivatives are those of the closed form, driven by load")
   check_star(creep(0.5, std::numeric_limits<double>::infinity()), times);
 }
 
-TEST_CASE("an organ's derivatives are the limits of its differences") {
+TEST_CASE("an organ's derivatives are the limits of its differences", "[heavy]") {
   LiverRequest request;
   request.count = 60;
   const OrganScene scene(fill_liver(request));

@@ -48,7 +48,7 @@ Followed follow(ContactModel& model, const ContactMotion& motion) {
 
 }  // namespace
 
-TEST_CASE("a zone that holds the whole organ is the servo network", "[zone]") {
+TEST_CASE("a zone that holds the whole organ is the servo network", "[zone][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const BondSystem bonds(scene.network, material_with(0.02));
@@ -67,7 +67,7 @@ TEST_CASE("a zone that holds the whole organ is the servo network", "[zone]") {
   CHECK((of_zone - of_whole).cwiseAbs().maxCoeff() < 2e-2 * of_whole.cwiseAbs().maxCoeff());
 }
 
-TEST_CASE("the surroundings of a zone are exact where the network is linear", "[zone]") {
+TEST_CASE("the surroundings of a zone are exact where the network is linear", "[zone][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
@@ -97,7 +97,7 @@ TEST_CASE("the surroundings of a zone are exact where the network is linear", "[
   }
 }
 
-TEST_CASE("a zone's error falls with its rings, and the estimate follows", "[zone]") {
+TEST_CASE("a zone's error falls with its rings, and the estimate follows", "[zone][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
@@ -119,7 +119,7 @@ TEST_CASE("a zone's error falls with its rings, and the estimate follows", "[zon
   CHECK(error[1] < 0.02);
 }
 
-TEST_CASE("a zone refuses what it cannot do", "[zone]") {
+TEST_CASE("a zone refuses what it cannot do", "[zone][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const BondSystem bonds(scene.network, material_with(0.02));

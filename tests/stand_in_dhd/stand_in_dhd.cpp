@@ -43,11 +43,29 @@ struct StandIn {
   std::atomic<int> cause{0};
 };
 
-std::unique_ptr<StandIn> device;
+std::atomic<bool> a_call_hung{false};
+
+// Those of earlier sessions stay: a call that hung may still be in one, even when the program ends.
+struct Connected {
+  Connected() = default;
+  Connected(const Connected&) = delete;
+  Connected& operator=(const Connected&) = delete;
+  ~Connected() {
+    if (!a_call_hung) delete list;
+  }
+  std::vector<std::unique_ptr<StandIn>>* list = new std::vector<std::unique_ptr<StandIn>>;
+};
+Connected connected;
+std::atomic<StandIn*> device{nullptr};
 thread_local int last_error = 0;
 
+void connect_anew() {
+  connected.list->push_back(std::make_unique<StandIn>());
+  device = connected.list->back().get();
+}
+
 StandIn& here() {
-  if (!device) device = std::make_unique<StandIn>();
+  if (device == nullptr) connect_anew();
   return *device;
 }
 
@@ -89,7 +107,7 @@ void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
 
 /// A library of its own is loaded for each session, and forgets nothing of what it was told.
 void read_script() {
-  device = std::make_unique<StandIn>();
+  connect_anew();
   const char* script = std::getenv("TPM_STAND_IN_SCRIPT");
   if (script == nullptr) return;
   std::ifstream lines(script);
@@ -119,6 +137,7 @@ void fall(int cause, const char* name) {
 void hang_if_due(long call) {
   for (const Fault& f : here().faults) {
     if (f.name != "hang" || f.first != call) continue;
+    a_call_hung = true;
     event("hang");
     std::this_thread::sleep_for(std::chrono::milliseconds(f.count));
     event("hang_over");

@@ -1,7 +1,6 @@
-#include <readerwriterqueue/readerwriterqueue.h>
-
 #include <algorithm>
 #include <atomic>
+#include <boost/lockfree/spsc_queue.hpp>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -26,7 +25,7 @@ struct Shared {
   std::shared_ptr<ContactModel> model;
   ServoSettings settings;
   ServoStep step;
-  moodycamel::ReaderWriterQueue<ServoRecord> ring{kRingRows};
+  boost::lockfree::spsc_queue<ServoRecord> ring{kRingRows};
   std::atomic<std::uint64_t> dropped{0};
   std::atomic<std::uint64_t> cycle{0};
   std::atomic<std::int64_t> busy_since_ns{0};  ///< 0: sleeping, or over
@@ -65,7 +64,7 @@ void serve(Shared& s) noexcept {
       row.busy_s = static_cast<float>(static_cast<double>(done - woke) * 1e-9);
       s.woke_late.note(woke - (deadline - missed * period_ns));
       s.busy.note(done - woke);
-      if (!s.ring.try_enqueue(row)) s.dropped.fetch_add(1, std::memory_order_relaxed);
+      if (!s.ring.push(row)) s.dropped.fetch_add(1, std::memory_order_relaxed);
       s.cycle.store(row.cycle, std::memory_order_release);
     }
     if (cause != StopCause::none) s.stop_took_ns = now_ns() - woke;
@@ -94,7 +93,7 @@ class RecordThread {
       for (;;) {
         const bool last = ending_;
         ServoRecord row;
-        while (shared_->ring.try_dequeue(row)) sink(row);
+        while (shared_->ring.pop(row)) sink(row);
         if (idle) idle();
         if (last) return;
         std::this_thread::sleep_for(10ms);
