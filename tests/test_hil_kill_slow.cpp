@@ -47,8 +47,9 @@ TEST_CASE("kill -9 at random moments: every recording opens and verifies up to t
     REQUIRE(std::filesystem::exists(file));
     const HilRecording recording = read_recording(file);
     // A stall of the machine lets the watchdog end a session before it is killed: then it is
-    // closed.
+    // closed, and whole.
     if (!WIFSIGNALED(status)) CHECK(recording.closed);
+    if (recording.closed) continue;
     // What is missing is what the last 50 ms and a stall of the machine can hold.
     const std::chrono::duration<double> unwritten =
         alive_until - std::filesystem::last_write_time(file);
