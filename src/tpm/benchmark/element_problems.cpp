@@ -83,7 +83,9 @@ BenchmarkProblem exact_problem(const PosedBond& bond, std::string name, std::str
 }
 
 PosedBond ramped_bond(double eta1_Pa_s) {
-  return posed_bond(eta1_Pa_s, ramp_and_hold(8e-3, 4e-3, 29.0), times_every(0.5, 31.0));
+  const Protocol protocol = ramp_and_hold(8e-3, 4e-3, 29.0);
+  return posed_bond(eta1_Pa_s, protocol,
+                    with_moments_after_kinks(times_every(0.5, 31.0), protocol));
 }
 
 /// The bond with mass under a load put on at once: depth, speed, and y, which follows the depth.

@@ -44,6 +44,18 @@ std::vector<double> times_every(double spacing_s, double end_s, int first) {
   return times;
 }
 
+std::vector<double> with_moments_after_kinks(std::vector<double> times_s,
+                                             const Protocol& protocol) {
+  const std::span<const Knot> knots = protocol.knots();
+  for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
+    for (const double after_s : {2.5e-4, 5e-4, 1e-3, 2e-3}) {
+      times_s.push_back(knots[i].time_s + after_s);
+    }
+  }
+  std::sort(times_s.begin(), times_s.end());
+  return times_s;
+}
+
 std::shared_ptr<const MethodProblem> rules_on(const std::shared_ptr<const PosedNetwork>& posed) {
   struct Kept {
     std::shared_ptr<const PosedNetwork> posed;
@@ -72,6 +84,9 @@ BenchmarkSetting rule_setting(const std::shared_ptr<const MethodProblem>& proble
 
 namespace {
 
+/// A sweep takes far less than the factorisation that comes with an evaluation elsewhere.
+constexpr long kSweepsPerRate = 5;
+
 std::string sweeps_words(int sweeps) {
   return sweeps == 1 ? "1 sweep" : fmt::format("{} sweeps", sweeps);
 }
@@ -87,6 +102,7 @@ std::vector<BenchmarkSetting> rule_settings(const std::shared_ptr<const MethodPr
     method.rule = rule.meaning;
     method.most_rates = settings.most_rates;
     const bool swept = rule.meaning == StepRule::xpbd;
+    if (swept) method.most_rates *= kSweepsPerRate;
     for (const int sweeps : swept ? settings.sweeps : std::vector<int>{1}) {
       method.sweeps = sweeps;
       for (const double value : rule.adaptive ? settings.tolerances : settings.steps_s) {

@@ -9,6 +9,7 @@ namespace {
 constexpr int kMostNewtonSteps = 60;
 constexpr int kMostHalvings = 30;
 constexpr double kShareOfDepth = 1e-12;
+constexpr double kFast = 0.05;  // what a step may leave of the force for its factor to be kept
 constexpr double kNear = 1e-5;  // of the depth: Newton's steps are not checked any more
 constexpr double kForceGrain = 8.0 * std::numeric_limits<double>::epsilon();
 
@@ -76,6 +77,7 @@ MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
                                 const SphereAnchors* anchors) {
   const double tolerance = tolerance_N(position, depth_m, anchors);
   double energy = potential(position, memory, load, anchors);
+  double left_before = 0.0;
   for (int iteration = 0;; ++iteration) {
     ++work_.rates;
     balance_forces(bonds_, position, memory, load, force_);
@@ -87,10 +89,13 @@ MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
     if (!std::isfinite(left)) return MethodEnd::newton_failed;
     if (left <= tolerance && iteration > 0) return MethodEnd::completed;
     if (iteration == kMostNewtonSteps) return MethodEnd::newton_failed;
-    if (!factorise_matrix(position, memory, anchors)) return MethodEnd::newton_failed;
-    if (factor_.negative_count() > 0) {
-      return anchors == nullptr ? MethodEnd::buckled : MethodEnd::newton_failed;
+    if (iteration == 0 || left > kFast * left_before) {
+      if (!factorise_matrix(position, memory, anchors)) return MethodEnd::newton_failed;
+      if (factor_.negative_count() > 0) {
+        return anchors == nullptr ? MethodEnd::buckled : MethodEnd::newton_failed;
+      }
     }
+    left_before = left;
     step_ = force_;
     displace(step_);
     const double slope = -force_.cwiseProduct(step_).sum();

@@ -12,7 +12,8 @@ struct SphereAnchors {
 };
 
 /// Balances bonds, loads and anchors on the free spheres, with as few factorisations as it takes:
-/// Newton's method, its steps shortened until the potential falls. Of tissue without anchors the
+/// Newton's method with a factor kept while it converges fast, its steps shortened until the potential
+/// falls. Of tissue without anchors the
 /// stiffness has to be positive definite wherever it is looked at.
 class ImplicitBalance {
  public:

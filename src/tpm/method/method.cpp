@@ -95,6 +95,7 @@ class MethodDriver {
 
   [[nodiscard]] bool all_answered() const { return next_ == times_s_.size(); }
   [[nodiscard]] double asked_s() const { return times_s_[next_]; }
+  [[nodiscard]] double last_asked_s() const { return times_s_.back(); }
 
   [[nodiscard]] MethodEnd answer(double time_s, const Vector& state) {
     double response = 0.0;
@@ -183,8 +184,9 @@ class FixedDriver final : public MethodDriver {
   MethodEnd cross(const Knot& from, const Knot& to) override {
     const double length = to.time_s - from.time_s;
     const double count = std::max(1.0, std::ceil(length / settings_.step_s * (1.0 - 1e-12)));
-    // Each step takes an evaluation at least.
-    if (!(count <= static_cast<double>(settings_.most_rates))) return MethodEnd::too_much_work;
+    // Each step up to the last time takes an evaluation at least.
+    const double least = (last_asked_s() - from.time_s) / settings_.step_s;
+    if (!(least <= static_cast<double>(settings_.most_rates))) return MethodEnd::too_much_work;
     const double h = length / count;
     for (double i = 0.0; i < count; ++i) {
       time_s_ = from.time_s + length * (i / count);
