@@ -51,7 +51,9 @@ void print_summary(const BenchmarkRecord& record) {
     fmt::print("{}: {} settings, {} failed; reference known to {}", result.name,
                result.points.size(), failed, significant(result.reference.floor, 2));
     if (best != nullptr) {
-      fmt::print("; cheapest within 1 %: {} ({}), {} ms", best->curve(), setting_words(*best),
+      const std::string setting = setting_words(*best);
+      fmt::print("; cheapest within 1 %: {}{}, {} ms", best->curve(),
+                 setting.empty() ? "" : " (" + setting + ")",
                  significant(1e3 * best->times->median_s, 3));
     }
     fmt::print("\n");

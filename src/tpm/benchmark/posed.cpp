@@ -85,7 +85,7 @@ BenchmarkSetting rule_setting(const std::shared_ptr<const MethodProblem>& proble
 namespace {
 
 /// A sweep takes far less than the factorisation that comes with an evaluation elsewhere.
-constexpr long kSweepsPerRate = 5;
+constexpr long kSweepsPerRate = 3;
 
 std::string sweeps_words(int sweeps) {
   return sweeps == 1 ? "1 sweep" : fmt::format("{} sweeps", sweeps);

@@ -20,7 +20,8 @@ ImplicitBalance::ImplicitBalance(const BondSystem& bonds, const Freedom& freedom
       freedom_(freedom),
       work_(work),
       matrix_(bonds.pattern()),
-      factor_(bonds.pattern()) {
+      factor_(bonds.pattern()),
+      kept_{KeptFactor{BlockLdlt(bonds.pattern())}, KeptFactor{BlockLdlt(bonds.pattern())}} {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.spheres()));
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const double k = bonds.stiffness()[static_cast<Eigen::Index>(i)];
@@ -47,7 +48,7 @@ double ImplicitBalance::tolerance_N(const Positions& position, double depth_m,
 }
 
 bool ImplicitBalance::factorise_matrix(const Positions& position, const BondMemory& memory,
-                                       const SphereAnchors* anchors) {
+                                       const SphereAnchors* anchors, BlockLdlt& factor) {
   ++work_.factorisations;
   matrix_.set_zero();
   bonds_.add_stiffness(position, memory, matrix_);
@@ -57,19 +58,37 @@ bool ImplicitBalance::factorise_matrix(const Positions& position, const BondMemo
     }
   }
   freedom_.constrain(bonds_, matrix_);
-  return factor_.factorise(matrix_);
+  return factor.factorise(matrix_);
 }
 
 MethodEnd ImplicitBalance::factorise(const Positions& position, const BondMemory& memory) {
-  if (!factorise_matrix(position, memory, nullptr)) return MethodEnd::newton_failed;
+  if (!factorise_matrix(position, memory, nullptr, factor_)) return MethodEnd::newton_failed;
   return factor_.negative_count() == 0 ? MethodEnd::completed : MethodEnd::buckled;
 }
 
 void ImplicitBalance::displace(Eigen::Matrix3Xd& vectors) {
+  displace(vectors, factor_);
+}
+
+void ImplicitBalance::displace(Eigen::Matrix3Xd& vectors, const BlockLdlt& factor) {
   ++work_.solves;
   freedom_.project(vectors);
-  factor_.solve(vectors);
+  factor.solve(vectors);
   freedom_.project(vectors);
+}
+
+ImplicitBalance::KeptFactor& ImplicitBalance::kept_for(const BondMemory& memory,
+                                                       const SphereAnchors* anchors) {
+  const double anchored = anchors == nullptr ? 0.0 : anchors->stiffness.maxCoeff();
+  for (KeptFactor& kept : kept_) {
+    const bool alike = kept.following == memory.following && kept.anchored == anchored;
+    if (kept.used > 0 && alike) return kept;
+  }
+  KeptFactor& oldest = kept_[0].used <= kept_[1].used ? kept_[0] : kept_[1];
+  oldest.used = 0;
+  oldest.following = memory.following;
+  oldest.anchored = anchored;
+  return oldest;
 }
 
 MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
@@ -77,7 +96,10 @@ MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
                                 const SphereAnchors* anchors) {
   const double tolerance = tolerance_N(position, depth_m, anchors);
   double energy = potential(position, memory, load, anchors);
-  double left_before = 0.0;
+  KeptFactor& kept = kept_for(memory, anchors);
+  bool known = kept.used > 0;  // and found elsewhere
+  kept.used = 0;               // until it has served
+  double left_before = std::numeric_limits<double>::infinity();
   for (int iteration = 0;; ++iteration) {
     ++work_.rates;
     balance_forces(bonds_, position, memory, load, force_);
@@ -87,29 +109,43 @@ MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
     freedom_.project(force_);
     const double left = force_.colwise().norm().maxCoeff();
     if (!std::isfinite(left)) return MethodEnd::newton_failed;
-    if (left <= tolerance && iteration > 0) return MethodEnd::completed;
-    if (iteration == kMostNewtonSteps) return MethodEnd::newton_failed;
-    if (iteration == 0 || left > kFast * left_before) {
-      if (!factorise_matrix(position, memory, anchors)) return MethodEnd::newton_failed;
-      if (factor_.negative_count() > 0) {
-        return anchors == nullptr ? MethodEnd::buckled : MethodEnd::newton_failed;
-      }
+    if (left <= tolerance && iteration > 0) {
+      kept.used = ++balances_;
+      return MethodEnd::completed;
     }
+    if (iteration == kMostNewtonSteps) return MethodEnd::newton_failed;
+    if (left > kFast * left_before) known = false;
     left_before = left;
-    step_ = force_;
-    displace(step_);
-    const double slope = -force_.cwiseProduct(step_).sum();
-    // There the potential has no digits left to judge by.
-    const bool near = step_.colwise().norm().maxCoeff() <= kNear * depth_m;
-    double length = 1.0;
-    for (int halvings = 0;; ++halvings, length *= 0.5) {
-      if (halvings == kMostHalvings) return MethodEnd::newton_failed;
-      const Positions next = position + length * step_;
-      const double there = potential(next, memory, load, anchors);
-      if (!(near || there <= energy + 1e-4 * length * slope)) continue;
-      position = next;
-      energy = there;
-      break;
+    for (bool moved = false; !moved;) {
+      const bool here = !known;
+      if (here) {
+        if (!factorise_matrix(position, memory, anchors, kept.factor)) {
+          return MethodEnd::newton_failed;
+        }
+        if (kept.factor.negative_count() > 0) {
+          return anchors == nullptr ? MethodEnd::buckled : MethodEnd::newton_failed;
+        }
+        known = true;
+      }
+      step_ = force_;
+      displace(step_, kept.factor);
+      const double slope = -force_.cwiseProduct(step_).sum();
+      // There the potential has no digits left to judge by.
+      const bool near = step_.colwise().norm().maxCoeff() <= kNear * depth_m;
+      double length = 1.0;
+      for (int halvings = 0; !moved; ++halvings, length *= 0.5) {
+        if (halvings == kMostHalvings) return MethodEnd::newton_failed;
+        const Positions next = position + length * step_;
+        const double there = potential(next, memory, load, anchors);
+        moved = near || there <= energy + 1e-4 * length * slope;
+        if (!moved && !here) {
+          known = false;  // a shorter step is worth less than a factor found here
+          break;
+        }
+        if (!moved) continue;
+        position = next;
+        energy = there;
+      }
     }
   }
 }

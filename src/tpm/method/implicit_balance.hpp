@@ -1,5 +1,7 @@
 #pragma once
 // Newton's method for the positions of an implicit stage.
+#include <array>
+
 #include "tpm/method/method.hpp"
 #include "tpm/network/equilibrium.hpp"
 
@@ -12,9 +14,9 @@ struct SphereAnchors {
 };
 
 /// Balances bonds, loads and anchors on the free spheres, with as few factorisations as it takes:
-/// Newton's method with a factor kept while it converges fast, its steps shortened until the potential
-/// falls. Of tissue without anchors the
-/// stiffness has to be positive definite wherever it is looked at.
+/// Newton's method, its steps shortened until the potential falls. A factor is kept, from balance
+/// to balance, while it converges fast; wherever a new one is found the stiffness of tissue without
+/// anchors has to be positive definite.
 class ImplicitBalance {
  public:
   /// @param bonds, freedom, work must live as long as this
@@ -33,8 +35,18 @@ class ImplicitBalance {
   void displace(Eigen::Matrix3Xd& vectors);
 
  private:
+  /// A factor for balances in which bonds follow alike and anchors are as stiff.
+  struct KeptFactor {
+    BlockLdlt factor;
+    double following = 0.0, anchored = 0.0;
+    long used = 0;  ///< number of the balance that used it last; 0: holds nothing
+  };
+
   [[nodiscard]] bool factorise_matrix(const Positions& position, const BondMemory& memory,
-                                      const SphereAnchors* anchors);
+                                      const SphereAnchors* anchors, BlockLdlt& factor);
+  /// The factor kept for balances like this one, or the one longest not used.
+  [[nodiscard]] KeptFactor& kept_for(const BondMemory& memory, const SphereAnchors* anchors);
+  void displace(Eigen::Matrix3Xd& vectors, const BlockLdlt& factor);
   [[nodiscard]] double potential(const Positions& position, const BondMemory& memory,
                                  const Eigen::Matrix3Xd& load, const SphereAnchors* anchors) const;
   /// What rounding and a share of the depth leave of a force, N.
@@ -45,7 +57,9 @@ class ImplicitBalance {
   const Freedom& freedom_;
   MethodWork& work_;
   BlockMatrix matrix_;
-  BlockLdlt factor_;
+  BlockLdlt factor_;  ///< of factorise()
+  std::array<KeptFactor, 2> kept_;
+  long balances_ = 0;
   double stiffest_ = 0.0;  ///< sum of stiffnesses at a sphere, N/m
   Eigen::Matrix3Xd force_, step_;
 };
