@@ -8,6 +8,7 @@
 #include "refusal.hpp"
 #include "tpm/benchmark/element_problems.hpp"
 #include "tpm/benchmark/runner.hpp"
+#include "tpm/benchmark/servo_problems.hpp"
 #include "tpm/report/benchmark_report.hpp"
 
 using namespace tpm;
@@ -218,6 +219,56 @@ TEST_CASE("how a run ended decides what becomes of it") {
   problem.settings = {answering("liar", liar)};
   CHECK_THAT(test::refusal_of([&] { (void)run_benchmark(problem, options); }),
              Contains("liar") && Contains("has not answered"));
+}
+
+TEST_CASE("a setting may answer a part of the response, in vectors, and claim an error") {
+  BenchmarkProblem problem;
+  problem.name = "made_up";
+  problem.reference = [] {
+    const Eigen::VectorXd right = (Eigen::VectorXd(6) << 3.0, 4.0, 0.0, 5.0, 5.0, 0.0).finished();
+    return checked_reference({"a", "one way", right}, {"b", "another way", right * (1.0 + 1e-7)},
+                             false, 1e-4, "made_up", 2);
+  };
+  BenchmarkSetting setting;
+  setting.method = "m";
+  setting.part = [] { return AnsweredPart{2, 4}; };
+  setting.run = [](bool time_steps) {
+    BenchmarkRun run;
+    run.outcome.response = Eigen::Vector4d(0.3, 5.4, 5.0, 0.1);  // off by 0.5 and 0.1
+    run.outcome.end_time_s = 1.0;
+    run.claimed = Eigen::Vector2d(1.0, 0.05);
+    run.build_s = 7.0;
+    if (time_steps) run.step_wall_s = {2e-6, 8e-6};
+    return run;
+  };
+  problem.settings = {setting};
+  BenchmarkOptions options;
+  options.repeats = 3;
+  const BenchmarkPoint point = run_benchmark(problem, options).points.front();
+  constexpr double peak = 5.0;
+  CHECK_THAT(point.error, WithinRel(0.5 / peak, 1e-12));
+  const BenchmarkClaims claims = point.claims.value();
+  CHECK_THAT(claims.largest, WithinRel(1.0 / peak, 1e-12));
+  CHECK_THAT(claims.median, WithinRel(0.5 * (2.0 + 0.5), 1e-9));
+  CHECK(claims.covered == 0.5);
+  CHECK(point.build_s == 7.0);
+  CHECK_THAT(point.step_times.value().median_s, WithinRel(5e-6, 1e-12));
+  CHECK(benchmark_csv({"n", "t", "x", "r", "N", 1.0, 0.0, {}, {}, {point}}, true).find(",7\n") !=
+        std::string::npos);
+}
+
+TEST_CASE("contact models are asked in servo problems as docs/benchmark.md says") {
+  for (const BenchmarkProblem& problem : {servo_normal_problem(), servo_space_problem()}) {
+    CAPTURE(problem.name);
+    std::set<std::string> curves;
+    for (const BenchmarkSetting& setting : problem.settings) {
+      curves.insert(setting.curve());
+      CHECK(setting.parameter == "relaxation_time_s");
+      CHECK(setting.step_s.value() <= 1e-3);
+    }
+    REQUIRE(problem.targets.size() >= 3);
+    for (const BenchmarkTarget& target : problem.targets) CHECK(curves.contains(target.curve));
+  }
 }
 
 TEST_CASE("quantiles lie between neighbours") {

@@ -111,6 +111,19 @@ ContactMotion ramp_motion(const Eigen::Vector3d& direction, double depth_m, doub
                     {{0, 0.0}, {up, depth_m}, {up + periods(hold_s, period_s), depth_m}}, period_s);
 }
 
+ContactMotion poke_motion(const Eigen::Vector3d& direction, double depth_m, double speed_m_per_s,
+                          double hold_s, double period_s) {
+  const Eigen::Index way = periods(depth_m / speed_m_per_s, period_s);
+  const Eigen::Index hold = periods(hold_s, period_s);
+  return along_line("poke at " + speed_words(speed_m_per_s), direction,
+                    {{0, 0.0},
+                     {way, depth_m},
+                     {way + hold, depth_m},
+                     {2 * way + hold, 0.0},
+                     {2 * (way + hold), 0.0}},
+                    period_s);
+}
+
 ContactMotion random_motion(const Eigen::Vector3d& direction, double deepest_m, double duration_s,
                             std::uint64_t seed, double period_s) {
   Random random(seed);
@@ -175,6 +188,21 @@ ContactMotion random_motion_in_space(const ContactAxes& axes, double deepest_m, 
   }
   ContactMotion motion = path.motion("random motion in space");
   motion.displacement_m.conservativeResize(Eigen::NoChange, steps);
+  return motion;
+}
+
+ContactMotion refined(ContactMotion motion, int pieces) {
+  Eigen::Matrix3Xd places(3, pieces * motion.steps());
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  for (Eigen::Index i = 0; i < places.cols(); ++i) {
+    const Eigen::Index whole = i / pieces;
+    const Eigen::Vector3d to = motion.displacement_m.col(whole);
+    const double share = static_cast<double>(i % pieces + 1) / pieces;
+    places.col(i) = share < 1.0 ? Eigen::Vector3d(from + share * (to - from)) : to;
+    if (share == 1.0) from = to;
+  }
+  motion.displacement_m = std::move(places);
+  motion.period_s /= pieces;
   return motion;
 }
 

@@ -36,6 +36,11 @@ struct ContactAxes {
 [[nodiscard]] ContactMotion ramp_motion(const Eigen::Vector3d& direction, double depth_m,
                                         double speed_m_per_s, double hold_s, double period_s);
 
+/// From rest to a depth at a speed, held, back at that speed, and held as long at rest.
+/// @param direction unit vector
+[[nodiscard]] ContactMotion poke_motion(const Eigen::Vector3d& direction, double depth_m,
+                                        double speed_m_per_s, double hold_s, double period_s);
+
 /// To random depths from 0 to `deepest_m` at random speeds, evenly spread over the logarithm from
 /// 1 to 100 mm/s, now and then held for up to 0.1 s.
 [[nodiscard]] ContactMotion random_motion(const Eigen::Vector3d& direction, double deepest_m,
@@ -56,5 +61,9 @@ struct ContactAxes {
 [[nodiscard]] ContactMotion random_motion_in_space(const ContactAxes& axes, double deepest_m,
                                                    double aside_m, Eigen::Index steps,
                                                    std::uint64_t seed, double period_s);
+
+/// The same way in shorter periods: straight within each of the motion's own.
+/// @param pieces of each period, >= 1
+[[nodiscard]] ContactMotion refined(ContactMotion motion, int pieces);
 
 }  // namespace tpm

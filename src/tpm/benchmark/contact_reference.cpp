@@ -21,40 +21,58 @@ Freedom with_contact_held(const TouchedTissue& tissue) {
   return freedom;
 }
 
-Eigen::Matrix3Xd forces_with(const TouchedTissue& tissue, const ContactMotion& motion,
-                             int substeps) {
+/// Forces and displacements as they are found.
+class Record {
+ public:
+  Record(const TouchedTissue& tissue, const ContactMotion& motion, Eigen::Index field_every)
+      : rest_(tissue.rest), field_every_(field_every) {
+    found_.force_N.resize(3, motion.steps());
+    if (field_every > 0) {
+      found_.displacement_m.resize(tissue.rest.size(), motion.steps() / field_every);
+    }
+  }
+  void put(Eigen::Index period, const Eigen::Vector3d& force_N, const Positions& position) {
+    found_.force_N.col(period) = force_N;
+    if (field_every_ == 0 || (period + 1) % field_every_ != 0) return;
+    found_.displacement_m.col(period / field_every_) = (position - rest_).reshaped();
+  }
+  [[nodiscard]] ContactReference take() { return std::move(found_); }
+
+ private:
+  const Positions& rest_;
+  Eigen::Index field_every_;
+  ContactReference found_;
+};
+
+ContactReference answers_with(const TouchedTissue& tissue, const ContactMotion& motion,
+                              int substeps, Eigen::Index field_every) {
   FineContact fine(tissue, motion.period_s / substeps);
-  Eigen::Matrix3Xd force(3, motion.steps());
+  Record record(tissue, motion, field_every);
   Eigen::Vector3d from = Eigen::Vector3d::Zero();
   for (Eigen::Index i = 0; i < motion.steps(); ++i) {
     const Eigen::Vector3d to = motion.displacement_m.col(i);
+    Eigen::Vector3d force_N;
     for (int s = 1; s <= substeps; ++s) {
-      force.col(i) = fine.step(from + static_cast<double>(s) / substeps * (to - from));
+      force_N = fine.step(from + static_cast<double>(s) / substeps * (to - from));
     }
+    record.put(i, force_N, fine.position());
     from = to;
   }
-  return force;
+  return record.take();
 }
 
 }  // namespace
 
-FineContact::FineContact(const TouchedTissue& tissue, double step_s)
+BalancedContact::BalancedContact(const TouchedTissue& tissue)
     : tissue_(tissue),
       freedom_(with_contact_held(tissue)),
       equilibrium_(tissue.bonds, freedom_),
-      position_(tissue.rest),
-      remembered_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tissue.bonds.size()))) {
-  const RelaxationWeights w = relaxation_weights(step_s / tissue.bonds.relaxation_time_s());
-  keep_ = w.r;
-  of_start_ = w.w0;
-  of_end_ = w.w1;
-  tissue.bonds.elongations(position_, elongation_);
-}
+      position_(tissue.rest) {}
 
-Eigen::Vector3d FineContact::step(const Eigen::Vector3d& displacement_m) {
+Eigen::Vector3d BalancedContact::go_to(const Eigen::Vector3d& displacement_m,
+                                       const BondMemory& memory) {
   const auto column = static_cast<Eigen::Index>(tissue_.contact);
   const double tolerance_N = kBalance * tissue_.bonds.stiffness().maxCoeff();
-  const BondMemory memory{keep_ * remembered_ + of_start_ * elongation_, of_end_};
   const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, position_.cols());
   position_.col(column) = tissue_.rest.col(column) + displacement_m;
   Eigen::Matrix3Xd force;
@@ -63,7 +81,7 @@ Eigen::Vector3d FineContact::step(const Eigen::Vector3d& displacement_m) {
     Eigen::Matrix3Xd left = force;
     freedom_.project(left);
     const double residual_N = left.cwiseAbs().maxCoeff();
-    if (residual_N <= tolerance_N) break;
+    if (residual_N <= tolerance_N) return force.col(column);
     if (iteration == kMostIterations || !std::isfinite(residual_N)) {
       throw Error(ExitCode::numerical, "contact", "the forces cannot be balanced");
     }
@@ -76,21 +94,76 @@ Eigen::Vector3d FineContact::step(const Eigen::Vector3d& displacement_m) {
     equilibrium_.displace(left);
     position_ += left;
   }
-  tissue_.bonds.elongations(position_, elongation_);
+}
+
+FineContact::FineContact(const TouchedTissue& tissue, double step_s)
+    : bonds_(tissue.bonds),
+      balanced_(tissue),
+      remembered_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tissue.bonds.size()))) {
+  const RelaxationWeights w = relaxation_weights(step_s / bonds_.relaxation_time_s());
+  keep_ = w.r;
+  of_start_ = w.w0;
+  of_end_ = w.w1;
+  bonds_.elongations(position(), elongation_);
+}
+
+Eigen::Vector3d FineContact::step(const Eigen::Vector3d& displacement_m) {
+  const BondMemory memory{keep_ * remembered_ + of_start_ * elongation_, of_end_};
+  const Eigen::Vector3d force_N = balanced_.go_to(displacement_m, memory);
+  bonds_.elongations(position(), elongation_);
   remembered_ = memory.offset + of_end_ * elongation_;
-  return force.col(column);
+  return force_N;
 }
 
 double FineContact::stored_J() const {
-  return tissue_.bonds.stored_energy_J(position_, remembered_);
+  return bonds_.stored_energy_J(position(), remembered_);
 }
 
 ContactReference fine_reference(const TouchedTissue& tissue, const ContactMotion& motion,
-                                int substeps) {
-  const Eigen::Matrix3Xd coarse = forces_with(tissue, motion, substeps);
-  const Eigen::Matrix3Xd fine = forces_with(tissue, motion, 2 * substeps);
-  const Eigen::Matrix3Xd change = (fine - coarse) / 3.0;
-  return {fine + change, change.colwise().norm().maxCoeff()};
+                                int substeps, Eigen::Index field_every) {
+  const ContactReference coarse = answers_with(tissue, motion, substeps, field_every);
+  ContactReference fine = answers_with(tissue, motion, 2 * substeps, field_every);
+  const Eigen::Matrix3Xd change = (fine.force_N - coarse.force_N) / 3.0;
+  fine.force_N += change;
+  fine.error_N = change.colwise().norm().maxCoeff();
+  fine.displacement_m += ((fine.displacement_m - coarse.displacement_m) / 3.0).eval();
+  return fine;
+}
+
+ContactReference runge_kutta_reference(const TouchedTissue& tissue, const ContactMotion& motion,
+                                       int substeps, Eigen::Index field_every) {
+  const double step_s = motion.period_s / substeps;
+  const double tau_s = tissue.bonds.relaxation_time_s();
+  BalancedContact balanced(tissue);
+  BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tissue.bonds.size())), 0.0};
+  Eigen::VectorXd elongation;
+  const auto rate = [&](const Eigen::Vector3d& displacement_m, const Eigen::VectorXd& y) {
+    memory.offset = y;
+    balanced.go_to(displacement_m, memory);
+    tissue.bonds.elongations(balanced.position(), elongation);
+    return Eigen::VectorXd((elongation - y) / tau_s);
+  };
+  Eigen::VectorXd remembered = memory.offset;
+  Record record(tissue, motion, field_every);
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();
+  for (Eigen::Index i = 0; i < motion.steps(); ++i) {
+    const Eigen::Vector3d to = motion.displacement_m.col(i);
+    for (int s = 0; s < substeps; ++s) {
+      const auto at = [&](double share) -> Eigen::Vector3d {
+        return from + (s + share) / substeps * (to - from);
+      };
+      const Eigen::VectorXd first = rate(at(0.0), remembered);
+      const Eigen::VectorXd second = rate(at(0.5), remembered + 0.5 * step_s * first);
+      const Eigen::VectorXd third = rate(at(0.5), remembered + 0.5 * step_s * second);
+      const Eigen::VectorXd fourth = rate(at(1.0), remembered + step_s * third);
+      remembered += step_s / 6.0 * (first + 2.0 * second + 2.0 * third + fourth);
+    }
+    memory.offset = remembered;
+    const Eigen::Vector3d force_N = balanced.go_to(to, memory);
+    record.put(i, force_N, balanced.position());
+    from = to;
+  }
+  return record.take();
 }
 
 Eigen::VectorXd line_reference(const TouchedTissue& tissue, const ContactMotion& motion,

@@ -17,13 +17,36 @@ struct TouchedTissue {
 /// Forces of the full network on its contact under a motion.
 struct ContactReference {
   Eigen::Matrix3Xd force_N;  ///< at the end of each period
-  double error_N = 0.0;      ///< estimate of the largest error
+  double error_N = 0.0;      ///< estimate of the largest error, if there is one
+  /// Of all spheres, three numbers each, at the end of every so many periods, if asked for.
+  Eigen::MatrixXd displacement_m = {};
   [[nodiscard]] double peak_N() const { return force_N.colwise().norm().maxCoeff(); }
 };
 
+/// The network balanced under what its bonds remember, by Newton's method with a factorisation that
+/// is found anew when it converges slowly.
+class BalancedContact {
+ public:
+  /// @param tissue must live as long as this
+  explicit BalancedContact(const TouchedTissue& tissue);
+
+  /// Goes to a displacement of the contact, m.
+  /// @returns force of the tissue on the contact, N
+  /// Throws Error(numerical) if the forces cannot be balanced.
+  Eigen::Vector3d go_to(const Eigen::Vector3d& displacement_m, const BondMemory& memory);
+
+  [[nodiscard]] const Positions& position() const { return position_; }
+
+ private:
+  const TouchedTissue& tissue_;
+  Freedom freedom_;
+  Equilibrium equilibrium_;
+  Positions position_;
+  bool factorised_ = false;
+};
+
 /// The quasi-static network in double precision with many steps a period: elongations are linear
-/// in a step, under which what is remembered is advanced exactly, and forces are balanced by
-/// Newton's method with a factorisation that is found anew when it converges slowly.
+/// in a step, under which what is remembered is advanced exactly.
 class FineContact {
  public:
   /// @param tissue must live as long as this
@@ -33,25 +56,32 @@ class FineContact {
   /// Throws Error(numerical) if the forces cannot be balanced.
   Eigen::Vector3d step(const Eigen::Vector3d& displacement_m);
 
-  [[nodiscard]] const Positions& position() const { return position_; }
+  [[nodiscard]] const Positions& position() const { return balanced_.position(); }
   /// Energy in the springs and power of the dashpots where it stands.
   [[nodiscard]] double stored_J() const;
 
  private:
-  const TouchedTissue& tissue_;
-  Freedom freedom_;
-  Equilibrium equilibrium_;
+  const BondSystem& bonds_;
+  BalancedContact balanced_;
   double keep_, of_start_, of_end_;
-  Positions position_;
   Eigen::VectorXd elongation_;
   Eigen::VectorXd remembered_;
-  bool factorised_ = false;
 };
 
 /// By FineContact with `substeps` and twice as many steps a period, extrapolated (the error falls
 /// with the square of the step); the error is estimated by what the extrapolation changes.
+/// @param field_every periods between those at whose end all displacements are told; 0: none
 [[nodiscard]] ContactReference fine_reference(const TouchedTissue& tissue,
-                                              const ContactMotion& motion, int substeps);
+                                              const ContactMotion& motion, int substeps,
+                                              Eigen::Index field_every = 0);
+
+/// By Runge-Kutta's rule of order 4 for what bonds remember, the forces balanced at each stage: it
+/// shares no integrator with FineContact. The error is not estimated.
+/// @param substeps a period; @param field_every as above
+/// Throws Error(numerical) if the forces cannot be balanced.
+[[nodiscard]] ContactReference runge_kutta_reference(const TouchedTissue& tissue,
+                                                     const ContactMotion& motion, int substeps,
+                                                     Eigen::Index field_every = 0);
 
 /// By QuasiStatic, for a motion along a line: the part of the force along it.
 /// @param tolerance of QuasiStatic, in parts of the peak

@@ -74,6 +74,7 @@ BenchmarkProblem exact_problem(const PosedBond& bond, std::string name, std::str
   problem.title = std::move(title);
   problem.text = std::move(text);
   problem.response = depth ? "depth" : "contact force";
+  problem.unit = depth ? "m" : "N";
   problem.simulated_s = bond.star->protocol.end_s();
   problem.relaxation_time_s = bond.material.relaxation_time_s();
   problem.settings = massless_settings(bond, rules);
@@ -186,6 +187,7 @@ BenchmarkProblem bond_mass_problem() {
       "at "
       "once: it rings at 30 Hz, damped by a tenth. The depth over 0.5 s.";
   problem.response = "depth";
+  problem.unit = "m";
   problem.simulated_s = kEnd_s;
   problem.relaxation_time_s = bond.material.relaxation_time_s();
   problem.settings = rule_settings(bond.element, bond.star->times_s, rules);

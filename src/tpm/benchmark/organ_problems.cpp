@@ -42,7 +42,9 @@ BenchmarkProblem massless_problem(const std::shared_ptr<const PosedNetwork>& pos
                                   const RuleSettings& rules, const Referee& referee) {
   const std::shared_ptr<const MethodProblem> rule_problem = rules_on(posed);
   BenchmarkProblem problem;
-  problem.response = posed->protocol.drive() == Drive::force ? "depth" : "contact force";
+  const bool loaded = posed->protocol.drive() == Drive::force;
+  problem.response = loaded ? "depth" : "contact force";
+  problem.unit = loaded ? "m" : "N";
   problem.simulated_s = posed->protocol.end_s();
   problem.relaxation_time_s = posed->network.bonds.relaxation_time_s();
   problem.settings = rule_settings(rule_problem, posed->times_s, rules);

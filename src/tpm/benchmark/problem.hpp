@@ -17,7 +17,16 @@ struct BenchmarkRun {
   MethodRun outcome;
   /// Wall time of each step, s, where the problem measures its steps one by one (contact models at
   /// servo rate) and was asked to; else empty.
+  /// Where that would be less than reading the clock costs: means of short batches.
   std::vector<double> step_wall_s;
+  double build_s = 0.0;  ///< wall time in which the model was built; 0: there is none to build
+  Eigen::VectorXd claimed =
+      {};  ///< error that the model told for each part of the response, or empty
+};
+
+/// The numbers of a response that a setting answers, where it is not all of them.
+struct AnsweredPart {
+  Eigen::Index first = 0, count = 0;
 };
 
 /// One setting of one method: a point of a chart.
@@ -29,6 +38,8 @@ struct BenchmarkSetting {
   std::optional<double> step_s;  ///< where all steps are equally long: one has to fit its period
   /// @param time_steps measure BenchmarkRun::step_wall_s, if the problem knows how
   std::function<BenchmarkRun(bool time_steps)> run;
+  /// Which numbers of the reference's response it answers; empty: all. Asked after the reference.
+  std::function<AnsweredPart()> part = {};
 
   [[nodiscard]] std::string curve() const {
     return variant.empty() ? method : method + ", " + variant;
@@ -47,7 +58,8 @@ struct BenchmarkReference {
   BenchmarkAnswer judge;
   BenchmarkAnswer second;  ///< found another way; it judges the judge's own method
   bool exact = false;      ///< the judge is a closed form
-  double peak = 0.0;       ///< largest absolute response of the judge, N or m
+  int components = 1;      ///< of a response at a time: numbers that stand in a row, a vector
+  double peak = 0.0;       ///< largest absolute response of the judge, in the problem's unit
   double agreement = 0.0;  ///< largest difference of the two, in parts of the peak
   double floor = 0.0;      ///< errors below this, in parts of the peak, cannot be told
 
@@ -56,6 +68,10 @@ struct BenchmarkReference {
     return method == judge.method ? second.response : judge.response;
   }
 };
+
+/// The absolute values of responses that are numbers or vectors.
+/// @param components divides the size
+[[nodiscard]] Eigen::VectorXd sizes_of(const Eigen::VectorXd& response, int components);
 
 /// What an answer of a closed form is good for: rounding.
 inline constexpr double kExactFloor = 1e-14;
@@ -68,7 +84,16 @@ inline constexpr double kExactFloor = 1e-14;
 /// size, or if both come from one method.
 [[nodiscard]] BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer second,
                                                    bool exact, double worst_floor,
-                                                   std::string_view where);
+                                                   std::string_view where, int components = 1);
+
+/// What a curve is to keep, over all its settings.
+struct BenchmarkTarget {
+  std::string curve;
+  double error = 0.0;          ///< in parts of the peak
+  double step_median_s = 0.0;  ///< wall time of a step
+  double step_p99_s = 0.0;     ///< 0: none
+  double build_s = 0.0;        ///< 0: none
+};
 
 /// A named problem: what is asked, in which ways, and what the answer is.
 struct BenchmarkProblem {
@@ -76,10 +101,14 @@ struct BenchmarkProblem {
   std::string title;         ///< a line
   std::string text;          ///< sentences: scene, protocol, material, what counts as error
   std::string response;      ///< "contact force" or "depth"
+  std::string unit = "N";    ///< of the response; empty: a share of its peak already
   double simulated_s = 0.0;  ///< length of the protocol
   double relaxation_time_s = 0.0;
   std::vector<BenchmarkSetting> settings;  ///< those of a curve in a row, cheapest first
   std::function<BenchmarkReference()> reference;
+  /// Of problems whose settings are one model each at several relaxation times: what each curve is
+  /// to keep. Others have none.
+  std::vector<BenchmarkTarget> targets = {};
 };
 
 /// A line of the list of problems.

@@ -5,12 +5,13 @@
 
 #include "tpm/benchmark/element_problems.hpp"
 #include "tpm/benchmark/organ_problems.hpp"
+#include "tpm/benchmark/servo_problems.hpp"
 #include "tpm/core/error.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr std::array<BenchmarkEntry, 8> kEntries{{
+constexpr std::array<BenchmarkEntry, 11> kEntries{{
     {"bond_paper", "one bond with the paper's eta1, ramp and hold", bond_paper_problem},
     {"bond_fitted", "one bond with the fitted eta1, ramp and hold", bond_fitted_problem},
     {"star_creep", "the star under a constant load", star_creep_problem},
@@ -19,6 +20,9 @@ constexpr std::array<BenchmarkEntry, 8> kEntries{{
     {"organ_creep", "424 spheres, 300 s of creep", organ_creep_problem},
     {"bond_mass", "one bond with a mass, loaded at once", bond_mass_problem},
     {"organ_poke_mass", "424 spheres with masses, poked at 100 mm/s", organ_poke_mass_problem},
+    {"servo_normal", "contact models along the normal, 424 spheres", servo_normal_problem},
+    {"servo_space", "contact models in space, 424 spheres", servo_space_problem},
+    {"servo_inner", "contact models in space, inner layer held", servo_inner_problem},
 }};
 
 }  // namespace

@@ -8,8 +8,12 @@
 
 namespace tpm {
 
+Eigen::VectorXd sizes_of(const Eigen::VectorXd& response, int components) {
+  return response.reshaped(components, response.size() / components).colwise().norm().transpose();
+}
+
 BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer second, bool exact,
-                                     double worst_floor, std::string_view where) {
+                                     double worst_floor, std::string_view where, int components) {
   const auto refused = [&](const std::string& what, const std::string& expected) {
     return Error(ExitCode::numerical, fmt::format("reference of {}", where), what, expected);
   };
@@ -22,8 +26,10 @@ BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer seco
   }
   BenchmarkReference reference;
   reference.exact = exact;
-  reference.peak = judge.response.cwiseAbs().maxCoeff();
-  reference.agreement = (judge.response - second.response).cwiseAbs().maxCoeff() / reference.peak;
+  reference.components = components;
+  reference.peak = sizes_of(judge.response, components).maxCoeff();
+  reference.agreement =
+      sizes_of(judge.response - second.response, components).maxCoeff() / reference.peak;
   const double told = 10.0 * reference.agreement;
   if (!(told <= worst_floor)) {
     throw refused(fmt::format("{} and {} differ by {:.2g} of the peak", judge.words, second.words,

@@ -21,19 +21,47 @@ double seconds_since(Clock::time_point start) {
 /// An error of the whole peak is no answer.
 constexpr double kUselessError = 1.0;
 
-void judge(BenchmarkPoint& point, const MethodRun& run, const BenchmarkReference& reference) {
+/// @param claimed, true_error at each time, in parts of the peak
+/// @param floor a true error below cannot be told
+/// @returns none if no error can be told
+std::optional<BenchmarkClaims> claims_of(const Eigen::VectorXd& claimed,
+                                         const Eigen::VectorXd& true_error, double floor) {
+  std::vector<double> ratios;
+  for (Eigen::Index i = 0; i < claimed.size(); ++i) {
+    if (true_error[i] > floor) ratios.push_back(claimed[i] / true_error[i]);
+  }
+  if (ratios.empty()) return std::nullopt;
+  BenchmarkClaims claims;
+  claims.largest = claimed.maxCoeff();
+  std::sort(ratios.begin(), ratios.end());
+  claims.median = quantile_of_sorted(ratios, 0.5);
+  const auto short_of = std::lower_bound(ratios.begin(), ratios.end(), 1.0) - ratios.begin();
+  claims.covered = 1.0 - static_cast<double>(short_of) / static_cast<double>(ratios.size());
+  return claims;
+}
+
+void judge(BenchmarkPoint& point, const BenchmarkRun& whole_run, const BenchmarkSetting& setting,
+           const BenchmarkReference& reference) {
+  const MethodRun& run = whole_run.outcome;
   point.end = benchmark_end_word(run.end);
   point.reason = run.reason;
   point.end_time_s = run.end_time_s;
   point.work = run.work;
   point.error = std::numeric_limits<double>::quiet_NaN();
   if (run.end != MethodEnd::completed) return;
-  const Eigen::VectorXd& truth = reference.response_for(point.method);
+  const Eigen::VectorXd& whole = reference.response_for(point.method);
+  const AnsweredPart part = setting.part ? setting.part() : AnsweredPart{0, whole.size()};
+  const auto truth = whole.segment(part.first, part.count);
   if (run.response.size() != truth.size() || !run.response.allFinite()) {
     throw Error(ExitCode::numerical, point.curve(),
                 "a run that says it completed has not answered at every time");
   }
-  const double error = (run.response - truth).cwiseAbs().maxCoeff() / reference.peak;
+  const Eigen::VectorXd errors =
+      sizes_of(run.response - truth, reference.components) / reference.peak;
+  const double error = errors.maxCoeff();
+  if (whole_run.claimed.size() > 0) {
+    point.claims = claims_of(whole_run.claimed / reference.peak, errors, reference.floor);
+  }
   point.below_floor = error <= reference.floor;
   point.error = std::max(error, reference.floor);
   if (error <= kUselessError) return;
@@ -57,17 +85,23 @@ void time_runs(const BenchmarkSetting& setting, double once_s, const BenchmarkOp
   }
   const long runs = std::max(1L, std::lround(std::ceil(options.least_repeat_s / once_s)));
   std::vector<double> taken;
-  std::vector<double> steps;
+  std::vector<std::vector<double>> of_step;
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
     const auto start = Clock::now();
     for (long i = 0; i < runs; ++i) {
       const BenchmarkRun run = setting.run(true);
-      steps.insert(steps.end(), run.step_wall_s.begin(), run.step_wall_s.end());
+      of_step.resize(run.step_wall_s.size());
+      for (std::size_t k = 0; k < of_step.size(); ++k) of_step[k].push_back(run.step_wall_s[k]);
     }
     taken.push_back(seconds_since(start) / static_cast<double>(runs));
   }
   point.times = quartiles(std::move(taken), runs);
-  if (steps.empty()) return;
+  if (of_step.empty()) return;
+  std::vector<double> steps;
+  for (std::vector<double>& times : of_step) {
+    std::sort(times.begin(), times.end());
+    steps.push_back(quantile_of_sorted(times, 0.5));
+  }
   std::sort(steps.begin(), steps.end());
   point.step_times = {quantile_of_sorted(steps, 0.5), quantile_of_sorted(steps, 0.99),
                       steps.back()};
@@ -84,7 +118,8 @@ BenchmarkPoint point_of(const BenchmarkSetting& setting, const BenchmarkReferenc
   const auto start = Clock::now();
   const BenchmarkRun run = setting.run(false);
   const double once_s = seconds_since(start);
-  judge(point, run.outcome, reference);
+  point.build_s = run.build_s;
+  judge(point, run, setting, reference);
   if (options.timing) time_runs(setting, once_s, options, point);
   return point;
 }
@@ -118,10 +153,16 @@ std::string_view benchmark_end_word(MethodEnd end) {
 
 BenchmarkResult run_benchmark(const BenchmarkProblem& problem, const BenchmarkOptions& options,
                               const std::function<void()>& progress) {
-  BenchmarkResult result{problem.name,        problem.title,
-                         problem.text,        problem.response,
-                         problem.simulated_s, problem.relaxation_time_s,
-                         problem.reference(), {}};
+  BenchmarkResult result{problem.name,
+                         problem.title,
+                         problem.text,
+                         problem.response,
+                         problem.unit,
+                         problem.simulated_s,
+                         problem.relaxation_time_s,
+                         problem.reference(),
+                         problem.targets,
+                         {}};
   for (const BenchmarkSetting& setting : problem.settings) {
     result.points.push_back(point_of(setting, result.reference, options));
     if (progress) progress();

@@ -18,9 +18,16 @@ struct BenchmarkTimes {
   double median_s = 0.0, lower_quartile_s = 0.0, upper_quartile_s = 0.0, least_s = 0.0;
 };
 
-/// Wall time of single steps over all repeats, s.
+/// Wall time of single steps, s: of each step the median over the repeats, over the steps these.
 struct BenchmarkStepTimes {
   double median_s = 0.0, p99_s = 0.0, largest_s = 0.0;
+};
+
+/// Errors that a model claimed over those that it had, at each time at which it had one.
+struct BenchmarkClaims {
+  double median = 0.0;   ///< claimed over true
+  double covered = 0.0;  ///< share of the times at which the claim was not less
+  double largest = 0.0;  ///< largest claim, in parts of the peak
 };
 
 /// A point of a chart, or a failure.
@@ -36,6 +43,8 @@ struct BenchmarkPoint {
   MethodWork work;
   std::optional<BenchmarkTimes> times;
   std::optional<BenchmarkStepTimes> step_times;
+  std::optional<BenchmarkClaims> claims;
+  double build_s = 0.0;  ///< wall time in which the model was built, once; 0: none
 
   [[nodiscard]] bool failed() const { return end != "completed"; }
   [[nodiscard]] std::string curve() const {
@@ -44,9 +53,10 @@ struct BenchmarkPoint {
 };
 
 struct BenchmarkResult {
-  std::string name, title, text, response;
+  std::string name, title, text, response, unit = "N";
   double simulated_s = 0.0, relaxation_time_s = 0.0;
   BenchmarkReference reference;
+  std::vector<BenchmarkTarget> targets;
   std::vector<BenchmarkPoint> points;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "tpm/core/text.hpp"
 #include "tpm/report/benchmark_report.hpp"
 
 namespace tpm {
@@ -121,6 +122,14 @@ void add_points(Panel& panel, const BenchmarkResult& result, const CostOf& cost_
     }
   }
   panel.series.push_back(limit(Series::Kind::level, result.reference.floor, "reference known to"));
+  std::vector<double> drawn;
+  for (const BenchmarkTarget& target : result.targets) {
+    if (std::find(drawn.begin(), drawn.end(), target.error) != drawn.end()) continue;
+    drawn.push_back(target.error);
+    panel.series.push_back(
+        limit(Series::Kind::level, target.error,
+              fmt::format("asked for: {} %", significant(100.0 * target.error, 2))));
+  }
 }
 
 bool any_placed(const Panel& panel) {
@@ -186,7 +195,8 @@ std::vector<Figure> benchmark_figures(const BenchmarkRecord& record) {
   std::vector<Figure> figures;
   for (const BenchmarkResult& result : record.results) {
     if (record.options.timing) figures.push_back(wall_figure(result));
-    figures.push_back(count_figure(result));
+    // Contact models count nothing: their work is that of a step.
+    if (result.targets.empty()) figures.push_back(count_figure(result));
   }
   return figures;
 }

@@ -22,9 +22,23 @@ double stored(double value) {
 
 using Cells = std::vector<std::string>;
 
-const Cells kColumns{"problem", "method",         "variant",     "parameter",  "value",
-                     "end",     "error",          "below_floor", "end_time_s", "steps",
-                     "rates",   "factorisations", "solves",      "reason"};
+const Cells kColumns{"problem",
+                     "method",
+                     "variant",
+                     "parameter",
+                     "value",
+                     "end",
+                     "error",
+                     "below_floor",
+                     "end_time_s",
+                     "steps",
+                     "rates",
+                     "factorisations",
+                     "solves",
+                     "claimed_error",
+                     "claimed_over_true_median",
+                     "claimed_share_covered",
+                     "reason"};
 const Cells kTimeColumns{"repeats",
                          "runs_per_repeat",
                          "wall_median_s",
@@ -34,7 +48,8 @@ const Cells kTimeColumns{"repeats",
                          "wall_per_simulated_s",
                          "step_median_s",
                          "step_p99_s",
-                         "step_largest_s"};
+                         "step_largest_s",
+                         "build_s"};
 
 Cells cells_of(const BenchmarkResult& result, const BenchmarkPoint& p) {
   return {result.name,
@@ -50,6 +65,9 @@ Cells cells_of(const BenchmarkResult& result, const BenchmarkPoint& p) {
           std::to_string(p.work.rates),
           std::to_string(p.work.factorisations),
           std::to_string(p.work.solves),
+          p.claims ? number(p.claims->largest) : "",
+          p.claims ? number(p.claims->median) : "",
+          p.claims ? number(p.claims->covered) : "",
           p.reason};
 }
 
@@ -70,6 +88,7 @@ void append_times(Cells& cells, const BenchmarkPoint& p) {
   } else {
     cells.insert(cells.end(), 3, "");
   }
+  cells.push_back(p.build_s > 0.0 ? number(p.build_s) : std::string());
 }
 
 Json point_json(const BenchmarkPoint& p, bool timing) {
@@ -87,6 +106,11 @@ Json point_json(const BenchmarkPoint& p, bool timing) {
   json["rates"] = p.work.rates;
   json["factorisations"] = p.work.factorisations;
   json["solves"] = p.work.solves;
+  if (p.claims) {
+    json["claims"] = {{"largest_error", stored(p.claims->largest)},
+                      {"median_over_true", stored(p.claims->median)},
+                      {"share_covered", stored(p.claims->covered)}};
+  }
   if (!timing) return json;
   const BenchmarkTimes& t = p.times.value();
   json["repeats"] = t.repeats;
@@ -100,6 +124,7 @@ Json point_json(const BenchmarkPoint& p, bool timing) {
                            {"p99", stored(p.step_times->p99_s)},
                            {"largest", stored(p.step_times->largest_s)}};
   }
+  if (p.build_s > 0.0) json["build_s"] = stored(p.build_s);
   return json;
 }
 
@@ -109,17 +134,23 @@ Json result_json(const BenchmarkResult& result, bool timing) {
             {"title", result.title},
             {"text", result.text},
             {"response", result.response},
-            {"simulated_s", stored(result.simulated_s)},
-            {"relaxation_time_s", stored(result.relaxation_time_s)}};
-  json["reference"] = {{"judge", reference.judge.words},
-                       {"judge_method", reference.judge.method},
-                       {"second", reference.second.words},
-                       {"second_method", reference.second.method},
-                       {"exact", reference.exact},
-                       {"peak", stored(reference.peak)},
-                       {"peak_unit", result.response == "depth" ? "m" : "N"},
-                       {"agreement", stored(reference.agreement)},
-                       {"floor", stored(reference.floor)}};
+            {"simulated_s", stored(result.simulated_s)}};
+  if (result.relaxation_time_s > 0.0) {
+    json["relaxation_time_s"] = stored(result.relaxation_time_s);
+  }
+  for (const BenchmarkTarget& target : result.targets) {
+    Json one{
+        {"curve", target.curve}, {"error", target.error}, {"step_median_s", target.step_median_s}};
+    if (target.step_p99_s > 0.0) one["step_p99_s"] = target.step_p99_s;
+    if (target.build_s > 0.0) one["build_s"] = target.build_s;
+    json["targets"].push_back(std::move(one));
+  }
+  json["reference"] = {
+      {"judge", reference.judge.words},   {"judge_method", reference.judge.method},
+      {"second", reference.second.words}, {"second_method", reference.second.method},
+      {"exact", reference.exact},         {"peak", stored(reference.peak)},
+      {"peak_unit", result.unit},         {"agreement", stored(reference.agreement)},
+      {"floor", stored(reference.floor)}};
   json["points"] = Json::array();
   for (const BenchmarkPoint& point : result.points) {
     json["points"].push_back(point_json(point, timing));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "tpm/core/text.hpp"
 #include "tpm/core/units.hpp"
@@ -36,17 +37,17 @@ double cost_of(const BenchmarkPoint& point) {
 
 std::string reference_words(const BenchmarkResult& result) {
   const BenchmarkReference& r = result.reference;
-  const char* unit = result.response == "depth" ? "m" : "N";
+  const std::string peak =
+      result.unit.empty() ? "the peak"
+                          : fmt::format("the peak of {} {}", significant(r.peak, 4), result.unit);
   if (r.exact) {
-    return fmt::format(
-        "Reference: {}, exact; {} differs from it by {} of the peak of {} {} and judges it.",
-        r.judge.words, r.second.words, significant(r.agreement, 2), significant(r.peak, 4), unit);
+    return fmt::format("Reference: {}, exact; {} differs from it by {} of {} and judges it.",
+                       r.judge.words, r.second.words, significant(r.agreement, 2), peak);
   }
   return fmt::format(
-      "Reference: {}. {} judges that method itself; the two differ by {} of the peak of {} {}, so "
-      "errors are told down to {}, ten times that.",
-      r.judge.words, r.second.words, significant(r.agreement, 2), significant(r.peak, 4), unit,
-      significant(r.floor, 2));
+      "Reference: {}. {} judges that method itself; the two differ by {} of {}, so errors are told "
+      "down to {}, ten times that.",
+      r.judge.words, r.second.words, significant(r.agreement, 2), peak, significant(r.floor, 2));
 }
 
 /// What a cell says of the cheapest point within an error.
@@ -160,6 +161,107 @@ Table failure_table(const BenchmarkResult& result) {
   return table;
 }
 
+/// The worst of a curve over its settings.
+struct WorstOf {
+  bool failed = false;
+  double error = 0.0, median_s = 0.0, p99_s = 0.0, build_s = 0.0;
+};
+
+WorstOf worst_of(const BenchmarkResult& result, const std::string& curve) {
+  WorstOf worst;
+  for (const BenchmarkPoint& p : result.points) {
+    if (p.curve() != curve) continue;
+    worst.failed = worst.failed || p.failed();
+    worst.error = std::max(worst.error, p.error);
+    worst.build_s = std::max(worst.build_s, p.build_s);
+    if (!p.step_times) continue;
+    worst.median_s = std::max(worst.median_s, p.step_times->median_s);
+    worst.p99_s = std::max(worst.p99_s, p.step_times->p99_s);
+  }
+  return worst;
+}
+
+Cell against(double value, double target, const std::string& words,
+             const std::string& target_words) {
+  if (target == 0.0) return {words};
+  return {fmt::format("{} (at most {})", words, target_words),
+          value <= target ? Tone::good : Tone::bad};
+}
+
+/// The largest error and times of each model over its relaxation times.
+Table targets_table(const BenchmarkResult& result, bool timing) {
+  Table table{"The largest over all relaxation times, and what is asked for",
+              {{"model"}, {"error", true}},
+              {}};
+  if (timing) {
+    for (const char* title : {"a step, median", "a step, 99th percentile", "built in"}) {
+      table.columns.push_back({title, true});
+    }
+  }
+  for (const std::string& curve : curves_of(result)) {
+    const WorstOf worst = worst_of(result, curve);
+    const auto named = std::find_if(result.targets.begin(), result.targets.end(),
+                                    [&](const BenchmarkTarget& t) { return t.curve == curve; });
+    const BenchmarkTarget target = named == result.targets.end() ? BenchmarkTarget{} : *named;
+    std::vector<Cell> row{{curve}};
+    row.push_back(worst.failed ? Cell{"fails", Tone::bad}
+                               : against(worst.error, target.error, percent_words(worst.error),
+                                         percent_words(target.error)));
+    const auto add = [&](double value_s, double most_s) {
+      row.push_back(against(value_s, most_s, seconds_words(value_s), seconds_words(most_s)));
+    };
+    if (timing) {
+      add(worst.median_s, target.step_median_s);
+      add(worst.p99_s, target.step_p99_s);
+      add(worst.build_s, target.build_s);
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+/// One column for each setting that any curve has.
+Table settings_table(const BenchmarkResult& result, const std::string& caption,
+                     const std::function<std::string(const BenchmarkPoint&)>& words) {
+  Table table{caption, {{"model"}}, {}};
+  std::vector<double> values;
+  for (const BenchmarkPoint& p : result.points) {
+    if (std::find(values.begin(), values.end(), p.value) != values.end()) continue;
+    values.push_back(p.value);
+    table.columns.push_back({setting_words(p), true});
+  }
+  for (const std::string& curve : curves_of(result)) {
+    std::vector<Cell> row(1 + values.size(), Cell{"-"});
+    row.front() = {curve};
+    bool any = false;
+    for (const BenchmarkPoint& p : result.points) {
+      const std::string text = p.curve() == curve ? words(p) : "";
+      if (text.empty()) continue;
+      const auto place = std::find(values.begin(), values.end(), p.value) - values.begin();
+      row[1 + static_cast<std::size_t>(place)] = {text};
+      any = true;
+    }
+    if (any) table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+/// Of a problem with targets: errors, times, and what the models claim of their errors.
+void add_model_tables(Document& document, const BenchmarkResult& result, bool timing) {
+  document.table(targets_table(result, timing));
+  document.table(settings_table(result, "Error at each relaxation time",
+                                [](const BenchmarkPoint& p) { return percent_words(p.error); }));
+  document.table(settings_table(
+      result,
+      "Claimed over true error: the median over all times of comparison, and how often the claim "
+      "was not less than the error",
+      [](const BenchmarkPoint& p) {
+        return p.claims ? fmt::format("{}; {} %", significant(p.claims->median, 2),
+                                      significant(100.0 * p.claims->covered, 3))
+                        : std::string();
+      }));
+}
+
 void add_pictures(Document& document, const std::vector<Figure>& figures, const std::string& id) {
   for (const Figure& figure : figures) {
     if (figure.id == id || figure.id == id + "_counts") {
@@ -197,6 +299,9 @@ std::vector<std::string> curves_of(const BenchmarkResult& result) {
 
 std::string setting_words(const BenchmarkPoint& point) {
   if (point.parameter == "step_s") return fmt::format("step {}", seconds_words(point.value));
+  if (point.parameter == "relaxation_time_s") {
+    return fmt::format("relaxing in {}", seconds_words(point.value));
+  }
   if (point.parameter.empty()) return "";
   return fmt::format("{} {}", point.parameter, significant(point.value, 3));
 }
@@ -219,10 +324,15 @@ Document benchmark_document(const BenchmarkRecord& record, const std::vector<Fig
     document.paragraph(result.text);
     document.paragraph(reference_words(result));
     add_pictures(document, figures, result.name);
-    document.table(aims_table(result, record.options.timing));
-    Table servo = servo_table(result);
-    if (!servo.rows.empty()) document.table(std::move(servo));
-    document.table(failure_table(result));
+    if (result.targets.empty()) {
+      document.table(aims_table(result, record.options.timing));
+      Table servo = servo_table(result);
+      if (!servo.rows.empty()) document.table(std::move(servo));
+    } else {
+      add_model_tables(document, result, record.options.timing);
+    }
+    Table failures = failure_table(result);
+    if (!failures.rows.empty()) document.table(std::move(failures));
     document.paragraph(fmt::format("Every setting: `{}.csv`.", result.name));
   }
   typeset(document);
