@@ -41,6 +41,15 @@ find_path(TPM_CSV_INCLUDE csv.h REQUIRED)
 find_library(TPM_CSV_LIBRARY csv REQUIRED)
 mark_as_advanced(TPM_CSV_INCLUDE TPM_CSV_LIBRARY)
 
+# Debian's library of httplib; what it was compiled with changes the layout of its types, so the
+# sources that include its header take the flags of its pkg-config file.
+find_library(TPM_HTTPLIB_LIBRARY cpp-httplib REQUIRED)
+mark_as_advanced(TPM_HTTPLIB_LIBRARY)
+if(NOT TPM_CONSUMER)
+  find_package(PkgConfig REQUIRED)
+  pkg_check_modules(TPM_HTTPLIB REQUIRED cpp-httplib>=0.11.4)
+endif()
+
 add_library(tpm_ceres INTERFACE IMPORTED)
 target_link_libraries(tpm_ceres INTERFACE Ceres::ceres)
 add_library(tpm_sundials INTERFACE IMPORTED)
@@ -57,6 +66,9 @@ target_link_libraries(tpm_assimp INTERFACE assimp::assimp)
 add_library(tpm_csv INTERFACE IMPORTED)
 target_include_directories(tpm_csv INTERFACE ${TPM_CSV_INCLUDE})
 target_link_libraries(tpm_csv INTERFACE ${TPM_CSV_LIBRARY})
+
+add_library(tpm_httplib INTERFACE IMPORTED)
+target_link_libraries(tpm_httplib INTERFACE ${TPM_HTTPLIB_LIBRARY})
 
 # --- headers that only our own sources read, and the program's ----------------------------------
 if(NOT TPM_CONSUMER)

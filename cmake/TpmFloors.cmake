@@ -1,6 +1,6 @@
 # The floors of src/tpm, each a library of objects, so that a library can be put together of floors
 # compiled in one way and floors compiled in another.
-set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_assimp OpenSSL::Crypto
+set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_assimp tpm_httplib OpenSSL::Crypto
     Threads::Threads ${CMAKE_DL_LIBS})
 
 function(tpm_floor_options target)
@@ -24,6 +24,9 @@ function(tpm_floors suffix flags)
   set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/network/lane_bonds.cpp
     ${PROJECT_SOURCE_DIR}/src/tpm/solve/lanes.cpp
     PROPERTIES COMPILE_OPTIONS "-fno-math-errno;-fopenmp-simd" SKIP_PRECOMPILE_HEADERS ON
+               SKIP_UNITY_BUILD_INCLUSION ON)
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/haptics/page_server.cpp
+    PROPERTIES COMPILE_OPTIONS "${TPM_HTTPLIB_CFLAGS_OTHER}" SKIP_PRECOMPILE_HEADERS ON
                SKIP_UNITY_BUILD_INCLUSION ON)
   set(objects)
   foreach(way fast arranging)

@@ -3,9 +3,11 @@
 #include <unistd.h>
 
 #include <memory>
+#include <optional>
 
 #include "command.hpp"
 #include "hil_options.hpp"
+#include "hil_page.hpp"
 #include "interrupt_watch.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
@@ -20,6 +22,7 @@ struct RunChoice {
   DeviceOptions device;
   std::string time;
   std::string output = "session.tpmrec";
+  PageOptions page;
 };
 
 int list_devices(const DeviceOptions& options, const Session& session) {
@@ -88,8 +91,16 @@ int run_hil(const RunChoice& choice, const Session& session) {
   options.recording = choice.output;
   const InterruptWatch interrupts;
   options.interrupted = InterruptWatch::seen;
+  std::optional<HilPage> page;
+  if (!choice.page.port.empty()) {
+    page.emplace(hil, options.real_time, choice.page);
+    page->show(options);
+  }
   auto guide = std::make_unique<Guide>(hil, options.real_time);
-  options.watcher = [&guide](const ServoRecord& row) { guide->see(row); };
+  options.watcher = [&guide, &page](const ServoRecord& row) {
+    guide->see(row);
+    if (page) page->see(row);
+  };
   const SessionRun run = run_session(hil, device, options);
   guide.reset();
   if (session.json()) {
@@ -99,6 +110,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   } else {
     fmt::print("{}wrote {}\n", run_text(hil, run), choice.output);
   }
+  if (page) page->end(run.outcome, options.interrupted);
   return exit_code_of(run.outcome);
 }
 
@@ -156,6 +168,14 @@ void add_hil_command(CLI::App& app, Session& session) {
                   "default: real with omega7, else virtual")
       ->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
+  run->add_option("--page", choice->page.port,
+                  "Show the session in a browser on this machine: port, 0 for one that is free");
+  run->add_option("--page-wait", choice->page.wait,
+                  "Begin when the page has been opened, or after so long")
+      ->capture_default_str();
+  run->add_option("--page-keep", choice->page.keep,
+                  "Keep a page that is open for so long after the end")
+      ->capture_default_str();
   add_format_option(*run, session);
   run->footer("Example:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec");
   run->callback([choice, &session] {

@@ -6,7 +6,7 @@
 //   fault NAME FIRST COUNT   at the calls of dhdGetPosition (dhdSetForce for saturated) numbered
 //                            FIRST to FIRST + COUNT - 1, from 0
 // Faults: time_guard, saturated, communication, nan, and those that stay: watchdog, velocity,
-// unplugged; hang sleeps COUNT milliseconds.
+// unplugged; hang sleeps COUNT milliseconds; each slow call takes 3 ms.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -144,6 +144,14 @@ void hang_if_due(long call) {
   }
 }
 
+void dawdle_if_due(long call) {
+  for (const Fault& f : here().faults) {
+    if (f.name != "slow" || call < f.first || call >= f.first + f.count) continue;
+    if (call == f.first) event("slow");
+    std::this_thread::sleep_for(std::chrono::milliseconds(3));
+  }
+}
+
 }  // namespace
 
 extern "C" {
@@ -235,6 +243,7 @@ int dhdGetPosition(double* x, double* y, double* z, char) {
   const long call = s.reads++;
   s.read_once = true;
   hang_if_due(call);
+  dawdle_if_due(call);
   if (due("unplugged", call)) {
     s.unplugged = true;
     fall(5, "unplugged");

@@ -13,7 +13,16 @@ namespace {
 
 constexpr const char* kFormat = "tpm hil recording 1";
 
-Json counts_json(const ServoCounts& counts) {
+Json times_json(const TimeHistogram& times) {
+  return {{"p50_s", times.quantile_s(0.5)},
+          {"p99_s", times.quantile_s(0.99)},
+          {"p999_s", times.quantile_s(0.999)},
+          {"max_s", times.max_s()}};
+}
+
+}  // namespace
+
+Json to_json(const ServoCounts& counts) {
   return {{"time_guards", counts.time_guards},
           {"saturations", counts.saturations},
           {"force_limited", counts.force_limited},
@@ -23,15 +32,6 @@ Json counts_json(const ServoCounts& counts) {
           {"late", counts.late},
           {"missed", counts.missed}};
 }
-
-Json times_json(const TimeHistogram& times) {
-  return {{"p50_s", times.quantile_s(0.5)},
-          {"p99_s", times.quantile_s(0.99)},
-          {"p999_s", times.quantile_s(0.999)},
-          {"max_s", times.max_s()}};
-}
-
-}  // namespace
 
 Json to_json(const DeviceIdentity& device) {
   return {{"kind", device.kind},
@@ -65,7 +65,7 @@ Json recording_closing(const ServoOutcome& outcome) {
   Json json{{"cause", word_of(outcome.cause)},
             {"detail", outcome.detail},
             {"cycles", outcome.cycles},
-            {"counts", counts_json(outcome.counts)},
+            {"counts", to_json(outcome.counts)},
             {"dropped_records", outcome.dropped_records},
             {"device_error", outcome.device.error},
             {"device_error_text", std::string(outcome.device.error_text)},

@@ -16,6 +16,7 @@ namespace tpm {
 [[nodiscard]] Json recording_closing(const ServoOutcome& outcome);
 
 [[nodiscard]] Json to_json(const DeviceIdentity& device);
+[[nodiscard]] Json to_json(const ServoCounts& counts);
 
 /// A recorded session.
 struct HilRecording {

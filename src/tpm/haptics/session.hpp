@@ -1,8 +1,10 @@
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "tpm/device/haptic_device.hpp"
@@ -56,6 +58,20 @@ struct HilSession {
                                        const std::filesystem::path& folder);
 [[nodiscard]] HilSession read_session(const std::filesystem::path& file);
 
+/// The tissue of a session as it is drawn, in the coordinates of its scene.
+struct TissueShape {
+  Eigen::Matrix3Xd rest_m;                          ///< centres of the spheres at rest
+  double radius_m = 0.0;                            ///< of each
+  std::size_t contact = 0;                          ///< the sphere that the tool meets
+  Eigen::Vector3d push = Eigen::Vector3d::UnitZ();  ///< into the tissue, unit vector
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> bonds;
+  /// Knows where all spheres are; steps of kDrawnEvery_s. Null: the contact sphere moves alone.
+  std::shared_ptr<ContactModel> field;
+};
+
+/// Between two pictures of a session.
+inline constexpr double kDrawnEvery_s = 0.04;
+
 /// The model of a session, with what is known of it.
 struct LoopModel {
   std::unique_ptr<ContactModel> model;
@@ -63,6 +79,7 @@ struct LoopModel {
   std::string name;                                 ///< for people
   std::string error_bound;         ///< what is known of its distance from the reference, in words
   double stiffness_N_per_m = 0.0;  ///< at once, at rest, along the push
+  TissueShape shape;
 };
 
 /// Throws Error(bad_input) if the scene is not one that the model can stand for.

@@ -14,6 +14,16 @@ namespace {
 
 constexpr const char* kScenePlace = "model: scene";
 
+TissueShape shape_of(const Network& network, std::size_t contact, const Eigen::Vector3d& push) {
+  TissueShape shape;
+  shape.rest_m = network.organ.position;
+  shape.radius_m = network.organ.radius;
+  shape.contact = contact;
+  shape.push = push;
+  for (const Bond& bond : network.bonds) shape.bonds.emplace_back(bond.a, bond.b);
+  return shape;
+}
+
 LoopModel element_model(const HilSession& session) {
   const Tissue tissue = parse_tissue(session.scene, kScenePlace, session.folder);
   if (session.scene.at("organ").value("kind", "") != "star") {
@@ -23,6 +33,9 @@ LoopModel element_model(const HilSession& session) {
   loop.model = std::make_unique<ElementContact>(tissue.material, session.servo.period_s);
   loop.name = "element: the paper's star, exact exponential update";
   loop.error_bound = "exact for linear motion within a period, to rounding";
+  const std::size_t contact = tissue.network.organ.contact.value();
+  loop.shape = shape_of(tissue.network, contact,
+                        -tissue.network.organ.normal.col(static_cast<Eigen::Index>(contact)));
   return loop;
 }
 
@@ -47,11 +60,14 @@ LoopModel condensed_model(const HilSession& session) {
   CondensedOptions options;
   options.depth_m = deepest_m(session);
   options.period_s = session.servo.period_s;
-  LoopModel loop;
-  loop.model = std::make_unique<CondensedContact>(
+  const CondensedContact condensed =
       build_condensed(tissue.bonds(), tissue.network.organ.position, tissue.freedom(), probe.sphere,
-                      probe.direction, options));
+                      probe.direction, options);
+  LoopModel loop;
+  loop.model = std::make_unique<CondensedContact>(condensed);
   loop.push = probe.direction;
+  loop.shape = shape_of(tissue.network, probe.sphere, probe.direction);
+  loop.shape.field = std::make_shared<CondensedContact>(condensed.with_period(kDrawnEvery_s));
   loop.name = fmt::format("condensed: {} spheres seen from sphere {}", tissue.network.organ.size(),
                           probe.sphere + 1);
   loop.error_bound = fmt::format("fitted to {} mm of depth; what tpm hil verify measures",

@@ -75,6 +75,7 @@ SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
   preparation.take_as_ready = choice.take_as_ready;
   try {
     run.device = device->open();
+    if (options.opened) options.opened(run.device, run.model);
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time)),
                      sizeof(ServoRecord));

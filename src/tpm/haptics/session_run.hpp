@@ -26,6 +26,8 @@ struct SessionRunOptions {
   std::function<bool()> interrupted;
   /// Sees every record, on the thread that writes them.
   std::function<void(const ServoRecord&)> watcher;
+  /// Called when the device is open and its forces are still off.
+  std::function<void(const DeviceIdentity&, const LoopModel&)> opened;
 };
 
 struct SessionRun {

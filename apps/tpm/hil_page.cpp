@@ -1,0 +1,62 @@
+// The page of tpm hil run: when it begins, and when it ends.
+#include "hil_page.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "command.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/units.hpp"
+
+namespace tpm::app {
+namespace {
+
+double page_time_s(const std::string& text, const char* option) {
+  constexpr double kLongest_s = 3600.0;
+  const double time_s = parse_quantity(text, Dimension::time, option);
+  if (time_s >= 0.0 && time_s <= kLongest_s) return time_s;
+  throw Error(ExitCode::usage, option, text, "0 to 3600 s");
+}
+
+int page_port(const std::string& text) {
+  constexpr std::uint64_t kLeast = 1024, kMost = 65535;
+  const std::uint64_t port = parse_whole_number(text, "--page", 0);
+  if (port == 0 || (port >= kLeast && port <= kMost)) return static_cast<int>(port);
+  throw Error(ExitCode::usage, "--page", text, "0 for a port that is free, or 1024 to 65535");
+}
+
+/// Until done() or the time is over.
+void linger(double seconds, const std::function<bool()>& done) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (std::chrono::steady_clock::now() < until && !done()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+}  // namespace
+
+HilPage::HilPage(const HilSession& session, bool real_time, const PageOptions& options)
+    : view_(session, real_time),
+      wait_s_(page_time_s(options.wait, "--page-wait")),
+      keep_s_(page_time_s(options.keep, "--page-keep")),
+      server_(view_, page_port(options.port)) {
+  fmt::print(stderr, "page: {}\n", server_.address());
+}
+
+void HilPage::show(SessionRunOptions& options) {
+  options.opened = [this, interrupted = options.interrupted](const DeviceIdentity& device,
+                                                             const LoopModel& model) {
+    view_.opened(device, model);
+    linger(wait_s_, [&] { return view_.watched() || interrupted(); });
+  };
+}
+
+void HilPage::end(const ServoOutcome& outcome, const std::function<bool()>& interrupted) {
+  view_.ended(outcome);
+  if (view_.watched()) linger(keep_s_, interrupted);
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,203 @@
+#!/usr/bin/env python3
+"""Opens the page of a session in headless Chromium and watches it: numbers change, phases follow each other,
+the tissue and the curves move, and nothing but this machine is asked.
+
+    page_in_chromium.py TPM [SESSION.json [SCREENSHOT.png SECONDS]]
+"""
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+SESSION = {
+    "title": "a session that is looked at",
+    "model": {"kind": "element", "scene": {
+        "organ": {"kind": "star", "spacing": "30 mm"},
+        "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"}}},
+    "rate": "500 Hz",
+    "limits": {"watchdog": "16 ms", "hang": "1 s", "late_cycles": 1000},
+    "indentations": {"depths": ["4 mm"], "rates": ["2 mm/s"], "hold": "2 s", "rest": "1 s"},
+    "creep": {"loads": ["0.2 N"], "hold": "2 s", "rest": "1 s"},
+}
+
+LOOK = """document.readyState !== "complete" ? "null" : JSON.stringify({
+  texts: Object.fromEntries(["title", "device", "status", "phase", "instruction", "tool_depth", "commanded", "clock",
+                             "target_depth", "target_force", "served"]
+                            .map(id => [id, document.getElementById(id).textContent])),
+  received: Number(document.body.dataset.received || 0),
+  ink: ["scene", "depth_plot", "force_plot"].map(id => {
+    const c = document.getElementById(id), d = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+    let sum = 0;
+    for (let i = 0; i < d.length; i += 4) sum = (31 * sum + d[i] + 3 * d[i + 1] + 7 * d[i + 2] + 11 * d[i + 3]) % 1000000007;
+    return sum; }),
+  overflow: document.documentElement.scrollWidth > document.documentElement.clientWidth})"""
+
+
+class Chromium:
+    """Spoken to over a pair of pipes, messages that end with a zero."""
+
+    def __init__(self, program, folder):
+        to_it, self.to = os.pipe()
+        self.back, from_it = os.pipe()
+        os.set_inheritable(to_it, True)
+        os.set_inheritable(from_it, True)
+        command = [program, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe",
+                   f"--user-data-dir={folder}", "--window-size=1100,900", "--no-first-run",
+                   "--disable-background-networking", "--disable-component-update", "about:blank"]
+        # Chromium reads from descriptor 3 and writes to 4.
+        self.process = subprocess.Popen(
+            ["sh", "-c", f'exec "$@" 3<&{to_it} 4>&{from_it}', "sh", *command], pass_fds=(to_it, from_it),
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(to_it)
+        os.close(from_it)
+        self.count, self.session, self.events, self.rest = 0, None, [], b""
+
+    def message(self):
+        while b"\0" not in self.rest:
+            got = os.read(self.back, 1 << 20)
+            if not got:
+                raise RuntimeError("Chromium has ended")
+            self.rest += got
+        text, self.rest = self.rest.split(b"\0", 1)
+        return json.loads(text)
+
+    def call(self, method, **parameters):
+        self.count += 1
+        request = {"id": self.count, "method": method, "params": parameters}
+        if self.session:
+            request["sessionId"] = self.session
+        os.write(self.to, json.dumps(request).encode() + b"\0")
+        while True:
+            message = self.message()
+            if message.get("id") == self.count:
+                if "error" in message:
+                    raise RuntimeError(f"{method}: {message['error']}")
+                return message["result"]
+            self.events.append(message)
+
+    def open(self, address):
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self.call("Emulation.setDeviceMetricsOverride", width=1100, height=800, deviceScaleFactor=1, mobile=False)
+        for domain in ("Runtime", "Network", "Page", "Log"):
+            self.call(f"{domain}.enable")
+        self.call("Page.navigate", url=address)
+
+    def look(self):
+        answer = self.call("Runtime.evaluate", expression=LOOK)
+        assert "exceptionDetails" not in answer, answer
+        return json.loads(answer["result"]["value"])
+
+    def picture(self, file):
+        Path(file).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+
+    def complaints(self):
+        found = [e["params"] for e in self.events if e.get("method") in ("Runtime.exceptionThrown", "Log.entryAdded")]
+        return [c for c in found if "entry" not in c or c["entry"]["level"] == "error"]
+
+    def asked(self):
+        return {e["params"]["request"]["url"] for e in self.events if e.get("method") == "Network.requestWillBeSent"}
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait()
+
+
+def begun(tpm, session, folder):
+    process = subprocess.Popen(
+        [tpm, "hil", "run", session, "--time", "real", "--page", "0", "--page-wait", "120 s", "--page-keep", "20 s",
+         "-o", folder / "r.tpmrec"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    line = process.stderr.readline()
+    assert line.startswith("page: http://127.0.0.1:"), line
+    return process, line.split()[1]
+
+
+def watched(chromium, address, seconds, shot):
+    """What the page shows, again and again until the session is over."""
+    chromium.open(address)
+    seen, start, pictured = [], time.monotonic(), shot is None
+    while time.monotonic() - start < seconds:
+        look = chromium.look()
+        if look is None:  # not loaded yet
+            continue
+        seen.append(look)
+        state = look["texts"]["status"]
+        if not pictured and time.monotonic() - start > shot[1]:
+            chromium.picture(shot[0])
+            return seen
+        if state == "finished" or state.startswith("stopped"):
+            time.sleep(0.6)
+            seen.append(chromium.look())
+            if not pictured:
+                chromium.picture(shot[0])
+            break
+        time.sleep(0.2)
+    return seen
+
+
+def check(seen, address, chromium):
+    running = [s for s in seen if s["texts"]["status"] == "running"]
+    assert len(running) >= 5, [s["texts"] for s in seen]
+
+    def different(name):
+        return len({s["texts"][name] for s in running})
+
+    for name in ("clock", "tool_depth", "commanded", "target_depth"):
+        assert different(name) >= 4, (name, [s["texts"][name] for s in running])
+    assert different("phase") >= 3 and different("instruction") >= 3, [s["texts"]["phase"] for s in running]
+    for k, canvas in enumerate(("scene", "depth_plot", "force_plot")):
+        assert len({s["ink"][k] for s in running}) >= 4, canvas
+    last = seen[-1]
+    assert last["received"] > len(running), last
+    assert last["texts"]["device"] == "SIMULATED DEVICE", last
+    assert last["texts"]["title"] == SESSION["title"], last
+    assert last["texts"]["status"] == "finished", last
+    assert "Let go of the device" in last["texts"]["instruction"], last
+    assert not last["overflow"]
+    assert not chromium.complaints(), chromium.complaints()
+    strangers = [url for url in chromium.asked() if not url.startswith((address, "data:"))]
+    assert not strangers, strangers
+
+
+def attempt(tpm, program, given, shot):
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        (folder / "session.json").write_text(json.dumps(SESSION))
+        session, address = begun(tpm, given or folder / "session.json", folder)
+        chromium = Chromium(program, folder / "profile")
+        try:
+            seen = watched(chromium, address, 60.0, shot)
+            # A machine that stalls for longer than the loop allows ends the session, and the page says so.
+            stalled = seen[-1]["texts"]["status"].startswith(("stopped: watchdog", "stopped: overrun", "stopped: hang"))
+            if shot is None and not stalled:
+                check(seen, address, chromium)
+            return stalled, len(seen)
+        finally:
+            chromium.close()
+            session.terminate()
+            session.wait()
+
+
+def main():
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if not program:
+        print("SKIPPED: there is no Chromium (Debian: chromium)")
+        sys.exit(77)
+    given = sys.argv[2] if len(sys.argv) > 2 else None
+    shot = (sys.argv[3], float(sys.argv[4])) if len(sys.argv) > 4 else None
+    for _ in range(4):
+        stalled, looks = attempt(sys.argv[1], program, given, shot)
+        if not stalled:
+            print(f"looked {looks} times")
+            return
+    sys.exit("this machine stalled in each of four sessions")
+
+
+if __name__ == "__main__":
+    main()
