@@ -162,7 +162,8 @@ Eigen::Index CondensedContact::spheres() const noexcept {
 // NOLINTNEXTLINE(performance-unnecessary-value-param)
 void CondensedContact::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
   const Eigen::Vector3d u = Eigen::Vector3d::Map(&state_.u[0]);
-  fit_->field.displacements(u, Eigen::Vector3d::Map(&state_.memory[0]), all);
+  fit_->field.displacements(u, Eigen::Vector3d::Map(&state_.memory[0]),
+                            Eigen::Vector3d::Map(&state_.memory[4]), all);
   all.col(fit_->contact) = fit_->frame.axes * u;
 }
 

@@ -134,7 +134,7 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   const CondensedPotential potential(fit->frame, samples);
   fit->tables = condensed_tables(fit->frame, potential, CondensedMatrices(fit->frame, metrics));
   fit->fit_error_N = potential.worst_N();
-  fit->field = CondensedField(fit->frame, rest, samples);
+  fit->field = CondensedField(fit->frame, rest, samples, metrics);
   return {fit, bonds.relaxation_time_s(), options.period_s};
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 
 #include "tpm/core/wide_vectors.hpp"
@@ -10,32 +11,44 @@ namespace tpm {
 namespace {
 
 constexpr std::array<int, 3> kFieldDegrees{5, 4, 2};
+/// Monomials of the depths that stand beside a tangential one, by the degree of that.
+constexpr std::array<int, 3> kBeside{21, 15, 6};
 constexpr double kFieldSlopeLength_m = 1e-3;  // an error of a derivative counts over it
 constexpr Eigen::Index kGroup = 48;           // numbers: of 16 spheres
 
-std::size_t place_of(const std::vector<CondensedExponents>& all, const CondensedExponents& e) {
-  return static_cast<std::size_t>(std::find(all.begin(), all.end(), e) - all.begin());
+/// Monomials of w to degree 2.
+template <class Number>
+std::array<Number, 10> monomials_of_w(const std::array<Number, 6>& x) {
+  const Number p = x[1];
+  const Number s = x[4];
+  const Number t = x[5];
+  return {Number(1), p, s, t, p * p, p * s, p * t, s * s, s * t, t * t};
+}
+
+/// Scaled depths of u and w, then tangents.
+template <class Number>
+std::array<Number, 6> scaled(const CondensedFrame& frame, const Eigen::Vector3d& u,
+                             const Eigen::Vector3d& w) {
+  const double depth = 1.0 / frame.half_depth_m;
+  const double across = 1.0 / frame.tangential_m;
+  return {static_cast<Number>((u[0] - frame.middle_depth_m) * depth),
+          static_cast<Number>((w[0] - frame.middle_depth_m) * depth),
+          static_cast<Number>(u[1] * across),
+          static_cast<Number>(u[2] * across),
+          static_cast<Number>(w[1] * across),
+          static_cast<Number>(w[2] * across)};
 }
 
 }  // namespace
 
 CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3Xd& rest,
-                               std::span<const CondensedSample> samples)
+                               std::span<const CondensedSample> samples,
+                               std::span<const CondensedMetric> metrics)
     : frame_(frame), spheres_(rest.cols()) {
-  auto monomials = condensed_monomials(kFieldDegrees);
-  for (const CondensedExponents& e : monomials) {
-    Step step{-1, 0};
-    for (int c = 0; c < 6; ++c) {
-      if (e[static_cast<std::size_t>(c)] == 0) continue;
-      CondensedExponents parent = e;
-      --parent[static_cast<std::size_t>(c)];
-      step = {static_cast<int>(place_of(monomials, parent)), c};
-    }
-    steps_.push_back(step);
-  }
-
+  const auto monomials = condensed_monomials(kFieldDegrees);
+  const auto count = static_cast<Eigen::Index>(monomials.size());
   const auto rows = static_cast<Eigen::Index>(4 * samples.size());
-  Eigen::MatrixXd terms(rows, kTerms);
+  Eigen::MatrixXd terms(rows, count);
   Eigen::MatrixXd fields(rows, rest.size());
   Eigen::Index row = 0;
   for (const CondensedSample& sample : samples) {
@@ -43,7 +56,7 @@ CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3
     for (int k = -1; k < 3; ++k, ++row) {
       const int by = k < 0 ? -1 : kCondensedOfU[static_cast<std::size_t>(k)];
       const double share = k < 0 ? 1.0 : kFieldSlopeLength_m / frame.scale_m(by);
-      for (Eigen::Index m = 0; m < kTerms; ++m) {
+      for (Eigen::Index m = 0; m < count; ++m) {
         terms(row, m) = share * powers.monomial(monomials[static_cast<std::size_t>(m)], by);
       }
       if (k < 0) {
@@ -58,62 +71,121 @@ CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3
   Eigen::MatrixXd gram = terms.transpose() * terms;
   gram.diagonal().array() += 1e-12 * gram.diagonal().maxCoeff();
   const Eigen::LLT<Eigen::MatrixXd> factor(gram);
-  const Eigen::MatrixXd coefficients =
-      factor.matrixL().solve(Eigen::MatrixXd(terms.transpose() * fields));
+
+  // What q does, likewise: one fit over the places of w for each of its directions.
+  const auto places = static_cast<Eigen::Index>(metrics.size());
+  Eigen::MatrixXd of_w(places, kOfW);
+  Eigen::MatrixXd answers(places, 3 * rest.size());
+  for (Eigen::Index m = 0; m < places; ++m) {
+    const CondensedMetric& metric = metrics[static_cast<std::size_t>(m)];
+    const auto x =
+        monomials_of_w(scaled<double>(frame, Eigen::Vector3d::Zero(), frame.local(metric.w_m)));
+    of_w.row(m) = Eigen::Map<const Eigen::RowVectorXd>(x.data(), kOfW);
+    answers.row(m) =
+        kFieldSlopeLength_m * (metric.second_moves * frame.axes).reshaped().transpose();
+  }
+  const Eigen::LLT<Eigen::MatrixXd> factor_of_w(of_w.transpose() * of_w);
+  const Eigen::MatrixXd second = factor_of_w.matrixL().solve(of_w.transpose() * answers);
+
+  Eigen::MatrixXd coefficients(count + 3 * kOfW, rest.size());
+  coefficients.topRows(count) = factor.matrixL().solve(Eigen::MatrixXd(terms.transpose() * fields));
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    coefficients.middleRows(count + k * kOfW, kOfW) =
+        second.middleCols(k * rest.size(), rest.size());
+  }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> strengths(coefficients *
                                                                  coefficients.transpose());
-  const Eigen::MatrixXd strongest = strengths.eigenvectors().rightCols(kMostModes);
+  const Eigen::MatrixXd strongest = strengths.eigenvectors().rightCols(kModes);
   const Eigen::MatrixXd modes = coefficients.transpose() * strongest;  // 3n x modes
-  amplitude_ = factor.matrixL().transpose().solve(strongest).transpose().cast<float>();
+  const auto rows_of = [](const Eigen::MatrixXd& table) {
+    std::vector<Amplitudes> all(static_cast<std::size_t>(table.rows()));
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      for (std::size_t m = 0; m < kModes; ++m) {
+        all[i][m] =
+            static_cast<float>(table(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(m)));
+      }
+    }
+    return all;
+  };
+  terms_ = rows_of(factor.matrixL().transpose().solve(strongest.topRows(count)));
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const auto some = rows_of(
+        factor_of_w.matrixL().transpose().solve(strongest.middleRows(count + k * kOfW, kOfW)) /
+        kFieldSlopeLength_m);
+    second_.insert(second_.end(), some.begin(), some.end());
+  }
   const Eigen::Index groups = (rest.size() + kGroup - 1) / kGroup;
-  modes_.assign(static_cast<std::size_t>(groups * kGroup * kMostModes), 0.0F);
+  modes_.assign(static_cast<std::size_t>(groups * kGroup * kModes), 0.0F);
   for (Eigen::Index i = 0; i < rest.size(); ++i) {
-    for (Eigen::Index m = 0; m < kMostModes; ++m) {
-      modes_[static_cast<std::size_t>(((i / kGroup) * kMostModes + m) * kGroup + i % kGroup)] =
+    for (Eigen::Index m = 0; m < kModes; ++m) {
+      modes_[static_cast<std::size_t>(((i / kGroup) * kModes + m) * kGroup + i % kGroup)] =
           static_cast<float>(modes(i, m));
     }
   }
 }
 
-void CondensedField::displacements(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m,
-                                   Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
-  const double middle = frame_.middle_depth_m;
-  const std::array<double, 6> x{(u_m[0] - middle) / frame_.half_depth_m,
-                                (w_m[0] - middle) / frame_.half_depth_m,
-                                u_m[1] / frame_.tangential_m,
-                                u_m[2] / frame_.tangential_m,
-                                w_m[1] / frame_.tangential_m,
-                                w_m[2] / frame_.tangential_m};
-  std::array<float, kTerms> terms;
-  terms[0] = 1.0F;
-  for (std::size_t m = 1; m < kTerms; ++m) {
-    terms[m] = terms[static_cast<std::size_t>(steps_[m].parent)] *
-               static_cast<float>(x[static_cast<std::size_t>(steps_[m].coordinate)]);
+CondensedField::Amplitudes CondensedField::amplitudes(const Eigen::Vector3d& u_m,
+                                                      const Eigen::Vector3d& w_m,
+                                                      const Eigen::Vector3d& q_m) const noexcept {
+  const std::array<float, 6> x = scaled<float>(frame_, u_m, w_m);
+  // In the order of condensed_monomials: those of higher degree come later.
+  std::array<float, kDepths> depths;
+  depths[0] = 1.0F;
+  for (std::size_t a = 1, next = 1, before = 0; a <= 5; ++a) {
+    for (std::size_t n = 0; n < a; ++n) depths[next + n] = x[0] * depths[before + n];
+    depths[next + a] = x[1] * depths[before + a - 1];
+    before = next;
+    next += a + 1;
   }
-  std::array<float, kMostModes> amplitude{};
-  const float* const table = amplitude_.data();
+  const std::array<float, kTangents> tangents{1.0F,        x[2],        x[3],        x[4],
+                                              x[5],        x[2] * x[2], x[2] * x[3], x[2] * x[4],
+                                              x[2] * x[5], x[3] * x[3], x[3] * x[4], x[3] * x[5],
+                                              x[4] * x[4], x[4] * x[5], x[5] * x[5]};
+  const std::array<float, kOfW> of_w = monomials_of_w(x);
+  Amplitudes sum{};
+  const Amplitudes* term = terms_.data();
+  const Amplitudes* second = second_.data();
   run_wide([&]() __attribute__((always_inline)) {
-    for (std::size_t m = 0; m < kTerms; ++m) {
-      for (std::size_t k = 0; k < kMostModes; ++k) {
-        amplitude[k] += terms[m] * table[m * kMostModes + k];
+    for (std::size_t t = 0; t < kTangents; ++t) {
+      const int beside = kBeside[t == 0 ? 0 : t < 5 ? 1 : 2];
+      Amplitudes part{};
+      for (std::size_t d = 0; d < static_cast<std::size_t>(beside); ++d, ++term) {
+        for (std::size_t m = 0; m < kModes; ++m) part[m] += depths[d] * (*term)[m];
       }
+      for (std::size_t m = 0; m < kModes; ++m) sum[m] += tangents[t] * part[m];
+    }
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const auto q = static_cast<float>(q_m[k]);
+      Amplitudes part{};
+      for (std::size_t d = 0; d < kOfW; ++d, ++second) {
+        for (std::size_t m = 0; m < kModes; ++m) part[m] += of_w[d] * (*second)[m];
+      }
+      for (std::size_t m = 0; m < kModes; ++m) sum[m] += q * part[m];
     }
   });
+  return sum;
+}
+
+void CondensedField::displacements(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m,
+                                   const Eigen::Vector3d& q_m,
+                                   Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
+  const Amplitudes amplitude = amplitudes(u_m, w_m, q_m);
   constexpr auto kNumbers = static_cast<std::size_t>(kGroup);
-  for (Eigen::Index first = 0; first < spheres_; first += kGroup / 3) {
-    std::array<float, kNumbers> sum{};
-    const float* const mode = modes_.data() + 3 * first * kMostModes;
+  const float* mode = modes_.data();
+  const bool in_a_row = all.outerStride() == 3;
+  for (Eigen::Index first = 0; first < spheres_; first += kGroup / 3, mode += kModes * kGroup) {
+    const Eigen::Index count = std::min<Eigen::Index>(kGroup / 3, spheres_ - first);
+    std::array<double, kNumbers> some;
+    double* const out = in_a_row && count == kGroup / 3 ? &all(0, first) : some.data();
     run_wide([&]() __attribute__((always_inline)) {
-      for (std::size_t m = 0; m < kMostModes; ++m) {
+      std::array<float, kNumbers> sum{};
+      for (std::size_t m = 0; m < kModes; ++m) {
         for (std::size_t i = 0; i < kNumbers; ++i) sum[i] += amplitude[m] * mode[m * kNumbers + i];
       }
+      for (std::size_t i = 0; i < kNumbers; ++i) out[i] = static_cast<double>(sum[i]);
     });
-    const Eigen::Index count = std::min<Eigen::Index>(kGroup / 3, spheres_ - first);
-    for (Eigen::Index s = 0; s < count; ++s) {
-      for (Eigen::Index k = 0; k < 3; ++k) {
-        all(k, first + s) = static_cast<double>(sum[static_cast<std::size_t>(3 * s + k)]);
-      }
-    }
+    if (out != some.data()) continue;
+    all.middleCols(first, count) = Eigen::Map<const Eigen::Matrix3Xd>(out, 3, count);
   }
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
+#include <span>
 #include <vector>
 
 #include "tpm/reduce/condensed_monomials.hpp"
@@ -7,34 +9,38 @@
 
 namespace tpm {
 
-/// Displacements of all spheres from few modes, whose amplitudes are polynomials of u and w. In
-/// single precision.
+/// Displacements of all spheres from few modes. Their amplitudes are polynomials of u and w, and
+/// linear in q with polynomials of w. In single precision.
 class CondensedField {
  public:
-  static constexpr int kMostModes = 24;
-  static constexpr int kTerms = 21 + 4 * 15 + 10 * 6;
+  static constexpr int kModes = 16;
 
   CondensedField() = default;
   /// @param rest 3 x n, m
   CondensedField(const CondensedFrame& frame, const Eigen::Matrix3Xd& rest,
-                 std::span<const CondensedSample> samples);
+                 std::span<const CondensedSample> samples,
+                 std::span<const CondensedMetric> metrics);
 
   [[nodiscard]] Eigen::Index spheres() const { return spheres_; }
-  /// @param u_m, w_m in the axes of the frame
+  /// @param u_m, w_m, q_m in the axes of the frame
   /// @param all 3 x n, m, in the coordinates of the organ
   void displacements(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m,
-                     Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept;
+                     const Eigen::Vector3d& q_m, Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept;
 
  private:
-  /// A monomial is an earlier one times a coordinate.
-  struct Step {
-    int parent, coordinate;
-  };
+  static constexpr int kTangents = 15;  ///< monomials of the four tangents, to degree 2
+  static constexpr int kDepths = 21;    ///< of the two depths, to degree 5
+  static constexpr int kOfW = 10;       ///< of w, to degree 2, times each of q
+  using Amplitudes = std::array<float, kModes>;
+
+  [[nodiscard]] Amplitudes amplitudes(const Eigen::Vector3d& u_m, const Eigen::Vector3d& w_m,
+                                      const Eigen::Vector3d& q_m) const noexcept;
+
   CondensedFrame frame_;
   Eigen::Index spheres_ = 0;
-  std::vector<Step> steps_;
-  Eigen::MatrixXf amplitude_;  ///< kMostModes x kTerms
-  std::vector<float> modes_;   ///< by groups of 16 spheres: mode by mode
+  std::vector<Amplitudes> terms_;   ///< in the order of condensed_monomials
+  std::vector<Amplitudes> second_;  ///< of each of q, for each monomial of w; 1/m
+  std::vector<float> modes_;        ///< by groups of 16 spheres: mode by mode; m
 };
 
 }  // namespace tpm

@@ -121,6 +121,7 @@ CondensedMetric CondensedSampler::relax_at(const Eigen::Vector3d& w_m) {
   // The reduced energy of a change dy of the memory is dy' (g - g S g) dy / 2, S g dy = B K^-1 B' g
   // dy what the elongations answer to it: found as the displacement under the forces of -g dy.
   Moves answer(second.rows(), 3);
+  found.second_moves.resize(rest_.size(), 3);
   for (Eigen::Index k = 0; k < 3; ++k) {
     // add_forces is affine in the memory: the forces of dy alone are a difference.
     Eigen::Matrix3Xd with = no_load_;
@@ -129,6 +130,7 @@ CondensedMetric CondensedSampler::relax_at(const Eigen::Vector3d& w_m) {
     bonds_.add_forces(latest_.position, memory_, without);
     with -= without;
     equilibrium_.displace(with);
+    found.second_moves.col(k) = with.reshaped();
     Eigen::VectorXd change;
     bonds_.elongation_changes(latest_.position, with, change);
     answer.col(k) = change;

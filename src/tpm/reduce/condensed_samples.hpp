@@ -33,6 +33,8 @@ struct CondensedMetric {
   Eigen::Matrix3d metric = Eigen::Matrix3d::Zero();         ///< J' g J, N/m
   Eigen::Matrix3d second_metric = Eigen::Matrix3d::Zero();  ///< P' g P, N/m
   Eigen::Matrix3d second_energy = Eigen::Matrix3d::Zero();  ///< of P in the reduced energy, N/m
+  /// How all positions (3 per sphere) answer to what is remembered along P, the contact held.
+  Eigen::Matrix<double, Eigen::Dynamic, 3> second_moves;
 };
 
 /// Finds samples by balancing the network, from place to place.
