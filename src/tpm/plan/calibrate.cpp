@@ -11,6 +11,11 @@
 #include "tpm/network/liver.hpp"
 #include "tpm/plan/operations.hpp"
 #include "tpm/plan/scalar_model.hpp"
+#include "tpm/reduce/condensed.hpp"
+#include "tpm/reduce/pushed_contact.hpp"
+#include "tpm/reduce/servo_bonds.hpp"
+#include "tpm/reduce/step_error.hpp"
+#include "tpm/solve/frontal_factor.hpp"
 #include "tpm/solve/lane_factor.hpp"
 
 namespace tpm {
@@ -98,7 +103,77 @@ class Bench {
            bonds();
   }
 
+  [[nodiscard]] double servo_bond_s() {
+    const auto spheres = static_cast<std::size_t>(rest().cols());
+    std::vector<ServoBonds::Choice> all;
+    for (std::size_t b = 0; b < bonds_.size(); ++b) {
+      all.push_back({b, bonds_.end_a()[b], bonds_.end_b()[b]});
+    }
+    ServoBonds servo(bonds_, rest(), all, static_cast<std::uint32_t>(spheres), true);
+    const ServoWeights weights = servo_weights(kPeriodOverTau);
+    const std::vector<float> displacement(4 * (spheres + 1), 1e-4F);
+    std::vector<float> force(8 * (spheres + 1), 0.0F);
+    return time_of([&] {
+             servo.advance(displacement.data(), weights, force.data());
+             servo.accept();
+           }) /
+           static_cast<double>(ServoBonds::kWide * servo.groups());
+  }
+
+  [[nodiscard]] double servo_block_s() {
+    std::vector<FrontalPattern::Edge> edges;
+    for (std::size_t b = 0; b < bonds_.size(); ++b) {
+      edges.push_back({bonds_.end_a()[b], bonds_.end_b()[b]});
+    }
+    const auto pattern = std::make_shared<const FrontalPattern>(rest(), edges);
+    FrontalFactor factor(pattern, true);
+    const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
+    // Near 1, so that repeated solutions stay of one size.
+    const std::vector<Eigen::Matrix3d> diagonal(pattern->nodes(), unit);
+    const std::vector<Eigen::Matrix3d> across(edges.size(), -1e-3 * unit);
+    (void)factor.factorise(diagonal, across);
+    const AlignedFloats one(4 * (pattern->nodes() + 1), 1.0F);
+    AlignedFloats x = one;
+    return time_of([&] {
+             std::copy(one.begin(), one.end(), x.begin());
+             factor.solve(x.data());
+           }) /
+           static_cast<double>(pattern->blocks_read());
+  }
+
+  [[nodiscard]] double contact_step_s() {
+    const Eigen::Vector3d into = push();
+    PushedContact tissue(bonds_, rest(), freedom_, contact());
+    StepError error(tissue, rest(), kPeriodOverTau, kPeriod_s);
+    double share = 0.0;
+    return time_of([&] {
+      share = 1.0 - share;
+      (void)error.advance(1e-3 * share * into);
+    });
+  }
+
+  [[nodiscard]] double condensed_step_s() {
+    const Eigen::Vector3d into = push();
+    CondensedOptions options;
+    options.depth_m = kCondensedDepth_m;
+    options.tangential_m = 0.5 * kCondensedDepth_m;
+    CondensedContact model = build_condensed(bonds_, rest(), freedom_, contact(), into, options);
+    double share = 0.0;
+    return time_of([&] {
+      share = share > 0.9 ? 0.0 : share + 1e-3;
+      (void)model.step(kCondensedDepth_m * share * into);
+    });
+  }
+
  private:
+  static constexpr double kPeriod_s = 1e-3;
+  static constexpr double kPeriodOverTau = 1e-3;
+  static constexpr double kCondensedDepth_m = 2e-3;
+
+  [[nodiscard]] std::size_t contact() const { return network_.organ.contact.value(); }
+  [[nodiscard]] Eigen::Vector3d push() const {
+    return -network_.organ.normal.col(static_cast<Eigen::Index>(contact()));
+  }
   [[nodiscard]] const Positions& rest() const { return network_.organ.position; }
   [[nodiscard]] double bonds() const { return static_cast<double>(bonds_.size()); }
   [[nodiscard]] double solved_blocks() const {
@@ -114,6 +189,15 @@ class Bench {
   LaneFactor factor_;
   BondMemory memory_;
 };
+
+double panel_product_s() {
+  constexpr std::size_t kSize = 128;
+  const AlignedFloats numbers(kSize * kSize, 1e-3F), x(kSize, 1.0F);
+  AlignedFloats y(kSize, 0.0F);
+  const FloatPanel panel{numbers.data(), kSize, kSize};
+  return time_of([&] { panel_kernels(true).times(panel, x.data(), y.data()); }) /
+         static_cast<double>(kSize * kSize);
+}
 
 double dense_flop_s() {
   constexpr int kSize = 64;
@@ -160,6 +244,11 @@ OperationCosts measured_costs() {
   set(Operation::solve_block, bench.solve_block_s());
   set(Operation::lane_block, bench.lane_block_s());
   set(Operation::lane_bond, bench.lane_bond_s());
+  set(Operation::contact_step, bench.contact_step_s());
+  set(Operation::servo_bond, bench.servo_bond_s());
+  set(Operation::servo_block, bench.servo_block_s());
+  set(Operation::panel_product, panel_product_s());
+  set(Operation::condensed_step, bench.condensed_step_s());
   return costs;
 }
 

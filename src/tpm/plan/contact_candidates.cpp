@@ -4,29 +4,43 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/servo_network.hpp"
+#include "tpm/reduce/zone_network.hpp"
 
 namespace tpm {
 namespace {
+
+constexpr double kRange = 1.05;  // that models are built for, in parts of the depth
+
+/// A model built for a scene, and what its steps take.
+struct BuiltContact {
+  std::unique_ptr<ContactModel> model;
+  OperationCount of_step;  ///< beside its balances
+  OperationCount of_balance;
+  int most_balances = 0;               ///< a step
+  std::function<int()> balances = {};  ///< of the last step; none: 0
+};
 
 /// A ContactModel moved through a protocol of depths. The scene leaves its sphere free across the
 /// push, where a ContactModel wants to be told: it is taken along by what the linear network says,
 /// and put right each period by the force across of the period before.
 class ContactRun {
  public:
-  ContactRun(const PlanScene& scene, ContactModel& model)
+  ContactRun(const PlanScene& scene, const BuiltContact& built)
       : protocol_(scene.protocol()),
-        model_(model),
+        built_(built),
+        model_(*built.model),
         into_(scene.scene().probe().direction),
         across_(across(into_)),
-        period_s_(model.period_s()),
+        period_s_(model_.period_s()),
         time_s_(protocol_.start_s()) {
-    const Eigen::Matrix3d k = model.instantaneous_stiffness();
+    const Eigen::Matrix3d k = model_.instantaneous_stiffness();
     const Eigen::Matrix2d free = across_.transpose() * k * across_;
     compliance_ = free.inverse();
     follows_ = -compliance_ * (across_.transpose() * k * into_);
@@ -44,7 +58,7 @@ class ContactRun {
     const double share = time_s_ > before_s_ ? (time_s - before_s_) / (time_s_ - before_s_) : 1.0;
     return before_N_ + std::clamp(share, 0.0, 1.0) * (force_N_ - before_N_);
   }
-  [[nodiscard]] double largest_error_N() const { return largest_error_N_; }
+  [[nodiscard]] double mean_balances() const { return balances_ / std::max(periods_, 1.0); }
   [[nodiscard]] bool trusted() const { return trusted_; }
 
  private:
@@ -63,11 +77,12 @@ class ContactRun {
     // The force of the tissue on the contact pushes it back.
     force_N_ = -answer.force_N.dot(into_);
     aside_ += compliance_ * (across_.transpose() * answer.force_N);
-    largest_error_N_ = std::max(largest_error_N_, answer.error_N);
+    if (built_.balances) balances_ += built_.balances();
     trusted_ = trusted_ && answer.trusted;
   }
 
   const Protocol& protocol_;
+  const BuiltContact& built_;
   ContactModel& model_;
   Eigen::Vector3d into_;
   Eigen::Matrix<double, 3, 2> across_;
@@ -75,9 +90,16 @@ class ContactRun {
   Eigen::Vector2d follows_ = Eigen::Vector2d::Zero(), aside_ = Eigen::Vector2d::Zero();
   double period_s_, time_s_, before_s_ = 0.0, periods_ = 0.0;
   double depth_m_ = 0.0, force_N_ = 0.0, before_N_ = 0.0;
-  double largest_error_N_ = 0.0;
+  double balances_ = 0.0;
   bool trusted_ = true;
 };
+
+OperationCount counted(const BalanceWork& work) {
+  return OperationCount()
+      .add(Operation::servo_bond, static_cast<double>(work.bonds))
+      .add(Operation::servo_block, static_cast<double>(work.blocks))
+      .add(Operation::panel_product, static_cast<double>(work.products));
+}
 
 /// What is common to them.
 class ContactCandidate : public PlanModel {
@@ -98,15 +120,25 @@ class ContactCandidate : public PlanModel {
   }
 
   [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
-    const PlanTrajectory answer = run(scout, budget, scout.times());
-    return {scout.claim_of(answer), answer.work, work_of_step(scout.scene())};
+    const BuiltContact built = build(scout.scene(), budget.period_s().value());
+    const PlanTrajectory answer = moved(scout.scene(), built, scout.times());
+    OperationCount worst = built.of_balance.times(built.most_balances);
+    worst += built.of_step;
+    return {scout.claim_of(answer), answer.work, worst};
   }
 
   [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
                                    const std::vector<double>& times_s) const override {
-    const PlanScene& scene = scout.scene();
-    const std::unique_ptr<ContactModel> model = build(scene, budget.period_s().value());
-    ContactRun run(scene, *model);
+    return moved(scout.scene(), build(scout.scene(), budget.period_s().value()), times_s);
+  }
+
+ protected:
+  [[nodiscard]] virtual BuiltContact build(const PlanScene& scene, double period_s) const = 0;
+
+ private:
+  [[nodiscard]] PlanTrajectory moved(const PlanScene& scene, const BuiltContact& built,
+                                     const std::vector<double>& times_s) const {
+    ContactRun run(scene, built);
     PlanTrajectory answer;
     answer.response.resize(std::ssize(times_s));
     for (std::size_t i = 0; i < times_s.size(); ++i) {
@@ -115,15 +147,11 @@ class ContactCandidate : public PlanModel {
     if (!run.trusted()) {
       throw Error(ExitCode::numerical, name(), "does not trust its answer within the protocol");
     }
-    answer.steps = scene.duration_s() / model->period_s();
-    answer.work = work_of_step(scene).times(answer.steps);
+    answer.steps = scene.duration_s() / built.model->period_s();
+    answer.work = built.of_step.times(answer.steps);
+    answer.work += built.of_balance.times(answer.steps * run.mean_balances());
     return answer;
   }
-
- protected:
-  [[nodiscard]] virtual std::unique_ptr<ContactModel> build(const PlanScene& scene,
-                                                            double period_s) const = 0;
-  [[nodiscard]] virtual OperationCount work_of_step(const PlanScene& scene) const = 0;
 };
 
 /// The network on its slow manifold (docs/reduction.md).
@@ -134,8 +162,7 @@ class CondensedCandidate final : public ContactCandidate {
   [[nodiscard]] std::string settings() const override { return "potential of a slow manifold"; }
 
  protected:
-  [[nodiscard]] std::unique_ptr<ContactModel> build(const PlanScene& scene,
-                                                    double period_s) const override {
+  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s) const override {
     constexpr double kAside = 0.25;  // of the depth, across
     const double depth = scene.protocol().peak();
     CondensedOptions options;
@@ -144,14 +171,47 @@ class CondensedCandidate final : public ContactCandidate {
     options.period_s = period_s;
     const DrivenNetwork& driven = scene.driven();
     const Probe& probe = scene.scene().probe();
-    return std::make_unique<CondensedContact>(build_condensed(
+    BuiltContact built;
+    built.model = std::make_unique<CondensedContact>(build_condensed(
         driven.bonds, driven.rest, driven.freedom, probe.sphere, probe.direction, options));
+    built.of_step.add(Operation::condensed_step, 1.0);
+    return built;
   }
-  [[nodiscard]] OperationCount work_of_step(const PlanScene& /*scene*/) const override {
-    // Polynomials with gradients, two evaluations a step: docs/reduction.md times them.
-    constexpr double kFlops = 1500.0;
-    return OperationCount().add(Operation::scalar_step, 1.0).add(Operation::dense_flop, kFlops);
+};
+
+/// The network near the contact, and what surrounds it as a linear tissue
+/// (docs/reduction_servo.md).
+class ZoneCandidate final : public ContactCandidate {
+ public:
+  explicit ZoneCandidate(int rings) : rings_(rings) {}
+  [[nodiscard]] std::string name() const override { return fmt::format("zone_{}", rings_); }
+  [[nodiscard]] std::string formulation() const override { return "zone"; }
+  [[nodiscard]] std::string settings() const override {
+    return fmt::format("{} ring{} of bonds", rings_, rings_ == 1 ? "" : "s");
   }
+
+ protected:
+  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s) const override {
+    ZoneNetworkOptions options;
+    options.period_s = period_s;
+    options.rings = rings_;
+    options.linear_depth_m = 0.4 * scene.protocol().peak();
+    options.frozen_depth_m = 0.5 * scene.protocol().peak();
+    options.deepest_m = kRange * scene.protocol().peak();
+    options.portable = true;  // the same answer on every machine
+    const DrivenNetwork& driven = scene.driven();
+    const Probe& probe = scene.scene().probe();
+    auto zone = std::make_unique<ZoneNetwork>(driven.bonds, driven.rest, driven.freedom,
+                                              probe.sphere, probe.direction, options);
+    BuiltContact built;
+    built.of_step = counted(zone->work());
+    built.of_step.add(Operation::contact_step, 1.0);
+    built.model = std::move(zone);
+    return built;
+  }
+
+ private:
+  int rings_;
 };
 
 /// The nonlinear network with a stiffness that was factorised beforehand, in single precision.
@@ -163,22 +223,23 @@ class ServoCandidate final : public ContactCandidate {
   [[nodiscard]] ModelReach reach() const override { return ModelReach::full; }
 
  protected:
-  [[nodiscard]] std::unique_ptr<ContactModel> build(const PlanScene& scene,
-                                                    double period_s) const override {
+  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s) const override {
     ServoNetworkOptions options;
     options.period_s = period_s;
     options.frozen_depth_m = 0.5 * scene.protocol().peak();
-    options.deepest_m = 1.05 * scene.protocol().peak();
-    options.portable = true;  // the same answer on every machine
+    options.deepest_m = kRange * scene.protocol().peak();
+    options.portable = true;
     const DrivenNetwork& driven = scene.driven();
     const Probe& probe = scene.scene().probe();
-    return std::make_unique<ServoNetwork>(driven.bonds, driven.rest, driven.freedom, probe.sphere,
-                                          probe.direction, options);
-  }
-  [[nodiscard]] OperationCount work_of_step(const PlanScene& scene) const override {
-    // Two balances a step; a bond and a block in single precision take about a lane's share.
-    constexpr double kBalances = 2.0;
-    return scene.iteration_work().times(kBalances / kLanes);
+    auto network = std::make_unique<ServoNetwork>(driven.bonds, driven.rest, driven.freedom,
+                                                  probe.sphere, probe.direction, options);
+    BuiltContact built;
+    built.of_step.add(Operation::contact_step, 1.0);
+    built.of_balance = counted(network->work());
+    built.most_balances = options.most_balances;
+    built.balances = [&counting = *network] { return counting.balances(); };
+    built.model = std::move(network);
+    return built;
   }
 };
 
@@ -186,6 +247,7 @@ class ServoCandidate final : public ContactCandidate {
 
 void add_contact_models(PlanModels& models) {
   models.push_back(std::make_unique<CondensedCandidate>());
+  for (const int rings : {1, 2, 3}) models.push_back(std::make_unique<ZoneCandidate>(rings));
   models.push_back(std::make_unique<ServoCandidate>());
 }
 

@@ -30,6 +30,11 @@ const std::array<OperationEntry, kOperations>& operation_table() {
       {Operation::bond_stiffness, "bond_stiffness", 15e-9},
       {Operation::factor_product, "factor_product", 8e-9},
       {Operation::solve_block, "solve_block", 3e-9},
+      {Operation::contact_step, "contact_step", 300e-9},
+      {Operation::servo_bond, "servo_bond", 5e-9},
+      {Operation::servo_block, "servo_block", 2e-9},
+      {Operation::panel_product, "panel_product", 0.2e-9},
+      {Operation::condensed_step, "condensed_step", 1.5e-6},
   }};
   return kTable;
 }

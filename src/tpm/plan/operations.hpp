@@ -18,8 +18,14 @@ enum class Operation : std::size_t {
   bond_stiffness,  ///< stiffness of a bond put into the matrix
   factor_product,  ///< product of two 3x3 blocks in a factorisation
   solve_block,     ///< a 3x3 block of a factor in a back-solve, one state
+  // Of models that a servo steps, in single precision and portable instructions.
+  contact_step,    ///< a step of a network seen from its contact, fixed part
+  servo_bond,      ///< force of a bond, now and at the end of the next period
+  servo_block,     ///< a 3x3 block of a factor in fronts in a back-solve
+  panel_product,   ///< a multiplication and addition in a dense panel times a vector
+  condensed_step,  ///< a step of the condensed model
 };
-inline constexpr std::size_t kOperations = 9;
+inline constexpr std::size_t kOperations = 14;
 
 /// A kind of work in words and figures.
 struct OperationEntry {

@@ -78,6 +78,7 @@ class Planning {
     tell("reference");
     truth_ = verified_truth(scene_, plan_.request.measure, plan_.inertial, plan_.request.tolerance);
     plan_.reference = truth_.reference;
+    tell("verification");
     verify_cheap();
     choose();
     plan_.needs_full = std::none_of(

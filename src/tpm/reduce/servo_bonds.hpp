@@ -15,6 +15,13 @@ struct ServoWeights {
   float keep = 0.0F, of_start = 0.0F, of_end = 0.0F;
 };
 
+/// What moving all spheres once for their forces takes, counted: for to say what a step costs.
+struct BalanceWork {
+  std::size_t bonds = 0;     ///< in all lanes, filled up ones too
+  std::size_t blocks = 0;    ///< 3x3 blocks of a FrontalFactor that a solution reads
+  std::size_t products = 0;  ///< multiplications of dense panels and vectors
+};
+
 /// @param period_over_tau > 0
 [[nodiscard]] ServoWeights servo_weights(double period_over_tau);
 

@@ -307,6 +307,13 @@ double ServoNetwork::residual_N() const noexcept {
   return std::sqrt(square);
 }
 
+BalanceWork ServoNetwork::work() const noexcept {
+  constexpr std::size_t kFields = 3;  // two depths' in the answer, and `remembering_`
+  constexpr std::size_t kAxes = 3, kFloats = 4;
+  return {ServoBonds::kWide * (at_contact_.groups() + elsewhere_.groups()), pattern_->blocks_read(),
+          kFields * kAxes * kFloats * free_.size()};
+}
+
 // A Ref is a view: what it shows is changed.
 // NOLINTNEXTLINE(performance-unnecessary-value-param)
 void ServoNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {

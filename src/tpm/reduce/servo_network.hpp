@@ -56,6 +56,8 @@ class ServoNetwork final : public ContactModel {
   /// Of the last step: balances, and what is left of the forces, the norm over free spheres, N.
   [[nodiscard]] int balances() const noexcept { return balances_; }
   [[nodiscard]] double residual_N() const noexcept;
+  /// Of one balance with its answer.
+  [[nodiscard]] BalanceWork work() const noexcept;
 
  private:
   /// Fields of the contact at a depth, four floats per free sphere.

@@ -206,6 +206,12 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
   return answer;
 }
 
+BalanceWork ZoneNetwork::work() const noexcept {
+  const auto size = [](const Dense& panel) { return panel.stride * panel.columns; };
+  return {ServoBonds::kWide * (2 * at_contact_.groups() + elsewhere_.groups()), 0,
+          size(inverse_) + size(stiff_) + size(relaxing_)};
+}
+
 // A Ref is a view: what it shows is changed.
 // NOLINTNEXTLINE(performance-unnecessary-value-param)
 void ZoneNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {

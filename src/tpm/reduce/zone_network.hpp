@@ -53,6 +53,8 @@ class ZoneNetwork final : public ContactModel {
   }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
 
+  /// Of a step.
+  [[nodiscard]] BalanceWork work() const noexcept;
   /// Spheres of the zone that move, the contact left out.
   [[nodiscard]] std::size_t zone_spheres() const noexcept { return zone_.size(); }
   /// Displacements of the surroundings beside those that follow the edge.
