@@ -5,11 +5,13 @@
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/haptics/recording_export.hpp"
 #include "tpm/haptics/rendering_border.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
 #include "tpm/report/hil_report.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/hdf5.hpp"
 
 namespace tpm {
 namespace {
@@ -119,6 +121,58 @@ TEST_CASE("Every output of a simulated device says so") {
   const Verification v = verify(recording);
   CHECK_THAT(verification_text(recording, v), Contains("SIMULATED DEVICE"));
   CHECK(verification_json(recording, v).at("simulated_device") == true);
+}
+
+TEST_CASE("An exported recording holds every column of every row, with unit, and what made it") {
+  const test::TempFolder folder;
+  const HilRecording recording = recorded(folder);
+  export_recording(recording, "0123", folder / "r.h5");
+  const Hdf5Reader file(folder / "r.h5");
+  CHECK(file.attribute("/", "simulated_device") == "true");
+  CHECK_THAT(file.attribute("/", "device"), Contains("SIMULATED DEVICE"));
+  CHECK(file.attribute("/", "device_kind") == "virtual");
+  CHECK(file.attribute("/", "recording_sha256") == "0123");
+  CHECK(file.attribute("/", "cause") == "finished");
+  CHECK(parse_json(file.texts("/header_json").at(0), "header") == recording.header);
+  CHECK(parse_json(file.texts("/closing_json").at(0), "closing") == recording.closing);
+  CHECK(file.texts("/phases/name").size() == recording.session.phases.size());
+  CHECK(file.members("/rows").size() == 28);
+  for (const std::string& name : file.members("/rows")) {
+    const std::string unit = file.attribute("/rows/" + name, "unit");
+    const std::string tail = name.substr(name.find_last_of('_') + 1);
+    CAPTURE(name, unit);
+    CHECK(unit == (tail == "s" || tail == "m" || tail == "N" || tail == "J" ? tail : "1"));
+    CHECK_FALSE(file.attribute("/rows/" + name, "meaning").empty());
+  }
+  const auto same = [&](const char* name, const std::function<double(const ServoRecord&)>& value) {
+    const std::vector<double> column = file.numbers(std::string("/rows/") + name);
+    REQUIRE(column.size() == recording.rows.size());
+    for (std::size_t i = 0; i < column.size(); ++i) {
+      if (column[i] != value(recording.rows[i])) FAIL(name << " of row " << i);
+    }
+  };
+  same("position_z_m", [](const ServoRecord& row) { return row.position_m[2]; });
+  same("commanded_z_N", [](const ServoRecord& row) { return row.commanded_N[2]; });
+  same("commanded_N", [](const ServoRecord& row) { return row.commanded_N[2]; });  // push -z
+  same("tool_depth_m", [](const ServoRecord& row) { return row.tool_depth_m; });
+  same("surface_depth_m", [](const ServoRecord& row) { return row.surface_depth_m; });
+  same("model_force_N", [](const ServoRecord& row) { return row.model_force_N; });
+  same("observed_J", [](const ServoRecord& row) { return row.observed_J; });
+  same("leak_J", [](const ServoRecord& row) { return row.leak_J; });
+  same("time_s", [](const ServoRecord& row) { return 1e-3 * static_cast<double>(row.cycle); });
+}
+
+TEST_CASE("A recording that is cut off is exported as such") {
+  const test::TempFolder folder;
+  HilRecording recording = recorded(folder);
+  recording.closed = false;
+  recording.rows.resize(100);
+  export_recording(recording, "", folder / "r.h5");
+  const Hdf5Reader file(folder / "r.h5");
+  CHECK(file.attribute("/", "whole") == "false");
+  CHECK(file.attribute("/", "cause") == "cut off");
+  CHECK_FALSE(file.has("/closing_json"));
+  CHECK(file.numbers("/rows/time_s").size() == 100);
 }
 
 TEST_CASE("The border of the exact update is the closed form, at every relaxation time") {

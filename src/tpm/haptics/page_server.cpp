@@ -21,12 +21,13 @@ namespace {
 using PageClock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr std::size_t kThreads = 8;            // as many requests at a time
-constexpr std::size_t kMostWaiting = 16;       // accepted beside them; more wait with the system
-constexpr std::size_t kMostBytes = 16 * 1024;  // of a request
-constexpr auto kMostTime = 2s;                 // of a request and its answer
-constexpr auto kLook = 50;                     // ms between looks at whether all is over
-constexpr int kGiveWay = 10;                   // nice value of the page's threads
+constexpr std::size_t kThreads = 8;         // as many requests at a time
+constexpr std::size_t kMostWaiting = 16;    // accepted beside them; more wait with the system
+constexpr std::size_t kMostBytes = 16'384;  // of a request
+constexpr auto kTimeToAsk = 500ms;          // a browser on the same machine asks at once
+constexpr auto kTimeToAnswer = 2s;
+constexpr auto kLook = 50;    // ms between looks at whether all is over
+constexpr int kGiveWay = 10;  // nice value of the page's threads
 
 /// Of the calling thread: Linux keeps a nice value for each.
 void give_way() {
@@ -37,7 +38,7 @@ void give_way() {
 class BoundedStream final : public httplib::Stream {
  public:
   BoundedStream(socket_t socket, const std::atomic<bool>& ending)
-      : socket_(socket), ending_(ending), deadline_(PageClock::now() + kMostTime) {}
+      : socket_(socket), ending_(ending), deadline_(PageClock::now() + kTimeToAsk) {}
 
   [[nodiscard]] bool is_readable() const override { return waited(POLLIN); }
   [[nodiscard]] bool is_writable() const override { return waited(POLLOUT); }
@@ -49,6 +50,8 @@ class BoundedStream final : public httplib::Stream {
     return static_cast<ssize_t>(count);
   }
   ssize_t write(const char* from, size_t size) override {
+    if (!answering_ && !late()) deadline_ = PageClock::now() + kTimeToAnswer;
+    answering_ = true;
     if (!waited(POLLOUT)) return -1;
     const ssize_t count = ::send(socket_, from, size, MSG_NOSIGNAL | MSG_DONTWAIT);
     answered_ = answered_ || count > 0;
@@ -114,7 +117,7 @@ class BoundedStream final : public httplib::Stream {
   PageClock::time_point deadline_;
   std::array<char, 4096> buffer_{};
   std::size_t next_ = 0, filled_ = 0, read_ = 0;
-  bool answered_ = false;
+  bool answering_ = false, answered_ = false;
 };
 
 /// httplib's pool with a bound: when it is full, no more connections are accepted for a while.

@@ -1,0 +1,54 @@
+// tpm hil export: a recording for other programs.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "command.hpp"
+#include "hil_options.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/haptics/recording_export.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct ExportChoice {
+  std::string recording, output;
+};
+
+int export_hil(const ExportChoice& choice, const Session& session) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(choice.recording, choice.output, ignored)) {
+    throw Error(ExitCode::usage, "-o " + choice.output, "is the recording itself", "another file");
+  }
+  const HilRecording recording = read_recording(choice.recording);
+  export_recording(recording, sha256_hex(read_file(choice.recording)), choice.output);
+  if (session.json()) {
+    fmt::print("{}", to_text(Json{{"file", choice.output},
+                                  {"rows", recording.rows.size()},
+                                  {"whole", recording.closed},
+                                  {"simulated_device", recording.simulated()}}));
+  } else {
+    fmt::print("{}\n{}wrote {}: {} rows\n", device_line(recording),
+               recording.closed ? "" : "the recording is cut off: no closing record\n",
+               choice.output, recording.rows.size());
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_hil_export_command(CLI::App& hil, Session& session) {
+  CLI::App* command = hil.add_subcommand("export", "Write a recording as HDF5");
+  auto choice = std::make_shared<ExportChoice>();
+  command->add_option("RECORDING", choice->recording, "What tpm hil run has written")->required();
+  command->add_option("-o,--output", choice->output, "HDF5 file")->required();
+  add_format_option(*command, session);
+  command->footer("Example:\n  tpm hil export session.tpmrec -o session.h5");
+  command->callback([choice, &session] {
+    session.run = [choice, &session] { return export_hil(*choice, session); };
+  });
+}
+
+}  // namespace tpm::app
