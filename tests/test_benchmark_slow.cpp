@@ -6,10 +6,13 @@
 #include <set>
 
 #include "refusal.hpp"
+#include "temp_folder.hpp"
 #include "tpm/benchmark/element_problems.hpp"
 #include "tpm/benchmark/runner.hpp"
 #include "tpm/benchmark/servo_problems.hpp"
 #include "tpm/report/benchmark_report.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/json.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;
@@ -305,4 +308,48 @@ TEST_CASE("the cheapest setting within an error") {
   CHECK(cheapest_within(result, "m", 1e-2) == &result.points[0]);
   CHECK(cheapest_within(result, "m", 2e-3) == &result.points[2]);
   CHECK(cheapest_within(result, "m", 1e-4) == nullptr);
+}
+
+TEST_CASE("a run that was interrupted goes on, and writes what a whole one writes") {
+  const test::TempFolder folder;
+  BenchmarkRecord whole;
+  whole.options = counts_only();
+  for (const BenchmarkEntry& entry : benchmark_entries()) {
+    if (entry.name != "bond_fitted" && entry.name != "star_creep") continue;
+    put_result(whole, run_benchmark(entry.make(), whole.options), {});
+  }
+  BenchmarkRecord begun = whole;
+  begun.results.erase(begun.results.begin());
+  write_file(folder / kBenchmarkPart, to_text(to_json(begun)));
+  KeptBenchmark kept = keep_benchmark(folder.path(), counts_only(), {});
+  CHECK(kept.missing.size() == benchmark_entries().size() - 1);
+  CHECK(std::none_of(kept.missing.begin(), kept.missing.end(),
+                     [](const BenchmarkEntry& entry) { return entry.name == "star_creep"; }));
+  put_result(kept.record, whole.results.front(), {});
+  CHECK(to_text(to_json(kept.record)) == to_text(to_json(whole)));
+  CHECK(benchmark_csv(kept.record.results.back(), false) ==
+        benchmark_csv(whole.results.back(), false));
+
+  SECTION("what is named is run anew") {
+    const std::vector<std::string> named{"star_creep"};
+    kept = keep_benchmark(folder.path(), counts_only(), named);
+    REQUIRE(kept.missing.size() == 1);
+    CHECK(kept.missing.front().name == "star_creep");
+  }
+  SECTION("with other options") {
+    CHECK_THROWS_WITH(keep_benchmark(folder.path(), BenchmarkOptions{}, {}),
+                      Contains("--keep") && Contains("made with --no-timing"));
+  }
+  SECTION("cut off") {
+    const std::string text = to_text(to_json(begun));
+    write_file(folder / kBenchmarkPart, text.substr(0, text.size() / 2));
+    CHECK_THROWS_WITH(keep_benchmark(folder.path(), counts_only(), {}), Contains(kBenchmarkPart));
+  }
+  SECTION("a key that is not known") {
+    Json json = to_json(begun);
+    json["problems"][0]["points"][3]["speed"] = 1.0;
+    write_file(folder / kBenchmarkPart, to_text(json));
+    CHECK_THROWS_WITH(keep_benchmark(folder.path(), counts_only(), {}),
+                      Contains(kBenchmarkPart) && Contains("speed"));
+  }
 }

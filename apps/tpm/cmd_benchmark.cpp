@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <filesystem>
 #include <memory>
 
 #include "command.hpp"
@@ -10,6 +11,8 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/benchmark_report.hpp"
 #include "tpm/report/draw.hpp"
+#include "tpm/report/run_record.hpp"
+#include "tpm/store/file.hpp"
 #include "tpm/store/writable.hpp"
 
 namespace tpm::app {
@@ -20,6 +23,7 @@ struct BenchmarkChoice {
   std::string folder = "out/accuracy";
   std::string repeats = "20";
   bool no_timing = false;
+  bool keep = false;
   bool list = false;
 };
 
@@ -65,19 +69,25 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
   BenchmarkRecord record;
   record.options.repeats = static_cast<int>(parse_whole_number(choice.repeats, "--repeats", 1));
   record.options.timing = !choice.no_timing;
-  const std::vector<BenchmarkEntry> entries = chosen_benchmarks(choice.problems);
+  std::vector<BenchmarkEntry> entries = chosen_benchmarks(choice.problems);
   const std::string python = find_drawing_python();  // before minutes of work, not after
   require_writable_folder(choice.folder);
-  std::map<std::string, double> seconds;
+  const std::filesystem::path part = std::filesystem::path(choice.folder) / kBenchmarkPart;
+  if (choice.keep) {
+    KeptBenchmark kept = keep_benchmark(choice.folder, record.options, choice.problems);
+    record = std::move(kept.record);
+    entries = std::move(kept.missing);
+  }
   for (const BenchmarkEntry& entry : entries) {
     const auto start = std::chrono::steady_clock::now();
     const BenchmarkProblem problem = entry.make();
     Progress progress(std::string(entry.name), problem.settings.size());
-    record.results.push_back(run_benchmark(problem, record.options, [&] { progress.advance(); }));
-    seconds[problem.name] =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    BenchmarkResult result = run_benchmark(problem, record.options, [&] { progress.advance(); });
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    put_result(record, std::move(result), run_record({{problem.name, took.count()}}));
+    write_file(part, to_text(to_json(record)));
   }
-  write_benchmark(record, choice.folder, python, std::move(seconds));
+  write_benchmark(record, choice.folder, python);
   if (session.json()) {
     fmt::print("{}", to_text(to_json(record)));
     return 0;
@@ -102,11 +112,15 @@ void add_benchmark_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_flag("--no-timing", choice->no_timing,
                     "Errors and counts only, each run once: the same bytes from run to run");
+  command->add_flag("--keep", choice->keep,
+                    "Keep what the folder holds: run the problems that are missing there, or those "
+                    "named; goes on from a run that was interrupted");
   command->add_flag("--list", choice->list, "Name the problems and do nothing");
   add_format_option(*command, session);
   command->footer(
       "Run it on an otherwise idle machine. Example:\n"
       "  tpm benchmark -o reports/accuracy\n"
+      "  tpm benchmark -o reports/accuracy --keep\n"
       "  tpm benchmark bond_paper organ_poke --repeats 50");
   command->callback([choice, &session] {
     session.run = [choice, &session] { return benchmark(*choice, session); };

@@ -95,6 +95,7 @@ Json point_json(const BenchmarkPoint& p, bool timing) {
   Json json{{"method", p.method}};
   if (!p.variant.empty()) json["variant"] = p.variant;
   if (!p.parameter.empty()) json[p.parameter] = stored(p.value);
+  if (p.step_s) json["step_s"] = stored(*p.step_s);
   json["end"] = p.end;
   if (!p.reason.empty()) json["reason"] = p.reason;
   if (std::isfinite(p.error)) {
@@ -177,7 +178,10 @@ Json to_json(const BenchmarkRecord& record) {
   if (record.options.timing) json["repeats"] = record.options.repeats;
   json["problems"] = Json::array();
   for (const BenchmarkResult& result : record.results) {
-    json["problems"].push_back(result_json(result, record.options.timing));
+    Json problem = result_json(result, record.options.timing);
+    const auto run = record.runs.find(result.name);
+    if (run != record.runs.end()) problem["run"] = run->second;
+    json["problems"].push_back(std::move(problem));
   }
   return json;
 }

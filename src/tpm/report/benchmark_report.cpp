@@ -340,12 +340,14 @@ Document benchmark_document(const BenchmarkRecord& record, const std::vector<Fig
 }
 
 void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path& folder,
-                     const std::string& python, std::map<std::string, double> seconds) {
+                     const std::string& python) {
   for (const BenchmarkResult& result : record.results) {
     write_file(folder / (result.name + ".csv"), benchmark_csv(result, record.options.timing));
   }
   write_file(folder / "benchmark.json", to_text(to_json(record)));
+  std::filesystem::remove(folder / kBenchmarkPart);
   const std::vector<Figure> figures = benchmark_figures(record);
+  std::map<std::string, double> seconds;
   const auto drawings =
       timed(seconds, "drawing", [&] { return draw_into(folder, figures, python); });
   const Document document = benchmark_document(record, figures);
@@ -353,6 +355,7 @@ void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path&
   write_file(folder / "report.html", to_html(document, drawings));
   Json run = run_record(seconds);
   run["drawing_python"] = python;
+  run["problems"] = record.runs;
   write_file(folder / "report.run.json", to_text(run));
 }
 

@@ -14,6 +14,7 @@ namespace tpm {
 struct BenchmarkRecord {
   std::vector<BenchmarkResult> results;
   BenchmarkOptions options;
+  std::map<std::string, Json> runs;  ///< of each problem when, where and how long; with times only
 };
 
 /// One line per setting, failures included; SI units in the column names. Without times the columns
@@ -22,6 +23,31 @@ struct BenchmarkRecord {
 
 /// The same for a program (docs/benchmark.md lists the keys).
 [[nodiscard]] Json to_json(const BenchmarkRecord& record);
+
+/// Reads what to_json wrote, for a run that goes on from it: of references only words and numbers
+/// are there, not their responses.
+/// Throws Error(input) with the place in the file where it is not what to_json writes.
+[[nodiscard]] BenchmarkRecord read_benchmark(const std::filesystem::path& file);
+
+/// The problems that are there already, and what has to be run to have them all.
+struct KeptBenchmark {
+  BenchmarkRecord record;
+  std::vector<BenchmarkEntry> missing;
+};
+
+/// Takes from a folder what an earlier run has left there: of one that was interrupted
+/// kBenchmarkPart, else benchmark.json; nothing if neither is there.
+/// @param named problems that are run in any case; none: those that are not there
+/// Throws Error(usage) if they were run with other options, and what read_benchmark throws.
+[[nodiscard]] KeptBenchmark keep_benchmark(const std::filesystem::path& folder,
+                                           const BenchmarkOptions& options,
+                                           std::span<const std::string> named);
+
+/// What is measured so far, in the folder of a run that goes on.
+inline constexpr const char* kBenchmarkPart = "benchmark.part.json";
+
+/// Adds a result, or puts it in the place of an earlier one, in the order of benchmark_entries().
+void put_result(BenchmarkRecord& record, BenchmarkResult result, Json run);
 
 /// For each problem error against wall time and, without times too, against counts. Settings that
 /// fail stand in a band above the panel.
@@ -47,8 +73,7 @@ struct BenchmarkRecord {
 /// figures/*.svg into `folder`, and report.run.json, which says when and where. Without times all
 /// but the last are the same from run to run.
 /// @param python from find_drawing_python()
-/// @param seconds wall time of each problem
 void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path& folder,
-                     const std::string& python, std::map<std::string, double> seconds);
+                     const std::string& python);
 
 }  // namespace tpm

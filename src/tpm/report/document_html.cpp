@@ -50,7 +50,7 @@ figcaption b { color: var(--ink); }
 )css";
 
 /// HTML text; words between backticks become code.
-std::string escaped(const std::string& text) {
+std::string html_escaped(const std::string& text) {
   std::string out;
   bool code = false;
   for (const char c : text) {
@@ -121,7 +121,7 @@ std::string inline_svg(const std::string& svg, const Picture& picture) {
   if (start == std::string::npos) {
     throw Error(ExitCode::environment, picture.id + ".svg", "is no SVG drawing");
   }
-  return fmt::format("<svg role=\"img\" aria-label=\"{}\"{}", escaped(picture.title),
+  return fmt::format("<svg role=\"img\" aria-label=\"{}\"{}", html_escaped(picture.title),
                      svg.substr(start + 4));
 }
 
@@ -130,17 +130,18 @@ struct HtmlBlock {
 
   std::string operator()(const Heading& heading) const {
     return fmt::format("<h{0} id=\"{1}\">{2}</h{0}>\n", heading.level, anchor(heading.text),
-                       escaped(heading.text));
+                       html_escaped(heading.text));
   }
 
   std::string operator()(const Paragraph& paragraph) const {
-    return fmt::format("<p>{}</p>\n", escaped(paragraph.text));
+    return fmt::format("<p>{}</p>\n", html_escaped(paragraph.text));
   }
 
   std::string operator()(const Bullets& bullets) const {
     std::string out = "<ul>\n";
     for (const Cell& item : bullets.items) {
-      out += fmt::format("<li{}>{}</li>\n", class_attribute(false, item.tone), escaped(item.text));
+      out += fmt::format("<li{}>{}</li>\n", class_attribute(false, item.tone),
+                         html_escaped(item.text));
     }
     return out + "</ul>\n";
   }
@@ -148,19 +149,19 @@ struct HtmlBlock {
   std::string operator()(const Table& table) const {
     std::string out = "<div class=\"wide\"><table>\n";
     if (!table.caption.empty()) {
-      out += fmt::format("<caption>{}</caption>\n", escaped(table.caption));
+      out += fmt::format("<caption>{}</caption>\n", html_escaped(table.caption));
     }
     out += "<thead><tr>";
     for (const Column& column : table.columns) {
       out += fmt::format("<th scope=\"col\"{}>{}</th>",
-                         class_attribute(column.numeric, Tone::plain), escaped(column.title));
+                         class_attribute(column.numeric, Tone::plain), html_escaped(column.title));
     }
     out += "</tr></thead>\n<tbody>\n";
     for (const auto& row : table.rows) {
       out += "<tr>";
       for (std::size_t i = 0; i < row.size(); ++i) {
         out += fmt::format("<td{}>{}</td>", class_attribute(table.columns[i].numeric, row[i].tone),
-                           escaped(row[i].text));
+                           html_escaped(row[i].text));
       }
       out += "</tr>\n";
     }
@@ -173,8 +174,8 @@ struct HtmlBlock {
       throw Error(ExitCode::environment, picture.id + ".svg", "was not drawn");
     }
     return fmt::format("<figure>\n{}\n<figcaption><b>{}.</b> {}</figcaption>\n</figure>\n",
-                       inline_svg(drawing->second, picture), escaped(picture.title),
-                       escaped(picture.caption));
+                       inline_svg(drawing->second, picture), html_escaped(picture.title),
+                       html_escaped(picture.caption));
   }
 };
 
@@ -183,7 +184,8 @@ std::string contents(const Document& document) {
   for (const Block& block : document.blocks) {
     const auto* heading = std::get_if<Heading>(&block);
     if (heading == nullptr || heading->level != 2) continue;
-    out += fmt::format("<a href=\"#{}\">{}</a>\n", anchor(heading->text), escaped(heading->text));
+    out +=
+        fmt::format("<a href=\"#{}\">{}</a>\n", anchor(heading->text), html_escaped(heading->text));
   }
   return out + "</nav>\n";
 }
@@ -196,7 +198,7 @@ std::string to_html(const Document& document, const std::map<std::string, std::s
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n"
       "<h1>{0}</h1>\n<p class=\"subtitle\">{2}</p>\n{3}",
-      escaped(document.title), kStyle, escaped(document.subtitle), contents(document));
+      html_escaped(document.title), kStyle, html_escaped(document.subtitle), contents(document));
   for (const Block& block : document.blocks) out += std::visit(HtmlBlock{drawings}, block);
   return out + "</body>\n</html>\n";
 }

@@ -6,7 +6,7 @@ namespace tpm {
 namespace {
 
 /// Outside code, characters that Markdown would read as markup are escaped.
-std::string escaped(const std::string& text, bool in_table = false) {
+std::string markdown_escaped(const std::string& text, bool in_table = false) {
   std::string out;
   bool code = false;
   for (const char c : text) {
@@ -26,16 +26,17 @@ std::string row_text(const std::vector<std::string>& cells) {
 struct MarkdownBlock {
   std::string operator()(const Heading& heading) const {
     return fmt::format("{} {}\n\n", std::string(static_cast<std::size_t>(heading.level), '#'),
-                       escaped(heading.text));
+                       markdown_escaped(heading.text));
   }
 
   std::string operator()(const Paragraph& paragraph) const {
-    return escaped(paragraph.text) + "\n\n";
+    return markdown_escaped(paragraph.text) + "\n\n";
   }
 
   std::string operator()(const Bullets& bullets) const {
     std::string out;
-    for (const Cell& item : bullets.items) out += fmt::format("- {}\n", escaped(item.text));
+    for (const Cell& item : bullets.items)
+      out += fmt::format("- {}\n", markdown_escaped(item.text));
     return out + "\n";
   }
 
@@ -43,31 +44,32 @@ struct MarkdownBlock {
     std::vector<std::string> titles;
     std::vector<std::string> rule;
     for (const Column& column : table.columns) {
-      titles.push_back(escaped(column.title, true));
+      titles.push_back(markdown_escaped(column.title, true));
       rule.emplace_back(column.numeric ? "---:" : "---");
     }
     std::string out = row_text(titles) + row_text(rule);
     for (const auto& row : table.rows) {
       std::vector<std::string> cells;
       cells.reserve(row.size());
-      for (const Cell& cell : row) cells.push_back(escaped(cell.text, true));
+      for (const Cell& cell : row) cells.push_back(markdown_escaped(cell.text, true));
       out += row_text(cells);
     }
     if (table.caption.empty()) return out + "\n";
-    return fmt::format("{}\n\n{}\n", escaped(table.caption), out);
+    return fmt::format("{}\n\n{}\n", markdown_escaped(table.caption), out);
   }
 
   std::string operator()(const Picture& picture) const {
-    return fmt::format("**{0}.** {1}\n\n![{0}](figures/{2}.svg)\n\n", escaped(picture.title),
-                       escaped(picture.caption), picture.id);
+    return fmt::format("**{0}.** {1}\n\n![{0}](figures/{2}.svg)\n\n",
+                       markdown_escaped(picture.title), markdown_escaped(picture.caption),
+                       picture.id);
   }
 };
 
 }  // namespace
 
 std::string to_markdown(const Document& document) {
-  std::string out =
-      fmt::format("# {}\n\n{}\n\n", escaped(document.title), escaped(document.subtitle));
+  std::string out = fmt::format("# {}\n\n{}\n\n", markdown_escaped(document.title),
+                                markdown_escaped(document.subtitle));
   for (const Block& block : document.blocks) out += std::visit(MarkdownBlock{}, block);
   out.pop_back();  // one line feed at the end, not two
   return out;
