@@ -4,6 +4,8 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -13,6 +15,8 @@ namespace {
 
 constexpr double kBalance = 1e-9;      // of stiffness at the contact times the stride
 constexpr double kLeastStride = 1e-3;  // of the longest
+constexpr double kSlow = 0.3;          // of the force left before: a new factorisation pays
+constexpr int kMostIterations = 40;
 
 }  // namespace
 
@@ -57,6 +61,28 @@ void CondensedSampler::find_moves(State& state, const BondMemory& memory) {
   }
 }
 
+bool CondensedSampler::balance(Positions& position, const BondMemory& memory) {
+  Eigen::Matrix3Xd force;
+  double before_N = std::numeric_limits<double>::infinity();
+  bool factorised = false;
+  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    equilibrium_.forces(position, memory, no_load_, force);
+    equilibrium_.freedom().project(force);
+    const double left_N = force.colwise().norm().maxCoeff();
+    if (left_N <= tolerance_N_) return true;
+    if (!std::isfinite(left_N)) return false;
+    if (!factorised || left_N > kSlow * before_N) {
+      ++factorisations_;
+      if (!equilibrium_.factorise(position, memory) || !equilibrium_.is_stable()) return false;
+      factorised = true;
+    }
+    before_N = left_N;
+    equilibrium_.displace(force);
+    position += force;
+  }
+  return false;
+}
+
 void CondensedSampler::move(State& state, const Eigen::Vector3d& contact,
                             const BondMemory& memory) {
   double stride = stride_m_;
@@ -68,6 +94,14 @@ void CondensedSampler::move(State& state, const Eigen::Vector3d& contact,
     const Eigen::Vector3d step = next.contact - state.contact;
     next.position += (state.moves * step).reshaped(3, rest_.cols());
     next.position.col(contact_) = rest_.col(contact_) + next.contact;
+    const Positions predicted = next.position;
+    if (balance(next.position, memory)) {
+      find_moves(next, memory);
+      state = std::move(next);
+      continue;
+    }
+    // With a line search, and the reason if that fails too.
+    next.position = predicted;
     const EquilibriumSearch search =
         equilibrium_.find(next.position, memory, no_load_, tolerance_N_);
     factorisations_ += search.factorisations;

@@ -66,6 +66,9 @@ class CondensedSampler {
     Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
   };
   void find_moves(State& state, const BondMemory& memory);
+  /// Newton's method with the factorisation at the start, found anew where it converges slowly.
+  /// False if it does not converge or the tissue is not stable where it was factorised.
+  [[nodiscard]] bool balance(Positions& position, const BondMemory& memory);
   void move(State& state, const Eigen::Vector3d& contact, const BondMemory& memory);
   [[nodiscard]] Moves elongation_moves(const State& state) const;
   [[nodiscard]] Eigen::VectorXd elongations(const State& state) const;

@@ -10,9 +10,10 @@
 namespace tpm {
 namespace {
 
-constexpr double kStride_m = 0.5e-3;
+constexpr double kStride_m = 1e-3;
 constexpr double kLeastStride_m = 1e-6;
-constexpr double kBalance = 1e-11;  // of the stiffest bond times a stride
+constexpr double kBalanceLength_m = 0.5e-3;
+constexpr double kBalance = 1e-11;  // of the stiffest bond times that length
 constexpr double kRestLength = 1e-9;
 
 Freedom with_contact_held(Freedom freedom, std::size_t contact) {
@@ -56,31 +57,47 @@ BondMemory PushedContact::memory(const Positions& position, double relaxed,
 }
 
 Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxed) {
-  const double way = displacement_m.norm();
-  const double tolerance_N = kBalance * kStride_m * bonds_.stiffness().maxCoeff();
+  Found here{relaxed, Eigen::Vector3d::Zero(), rest_};
+  for (const Found& other : found_) {
+    const bool nearer = (other.displacement_m - displacement_m).norm() <
+                        (here.displacement_m - displacement_m).norm();
+    if (other.relaxed == relaxed && nearer) here = other;
+  }
+  const Eigen::Vector3d from = here.displacement_m;
+  const double way = (displacement_m - from).norm();
+  const double tolerance_N = kBalance * kBalanceLength_m * bonds_.stiffness().maxCoeff();
   const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, rest_.cols());
   const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), relaxed};
   const auto column = static_cast<Eigen::Index>(contact_);
-  Positions position = rest_;
   double done = 0.0;
   double stride = kStride_m;
+  // What is free goes on as it went over the stride before.
+  Positions before = here.position;
+  double went = 0.0;
   while (done < way) {
     const double aim = std::min(done + stride, way);
-    Positions next = position;
-    next.col(column) = rest_.col(column) + aim / way * displacement_m;
+    Positions next = here.position;
+    if (went > 0.0) next += (aim - done) / went * (here.position - before);
+    next.col(column) = rest_.col(column) + from + aim / way * (displacement_m - from);
     const EquilibriumSearch search = equilibrium_.find(next, memory, load, tolerance_N);
     if (search.converged && search.stable) {
-      position = std::move(next);
+      before = std::move(here.position);
+      here.position = std::move(next);
+      went = aim - done;
       done = aim;
       stride = kStride_m;
       continue;
     }
     stride *= 0.5;
     if (stride > kLeastStride_m) continue;
-    throw Error(ExitCode::numerical, "contact",
-                fmt::format("no stable equilibrium at {} mm from rest", significant(1e3 * aim, 4)));
+    throw Error(
+        ExitCode::numerical, "contact",
+        fmt::format("no stable equilibrium at {} mm from rest",
+                    significant(1e3 * (from + aim / way * (displacement_m - from)).norm(), 4)));
   }
-  return position;
+  here.displacement_m = displacement_m;
+  if (way > 0.0) found_.push_back(here);
+  return here.position;
 }
 
 ContactFields PushedContact::fields(const Positions& position, const BondMemory& memory) {

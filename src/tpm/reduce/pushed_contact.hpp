@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <vector>
 
 #include "tpm/network/equilibrium.hpp"
 
@@ -30,7 +31,8 @@ class PushedContact {
   [[nodiscard]] const Freedom& freedom() const { return freedom_; }
   [[nodiscard]] std::size_t contact() const { return contact_; }
 
-  /// The equilibrium with the contact displaced, found along a straight line from rest.
+  /// The equilibrium with the contact displaced, found along a straight line from rest or from the
+  /// nearest of those found before with the same `relaxed`.
   /// @param relaxed how far what bonds remember has caught up: 0 at once, 1 relaxed
   /// Throws Error(numerical) where the tissue buckles or none is found.
   [[nodiscard]] Positions at(const Eigen::Vector3d& displacement_m, double relaxed);
@@ -45,11 +47,17 @@ class PushedContact {
   void displace(Eigen::Matrix3Xd& forces) const { equilibrium_.displace(forces); }
 
  private:
+  struct Found {
+    double relaxed;
+    Eigen::Vector3d displacement_m;
+    Positions position;
+  };
   const BondSystem& bonds_;
   Positions rest_;
   Freedom freedom_;
   std::size_t contact_;
   Equilibrium equilibrium_;
+  std::vector<Found> found_;
 };
 
 }  // namespace tpm
