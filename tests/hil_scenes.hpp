@@ -16,6 +16,19 @@ inline Json short_session() {
     "creep": {"loads": ["0.2 N"], "hold": "1 s", "rest": "1 s"}})");
 }
 
+/// One indentation of a small liver. @param kind of the model
+inline Json network_session(const char* kind, const char* eta1 = "2.4e4 Pa s") {
+  Json json = Json::parse(R"({
+    "model": {"kind": "", "scene": {
+      "organ": {"kind": "liver", "count": 60},
+      "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa"},
+      "anchors": [{"kind": "far_side", "fraction": 0.3}]}},
+    "indentations": {"depths": ["4 mm"], "rates": ["8 mm/s"], "hold": "0.4 s", "rest": "0.2 s"}})");
+  json["model"]["kind"] = kind;
+  json["model"]["scene"]["material"]["eta1"] = eta1;
+  return json;
+}
+
 inline HilSession parsed(const Json& json) {
   return parse_session(json, "session", {});
 }

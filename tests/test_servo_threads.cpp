@@ -14,6 +14,7 @@
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/haptics/jitter_check.hpp"
+#include "tpm/haptics/network_beside.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
 #include "tpm/store/file.hpp"
@@ -158,6 +159,51 @@ TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as
     if (slow > 0) CHECK(1e-9 * static_cast<double>(off - slow) < 2.0);
   }
   CHECK(best_ms <= 10.0);
+}
+
+TEST_CASE("What goes through a triple buffer arrives whole, in order, the last one at last") {
+  struct Value {
+    long number = 0, negative = 0, twice = 0;
+  };
+  constexpr long kLast = 200'000;
+  TripleBuffer<Value> buffer;
+  std::thread writer([&] {
+    for (long i = 1; i <= kLast; ++i) buffer.write({i, -i, 2 * i});
+  });
+  long seen = 0, broken = 0;
+  while (seen < kLast) {
+    if (!buffer.refresh()) continue;
+    const Value& value = buffer.latest();
+    if (value.negative != -value.number || value.twice != 2 * value.number) ++broken;
+    if (value.number <= seen) ++broken;
+    seen = value.number;
+  }
+  writer.join();
+  CHECK(broken == 0);
+  CHECK_FALSE(buffer.refresh());
+}
+
+TEST_CASE("A network in a thread of its own follows the loop, however late it is, run after run") {
+  const LoopModel beside =
+      make_loop_model(test::parsed(test::network_session("network_beside")), true);
+  const LoopModel inside = make_loop_model(test::parsed(test::network_session("network")));
+  auto& model = dynamic_cast<NetworkBeside&>(*beside.model);
+  for (int run = 0; run < 2; ++run) {
+    model.reset();
+    inside.model->reset();
+    ContactAnswer answer, expected;
+    for (int i = 1; i <= 20'000 && (i <= 600 || model.age() > 5); ++i) {
+      const Eigen::Vector3d at = 1e-5 * std::min(i, 400) * beside.push;
+      expected = inside.model->step(at);
+      answer = model.step(at);
+      std::this_thread::sleep_for(500us);
+    }
+    INFO("run " << run);
+    CHECK(model.age() <= 5);
+    CHECK(answer.trusted);
+    CHECK(expected.force_N.norm() > 0.1);
+    CHECK((answer.force_N - expected.force_N).norm() < 0.01 * expected.force_N.norm());
+  }
 }
 
 TEST_CASE("The jitter check counts and judges") {

@@ -61,6 +61,13 @@ void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& p
   plant.arm.correction_per_s = block.value("correction_per_s", plant.arm.correction_per_s);
 }
 
+LoopModelKind parse_model(const std::string& kind) {
+  if (kind == "element") return LoopModelKind::element;
+  if (kind == "network") return LoopModelKind::network;
+  if (kind == "network_beside") return LoopModelKind::network_beside;
+  return LoopModelKind::condensed;
+}
+
 std::vector<std::uint64_t> ends_of(const std::vector<SessionPhase>& phases, double period_s) {
   std::vector<std::uint64_t> ends;
   for (const SessionPhase& phase : phases) {
@@ -108,8 +115,7 @@ HilSession parse_session(const Json& json, std::string_view where,
   const DocumentPlace place{std::string(where)};
   HilSession session;
   session.title = json.value("title", std::string("session"));
-  session.model =
-      json.at("model").at("kind") == "element" ? LoopModelKind::element : LoopModelKind::condensed;
+  session.model = parse_model(json.at("model").at("kind").get<std::string>());
   session.text = to_text(json);
   session.folder = folder;
   const Json& scene = json.at("model").at("scene");

@@ -32,8 +32,10 @@ struct SessionPhase {
 
 /// What is stepped in the loop.
 enum class LoopModelKind {
-  element,    ///< the paper's star
-  condensed,  ///< a network seen from its contact sphere, reduced
+  element,         ///< the paper's star
+  condensed,       ///< a network seen from its contact sphere, reduced
+  network,         ///< the whole network, every period
+  network_beside,  ///< the whole network at a lower rate beside the loop
 };
 
 /// A session as its file says.
@@ -82,7 +84,8 @@ struct LoopModel {
   TissueShape shape;
 };
 
+/// @param threads the model may work in a thread of its own; else all happens in its steps
 /// Throws Error(bad_input) if the scene is not one that the model can stand for.
-[[nodiscard]] LoopModel make_loop_model(const HilSession& session);
+[[nodiscard]] LoopModel make_loop_model(const HilSession& session, bool threads = false);
 
 }  // namespace tpm

@@ -5,6 +5,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/element_contact.hpp"
+#include "tpm/haptics/network_beside.hpp"
 #include "tpm/haptics/session.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
@@ -50,35 +51,96 @@ double deepest_m(const HilSession& session) {
   return deepest;
 }
 
+/// The network of a scene, pushed at its contact sphere.
+struct PushedScene {
+  explicit PushedScene(const HilSession& session)
+      : tissue(parse_tissue(session.scene, kScenePlace, session.folder)),
+        deepest(deepest_m(session)) {
+    require_standing(tissue, kScenePlace);
+    probe = parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{kScenePlace})
+                .front()
+                .probe;
+  }
+  [[nodiscard]] const Positions& rest() const { return tissue.network.organ.position; }
+  /// Name and shape; the model is still to come.
+  [[nodiscard]] LoopModel begun(std::string_view kind, std::string_view how) const {
+    LoopModel loop;
+    loop.push = probe.direction;
+    loop.shape = shape_of(tissue.network, probe.sphere, probe.direction);
+    loop.name = fmt::format("{}: {} spheres {} sphere {}", kind, tissue.network.organ.size(), how,
+                            probe.sphere + 1);
+    return loop;
+  }
+  [[nodiscard]] ServoNetworkOptions network_options(double period_s) const {
+    return {.period_s = period_s, .frozen_depth_m = 0.5 * deepest, .deepest_m = deepest};
+  }
+  [[nodiscard]] std::unique_ptr<ServoNetwork> network(double period_s) const {
+    return std::make_unique<ServoNetwork>(tissue.bonds(), rest(), tissue.freedom(), probe.sphere,
+                                          probe.direction, network_options(period_s));
+  }
+
+  Tissue tissue;
+  Probe probe;
+  double deepest;
+};
+
 LoopModel condensed_model(const HilSession& session) {
-  const Tissue tissue = parse_tissue(session.scene, kScenePlace, session.folder);
-  require_standing(tissue, kScenePlace);
-  const Probe probe =
-      parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{kScenePlace})
-          .front()
-          .probe;
+  const PushedScene scene(session);
   CondensedOptions options;
-  options.depth_m = deepest_m(session);
+  options.depth_m = scene.deepest;
   options.period_s = session.servo.period_s;
   const CondensedContact condensed =
-      build_condensed(tissue.bonds(), tissue.network.organ.position, tissue.freedom(), probe.sphere,
-                      probe.direction, options);
-  LoopModel loop;
+      build_condensed(scene.tissue.bonds(), scene.rest(), scene.tissue.freedom(),
+                      scene.probe.sphere, scene.probe.direction, options);
+  LoopModel loop = scene.begun("condensed", "seen from");
   loop.model = std::make_unique<CondensedContact>(condensed);
-  loop.push = probe.direction;
-  loop.shape = shape_of(tissue.network, probe.sphere, probe.direction);
   loop.shape.field = std::make_shared<CondensedContact>(condensed.with_period(kDrawnEvery_s));
-  loop.name = fmt::format("condensed: {} spheres seen from sphere {}", tissue.network.organ.size(),
-                          probe.sphere + 1);
   loop.error_bound = fmt::format("fitted to {} mm of depth; what tpm hil verify measures",
                                  significant(1e3 * options.depth_m, 4));
   return loop;
 }
 
-LoopModel model_of(const HilSession& session) {
+LoopModel network_model(const HilSession& session) {
+  const PushedScene scene(session);
+  LoopModel loop = scene.begun("network", "stepped every period, pushed at");
+  loop.model = scene.network(session.servo.period_s);
+  loop.shape.field = scene.network(kDrawnEvery_s);
+  loop.error_bound = "its own estimate, row by row; what tpm hil verify measures";
+  return loop;
+}
+
+LoopModel network_beside_model(const HilSession& session, bool threads) {
+  constexpr double kShortest_s = 0.1;
+  const PushedScene scene(session);
+  const double tau_s = scene.tissue.material.relaxation_time_s();
+  if (tau_s < kShortest_s) {
+    throw bad_input(kScenePlace,
+                    fmt::format("has a relaxation time of {} s, too short for the model "
+                                "'network_beside'",
+                                significant(tau_s, 4)),
+                    "0.1 s or more, or the model 'network'");
+  }
+  const int every = NetworkBeside::periods_between(session.servo.period_s);
+  const BondSystem bonds = scene.tissue.bonds();
+  LoopModel loop = scene.begun("network_beside", "stepped beside the loop, pushed at");
+  loop.model = std::make_unique<NetworkBeside>(
+      scene.network(every * session.servo.period_s),
+      StiffnessByDepth(bonds, scene.rest(), scene.tissue.freedom(), scene.probe.sphere,
+                       scene.probe.direction, scene.deepest),
+      session.servo.period_s, tau_s, threads);
+  loop.shape.field = scene.network(kDrawnEvery_s);
+  loop.error_bound = "its own estimate, row by row; what tpm hil verify measures";
+  return loop;
+}
+
+LoopModel model_of(const HilSession& session, bool threads) {
   switch (session.model) {
     case LoopModelKind::element:
       return element_model(session);
+    case LoopModelKind::network:
+      return network_model(session);
+    case LoopModelKind::network_beside:
+      return network_beside_model(session, threads);
     case LoopModelKind::condensed:
       break;
   }
@@ -87,8 +149,8 @@ LoopModel model_of(const HilSession& session) {
 
 }  // namespace
 
-LoopModel make_loop_model(const HilSession& session) {
-  LoopModel loop = model_of(session);
+LoopModel make_loop_model(const HilSession& session, bool threads) {
+  LoopModel loop = model_of(session, threads);
   loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
   return loop;
 }

@@ -190,8 +190,10 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
   const BondSystem bonds = tissue.bonds();
   QuasiStaticOptions settings;
   settings.tolerance = options.tolerance;
-  const QuasiStatic network(bonds, tissue.network.organ.position, tissue.freedom(), probe,
-                            settings);
+  // As in the loop, the tool takes the sphere along the push and not across it.
+  Freedom freedom = tissue.freedom();
+  freedom.guide(probe.sphere, probe.direction);
+  const QuasiStatic network(bonds, tissue.network.organ.position, freedom, probe, settings);
 
   Verification v;
   v.reference = "full nonlinear quasi-static network of " +
