@@ -161,9 +161,13 @@ Table failure_table(const BenchmarkResult& result) {
   return table;
 }
 
+std::string error_words(double error, bool below_floor) {
+  return (below_floor ? "< " : "") + percent_words(error);
+}
+
 /// The worst of a curve over its settings.
 struct WorstOf {
-  bool failed = false;
+  bool failed = false, below_floor = true;
   double error = 0.0, median_s = 0.0, p99_s = 0.0, build_s = 0.0;
 };
 
@@ -172,6 +176,7 @@ WorstOf worst_of(const BenchmarkResult& result, const std::string& curve) {
   for (const BenchmarkPoint& p : result.points) {
     if (p.curve() != curve) continue;
     worst.failed = worst.failed || p.failed();
+    worst.below_floor = worst.below_floor && p.below_floor;
     worst.error = std::max(worst.error, p.error);
     worst.build_s = std::max(worst.build_s, p.build_s);
     if (!p.step_times) continue;
@@ -205,7 +210,8 @@ Table targets_table(const BenchmarkResult& result, bool timing) {
     const BenchmarkTarget target = named == result.targets.end() ? BenchmarkTarget{} : *named;
     std::vector<Cell> row{{curve}};
     row.push_back(worst.failed ? Cell{"fails", Tone::bad}
-                               : against(worst.error, target.error, percent_words(worst.error),
+                               : against(worst.error, target.error,
+                                         error_words(worst.error, worst.below_floor),
                                          percent_words(target.error)));
     const auto add = [&](double value_s, double most_s) {
       row.push_back(against(value_s, most_s, seconds_words(value_s), seconds_words(most_s)));
@@ -249,8 +255,9 @@ Table settings_table(const BenchmarkResult& result, const std::string& caption,
 /// Of a problem with targets: errors, times, and what the models claim of their errors.
 void add_model_tables(Document& document, const BenchmarkResult& result, bool timing) {
   document.table(targets_table(result, timing));
-  document.table(settings_table(result, "Error at each relaxation time",
-                                [](const BenchmarkPoint& p) { return percent_words(p.error); }));
+  document.table(
+      settings_table(result, "Error at each relaxation time",
+                     [](const BenchmarkPoint& p) { return error_words(p.error, p.below_floor); }));
   document.table(settings_table(
       result,
       "Claimed over true error: the median over all times of comparison, and how often the claim "
