@@ -63,6 +63,8 @@ struct BenchmarkReference {
   double agreement = 0.0;  ///< largest difference of the two, in parts of the peak
   double floor = 0.0;      ///< errors below this, in parts of the peak, cannot be told
 
+  /// The floor of a part of the response by itself, not above that of the whole.
+  [[nodiscard]] double floor_of(const AnsweredPart& part) const;
   /// The answer that settings of a method are compared with: no method is its own judge.
   [[nodiscard]] const Eigen::VectorXd& response_for(std::string_view method) const {
     return method == judge.method ? second.response : judge.response;

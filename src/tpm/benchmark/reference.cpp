@@ -12,6 +12,13 @@ Eigen::VectorXd sizes_of(const Eigen::VectorXd& response, int components) {
   return response.reshaped(components, response.size() / components).colwise().norm().transpose();
 }
 
+double BenchmarkReference::floor_of(const AnsweredPart& part) const {
+  if (exact) return floor;
+  const Eigen::VectorXd apart = judge.response.segment(part.first, part.count) -
+                                second.response.segment(part.first, part.count);
+  return std::max(10.0 * sizes_of(apart, components).maxCoeff() / peak, kExactFloor);
+}
+
 BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer second, bool exact,
                                      double worst_floor, std::string_view where, int components) {
   const auto refused = [&](const std::string& what, const std::string& expected) {

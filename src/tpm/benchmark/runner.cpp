@@ -59,11 +59,12 @@ void judge(BenchmarkPoint& point, const BenchmarkRun& whole_run, const Benchmark
   const Eigen::VectorXd errors =
       sizes_of(run.response - truth, reference.components) / reference.peak;
   const double error = errors.maxCoeff();
+  const double floor = setting.part ? reference.floor_of(part) : reference.floor;
   if (whole_run.claimed.size() > 0) {
-    point.claims = claims_of(whole_run.claimed / reference.peak, errors, reference.floor);
+    point.claims = claims_of(whole_run.claimed / reference.peak, errors, floor);
   }
-  point.below_floor = error <= reference.floor;
-  point.error = std::max(error, reference.floor);
+  point.below_floor = error <= floor;
+  point.error = std::max(error, floor);
   if (error <= kUselessError) return;
   point.end = "error_above_peak";
   point.reason = fmt::format("ran to the end with an error of {:.2g} times the peak", error);

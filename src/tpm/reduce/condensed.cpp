@@ -4,6 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "tpm/core/error.hpp"
@@ -15,6 +16,9 @@ namespace {
 /// The share of the second mode's force, were it coupled as strongly everywhere as where it is
 /// strongest, that further modes and its own nonlinearity are taken to make.
 constexpr double kSecondModeError = 0.35;
+/// Misfits grow aside: their share of the largest along the normal, to which the square of the way
+/// aside (of u or w, over the range) adds.
+constexpr double kMisfitAlong = 0.3;
 
 /// (1 - exp(-y))/y, and the next one: (1 - that)/y.
 double first_phi(double y) {
@@ -138,9 +142,12 @@ ContactAnswer CondensedContact::step(const Eigen::Vector3d& displacement_m) noex
   ContactAnswer answer;
   answer.force_N = fit_->frame.axes * Eigen::Vector3d::Map(&state_.force[0]);
   const Eigen::Vector3d q = Eigen::Vector3d::Map(&state_.memory[4]);
-  answer.error_N =
-      fit_->fit_error_N + kSecondModeError * (fit_->coupling_along * std::abs(q[0]) +
-                                              fit_->coupling_across * std::hypot(q[1], q[2]));
+  const double aside_m =
+      std::max(std::hypot(u[1], u[2]), std::hypot(state_.memory[1], state_.memory[2]));
+  const double aside = aside_m / fit_->frame.tangential_m;
+  answer.error_N = (kMisfitAlong + aside * aside) * fit_->fit_error_N +
+                   kSecondModeError * (fit_->coupling_along * std::abs(q[0]) +
+                                       fit_->coupling_across * std::hypot(q[1], q[2]));
   answer.trusted = u[0] >= fit_->least_depth_m && u[0] <= fit_->most_depth_m &&
                    std::hypot(u[1], u[2]) <= fit_->most_tangential_m;
   return answer;

@@ -12,7 +12,10 @@ namespace {
 
 constexpr double kTrustedZone = 0.05;       // error over the largest force
 constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
-constexpr double kUnbalanced = 0.1;         // what is left of the correction for what is unbalanced
+/// What the surroundings miss in motion over what they miss in equilibrium: what they remember of
+/// deeper places is missed too.
+constexpr double kMissedInMotion = 1.5;
+constexpr double kUnbalanced = 0.1;  // what is left of the correction for what is unbalanced
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
 
 void require(const ZoneNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
@@ -197,8 +200,9 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
   const double at = std::clamp(std::abs(depth_m) / missed_stride_m_, 0.0, last);
   const std::size_t low = std::min(static_cast<std::size_t>(at), missed_N_.size() - 2);
   const double share = at - static_cast<double>(low);
-  answer.error_N = (1.0 - share) * missed_N_[low] + share * missed_N_[low + 1] +
-                   aside_m * missed_aside_N_per_m_ + kUnbalanced * correction.norm() +
+  const double missed_N =
+      (1.0 - share) * missed_N_[low] + share * missed_N_[low + 1] + aside_m * missed_aside_N_per_m_;
+  answer.error_N = kMissedInMotion * missed_N + kUnbalanced * correction.norm() +
                    step_error_->advance(displacement_m).norm();
   const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * relaxed_.norm());
   answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&
