@@ -59,8 +59,7 @@ void measure(const std::string& file, Eigen::Index steps, std::uint64_t seed) {
     };
     const auto inside = network(kPeriod_s);
     NetworkBeside beside(network(kPeriod_s * NetworkBeside::periods_between(kPeriod_s)),
-                         {bonds, rest, freedom, contact, into, kDeepest_m}, kPeriod_s, tau_s,
-                         false);
+                         {bonds, rest, freedom, contact, into, kDeepest_m}, kPeriod_s, false);
     double peak_N = 0.0, off_N = 0.0, squares = 0.0, estimate_N = 0.0;
     Work drawn, drawn_inside;
     for (Eigen::Index i = 0; i < steps; ++i) {

@@ -39,11 +39,10 @@ Eigen::Matrix3d StiffnessByDepth::at(const Eigen::Vector3d& displacement_m) cons
 }
 
 NetworkBeside::NetworkBeside(std::unique_ptr<ServoNetwork> network, StiffnessByDepth stiffness,
-                             double period_s, double relaxation_time_s, bool threads)
+                             double period_s, bool threads)
     : network_(std::move(network)),
       stiffness_(std::move(stiffness)),
       period_s_(period_s),
-      relaxation_time_s_(relaxation_time_s),
       every_(static_cast<std::uint64_t>(periods_between(period_s))),
       threads_(threads) {
   reset();
@@ -77,6 +76,7 @@ NetworkBeside::Linearised NetworkBeside::follow(const Place& place) noexcept {
     network_->reset();
     reached_ = Place{};
     reached_.run = place.run;
+    reached_N_.setZero();
   }
   // Places between were overwritten if this thread was late: the motion is taken as linear.
   const std::uint64_t steps = (place.step - reached_.step) / every_;
@@ -86,14 +86,22 @@ NetworkBeside::Linearised NetworkBeside::follow(const Place& place) noexcept {
     answer = network_->step(reached_.displacement_m +
                             share * (place.displacement_m - reached_.displacement_m));
   }
+  Linearised result;
+  result.run = place.run;
+  result.step = place.step;
+  result.displacement_m = place.displacement_m;
+  result.force_N = answer.force_N;
+  result.stiffness = stiffness_.at(place.displacement_m);
+  const Eigen::Vector3d moved = place.displacement_m - reached_.displacement_m;
+  const double passed_s = static_cast<double>(place.step - reached_.step) * period_s_;
+  result.unforeseen_N_per_s =
+      (answer.force_N - reached_N_ + stiffness_.at(reached_.displacement_m) * moved).norm() /
+      passed_s;
+  result.error_N = answer.error_N;
+  result.trusted = answer.trusted;
   reached_ = place;
-  return {place.run,
-          place.step,
-          place.displacement_m,
-          answer.force_N,
-          stiffness_.at(place.displacement_m),
-          answer.error_N,
-          answer.trusted};
+  reached_N_ = answer.force_N;
+  return result;
 }
 
 void NetworkBeside::work() noexcept {
@@ -121,11 +129,11 @@ ContactAnswer NetworkBeside::step(const Eigen::Vector3d& displacement_m) noexcep
   const Eigen::Vector3d moved = displacement_m - used_.displacement_m;
   ContactAnswer answer;
   answer.force_N = used_.force_N - used_.stiffness * moved;
-  // What the linearisation leaves out: curvature, and what has relaxed since.
+  // What relaxes and curves goes on as it did over the last step of the network; beside it, the
+  // curvature along the way since.
   const double curved_N = 0.5 * ((stiffness_.at(displacement_m) - used_.stiffness) * moved).norm();
-  const double relaxed = std::min(1.0, static_cast<double>(age()) * period_s_ / relaxation_time_s_);
-  answer.error_N = used_.error_N + curved_N +
-                   relaxed * ((instantaneous_stiffness() - relaxed_stiffness()) * moved).norm();
+  answer.error_N =
+      used_.error_N + curved_N + used_.unforeseen_N_per_s * static_cast<double>(age()) * period_s_;
   answer.trusted = used_.trusted && age() <= kOldest * every_;
   return answer;
 }

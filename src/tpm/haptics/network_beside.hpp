@@ -32,9 +32,8 @@ class StiffnessByDepth {
 class NetworkBeside final : public ContactModel {
  public:
   /// @param network its period is periods_between(period_s) periods of the loop
-  /// @param relaxation_time_s > 0
   NetworkBeside(std::unique_ptr<ServoNetwork> network, StiffnessByDepth stiffness, double period_s,
-                double relaxation_time_s, bool threads);
+                bool threads);
   ~NetworkBeside() override;
   NetworkBeside(const NetworkBeside&) = delete;
   NetworkBeside& operator=(const NetworkBeside&) = delete;
@@ -71,6 +70,7 @@ class NetworkBeside final : public ContactModel {
     Eigen::Vector3d force_N = Eigen::Vector3d::Zero();
     Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
     double error_N = 0.0;
+    double unforeseen_N_per_s = 0.0;  ///< what the answer before did not say, over its age
     bool trusted = true;
   };
   void work() noexcept;
@@ -79,13 +79,14 @@ class NetworkBeside final : public ContactModel {
 
   std::unique_ptr<ServoNetwork> network_;
   StiffnessByDepth stiffness_;
-  double period_s_, relaxation_time_s_;
+  double period_s_;
   std::uint64_t every_;
   // Of the loop.
   std::uint64_t run_ = 0, step_ = 0;
   Linearised used_, next_;
   // Of whoever steps the network.
   Place reached_;
+  Eigen::Vector3d reached_N_ = Eigen::Vector3d::Zero();
   // Between the two.
   TripleBuffer<Place> places_;
   TripleBuffer<Linearised> answers_;

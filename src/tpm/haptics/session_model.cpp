@@ -127,7 +127,7 @@ LoopModel network_beside_model(const HilSession& session, bool threads) {
       scene.network(every * session.servo.period_s),
       StiffnessByDepth(bonds, scene.rest(), scene.tissue.freedom(), scene.probe.sphere,
                        scene.probe.direction, scene.deepest),
-      session.servo.period_s, tau_s, threads);
+      session.servo.period_s, threads);
   loop.shape.field = scene.network(kDrawnEvery_s);
   loop.error_bound = "its own estimate, row by row; what tpm hil verify measures";
   return loop;
