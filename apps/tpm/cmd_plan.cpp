@@ -54,7 +54,7 @@ PlanRequest plan_request(const PlanChoice& choice) {
 }
 
 Plan planned(const ExperimentScene& scene, PlanRequest request) {
-  Progress progress("planning", 5);
+  Progress progress("planning", 6);
   request.progress = [&](const std::string&) { progress.advance(); };
   return make_plan(scene, request);
 }

@@ -61,7 +61,7 @@ struct OperationCosts {
 
 [[nodiscard]] OperationCosts nominal_costs();
 
-/// Measures every operation on this machine, about 2 s: the median of many short repeats, written
+/// Measures every operation on this machine, some seconds: the least of many short repeats, written
 /// with two digits.
 [[nodiscard]] OperationCosts measured_costs();
 

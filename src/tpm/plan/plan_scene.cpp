@@ -157,18 +157,14 @@ PlanTrajectory PlanScene::inertial(const InertialOptions& options,
   const Inertial equations(driven().bonds, driven().rest, driven().freedom, driven().probes,
                            masses_kg(), options);
   PlanTrajectory result;
-  ValidityWatch watch(network(), scene_.probe());
   const Eigen::Index spheres = network().organ.position.cols();
   const auto see = [&](const QuasiStaticState& state) {
-    watch.see(state.time_s, network_.spheres(state.position));
-    if (with_field) {
-      result.displacement.emplace_back(state.position.leftCols(spheres) -
-                                       driven().rest.leftCols(spheres));
-    }
+    result.displacement.emplace_back(state.position.leftCols(spheres) -
+                                     driven().rest.leftCols(spheres));
   };
-  const InertialRun run = equations.run(protocol(), times_s, see);
+  const InertialRun run =
+      equations.run(protocol(), times_s, with_field ? QuasiStaticObserver(see) : nullptr);
   result.response = run.response;
-  result.validity = watch.seen();
   const auto& pattern = driven().bonds.pattern();
   const auto bonds = static_cast<double>(driven().bonds.size());
   const auto rates = static_cast<double>(run.work.rates);

@@ -24,7 +24,7 @@ struct PlanMeasure {
 struct PlanTrajectory {
   Eigen::VectorXd response;                    ///< N or m, at each time
   std::vector<Eigen::Matrix3Xd> displacement;  ///< of all spheres, m, at each time; if asked for
-  Validity validity;  ///< of networks: limits passed at the times asked for
+  Validity validity;  ///< of networks without masses: limits passed at the times asked for
   OperationCount work;
   double steps = 0.0;
 };
