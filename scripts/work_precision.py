@@ -23,6 +23,9 @@ LOOKS = {
     "cvode_adams": (ORANGE, "^"), "cvode_bdf": (ORANGE, "s"), "ida": (ORANGE, "D"),
     "collocation": (BLACK, "*"), "closed_form": (BLACK, "x"),
     "inertial": (SKY, "o"), "inertial, order 2": (SKY, "o"), "inertial, order 5": (SKY, "s"),
+    "condensed": (GREEN, "o"), "condensed, 4 kHz": (GREEN, "^"), "condensed, all positions": (SKY, "s"),
+    "zone, 2 rings": (ORANGE, "v"), "zone, 3 rings": (ORANGE, "D"), "zone, 4 rings": (ORANGE, "P"),
+    "full_network": (BLUE, "o"), "full_network, 4 kHz": (BLUE, "^"),
 }
 SPARE = [(colour, marker) for marker in "hp8d>" for colour in (GREY, GREEN, SKY, PINK, BLACK)]
 
@@ -62,7 +65,8 @@ def draw_limit(axes, series):
         for y in series["y"]:
             axes.axhline(y, color=GREY, linewidth=0.9, linestyle=":", zorder=1)
             axes.annotate(series["text"], (0.01, y), xycoords=("axes fraction", "data"), xytext=(0, 2), textcoords="offset points",
-                          ha="left", va="bottom", fontsize=7, color="#666666")
+                          ha="left", va="bottom", fontsize=7, color="#666666", zorder=6,
+                          bbox=dict(facecolor="white", edgecolor="none", alpha=0.7, pad=0.6))
 
 
 def failure_rows(figure):

@@ -74,11 +74,14 @@ Table aims_table(const BenchmarkResult& result, bool timing) {
                                      : Cell{"-", Tone::fair});
     }
     const BenchmarkPoint* best = nullptr;
+    std::string otherwise = "not applicable";
     for (const BenchmarkPoint& p : result.points) {
-      if (p.curve() != curve || p.failed()) continue;
+      if (p.curve() != curve) continue;
+      if (p.end != "not_applicable") otherwise = "fails";
+      if (p.failed()) continue;
       if (best == nullptr || p.error < best->error) best = &p;
     }
-    row.push_back(best == nullptr ? Cell{"fails", Tone::bad}
+    row.push_back(best == nullptr ? Cell{otherwise, otherwise == "fails" ? Tone::bad : Tone::fair}
                                   : Cell{fmt::format("{}{}", best->below_floor ? "< " : "",
                                                      significant(best->error, 2))});
     table.rows.push_back(std::move(row));
