@@ -109,7 +109,7 @@ FineContact::FineContact(const TouchedTissue& tissue, double step_s)
 
 Eigen::Vector3d FineContact::step(const Eigen::Vector3d& displacement_m) {
   const BondMemory memory{keep_ * remembered_ + of_start_ * elongation_, of_end_};
-  const Eigen::Vector3d force_N = balanced_.go_to(displacement_m, memory);
+  Eigen::Vector3d force_N = balanced_.go_to(displacement_m, memory);
   bonds_.elongations(position(), elongation_);
   remembered_ = memory.offset + of_end_ * elongation_;
   return force_N;

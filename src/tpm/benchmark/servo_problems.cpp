@@ -401,7 +401,7 @@ constexpr const char* kServoText =
     "is that of single steps, of the condensed model without positions of batches of 20 steps.";
 
 BenchmarkProblem space_problem(const char* file, std::string name, std::string title,
-                               const std::string& whose, std::vector<ServoModel> models) {
+                               const std::string& whose, const std::vector<ServoModel>& models) {
   const auto asked =
       std::make_shared<ServoCase>(servo_liver(file), servo_taus_s(), false, motions_in_space);
   BenchmarkProblem problem = servo_problem(asked, models);
