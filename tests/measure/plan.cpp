@@ -26,6 +26,7 @@ using Fields = std::vector<std::string>;
 //   claim SEED NUMBER NAME FORMULATION CLAIMED TRUE REFERENCE_DIFFERENCE PICK REJECTED
 //   scene SEED NUMBER OUTCOME TOLERANCE CPU_S WORDS
 constexpr char kBetween = ';';
+constexpr double kNothing = 1e-12;  // an error of rounding alone, for ratios
 
 std::vector<Fields> read_lines(const std::string& file) {
   std::vector<Fields> lines;
@@ -110,7 +111,7 @@ int count(const std::vector<std::string>& files) {
   const auto add = [](Tally& tally, double claimed, double truth) {
     ++tally.count;
     if (truth > claimed) ++tally.violated;
-    tally.ratio.push_back(claimed / truth);
+    tally.ratio.push_back(claimed / std::max(truth, kNothing));
   };
   for (const std::string& file : files) {
     open.clear();
@@ -128,7 +129,7 @@ int count(const std::vector<std::string>& files) {
       for (const Fields& claim : open[scene]) {
         if (!counted.insert(claim.at(3)).second) continue;
         const double claimed = std::stod(claim.at(5));
-        const double truth = std::max(std::stod(claim.at(6)), 1e-15);
+        const double truth = std::stod(claim.at(6));
         add(by_formulation[claim.at(4)], claimed, truth);
         add(all, claimed, truth);
         if (claim.at(8) == "1") add(picks, claimed, truth);

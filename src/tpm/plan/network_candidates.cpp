@@ -66,12 +66,12 @@ class CollocationCandidate final : public LayeredCandidate {
       const PlanTrajectory answer = run(scout, budget, scout.times());
       return {scout.claim_of(answer), answer.work, {}};
     }
-    // Against a run much finer: one at a tenth of the tolerance may well take the same steps.
     const PlanTrajectory& answer = scout.collocation(tolerance_);
+    if (scout.inertial()) return {scout.claim_of(answer), answer.work, {}};
+    // Against a run much finer: one at a tenth of the tolerance may well take the same steps.
     const PlanTrajectory& finer = scout.collocation(std::max(0.01 * tolerance_, kFinest));
-    double error = kSafety * trajectory_error(answer, finer, scout.measure()) + kFloor * tolerance_;
-    if (scout.inertial()) error += PlanScout::kSafety * scout.inertia_share();
-    return {error, answer.work, {}};
+    const double error = trajectory_error(answer, finer, scout.measure());
+    return {kSafety * error + kFloor * tolerance_, answer.work, {}};
   }
 
   [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
@@ -110,17 +110,16 @@ class NetworkStepCandidate final : public LayeredCandidate {
     const double period = budget.period_s().value();
     const double step = std::max(period, scene.duration_s() / kTried);
     const PlanTrajectory answer = stepped(scene, step, scout.times(), scout.wants_field());
-    const PlanTrajectory half = stepped(scene, 0.5 * step, scout.times(), scout.wants_field());
     ModelClaim claim;
     claim.of_period = answer.work.times(kWorst / answer.steps);
     claim.work = answer.work.times(scene.duration_s() / period / answer.steps);
-    if (layers() > 0) {
+    if (layers() > 0 || scout.inertial()) {
       claim.error = scout.claim_of(answer);
       return claim;
     }
+    const PlanTrajectory half = stepped(scene, 0.5 * step, scout.times(), scout.wants_field());
     const double halved = trajectory_error(answer, half, scout.measure());
     claim.error = kSafety * halved * std::min(1.0, period / step) + kFloor * kTolerance;
-    if (scout.inertial()) claim.error += PlanScout::kSafety * scout.inertia_share();
     return claim;
   }
 

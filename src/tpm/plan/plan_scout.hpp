@@ -45,7 +45,8 @@ class PlanScout {
   [[nodiscard]] const ContactCurves& curves() const;
 
   /// A bound of the error of a model without masses that answers `model` at times(): `kSafety`
-  /// times its difference from the coarse run, and what that run and the masses left out may add.
+  /// times its difference from the coarse run, with masses where those are asked for, and what that
+  /// run may add.
   [[nodiscard]] double claim_of(const PlanTrajectory& model) const;
 
   static constexpr double kSafety = 1.5;
