@@ -51,7 +51,7 @@ ContactReference answers_with(const TouchedTissue& tissue, const ContactMotion& 
   Eigen::Vector3d from = Eigen::Vector3d::Zero();
   for (Eigen::Index i = 0; i < motion.steps(); ++i) {
     const Eigen::Vector3d to = motion.displacement_m.col(i);
-    Eigen::Vector3d force_N;
+    Eigen::Vector3d force_N = Eigen::Vector3d::Zero();
     for (int s = 1; s <= substeps; ++s) {
       force_N = fine.step(from + static_cast<double>(s) / substeps * (to - from));
     }

@@ -178,12 +178,14 @@ void add_imposed(ImportedSeries& series, const std::string& file, const ImportOp
 std::string csv_text(const ImportedSeries& series, std::string_view provenance) {
   std::string csv;
   for (const ImportedColumn& column : series.columns) {
-    csv += (csv.empty() ? "" : ",") + header_of(column);
+    if (!csv.empty()) csv += ',';
+    csv += header_of(column);
   }
   csv += provenance.empty() ? "\n" : ",provenance\n";
   for (std::size_t row = 0; row < series.columns.front().values.size(); ++row) {
     for (std::size_t c = 0; c < series.columns.size(); ++c) {
-      csv += (c == 0 ? "" : ",") + number_text(series.columns[c], row);
+      if (c > 0) csv += ',';
+      csv += number_text(series.columns[c], row);
     }
     csv += provenance.empty() ? "\n" : fmt::format(",{}\n", provenance);
   }
