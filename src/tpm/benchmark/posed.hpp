@@ -30,8 +30,8 @@ struct PosedNetwork {
 /// @param first number of the first multiple
 [[nodiscard]] std::vector<double> times_every(double spacing_s, double end_s, int first = 0);
 
-/// These times and moments after each kink of the protocol, the last left out: what happens there is
-/// over before the next of times that are far apart. 0.25, 0.5, 1 and 2 ms.
+/// These times and moments after each kink of the protocol, the last left out: what happens there
+/// is over before the next of times that are far apart. 0.25, 0.5, 1 and 2 ms.
 /// @param times_s rising, further apart than the moments, kinks among them
 [[nodiscard]] std::vector<double> with_moments_after_kinks(std::vector<double> times_s,
                                                            const Protocol& protocol);
