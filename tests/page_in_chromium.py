@@ -22,6 +22,7 @@ SESSION = {
         "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"}}},
     "rate": "500 Hz",
     "limits": {"watchdog": "16 ms", "hang": "1 s", "late_cycles": 1000},
+    "virtual_device": {"least_watchdog": "1 s"},
     "indentations": {"depths": ["4 mm"], "rates": ["2 mm/s"], "hold": "2 s", "rest": "1 s"},
     "creep": {"loads": ["0.2 N"], "hold": "2 s", "rest": "1 s"},
 }

@@ -115,6 +115,21 @@ TEST_CASE("The simulated device clips, watches for commands and for speed, and s
   CHECK(fast.status().forces_off == ForcesOff::velocity);
 }
 
+TEST_CASE("A simulated watchdog can be told to forgive, and names that among its assumptions") {
+  PlantSettings s = bare();
+  s.least_watchdog_s = 0.01;
+  VirtualOmega7 device(s, still());
+  CHECK_THAT(device.open().assumptions.back(), Catch::Contains("watchdog"));
+  DevicePreparation preparation;
+  preparation.watchdog_s = 0.004;
+  device.prepare(preparation);
+  CHECK(device.write({1.0, 0.0, 0.0}) == DeviceAnswer::ok);
+  for (int i = 0; i < 10; ++i) device.advance(1e-3);
+  CHECK(device.status().forces_off == ForcesOff::none);
+  device.advance(1e-3);
+  CHECK(device.status().forces_off == ForcesOff::watchdog);
+}
+
 TEST_CASE("An operator script reads back as it was written") {
   const OperatorScript script({{OperatorPiece::Aim::place, 0.1, -0.002, 1.0 / 3.0},
                                {OperatorPiece::Aim::force, 0.7, 0.0, 0.196}});

@@ -1,5 +1,7 @@
 #include "tpm/device/virtual_omega7.hpp"
 
+#include <algorithm>
+
 namespace tpm {
 
 VirtualOmega7::VirtualOmega7(const PlantSettings& settings, OperatorScript script)
@@ -14,7 +16,7 @@ const DeviceIdentity& VirtualOmega7::open() {
 }
 
 void VirtualOmega7::prepare(const DevicePreparation& preparation) {
-  settings_.watchdog_s = preparation.watchdog_s;
+  settings_.watchdog_s = std::max(preparation.watchdog_s, settings_.least_watchdog_s);
   plant_ = VirtualPlant(settings_, script_);
   saturations_ = 0;
   owed_s_ = 0.0;

@@ -31,7 +31,7 @@ Eigen::Matrix<double, 2, 3> place_propagator(const PlantSettings& settings) {
 }
 
 std::vector<std::string> assumptions_of(const PlantSettings& s) {
-  return {
+  std::vector<std::string> assumptions{
       line_of("moving mass %g kg (assumed; 0.2 to 0.4 is usual)", s.mass_kg),
       line_of("viscous friction %g N s/m (assumed; 0.1 to 1 is usual)", s.damping_N_s_per_m),
       line_of("encoder step %g m (assumed; the data sheet says below 1e-5)", s.encoder_step_m),
@@ -43,6 +43,10 @@ std::vector<std::string> assumptions_of(const PlantSettings& s) {
       line_of("eye of the operator: a wrong depth is corrected at %g a second (assumed)",
               s.arm.correction_per_s),
   };
+  if (s.least_watchdog_s > 0.0)
+    assumptions.push_back(
+        line_of("a watchdog that waits %g s at least, which no Omega.7 does", s.least_watchdog_s));
+  return assumptions;
 }
 
 VirtualPlant::VirtualPlant(const PlantSettings& settings, OperatorScript script)

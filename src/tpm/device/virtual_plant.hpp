@@ -25,6 +25,7 @@ struct PlantSettings {
   double encoder_step_m = 1e-5;         ///< 0: positions as they are
   double motor_limit_N = 12.0;          ///< of the length of the force
   double watchdog_s = 0.008;            ///< forces are cut without a command for so long
+  double least_watchdog_s = 0.0;        ///< what is asked of the watchdog counts only above it
   int delay_periods = 0;                ///< from a command to its force
   double velocity_limit_m_per_s = 2.0;  ///< above it forces are cut
   ArmSettings arm;

@@ -54,6 +54,7 @@ void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& p
   plant.delay_periods = block.value("delay_periods", plant.delay_periods);
   plant.motor_limit_N =
       in_range(block, "motor_limit", Dimension::force, plant.motor_limit_N, 1e-3, 1e3, place);
+  plant.least_watchdog_s = in_range(block, "least_watchdog", Dimension::time, 0.0, 0.0, 10.0, place);
   plant.arm.mass_kg = block.value("arm_mass_kg", plant.arm.mass_kg);
   plant.arm.damping_N_s_per_m = block.value("arm_damping_N_s_per_m", plant.arm.damping_N_s_per_m);
   plant.arm.stiffness_N_per_m = in_range(block, "arm_stiffness", Dimension::stiffness,
