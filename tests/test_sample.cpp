@@ -6,6 +6,7 @@
 
 #include "sensitivity_problems.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/sample/grid_convergence.hpp"
 #include "tpm/sample/point_set.hpp"
 #include "tpm/sample/sensitivity.hpp"
 
@@ -134,6 +135,26 @@ TEST_CASE("Points without a finite output are left out and counted") {
   CHECK(found.left_out == 3);
   CHECK_THAT(found.inputs[0].total.value, WithinAbs(problem.total[0], 0.05));
   CHECK(sobol_indices(design, std::vector<double>(design.cells(), 2.5)).inputs.empty());
+}
+
+TEST_CASE("Three grids tell order, limit and error of a solution") {
+  const std::vector<double> h{0.4, 0.2, 0.09};
+  for (const double p : {0.5, 1.0, 2.0, 4.0}) {
+    std::vector<double> f;
+    for (const double size : h) f.push_back(3.0 - 2.0 * std::pow(size, p));
+    const GridConvergence g = grid_convergence(h, f);
+    CHECK(g.behaviour == GridConvergence::Behaviour::monotone);
+    CHECK_THAT(g.order, WithinAbs(p, 1e-9));
+    CHECK_THAT(g.extrapolated, WithinAbs(3.0, 1e-9));
+    CHECK_THAT(g.index, WithinAbs(1.25 * (3.0 - f[2]), 1e-9));
+  }
+  using Behaviour = GridConvergence::Behaviour;
+  CHECK(grid_convergence(h, std::vector<double>{1.0, 1.5, 1.25}).behaviour ==
+        Behaviour::oscillating);
+  CHECK(grid_convergence(h, std::vector<double>{1.0, 1.1, 1.5}).behaviour == Behaviour::diverging);
+  CHECK(grid_convergence(h, std::vector<double>{1.0, 1.0, 1.0}).behaviour == Behaviour::exact);
+  CHECK_THROWS_AS(grid_convergence(h, std::vector<double>{1.0, 2.0}), Error);
+  CHECK_THROWS_AS(grid_convergence(std::vector<double>{0.1, 0.2, 0.3}, h), Error);
 }
 
 TEST_CASE("A design out of range is refused in one line") {
