@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/wide_vectors.hpp"
 #include "tpm/reduce/flush_denormals.hpp"
 
 namespace tpm {
@@ -23,8 +25,9 @@ constexpr double kAside = 2.0;  // how much faster the fields change across the 
 constexpr double kRounding = 3e-7;
 constexpr double kRememberedRounding = 6e-9;
 constexpr double kLongestMemory = 1e3;  // steps
-//      // of the largest force
 constexpr std::size_t kNow = 0, kNext = 4;
+
+using Eight [[gnu::vector_size(8 * sizeof(float))]] = float;
 
 void require(const ServoNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
   const auto refuse = [](std::string_view key, double value, std::string_view expected) {
@@ -165,7 +168,7 @@ ServoNetwork::Field ServoNetwork::field_of(const std::array<Eigen::Matrix3Xd, 3>
                                            double depth_m) const {
   Field field{depth_m, {}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    field.along[axis].assign(4 * free_.size(), 0.0F);
+    field.along[axis].assign(8 * ((free_.size() + 1) / 2), 0.0F);
     for (const std::size_t i : free_) {
       const Eigen::Vector3f at = displacement[axis].col(static_cast<Eigen::Index>(i)).cast<float>();
       std::copy_n(at.data(), 3, field.along[axis].data() + std::size_t{4} * column_[i]);
@@ -205,6 +208,7 @@ void ServoNetwork::reset() noexcept {
   largest_N_ = held_error_N_ = 0.0;
   remembered_error_.setZero();
   remembered_source_.setZero();
+  source_.setZero();
 }
 
 void ServoNetwork::project(float* four_per_sphere) const noexcept {
@@ -227,24 +231,30 @@ void ServoNetwork::balance(std::size_t first) noexcept {
   elsewhere_.advance(displacement_.data(), weights_, force_.data());
 }
 
-Eigen::Vector3d ServoNetwork::weighed(const Field& field) const noexcept {
-  Eigen::Vector3d sum;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const float* const along = field.along[axis].data();
-    std::array<float, 8> part{};
-    for (std::size_t i = 0; i + 1 < free_.size(); i += 2) {
-      const float* const first = force_.data() + 8 * i;
-      for (std::size_t c = 0; c < 4; ++c) part[c] += along[4 * i + c] * first[c];
-      for (std::size_t c = 0; c < 4; ++c) part[4 + c] += along[4 * i + 4 + c] * first[8 + c];
+std::array<Eigen::Vector3d, 3> ServoNetwork::weighed(
+    const std::array<const Field*, 3>& fields) const noexcept {
+  constexpr std::size_t kSums = 9;
+  std::array<Eight, kSums> sum{};
+  run_wide([&] {
+    const float* force = force_.data();
+    for (std::size_t at = 0; at < 4 * free_.size(); at += 8, force += 16) {
+      Eight two;  // spheres
+      std::memcpy(&two, force, 4 * sizeof(float));
+      std::memcpy(reinterpret_cast<float*>(&two) + 4, force + 8, 4 * sizeof(float));
+      for (std::size_t s = 0; s < kSums; ++s) {
+        Eight along;
+        std::memcpy(&along, fields[s / 3]->along[s % 3].data() + at, sizeof(Eight));
+        sum[s] += along * two;
+      }
     }
-    if (free_.size() % 2 == 1) {
-      const std::size_t last = free_.size() - 1;
-      for (std::size_t c = 0; c < 4; ++c) part[c] += along[4 * last + c] * force_[8 * last + c];
-    }
-    sum[static_cast<Eigen::Index>(axis)] =
+  });
+  std::array<Eigen::Vector3d, 3> weighed;
+  for (std::size_t s = 0; s < kSums; ++s) {
+    const Eight& part = sum[s];
+    weighed[s / 3][static_cast<Eigen::Index>(s % 3)] =
         static_cast<double>(((part[0] + part[4]) + (part[1] + part[5])) + (part[2] + part[6]));
   }
-  return sum;
+  return weighed;
 }
 
 void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_error_N) noexcept {
@@ -254,8 +264,9 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
   const double at = std::clamp(depth_m / stride_m, 0.0, static_cast<double>(fields_.size() - 1));
   const std::size_t low = std::min(static_cast<std::size_t>(at), fields_.size() - 2);
   const double share = at - static_cast<double>(low);
-  const Eigen::Vector3d above = weighed(fields_[low]);
-  const Eigen::Vector3d change = weighed(fields_[low + 1]) - above;
+  const auto [above, below, source] = weighed({&fields_[low], &fields_[low + 1], &remembering_});
+  const Eigen::Vector3d change = below - above;
+  source_ = source;
   const Eigen::Vector3f at_contact =
       Eigen::Map<const Eigen::Vector3f>(force_.data() + 8 * free_.size());
   answer_.force_N = at_contact.cast<double>() + above + share * change;
@@ -288,11 +299,10 @@ ContactAnswer ServoNetwork::step(const Eigen::Vector3d& displacement_m) noexcept
     answer(displacement_m, step_error_N);
   }
   held_error_N_ = answer_.error_N - elsewhere_N;
-  const Eigen::Vector3d source = weighed(remembering_);
   remembered_error_ = static_cast<double>(weights_.keep) * remembered_error_ +
                       static_cast<double>(weights_.of_start) * remembered_source_ +
-                      static_cast<double>(weights_.of_end) * source;
-  remembered_source_ = source;
+                      static_cast<double>(weights_.of_end) * source_;
+  remembered_source_ = source_;
   at_contact_.accept();
   elsewhere_.accept();
   return answer_;

@@ -60,7 +60,7 @@ class ServoNetwork final : public ContactModel {
   [[nodiscard]] BalanceWork work() const noexcept;
 
  private:
-  /// Fields of the contact at a depth, four floats per free sphere.
+  /// Fields of the contact at a depth, four floats per free sphere, for an even number of them.
   struct Field {
     double depth_m;
     std::array<AlignedFloats, 3> along;
@@ -80,8 +80,9 @@ class ServoNetwork final : public ContactModel {
   /// Solves for the part of the forces that starts at `first`, and moves the free spheres.
   void balance(std::size_t first) noexcept;
   void project(float* four_per_sphere) const noexcept;
-  /// What the fields of a depth make of the forces left, N.
-  [[nodiscard]] Eigen::Vector3d weighed(const Field& field) const noexcept;
+  /// What each of three fields makes of the forces left, N.
+  [[nodiscard]] std::array<Eigen::Vector3d, 3> weighed(
+      const std::array<const Field*, 3>& fields) const noexcept;
   void answer(const Eigen::Vector3d& displacement_m, double step_error_N) noexcept;
 
   ServoNetworkOptions options_;
@@ -105,6 +106,7 @@ class ServoNetwork final : public ContactModel {
   /// Force from what is remembered of places that were not balanced, and its source, N.
   Eigen::Vector3d remembered_error_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d remembered_source_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d source_ = Eigen::Vector3d::Zero();  ///< the same, of the balance just made
   int balances_ = 0;
 };
 

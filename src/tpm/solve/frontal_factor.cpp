@@ -117,6 +117,22 @@ void put(const Eigen::MatrixXd& matrix, float* to) {
 
 constexpr std::size_t kNode = 3 * sizeof(float);
 
+/// Four floats at once are moved much faster than three.
+using Four [[gnu::vector_size(4 * sizeof(float))]] = float;
+
+Four four_at(const float* from) {
+  Four v;
+  std::memcpy(&v, from, sizeof(Four));
+  return v;
+}
+
+/// Copies a node out of four floats to three, in rising order of nodes: the fourth is written over
+/// by the next node, or lies in the padding behind the last.
+void copy_node(const float* from, float* to) {
+  const Four v = four_at(from);
+  std::memcpy(to, &v, sizeof(Four));
+}
+
 }  // namespace
 
 FrontalFactor::FrontalFactor(std::shared_ptr<const FrontalPattern> pattern, bool portable)
@@ -136,9 +152,9 @@ FrontalFactor::FrontalFactor(std::shared_ptr<const FrontalPattern> pattern, bool
     most_reached = std::max(most_reached, padded(reached));
   }
   numbers_.assign(numbers, 0.0F);
-  own_.assign(most_own, 0.0F);
-  reached_.assign(most_reached, 0.0F);
-  sum_.assign(std::max(most_own, most_reached), 0.0F);
+  own_.assign(most_own + 1, 0.0F);  // with the padding of copy_node
+  reached_.assign(most_reached + 1, 0.0F);
+  sum_.assign(std::max(most_own, most_reached) + 1, 0.0F);
 }
 
 FloatPanel FrontalFactor::inverse(const Place& front) const {
@@ -166,26 +182,29 @@ void FrontalFactor::solve(float* x) noexcept {
   for (const Place& front : front_) {
     if (front.count == 0) continue;
     for (std::size_t i = 0; i < front.own; ++i) {
-      std::memcpy(own_.data() + 3 * i, x + 4 * (front.first + i), kNode);
+      copy_node(x + 4 * (front.first + i), own_.data() + 3 * i);
     }
     kernels_.times(passed(front), own_.data(), sum_.data());
     const std::uint32_t* const row = row_.data() + front.rows;
     for (std::size_t i = 0; i < front.count; ++i) {
       float* const to = x + std::size_t{4} * row[i];
-      for (std::size_t c = 0; c < 3; ++c) to[c] -= sum_[3 * i + c];
+      Four sum = four_at(sum_.data() + 3 * i);
+      sum[3] = 0.0F;
+      const Four left = four_at(to) - sum;
+      std::memcpy(to, &left, sizeof(Four));
     }
   }
   for (std::size_t f = front_.size(); f-- > 0;) {
     const Place& front = front_[f];
     for (std::size_t i = 0; i < front.own; ++i) {
-      std::memcpy(own_.data() + 3 * i, x + 4 * (front.first + i), kNode);
+      copy_node(x + 4 * (front.first + i), own_.data() + 3 * i);
     }
     kernels_.times(inverse(front), own_.data(), sum_.data());
     if (front.count > 0) {
       const FloatPanel down = passed(front);
       const std::uint32_t* const row = row_.data() + front.rows;
       for (std::size_t i = 0; i < front.count; ++i) {
-        std::memcpy(reached_.data() + 3 * i, x + std::size_t{4} * row[i], kNode);
+        copy_node(x + std::size_t{4} * row[i], reached_.data() + 3 * i);
       }
       std::fill(reached_.begin() + 3 * front.count,
                 reached_.begin() + static_cast<std::ptrdiff_t>(down.stride), 0.0F);
