@@ -65,7 +65,7 @@ function(tpm_floors suffix flags)
 endfunction()
 
 set(TPM_SANITIZED_FLOORS core store protocol material solve model law network curve scene simulate method
-    reduce device servo haptics CACHE STRING "Floors under address and undefined in sanitized twins")
+    reduce device servo haptics sample CACHE STRING "Floors under address and undefined in sanitized twins")
 
 # A twin of the library in which the floors named run under sanitizers; the others are those of
 # tpmkit. The fast tests, compiled once, run with tpmkit and with the twin. A floor's own inline

@@ -1,6 +1,7 @@
 // Prints the measured numbers of docs/reduction_servo.md as CSV:
 //     measure_servo SCENE errors [TAU_S ...]     error, estimate and step time of each motion
-//     measure_servo SCENE energy STEPS SEED      work drawn over random motions in space
+//     measure_servo SCENE energy STEPS SEED [TAU_S ...]
+//                                                work drawn over random motions in space
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,6 +23,7 @@ namespace {
 
 constexpr double kPeriod_s = 1e-3;
 constexpr int kRepeats = 21;
+const std::vector<double> kTaus_s{2e-4, 2e-3, 0.05, 1.0, 100.0};
 
 double cpu_s() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
@@ -146,11 +148,12 @@ void measure_errors(const Setup& setup, const std::vector<double>& taus_s) {
 }
 
 /// Work of the contact on the tissue from rest, by the trapezoidal rule over each period.
-void measure_energy(const Setup& setup, Eigen::Index steps, std::uint64_t seed) {
+void measure_energy(const Setup& setup, Eigen::Index steps, std::uint64_t seed,
+                    const std::vector<double>& taus_s) {
   fmt::print("tau_s,model,steps,least_work_J,largest_work_J,end_work_J,not_trusted\n");
   const ContactMotion motion =
       random_motion_in_space(contact_axes(setup.into), 8e-3, 2e-3, steps, seed, kPeriod_s);
-  for (const double tau_s : {2e-4, 2e-3, 0.05, 1.0, 100.0}) {
+  for (const double tau_s : taus_s) {
     const BondSystem bonds = setup.bonds(tau_s);
     for (const Built& built : models(setup, bonds)) {
       Eigen::Vector3d at = Eigen::Vector3d::Zero();
@@ -181,21 +184,24 @@ void measure_energy(const Setup& setup, Eigen::Index steps, std::uint64_t seed) 
 int main(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   try {
-    if (words.size() >= 2 && words[1] == "errors") {
+    const auto taus_from = [&](std::size_t first) {
       std::vector<double> taus_s;
-      for (std::size_t i = 2; i < words.size(); ++i) taus_s.push_back(std::stod(words[i]));
-      if (taus_s.empty()) taus_s = {2e-4, 2e-3, 0.05, 1.0, 100.0};
-      measure_errors(Setup(words[0]), taus_s);
+      for (std::size_t i = first; i < words.size(); ++i) taus_s.push_back(std::stod(words[i]));
+      return taus_s.empty() ? kTaus_s : taus_s;
+    };
+    if (words.size() >= 2 && words[1] == "errors") {
+      measure_errors(Setup(words[0]), taus_from(2));
       return 0;
     }
-    if (words.size() == 4 && words[1] == "energy") {
-      measure_energy(Setup(words[0]), std::stol(words[2]), std::stoull(words[3]));
+    if (words.size() >= 4 && words[1] == "energy") {
+      measure_energy(Setup(words[0]), std::stol(words[2]), std::stoull(words[3]), taus_from(4));
       return 0;
     }
   } catch (const Error& error) {
     fmt::print(stderr, "{}\n", error.what());
     return static_cast<int>(error.code());
   }
-  fmt::print(stderr, "measure_servo SCENE errors [TAU_S ...] | SCENE energy STEPS SEED\n");
+  fmt::print(stderr,
+             "measure_servo SCENE errors [TAU_S ...] | SCENE energy STEPS SEED [TAU_S ...]\n");
   return 2;
 }
