@@ -1,5 +1,7 @@
 // Sweeps: cells against the tables and the closed forms they are made of, storage, going on after
 // an interruption, damaged logs.
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>
@@ -8,6 +10,7 @@
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/model/closed_form.hpp"
+#include "tpm/sample/point_set.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/study/tables.hpp"
@@ -255,6 +258,110 @@ TEST_CASE("a log that is cut, damaged or another sweep's") {
           static_cast<void>(run_sweep(sweep, log_path(file), {}));
         }).find("no log") != std::string::npos);
   CHECK(read_file(log_path(file)) == "what somebody else has written");
+}
+
+TEST_CASE("shards put together are the whole sweep, to the byte") {
+  const test::TempFolder folder;
+  const Sweep sweep = parsed(kMixed);
+  const std::string expected = result_of(sweep, folder / "whole.h5");
+  for (const std::uint64_t count : {std::uint64_t{1}, std::uint64_t{3}, std::uint64_t{7}}) {
+    std::vector<BlockLog> logs;
+    std::uint64_t blocks = 0;
+    for (std::uint64_t i = 0; i < count; ++i) {
+      const std::string file = folder / fmt::format("{}-of-{}", i, count);
+      SweepControls controls;
+      controls.shard = {i, count};
+      blocks += run_sweep(sweep, file, controls).blocks;
+      logs.push_back(BlockLog::to_read(file, sweep, {}));
+      CHECK(logs.back().size() == controls.shard.size(sweep.blocks()));
+    }
+    CHECK(blocks == sweep.blocks());
+    std::vector<const BlockLog*> all;
+    for (const BlockLog& log : logs) all.push_back(&log);
+    static_cast<void>(write_sweep(sweep, all, folder / "merged.h5"));
+    CHECK(read_file(folder / "merged.h5") == expected);
+    all.pop_back();
+    CHECK(test::refusal_of([&] { write_sweep(sweep, all, folder / "part.h5"); }).find("missing") !=
+          std::string::npos);
+    CHECK_FALSE(std::filesystem::exists(folder / "part.h5"));
+  }
+}
+
+TEST_CASE("samples are the point set's coordinates between the ends") {
+  const char* const text = R"({"model": "single_contact",
+    "indentation": {"kind": "step_hold", "depth": "4 mm"},
+    "axes": [{"parameter": "spacing", "values": ["20 mm", "30 mm"]},
+             {"samples": "KIND", "count": 16, "seed": 5, MORE "parameters": {
+               "E1": {"from": "6 kPa", "to": "24 kPa", "scale": "log"},
+               "E2": {"from": "10 kPa", "to": "20 kPa"}}}],
+    "outputs": ["peak_force"]})";
+  const auto with = [&](const std::string& kind, const std::string& more) {
+    std::string filled = text;
+    filled.replace(filled.find("KIND"), 4, kind);
+    filled.replace(filled.find("MORE"), 4, more);
+    return parsed(filled.c_str());
+  };
+  const std::vector<std::pair<std::string, std::unique_ptr<CubePoints>>> sets = [] {
+    std::vector<std::pair<std::string, std::unique_ptr<CubePoints>>> made;
+    made.emplace_back("random", random_points(5));
+    made.emplace_back("latin_hypercube", latin_hypercube(16, 5));
+    made.emplace_back("sobol", sobol_points(2, 5));
+    made.emplace_back("plain_sobol", plain_sobol_points(2));
+    return made;
+  }();
+  for (const auto& [kind, set] : sets) {
+    CAPTURE(kind);
+    const Sweep sweep = with(kind, "");
+    REQUIRE(sweep.cells() == 32);
+    const CellBlock block = only_block(sweep);
+    for (std::uint64_t i = 0; i < 16; ++i) {
+      const double E1 = 6e3 * std::pow(4.0, set->coordinate(i, 0));
+      const double E2 = 10e3 + 10e3 * set->coordinate(i, 1);
+      CHECK_THAT(sweep.parameters[1].values.at(i), WithinRel(E1, 1e-14));
+      CHECK(sweep.parameters[2].values.at(i) == E2);
+      CHECK_THAT(block.values[0][16 + i],
+                 WithinRel((E2 + lambda1_Pa(12e3, 0.004, 0.03)) * 0.004 * 12.56e-3, 1e-13));
+    }
+  }
+  CHECK(with("sensitivity", R"("replicates": 3,)").cells() == 2 * 3 * 16 * 4);
+  CHECK(test::refusal_of([&] {
+          static_cast<void>(with("sobol", R"("replicates": 3,)"));
+        }).find("replicates") != std::string::npos);
+  CHECK(test::refusal_of([&] { static_cast<void>(with("sobel", "")); }).find("one of random") !=
+        std::string::npos);
+}
+
+TEST_CASE("a sweep over a star as a network is the sweep over it in closed form") {
+  const Sweep star = parsed(R"({"model": "organ", "block": 5, "scene": {
+      "organ": {"kind": "star", "spacing": "30 mm"},
+      "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "240 kPa s"},
+      "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "30 s"},
+      "tolerance": 1e-7},
+    "axes": [{"parameter": "/organ/spacing", "name": "x", "values": ["20 mm", "30 mm"]},
+             {"parameter": "/material/E1", "values": ["6 kPa", "12 kPa"]},
+             {"parameter": "/protocol/depth", "values": ["2 mm", "8 mm"]}],
+    "outputs": ["peak_force", "end_force", {"force_at": "7 s", "name": "at7"}]})");
+  const Sweep closed = parsed(R"({"model": "single_contact", "block": 5,
+    "material": {"eta1": "240 kPa s"},
+    "indentation": {"kind": "ramp_hold", "rate": "4 mm/s", "hold": "30 s"},
+    "axes": [{"parameter": "spacing", "values": ["20 mm", "30 mm"]},
+             {"parameter": "E1", "values": ["6 kPa", "12 kPa"]},
+             {"parameter": "depth", "values": ["2 mm", "8 mm"]}],
+    "outputs": ["peak_force", "end_force", {"force_at": "7 s", "name": "at7"}]})");
+  const auto found = all_blocks(star);
+  const auto truth = all_blocks(closed);
+  for (std::size_t b = 0; b < found.size(); ++b) {
+    for (std::size_t i = 0; i < found[b].cells(); ++i) {
+      REQUIRE(found[b].status[i] == CellStatus::done);
+      CHECK(found[b].error_estimate[i] <= 1e-7);
+      CHECK(found[b].counts[0][i] > 0);
+      for (std::size_t v = 0; v < 3; ++v) {
+        CHECK_THAT(found[b].values[v][i], WithinRel(truth[b].values[v][i], 1e-6));
+      }
+    }
+  }
+  // A block by itself, without those before it: the same bits.
+  CHECK(CellRunner(star).run(1).values == found[1].values);
 }
 
 TEST_CASE("a log is written by one process at a time") {

@@ -1,6 +1,7 @@
 // tpm sweep: many experiments over the combinations of parameters that a file asks for.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ctime>
 #include <filesystem>
 #include <memory>
@@ -23,6 +24,8 @@ struct SweepChoice {
   std::string sweep;
   std::string output = "sweep.h5";
   std::string workers;
+  std::string shard;                ///< "2/8"
+  std::vector<std::string> shards;  ///< of merge: files
 };
 
 /// "results.h5" becomes "results.run.json".
@@ -123,7 +126,94 @@ void print_results(const Sweep& sweep, const CellTally& tally,
   fmt::print("wrote {}\n", fmt::join(files, ", "));
 }
 
+/// "2/8": the second of eight.
+Shard parse_shard(const std::string& text) {
+  const std::size_t stroke = text.find('/');
+  if (stroke == std::string::npos) {
+    throw Error(ExitCode::usage, "--shard", fmt::format("'{}'", printable(text)),
+                "I/N, the I-th of N, from 1 on");
+  }
+  const std::uint64_t index = parse_whole_number(text.substr(0, stroke), "--shard", 1);
+  const std::uint64_t count = parse_whole_number(text.substr(stroke + 1), "--shard", 1);
+  if (index <= count) return {index - 1, count};
+  throw Error(ExitCode::usage, "--shard", fmt::format("the {}th of {}", index, count),
+              "I/N with I up to N");
+}
+
+fs::path shard_path(const fs::path& output, const Shard& shard) {
+  return fmt::format("{}.shard-{}-of-{}", output.string(), shard.index + 1, shard.count);
+}
+
+/// Every file beside the output that is named as its shards are.
+std::vector<std::string> shards_beside(const fs::path& output) {
+  const std::string begin = output.filename().string() + ".shard-";
+  const fs::path folder = output.parent_path();
+  std::vector<std::string> files;
+  std::error_code ec;
+  for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, ec)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(begin) && !name.ends_with(".json")) {
+      files.push_back((folder / name).string());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls,
+              const Session& session) {
+  const fs::path log = shard_path(output, controls.shard);
+  const Shard shard = controls.shard;
+  const SweepRun run = run_watched(sweep, log, std::move(controls));
+  if (run.interrupted) return stopped(log);
+  write_file(log.string() + ".run.json", to_text(sidecar(sweep, run, {})));
+  if (session.json()) {
+    fmt::print("{}", to_text(Json{{"file", log.string()}, {"blocks", run.blocks}}));
+  } else {
+    fmt::print("shard {} of {}: {} of {} blocks in {}\n", shard.index + 1, shard.count, run.blocks,
+               sweep.blocks(), log.string());
+  }
+  return 0;
+}
+
+/// Puts shards together.
+int merge(const SweepChoice& choice, const Session& session) {
+  const Sweep sweep = read_sweep(choice.sweep);
+  const fs::path output = choice.output;
+  const auto files = choice.shards.empty() ? shards_beside(output) : choice.shards;
+  if (files.empty()) {
+    throw bad_input(output.string(), "no shards beside it", "files of tpm sweep --shard I/N");
+  }
+  const auto note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
+  std::vector<BlockLog> logs;
+  for (const std::string& file : files) logs.push_back(BlockLog::to_read(file, sweep, note));
+  std::vector<const BlockLog*> all;
+  SweepRun run;
+  run.blocks = sweep.blocks();
+  for (const BlockLog& log : logs) {
+    all.push_back(&log);
+    run.resumed_blocks += log.size();
+  }
+  std::uint64_t missing = 0;
+  for (std::uint64_t b = 0; b < sweep.blocks(); ++b) {
+    missing +=
+        std::none_of(logs.begin(), logs.end(), [b](auto& log) { return log.has(b); }) ? 1 : 0;
+  }
+  if (missing > 0) {
+    throw bad_input(output.string(),
+                    fmt::format("{} of {} blocks are in none of {} shards", missing, sweep.blocks(),
+                                logs.size()),
+                    "all shards, each run to its end");
+  }
+  const WrittenSweep written = write_results(sweep, run, all, output);
+  print_results(sweep, written.tally, written.files, session);
+  return 0;
+}
+
 int run_command(const SweepChoice& choice, const Session& session) {
+  if (choice.sweep.empty()) {
+    throw Error(ExitCode::usage, "sweep", "no file", "tpm sweep SWEEP.json, or merge");
+  }
   const Sweep sweep = read_sweep(choice.sweep);
   const fs::path output = choice.output, log = log_path(output);
   if (fingerprint_of(output) == sweep.fingerprint) {
@@ -139,7 +229,11 @@ int run_command(const SweepChoice& choice, const Session& session) {
   if (!choice.workers.empty()) {
     controls.workers = static_cast<int>(parse_whole_number(choice.workers, "--workers", 1));
   }
-  const SweepRun run = run_watched(sweep, log, controls);
+  if (!choice.shard.empty()) {
+    controls.shard = parse_shard(choice.shard);
+    return run_shard(sweep, output, std::move(controls), session);
+  }
+  const SweepRun run = run_watched(sweep, log, std::move(controls));
   if (run.interrupted) return stopped(log);
   const BlockLog blocks = BlockLog::to_read(log, sweep, {});
   const WrittenSweep written = write_results(sweep, run, {&blocks}, output);
@@ -154,15 +248,27 @@ void add_sweep_command(CLI::App& app, Session& session) {
   CLI::App* command =
       app.add_subcommand("sweep", "Many experiments over combinations of parameters; one HDF5");
   auto choice = std::make_shared<SweepChoice>();
-  command->add_option("SWEEP", choice->sweep, "JSON sweep (schemas/sweep.schema.json)")->required();
+  command->add_option("SWEEP", choice->sweep, "JSON sweep (schemas/sweep.schema.json)");
   command->add_option("-o,--output", choice->output, "HDF5 file; CSV and times go beside it")
       ->capture_default_str();
   command->add_option("--workers", choice->workers, "Threads (default: all processors)");
+  command->add_option("--shard", choice->shard,
+                      "I/N: compute the I-th of N parts, into a file of its own for merge");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm sweep configs/sweep_x_depth.json -o sweep.h5\n"
       "A stopped or killed sweep goes on where it was when the same command is given again.");
-  command->callback([choice, &session] {
+  CLI::App* merging = command->add_subcommand("merge", "Put the shards of a sweep together");
+  merging->add_option("SWEEP", choice->sweep, "JSON sweep")->required();
+  merging->add_option("SHARD", choice->shards,
+                      "Files of shards (default: those beside the output)");
+  merging->add_option("-o,--output", choice->output, "HDF5 file, as it was given to the shards")
+      ->capture_default_str();
+  add_format_option(*merging, session);
+  merging->callback(
+      [choice, &session] { session.run = [choice, &session] { return merge(*choice, session); }; });
+  command->callback([command, choice, &session] {
+    if (!command->get_subcommands().empty()) return;
     session.run = [choice, &session] { return run_command(*choice, session); };
   });
 }

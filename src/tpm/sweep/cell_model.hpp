@@ -70,4 +70,10 @@ class SweepModel {
 [[nodiscard]] std::shared_ptr<const SweepModel> single_contact_model(const Json& document,
                                                                      std::string_view where);
 
+/// The quasi-static network of a scene (block `scene`, which may not be a file's name any more, and
+/// outputs). Parameters are JSON pointers to numbers in the scene.
+/// @param folder that a mesh in the scene is relative to
+[[nodiscard]] std::shared_ptr<const SweepModel> organ_sweep_model(
+    const Json& document, std::string_view where, const std::filesystem::path& folder);
+
 }  // namespace tpm

@@ -2,12 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <set>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/version.hpp"
+#include "tpm/core/word_table.hpp"
+#include "tpm/sample/sensitivity.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/expression.hpp"
 #include "tpm/sweep/sweep.hpp"
@@ -21,6 +23,57 @@ std::string usual_name(const std::string& target) {
   return target.substr(target.rfind('/') + 1);
 }
 
+enum class PointKind { random, latin_hypercube, sobol, plain_sobol, sensitivity };
+
+constexpr std::array<Word<PointKind>, 5> kPointKinds{{
+    {PointKind::random, "random"},
+    {PointKind::latin_hypercube, "latin_hypercube"},
+    {PointKind::sobol, "sobol"},
+    {PointKind::plain_sobol, "plain_sobol"},
+    {PointKind::sensitivity, "sensitivity"},
+}};
+
+/// The points of an axis of samples.
+struct SampledPoints {
+  std::shared_ptr<const CubePoints> set;
+  std::uint64_t count = 0;
+};
+
+SampledPoints parse_points(const Json& axis, int dimensions, const DocumentPlace& place) {
+  const PointKind kind =
+      parse_word(kPointKinds, "kind of samples", axis.at("samples").get<std::string>(),
+                 place.key("samples").where);
+  const auto count = axis.at("count").get<std::uint64_t>();
+  const auto seed = axis.value("seed", std::uint64_t{0});
+  if (axis.contains("replicates") != (kind == PointKind::sensitivity)) {
+    throw bad_input(place.key("replicates").where, "belongs to samples of kind 'sensitivity'",
+                    "a number of replicates there, and nowhere else");
+  }
+  constexpr std::uint64_t kMostSobol = std::uint64_t{1} << 32U;
+  if ((kind == PointKind::sobol || kind == PointKind::plain_sobol) && count > kMostSobol) {
+    throw bad_input(place.key("count").where, "more points than the sequence has", "at most 2^32");
+  }
+  try {
+    switch (kind) {
+      case PointKind::random:
+        return {random_points(seed), count};
+      case PointKind::latin_hypercube:
+        return {latin_hypercube(count, seed), count};
+      case PointKind::sobol:
+        return {sobol_points(dimensions, seed), count};
+      case PointKind::plain_sobol:
+        return {plain_sobol_points(dimensions), count};
+      case PointKind::sensitivity:
+        break;
+    }
+    const SensitivityDesign design{dimensions, count, axis.at("replicates").get<std::uint64_t>(),
+                                   seed};
+    return {sensitivity_points(design), design.cells()};
+  } catch (const Error& error) {
+    throw error.within(place.where);
+  }
+}
+
 /// Puts axes and parameters together; every name once.
 class AxisReader {
  public:
@@ -28,12 +81,12 @@ class AxisReader {
 
   void read(const Json& axis) {
     const DocumentPlace here = place_.key(std::to_string(sweep_.axes.size()));
-    const int forms =
-        static_cast<int>(axis.contains("parameter")) + static_cast<int>(axis.contains("together"));
-    if (forms != 1) {
-      throw bad_input(here.where, "no axis", "one of 'parameter' and 'together'");
+    const auto has = [&](const char* key) { return axis.contains(key) ? 1 : 0; };
+    if (has("parameter") + has("together") + has("samples") != 1) {
+      throw bad_input(here.where, "no axis", "one of 'parameter', 'together' and 'samples'");
     }
     if (axis.contains("parameter")) return single(axis, here);
+    if (axis.contains("samples")) return sampled(axis, here);
     together(axis, here);
   }
 
@@ -65,6 +118,30 @@ class AxisReader {
       if (count == 0) add_axis(axis.value("name", "case"), count = values.count, here);
       add_parameter(object.value("name", usual_name(target)), target, dimension,
                     std::move(values.values), at);
+    }
+  }
+
+  /// Points in the box between the ends of several parameters.
+  void sampled(const Json& axis, const DocumentPlace& here) {
+    only(axis, {"samples", "name", "count", "replicates", "seed", "parameters"}, here);
+    for (const char* key : {"count", "parameters"}) {
+      if (!axis.contains(key)) throw bad_input(here.where, fmt::format("no '{}'", key), "one");
+    }
+    const Json& parameters = axis.at("parameters");
+    const SampledPoints points = parse_points(axis, static_cast<int>(parameters.size()), here);
+    add_axis(axis.value("name", "sample"), points.count, here);
+    int dimension_of_cube = 0;
+    for (const auto& [target, object] : parameters.items()) {
+      const DocumentPlace at = here.key("parameters").key(target);
+      only(object, {"from", "to", "scale", "name"}, at);
+      const Dimension dimension = sweep_.model->dimension_of(target, at.where);
+      const SweepRange range = parse_range(object, dimension, at);
+      add_parameter(
+          object.value("name", usual_name(target)), target, dimension,
+          ParameterValues::samples(range.from, range.to, range.scale,
+                                   [set = points.set, d = dimension_of_cube++](
+                                       std::uint64_t point) { return set->coordinate(point, d); }),
+          at);
     }
   }
 
@@ -173,6 +250,32 @@ void read_axes(const Json& document, Sweep& sweep, const DocumentPlace& place) {
   }
 }
 
+/// Each model has blocks of its own.
+void require_blocks_of_model(const Json& document, const DocumentPlace& place) {
+  const bool organ = document.at("model").get<std::string>() == "organ";
+  for (const char* key : {"material", "indentation", "creep"}) {
+    if (!organ || !document.contains(key)) continue;
+    throw bad_input(place.key(key).where, "belongs to the single contact", "keys of the scene");
+  }
+  if (organ == document.contains("scene")) return;
+  throw bad_input(place.key("scene").where, organ ? "is missing" : "belongs to the model 'organ'",
+                  organ ? "a scene's file, or a scene" : "");
+}
+
+/// Puts the scene in the place of its file's name. Returns the folder that its mesh is relative to.
+std::filesystem::path put_scene_in(Json& document, const std::filesystem::path& folder) {
+  if (!document.contains("scene") || !document.at("scene").is_string()) return folder;
+  const std::filesystem::path file = folder / document.at("scene").get<std::string>();
+  document.at("scene") = read_json(file);
+  return file.parent_path();
+}
+
+std::string sha256_of_mesh(const Json& document, const std::filesystem::path& folder) {
+  const Json::json_pointer mesh("/scene/organ/mesh");
+  if (!document.contains(mesh)) return {};
+  return sha256_hex(read_file(folder / document.at(mesh).get<std::string>()));
+}
+
 /// So many cells that their numbers fill some 1.5 MB.
 std::uint64_t usual_block(const Sweep& sweep) {
   constexpr std::uint64_t kNumbers = 200'000;
@@ -204,14 +307,18 @@ std::size_t Sweep::width() const {
   return width;
 }
 
-Sweep parse_sweep(const Json& document, std::string_view where,
-                  const std::filesystem::path& /*folder*/) {
-  check_schema(document, "sweep", where);
+Sweep parse_sweep(const Json& written, std::string_view where,
+                  const std::filesystem::path& folder) {
+  check_schema(written, "sweep", where);
   const DocumentPlace place{std::string(where)};
+  require_blocks_of_model(written, place);
+  Json document = written;
+  const std::filesystem::path scene_folder = put_scene_in(document, folder);
   Sweep sweep;
   sweep.title = document.value("title", "");
   sweep.description = document.value("description", "");
-  sweep.model = single_contact_model(document, where);
+  sweep.model = document.contains("scene") ? organ_sweep_model(document, where, scene_folder)
+                                           : single_contact_model(document, where);
   read_axes(document, sweep, place);
   sweep.variables = sweep.model->variables();
   read_formulas(document.at("outputs"), sweep, place.key("outputs"));
@@ -231,7 +338,8 @@ Sweep parse_sweep(const Json& document, std::string_view where,
   }
   sweep.document = document.dump();
   sweep.fingerprint =
-      sha256_hex(fmt::format("{}\n{}\n{}", version(), sweep.block_cells, sweep.document));
+      sha256_hex(fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, sweep.document,
+                             sha256_of_mesh(document, scene_folder)));
   return sweep;
 }
 
