@@ -7,12 +7,13 @@ packages_run=(
   libeigen3-dev libceres-dev libsundials-dev libboost-dev
   libhdf5-dev nlohmann-json3-dev libvalijson-dev libcsv-dev libutfcpp-dev libssl-dev
   libmuparser-dev libcpp-httplib-dev pkg-config libcli11-dev libfmt-dev libassimp-dev libnanoflann-dev
+  libtbb-dev
   python3 python3-numpy python3-matplotlib
 )
 
 # What the tests need besides.
 packages_test=(
-  catch2 python3-scipy python3-h5py
+  catch2 python3-scipy python3-h5py python3-xarray python3-h5netcdf
 )
 
 # What checks the sources.

@@ -17,7 +17,7 @@ using Catch::Matchers::WithinAbs;
 
 /// How many of the first `count` points fall into each of the boxes of 2^a by 2^b over dimensions
 /// i and j; the largest and the smallest number.
-std::pair<int, int> filling(const PointSet& set, std::uint64_t count, int i, int j, int a, int b) {
+std::pair<int, int> filling(const CubePoints& set, std::uint64_t count, int i, int j, int a, int b) {
   std::vector<int> box(std::size_t{1} << (a + b), 0);
   for (std::uint64_t p = 0; p < count; ++p) {
     const auto x = static_cast<std::size_t>(std::ldexp(set.coordinate(p, i), a));
@@ -29,7 +29,7 @@ std::pair<int, int> filling(const PointSet& set, std::uint64_t count, int i, int
 }
 
 /// Of the mean of exp(x1 + x2 + x3) over `count` points: root mean square error over seeds.
-double error_of_mean(const std::function<std::unique_ptr<PointSet>(std::uint64_t)>& make,
+double error_of_mean(const std::function<std::unique_ptr<CubePoints>(std::uint64_t)>& make,
                      std::uint64_t count) {
   const double exact = std::pow(std::numbers::e - 1.0, 3);
   double squares = 0.0;
@@ -82,7 +82,7 @@ TEST_CASE("A Latin hypercube has one point in each interval of each dimension") 
 }
 
 TEST_CASE("Means over points err as the theory of each kind says") {
-  const auto order = [](const std::function<std::unique_ptr<PointSet>(std::uint64_t)>& make) {
+  const auto order = [](const std::function<std::unique_ptr<CubePoints>(std::uint64_t)>& make) {
     return std::log2(error_of_mean(make, 256) / error_of_mean(make, 4096)) / 4.0;
   };
   const auto sobol = [](std::uint64_t seed) { return sobol_points(3, seed); };

@@ -65,6 +65,7 @@ int run(int argc, char** argv) {
   add_experiments_command(app, session);
   add_benchmark_command(app, session);
   add_stability_command(app, session);
+  add_sweep_command(app, session);
   add_hil_command(app, session);
 
   try {

@@ -1,16 +1,19 @@
 #pragma once
+#include <chrono>
 #include <cstddef>
 #include <string>
 
 namespace tpm {
 
-/// One line of progress on standard error, rewritten in place; silent unless standard error is a
+/// One line of progress on standard error, rewritten in place, with an estimate of the time that is
+/// left once some seconds have passed; silent unless standard error is a
 /// terminal, so that pipes and logs stay clean.
 class Progress {
  public:
   /// @param what a short phrase ("profiling", "coverage")
   /// @param total number of steps; 0 if not known
-  Progress(std::string what, std::size_t total);
+  /// @param already steps of the total that were done before: they say nothing about the time left
+  Progress(std::string what, std::size_t total, std::size_t already = 0);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -19,9 +22,12 @@ class Progress {
 
  private:
   void draw() const;
+  [[nodiscard]] std::string time_left() const;
   std::string what_;
   std::size_t total_;
   std::size_t done_ = 0;
+  std::size_t already_ = 0;
+  std::chrono::steady_clock::time_point start_;
   bool on_terminal_;
 };
 

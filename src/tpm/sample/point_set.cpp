@@ -32,7 +32,7 @@ double uniform(std::uint64_t bits) {
   return kTwoToMinus53 * static_cast<double>(bits >> 11);
 }
 
-class RandomPoints final : public PointSet {
+class RandomPoints final : public CubePoints {
  public:
   explicit RandomPoints(std::uint64_t seed) : key_(mixed(seed + 1)) {}
   double coordinate(std::uint64_t point, int dimension) const override {
@@ -43,7 +43,7 @@ class RandomPoints final : public PointSet {
   std::uint64_t key_;
 };
 
-class LatinHypercube final : public PointSet {
+class LatinHypercube final : public CubePoints {
  public:
   LatinHypercube(std::uint64_t count, std::uint64_t seed)
       : count_(count),
@@ -109,7 +109,7 @@ std::uint32_t net_digits(const std::vector<std::uint32_t>& directions, std::uint
   return digits;
 }
 
-class PlainSobol final : public PointSet {
+class PlainSobol final : public CubePoints {
  public:
   explicit PlainSobol(int dimensions) : directions_(direction_numbers(dimensions)) {}
   double coordinate(std::uint64_t point, int dimension) const override {
@@ -120,7 +120,7 @@ class PlainSobol final : public PointSet {
   std::vector<std::uint32_t> directions_;
 };
 
-class ScrambledSobol final : public PointSet {
+class ScrambledSobol final : public CubePoints {
  public:
   ScrambledSobol(int dimensions, std::uint64_t seed)
       : directions_(direction_numbers(dimensions)), key_(mixed(seed + 3)) {}
@@ -149,20 +149,20 @@ class ScrambledSobol final : public PointSet {
 
 }  // namespace
 
-std::unique_ptr<PointSet> random_points(std::uint64_t seed) {
+std::unique_ptr<CubePoints> random_points(std::uint64_t seed) {
   return std::make_unique<RandomPoints>(seed);
 }
 
-std::unique_ptr<PointSet> latin_hypercube(std::uint64_t count, std::uint64_t seed) {
+std::unique_ptr<CubePoints> latin_hypercube(std::uint64_t count, std::uint64_t seed) {
   if (count == 0) throw bad_input("a Latin hypercube", "has no points", "1 or more");
   return std::make_unique<LatinHypercube>(count, seed);
 }
 
-std::unique_ptr<PointSet> plain_sobol_points(int dimensions) {
+std::unique_ptr<CubePoints> plain_sobol_points(int dimensions) {
   return std::make_unique<PlainSobol>(dimensions);
 }
 
-std::unique_ptr<PointSet> sobol_points(int dimensions, std::uint64_t seed) {
+std::unique_ptr<CubePoints> sobol_points(int dimensions, std::uint64_t seed) {
   return std::make_unique<ScrambledSobol>(dimensions, seed);
 }
 

@@ -27,7 +27,7 @@ void check_design(const SensitivityDesign& design) {
                     "2 or more: their spread is the error");
 }
 
-class SensitivityPoints final : public PointSet {
+class SensitivityPoints final : public CubePoints {
  public:
   explicit SensitivityPoints(const SensitivityDesign& design)
       : inputs_(design.inputs), points_(design.points) {
@@ -52,7 +52,7 @@ class SensitivityPoints final : public PointSet {
  private:
   int inputs_;
   std::uint64_t points_;
-  std::vector<std::unique_ptr<PointSet>> replicates_;
+  std::vector<std::unique_ptr<CubePoints>> replicates_;
 };
 
 /// Sums over the points of one replicate.
@@ -119,7 +119,7 @@ std::uint64_t SensitivityDesign::cells() const {
   return replicates * points * (static_cast<std::uint64_t>(inputs) + 2);
 }
 
-std::unique_ptr<PointSet> sensitivity_points(const SensitivityDesign& design) {
+std::unique_ptr<CubePoints> sensitivity_points(const SensitivityDesign& design) {
   return std::make_unique<SensitivityPoints>(design);
 }
 

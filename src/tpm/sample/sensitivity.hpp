@@ -23,7 +23,7 @@ struct SensitivityDesign {
 };
 
 /// The cells of the design as points of `inputs` dimensions. Throws Error on a design out of range.
-[[nodiscard]] std::unique_ptr<PointSet> sensitivity_points(const SensitivityDesign& design);
+[[nodiscard]] std::unique_ptr<CubePoints> sensitivity_points(const SensitivityDesign& design);
 
 /// A value and its confidence interval.
 struct IndexEstimate {

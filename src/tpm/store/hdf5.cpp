@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 #include <hdf5.h>
+#include <hdf5_hl.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <fstream>
 #include <type_traits>
 #include <utility>
 
@@ -224,6 +228,114 @@ void Hdf5Writer::attribute(const std::string& object, const std::string& name,
   attach(object, name, H5T_NATIVE_INT64, space, values.data());
 }
 
+namespace {
+
+/// A stretch of an array, counted row by row, put together of boxes: the rest of a row, the rest of
+/// a plane, ..., whole ones, and the same backwards.
+void select_stretch(hid_t space, const std::vector<hsize_t>& shape, std::uint64_t first,
+                    std::uint64_t count) {
+  H5Sselect_none(space);
+  const std::size_t rank = shape.size();
+  std::vector<hsize_t> start(rank), box(rank);
+  while (count > 0) {
+    std::uint64_t rest = first;
+    for (std::size_t d = rank; d-- > 0; rest /= shape[d]) start[d] = rest % shape[d];
+    // The first dimension along which more than one can be taken at once.
+    std::fill(box.begin(), box.end(), hsize_t{1});
+    std::uint64_t inner = 1;  // numbers in one step along dimension d
+    std::size_t d = rank - 1;
+    while (d > 0 && start[d] == 0 && inner * shape[d] <= count) {
+      box[d] = shape[d];
+      inner *= shape[d--];
+    }
+    box[d] = std::min<std::uint64_t>(shape[d] - start[d], count / inner);
+    H5Sselect_hyperslab(space, H5S_SELECT_OR, start.data(), nullptr, box.data(), nullptr);
+    first += box[d] * inner;
+    count -= box[d] * inner;
+  }
+}
+
+hid_t stored_type(Hdf5Writer::Number kind) {
+  switch (kind) {
+    case Hdf5Writer::Number::float64:
+      break;
+    case Hdf5Writer::Number::int64:
+      return H5T_STD_I64LE;
+    case Hdf5Writer::Number::int32:
+      return H5T_STD_I32LE;
+    case Hdf5Writer::Number::uint8:
+      return H5T_STD_U8LE;
+  }
+  return H5T_IEEE_F64LE;
+}
+
+std::vector<hsize_t> shape_of(const Hdf5Handle& space) {
+  std::vector<hsize_t> shape(
+      static_cast<std::size_t>(std::max(0, H5Sget_simple_extent_ndims(space.get()))));
+  H5Sget_simple_extent_dims(space.get(), shape.data(), nullptr);
+  return shape;
+}
+
+}  // namespace
+
+void Hdf5Writer::array(const std::string& name, Number kind,
+                       const std::vector<std::uint64_t>& extents) {
+  const QuietErrors quiet;
+  static_cast<void>(dataset(name, stored_type(kind), extents));
+}
+
+void Hdf5Writer::write_part(const std::string& name, std::uint64_t first, std::uint64_t count,
+                            hid_t type, const void* values) {
+  if (count == 0) return;
+  const QuietErrors quiet;
+  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
+  select_stretch(space.get(), shape_of(space), first, count);
+  const hsize_t size = count;
+  const Hdf5Handle memory(H5Screate_simple(1, &size, nullptr), H5Sclose);
+  if (H5Dwrite(set.get(), type, memory.get(), space.get(), H5P_DEFAULT, values) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::part(const std::string& name, std::uint64_t first,
+                      std::span<const double> values) {
+  write_part(name, first, values.size(), H5T_NATIVE_DOUBLE, values.data());
+}
+
+void Hdf5Writer::part(const std::string& name, std::uint64_t first,
+                      std::span<const std::int64_t> values) {
+  write_part(name, first, values.size(), H5T_NATIVE_INT64, values.data());
+}
+
+void Hdf5Writer::part(const std::string& name, std::uint64_t first,
+                      std::span<const std::int32_t> values) {
+  write_part(name, first, values.size(), H5T_NATIVE_INT32, values.data());
+}
+
+void Hdf5Writer::part(const std::string& name, std::uint64_t first,
+                      std::span<const std::uint8_t> values) {
+  write_part(name, first, values.size(), H5T_NATIVE_UINT8, values.data());
+}
+
+void Hdf5Writer::dimension_scale(const std::string& name) {
+  const QuietErrors quiet;
+  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (H5DSset_scale(set.get(), name.substr(name.rfind('/') + 1).c_str()) < 0) {
+    fail(fmt::format("cannot write the scale {}", name));
+  }
+}
+
+void Hdf5Writer::attach_scale(const std::string& array, unsigned dimension,
+                              const std::string& scale) {
+  const QuietErrors quiet;
+  const Hdf5Handle set(H5Dopen2(file_.get(), array.c_str(), H5P_DEFAULT), H5Dclose);
+  const Hdf5Handle along(H5Dopen2(file_.get(), scale.c_str(), H5P_DEFAULT), H5Dclose);
+  if (H5DSattach_scale(set.get(), along.get(), dimension) < 0) {
+    fail(fmt::format("cannot write the scales of {}", array));
+  }
+}
+
 void Hdf5Writer::commit() {
   const QuietErrors quiet;
   if (H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) < 0) fail("cannot write");
@@ -238,7 +350,15 @@ Hdf5Reader::Hdf5Reader(fs::path path) : path_(std::move(path)) {
   const QuietErrors quiet;
   // HDF5 says the same of a missing file and of garbage: tell them apart first.
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  if (!read_file(path_).starts_with(kSignature)) {
+  std::array<char, kSignature.size()> begin{};
+  std::ifstream in(path_, std::ios::binary);
+  // Not a file, not readable or empty: the reason is read_file's to tell.
+  std::error_code ec;
+  if (!in || !fs::is_regular_file(path_, ec) || fs::is_empty(path_, ec)) {
+    static_cast<void>(read_file(path_));
+  }
+  in.read(begin.data(), begin.size());
+  if (!std::equal(begin.begin(), begin.end(), kSignature.begin())) {
     throw bad_input(path_.string(), "is not an HDF5 file", "an HDF5 file that tpm wrote");
   }
   file_ = {H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose};
@@ -309,6 +429,45 @@ std::vector<double> Hdf5Reader::real_numbers(const std::string& name, int dimens
   const Hdf5Handle set = open_dataset(name, false, dimensions, size);
   std::vector<double> values(size);
   if (H5Dread(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+    fail(name, "cannot be read", "a whole HDF5 file");
+  }
+  return values;
+}
+
+std::vector<std::uint64_t> Hdf5Reader::extents(const std::string& name) const {
+  const QuietErrors quiet;
+  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!set.valid()) fail(name, "no such dataset", "an HDF5 file that tpm wrote");
+  const Hdf5Handle type(H5Dget_type(set.get()), H5Tclose);
+  const H5T_class_t kind = H5Tget_class(type.get());
+  if (kind != H5T_FLOAT && kind != H5T_INTEGER) fail(name, "is of another type", "numbers");
+  const auto shape = shape_of({H5Dget_space(set.get()), H5Sclose});
+  return {shape.begin(), shape.end()};
+}
+
+std::vector<double> Hdf5Reader::part(const std::string& name,
+                                     const std::vector<std::uint64_t>& first,
+                                     const std::vector<std::uint64_t>& counts) const {
+  const auto extents_now = extents(name);
+  bool inside = first.size() == extents_now.size() && counts.size() == extents_now.size();
+  std::uint64_t size = 1;
+  for (std::size_t d = 0; inside && d < counts.size(); ++d) {
+    inside = first[d] <= extents_now[d] && counts[d] <= extents_now[d] - first[d];
+    size *= counts[d];
+  }
+  if (!inside) fail(name, "is smaller than was asked for", "a whole HDF5 file");
+  if (size > fs::file_size(path_))
+    fail(name, "says it is larger than the file", "a whole HDF5 file");
+  const QuietErrors quiet;
+  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
+  const std::vector<hsize_t> start(first.begin(), first.end()), box(counts.begin(), counts.end());
+  H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, box.data(), nullptr);
+  const hsize_t count = size;
+  const Hdf5Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  std::vector<double> values(size);
+  if (H5Dread(set.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, values.data()) <
+      0) {
     fail(name, "cannot be read", "a whole HDF5 file");
   }
   return values;

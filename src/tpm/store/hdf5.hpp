@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -59,10 +60,23 @@ class Hdf5Writer {
   /// Attaches whole numbers; a single one as a scalar.
   void attribute(const std::string& object, const std::string& name,
                  const std::vector<std::int64_t>& values);
+
+  /// Numbers over several dimensions, to be written in parts.
+  enum class Number { float64, int64, int32, uint8 };
+  void array(const std::string& name, Number kind, const std::vector<std::uint64_t>& extents);
+  /// Writes the numbers from `first` on, counted row by row through all dimensions.
+  void part(const std::string& name, std::uint64_t first, std::span<const double> values);
+  void part(const std::string& name, std::uint64_t first, std::span<const std::int64_t> values);
+  void part(const std::string& name, std::uint64_t first, std::span<const std::int32_t> values);
+  void part(const std::string& name, std::uint64_t first, std::span<const std::uint8_t> values);
+  /// Makes a list the coordinate of a dimension: readers name the dimension after it.
+  void dimension_scale(const std::string& name);
+  void attach_scale(const std::string& array, unsigned dimension, const std::string& scale);
   void commit();
 
  private:
-  /// @param extents one or two
+  void write_part(const std::string& name, std::uint64_t first, std::uint64_t count,
+                  Hdf5Handle::Id type, const void* values);
   [[nodiscard]] Hdf5Handle dataset(const std::string& name, Hdf5Handle::Id type,
                                    const std::vector<std::uint64_t>& extents);
   void attach(const std::string& object, const std::string& name, Hdf5Handle::Id type,
@@ -87,6 +101,12 @@ class Hdf5Reader {
   [[nodiscard]] std::vector<double> numbers(const std::string& name) const;
   /// The rows of a table, one after the other.
   [[nodiscard]] std::vector<double> table(const std::string& name) const;
+  /// Of an array of numbers of any kind.
+  [[nodiscard]] std::vector<std::uint64_t> extents(const std::string& name) const;
+  /// Numbers of an array of any kind: `counts` of them from `first` on along each dimension.
+  [[nodiscard]] std::vector<double> part(const std::string& name,
+                                         const std::vector<std::uint64_t>& first,
+                                         const std::vector<std::uint64_t>& counts) const;
   [[nodiscard]] std::vector<std::string> texts(const std::string& name) const;
   [[nodiscard]] bool has_attribute(const std::string& object, const std::string& name) const;
   [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;

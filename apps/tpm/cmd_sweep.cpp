@@ -1,0 +1,276 @@
+// tpm sweep: many experiments over the combinations of parameters that a file asks for.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <ctime>
+#include <filesystem>
+#include <memory>
+
+#include "command.hpp"
+#include "interrupt_watch.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/report/run_record.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/sweep/run_sweep.hpp"
+#include "tpm/sweep/sweep_result.hpp"
+
+namespace tpm::app {
+namespace fs = std::filesystem;
+namespace {
+
+struct SweepChoice {
+  std::string sweep;
+  std::string output = "sweep.h5";
+  std::string workers;
+  std::string shard;                ///< "2/8"
+  std::vector<std::string> shards;  ///< of merge: files
+};
+
+/// "results.h5" becomes "results.run.json".
+fs::path beside(const fs::path& file, const char* ending) {
+  fs::path other = file;
+  return other.replace_extension(ending);
+}
+
+/// The end of a sweep: files, and the time of the HDF5 file alone.
+struct WrittenSweep {
+  CellTally tally;
+  std::vector<std::string> files;
+  double seconds = 0.0, cpu_seconds = 0.0;
+};
+
+SweepRun run_watched(const Sweep& sweep, const fs::path& log, SweepControls controls) {
+  const InterruptWatch interrupts;
+  std::optional<Progress> progress;
+  std::uint64_t before = 0;
+  controls.progress = [&](std::uint64_t done, std::uint64_t blocks) {
+    if (!progress) {
+      progress.emplace("blocks of the sweep", blocks, done);
+    } else {
+      progress->advance(done - before);
+    }
+    before = done;
+  };
+  controls.interrupted = InterruptWatch::seen;
+  controls.note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
+  return run_sweep(sweep, log, controls);
+}
+
+Json tally_json(const Sweep& sweep, const CellTally& tally) {
+  return {{"cells", sweep.cells()},
+          {"done", tally.done},
+          {"skipped", tally.skipped},
+          {"failed", tally.failed},
+          {"reasons", tally.reasons}};
+}
+
+/// Wall times and what else changes from run to run.
+Json sidecar(const Sweep& sweep, const SweepRun& run, const WrittenSweep& written) {
+  Json record = run_record({{"computing", run.seconds}, {"writing", written.seconds}});
+  record["workers"] = run.workers;
+  record["blocks"] = run.blocks;
+  record["blocks_found_in_the_log"] = run.resumed_blocks;
+  record["cells_of_a_block"] = sweep.block_cells;
+  record["cpu_seconds"] = {{"computing", rounded(run.cpu_seconds, 3)},
+                           {"writing", rounded(written.cpu_seconds, 3)}};
+  const double whole = run.cpu_seconds + written.cpu_seconds;
+  if (run.resumed_blocks == 0 && whole > 0.0) {
+    record["cells_per_cpu_second"] = rounded(static_cast<double>(run.cells) / whole, 3);
+  }
+  return record;
+}
+
+int stopped(const fs::path& log) {
+  constexpr int kStoppedBySignal = 128;
+  fmt::print(stderr, "tpm: stopped; what was computed is in {}: the same command goes on\n",
+             log.string());
+  return kStoppedBySignal + InterruptWatch::signal();
+}
+
+WrittenSweep write_results(const Sweep& sweep, const SweepRun& run,
+                           const std::vector<const BlockLog*>& logs, const fs::path& output) {
+  WrittenSweep written;
+  std::map<std::string, double> seconds;
+  const std::clock_t cpu_start = std::clock();
+  written.tally = timed(seconds, "writing", [&] { return write_sweep(sweep, logs, output); });
+  written.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
+  written.seconds = seconds["writing"];
+  written.files.push_back(output.string());
+  if (write_sweep_csv(sweep, logs, beside(output, ".csv"))) {
+    written.files.push_back(beside(output, ".csv").string());
+  }
+  write_file(beside(output, ".run.json"), to_text(sidecar(sweep, run, written)));
+  written.files.push_back(beside(output, ".run.json").string());
+  return written;
+}
+
+void print_results(const Sweep& sweep, const CellTally& tally,
+                   const std::vector<std::string>& files, const Session& session) {
+  if (session.json()) {
+    Json json = tally_json(sweep, tally);
+    json["files"] = files;
+    fmt::print("{}", to_text(json));
+    return;
+  }
+  fmt::print("{} cells: {} done, {} skipped, {} failed\n", sweep.cells(), tally.done, tally.skipped,
+             tally.failed);
+  constexpr std::size_t kShown = 5;
+  for (std::size_t i = 0; i < std::min(kShown, tally.reasons.size()); ++i) {
+    fmt::print("- {}\n", printable(tally.reasons[i], 160));
+  }
+  if (tally.reasons.size() > kShown) {
+    fmt::print("- and {} more reasons: /reason_text\n", tally.reasons.size() - kShown);
+  }
+  fmt::print("wrote {}\n", fmt::join(files, ", "));
+}
+
+/// "2/8": the second of eight.
+Shard parse_shard(const std::string& text) {
+  const std::size_t stroke = text.find('/');
+  if (stroke == std::string::npos) {
+    throw Error(ExitCode::usage, "--shard", fmt::format("'{}'", printable(text)),
+                "I/N, the I-th of N, from 1 on");
+  }
+  const std::uint64_t index = parse_whole_number(text.substr(0, stroke), "--shard", 1);
+  const std::uint64_t count = parse_whole_number(text.substr(stroke + 1), "--shard", 1);
+  if (index <= count) return {index - 1, count};
+  throw Error(ExitCode::usage, "--shard", fmt::format("the {}th of {}", index, count),
+              "I/N with I up to N");
+}
+
+fs::path shard_path(const fs::path& output, const Shard& shard) {
+  return fmt::format("{}.shard-{}-of-{}", output.string(), shard.index + 1, shard.count);
+}
+
+/// Every file beside the output that is named as its shards are.
+std::vector<std::string> shards_beside(const fs::path& output) {
+  const std::string begin = output.filename().string() + ".shard-";
+  const fs::path folder = output.parent_path();
+  std::vector<std::string> files;
+  std::error_code ec;
+  for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, ec)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(begin) && !name.ends_with(".json")) {
+      files.push_back((folder / name).string());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls,
+              const Session& session) {
+  const fs::path log = shard_path(output, controls.shard);
+  const Shard shard = controls.shard;
+  const SweepRun run = run_watched(sweep, log, std::move(controls));
+  if (run.interrupted) return stopped(log);
+  write_file(log.string() + ".run.json", to_text(sidecar(sweep, run, {})));
+  if (session.json()) {
+    fmt::print("{}", to_text(Json{{"file", log.string()}, {"blocks", run.blocks}}));
+  } else {
+    fmt::print("shard {} of {}: {} of {} blocks in {}\n", shard.index + 1, shard.count, run.blocks,
+               sweep.blocks(), log.string());
+  }
+  return 0;
+}
+
+/// Puts shards together.
+int merge(const SweepChoice& choice, const Session& session) {
+  const Sweep sweep = read_sweep(choice.sweep);
+  const fs::path output = choice.output;
+  const auto files = choice.shards.empty() ? shards_beside(output) : choice.shards;
+  if (files.empty()) {
+    throw bad_input(output.string(), "no shards beside it", "files of tpm sweep --shard I/N");
+  }
+  const auto note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
+  std::vector<BlockLog> logs;
+  for (const std::string& file : files) logs.push_back(BlockLog::to_read(file, sweep, note));
+  std::vector<const BlockLog*> all;
+  SweepRun run;
+  run.blocks = sweep.blocks();
+  for (const BlockLog& log : logs) {
+    all.push_back(&log);
+    run.resumed_blocks += log.size();
+  }
+  std::uint64_t missing = 0;
+  for (std::uint64_t b = 0; b < sweep.blocks(); ++b) {
+    missing +=
+        std::none_of(logs.begin(), logs.end(), [b](auto& log) { return log.has(b); }) ? 1 : 0;
+  }
+  if (missing > 0) {
+    throw bad_input(output.string(),
+                    fmt::format("{} of {} blocks are in none of {} shards", missing, sweep.blocks(),
+                                logs.size()),
+                    "all shards, each run to its end");
+  }
+  const WrittenSweep written = write_results(sweep, run, all, output);
+  print_results(sweep, written.tally, written.files, session);
+  return 0;
+}
+
+int run_command(const SweepChoice& choice, const Session& session) {
+  if (choice.sweep.empty()) {
+    throw Error(ExitCode::usage, "sweep", "no file", "tpm sweep SWEEP.json, or merge");
+  }
+  const Sweep sweep = read_sweep(choice.sweep);
+  const fs::path output = choice.output, log = log_path(output);
+  if (fingerprint_of(output) == sweep.fingerprint) {
+    std::error_code ignored;
+    fs::remove(log, ignored);  // left where a run was killed after its last step
+    fmt::print(stderr, "tpm: {} holds this sweep already\n", output.string());
+    return 0;
+  }
+  if (fs::is_directory(output)) {
+    throw Error(ExitCode::environment, output.string(), "is a folder", "a file to write");
+  }
+  SweepControls controls;
+  if (!choice.workers.empty()) {
+    controls.workers = static_cast<int>(parse_whole_number(choice.workers, "--workers", 1));
+  }
+  if (!choice.shard.empty()) {
+    controls.shard = parse_shard(choice.shard);
+    return run_shard(sweep, output, std::move(controls), session);
+  }
+  const SweepRun run = run_watched(sweep, log, std::move(controls));
+  if (run.interrupted) return stopped(log);
+  const BlockLog blocks = BlockLog::to_read(log, sweep, {});
+  const WrittenSweep written = write_results(sweep, run, {&blocks}, output);
+  fs::remove(log);
+  print_results(sweep, written.tally, written.files, session);
+  return 0;
+}
+
+}  // namespace
+
+void add_sweep_command(CLI::App& app, Session& session) {
+  CLI::App* command =
+      app.add_subcommand("sweep", "Many experiments over combinations of parameters; one HDF5");
+  auto choice = std::make_shared<SweepChoice>();
+  command->add_option("SWEEP", choice->sweep, "JSON sweep (schemas/sweep.schema.json)");
+  command->add_option("-o,--output", choice->output, "HDF5 file; CSV and times go beside it")
+      ->capture_default_str();
+  command->add_option("--workers", choice->workers, "Threads (default: all processors)");
+  command->add_option("--shard", choice->shard,
+                      "I/N: compute the I-th of N parts, into a file of its own for merge");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm sweep configs/sweep_x_depth.json -o sweep.h5\n"
+      "A stopped or killed sweep goes on where it was when the same command is given again.");
+  CLI::App* merging = command->add_subcommand("merge", "Put the shards of a sweep together");
+  merging->add_option("SWEEP", choice->sweep, "JSON sweep")->required();
+  merging->add_option("SHARD", choice->shards,
+                      "Files of shards (default: those beside the output)");
+  merging->add_option("-o,--output", choice->output, "HDF5 file, as it was given to the shards")
+      ->capture_default_str();
+  add_format_option(*merging, session);
+  merging->callback(
+      [choice, &session] { session.run = [choice, &session] { return merge(*choice, session); }; });
+  command->callback([command, choice, &session] {
+    if (!command->get_subcommands().empty()) return;
+    session.run = [choice, &session] { return run_command(*choice, session); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,62 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tpm/sweep/cell_block.hpp"
+
+namespace tpm {
+
+/// Blocks of a sweep in the order in which they were finished, each with a check sum. What stands
+/// in the file survives the process; a block that was cut short or damaged is not there.
+class BlockLog {
+ public:
+  /// Opens the log for reading and going on, or begins it. Only one process can hold it.
+  /// @param note told, in words, what was found damaged
+  /// Throws Error(bad_input) for a file that is no log or that of another sweep,
+  /// Error(environment) if it cannot be written or is held.
+  BlockLog(std::filesystem::path path, const Sweep& sweep,
+           const std::function<void(const std::string&)>& note);
+  /// Opens a log for reading alone.
+  [[nodiscard]] static BlockLog to_read(std::filesystem::path path, const Sweep& sweep,
+                                        const std::function<void(const std::string&)>& note);
+  ~BlockLog();
+  BlockLog(BlockLog&& other) noexcept;
+  BlockLog(const BlockLog&) = delete;
+  BlockLog& operator=(const BlockLog&) = delete;
+  BlockLog& operator=(BlockLog&&) = delete;
+
+  [[nodiscard]] bool has(std::uint64_t block) const { return place_[block] != 0; }
+  /// How many blocks there are.
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+  /// Throws Error(environment); the log is then as it was before.
+  void append(const CellBlock& block);
+  /// Throws Error(bad_input) if the block was damaged since the log was opened.
+  [[nodiscard]] CellBlock read(std::uint64_t block) const;
+  /// Passes everything to the disk: from here on it survives the machine.
+  void sync();
+
+ private:
+  BlockLog(std::filesystem::path path, const Sweep& sweep);
+  void open(int flags);
+  void begin();
+  void find_blocks(const std::function<void(const std::string&)>& note);
+  [[nodiscard]] std::uint64_t find_next(std::uint64_t from) const;
+  [[nodiscard]] bool read_at(std::uint64_t offset, std::string& bytes, std::uint64_t size) const;
+  /// The payload of a block if one begins here, and where it ends.
+  [[nodiscard]] bool record_at(std::uint64_t offset, std::uint64_t& number, std::string& payload,
+                               std::uint64_t& end) const;
+
+  std::filesystem::path path_;
+  const Sweep* sweep_;
+  int file_ = -1;
+  std::uint64_t length_ = 0;  ///< of the file
+  std::uint64_t size_ = 0;
+  std::vector<std::uint64_t> place_;  ///< of each block in the file; 0: it is not there
+};
+
+}  // namespace tpm

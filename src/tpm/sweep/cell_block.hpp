@@ -1,0 +1,53 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tpm/sweep/sweep.hpp"
+
+namespace tpm {
+
+/// What became of a cell.
+enum class CellStatus : std::uint8_t { done, skipped, failed };
+
+/// The results of a stretch of cells: the unit of work and of storage.
+struct CellBlock {
+  std::uint64_t number = 0;
+  std::vector<CellStatus> status;
+  std::vector<std::uint16_t> reason;   ///< of each cell: a place in `reasons`, from 1; 0: none
+  std::vector<double> error_estimate;  ///< NaN where nothing was found
+  std::vector<std::vector<std::int64_t>> counts;  ///< of each counted operation
+  std::vector<std::vector<double>> values;        ///< of each variable, cell by cell; NaN as above
+  std::vector<std::string> reasons;
+
+  [[nodiscard]] std::size_t cells() const { return status.size(); }
+};
+
+/// Computes blocks, for one worker.
+class CellRunner {
+ public:
+  /// @param sweep has to outlive the runner
+  explicit CellRunner(const Sweep& sweep);
+  ~CellRunner();
+  CellRunner(const CellRunner&) = delete;
+  CellRunner& operator=(const CellRunner&) = delete;
+
+  /// A cell without an answer is recorded with its reason. What it holds depends on the sweep and
+  /// the block's number alone.
+  [[nodiscard]] CellBlock run(std::uint64_t block);
+
+ private:
+  struct Expressions;
+  void run_cell(std::size_t cell, CellBlock& block);
+  void set_aside(std::size_t cell, CellStatus status, const std::string& reason, CellBlock& block);
+
+  const Sweep& sweep_;
+  std::unique_ptr<CellModel> model_;
+  std::unique_ptr<Expressions> expressions_;  ///< none if the sweep has no conditions and formulas
+  std::vector<std::uint64_t> places_;
+  std::vector<double> swept_, values_;
+  std::vector<std::int64_t> counts_;
+};
+
+}  // namespace tpm

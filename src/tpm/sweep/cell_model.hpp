@@ -1,0 +1,79 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tpm/core/units.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// What is found for each cell under one name: a number, or a curve.
+struct SweepVariable {
+  std::string name;
+  std::string unit;  ///< SI; may be empty
+  std::string meaning;
+  std::vector<double> times_s;  ///< of a curve; empty for a number
+
+  [[nodiscard]] std::size_t width() const { return times_s.empty() ? 1 : times_s.size(); }
+};
+
+/// A worker's own model of a cell: not for two threads.
+class CellModel {
+ public:
+  CellModel() = default;
+  CellModel(const CellModel&) = delete;
+  CellModel& operator=(const CellModel&) = delete;
+  virtual ~CellModel() = default;
+
+  /// @param swept SI values of the swept parameters
+  /// @param values of the model's variables one after the other; to be filled
+  /// @param counts of the model's operations, to be filled
+  /// @returns the method's estimate of its error in parts of the largest response; 0 where there is
+  ///          none but rounding
+  /// Throws Error(bad_input) or Error(numerical) where the cell has no answer. The result depends
+  /// on `swept` alone, not on cells before.
+  virtual double run(std::span<const double> swept, std::span<double> values,
+                     std::span<std::int64_t> counts) = 0;
+};
+
+/// What a sweep is made over, as SWEEP.json describes it.
+class SweepModel {
+ public:
+  SweepModel() = default;
+  SweepModel(const SweepModel&) = delete;
+  SweepModel& operator=(const SweepModel&) = delete;
+  virtual ~SweepModel() = default;
+
+  /// Of a parameter that can be swept. Throws Error(bad_input) that names those there are.
+  [[nodiscard]] virtual Dimension dimension_of(const std::string& target,
+                                               std::string_view where) const = 0;
+  [[nodiscard]] virtual const std::vector<SweepVariable>& variables() const = 0;
+  /// Names of the operations that are counted.
+  [[nodiscard]] virtual std::vector<std::string> counted() const = 0;
+  /// Names that expressions may use besides swept parameters, with their SI values.
+  [[nodiscard]] virtual std::vector<std::pair<std::string, double>> constants() const { return {}; }
+  /// How many cells are worth being computed and stored together.
+  [[nodiscard]] virtual std::uint64_t usual_block() const = 0;
+  /// @param targets of the swept parameters, in their order
+  [[nodiscard]] virtual std::unique_ptr<CellModel> cell_model(
+      const std::vector<std::string>& targets) const = 0;
+};
+
+/// The paper's star in closed form: indentation, creep or both
+/// (blocks material, indentation, creep and outputs of SWEEP.json).
+[[nodiscard]] std::shared_ptr<const SweepModel> single_contact_model(const Json& document,
+                                                                     std::string_view where);
+
+/// The quasi-static network of a scene (block `scene`, which may not be a file's name any more, and
+/// outputs). Parameters are JSON pointers to numbers in the scene.
+/// @param folder that a mesh in the scene is relative to
+[[nodiscard]] std::shared_ptr<const SweepModel> organ_sweep_model(
+    const Json& document, std::string_view where, const std::filesystem::path& folder);
+
+}  // namespace tpm

@@ -1,0 +1,350 @@
+// Reading SWEEP.json.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/core/word_table.hpp"
+#include "tpm/sample/sensitivity.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/study/expression.hpp"
+#include "tpm/sweep/sweep.hpp"
+#include "tpm/sweep/sweep_outputs.hpp"
+
+namespace tpm {
+namespace {
+
+/// "/material/E1" becomes "E1".
+std::string usual_name(const std::string& target) {
+  return target.substr(target.rfind('/') + 1);
+}
+
+enum class PointKind { random, latin_hypercube, sobol, plain_sobol, sensitivity };
+
+constexpr std::array<Word<PointKind>, 5> kPointKinds{{
+    {PointKind::random, "random"},
+    {PointKind::latin_hypercube, "latin_hypercube"},
+    {PointKind::sobol, "sobol"},
+    {PointKind::plain_sobol, "plain_sobol"},
+    {PointKind::sensitivity, "sensitivity"},
+}};
+
+/// The points of an axis of samples.
+struct SampledPoints {
+  std::shared_ptr<const CubePoints> set;
+  std::uint64_t count = 0;
+};
+
+SampledPoints parse_points(const Json& axis, int dimensions, const DocumentPlace& place) {
+  const PointKind kind =
+      parse_word(kPointKinds, "kind of samples", axis.at("samples").get<std::string>(),
+                 place.key("samples").where);
+  const auto count = axis.at("count").get<std::uint64_t>();
+  const auto seed = axis.value("seed", std::uint64_t{0});
+  if (axis.contains("replicates") != (kind == PointKind::sensitivity)) {
+    throw bad_input(place.key("replicates").where, "belongs to samples of kind 'sensitivity'",
+                    "a number of replicates there, and nowhere else");
+  }
+  constexpr std::uint64_t kMostSobol = std::uint64_t{1} << 32U;
+  if ((kind == PointKind::sobol || kind == PointKind::plain_sobol) && count > kMostSobol) {
+    throw bad_input(place.key("count").where, "more points than the sequence has", "at most 2^32");
+  }
+  try {
+    switch (kind) {
+      case PointKind::random:
+        return {random_points(seed), count};
+      case PointKind::latin_hypercube:
+        return {latin_hypercube(count, seed), count};
+      case PointKind::sobol:
+        return {sobol_points(dimensions, seed), count};
+      case PointKind::plain_sobol:
+        return {plain_sobol_points(dimensions), count};
+      case PointKind::sensitivity:
+        break;
+    }
+    const SensitivityDesign design{dimensions, count, axis.at("replicates").get<std::uint64_t>(),
+                                   seed};
+    return {sensitivity_points(design), design.cells()};
+  } catch (const Error& error) {
+    throw error.within(place.where);
+  }
+}
+
+/// Puts axes and parameters together; every name once.
+class AxisReader {
+ public:
+  AxisReader(Sweep& sweep, const DocumentPlace& place) : sweep_(sweep), place_(place) {}
+
+  void read(const Json& axis) {
+    const DocumentPlace here = place_.key(std::to_string(sweep_.axes.size()));
+    const auto has = [&](const char* key) { return axis.contains(key) ? 1 : 0; };
+    if (has("parameter") + has("together") + has("samples") != 1) {
+      throw bad_input(here.where, "no axis", "one of 'parameter', 'together' and 'samples'");
+    }
+    if (axis.contains("parameter")) return single(axis, here);
+    if (axis.contains("samples")) return sampled(axis, here);
+    together(axis, here);
+  }
+
+ private:
+  /// One parameter, whose values are the coordinate.
+  void single(const Json& axis, const DocumentPlace& here) {
+    const auto target = axis.at("parameter").get<std::string>();
+    const Dimension dimension = sweep_.model->dimension_of(target, here.key("parameter").where);
+    CountedValues values = parse_values(without(axis, {"parameter", "name"}), dimension, here);
+    const std::string name = axis.value("name", usual_name(target));
+    add_axis(name, values.count, here);
+    add_parameter(name, target, dimension, std::move(values.values), here);
+  }
+
+  /// Several parameters with a list each, which go on together.
+  void together(const Json& axis, const DocumentPlace& here) {
+    only(axis, {"together", "name"}, here);
+    std::uint64_t count = 0;
+    const DocumentPlace lists = here.key("together");
+    for (const auto& [target, object] : axis.at("together").items()) {
+      const DocumentPlace at = lists.key(target);
+      const Dimension dimension = sweep_.model->dimension_of(target, at.where);
+      only(object, {"values", "name"}, at);
+      CountedValues values = parse_values(without(object, {"name"}), dimension, at);
+      if (count != 0 && values.count != count) {
+        throw bad_input(at.where, fmt::format("{} values beside {}", values.count, count),
+                        "lists of one length");
+      }
+      if (count == 0) add_axis(axis.value("name", "case"), count = values.count, here);
+      add_parameter(object.value("name", usual_name(target)), target, dimension,
+                    std::move(values.values), at);
+    }
+  }
+
+  /// Points in the box between the ends of several parameters.
+  void sampled(const Json& axis, const DocumentPlace& here) {
+    only(axis, {"samples", "name", "count", "replicates", "seed", "parameters"}, here);
+    for (const char* key : {"count", "parameters"}) {
+      if (!axis.contains(key)) throw bad_input(here.where, fmt::format("no '{}'", key), "one");
+    }
+    const Json& parameters = axis.at("parameters");
+    const SampledPoints points = parse_points(axis, static_cast<int>(parameters.size()), here);
+    add_axis(axis.value("name", "sample"), points.count, here);
+    int dimension_of_cube = 0;
+    for (const auto& [target, object] : parameters.items()) {
+      const DocumentPlace at = here.key("parameters").key(target);
+      only(object, {"from", "to", "scale", "name"}, at);
+      const Dimension dimension = sweep_.model->dimension_of(target, at.where);
+      const SweepRange range = parse_range(object, dimension, at);
+      add_parameter(
+          object.value("name", usual_name(target)), target, dimension,
+          ParameterValues::samples(range.from, range.to, range.scale,
+                                   [set = points.set, d = dimension_of_cube++](
+                                       std::uint64_t point) { return set->coordinate(point, d); }),
+          at);
+    }
+  }
+
+  static Json without(const Json& object, std::initializer_list<const char*> keys) {
+    Json rest = object;
+    for (const char* key : keys) rest.erase(key);
+    return rest;
+  }
+
+  static void only(const Json& object, const std::set<std::string>& keys,
+                   const DocumentPlace& place) {
+    for (const auto& [key, value] : object.items()) {
+      if (keys.contains(key)) continue;
+      throw bad_input(place.key(key).where, "does not belong to this kind of axis", "");
+    }
+  }
+
+  void add_axis(const std::string& name, std::uint64_t size, const DocumentPlace& here) {
+    take_name(name, here);
+    sweep_.axes.push_back({name, size});
+  }
+
+  void add_parameter(const std::string& name, const std::string& target, Dimension dimension,
+                     ParameterValues values, const DocumentPlace& here) {
+    if (name != sweep_.axes.back().name) take_name(name, here);
+    if (!targets_.insert(target).second) {
+      throw bad_input(here.where, fmt::format("'{}' is swept twice", printable(target)),
+                      "one axis for a parameter");
+    }
+    sweep_.parameters.push_back({name, target, std::string(si_symbol(dimension)),
+                                 sweep_.axes.size() - 1, std::move(values)});
+  }
+
+  void take_name(const std::string& name, const DocumentPlace& here) {
+    require_identifier(name, here.where);
+    if (names_.insert(name).second) return;
+    throw bad_input(here.where, fmt::format("the name '{}' is taken", name),
+                    "a 'name' that nothing else has");
+  }
+
+  Sweep& sweep_;
+  DocumentPlace place_;
+  std::set<std::string> names_, targets_;
+};
+
+void read_formulas(const Json& outputs, Sweep& sweep, const DocumentPlace& place) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const Json& output = outputs[i];
+    if (!output.is_object() || !output.contains("formula")) continue;
+    const DocumentPlace here = place.key(std::to_string(i));
+    if (output.size() != 2 || !output.contains("name") || !output.at("formula").is_string()) {
+      throw bad_input(here.where, "no formula", "{\"formula\": TEXT, \"name\": NAME}");
+    }
+    sweep.formulas.push_back(
+        {output.at("name").get<std::string>(), output.at("formula").get<std::string>()});
+    sweep.variables.push_back({sweep.formulas.back().name, "", sweep.formulas.back().text, {}});
+  }
+}
+
+/// Names of variables differ from each other and from everything else in the file of results.
+void require_own_names(const Sweep& sweep, const DocumentPlace& place) {
+  std::set<std::string> taken{"status", "reason", "reason_text", "error_estimate"};
+  for (const SweepAxis& axis : sweep.axes) taken.insert(axis.name);
+  for (const SweptParameter& parameter : sweep.parameters) taken.insert(parameter.name);
+  for (const SweepVariable& variable : sweep.variables) {
+    require_identifier(variable.name, place.where);
+    if (taken.insert(variable.name).second) continue;
+    throw bad_input(place.where, fmt::format("the name '{}' is taken", variable.name),
+                    "a name that nothing else has");
+  }
+}
+
+/// Tries expressions with names that stand: a mistake is found before the first cell.
+void require_expressions(const Sweep& sweep, const DocumentPlace& place) {
+  Evaluator evaluator;
+  Scope scope;
+  for (const auto& [name, value] : sweep.model->constants()) scope.values[name] = value;
+  for (const SweptParameter& p : sweep.parameters) scope.values[p.name] = p.values.at(0);
+  const auto require_known = [&](const std::string& text, const std::string& where) {
+    for (const std::string& name : evaluator.inputs(text, scope, where)) {
+      if (scope.values.contains(name)) continue;
+      throw bad_input(where, fmt::format("unknown symbol '{}'", printable(name)),
+                      "a parameter, or a number found before");
+    }
+  };
+  for (std::size_t i = 0; i < sweep.skip.size(); ++i) {
+    require_known(sweep.skip[i].when, place.key("skip").key(std::to_string(i)).where);
+  }
+  for (const SweepVariable& v : sweep.model->variables()) {
+    if (v.times_s.empty()) scope.values[v.name] = 1.0;
+  }
+  for (const SweepFormula& formula : sweep.formulas) {
+    require_known(formula.text, place.key("outputs").key(formula.name).where);
+    scope.values[formula.name] = 1.0;
+  }
+}
+
+void read_axes(const Json& document, Sweep& sweep, const DocumentPlace& place) {
+  AxisReader reader(sweep, place.key("axes"));
+  for (const Json& axis : document.at("axes")) reader.read(axis);
+  double cells = 1.0;
+  for (const SweepAxis& axis : sweep.axes) cells *= static_cast<double>(axis.size);
+  if (cells > kMostCells) {
+    throw bad_input(place.key("axes").where, fmt::format("{} cells", significant(cells, 3)),
+                    fmt::format("at most {}", significant(kMostCells, 1)));
+  }
+}
+
+/// Each model has blocks of its own.
+void require_blocks_of_model(const Json& document, const DocumentPlace& place) {
+  const bool organ = document.at("model").get<std::string>() == "organ";
+  for (const char* key : {"material", "indentation", "creep"}) {
+    if (!organ || !document.contains(key)) continue;
+    throw bad_input(place.key(key).where, "belongs to the single contact", "keys of the scene");
+  }
+  if (organ == document.contains("scene")) return;
+  throw bad_input(place.key("scene").where, organ ? "is missing" : "belongs to the model 'organ'",
+                  organ ? "a scene's file, or a scene" : "");
+}
+
+/// Puts the scene in the place of its file's name. Returns the folder that its mesh is relative to.
+std::filesystem::path put_scene_in(Json& document, const std::filesystem::path& folder) {
+  if (!document.contains("scene") || !document.at("scene").is_string()) return folder;
+  const std::filesystem::path file = folder / document.at("scene").get<std::string>();
+  document.at("scene") = read_json(file);
+  return file.parent_path();
+}
+
+std::string sha256_of_mesh(const Json& document, const std::filesystem::path& folder) {
+  const Json::json_pointer mesh("/scene/organ/mesh");
+  if (!document.contains(mesh)) return {};
+  return sha256_hex(read_file(folder / document.at(mesh).get<std::string>()));
+}
+
+/// So many cells that their numbers fill some 1.5 MB.
+std::uint64_t usual_block(const Sweep& sweep) {
+  constexpr std::uint64_t kNumbers = 200'000;
+  return std::clamp<std::uint64_t>(kNumbers / std::max<std::size_t>(sweep.width(), 1), 1,
+                                   sweep.model->usual_block());
+}
+
+}  // namespace
+
+std::uint64_t Sweep::cells() const {
+  std::uint64_t cells = 1;
+  for (const SweepAxis& axis : axes) cells *= axis.size;
+  return cells;
+}
+
+std::uint64_t Sweep::blocks() const {
+  return (cells() + block_cells - 1) / block_cells;
+}
+
+std::vector<std::uint64_t> Sweep::places(std::uint64_t cell) const {
+  std::vector<std::uint64_t> places(axes.size());
+  for (std::size_t a = axes.size(); a-- > 0; cell /= axes[a].size) places[a] = cell % axes[a].size;
+  return places;
+}
+
+std::size_t Sweep::width() const {
+  std::size_t width = 0;
+  for (const SweepVariable& variable : variables) width += variable.width();
+  return width;
+}
+
+Sweep parse_sweep(const Json& written, std::string_view where,
+                  const std::filesystem::path& folder) {
+  check_schema(written, "sweep", where);
+  const DocumentPlace place{std::string(where)};
+  require_blocks_of_model(written, place);
+  Json document = written;
+  const std::filesystem::path scene_folder = put_scene_in(document, folder);
+  Sweep sweep;
+  sweep.title = document.value("title", "");
+  sweep.description = document.value("description", "");
+  sweep.model = document.contains("scene") ? organ_sweep_model(document, where, scene_folder)
+                                           : single_contact_model(document, where);
+  read_axes(document, sweep, place);
+  sweep.variables = sweep.model->variables();
+  read_formulas(document.at("outputs"), sweep, place.key("outputs"));
+  require_own_names(sweep, place.key("outputs"));
+  for (const Json& skip : document.value("skip", Json::array())) {
+    const auto when = skip.at("when").get<std::string>();
+    sweep.skip.push_back({when, skip.value("reason", when)});
+  }
+  require_expressions(sweep, place);
+  sweep.block_cells = document.value("block", usual_block(sweep));
+  std::vector<std::string> targets;
+  for (const SweptParameter& p : sweep.parameters) targets.push_back(p.target);
+  try {
+    static_cast<void>(sweep.model->cell_model(targets));
+  } catch (const Error& error) {
+    throw error.within(where);
+  }
+  sweep.document = document.dump();
+  sweep.fingerprint =
+      sha256_hex(fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, sweep.document,
+                             sha256_of_mesh(document, scene_folder)));
+  return sweep;
+}
+
+Sweep read_sweep(const std::filesystem::path& path) {
+  return parse_sweep(read_json(path), path.string(), path.parent_path());
+}
+
+}  // namespace tpm
