@@ -47,7 +47,11 @@ TEST_CASE("Bad sessions: one line each, with the key") {
       Case{"/push", Json::array({0, 0, 0}), "has no direction"},
       Case{"/indentations/depths", Json::array({"0 mm"}), "key /indentations/depths/0"},
       Case{"/indentations/hold", "13 h", "takes 4.681e+04 s; expected 12 hours"},
-      Case{"/model/kind", "magic", "/model/kind"}, Case{"/phase", 1, "phase"});
+      Case{"/model/kind", "magic", "/model/kind"},
+      Case{"/model/tolerance", "1%", "none but with the kind 'planned'"},
+      Case{"/model", Json{{"tolerance", "70%"}, {"scene", Json::object()}},
+           "key /model/tolerance: '70%'; expected a share of the peak"},
+      Case{"/phase", 1, "phase"});
   CAPTURE(bad.pointer, bad.value.dump());
   CHECK_THROWS_WITH(parsed(with(short_session(), bad.pointer, bad.value)), Contains(bad.message));
 }
@@ -73,13 +77,16 @@ TEST_CASE("A session of the element verifies against the network, the closed for
   CHECK(v.whole);
   CHECK(v.all.peak_N > 0.4);
   CHECK(v.all.max_N < 0.005 * v.all.peak_N);
-  REQUIRE(v.others.size() == 2);
+  REQUIRE(v.others.size() == 3);
+  // By CVODE on the network, CVODES on the element and in closed form: one and the same force.
+  CHECK(v.others[0].apart_N < 1e-6 * v.all.peak_N);
+  CHECK(v.others[2].apart_N < 1e-6 * v.all.peak_N);
   // At every sample and undecimated: what is left comes from letting go within a period, at most
   // the force of one encoder step.
   constexpr double kStep_N = 150.72 * 1e-5;
-  CHECK(v.others[0].commanded.max_N < kStep_N);
-  CHECK(v.others[0].commanded.rms_N < 0.05 * kStep_N);
-  CHECK(v.others[1].commanded.max_N < 0.005 * v.all.peak_N);
+  CHECK(v.others[1].commanded.max_N < kStep_N);
+  CHECK(v.others[1].commanded.rms_N < 0.05 * kStep_N);
+  CHECK(v.others[2].commanded.max_N < 0.005 * v.all.peak_N);
   CHECK(v.phases.size() == recording.session.phases.size());
 }
 

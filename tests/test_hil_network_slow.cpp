@@ -1,6 +1,7 @@
 // Sessions with a whole network in the loop, or beside it.
 #include <catch2/catch.hpp>
 
+#include "endless_motion.hpp"
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
@@ -18,13 +19,17 @@ struct Ran {
   std::string bytes;
 };
 
-Ran ran(const char* kind) {
+Ran ran(const Json& session) {
   const test::TempFolder folder;
   SessionRunOptions options;
   options.recording = folder / "r";
-  const SessionRun run = run_session(test::parsed(test::network_session(kind)), {}, options);
+  const SessionRun run = run_session(test::parsed(session), {}, options);
   REQUIRE(run.outcome.cause == StopCause::finished);
   return {read_recording(folder / "r"), read_file(folder / "r")};
+}
+
+Ran ran(const char* kind) {
+  return ran(test::network_session(kind));
 }
 
 TEST_CASE("A session of the whole network verifies, stepped in the loop and beside it", "[heavy]") {
@@ -33,10 +38,107 @@ TEST_CASE("A session of the whole network verifies, stepped in the loop and besi
   const Verification in_loop = verify(ran("network").recording, options);
   CHECK(in_loop.all.peak_N > 0.1);
   CHECK(in_loop.all.max_N < 0.001 * in_loop.all.peak_N);
+  REQUIRE(in_loop.others.size() == 1);  // CVODE, over the whole of it
+  CHECK(in_loop.others[0].end_s > 2.5);
+  CHECK(in_loop.others[0].apart_N < 1e-5 * in_loop.all.peak_N);
   const Ran beside = ran("network_beside");
   const Verification v = verify(beside.recording, options);
   CHECK(v.all.max_N < 0.004 * v.all.peak_N);
   CHECK(beside.bytes == ran("network_beside").bytes);
+}
+
+/// One session with each tolerance: what was picked, and how far it was from the reference.
+struct Picked {
+  Json plan;
+  double error = 0.0;  ///< largest, in parts of the peak
+};
+
+Picked picked(const char* tolerance) {
+  const Json json = test::with(test::network_session("planned"), "/model/tolerance", tolerance);
+  const Ran run = ran(json);
+  VerifyOptions options;
+  options.motion_tolerance_m = 2e-6;
+  options.window_s = 0.0;
+  const Verification v = verify(run.recording, options);
+  return {run.recording.header.at("model").at("plan"), v.all.max_N / v.all.peak_N};
+}
+
+TEST_CASE("A planned model keeps to the tolerance, and a tighter one picks another") {
+  const Picked wide = picked("10%");
+  const Picked tight = picked("0.2%");
+  CAPTURE(wide.plan.dump(), tight.plan.dump());
+  CHECK(wide.plan.at("choice") != tight.plan.at("choice"));
+  CHECK(wide.error < 0.1);
+  // What letting go within a period costs is none of the model's.
+  CHECK(tight.error < 0.003);
+  CHECK(tight.error < wide.error);
+}
+
+TEST_CASE("A session without a kind is planned for 1 %, of the star it is the element") {
+  Json json = test::short_session();
+  json.at("model").erase("kind");
+  const LoopModel loop = make_loop_model(test::parsed(json));
+  CHECK(loop.plan.at("choice") == "element");
+  CHECK(loop.plan.at("tolerance") == 0.01);
+  Json known = json;
+  known["model"]["kind"] = "element";
+  const LoopModel element = make_loop_model(test::parsed(known));
+  for (int i = 1; i <= 2000; ++i) {
+    const double depth = 2e-6 * i;
+    const Eigen::Vector3d there = depth * loop.push;
+    const double force = -loop.push.dot(loop.model->step(there).force_N);
+    const double exact = -element.push.dot(element.model->step(depth * element.push).force_N);
+    CHECK(std::abs(force - exact) <= 1e-9 * (1.0 + exact));
+  }
+}
+
+TEST_CASE("A tolerance that nothing keeps within a period is refused, with what would do") {
+  const Json json = test::with(test::network_session("planned"), "/model/tolerance", "0.000001");
+  CHECK_THROWS_WITH(make_loop_model(test::parsed(json)),
+                    Contains("nothing that the loop steps is within 0.0001 %"));
+}
+
+/// One motion for `rounds` times 2 s of a tissue that relaxes within 0.1 s, and what has grown.
+struct Endless {
+  test::Drift drift;
+  double grown_bytes = 0.0;
+};
+
+Endless endless(const Json& json, std::uint64_t rounds) {
+  HilSession session = test::parsed(json);
+  const LoopModel loop = make_loop_model(session);
+  session.servo.model_push = loop.push;
+  // The contact's longest relaxation time is twice the bonds': 40 of it.
+  constexpr std::uint64_t kRound = 2000, kSettled = 5, kRest = 8000;
+  test::EndlessMotion device(kRound, 4e-3);
+  double settled_bytes = 0.0, most_bytes = 0.0;
+  Endless run;
+  run.drift = test::endless_run(
+      device, *loop.model, session.servo, kRound, rounds, kSettled, kRest,
+      [](const ServoRecord&) {},
+      [&](std::uint64_t done) {
+        if (done == kSettled) settled_bytes = test::resident_bytes();
+        if (done > kSettled) most_bytes = std::max(most_bytes, test::resident_bytes());
+      });
+  run.grown_bytes = most_bytes - settled_bytes;
+  return run;
+}
+
+// tests/measure/hil_long.cpp does this for ten hours.
+TEST_CASE("Twenty minutes of one motion: nothing grows, and the end feels like the start") {
+  const Endless run = endless(test::network_session("condensed", "2.4e3 Pa s"), 600);
+  CHECK(run.drift.peak_N > 0.05);
+  CHECK(run.drift.late_rounds_N == 0.0);
+  // Its guard keeps a memory whose energy can no longer be told from rest (docs/reduction.md).
+  CHECK(run.drift.end_start_N < 5e-6 * run.drift.peak_N);
+  CHECK(run.grown_bytes < 256.0 * 1024.0);
+}
+
+TEST_CASE("The loop itself forgets to the last digits") {
+  const Json json = test::with(test::short_session(), "/model/scene/material/eta1", "2.4e3 Pa s");
+  const Endless run = endless(json, 10);
+  CHECK(run.drift.late_rounds_N == 0.0);
+  CHECK(run.drift.end_start_N < 1e-14 * run.drift.peak_N);
 }
 
 TEST_CASE("A network beside the loop is for tissues that relax slowly") {

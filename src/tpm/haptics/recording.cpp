@@ -57,7 +57,8 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
           {"model",
            {{"name", model.name},
             {"error_bound", model.error_bound},
-            {"stiffness_at_once_N_per_m", model.stiffness_N_per_m}}},
+            {"stiffness_at_once_N_per_m", model.stiffness_N_per_m},
+            {"plan", model.plan}}},
           {"session", std::move(said)}};
 }
 

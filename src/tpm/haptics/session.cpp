@@ -8,6 +8,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/session_phases.hpp"
+#include "tpm/plan/plan.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/store/file.hpp"
 
@@ -54,7 +55,8 @@ void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& p
   plant.delay_periods = block.value("delay_periods", plant.delay_periods);
   plant.motor_limit_N =
       in_range(block, "motor_limit", Dimension::force, plant.motor_limit_N, 1e-3, 1e3, place);
-  plant.least_watchdog_s = in_range(block, "least_watchdog", Dimension::time, 0.0, 0.0, 10.0, place);
+  plant.least_watchdog_s =
+      in_range(block, "least_watchdog", Dimension::time, 0.0, 0.0, 10.0, place);
   plant.arm.mass_kg = block.value("arm_mass_kg", plant.arm.mass_kg);
   plant.arm.damping_N_s_per_m = block.value("arm_damping_N_s_per_m", plant.arm.damping_N_s_per_m);
   plant.arm.stiffness_N_per_m = in_range(block, "arm_stiffness", Dimension::stiffness,
@@ -66,7 +68,24 @@ LoopModelKind parse_model(const std::string& kind) {
   if (kind == "element") return LoopModelKind::element;
   if (kind == "network") return LoopModelKind::network;
   if (kind == "network_beside") return LoopModelKind::network_beside;
-  return LoopModelKind::condensed;
+  if (kind == "condensed") return LoopModelKind::condensed;
+  return LoopModelKind::planned;
+}
+
+std::string parse_tolerance(const Json& model, LoopModelKind kind, const DocumentPlace& place) {
+  const std::string text = model.value("tolerance", std::string("1%"));
+  const DocumentPlace at = place.key("tolerance");
+  if (model.contains("tolerance") && kind != LoopModelKind::planned) {
+    throw bad_input(at.where, printable(text), "none but with the kind 'planned'");
+  }
+  try {
+    PlanRequest request;
+    set_tolerance(request, text);
+  } catch (const Error&) {
+    throw bad_input(at.where, "'" + printable(text) + "'",
+                    "a share of the peak such as 1% or 0.01, 1e-6 to 0.5, or jnd");
+  }
+  return text;
 }
 
 std::vector<std::uint64_t> ends_of(const std::vector<SessionPhase>& phases, double period_s) {
@@ -116,7 +135,8 @@ HilSession parse_session(const Json& json, std::string_view where,
   const DocumentPlace place{std::string(where)};
   HilSession session;
   session.title = json.value("title", std::string("session"));
-  session.model = parse_model(json.at("model").at("kind").get<std::string>());
+  session.model = parse_model(json.at("model").value("kind", std::string("planned")));
+  session.tolerance = parse_tolerance(json.at("model"), session.model, place.key("model"));
   session.text = to_text(json);
   session.folder = folder;
   const Json& scene = json.at("model").at("scene");

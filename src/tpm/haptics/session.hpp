@@ -36,12 +36,14 @@ enum class LoopModelKind {
   condensed,       ///< a network seen from its contact sphere, reduced
   network,         ///< the whole network, every period
   network_beside,  ///< the whole network at a lower rate beside the loop
+  planned,         ///< the cheapest of those that a plan finds accurate enough
 };
 
 /// A session as its file says.
 struct HilSession {
   std::string title;
-  LoopModelKind model = LoopModelKind::element;
+  LoopModelKind model = LoopModelKind::planned;
+  std::string tolerance = "1%";  ///< of a planned model, as set_tolerance() takes it
   Json scene;                    ///< of the tissue, a mesh's path made absolute is not asked for
   std::filesystem::path folder;  ///< that paths in the scene are relative to
   std::vector<SessionPhase> phases;
@@ -80,12 +82,14 @@ struct LoopModel {
   Eigen::Vector3d push = Eigen::Vector3d::UnitZ();  ///< into the tissue, in its coordinates
   std::string name;                                 ///< for people
   std::string error_bound;         ///< what is known of its distance from the reference, in words
+  Json plan;                       ///< null, or what a plan was asked for, considered and picked
   double stiffness_N_per_m = 0.0;  ///< at once, at rest, along the push
   TissueShape shape;
 };
 
 /// @param threads the model may work in a thread of its own; else all happens in its steps
-/// Throws Error(bad_input) if the scene is not one that the model can stand for.
+/// Throws Error(bad_input) if the scene is not one that the model can stand for; of a planned model
+/// Error(answer_is_no) if none is accurate and fast enough, Error(numerical) as make_plan().
 [[nodiscard]] LoopModel make_loop_model(const HilSession& session, bool threads = false);
 
 }  // namespace tpm

@@ -1,29 +1,16 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/element_contact.hpp"
 #include "tpm/haptics/network_beside.hpp"
+#include "tpm/haptics/planned_model.hpp"
+#include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/haptics/session.hpp"
 #include "tpm/reduce/condensed.hpp"
-#include "tpm/scene/experiment_blocks.hpp"
 
 namespace tpm {
 namespace {
-
-constexpr const char* kScenePlace = "model: scene";
-
-TissueShape shape_of(const Network& network, std::size_t contact, const Eigen::Vector3d& push) {
-  TissueShape shape;
-  shape.rest_m = network.organ.position;
-  shape.radius_m = network.organ.radius;
-  shape.contact = contact;
-  shape.push = push;
-  for (const Bond& bond : network.bonds) shape.bonds.emplace_back(bond.a, bond.b);
-  return shape;
-}
 
 LoopModel element_model(const HilSession& session) {
   const Tissue tissue = parse_tissue(session.scene, kScenePlace, session.folder);
@@ -40,54 +27,10 @@ LoopModel element_model(const HilSession& session) {
   return loop;
 }
 
-/// As deep as the session goes, with some room for an operator that goes deeper.
-double deepest_m(const HilSession& session) {
-  constexpr double kRoom = 1.1, kUnderLoads_m = 0.010;  // to the limit of the paper's validity
-  double deepest = 0.0;
-  for (const SessionPhase& phase : session.phases) {
-    deepest = std::max(deepest, kRoom * phase.depth_m);
-    if (phase.kind == SessionPhaseKind::load) deepest = std::max(deepest, kUnderLoads_m);
-  }
-  return deepest;
-}
-
-/// The network of a scene, pushed at its contact sphere.
-struct PushedScene {
-  explicit PushedScene(const HilSession& session)
-      : tissue(parse_tissue(session.scene, kScenePlace, session.folder)),
-        deepest(deepest_m(session)) {
-    require_standing(tissue, kScenePlace);
-    probe = parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{kScenePlace})
-                .front()
-                .probe;
-  }
-  [[nodiscard]] const Positions& rest() const { return tissue.network.organ.position; }
-  /// Name and shape; the model is still to come.
-  [[nodiscard]] LoopModel begun(std::string_view kind, std::string_view how) const {
-    LoopModel loop;
-    loop.push = probe.direction;
-    loop.shape = shape_of(tissue.network, probe.sphere, probe.direction);
-    loop.name = fmt::format("{}: {} spheres {} sphere {}", kind, tissue.network.organ.size(), how,
-                            probe.sphere + 1);
-    return loop;
-  }
-  [[nodiscard]] ServoNetworkOptions network_options(double period_s) const {
-    return {.period_s = period_s, .frozen_depth_m = 0.5 * deepest, .deepest_m = deepest};
-  }
-  [[nodiscard]] std::unique_ptr<ServoNetwork> network(double period_s) const {
-    return std::make_unique<ServoNetwork>(tissue.bonds(), rest(), tissue.freedom(), probe.sphere,
-                                          probe.direction, network_options(period_s));
-  }
-
-  Tissue tissue;
-  Probe probe;
-  double deepest;
-};
-
 LoopModel condensed_model(const HilSession& session) {
   const PushedScene scene(session);
   CondensedOptions options;
-  options.depth_m = scene.deepest;
+  options.depth_m = scene.deepest_m;
   options.period_s = session.servo.period_s;
   const CondensedContact condensed =
       build_condensed(scene.tissue.bonds(), scene.rest(), scene.tissue.freedom(),
@@ -126,7 +69,7 @@ LoopModel network_beside_model(const HilSession& session, bool threads) {
   loop.model = std::make_unique<NetworkBeside>(
       scene.network(every * session.servo.period_s),
       StiffnessByDepth(bonds, scene.rest(), scene.tissue.freedom(), scene.probe.sphere,
-                       scene.probe.direction, scene.deepest),
+                       scene.probe.direction, scene.deepest_m),
       session.servo.period_s, threads);
   loop.shape.field = scene.network(kDrawnEvery_s);
   loop.error_bound = "its own estimate, row by row; what tpm hil verify measures";
@@ -141,6 +84,8 @@ LoopModel model_of(const HilSession& session, bool threads) {
       return network_model(session);
     case LoopModelKind::network_beside:
       return network_beside_model(session, threads);
+    case LoopModelKind::planned:
+      return planned_model(session);
     case LoopModelKind::condensed:
       break;
   }

@@ -6,6 +6,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/load.hpp"
+#include "tpm/method/method.hpp"
 #include "tpm/model/model.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
@@ -113,32 +114,66 @@ void judge_phases(Verification& v, const HilRecording& recording,
   }
 }
 
-/// The star's own models on the same motion: the closed form at every sample, and CVODES.
-void ask_others(Verification& v, const HilRecording& recording, const Motion& motion,
-                const std::vector<const ServoRecord*>& rows, const TpmParameters& material,
-                const VerifyOptions& options) {
+/// How far the reference is from another answer, at its own instants up to the answer's end.
+double apart_from_reference(const Verification& v, const std::vector<double>& time_s,
+                            const std::vector<double>& answer_N) {
+  double most = 0.0;
+  std::size_t i = 0;
+  for (std::size_t k = 0; k < v.time_s.size() && v.time_s[k] <= time_s.back(); ++k) {
+    while (time_s[i] < v.time_s[k]) ++i;  // the instants of the reference are among them
+    most = std::max(most, std::abs(answer_N[i] - v.reference_N[k]));
+  }
+  return most;
+}
+
+/// The network again, over the first seconds, by an integrator of its own.
+void ask_cvode(Verification& v, const HilRecording& recording, const DrivenNetwork& network,
+               const Protocol& motion, const VerifyOptions& options) {
+  const auto past = std::upper_bound(v.time_s.begin(), v.time_s.end(), options.window_s);
+  const std::vector<double> times(v.time_s.begin(), past);
+  if (!(options.window_s > 0.0) || times.size() < 2) return;
+  MethodSettings settings;
+  settings.rule = StepRule::cvode_bdf;
+  settings.tolerance = options.window_tolerance;
+  const MethodRun run = network_problem(network, motion)->run(settings, times);
+  if (run.end != MethodEnd::completed) {
+    throw Error(ExitCode::numerical, recording.name,
+                "the second opinion by CVODE ends early: " + run.reason,
+                "another --window, or 0 s");
+  }
+  const std::vector<double> answer(run.response.begin(), run.response.end());
+  FidelitySum sum;
+  for (std::size_t k = 0; k < times.size(); ++k) sum.add(v.commanded_N[k], answer[k]);
+  v.others.push_back({"CVODE (BDF) on what the bonds remember, in balance at each evaluation",
+                      times.back(), sum.take(), apart_from_reference(v, times, answer)});
+}
+
+/// The star's own models: in closed form on every sample, and CVODES on the reference's motion.
+void ask_others(Verification& v, const HilRecording& recording, const Motion& every_sample,
+                const Protocol& thinned, const std::vector<const ServoRecord*>& rows,
+                const TpmParameters& material, const VerifyOptions& options) {
   const TpmVector parameters = to_vector(material);
-  const auto ask = [&](const char* model, const std::string& name, std::size_t count,
-                       double tolerance_m) {
-    Motion part{
-        {motion.time_s.begin(), motion.time_s.begin() + static_cast<std::ptrdiff_t>(count)},
-        {motion.surface_m.begin(), motion.surface_m.begin() + static_cast<std::ptrdiff_t>(count)}};
-    const Protocol protocol =
-        protocol_of(part, decimated(part.time_s, part.surface_m, tolerance_m));
-    const Response response =
-        make_model(model)->respond(protocol, part.time_s, parameters, Want::values);
+  const auto ask = [&](const char* model, const std::string& name, const Protocol& protocol,
+                       std::size_t count) {
+    const std::vector<double> times(
+        every_sample.time_s.begin(),
+        every_sample.time_s.begin() + static_cast<std::ptrdiff_t>(count));
+    const Response response = make_model(model)->respond(protocol, times, parameters, Want::values);
     FidelitySum sum;
     for (std::size_t i = 0; i < count; ++i) {
       sum.add(recording.commanded_N(*rows[i]), response.value[static_cast<Eigen::Index>(i)]);
     }
-    v.others.push_back({name, part.time_s.back(), sum.take()});
+    const std::vector<double> answer(response.value.begin(), response.value.end());
+    v.others.push_back({name, times.back(), sum.take(), apart_from_reference(v, times, answer)});
   };
-  ask("closed_form", "closed form of the star at every sample", rows.size(), 0.0);
-  const auto past = std::upper_bound(motion.time_s.begin(), motion.time_s.end(), options.window_s);
-  const auto count = static_cast<std::size_t>(past - motion.time_s.begin());
+  ask("closed_form", "closed form of the star at every sample",
+      measured_history(Drive::displacement, every_sample.time_s, every_sample.surface_m),
+      rows.size());
+  const auto past =
+      std::upper_bound(every_sample.time_s.begin(), every_sample.time_s.end(), options.window_s);
+  const auto count = static_cast<std::size_t>(past - every_sample.time_s.begin());
   if (options.window_s > 0.0 && count >= 2) {
-    ask("cvodes", "CVODES on the element's differential equation", count,
-        options.motion_tolerance_m);
+    ask("cvodes", "CVODES on the element's differential equation", thinned, count);
   }
 }
 
@@ -193,7 +228,8 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
   // As in the loop, the tool takes the sphere along the push and not across it.
   Freedom freedom = tissue.freedom();
   freedom.guide(probe.sphere, probe.direction);
-  const QuasiStatic network(bonds, tissue.network.organ.position, freedom, probe, settings);
+  const DrivenNetwork driven = driven_network(bonds, tissue.network.organ, freedom, {probe}, {});
+  const QuasiStatic network(bonds, driven.rest, freedom, probe, settings);
 
   Verification v;
   v.reference = "full nonlinear quasi-static network of " +
@@ -212,12 +248,14 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
     v.commanded_N.push_back(recording.commanded_N(*rows[i]));
     v.model_error_N = std::max(v.model_error_N, rows[i]->model_error_N);
   }
-  const QuasiStaticRun run = network.run(protocol_of(motion, kept), v.time_s);
+  const Protocol protocol = protocol_of(motion, kept);
+  const QuasiStaticRun run = network.run(protocol, v.time_s);
   v.reference_N.assign(run.response.begin(), run.response.end());
   v.reference_error_N = run.error_estimate;
   judge_phases(v, recording, rows, compared);
+  ask_cvode(v, recording, driven, protocol, options);
   if (recording.session.model == LoopModelKind::element) {
-    ask_others(v, recording, motion, rows, tissue.material, options);
+    ask_others(v, recording, motion, protocol, rows, tissue.material, options);
   }
   v.motion_error_N = options.motion_tolerance_m *
                      recording.header.at("model").at("stiffness_at_once_N_per_m").get<double>();

@@ -12,6 +12,7 @@ struct VerifyOptions {
   double spacing_s = 0.01;           ///< of the instants compared, >= the period
   double tolerance = 1e-9;           ///< of the reference run, see QuasiStaticOptions
   double window_s = 10.0;            ///< from the start, of the second opinion; 0: none
+  double window_tolerance = 1e-9;    ///< of its integrator, relative
 };
 
 /// How far the forces commanded are from the reference over some stretch.
@@ -32,6 +33,7 @@ struct OtherOpinion {
   std::string name;
   double end_s = 0.0;
   ForceFidelity commanded;  ///< against this opinion
+  double apart_N = 0.0;     ///< between this opinion and the reference, at most
 };
 
 /// A reading of the experiment beside the session's.
@@ -64,7 +66,10 @@ struct Verification {
                                                  double tolerance);
 
 /// Feeds the recorded motion of the surface to the full nonlinear quasi-static network of the
-/// session's scene and compares its force with the forces commanded.
+/// session's scene and compares its force with the forces commanded. Beside it, over a window,
+/// CVODE integrates what the bonds remember, forces balanced at each of its evaluations: the same
+/// equations by another integrator, with error control of its own. Like the reference it has no
+/// masses. The star's other models are asked as well.
 /// Throws Error(bad_input) for an empty recording, Error(numerical) if the reference run fails.
 [[nodiscard]] Verification verify(const HilRecording& recording, const VerifyOptions& options = {});
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <vector>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -16,6 +17,7 @@
 namespace tpm {
 namespace {
 
+constexpr double kParallel = 1e-9;
 constexpr double kRange = 1.05;  // that models are built for, in parts of the depth
 
 /// A model built for a scene, and what its steps take.
@@ -27,9 +29,25 @@ struct BuiltContact {
   std::function<int()> balances = {};  ///< of the last step; none: 0
 };
 
-/// A ContactModel moved through a protocol of depths. The scene leaves its sphere free across the
-/// push, where a ContactModel wants to be told: it is taken along by what the linear network says,
-/// and put right each period by the force across of the period before.
+/// The scene guides the sphere along its own push.
+bool is_guided(const PlanScene& scene) {
+  const Probe& probe = scene.scene().probe();
+  const auto& guides = scene.scene().tissue.guides;
+  return std::any_of(guides.begin(), guides.end(),
+                     [&](const Guide& guide) { return guide.sphere == probe.sphere; });
+}
+
+/// Of the tissue, the contact free: where it is, a ContactModel is told.
+Freedom freedom_around(const PlanScene& scene) {
+  Tissue tissue = scene.scene().tissue;
+  std::erase_if(tissue.guides,
+                [&](const Guide& guide) { return guide.sphere == scene.scene().probe().sphere; });
+  return tissue.freedom();
+}
+
+/// A ContactModel moved through a protocol of depths. Where the scene leaves its sphere free across
+/// the push, and a ContactModel wants to be told, it is taken along by what the linear network
+/// says, and put right each period by the force across of the period before.
 class ContactRun {
  public:
   ContactRun(const PlanScene& scene, const BuiltContact& built)
@@ -40,11 +58,12 @@ class ContactRun {
         across_(across(into_)),
         period_s_(model_.period_s()),
         time_s_(protocol_.start_s()) {
+    model_.reset();
+    if (is_guided(scene)) return;
     const Eigen::Matrix3d k = model_.instantaneous_stiffness();
     const Eigen::Matrix2d free = across_.transpose() * k * across_;
     compliance_ = free.inverse();
     follows_ = -compliance_ * (across_.transpose() * k * into_);
-    model_.reset();
   }
 
   /// The response at a time, between the periods around it.
@@ -110,8 +129,10 @@ class ContactCandidate : public PlanModel {
     if (!budget.rate_Hz) return "steps a servo's period, and there is none";
     if (!scene.single_sphere() || !scene.by_depth()) return "sees one sphere that is moved";
     if (scene.jumps()) return "a servo's contact does not jump";
-    const std::size_t sphere = scene.scene().probe().sphere;
-    if (!scene.driven().freedom.is_free(sphere)) return "the contact is guided";
+    const Probe& probe = scene.scene().probe();
+    const Freedom freedom = scene.scene().tissue.freedom();
+    const Eigen::Vector3d along = freedom.projector(probe.sphere) * probe.direction;
+    if (!along.isApprox(probe.direction, kParallel)) return "the contact is guided elsewhere";
     if (scout.wants_field()) return "is planned for its force only";
     for (const Knot& knot : scene.protocol().knots()) {
       if (knot.value < 0.0) return "its range is a push";
@@ -120,7 +141,7 @@ class ContactCandidate : public PlanModel {
   }
 
   [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
-    const BuiltContact built = build(scout.scene(), budget.period_s().value());
+    const BuiltContact built = build(scout.scene(), budget.period_s().value(), kPortable);
     const PlanTrajectory answer = moved(scout.scene(), built, scout.times());
     OperationCount worst = built.of_balance.times(built.most_balances);
     worst += built.of_step;
@@ -129,13 +150,23 @@ class ContactCandidate : public PlanModel {
 
   [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
                                    const std::vector<double>& times_s) const override {
-    return moved(scout.scene(), build(scout.scene(), budget.period_s().value()), times_s);
+    return moved(scout.scene(), build(scout.scene(), budget.period_s().value(), kPortable),
+                 times_s);
+  }
+
+  [[nodiscard]] bool for_loop() const override { return true; }
+  [[nodiscard]] std::unique_ptr<ContactModel> contact(const PlanScout& scout,
+                                                      double period_s) const override {
+    return build(scout.scene(), period_s, !kPortable).model;
   }
 
  protected:
-  [[nodiscard]] virtual BuiltContact build(const PlanScene& scene, double period_s) const = 0;
+  /// @param portable the same answer on every machine, where the model has the choice
+  [[nodiscard]] virtual BuiltContact build(const PlanScene& scene, double period_s,
+                                           bool portable) const = 0;
 
  private:
+  static constexpr bool kPortable = true;
   [[nodiscard]] PlanTrajectory moved(const PlanScene& scene, const BuiltContact& built,
                                      const std::vector<double>& times_s) const {
     ContactRun run(scene, built);
@@ -162,7 +193,8 @@ class CondensedCandidate final : public ContactCandidate {
   [[nodiscard]] std::string settings() const override { return "potential of a slow manifold"; }
 
  protected:
-  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s) const override {
+  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s,
+                                   bool /*portable*/) const override {
     constexpr double kAside = 0.25;  // of the depth, across
     const double depth = scene.protocol().peak();
     CondensedOptions options;
@@ -173,7 +205,7 @@ class CondensedCandidate final : public ContactCandidate {
     const Probe& probe = scene.scene().probe();
     BuiltContact built;
     built.model = std::make_unique<CondensedContact>(build_condensed(
-        driven.bonds, driven.rest, driven.freedom, probe.sphere, probe.direction, options));
+        driven.bonds, driven.rest, freedom_around(scene), probe.sphere, probe.direction, options));
     built.of_step.add(Operation::condensed_step, 1.0);
     return built;
   }
@@ -191,17 +223,18 @@ class ZoneCandidate final : public ContactCandidate {
   }
 
  protected:
-  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s) const override {
+  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s,
+                                   bool portable) const override {
     ZoneNetworkOptions options;
     options.period_s = period_s;
     options.rings = rings_;
     options.linear_depth_m = 0.4 * scene.protocol().peak();
     options.frozen_depth_m = 0.5 * scene.protocol().peak();
     options.deepest_m = kRange * scene.protocol().peak();
-    options.portable = true;  // the same answer on every machine
+    options.portable = portable;
     const DrivenNetwork& driven = scene.driven();
     const Probe& probe = scene.scene().probe();
-    auto zone = std::make_unique<ZoneNetwork>(driven.bonds, driven.rest, driven.freedom,
+    auto zone = std::make_unique<ZoneNetwork>(driven.bonds, driven.rest, freedom_around(scene),
                                               probe.sphere, probe.direction, options);
     BuiltContact built;
     built.of_step = counted(zone->work());
@@ -223,15 +256,16 @@ class ServoCandidate final : public ContactCandidate {
   [[nodiscard]] ModelReach reach() const override { return ModelReach::full; }
 
  protected:
-  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s) const override {
+  [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s,
+                                   bool portable) const override {
     ServoNetworkOptions options;
     options.period_s = period_s;
     options.frozen_depth_m = 0.5 * scene.protocol().peak();
     options.deepest_m = kRange * scene.protocol().peak();
-    options.portable = true;
+    options.portable = portable;
     const DrivenNetwork& driven = scene.driven();
     const Probe& probe = scene.scene().probe();
-    auto network = std::make_unique<ServoNetwork>(driven.bonds, driven.rest, driven.freedom,
+    auto network = std::make_unique<ServoNetwork>(driven.bonds, driven.rest, freedom_around(scene),
                                                   probe.sphere, probe.direction, options);
     BuiltContact built;
     built.of_step.add(Operation::contact_step, 1.0);

@@ -27,6 +27,9 @@ void require_valid(const PlanRequest& request) {
   if (budget.rate_Hz && !(*budget.rate_Hz >= kSlowest_Hz && *budget.rate_Hz <= kFastest_Hz)) {
     throw bad_input("rate", shortest(*budget.rate_Hz) + " Hz", "1 to 1e6 Hz");
   }
+  if (request.for_loop && !budget.rate_Hz) {
+    throw bad_input("rate", "is missing", "that of the loop");
+  }
   if (budget.wall_s_per_s && !(*budget.wall_s_per_s > 0.0 && std::isfinite(*budget.wall_s_per_s))) {
     throw bad_input("wall", shortest(*budget.wall_s_per_s) + " s per s", "a time above 0");
   }
@@ -38,12 +41,14 @@ bool masses_known(const ExperimentScene& scene) {
 }
 
 /// Whether the truth has masses: the scene says so, or they would be felt at this tolerance.
-bool truth_has_masses(const ExperimentScene& scene, const PlanScout& massless, double tolerance) {
+bool truth_has_masses(const ExperimentScene& scene, const PlanScout& massless,
+                      const PlanRequest& request) {
+  if (request.for_loop) return false;
   if (scene.formulation.inertial()) return true;
   if (!masses_known(scene)) return false;
   const InertiaEstimate& estimate = massless.inertia();
   return !std::isinf(estimate.of_jumps) &&
-         massless.inertia_share() >= std::max(tolerance, kMassesFelt);
+         massless.inertia_share() >= std::max(request.tolerance, kMassesFelt);
 }
 
 /// A plan being made.
@@ -59,7 +64,7 @@ class Planning {
     plan_.bonds = scene_.network().bonds.size();
     tell("coarse runs of the network");
     PlanScout massless(scene_, request.measure, false);
-    plan_.inertial = truth_has_masses(scene, massless, request.tolerance);
+    plan_.inertial = truth_has_masses(scene, massless, request);
     if (!plan_.inertial && masses_known(scene)) {
       const double share = massless.inertia_share();
       if (share > request.tolerance) plan_.masses_left_out = share;
@@ -113,7 +118,9 @@ class Planning {
     candidate.formulation = model.formulation();
     candidate.settings = model.settings();
     candidate.reach = model.reach();
-    if (const auto reason = model.why_not(*scout_, request.budget)) {
+    if (request.for_loop && !model.for_loop()) {
+      candidate.reason = "nothing that a loop steps";
+    } else if (const auto reason = model.why_not(*scout_, request.budget)) {
       candidate.reason = *reason;
     } else if (model.has_masses() && with_masses_found_) {
       candidate.reason = "not tried: a cheaper one with masses meets the tolerance";
@@ -241,17 +248,38 @@ Plan make_plan(const ExperimentScene& scene, const PlanRequest& request) {
   return Planning(scene, request).make();
 }
 
+namespace {
+
+/// What a plan chose, with the scout of its scene.
+struct Chosen {
+  Chosen(const Plan& plan, const ExperimentScene& scene)
+      : scout(PlanScene(scene), plan.request.measure, plan.inertial) {
+    for (auto& candidate : plan_models(scout.scene())) {
+      if (candidate->name() == plan.chosen().name) model = std::move(candidate);
+    }
+    if (!model) throw bad_input("plan", "made for another scene", "a plan of this scene");
+  }
+  PlanScout scout;
+  std::unique_ptr<PlanModel> model;
+};
+
+}  // namespace
+
 PlanTrajectory run_planned(const Plan& plan, const ExperimentScene& scene,
                            const std::vector<double>& times_s) {
-  const PlanScout scout(PlanScene(scene), plan.request.measure, plan.inertial);
-  for (const auto& model : plan_models(scout.scene())) {
-    if (model->name() == plan.chosen().name) return model->run(scout, plan.request.budget, times_s);
-  }
-  throw bad_input("plan", "made for another scene", "a plan of this scene");
+  const Chosen chosen(plan, scene);
+  return chosen.model->run(chosen.scout, plan.request.budget, times_s);
 }
 
-Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
-                      const PlanRequest& request) {
+std::unique_ptr<ContactModel> planned_contact(const Plan& plan, const ExperimentScene& scene,
+                                              double period_s) {
+  const Chosen chosen(plan, scene);
+  std::unique_ptr<ContactModel> contact = chosen.model->contact(chosen.scout, period_s);
+  if (!contact) throw bad_input("plan", "chose nothing that a loop steps", "a plan for a loop");
+  return contact;
+}
+
+ExperimentScene contact_scene(const ExperimentScene& scene, const ContactRange& range) {
   if (!(range.depth_m > 0.0 && range.speed_m_per_s > 0.0 && range.hold_s >= 0.0)) {
     throw bad_input("contact", "a depth or speed that is not above 0, or a rest below 0",
                     "how a hand moves it");
@@ -274,7 +302,12 @@ Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
   go(0.0, range.speed_m_per_s);
   ExperimentScene probed = scene;
   probed.protocol = Protocol(Drive::displacement, std::move(knots), "a hand's contact");
-  return make_plan(probed, request);
+  return probed;
+}
+
+Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
+                      const PlanRequest& request) {
+  return make_plan(contact_scene(scene, range), request);
 }
 
 }  // namespace tpm

@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,9 @@ struct PlanRequest {
   std::string tolerance_source;  ///< in words, if it is not a number that was given
   PlanBudget budget;
   OperationCosts costs = nominal_costs();
+  /// For the loop of a haptic device: only what it can step, and without masses, which nothing in
+  /// the loop has; what they would change is in masses_left_out. Needs a rate.
+  bool for_loop = false;
   bool relevance = true;                                  ///< find out what does not matter
   bool changes = true;                                    ///< find out what would break first
   std::function<void(const std::string& what)> progress;  ///< told what is being done
@@ -111,5 +115,16 @@ struct ContactRange {
 /// @param scene of which organ, material and contacts are used
 [[nodiscard]] Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
                                     const PlanRequest& request);
+
+/// A scene with that protocol.
+[[nodiscard]] ExperimentScene contact_scene(const ExperimentScene& scene,
+                                            const ContactRange& range);
+
+/// The planned model for a servo loop to step, at rest.
+/// @param plan made `for_loop`, with a choice, of the same scene
+/// @param period_s may be another than that of the plan's rate
+[[nodiscard]] std::unique_ptr<ContactModel> planned_contact(const Plan& plan,
+                                                            const ExperimentScene& scene,
+                                                            double period_s);
 
 }  // namespace tpm

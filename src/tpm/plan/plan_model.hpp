@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/plan/plan_scout.hpp"
+#include "tpm/reduce/contact_model.hpp"
 
 namespace tpm {
 
@@ -53,6 +54,13 @@ class PlanModel {
                                                            const PlanBudget& budget) const = 0;
   /// Why a servo cannot step it, whatever it costs; none if it can.
   [[nodiscard]] virtual std::optional<std::string> why_no_servo() const { return std::nullopt; }
+  /// contact() has a model.
+  [[nodiscard]] virtual bool for_loop() const { return false; }
+  /// What a servo loop steps, at rest; null unless for_loop(). Throws as claim() does.
+  [[nodiscard]] virtual std::unique_ptr<ContactModel> contact(const PlanScout& /*scout*/,
+                                                              double /*period_s*/) const {
+    return nullptr;
+  }
   /// Throws Error(numerical) where the model fails.
   [[nodiscard]] virtual ModelClaim claim(const PlanScout& scout,
                                          const PlanBudget& budget) const = 0;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/plan/plan_model.hpp"
+#include "tpm/plan/scalar_contact.hpp"
 
 namespace tpm {
 namespace {
@@ -26,6 +27,18 @@ class ScalarCandidate : public PlanModel {
 
   [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
                                    const std::vector<double>& times_s) const override;
+
+  [[nodiscard]] bool for_loop() const override { return true; }
+  [[nodiscard]] std::unique_ptr<ContactModel> contact(const PlanScout& scout,
+                                                      double period_s) const override {
+    constexpr double kRange = 1.05;  // as of other contact models
+    const ContactSpectrum& spectrum = scout.spectrum();
+    return std::make_unique<ScalarContact>(
+        model(scout), scout.scene().scene().probe().direction,
+        ScalarContact::Range{spectrum.at_once(), spectrum.relaxed(),
+                             kRange * scout.scene().protocol().peak()},
+        period_s);
+  }
 
  protected:
   [[nodiscard]] virtual ScalarModel model(const PlanScout& scout) const = 0;

@@ -109,6 +109,29 @@ void add_identity(Document& d, const HilRecording& r) {
   if (!assumed.empty()) d.bullets(std::move(assumed));
 }
 
+/// What a planned model was picked from.
+void add_plan(Document& d, const Json& plan) {
+  if (plan.is_null()) return;
+  const auto number = [](const Json& value, double scale, const char* unit) {
+    return value.is_null() ? std::string("-") : significant(scale * value.get<double>(), 3) + unit;
+  };
+  Table table{fmt::format("Picked by tpm plan: {}, the cheapest within {} % of the peak at {} Hz",
+                          plan.at("choice").get<std::string>(),
+                          significant(100.0 * plan.at("tolerance").get<double>(), 3),
+                          significant(plan.at("rate_Hz").get<double>(), 4)),
+              {{"candidate"}, {"a period, us"}, {"claimed error"}, {"verified"}, {"why not"}},
+              {}};
+  for (const Json& c : plan.at("candidates")) {
+    if (c.at("claimed_error").is_null()) continue;
+    table.rows.push_back({{c.at("name").get<std::string>()},
+                          {number(c.at("period_s"), 1e6, "")},
+                          {number(c.at("claimed_error"), 100.0, " %")},
+                          {number(c.at("verified_error"), 100.0, " %")},
+                          {c.at("reason").get<std::string>()}});
+  }
+  d.table(std::move(table));
+}
+
 void add_fidelity(Document& d, const Verification& v) {
   d.heading(2, "Fidelity");
   d.paragraph(fmt::format(
@@ -120,9 +143,9 @@ void add_fidelity(Document& d, const Verification& v) {
       percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)));
   std::vector<Cell> others;
   for (const OtherOpinion& o : v.others) {
-    others.push_back(
-        {fmt::format("{}, first {} s: {} mN rms, {} mN at most", o.name, significant(o.end_s, 4),
-                     mN(o.commanded.rms_N), mN(o.commanded.max_N))});
+    others.push_back({fmt::format(
+        "{}, first {} s: {} mN rms, {} mN at most; {} mN from the reference at most", o.name,
+        significant(o.end_s, 4), mN(o.commanded.rms_N), mN(o.commanded.max_N), mN(o.apart_N))});
   }
   if (!others.empty()) d.bullets(std::move(others));
   d.picture({"session", "The session", ""});
@@ -255,6 +278,7 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   d.title = recording.session.title;
   d.subtitle = device_line(recording);
   add_identity(d, recording);
+  add_plan(d, recording.header.at("model").value("plan", Json()));
   add_fidelity(d, v);
   add_experiment(d, v);
   add_timing(d, recording, summary);

@@ -109,7 +109,10 @@ Json run_json(const HilSession& session, const SessionRun& run) {
   return {{"simulated_device", !run.device.hardware},
           {"title", session.title},
           {"device", to_json(run.device)},
-          {"model", {{"name", run.model.name}, {"error_bound", run.model.error_bound}}},
+          {"model",
+           {{"name", run.model.name},
+            {"error_bound", run.model.error_bound},
+            {"plan", run.model.plan}}},
           {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
           {"duration_s", rounded(session.duration_s(), kHilDigits)},
           {"phases", session.phases.size()},
@@ -156,6 +159,7 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
     Json json = fidelity_json(o.commanded);
     json["name"] = o.name;
     json["end_s"] = rounded(o.end_s, kHilDigits);
+    json["apart_from_reference_N"] = rounded(o.apart_N, kHilDigits);
     others.push_back(std::move(json));
   }
   for (const BesideExperiment& e : v.experiment) {
@@ -217,9 +221,9 @@ std::string verification_text(const HilRecording& recording, const Verification&
                       significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
                       share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
   for (const OtherOpinion& o : v.others) {
-    text += fmt::format("beside: {}, first {} s: rms {} mN, max {} mN\n", o.name,
-                        significant(o.end_s, 4), significant(1e3 * o.commanded.rms_N, 3),
-                        significant(1e3 * o.commanded.max_N, 3));
+    text += fmt::format("beside: {}, first {} s: rms {} mN, max {} mN; {} mN from the reference\n",
+                        o.name, significant(o.end_s, 4), significant(1e3 * o.commanded.rms_N, 3),
+                        significant(1e3 * o.commanded.max_N, 3), significant(1e3 * o.apart_N, 3));
   }
   for (const BesideExperiment& e : v.experiment) {
     text += fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, felt {} N ({:+.1f} %)\n",

@@ -1,0 +1,140 @@
+#include "tpm/haptics/planned_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/haptics/pushed_scene.hpp"
+#include "tpm/plan/plan.hpp"
+
+namespace tpm {
+namespace {
+
+ContactRange range_of(const HilSession& session, double deepest_m) {
+  ContactRange range;
+  range.depth_m = deepest_m;
+  range.hold_s = 0.0;
+  double begin_s = 0.0;
+  for (const SessionPhase& phase : session.phases) {
+    const double length_s = phase.end_s - begin_s;
+    begin_s = phase.end_s;
+    range.speed_m_per_s = std::max(range.speed_m_per_s, phase.rate_m_per_s);
+    switch (phase.kind) {
+      case SessionPhaseKind::load:  // how deep a load goes is not known: at most so deep
+        range.speed_m_per_s = std::max(range.speed_m_per_s, deepest_m / length_s);
+        break;
+      case SessionPhaseKind::hold:
+      case SessionPhaseKind::creep:
+        range.hold_s = std::max(range.hold_s, length_s);
+        break;
+      default:
+        break;
+    }
+  }
+  return range;
+}
+
+ExperimentScene scene_of(const PushedScene& pushed, const ContactRange& range) {
+  SceneContact contact;
+  contact.probe = pushed.probe;
+  ExperimentScene scene{pushed.tissue,
+                        {std::move(contact)},
+                        Protocol(Drive::displacement, {{0.0, 0.0}, {1.0, range.depth_m}}, "push"),
+                        {},
+                        {},
+                        {}};
+  std::vector<Guide>& guides = scene.tissue.guides;
+  const auto of_contact = [&](const Guide& guide) { return guide.sphere == pushed.probe.sphere; };
+  if (std::none_of(guides.begin(), guides.end(), of_contact)) {
+    guides.push_back({pushed.probe.sphere, pushed.probe.direction});
+  }
+  return contact_scene(scene, range);
+}
+
+PlanRequest request_of(const HilSession& session) {
+  PlanRequest request;
+  set_tolerance(request, session.tolerance);
+  request.for_loop = true;
+  request.relevance = request.changes = false;
+  request.budget.rate_Hz = 1.0 / session.servo.period_s;
+  return request;
+}
+
+std::string percent(double part) {
+  return significant(100.0 * part, 3) + " %";
+}
+
+Json number_or_null(const std::optional<double>& number) {
+  return number ? Json(*number) : Json();
+}
+
+Json json_of(const Plan& plan) {
+  Json candidates = Json::array();
+  for (const PlannedCandidate& c : plan.candidates) {
+    candidates.push_back({{"name", c.name},
+                          {"period_s", number_or_null(c.period_s)},
+                          {"claimed_error", number_or_null(c.claimed_error)},
+                          {"verified_error", number_or_null(c.verified_error)},
+                          {"feasible", c.feasible},
+                          {"reason", c.reason}});
+  }
+  return {{"tolerance", plan.request.tolerance},
+          {"tolerance_source", plan.request.tolerance_source},
+          {"rate_Hz", plan.request.budget.rate_Hz.value()},
+          {"reference", plan.reference.method},
+          {"peak_N", plan.reference.peak},
+          {"masses_left_out", number_or_null(plan.masses_left_out)},
+          {"choice", plan.chosen().name},
+          {"candidates", std::move(candidates)}};
+}
+
+/// What a plan is asked for that has no answer.
+Error no_model(const Plan& plan) {
+  const std::string instead =
+      plan.without_budget
+          ? fmt::format(
+                "a lower rate or a wider tolerance: {} meets the tolerance and takes {} us "
+                "a period",
+                plan.candidates[*plan.without_budget].name,
+                significant(1e6 * plan.candidates[*plan.without_budget].period_s.value(), 3))
+          : "a wider tolerance";
+  return {ExitCode::answer_is_no, "model",
+          fmt::format("nothing that the loop steps is within {} of the peak at {} Hz",
+                      percent(plan.request.tolerance),
+                      significant(plan.request.budget.rate_Hz.value(), 4)),
+          instead};
+}
+
+}  // namespace
+
+LoopModel planned_model(const HilSession& session) {
+  const PushedScene pushed(session);
+  const ContactRange range = range_of(session, pushed.deepest_m);
+  const ExperimentScene scene = scene_of(pushed, range);
+  const Plan plan = make_plan(scene, request_of(session));
+  if (!plan.choice) throw no_model(plan);
+  const PlannedCandidate& chosen = plan.chosen();
+  LoopModel loop = pushed.begun(chosen.name, "seen from");
+  loop.name += fmt::format(
+      "; picked by tpm plan: the cheapest within {} of the peak at {} Hz, pushed to {} mm at {} "
+      "mm/s",
+      percent(plan.request.tolerance), significant(plan.request.budget.rate_Hz.value(), 4),
+      significant(1e3 * range.depth_m, 4), significant(1e3 * range.speed_m_per_s, 4));
+  loop.error_bound = fmt::format(
+      "at most {} of the peak of {} N on the planned motion, {} verified against the nonlinear "
+      "network; on others what tpm hil verify measures",
+      percent(chosen.claimed_error.value()), significant(plan.reference.peak, 3),
+      percent(chosen.verified_error.value()));
+  if (plan.masses_left_out) {
+    loop.error_bound += fmt::format("; masses, which are left out, would change {}",
+                                    percent(*plan.masses_left_out));
+  }
+  loop.plan = json_of(plan);
+  loop.model = planned_contact(plan, scene, session.servo.period_s);
+  if (loop.model->spheres() > 0) loop.shape.field = planned_contact(plan, scene, kDrawnEvery_s);
+  return loop;
+}
+
+}  // namespace tpm

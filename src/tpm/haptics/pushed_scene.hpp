@@ -1,0 +1,28 @@
+#pragma once
+#include "tpm/haptics/session.hpp"
+#include "tpm/reduce/servo_network.hpp"
+#include "tpm/scene/experiment_scene.hpp"
+
+namespace tpm {
+
+/// Where the scene of a session's model stands, for messages.
+inline constexpr const char* kScenePlace = "model: scene";
+
+[[nodiscard]] TissueShape shape_of(const Network& network, std::size_t contact,
+                                   const Eigen::Vector3d& push);
+
+/// The network of a session's scene, pushed at its contact sphere.
+struct PushedScene {
+  /// Throws Error(bad_input) for a network that does not stand.
+  explicit PushedScene(const HilSession& session);
+  [[nodiscard]] const Positions& rest() const { return tissue.network.organ.position; }
+  /// Name and shape; the model is still to come.
+  [[nodiscard]] LoopModel begun(std::string_view kind, std::string_view how) const;
+  [[nodiscard]] std::unique_ptr<ServoNetwork> network(double period_s) const;
+
+  Tissue tissue;
+  Probe probe;
+  double deepest_m;  ///< of the session, with some room for an operator that goes deeper
+};
+
+}  // namespace tpm

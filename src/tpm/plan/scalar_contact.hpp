@@ -1,0 +1,39 @@
+#pragma once
+#include "tpm/plan/scalar_model.hpp"
+#include "tpm/reduce/contact_model.hpp"
+
+namespace tpm {
+
+/// A ScalarModel for a servo loop: a contact that moves along its push. Across it there is no
+/// force, and motion across is not seen.
+class ScalarContact final : public ContactModel {
+ public:
+  /// What is known of the contact it stands for.
+  struct Range {
+    double at_once_N_per_m = 0.0, relaxed_N_per_m = 0.0;  ///< stiffness at rest
+    double deepest_m = 0.0;                               ///< answers beyond are not trusted
+  };
+  /// @param into_tissue unit vector
+  ScalarContact(ScalarModel model, const Eigen::Vector3d& into_tissue, const Range& range,
+                double period_s);
+
+  void reset() noexcept override;
+  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  [[nodiscard]] double period_s() const noexcept override { return period_s_; }
+  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
+    return range_.at_once_N_per_m * (into_ * into_.transpose());
+  }
+  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+    return range_.relaxed_N_per_m * (into_ * into_.transpose());
+  }
+  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
+  void displacements(Eigen::Ref<Eigen::Matrix3Xd> /*all*/) const noexcept override {}
+
+ private:
+  ScalarModel model_;
+  Eigen::Vector3d into_;
+  Range range_;
+  double period_s_;
+};
+
+}  // namespace tpm
