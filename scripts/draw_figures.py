@@ -160,6 +160,33 @@ def draw_mark(axes, series, look):
     return Line2D([], [], **style)
 
 
+def edges(places, logarithmic):
+    """Half-way between places, on the axis' scale; outer ones as far out as the next ones in."""
+    values = [math.log(v) if logarithmic else v for v in places]
+    if len(values) == 1:
+        values = [values[0] - 0.5, values[0] + 0.5]
+    else:
+        middle = [(a + b) / 2 for a, b in zip(values, values[1:])]
+        values = [2 * values[0] - middle[0], *middle, 2 * values[-1] - middle[-1]]
+    return [math.exp(v) if logarithmic else v for v in values]
+
+
+def draw_heat(axes, series, look, panel):
+    """Colours over x and y with lines of equal value; where there is nothing, the grey page."""
+    x, y = series["x"], series["y"]
+    rows = [[math.nan if v is None else v for v in series["z"][i * len(x):(i + 1) * len(x)]] for i in range(len(y))]
+    axes.set_facecolor("#E8E8E8")
+    axes.grid(False)
+    mesh = axes.pcolormesh(edges(x, panel["x"]["logarithmic"]), edges(y, panel["y"]["logarithmic"]), rows, cmap="viridis",
+                           shading="flat", rasterized=True)
+    found = [v for row in rows for v in row if not math.isnan(v)]
+    if len(x) > 1 and len(y) > 1 and found and min(found) < max(found):
+        lines = axes.contour(x, y, rows, levels=6, colors="white", linewidths=0.7)
+        axes.clabel(lines, fontsize=6.5, fmt="%g")
+    axes.figure.colorbar(mesh, ax=axes, fraction=0.16, pad=0.02, aspect=22)
+    return Rectangle((0, 0), 1, 1, facecolor=mesh.get_cmap()(0.5))
+
+
 DRAW = {"line": draw_line, "points": draw_points, "band": draw_band, "bracket": draw_bracket, "mark": draw_mark}
 
 
@@ -207,7 +234,10 @@ def counts(panel):
 def draw_panel(axes, panel, look, handles):
     """Draws one panel and adds a handle per new legend text to `handles`."""
     for series in panel["series"]:
-        handle = DRAW[series["kind"]](axes, series, look[series["label"]])
+        if series["kind"] == "heat":
+            handle = draw_heat(axes, series, look[series["label"]], panel)
+        else:
+            handle = DRAW[series["kind"]](axes, series, look[series["label"]])
         handles.setdefault(legend_text(series), handle)
     axes.set_title(panel["title"], loc="left")
     for name, axis in (("x", panel["x"]), ("y", panel["y"])):

@@ -9,7 +9,9 @@
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"
+#include "tpm/core/random.hpp"
 #include "tpm/model/closed_form.hpp"
+#include "tpm/report/sweep_report.hpp"
 #include "tpm/sample/point_set.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
@@ -121,8 +123,8 @@ TEST_CASE("creep in a sweep obeys the balance at once and in the end, and the mo
 }
 
 TEST_CASE("ranges reach both ends exactly and lie evenly on their scale") {
-  const auto linear = ParameterValues::range(0.1, 0.7, 7, Spread::linear);
-  const auto log = ParameterValues::range(1e-3, 1e3, 7, Spread::logarithmic);
+  const auto linear = ParameterValues::range(0.1, 0.7, 7, AxisScale::linear);
+  const auto log = ParameterValues::range(1e-3, 1e3, 7, AxisScale::logarithmic);
   CHECK((linear.at(0) == 0.1 && linear.at(6) == 0.7));
   CHECK((log.at(0) == 1e-3 && log.at(6) == 1e3));
   for (std::uint64_t i = 0; i < 7; ++i) {
@@ -130,7 +132,7 @@ TEST_CASE("ranges reach both ends exactly and lie evenly on their scale") {
     CHECK_THAT(log.at(i), WithinRel(std::pow(10.0, static_cast<double>(i) - 3.0), 1e-13));
   }
   const auto sampled =
-      ParameterValues::samples(2.0, 8.0, Spread::logarithmic, [](std::uint64_t) { return 0.5; });
+      ParameterValues::samples(2.0, 8.0, AxisScale::logarithmic, [](std::uint64_t) { return 0.5; });
   CHECK_THAT(sampled.at(3), WithinRel(4.0, 1e-14));
 }
 
@@ -284,6 +286,57 @@ TEST_CASE("shards put together are the whole sweep, to the byte") {
     CHECK(test::refusal_of([&] { write_sweep(sweep, all, folder / "part.h5"); }).find("missing") !=
           std::string::npos);
     CHECK_FALSE(std::filesystem::exists(folder / "part.h5"));
+  }
+}
+
+TEST_CASE("a file of results is read back by axes, either way round, and drawn") {
+  const test::TempFolder folder;
+  const Sweep sweep = parsed(kMixed);
+  static_cast<void>(result_of(sweep, folder / "a.h5"));
+  const SweepReader reader(folder / "a.h5");
+  REQUIRE(reader.axes().size() == 3);
+  CHECK(reader.tally().skipped == 12);
+  CHECK(reader.tally().failed == 16);
+  CHECK(reader.parameter_unit("E1") == "Pa");
+  const HeldPlaces held{{"rate", 2}};
+  const auto upright = reader.slice("end_force", "E1", "x", held);
+  const auto turned = reader.slice("end_force", "x", "E1", held);
+  const auto whole = all_blocks(sweep);
+  for (std::uint64_t e = 0; e < 4; ++e) {
+    for (std::uint64_t x = 1; x < 5; ++x) {
+      const std::uint64_t cell = (2 * 4 + e) * 5 + x;
+      CHECK(upright[e * 5 + x] == whole[cell / 7].values[2][cell % 7]);
+      CHECK(turned[x * 4 + e] == upright[e * 5 + x]);
+      CHECK(reader.curve("force", {{"rate", 2}, {"E1", e}, {"x", x}}).back() ==
+            whole[cell / 7].values[1][6 * (cell % 7) + 5]);
+    }
+  }
+  SweepFigures wished;
+  wished.held = held;
+  wished.pareto = {"share", "peak_force"};
+  const auto figures = sweep_figures(reader, wished);
+  REQUIRE(figures.size() == 5);
+  const Series& map = figures[0].panels[0].series[0];
+  CHECK(map.kind == Series::Kind::heat);
+  CHECK(map.z.size() == map.x.size() * map.y.size());
+  CHECK_FALSE(to_text(to_json(figures)).empty());  // it can be drawn
+  CHECK(sweep_text(reader).find("12 skipped, 16 failed") != std::string::npos);
+}
+
+TEST_CASE("a Pareto front is what no other pair betters in both") {
+  Random random(3);
+  std::vector<std::pair<double, double>> pairs;
+  for (int i = 0; i < 300; ++i) {
+    pairs.emplace_back(std::floor(20.0 * random.uniform()), std::floor(20.0 * random.uniform()));
+  }
+  const auto front = pareto_front(pairs);
+  const auto bettered = [&](const auto& p) {
+    return std::any_of(pairs.begin(), pairs.end(), [&](const auto& q) {
+      return q.first <= p.first && q.second <= p.second && q != p;
+    });
+  };
+  for (const auto& p : pairs) {
+    CHECK((std::find(front.begin(), front.end(), p) != front.end()) == !bettered(p));
   }
 }
 

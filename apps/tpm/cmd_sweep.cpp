@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <filesystem>
 #include <memory>
@@ -11,7 +12,10 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
+#include "tpm/report/sweep_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/sweep/run_sweep.hpp"
 #include "tpm/sweep/sweep_result.hpp"
@@ -210,9 +214,58 @@ int merge(const SweepChoice& choice, const Session& session) {
   return 0;
 }
 
+struct SweepViewChoice {
+  std::string file, folder = "sweep_figures", x, y, pareto;
+  std::vector<std::string> variables, at;
+};
+
+int show(const SweepViewChoice& choice, const Session& session) {
+  const SweepReader sweep(choice.file);
+  fmt::print("{}", session.json() ? to_text(sweep_json(sweep)) : sweep_text(sweep));
+  return 0;
+}
+
+/// "rate=4 mm/s": the nearest place on that axis.
+std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
+                                                 const SweepReader& sweep) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos) {
+    throw Error(ExitCode::usage, "--at", fmt::format("'{}'", printable(text)), "AXIS=VALUE");
+  }
+  const std::string name = text.substr(0, equals);
+  const ReadAxis& axis = sweep.axes()[sweep.axis(name)];
+  const Dimension dimension =
+      axis.unit.empty() ? Dimension::dimensionless : parse_unit(axis.unit, "--at").dimension;
+  const double wished = parse_quantity(text.substr(equals + 1), dimension, "--at " + name);
+  const auto nearest = std::min_element(
+      axis.places.begin(), axis.places.end(),
+      [&](double a, double b) { return std::abs(a - wished) < std::abs(b - wished); });
+  return {name, static_cast<std::uint64_t>(nearest - axis.places.begin())};
+}
+
+int plot(const SweepViewChoice& choice) {
+  const SweepReader sweep(choice.file);
+  SweepFigures wished;
+  wished.variables = choice.variables;
+  if (!choice.x.empty()) wished.x = choice.x;
+  if (!choice.y.empty()) wished.y = choice.y;
+  for (const std::string& text : choice.at) wished.held.push_back(parse_held(text, sweep));
+  if (!choice.pareto.empty()) {
+    const std::size_t comma = choice.pareto.find(',');
+    if (comma == std::string::npos) {
+      throw Error(ExitCode::usage, "--pareto", fmt::format("'{}'", printable(choice.pareto)),
+                  "MISFIT,COST: two variables");
+    }
+    wished.pareto = {choice.pareto.substr(0, comma), choice.pareto.substr(comma + 1)};
+  }
+  const auto files = write_figures(choice.folder, sweep_figures(sweep, wished));
+  fmt::print("wrote {} into {}\n", fmt::join(files, ", "), choice.folder);
+  return 0;
+}
+
 int run_command(const SweepChoice& choice, const Session& session) {
   if (choice.sweep.empty()) {
-    throw Error(ExitCode::usage, "sweep", "no file", "tpm sweep SWEEP.json, or merge");
+    throw Error(ExitCode::usage, "sweep", "no file", "tpm sweep SWEEP.json, or merge, show, plot");
   }
   const Sweep sweep = read_sweep(choice.sweep);
   const fs::path output = choice.output, log = log_path(output);
@@ -242,6 +295,26 @@ int run_command(const SweepChoice& choice, const Session& session) {
   return 0;
 }
 
+void add_views(CLI::App& sweep, Session& session) {
+  auto choice = std::make_shared<SweepViewChoice>();
+  CLI::App* showing = sweep.add_subcommand("show", "What a file of results holds");
+  showing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  add_format_option(*showing, session);
+  showing->callback(
+      [choice, &session] { session.run = [choice, &session] { return show(*choice, session); }; });
+  CLI::App* plotting = sweep.add_subcommand("plot", "Maps, families of lines, Pareto fronts");
+  plotting->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  plotting->add_option("-o,--output", choice->folder, "Folder for pictures (PNG, SVG)")
+      ->capture_default_str();
+  plotting->add_option("--variable", choice->variables, "What is drawn (default: all but counts)");
+  plotting->add_option("--x", choice->x, "Axis drawn across (default: the last)");
+  plotting->add_option("--y", choice->y, "Axis drawn upwards, and of families");
+  plotting->add_option("--at", choice->at, "AXIS=VALUE: place on an axis that is not drawn");
+  plotting->add_option("--pareto", choice->pareto,
+                       "MISFIT,COST: cells that no other betters in both");
+  plotting->callback([choice, &session] { session.run = [choice] { return plot(*choice); }; });
+}
+
 }  // namespace
 
 void add_sweep_command(CLI::App& app, Session& session) {
@@ -267,6 +340,7 @@ void add_sweep_command(CLI::App& app, Session& session) {
   add_format_option(*merging, session);
   merging->callback(
       [choice, &session] { session.run = [choice, &session] { return merge(*choice, session); }; });
+  add_views(*command, session);
   command->callback([command, choice, &session] {
     if (!command->get_subcommands().empty()) return;
     session.run = [choice, &session] { return run_command(*choice, session); };

@@ -32,6 +32,8 @@ std::string_view kind_name(Series::Kind kind) {
       return "upright";
     case Series::Kind::level:
       return "level";
+    case Series::Kind::heat:
+      return "heat";
   }
   return "";
 }
@@ -42,6 +44,15 @@ constexpr int kFigureDigits = 6;
 Json numbers(const std::vector<double>& values) {
   Json list = Json::array();
   for (const double v : values) list.push_back(rounded(v, kFigureDigits));
+  return list;
+}
+
+/// Of a map of colours, with null where there is nothing.
+Json numbers_or_null(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double v : values) {
+    list.push_back(std::isnan(v) ? Json() : Json(rounded(v, kFigureDigits)));
+  }
   return list;
 }
 
@@ -60,6 +71,8 @@ bool matching(const Series& s) {
       return s.y.empty();
     case Series::Kind::level:
       return n == 0;
+    case Series::Kind::heat:
+      return n * s.y.size() == s.z.size();
     default:
       return s.y.size() == n;
   }
@@ -93,6 +106,7 @@ Json series_json(const Series& s) {
                                     std::pair{"lower", &s.lower}, std::pair{"upper", &s.upper}}) {
     if (!values->empty()) json[key] = numbers(*values);
   }
+  if (!s.z.empty()) json["z"] = numbers_or_null(s.z);
   return json;
 }
 

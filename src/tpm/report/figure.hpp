@@ -19,6 +19,7 @@ struct Series {
     failed,   ///< x: settings that have no y; they stand above the panel, in a row named `text`
     upright,  ///< x: a limit, named `text`
     level,    ///< y: a limit, named `text`
+    heat,     ///< x, y, and `z` at each place of them, row by row of x: colours
   };
   Kind kind = Kind::line;
   std::string label;       ///< for the legend; same label, same colour in all panels of a figure
@@ -29,6 +30,7 @@ struct Series {
   std::vector<double> sd;
   std::vector<double> lower;
   std::vector<double> upper;
+  std::vector<double> z;  ///< NaN: nothing there
   std::string text;
 };
 

@@ -6,8 +6,8 @@
 namespace tpm {
 namespace {
 
-double between(double from, double to, Spread scale, double share) {
-  if (scale == Spread::linear) return from + (to - from) * share;
+double between(double from, double to, AxisScale scale, double share) {
+  if (scale == AxisScale::linear) return from + (to - from) * share;
   return from * std::exp(std::log(to / from) * share);
 }
 
@@ -19,7 +19,8 @@ ParameterValues ParameterValues::list(std::vector<double> values) {
   return made;
 }
 
-ParameterValues ParameterValues::range(double from, double to, std::uint64_t count, Spread scale) {
+ParameterValues ParameterValues::range(double from, double to, std::uint64_t count,
+                                       AxisScale scale) {
   ParameterValues made;
   made.from_ = from;
   made.to_ = to;
@@ -28,7 +29,7 @@ ParameterValues ParameterValues::range(double from, double to, std::uint64_t cou
   return made;
 }
 
-ParameterValues ParameterValues::samples(double from, double to, Spread scale,
+ParameterValues ParameterValues::samples(double from, double to, AxisScale scale,
                                          std::function<double(std::uint64_t)> coordinate) {
   ParameterValues made = range(from, to, 0, scale);
   made.coordinate_ = std::move(coordinate);

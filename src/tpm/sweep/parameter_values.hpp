@@ -6,7 +6,7 @@
 namespace tpm {
 
 /// How the places between two ends are spread.
-enum class Spread { linear, logarithmic };
+enum class AxisScale { linear, logarithmic };
 
 /// The values that a swept parameter takes along its axis, SI, each by its number alone. What can
 /// be computed is not kept: an axis may have tens of millions of places.
@@ -17,9 +17,9 @@ class ParameterValues {
   /// From the first end to the last, both reached exactly.
   /// @param count at least 1; 1 gives the first end alone
   [[nodiscard]] static ParameterValues range(double from, double to, std::uint64_t count,
-                                             Spread scale);
+                                             AxisScale scale);
   /// Places between two ends given by a coordinate in [0, 1) of each point.
-  [[nodiscard]] static ParameterValues samples(double from, double to, Spread scale,
+  [[nodiscard]] static ParameterValues samples(double from, double to, AxisScale scale,
                                                std::function<double(std::uint64_t)> coordinate);
 
   [[nodiscard]] double at(std::uint64_t number) const;
@@ -28,7 +28,7 @@ class ParameterValues {
   std::vector<double> values_;
   double from_ = 0.0, to_ = 0.0;
   std::uint64_t count_ = 0;
-  Spread scale_ = Spread::linear;
+  AxisScale scale_ = AxisScale::linear;
   std::function<double(std::uint64_t)> coordinate_;
 };
 

@@ -130,8 +130,8 @@ SweepRange parse_range(const Json& object, Dimension dimension, const DocumentPl
   const SweepRange range{
       quantity(object.at("from"), dimension, place.key("from")),
       quantity(object.at("to"), dimension, place.key("to")),
-      object.value("scale", "linear") == "log" ? Spread::logarithmic : Spread::linear};
-  if (range.scale == Spread::logarithmic && !(range.from > 0.0 && range.to > 0.0)) {
+      object.value("scale", "linear") == "log" ? AxisScale::logarithmic : AxisScale::linear};
+  if (range.scale == AxisScale::logarithmic && !(range.from > 0.0 && range.to > 0.0)) {
     throw bad_input(place.where, "a logarithmic range with an end that is not above 0",
                     "two ends above 0");
   }

@@ -39,7 +39,7 @@ struct SweepOutput {
 /// Two ends and how what lies between is spread: {"from", "to", "scale"}. Throws Error(bad_input).
 struct SweepRange {
   double from = 0.0, to = 0.0;
-  Spread scale = Spread::linear;
+  AxisScale scale = AxisScale::linear;
 };
 [[nodiscard]] SweepRange parse_range(const Json& object, Dimension dimension,
                                      const DocumentPlace& place);

@@ -64,6 +64,13 @@ std::string path_to(const std::string& dataset) {
   return fmt::format("/{}", dataset);
 }
 
+template <class List>
+std::vector<std::string> names_of(const List& list) {
+  std::vector<std::string> names;
+  for (const auto& entry : list) names.push_back(entry.name);
+  return names;
+}
+
 /// Writes the datasets of a sweep.
 class ResultWriter {
  public:
@@ -73,6 +80,10 @@ class ResultWriter {
     out_.attribute("/", "description", sweep.description);
     out_.attribute("/", "sweep_json", sweep.document);
     out_.attribute("/", "sweep_fingerprint", sweep.fingerprint);
+    out_.texts("/sweep/axes", names_of(sweep.axes));
+    out_.texts("/sweep/parameters", names_of(sweep.parameters));
+    out_.texts("/sweep/variables", names_of(sweep.variables));
+    out_.texts("/sweep/counted", sweep.model->counted());
     write_axes();
     add_array("status", Number::uint8, "", "0 done, 1 skipped, 2 failed");
     add_array("reason", Number::int32, "", "why not done: a place in reason_text");
@@ -155,6 +166,7 @@ class ResultWriter {
     if (parameter == nullptr) return;
     out_.attribute(name, "units", parameter->unit);
     out_.attribute(name, "parameter", parameter->target);
+    out_.attribute(name, "axis", sweep_.axes[axis].name);
   }
 
   void add_array(const std::string& name, Number kind, const std::string& unit,

@@ -1,0 +1,353 @@
+#include "tpm/report/sweep_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/core/units.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr std::size_t kMostPlaces = 200;   ///< of a map along one axis
+constexpr std::size_t kMostPoints = 2000;  ///< of a cloud
+constexpr std::size_t kLines = 5;          ///< of a family
+
+/// The unit in which people read numbers of an SI unit, and what to divide them by.
+Unit read_in(const std::string& si_unit) {
+  if (si_unit.empty()) return {"", Dimension::dimensionless, 1.0};
+  return shown_unit(parse_unit(si_unit, "unit").dimension);
+}
+
+std::vector<double> in_shown_unit(std::vector<double> values, const Unit& unit) {
+  for (double& v : values) v /= unit.to_si;
+  return values;
+}
+
+std::string named_in_unit(const std::string& name, const Unit& unit) {
+  return unit.symbol.empty() ? name : fmt::format("{} [{}]", name, unit.symbol);
+}
+
+/// At most so many numbers from 0 to count - 1, evenly, both ends among them.
+std::vector<std::size_t> some_of(std::size_t count, std::size_t most) {
+  std::vector<std::size_t> chosen;
+  const std::size_t n = std::min(count, most);
+  for (std::size_t i = 0; i < n; ++i) {
+    chosen.push_back(n == 1 ? 0 : i * (count - 1) / (n - 1));
+  }
+  return chosen;
+}
+
+/// True for steps that grow: such an axis is drawn on a logarithmic scale.
+bool even_in_logarithm(const std::vector<double>& places) {
+  if (places.size() < 3 || !(places.front() > 0.0)) return false;
+  const double first = places[1] / places[0];
+  const double last = places.back() / places[places.size() - 2];
+  return std::abs(first - last) < 1e-6 * first && std::abs(first - 1.0) > 1e-6;
+}
+
+Axis axis_of(const ReadAxis& axis) {
+  return {axis.name, read_in(axis.unit).symbol, even_in_logarithm(axis.places), {}, {}};
+}
+
+/// Its own parameter's place, with the unit; else its number.
+std::string place_words(const ReadAxis& axis, std::uint64_t place) {
+  const Unit unit = read_in(axis.unit);
+  return fmt::format("{} = {}{}{}", axis.name, significant(axis.places[place] / unit.to_si, 4),
+                     unit.symbol.empty() ? "" : " ", unit.symbol);
+}
+
+std::string held_words(const SweepReader& sweep, const std::vector<std::string>& free,
+                       const HeldPlaces& held) {
+  std::string words;
+  for (const ReadAxis& axis : sweep.axes()) {
+    if (std::find(free.begin(), free.end(), axis.name) != free.end()) continue;
+    std::uint64_t place = 0;
+    for (const auto& [name, at] : held) place = name == axis.name ? at : place;
+    words += (words.empty() ? " At " : ", ") + place_words(axis, place);
+  }
+  return words.empty() ? words : words + ".";
+}
+
+/// Lines need numbers: a cell without one ends a line, and the next begins another of its label.
+void add_lines(const std::string& label, const std::vector<double>& x, const std::vector<double>& y,
+               std::vector<Series>& series) {
+  std::vector<double> part_x, part_y;
+  const auto finish = [&] {
+    if (!part_x.empty()) series.push_back(line(label, part_x, part_y));
+    part_x.clear();
+    part_y.clear();
+  };
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (!std::isfinite(y[i])) {
+      finish();
+      continue;
+    }
+    part_x.push_back(x[i]);
+    part_y.push_back(y[i]);
+  }
+  finish();
+}
+
+Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const std::string& x,
+                const std::string& y, const HeldPlaces& held) {
+  const ReadAxis& across = sweep.axes()[sweep.axis(x)];
+  const ReadAxis& up = sweep.axes()[sweep.axis(y)];
+  const std::vector<double> all = sweep.slice(v.name, y, x, held);
+  const auto columns = some_of(across.places.size(), kMostPlaces);
+  const auto rows = some_of(up.places.size(), kMostPlaces);
+  const Unit unit = read_in(v.unit), unit_x = read_in(across.unit), unit_y = read_in(up.unit);
+  Series heat;
+  heat.kind = Series::Kind::heat;
+  heat.label = v.name;
+  heat.provenance = "model";
+  for (const std::size_t c : columns) heat.x.push_back(across.places[c] / unit_x.to_si);
+  for (const std::size_t r : rows) {
+    heat.y.push_back(up.places[r] / unit_y.to_si);
+    for (const std::size_t c : columns) {
+      heat.z.push_back(all[r * across.places.size() + c] / unit.to_si);
+    }
+  }
+  return {named_in_unit(v.name, unit), axis_of(across), axis_of(up), {std::move(heat)}};
+}
+
+Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const std::string& x,
+                   const std::optional<std::string>& of, const HeldPlaces& held) {
+  const ReadAxis& across = sweep.axes()[sweep.axis(x)];
+  const Unit unit = read_in(v.unit);
+  Panel panel{
+      named_in_unit(v.name, unit), axis_of(across), {v.name, unit.symbol, false, {}, {}}, {}};
+  const std::vector<double> places = in_shown_unit(across.places, read_in(across.unit));
+  if (!of) {
+    add_lines(v.name, places, in_shown_unit(sweep.slice(v.name, {}, x, held), unit), panel.series);
+    return panel;
+  }
+  const ReadAxis& other = sweep.axes()[sweep.axis(*of)];
+  for (const std::size_t place : some_of(other.places.size(), kLines)) {
+    HeldPlaces here = held;
+    here.emplace_back(*of, place);
+    add_lines(place_words(other, place), places,
+              in_shown_unit(sweep.slice(v.name, {}, x, here), unit), panel.series);
+  }
+  return panel;
+}
+
+Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const std::string& of,
+                   const HeldPlaces& held) {
+  const ReadAxis& axis = sweep.axes()[sweep.axis(of)];
+  const Unit unit = read_in(v.unit);
+  Panel panel{v.name,
+              {"time", "s", even_in_logarithm(v.times_s), {}, {}},
+              {v.name, unit.symbol, false, {}, {}},
+              {}};
+  for (const std::size_t place : some_of(axis.places.size(), kLines)) {
+    HeldPlaces here = held;
+    here.emplace_back(of, place);
+    add_lines(place_words(axis, place), v.times_s, in_shown_unit(sweep.curve(v.name, here), unit),
+              panel.series);
+  }
+  return panel;
+}
+
+/// A number over each parameter of an axis of samples.
+std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
+                                const ReadAxis& axis, const HeldPlaces& held) {
+  const Unit unit = read_in(v.unit);
+  const auto found = in_shown_unit(sweep.slice(v.name, {}, axis.name, held), unit);
+  const auto chosen = some_of(found.size(), kMostPoints);
+  std::vector<Panel> panels;
+  for (const std::string& name : axis.parameters) {
+    const std::vector<double> values = sweep.parameter(name);
+    const Unit unit_x = read_in(sweep.parameter_unit(name));
+    Series cloud;
+    cloud.kind = Series::Kind::points;
+    cloud.label = v.name;
+    cloud.provenance = "model";
+    for (const std::size_t i : chosen) {
+      if (!std::isfinite(found[i])) continue;
+      cloud.x.push_back(values[i] / unit_x.to_si);
+      cloud.y.push_back(found[i]);
+    }
+    panels.push_back(
+        {name, {name, unit_x.symbol, false, {}, {}}, {v.name, unit.symbol, false, {}, {}}, {}});
+    if (!cloud.x.empty()) panels.back().series.push_back(std::move(cloud));
+  }
+  return panels;
+}
+
+Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const SweepFigures& wished) {
+  const auto& axes = sweep.axes();
+  const std::string x = wished.x.value_or(axes.back().name);
+  const ReadAxis& across = axes[sweep.axis(x)];
+  std::optional<std::string> y = wished.y;
+  for (std::size_t a = axes.size(); a-- > 0 && !y;) {
+    if (axes[a].name != x) y = axes[a].name;
+  }
+  Figure figure{v.name, v.name, fmt::format("{}: {}.", sweep.title(), v.meaning), {}};
+  std::vector<std::string> free{x};
+  if (!v.times_s.empty()) {
+    figure.panels.push_back(sweep_curves(sweep, v, x, wished.held));
+  } else if (across.parameters != std::vector{across.name}) {
+    figure.panels = sweep_clouds(sweep, v, across, wished.held);
+  } else {
+    if (y) {
+      free.push_back(*y);
+      figure.panels.push_back(sweep_map(sweep, v, x, *y, wished.held));
+    }
+    figure.panels.push_back(sweep_family(sweep, v, x, y, wished.held));
+  }
+  figure.caption += held_words(sweep, free, wished.held);
+  return figure;
+}
+
+Figure pareto_figure(const SweepReader& sweep, const std::string& first,
+                     const std::string& second) {
+  std::vector<std::pair<double, double>> front;
+  Series cloud;
+  cloud.kind = Series::Kind::points;
+  cloud.label = "cells";
+  cloud.provenance = "model";
+  const std::uint64_t stride = sweep.cells() / kMostPoints + 1;
+  std::uint64_t cell = 0;
+  const Unit unit_x = read_in(sweep.variable(second).unit),
+             unit_y = read_in(sweep.variable(first).unit);
+  sweep.each({second, first, "status"}, [&](const auto& found) {
+    for (std::size_t i = 0; i < found[0].size(); ++i, ++cell) {
+      if (found[2][i] != 0.0) continue;
+      front.emplace_back(found[0][i], found[1][i]);
+      if (cell % stride != 0) continue;
+      cloud.x.push_back(found[0][i] / unit_x.to_si);
+      cloud.y.push_back(found[1][i] / unit_y.to_si);
+    }
+    front = pareto_front(std::move(front));  // what was seen so far needs no more
+  });
+  if (front.empty()) throw bad_input("sweep", "no cell is done", "cells to choose from");
+  Series best = line("Pareto front", {}, {});
+  for (const auto& [x, y] : front) {
+    best.x.push_back(x / unit_x.to_si);
+    best.y.push_back(y / unit_y.to_si);
+  }
+  Panel panel{
+      "", {second, unit_x.symbol, false, {}, {}}, {first, unit_y.symbol, false, {}, {}}, {}};
+  if (!cloud.x.empty()) panel.series.push_back(std::move(cloud));
+  Series ends = best;
+  ends.kind = Series::Kind::points;
+  ends.label = "best cells";
+  panel.series.push_back(std::move(best));
+  panel.series.push_back(std::move(ends));
+  return {"pareto",
+          fmt::format("{} against {}", first, second),
+          fmt::format("{} cells that no other betters in both.", front.size()),
+          {std::move(panel)}};
+}
+
+struct FoundRange {
+  double least = std::numeric_limits<double>::infinity();
+  double largest = -std::numeric_limits<double>::infinity();
+};
+
+FoundRange range_of(const SweepReader& sweep, const std::string& name) {
+  FoundRange range;
+  sweep.each({name, "status"}, [&](const auto& found) {
+    for (std::size_t i = 0; i < found[0].size(); ++i) {
+      if (found[1][i] != 0.0 || std::isnan(found[0][i])) continue;
+      range.least = std::min(range.least, found[0][i]);
+      range.largest = std::max(range.largest, found[0][i]);
+    }
+  });
+  return range;
+}
+
+}  // namespace
+
+std::vector<std::pair<double, double>> pareto_front(std::vector<std::pair<double, double>> pairs) {
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<std::pair<double, double>> front;
+  for (const auto& pair : pairs) {
+    if (front.empty() || pair.second < front.back().second) front.push_back(pair);
+  }
+  return front;
+}
+
+std::string sweep_text(const SweepReader& sweep) {
+  const CellTally tally = sweep.tally();
+  std::string text = sweep.title().empty() ? "" : sweep.title() + "\n";
+  text += fmt::format("{} cells: {} done, {} skipped, {} failed\n", sweep.cells(), tally.done,
+                      tally.skipped, tally.failed);
+  for (const std::string& reason : tally.reasons)
+    text += fmt::format("- {}\n", printable(reason, 160));
+  for (const ReadAxis& axis : sweep.axes()) {
+    text += fmt::format("axis {}: {}", axis.name, axis.places.size());
+    if (axis.parameters == std::vector{axis.name}) {
+      text += fmt::format(" from {} to {}", place_words(axis, 0).substr(axis.name.size() + 3),
+                          place_words(axis, axis.places.size() - 1).substr(axis.name.size() + 3));
+    } else {
+      for (const std::string& name : axis.parameters) {
+        text += fmt::format("{}{}", name == axis.parameters.front() ? " of " : ", ", name);
+      }
+    }
+    text += "\n";
+  }
+  for (const ReadVariable& v : sweep.variables()) {
+    const Unit unit = read_in(v.unit);
+    text += fmt::format("{}: ", named_in_unit(v.name, unit));
+    if (!v.times_s.empty()) {
+      text += fmt::format("curves at {} times", v.times_s.size());
+    } else if (const FoundRange range = range_of(sweep, v.name); range.least <= range.largest) {
+      text += fmt::format("{} to {}", significant(range.least / unit.to_si, 4),
+                          significant(range.largest / unit.to_si, 4));
+    } else {
+      text += "nothing found";
+    }
+    text += fmt::format(" ({})\n", v.meaning);
+  }
+  return text;
+}
+
+Json sweep_json(const SweepReader& sweep) {
+  const CellTally tally = sweep.tally();
+  Json json{{"title", sweep.title()},   {"cells", sweep.cells()},    {"done", tally.done},
+            {"skipped", tally.skipped}, {"failed", tally.failed},    {"reasons", tally.reasons},
+            {"axes", Json::array()},    {"variables", Json::array()}};
+  for (const ReadAxis& axis : sweep.axes()) {
+    json["axes"].push_back({{"name", axis.name},
+                            {"unit", axis.unit},
+                            {"size", axis.places.size()},
+                            {"first", axis.places.front()},
+                            {"last", axis.places.back()},
+                            {"parameters", axis.parameters}});
+  }
+  for (const ReadVariable& v : sweep.variables()) {
+    Json entry{{"name", v.name}, {"unit", v.unit}, {"meaning", v.meaning}};
+    if (!v.times_s.empty()) {
+      entry["times_s"] = v.times_s;
+    } else if (const FoundRange range = range_of(sweep, v.name); range.least <= range.largest) {
+      entry["least"] = range.least;
+      entry["largest"] = range.largest;
+    }
+    json["variables"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& wished) {
+  std::vector<Figure> figures;
+  for (const ReadVariable& v : sweep.variables()) {
+    const bool named = std::find(wished.variables.begin(), wished.variables.end(), v.name) !=
+                       wished.variables.end();
+    if (named || (wished.variables.empty() && !v.name.starts_with("count_"))) {
+      figures.push_back(sweep_figure(sweep, v, wished));
+    }
+  }
+  for (const std::string& name : wished.variables) static_cast<void>(sweep.variable(name));
+  if (wished.pareto) {
+    figures.push_back(pareto_figure(sweep, wished.pareto->first, wished.pareto->second));
+  }
+  return figures;
+}
+
+}  // namespace tpm

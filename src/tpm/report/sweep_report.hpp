@@ -1,0 +1,33 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/report/figure.hpp"
+#include "tpm/sweep/sweep_reader.hpp"
+
+namespace tpm {
+
+/// What a file of results holds: axes, variables with their ranges, cells and reasons.
+[[nodiscard]] std::string sweep_text(const SweepReader& sweep);
+[[nodiscard]] Json sweep_json(const SweepReader& sweep);
+
+/// What is drawn of a sweep.
+struct SweepFigures {
+  std::vector<std::string> variables;  ///< empty: all that are no counts
+  std::optional<std::string> x, y;     ///< axes; none: the last and the one before
+  HeldPlaces held;                     ///< places on the other axes
+  /// Two numbers that are both better when smaller, such as misfit and cost.
+  std::optional<std::pair<std::string, std::string>> pareto;
+};
+
+/// Maps of colours of numbers over two axes with families of lines beside them, lines over one,
+/// points over samples, curves in time, and a Pareto front. Throws Error(bad_input).
+[[nodiscard]] std::vector<Figure> sweep_figures(const SweepReader& sweep,
+                                                const SweepFigures& wished);
+
+/// Of pairs that are better when smaller, those that no other betters in both, by rising first.
+[[nodiscard]] std::vector<std::pair<double, double>> pareto_front(
+    std::vector<std::pair<double, double>> pairs);
+
+}  // namespace tpm

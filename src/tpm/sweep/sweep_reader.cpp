@@ -1,0 +1,151 @@
+#include "tpm/sweep/sweep_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+namespace {
+
+std::string path_of(const std::string& name) {
+  return fmt::format("/{}", name);
+}
+
+template <class List>
+std::string names_in(const List& list) {
+  std::string names;
+  for (const auto& entry : list) {
+    names += names.empty() ? "" : ", ";
+    names += entry.name;
+  }
+  return names;
+}
+
+}  // namespace
+
+SweepReader::SweepReader(const std::filesystem::path& file) : file_(file) {
+  if (!file_.has_attribute("/", "sweep_fingerprint")) {
+    throw bad_input(file.string(), "holds no sweep", "a file that tpm sweep has written");
+  }
+  title_ = file_.attribute("/", "title");
+  for (const std::string& name : file_.texts("/sweep/axes")) {
+    const std::string path = path_of(name);
+    const bool own = file_.has_attribute(path, "parameter");
+    axes_.push_back({name, own ? file_.attribute(path, "units") : "", file_.numbers(path), {}});
+  }
+  for (const std::string& name : file_.texts("/sweep/parameters")) {
+    axes_[axis(file_.attribute(path_of(name), "axis"))].parameters.push_back(name);
+  }
+  std::vector<std::string> names = file_.texts("/sweep/variables");
+  for (const std::string& name : file_.texts("/sweep/counted")) {
+    names.push_back(fmt::format("count_{}", name));
+  }
+  for (const std::string& name : names) {
+    const std::string path = path_of(name), time = fmt::format("/{}_time", name);
+    variables_.push_back({name, file_.attribute(path, "units"), file_.attribute(path, "long_name"),
+                          file_.has(time) ? file_.numbers(time) : std::vector<double>{}});
+  }
+}
+
+const ReadVariable& SweepReader::variable(const std::string& name) const {
+  const auto found = std::find_if(variables_.begin(), variables_.end(),
+                                  [&](const ReadVariable& v) { return v.name == name; });
+  if (found != variables_.end()) return *found;
+  throw bad_input("sweep", fmt::format("no variable '{}'", printable(name)),
+                  fmt::format("one of {}", names_in(variables_)));
+}
+
+std::size_t SweepReader::axis(const std::string& name) const {
+  const auto found =
+      std::find_if(axes_.begin(), axes_.end(), [&](const ReadAxis& a) { return a.name == name; });
+  if (found != axes_.end()) return static_cast<std::size_t>(found - axes_.begin());
+  throw bad_input("sweep", fmt::format("no axis '{}'", printable(name)),
+                  fmt::format("one of {}", names_in(axes_)));
+}
+
+std::uint64_t SweepReader::cells() const {
+  std::uint64_t cells = 1;
+  for (const ReadAxis& axis : axes_) cells *= axis.places.size();
+  return cells;
+}
+
+CellTally SweepReader::tally() const {
+  CellTally tally;
+  each({"status"}, [&](const auto& found) {
+    for (const double status : found.front()) {
+      tally.done += status == 0.0 ? 1 : 0;
+      tally.skipped += status == 1.0 ? 1 : 0;
+      tally.failed += status == 2.0 ? 1 : 0;
+    }
+  });
+  const auto texts = file_.texts("/reason_text");
+  tally.reasons.assign(texts.begin() + 1, texts.end());
+  return tally;
+}
+
+std::vector<double> SweepReader::parameter(const std::string& name) const {
+  return file_.numbers(path_of(name));
+}
+
+std::string SweepReader::parameter_unit(const std::string& name) const {
+  return file_.attribute(path_of(name), "units");
+}
+
+std::vector<std::uint64_t> SweepReader::start_at(const HeldPlaces& held) const {
+  std::vector<std::uint64_t> first(axes_.size(), 0);
+  for (const auto& [name, place] : held) first[axis(name)] = place;
+  return first;
+}
+
+std::vector<double> SweepReader::slice(const std::string& name,
+                                       const std::optional<std::string>& rows,
+                                       const std::string& columns, const HeldPlaces& held) const {
+  if (!variable(name).times_s.empty()) {
+    throw bad_input("sweep", fmt::format("'{}' is a curve in each cell", name), "a number");
+  }
+  std::vector<std::uint64_t> first = start_at(held), counts(axes_.size(), 1);
+  const std::size_t column = axis(columns);
+  first[column] = 0;
+  counts[column] = axes_[column].places.size();
+  if (!rows) return file_.part(path_of(name), first, counts);
+  const std::size_t row = axis(*rows);
+  if (row == column) throw bad_input("sweep", "one axis for both directions", "two axes");
+  first[row] = 0;
+  counts[row] = axes_[row].places.size();
+  std::vector<double> values = file_.part(path_of(name), first, counts);
+  if (row < column) return values;
+  std::vector<double> turned;  // the file has the axis of the columns outside
+  turned.reserve(values.size());
+  for (std::uint64_t i = 0; i < counts[row]; ++i) {
+    for (std::uint64_t j = 0; j < counts[column]; ++j)
+      turned.push_back(values[j * counts[row] + i]);
+  }
+  return turned;
+}
+
+std::vector<double> SweepReader::curve(const std::string& name, const HeldPlaces& held) const {
+  std::vector<std::uint64_t> first = start_at(held), counts(axes_.size(), 1);
+  first.push_back(0);
+  counts.push_back(variable(name).times_s.size());
+  return file_.part(path_of(name), first, counts);
+}
+
+void SweepReader::each(
+    const std::vector<std::string>& names,
+    const std::function<void(const std::vector<std::vector<double>>&)>& see) const {
+  constexpr std::uint64_t kAtOnce = 1'000'000;
+  const std::uint64_t rows = axes_.front().places.size(), in_row = cells() / rows;
+  const std::uint64_t step = std::max<std::uint64_t>(kAtOnce / in_row, 1);
+  std::vector<std::uint64_t> first(axes_.size(), 0), counts;
+  for (const ReadAxis& axis : axes_) counts.push_back(axis.places.size());
+  for (first[0] = 0; first[0] < rows; first[0] += step) {
+    counts[0] = std::min(step, rows - first[0]);
+    std::vector<std::vector<double>> found;
+    for (const std::string& name : names) found.push_back(file_.part(path_of(name), first, counts));
+    see(found);
+  }
+}
+
+}  // namespace tpm

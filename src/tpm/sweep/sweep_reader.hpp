@@ -1,0 +1,70 @@
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tpm/store/hdf5.hpp"
+#include "tpm/sweep/sweep_result.hpp"
+
+namespace tpm {
+
+/// An axis of a file of results.
+struct ReadAxis {
+  std::string name, unit;
+  std::vector<double> places;  ///< SI, or numbers from 0 on where several parameters change
+  std::vector<std::string> parameters;  ///< that change along it
+};
+
+/// A variable, or an operation that is counted.
+struct ReadVariable {
+  std::string name, unit, meaning;
+  std::vector<double> times_s;  ///< of a curve
+};
+
+/// A place on each axis that is held, by name.
+using HeldPlaces = std::vector<std::pair<std::string, std::uint64_t>>;
+
+/// Reads what write_sweep has written, a piece at a time. Everything throws Error(bad_input).
+class SweepReader {
+ public:
+  explicit SweepReader(const std::filesystem::path& file);
+
+  [[nodiscard]] const std::string& title() const { return title_; }
+  [[nodiscard]] const std::vector<ReadAxis>& axes() const { return axes_; }
+  /// Variables, then counts of operations as count_NAME.
+  [[nodiscard]] const std::vector<ReadVariable>& variables() const { return variables_; }
+  [[nodiscard]] const ReadVariable& variable(const std::string& name) const;
+  /// The number of an axis. Throws Error(bad_input) that names those there are.
+  [[nodiscard]] std::size_t axis(const std::string& name) const;
+  [[nodiscard]] std::uint64_t cells() const;
+  [[nodiscard]] CellTally tally() const;
+  /// A parameter's values along its axis.
+  [[nodiscard]] std::vector<double> parameter(const std::string& name) const;
+  [[nodiscard]] std::string parameter_unit(const std::string& name) const;
+
+  /// A number over one or two axes, the others held at a place each (the first, if not said).
+  /// @param rows, columns names of axes; no rows: one row
+  [[nodiscard]] std::vector<double> slice(const std::string& variable,
+                                          const std::optional<std::string>& rows,
+                                          const std::string& columns, const HeldPlaces& held) const;
+  /// A curve at a place on each axis.
+  [[nodiscard]] std::vector<double> curve(const std::string& variable,
+                                          const HeldPlaces& held) const;
+  /// All numbers of several scalars, a stretch of cells at a time.
+  void each(const std::vector<std::string>& names,
+            const std::function<void(const std::vector<std::vector<double>>&)>& see) const;
+
+ private:
+  [[nodiscard]] std::vector<std::uint64_t> start_at(const HeldPlaces& held) const;
+
+  Hdf5Reader file_;
+  std::string title_;
+  std::vector<ReadAxis> axes_;
+  std::vector<ReadVariable> variables_;
+};
+
+}  // namespace tpm
