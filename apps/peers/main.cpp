@@ -24,7 +24,8 @@ namespace {
 const char* const kText =
     "The liver of 424 spheres with masses and a drag of a tenth of the lowest mode, its bonds "
     "elastic "
-    "(E2 = E' = 12 kPa, nothing relaxes): 8 mm in at 100 mm/s, held to 0.2 s. "
+    "(E2 = E' = 12 kPa, nothing relaxes): 8 mm in at 100 mm/s along the normal alone, held to 0.2 "
+    "s. "
     "MuJoCo 2.2.2: spheres on three slides, bonds as spatial tendons with stiffness and spring "
     "length: "
     "the same force law. Bullet 3.24 (double precision): a soft body of links; a link is a share "

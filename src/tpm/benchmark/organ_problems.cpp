@@ -64,7 +64,8 @@ BenchmarkProblem massless_problem(const std::shared_ptr<const PosedNetwork>& pos
 }
 
 /// The poke of a network with masses, 0.2 s.
-std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue) {
+/// @param guided the driven sphere moves along the push alone; else it is free across
+std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guided) {
   constexpr double kDampingRatio = 0.1;
   constexpr double kSpacing_s = 5e-3;
   std::vector<double> times_s = times_every(kSpacing_s, kMovingPoke_s);
@@ -73,6 +74,10 @@ std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue) {
   for (double& time : times_s) time += 0.5 * kSpacing_s;
   const auto posed = posed_liver(tissue, tissue.material.eta1_Pa_s,
                                  ramp_and_hold(8e-3, 0.1, kMovingPoke_s - 0.08), times_s);
+  if (guided) {
+    const Probe& probe = posed->network.probes.front();
+    posed->network.freedom.guide(probe.sphere, probe.direction);
+  }
   posed->set_masses(sphere_masses_kg(tissue.network.organ), kDampingRatio);
   return posed;
 }
@@ -164,7 +169,7 @@ BenchmarkProblem moving_poke_problem(const std::shared_ptr<const PosedNetwork>& 
 }
 
 BenchmarkProblem organ_poke_mass_problem() {
-  BenchmarkProblem problem = moving_poke_problem(posed_moving_liver(liver()));
+  BenchmarkProblem problem = moving_poke_problem(posed_moving_liver(liver(), false));
   problem.name = "organ_poke_mass";
   problem.title = "Organ with masses, poked at 100 mm/s";
   problem.text =
@@ -177,9 +182,10 @@ BenchmarkProblem organ_poke_mass_problem() {
 
 std::shared_ptr<const PosedNetwork> posed_elastic_poke() {
   Tissue tissue = liver();
-  // A spring E1 that gives nothing leaves E2 alone.
-  tissue.material.E1_Pa = 1e9 * tissue.material.E2_Pa;
-  return posed_moving_liver(tissue);
+  // A dashpot that gives nothing for 1e9 s leaves E2 alone.
+  tissue.material.eta1_Pa_s = 1e9 * (tissue.material.E1_Pa + tissue.material.E2_Pa);
+  // The engines move a sphere as a whole.
+  return posed_moving_liver(tissue, true);
 }
 
 }  // namespace tpm
