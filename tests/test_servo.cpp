@@ -14,6 +14,7 @@
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
 #include "tpm/servo/servo_loop.hpp"
+#include "tpm/servo/surface_contact.hpp"
 #include "tpm/store/file.hpp"
 
 namespace {
@@ -396,6 +397,211 @@ TEST_CASE("A sink that fails stops the session safely, with the cause") {
   CHECK(outcome.cause == StopCause::exception);
   CHECK(outcome.detail == "disk: full");
   CHECK(device.status().forces_off == ForcesOff::software);
+}
+
+/// A spring along a direction.
+class Spring final : public ContactModel {
+ public:
+  Spring(double stiffness_N_per_m, const Eigen::Vector3d& into)
+      : stiffness_(stiffness_N_per_m * into * into.transpose()) {}
+  void reset() noexcept override {}
+  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override {
+    return {-stiffness_ * displacement_m, 0.0, true};
+  }
+  [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
+  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
+    return stiffness_;
+  }
+  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return stiffness_; }
+  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
+  void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
+
+ private:
+  Eigen::Matrix3d stiffness_;
+};
+
+constexpr double kBetween_m = 20e-3;  // of places
+
+/// Places in triangles on a plane, into which +z leads; the outermost ones have no model.
+/// @param model of a place, from its number and direction
+template <class Model>
+SurfaceContact flat_surface(int half, Model&& model) {
+  std::vector<SurfacePlace> places;
+  for (int i = -half - 1; i <= half + 1; ++i) {
+    for (int j = -half - 1; j <= half + 1; ++j) {
+      const bool bare = std::abs(i) > half || std::abs(j) > half;
+      const Eigen::Vector3d rest(kBetween_m * (i + 0.5 * j), kBetween_m * std::sqrt(0.75) * j, 0.0);
+      places.push_back({rest, Eigen::Vector3d::UnitZ(), nullptr});
+      if (!bare) places.back().model = model(places.size());
+    }
+  }
+  return {std::move(places), {.tool_radius_m = 5e-3, .sphere_radius_m = 10e-3, .reach_m = 20e-3}};
+}
+
+/// Where a tool's centre is at a depth below a flat surface.
+Eigen::Vector3d at_depth(double depth_m, double x_m = 0.0, double y_m = 0.0) {
+  return {x_m, y_m, depth_m - 15e-3};
+}
+
+TEST_CASE("A surface of equal springs is a plane of one stiffness, without force aside") {
+  SurfaceContact surface = flat_surface(
+      2, [](std::size_t) { return std::make_unique<Spring>(150.0, Eigen::Vector3d::UnitZ()); });
+  Random random(1);
+  for (int i = 0; i < 2000; ++i) {
+    const double depth = 8e-3 * random.uniform();
+    const SurfaceContact::Answer answer = surface.step(
+        at_depth(depth, 0.03 * (random.uniform() - 0.5), 0.03 * (random.uniform() - 0.5)));
+    REQUIRE((answer.force_N + 150.0 * depth * Eigen::Vector3d::UnitZ()).norm() < 1e-12);
+    REQUIRE_THAT(answer.depth_m, WithinAbs(depth, 1e-15));
+    REQUIRE(answer.trusted);
+  }
+}
+
+TEST_CASE("Over unlike springs the force is minus the gradient of what they store") {
+  const auto stiffness = [](std::size_t number) {
+    return 100.0 + 20.0 * static_cast<double>(number % 7);
+  };
+  SurfaceContact surface = flat_surface(2, [&](std::size_t number) {
+    return std::make_unique<Spring>(stiffness(number), Eigen::Vector3d::UnitZ());
+  });
+  const auto stored_J = [&](const Eigen::Vector3d& at) {
+    surface.reset();
+    (void)surface.step(at);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < surface.places(); ++i) {
+      const double depth = std::max(surface.depth_m(i), 0.0);
+      sum += 0.5 * stiffness(i + 1) * depth * depth;
+    }
+    return sum;
+  };
+  Random random(5);
+  double aside = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    const Eigen::Vector3d at =
+        at_depth(1e-3 + 7e-3 * random.uniform(), 0.03 * (random.uniform() - 0.5),
+                 0.03 * (random.uniform() - 0.5));
+    surface.reset();
+    const Eigen::Vector3d force = surface.step(at).force_N;
+    constexpr double kStep_m = 1e-6;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d step = kStep_m * Eigen::Vector3d::Unit(k);
+      const double slope = (stored_J(at + step) - stored_J(at - step)) / (2.0 * kStep_m);
+      REQUIRE_THAT(force[k], WithinAbs(-slope, 1e-7));
+    }
+    aside = std::max(aside, force.head<2>().norm());
+  }
+  CHECK(aside > 0.01);  // there is something to be found
+}
+
+TEST_CASE("Over a place a surface is that place's contact alone") {
+  const auto element = [](std::size_t) {
+    return std::make_unique<ElementContact>(slow_liver(), 1e-3);
+  };
+  SurfaceContact surface = flat_surface(1, element);
+  ElementContact model(slow_liver(), 1e-3);
+  OneSidedContact alone(model, Eigen::Vector3d::UnitZ());
+  double touched = 0.0;
+  for (int i = 0; i < 4000; ++i) {  // in, out, and in again before all has recovered
+    const double depth = 6e-3 * std::sin(5e-3 * i) - 1e-3;
+    const Eigen::Vector3d force = surface.step(at_depth(depth)).force_N;
+    const double expected = alone.step(depth).force_N;
+    REQUIRE((force + expected * Eigen::Vector3d::UnitZ()).norm() < 1e-14);
+    touched = std::max(touched, expected);
+  }
+  CHECK(touched > 0.5);
+}
+
+/// A random walk of a tool, smooth at the scale of a period, on and off and over several places.
+class Wander {
+ public:
+  explicit Wander(std::uint64_t seed) : random_(seed) {}
+  Eigen::Vector3d next() {
+    if (++steps_ % 50 == 0) {
+      const auto about = [this](double size) { return size * (2.0 * random_.uniform() - 1.0); };
+      aim_ = at_depth(about(6e-3) + 2e-3, about(0.025), about(0.02));
+    }
+    speed_ += 1e-3 * (400.0 * (aim_ - at_) - 30.0 * speed_);
+    at_ += 1e-3 * speed_;
+    return at_;
+  }
+
+ private:
+  Random random_;
+  long steps_ = 0;
+  Eigen::Vector3d at_ = at_depth(-5e-3), aim_ = at_depth(-5e-3), speed_ = Eigen::Vector3d::Zero();
+};
+
+TEST_CASE("A surface never pulls, gives no energy, and hands over without a jump") {
+  // Places of unlike stiffness, so that there is something to be had from sliding.
+  TpmParameters material = slow_liver();
+  material.eta1_Pa_s = GENERATE(2.4e2, 2.4e3, 2.4e4);  // tau 10 ms to 1 s
+  SurfaceContact surface = flat_surface(1, [&](std::size_t number) {
+    TpmParameters own = material;
+    const double factor = 0.5 + 0.1 * static_cast<double>(number % 10);
+    own.E1_Pa *= factor;
+    own.E2_Pa *= factor;
+    own.Eprime_Pa *= factor;
+    own.eta1_Pa_s *= factor;
+    return std::make_unique<ElementContact>(own, 1e-3);
+  });
+  constexpr double kStiffest_N_per_m = 1.5 * 200.0;
+  Wander tool(7);
+  Eigen::Vector3d before = at_depth(-5e-3), force = Eigen::Vector3d::Zero();
+  double work = 0.0, least = 0.0, most = 0.0;
+  int most_touching = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    const Eigen::Vector3d at = tool.next();
+    const SurfaceContact::Answer answer = surface.step(at);
+    // Along the plane's normal out of the tissue.
+    REQUIRE(answer.force_N.z() <= 0.0);
+    if (answer.touching == 0) REQUIRE(answer.force_N.isZero(0.0));
+    const Eigen::Vector3d moved = at - before;
+    REQUIRE((answer.force_N - force).norm() < kStiffest_N_per_m * moved.norm() + 2e-3);
+    work -= 0.5 * (force + answer.force_N).dot(moved);
+    least = std::min(least, work);
+    most = std::max(most, work);
+    most_touching = std::max(most_touching, answer.touching);
+    before = at;
+    force = answer.force_N;
+  }
+  CHECK(most > 1e-3);
+  CHECK(least > -1e-7 * most);  // of the trapezoidal rule
+  CHECK(most_touching >= 3);
+}
+
+TEST_CASE(
+    "A place whose surface has recovered goes to sleep, and past the models none is trusted") {
+  SurfaceContact surface = flat_surface(
+      0, [](std::size_t) { return std::make_unique<ElementContact>(slow_liver(), 1e-3); });
+  CHECK(surface.step(at_depth(4e-3)).trusted);
+  int awake = 1, steps = 0;
+  for (; awake > 0 && steps < 100'000; ++steps) awake = surface.step(at_depth(-1e-3)).awake;
+  CHECK(steps > 1000);  // it recovers with its relaxation time, 1 to 2 s
+  CHECK(steps < 100'000);
+  const SurfaceContact::Answer aside = surface.step(at_depth(4e-3, 0.5 * kBetween_m));
+  CHECK_FALSE(aside.trusted);
+  CHECK(surface.step(at_depth(4e-3, 1.0)).force_N.isZero(0.0));
+}
+
+TEST_CASE("A step over a surface neither allocates nor frees") {
+  SurfaceContact surface = flat_surface(
+      1, [](std::size_t) { return std::make_unique<ElementContact>(slow_liver(), 1e-3); });
+  Wander tool(3);
+  int touching = 0;
+  allocations = 0;
+  counting = true;
+  for (int i = 0; i < 5000; ++i) touching += surface.step(tool.next()).touching;
+  counting = false;
+  CHECK(allocations == 0);
+  CHECK(touching > 0);
+}
+
+TEST_CASE("A surface without a model, or without reach, is refused") {
+  std::vector<SurfacePlace> bare(1);
+  bare[0].rest_m = Eigen::Vector3d::Zero();
+  bare[0].into = Eigen::Vector3d::UnitZ();
+  CHECK_THROWS_AS(SurfaceContact(std::move(bare), {.reach_m = 0.02}), Error);
+  CHECK_THROWS_AS(SurfaceContact({}, {.reach_m = 0.0}), Error);
 }
 
 }  // namespace
