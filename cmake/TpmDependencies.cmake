@@ -26,6 +26,9 @@ tpm_find(OpenSSL 3 COMPONENTS Crypto)
 tpm_find(assimp 5.2)
 tpm_find(Threads)
 tpm_find(TBB 2021)
+if(TPM_MPI)
+  tpm_find(MPI 3 COMPONENTS C)
+endif()
 
 # libsundials-dev brings the MPI build of HDF5 along, which is not thread safe: the serial one is
 # asked for by name, and an MPI one is refused rather than linked silently.

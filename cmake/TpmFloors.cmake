@@ -1,7 +1,8 @@
 # The floors of src/tpm, each a library of objects, so that a library can be put together of floors
 # compiled in one way and floors compiled in another.
 set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_assimp tpm_httplib OpenSSL::Crypto
-    Threads::Threads TBB::tbb ${CMAKE_DL_LIBS})
+    Threads::Threads TBB::tbb ${CMAKE_DL_LIBS}
+    $<$<BOOL:${TPM_MPI}>:$<LINK_ONLY:MPI::MPI_C>>)
 
 function(tpm_floor_options target)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src)
@@ -55,6 +56,10 @@ function(tpm_floors suffix flags)
       add_library(${target} OBJECT ${sources})
       tpm_floor_options(${target} ${own_flags})
       tpm_compile_together(${target})
+      if(TPM_MPI AND floor STREQUAL sweep)  # only this floor speaks to other processes
+        target_compile_definitions(${target} PRIVATE TPM_MPI OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
+        target_link_libraries(${target} PRIVATE MPI::MPI_C)
+      endif()
       if(TPM_COMMON_HEADERS)
         target_precompile_headers(${target} REUSE_FROM ${carrier})
       endif()

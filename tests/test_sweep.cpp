@@ -384,6 +384,37 @@ TEST_CASE("samples are the point set's coordinates between the ends") {
         std::string::npos);
 }
 
+TEST_CASE("sensitivity of a sum: each term's share of the variance") {
+  const test::TempFolder folder;
+  const Sweep sweep = parsed(R"({"model": "single_contact",
+    "indentation": {"kind": "step_hold", "depth": "4 mm"},
+    "axes": [{"samples": "sensitivity", "count": 64, "replicates": 16, "seed": 2, "parameters": {
+               "E1": {"from": "6 kPa", "to": "16 kPa"}, "E2": {"from": "10 kPa", "to": "20 kPa"}}},
+             {"parameter": "depth", "values": ["4 mm", "8 mm"]}],
+    "outputs": ["peak_force", {"formula": "E1 + 2 * E2 + 1e6 * depth", "name": "sum"}]})");
+  static_cast<void>(result_of(sweep, folder / "a.h5"));
+  const SweepReader reader(folder / "a.h5");
+  const SweepSensitivity sum = sensitivity_of(reader, "sum", {{"depth", 1}});
+  REQUIRE(sum.parameters == std::vector<std::string>{"E1", "E2"});
+  CHECK_THAT(sum.indices.mean, WithinRel(11e3 + 30e3 + 8e3, 1e-4));
+  for (const auto& [input, share] : {std::pair{0U, 0.2}, {1U, 0.8}}) {
+    for (const IndexEstimate& index :
+         {sum.indices.inputs[input].first_order, sum.indices.inputs[input].total}) {
+      CHECK(std::abs(index.value - share) < 2.0 * (index.high - index.low));
+      CHECK(index.high - index.low < 0.03);
+    }
+  }
+  // A step's first force does not know E1.
+  const SweepSensitivity peak = sensitivity_of(reader, "peak_force", {});
+  CHECK(peak.indices.inputs[0].total.value == 0.0);
+  CHECK(sensitivity_text({sum, peak}).find("E2") != std::string::npos);
+  const Sweep plain = parsed(kMixed);
+  static_cast<void>(result_of(plain, folder / "b.h5"));
+  CHECK(test::refusal_of([&] {
+          static_cast<void>(sensitivity_of(SweepReader(folder / "b.h5"), "share", {}));
+        }).find("no axis of samples") != std::string::npos);
+}
+
 TEST_CASE("a sweep over a star as a network is the sweep over it in closed form") {
   const Sweep star = parsed(R"({"model": "organ", "block": 5, "scene": {
       "organ": {"kind": "star", "spacing": "30 mm"},

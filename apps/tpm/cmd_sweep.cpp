@@ -17,7 +17,7 @@
 #include "tpm/report/run_record.hpp"
 #include "tpm/report/sweep_report.hpp"
 #include "tpm/store/file.hpp"
-#include "tpm/sweep/run_sweep.hpp"
+#include "tpm/sweep/sweep_ranks.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
 namespace tpm::app {
@@ -45,7 +45,9 @@ struct WrittenSweep {
   double seconds = 0.0, cpu_seconds = 0.0;
 };
 
-SweepRun run_watched(const Sweep& sweep, const fs::path& log, SweepControls controls) {
+/// @param ranks none: this process alone
+SweepRun run_watched(const Sweep& sweep, const fs::path& log, SweepControls controls,
+                     SweepRanks* ranks = nullptr) {
   const InterruptWatch interrupts;
   std::optional<Progress> progress;
   std::uint64_t before = 0;
@@ -59,7 +61,7 @@ SweepRun run_watched(const Sweep& sweep, const fs::path& log, SweepControls cont
   };
   controls.interrupted = InterruptWatch::seen;
   controls.note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
-  return run_sweep(sweep, log, controls);
+  return ranks != nullptr ? ranks->run(sweep, log, controls) : run_sweep(sweep, log, controls);
 }
 
 Json tally_json(const Sweep& sweep, const CellTally& tally) {
@@ -243,6 +245,23 @@ std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
   return {name, static_cast<std::uint64_t>(nearest - axis.places.begin())};
 }
 
+int sensitivity(const SweepViewChoice& choice, const Session& session) {
+  const SweepReader sweep(choice.file);
+  HeldPlaces held;
+  for (const std::string& text : choice.at) held.push_back(parse_held(text, sweep));
+  std::vector<SweepSensitivity> all;
+  for (const ReadVariable& v : sweep.variables()) {
+    const bool wished =
+        choice.variables.empty()
+            ? v.times_s.empty() && !v.name.starts_with("count_")
+            : std::count(choice.variables.begin(), choice.variables.end(), v.name) > 0;
+    if (wished) all.push_back(sensitivity_of(sweep, v.name, held));
+  }
+  for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
+  fmt::print("{}", session.json() ? to_text(sensitivity_json(all)) : sensitivity_text(all));
+  return 0;
+}
+
 int plot(const SweepViewChoice& choice) {
   const SweepReader sweep(choice.file);
   SweepFigures wished;
@@ -265,9 +284,16 @@ int plot(const SweepViewChoice& choice) {
 
 int run_command(const SweepChoice& choice, const Session& session) {
   if (choice.sweep.empty()) {
-    throw Error(ExitCode::usage, "sweep", "no file", "tpm sweep SWEEP.json, or merge, show, plot");
+    throw Error(ExitCode::usage, "sweep", "no file",
+                "tpm sweep SWEEP.json, or merge, show, plot, sensitivity");
   }
+  const std::unique_ptr<SweepRanks> ranks = SweepRanks::of_this_run();
   const Sweep sweep = read_sweep(choice.sweep);
+  if (ranks && !ranks->first()) {
+    const InterruptWatch until_sent_home;
+    ranks->serve(sweep);
+    return 0;
+  }
   const fs::path output = choice.output, log = log_path(output);
   if (fingerprint_of(output) == sweep.fingerprint) {
     std::error_code ignored;
@@ -283,10 +309,13 @@ int run_command(const SweepChoice& choice, const Session& session) {
     controls.workers = static_cast<int>(parse_whole_number(choice.workers, "--workers", 1));
   }
   if (!choice.shard.empty()) {
+    if (ranks) {
+      throw Error(ExitCode::usage, "--shard", "under mpirun", "one way of sharing the work");
+    }
     controls.shard = parse_shard(choice.shard);
     return run_shard(sweep, output, std::move(controls), session);
   }
-  const SweepRun run = run_watched(sweep, log, std::move(controls));
+  const SweepRun run = run_watched(sweep, log, std::move(controls), ranks.get());
   if (run.interrupted) return stopped(log);
   const BlockLog blocks = BlockLog::to_read(log, sweep, {});
   const WrittenSweep written = write_results(sweep, run, {&blocks}, output);
@@ -302,6 +331,14 @@ void add_views(CLI::App& sweep, Session& session) {
   add_format_option(*showing, session);
   showing->callback(
       [choice, &session] { session.run = [choice, &session] { return show(*choice, session); }; });
+  CLI::App* judging = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
+  judging->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  judging->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
+  judging->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
+  add_format_option(*judging, session);
+  judging->callback([choice, &session] {
+    session.run = [choice, &session] { return sensitivity(*choice, session); };
+  });
   CLI::App* plotting = sweep.add_subcommand("plot", "Maps, families of lines, Pareto fronts");
   plotting->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   plotting->add_option("-o,--output", choice->folder, "Folder for pictures (PNG, SVG)")

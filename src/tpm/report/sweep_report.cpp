@@ -334,6 +334,57 @@ Json sweep_json(const SweepReader& sweep) {
   return json;
 }
 
+std::string sensitivity_text(const std::vector<SweepSensitivity>& all) {
+  std::string text;
+  const auto words = [](const IndexEstimate& e) {
+    return fmt::format("{:7.4f} ({:.4f} to {:.4f})", e.value, e.low, e.high);
+  };
+  for (const SweepSensitivity& s : all) {
+    text += fmt::format("{}{}: mean {}, standard deviation {} (SI), {} replicates of {} points",
+                        text.empty() ? "" : "\n", s.variable, significant(s.indices.mean, 4),
+                        significant(s.indices.standard_deviation, 4), s.design.replicates,
+                        s.design.points);
+    if (s.indices.left_out > 0) text += fmt::format(", {} points left out", s.indices.left_out);
+    text += "\n";
+    if (s.indices.inputs.empty()) {
+      text += "it does not vary\n";
+      continue;
+    }
+    text +=
+        fmt::format("{:<12} {:<28} {:<28}\n", "parameter", "first order (95 %)", "total (95 %)");
+    for (std::size_t i = 0; i < s.parameters.size(); ++i) {
+      text += fmt::format("{:<12} {:<28} {:<28}\n", s.parameters[i],
+                          words(s.indices.inputs[i].first_order), words(s.indices.inputs[i].total));
+    }
+  }
+  return text;
+}
+
+Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
+  const auto numbers = [](const IndexEstimate& e) {
+    return Json{
+        {"value", rounded(e.value, 6)}, {"low", rounded(e.low, 6)}, {"high", rounded(e.high, 6)}};
+  };
+  Json list = Json::array();
+  for (const SweepSensitivity& s : all) {
+    Json inputs = Json::array();
+    for (std::size_t i = 0; i < s.indices.inputs.size(); ++i) {
+      inputs.push_back({{"parameter", s.parameters[i]},
+                        {"first_order", numbers(s.indices.inputs[i].first_order)},
+                        {"total", numbers(s.indices.inputs[i].total)}});
+    }
+    list.push_back({{"variable", s.variable},
+                    {"mean", rounded(s.indices.mean, 6)},
+                    {"standard_deviation", rounded(s.indices.standard_deviation, 6)},
+                    {"level", s.indices.level},
+                    {"points", s.design.points},
+                    {"replicates", s.design.replicates},
+                    {"points_left_out", s.indices.left_out},
+                    {"inputs", std::move(inputs)}});
+  }
+  return Json{{"sensitivity", std::move(list)}};
+}
+
 std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& wished) {
   std::vector<Figure> figures;
   for (const ReadVariable& v : sweep.variables()) {

@@ -4,13 +4,17 @@
 #include <vector>
 
 #include "tpm/report/figure.hpp"
-#include "tpm/sweep/sweep_reader.hpp"
+#include "tpm/sweep/sweep_sensitivity.hpp"
 
 namespace tpm {
 
 /// What a file of results holds: axes, variables with their ranges, cells and reasons.
 [[nodiscard]] std::string sweep_text(const SweepReader& sweep);
 [[nodiscard]] Json sweep_json(const SweepReader& sweep);
+
+/// First-order and total indices with their intervals, one table for each number.
+[[nodiscard]] std::string sensitivity_text(const std::vector<SweepSensitivity>& all);
+[[nodiscard]] Json sensitivity_json(const std::vector<SweepSensitivity>& all);
 
 /// What is drawn of a sweep.
 struct SweepFigures {

@@ -53,17 +53,6 @@ bool take_all(std::string_view& from, std::vector<T>& values) {
   return true;
 }
 
-std::string packed(const CellBlock& block) {
-  std::string bytes;
-  put_all(bytes, block.status);
-  put_all(bytes, block.reason);
-  put_all(bytes, block.error_estimate);
-  for (const auto& counts : block.counts) put_all(bytes, counts);
-  for (const auto& values : block.values) put_all(bytes, values);
-  for (const std::string& reason : block.reasons) bytes.append(reason).push_back('\0');
-  return bytes;
-}
-
 bool unpack(const Sweep& sweep, std::string_view bytes, CellBlock& block) {
   const std::uint64_t first = block.number * sweep.block_cells;
   const auto cells = static_cast<std::size_t>(std::min(sweep.block_cells, sweep.cells() - first));
@@ -99,6 +88,17 @@ Error cannot_write_log(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+std::string pack(const CellBlock& block) {
+  std::string bytes;
+  put_all(bytes, block.status);
+  put_all(bytes, block.reason);
+  put_all(bytes, block.error_estimate);
+  for (const auto& counts : block.counts) put_all(bytes, counts);
+  for (const auto& values : block.values) put_all(bytes, values);
+  for (const std::string& reason : block.reasons) bytes.append(reason).push_back('\0');
+  return bytes;
+}
 
 BlockLog::BlockLog(std::filesystem::path path, const Sweep& sweep)
     : path_(std::move(path)), sweep_(&sweep), place_(sweep.blocks(), 0) {}
@@ -253,11 +253,10 @@ void BlockLog::find_blocks(const std::function<void(const std::string&)>& note) 
   }
 }
 
-void BlockLog::append(const CellBlock& block) {
-  const std::string payload = packed(block);
+void BlockLog::append(std::uint64_t number, const std::string& payload) {
   RecordHead head{};
   std::copy(kRecordMagic.begin(), kRecordMagic.end(), head.magic);
-  head.number = block.number;
+  head.number = number;
   head.size = payload.size();
   head.crc_of_payload = checksum(payload.data(), payload.size());
   head.crc_of_head = checksum(&head, sizeof head - sizeof head.crc_of_head);
@@ -277,7 +276,7 @@ void BlockLog::append(const CellBlock& block) {
     }
     done += static_cast<std::uint64_t>(n);
   }
-  place_[block.number] = length_;
+  place_[number] = length_;
   length_ += bytes.size();
   ++size_;
 }

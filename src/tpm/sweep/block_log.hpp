@@ -9,6 +9,9 @@
 
 namespace tpm {
 
+/// A block as the log holds it.
+[[nodiscard]] std::string pack(const CellBlock& block);
+
 /// Blocks of a sweep in the order in which they were finished, each with a check sum. What stands
 /// in the file survives the process; a block that was cut short or damaged is not there.
 class BlockLog {
@@ -34,7 +37,8 @@ class BlockLog {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
   /// Throws Error(environment); the log is then as it was before.
-  void append(const CellBlock& block);
+  void append(const CellBlock& block) { append(block.number, pack(block)); }
+  void append(std::uint64_t block, const std::string& packed);
   /// Throws Error(bad_input) if the block was damaged since the log was opened.
   [[nodiscard]] CellBlock read(std::uint64_t block) const;
   /// Passes everything to the disk: from here on it survives the machine.

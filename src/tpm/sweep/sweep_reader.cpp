@@ -30,6 +30,7 @@ SweepReader::SweepReader(const std::filesystem::path& file) : file_(file) {
     throw bad_input(file.string(), "holds no sweep", "a file that tpm sweep has written");
   }
   title_ = file_.attribute("/", "title");
+  document_ = parse_json(file_.attribute("/", "sweep_json"), file.string());
   for (const std::string& name : file_.texts("/sweep/axes")) {
     const std::string path = path_of(name);
     const bool own = file_.has_attribute(path, "parameter");

@@ -34,6 +34,8 @@ class SweepReader {
   explicit SweepReader(const std::filesystem::path& file);
 
   [[nodiscard]] const std::string& title() const { return title_; }
+  /// SWEEP.json as it was read.
+  [[nodiscard]] const Json& document() const { return document_; }
   [[nodiscard]] const std::vector<ReadAxis>& axes() const { return axes_; }
   /// Variables, then counts of operations as count_NAME.
   [[nodiscard]] const std::vector<ReadVariable>& variables() const { return variables_; }
@@ -63,6 +65,7 @@ class SweepReader {
 
   Hdf5Reader file_;
   std::string title_;
+  Json document_;
   std::vector<ReadAxis> axes_;
   std::vector<ReadVariable> variables_;
 };
