@@ -16,6 +16,7 @@
 
 #include "error_case.hpp"
 #include "simulation_error_cases.hpp"
+#include "sweep_error_cases.hpp"
 #include "temp_folder.hpp"
 #include "tpm/curve/load.hpp"
 #include "tpm/curve/pack.hpp"
@@ -553,7 +554,8 @@ std::vector<ErrorCase> all_cases() {
   for (const auto& cases :
        {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
         hdf5_cases(), fit_config_cases(), oscillation_cases(), fit_tables_cases(), design_cases(),
-        claims_cases(), law_cases(), scene_cases(), test::simulation_error_cases()}) {
+        claims_cases(), law_cases(), scene_cases(), test::simulation_error_cases(),
+        test::sweep_error_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

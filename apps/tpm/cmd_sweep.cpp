@@ -142,7 +142,7 @@ Shard parse_shard(const std::string& text) {
   const std::uint64_t index = parse_whole_number(text.substr(0, stroke), "--shard", 1);
   const std::uint64_t count = parse_whole_number(text.substr(stroke + 1), "--shard", 1);
   if (index <= count) return {index - 1, count};
-  throw Error(ExitCode::usage, "--shard", fmt::format("the {}th of {}", index, count),
+  throw Error(ExitCode::usage, "--shard", fmt::format("part {} of {}", index, count),
               "I/N with I up to N");
 }
 

@@ -1,0 +1,72 @@
+#pragma once
+// Bad sweeps, and bad files beside them (test_errors.cpp).
+#include <string>
+#include <vector>
+
+#include "error_case.hpp"
+
+namespace tpm::test {
+
+inline std::vector<ErrorCase> sweep_error_cases() {
+  const std::string type = "sweep";
+  const std::string good =
+      R"({"model": "single_contact", "indentation": {"kind": "step_hold", "depth": "4 mm"},
+"axes": [{"parameter": "spacing", "values": ["20 mm", "30 mm"]}], "outputs": ["peak_force"]})";
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    const auto at = text.find(from);
+    if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
+    return files({{"s.json", text.replace(at, from.size(), to)}});
+  };
+  const std::string run = "sweep {}/s.json -o {}/out.h5";
+  return {
+      {type, "missing", run, files({})},
+      {type, "empty", run, files({{"s.json", ""}})},
+      {type, "truncated", run, files({{"s.json", good.substr(0, 60)}})},
+      {type, "binary garbage", run, files({{"s.json", kGarbage}})},
+      {type, "unknown key", run, with("\"axes\"", "\"axis\"")},
+      {type, "unknown model", run, with("single_contact", "double_contact")},
+      {type, "unknown parameter", run, with("\"spacing\"", "\"distance\"")},
+      {type, "unit of another kind", run, with("\"20 mm\"", "\"20 N\"")},
+      {type, "parameter of what is not done", run, with("\"spacing\"", "\"load\"")},
+      {type, "nothing to sweep", run,
+       with("{\"parameter\": \"spacing\", \"values\": [\"20 mm\", \"30 mm\"]}", "")},
+      {type, "range without a count", run,
+       with("\"values\": [\"20 mm\", \"30 mm\"]", "\"from\": \"20 mm\", \"to\": \"30 mm\"")},
+      {type, "values and a range", run, with("\"values\"", "\"from\": \"20 mm\", \"values\"")},
+      {type, "two axes of one parameter", run,
+       with("\"axes\": [",
+            "\"axes\": [{\"parameter\": \"spacing\", \"name\": \"x\", \"values\": "
+            "[\"1 mm\"]}, ")},
+      {type, "too many cells", run,
+       with("\"axes\": [",
+            "\"axes\": [{\"parameter\": \"E1\", \"from\": \"1 kPa\", \"to\": \"2 "
+            "kPa\", \"count\": 1000000000000}, ")},
+      {type, "unknown output", run, with("peak_force", "peek_force")},
+      {type, "output of what is not done", run, with("peak_force", "creep_depth")},
+      {type, "name twice", run,
+       with("\"peak_force\"", "{\"formula\": \"1\", \"name\": \"spacing\"}")},
+      {type, "formula of something unknown", run,
+       with("\"peak_force\"", "{\"formula\": \"farce\", \"name\": \"a\"}")},
+      {type, "condition that is no formula", run,
+       with("\"axes\"", "\"skip\": [{\"when\": \"spacing >\"}], \"axes\"")},
+      {type, "no depth", run, with(", \"depth\": \"4 mm\"", "")},
+      {type, "organ with an indentation of the single contact", run,
+       with("single_contact", "organ")},
+      {type, "samples of an unknown kind", run,
+       with("\"parameter\": \"spacing\", \"values\": [\"20 mm\", \"30 mm\"]",
+            "\"samples\": \"sobel\", \"count\": 4, \"parameters\": {\"spacing\": {\"from\": \"20 "
+            "mm\", \"to\": \"30 mm\"}}")},
+      {type, "shard beyond the last", run + " --shard 3/2", files({{"s.json", good}})},
+      {type, "merge without shards", "sweep merge {}/s.json -o {}/out.h5",
+       files({{"s.json", good}})},
+      {type, "merge of garbage", "sweep merge {}/s.json {}/shard -o {}/out.h5",
+       files({{"s.json", good}, {"shard", kGarbage}})},
+      {type, "garbage as log", run, files({{"s.json", good}, {"out.h5.blocks", kGarbage}})},
+      {type, "output cannot be written", "sweep {}/s.json -o /proc/none/out.h5",
+       files({{"s.json", good}})},
+      {type, "show of another file", "sweep show {}/s.json", files({{"s.json", good}})},
+  };
+}
+
+}  // namespace tpm::test
