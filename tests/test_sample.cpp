@@ -17,7 +17,8 @@ using Catch::Matchers::WithinAbs;
 
 /// How many of the first `count` points fall into each of the boxes of 2^a by 2^b over dimensions
 /// i and j; the largest and the smallest number.
-std::pair<int, int> filling(const CubePoints& set, std::uint64_t count, int i, int j, int a, int b) {
+std::pair<int, int> filling(const CubePoints& set, std::uint64_t count, int i, int j, int a,
+                            int b) {
   std::vector<int> box(std::size_t{1} << (a + b), 0);
   for (std::uint64_t p = 0; p < count; ++p) {
     const auto x = static_cast<std::size_t>(std::ldexp(set.coordinate(p, i), a));
