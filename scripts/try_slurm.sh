@@ -21,9 +21,13 @@ export TPM PATH="$PATH:/usr/sbin"
 folder=$(mktemp -d)
 chmod 755 "$folder"
 end() {
-  local daemon
+  local daemon pid
   for daemon in slurmd slurmctld munged; do
-    if [[ -s $folder/$daemon.pid ]]; then kill "$(<"$folder/$daemon.pid")" 2>/dev/null || true; fi
+    if [[ -s $folder/$daemon.pid ]]; then
+      pid=$(<"$folder/$daemon.pid")
+      kill "$pid" 2>/dev/null || true
+      timeout 10 tail --pid="$pid" -f /dev/null || true
+    fi
   done
   rm -rf "$folder"
 }
@@ -75,7 +79,7 @@ done
 [[ $state == idle* ]] || { tail -n 20 "$folder/slurmctld.log" "$folder/slurmd.log" >&2; die "the node is '$state', not idle"; }
 
 say "a job array of $tasks tasks"
-sbatch --wait --chdir="$folder" --array="0-$((tasks - 1))" scripts/sweep.sbatch "$sweep" "$folder/array.h5" ||
+sbatch --wait --cpus-per-task=1 --chdir="$folder" --array="1-$tasks" scripts/sweep.sbatch "$sweep" "$folder/array.h5" ||
   { tail -n 5 "$folder"/tpm-sweep-*.out >&2; die "the job array failed (its words stand above)"; }
 say "merging"
 "$TPM" sweep merge "$sweep" -o "$folder/array.h5"
