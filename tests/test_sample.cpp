@@ -142,6 +142,7 @@ TEST_CASE("Three grids tell order, limit and error of a solution") {
   const std::vector<double> h{0.4, 0.2, 0.09};
   for (const double p : {0.5, 1.0, 2.0, 4.0}) {
     std::vector<double> f;
+    f.reserve(h.size());
     for (const double size : h) f.push_back(3.0 - 2.0 * std::pow(size, p));
     const GridConvergence g = grid_convergence(h, f);
     CHECK(g.behaviour == GridConvergence::Behaviour::monotone);
