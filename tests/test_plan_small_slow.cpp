@@ -253,7 +253,8 @@ TEST_CASE("costs of operations are kept in a file") {
 }
 
 TEST_CASE("a contact that a hand moves is planned for") {
-  const Plan plan = plan_for_contact(star(ramp("1 mm")), {3e-3, 5e-3, 0.5}, request(0.01, 1000.0));
+  const Plan plan =
+      make_plan(contact_scene(star(ramp("1 mm")), {3e-3, 5e-3, 0.5}), request(0.01, 1000.0));
   REQUIRE(plan.choice);
   CHECK(plan.chosen().name == "element");
 }

@@ -24,7 +24,7 @@ using Catch::Matchers::WithinRel;
 
 namespace {
 
-Sweep parsed(const char* text) {
+Sweep parsed(std::string_view text) {
   return parse_sweep(parse_json(text, "sweep"), "sweep", ".");
 }
 
@@ -287,6 +287,15 @@ TEST_CASE("shards put together are the whole sweep, to the byte") {
           std::string::npos);
     CHECK_FALSE(std::filesystem::exists(folder / "part.h5"));
   }
+}
+
+TEST_CASE("a material that no tissue has is refused before the first cell") {
+  std::string text = R"({"model": "single_contact", "material": {"E1": "-12 kPa"},
+    "indentation": {"kind": "step_hold"}, "outputs": ["peak_force"],
+    "axes": [{"parameter": "depth", "values": ["2 mm"]}]})";
+  const std::string refusal = test::refusal_of([&] { static_cast<void>(parsed(text)); });
+  CHECK(refusal.find("material") != std::string::npos);
+  CHECK(refusal.find("E1 = -12000 Pa") != std::string::npos);
 }
 
 TEST_CASE("a file of results is read back by axes, either way round, and drawn") {

@@ -112,13 +112,16 @@ WrittenSweep write_results(const Sweep& sweep, const SweepRun& run,
   return written;
 }
 
-void print_results(const Sweep& sweep, const CellTally& tally,
-                   const std::vector<std::string>& files, const Session& session) {
+/// @returns the exit code: a sweep of which no cell has an answer has none either
+int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<std::string>& files,
+                  const Session& session) {
+  const bool none = tally.done == 0 && tally.failed > 0;
+  const int code = static_cast<int>(none ? ExitCode::answer_is_no : ExitCode::success);
   if (session.json()) {
     Json json = tally_json(sweep, tally);
     json["files"] = files;
     fmt::print("{}", to_text(json));
-    return;
+    return code;
   }
   fmt::print("{} cells: {} done, {} skipped, {} failed\n", sweep.cells(), tally.done, tally.skipped,
              tally.failed);
@@ -130,6 +133,7 @@ void print_results(const Sweep& sweep, const CellTally& tally,
     fmt::print("- and {} more reasons: /reason_text\n", tally.reasons.size() - kShown);
   }
   fmt::print("wrote {}\n", fmt::join(files, ", "));
+  return code;
 }
 
 /// "2/8": the second of eight.
@@ -212,8 +216,7 @@ int merge(const SweepChoice& choice, const Session& session) {
                     "all shards, each run to its end");
   }
   const WrittenSweep written = write_results(sweep, run, all, output);
-  print_results(sweep, written.tally, written.files, session);
-  return 0;
+  return print_results(sweep, written.tally, written.files, session);
 }
 
 struct SweepViewChoice {
@@ -320,8 +323,7 @@ int run_command(const SweepChoice& choice, const Session& session) {
   const BlockLog blocks = BlockLog::to_read(log, sweep, {});
   const WrittenSweep written = write_results(sweep, run, {&blocks}, output);
   fs::remove(log);
-  print_results(sweep, written.tally, written.files, session);
-  return 0;
+  return print_results(sweep, written.tally, written.files, session);
 }
 
 void add_views(CLI::App& sweep, Session& session) {

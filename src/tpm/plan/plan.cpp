@@ -305,9 +305,4 @@ ExperimentScene contact_scene(const ExperimentScene& scene, const ContactRange& 
   return probed;
 }
 
-Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
-                      const PlanRequest& request) {
-  return make_plan(contact_scene(scene, range), request);
-}
-
 }  // namespace tpm

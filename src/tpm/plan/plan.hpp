@@ -110,13 +110,9 @@ struct ContactRange {
   double hold_s = 1.0;         ///< longest rest at a depth, >= 0
 };
 
-/// A plan for a contact that is moved as a hand likes: the protocol it is made for goes to the
+/// What to plan for a contact that is moved as a hand likes: a scene whose protocol goes to the
 /// whole and to half of the depth at full and at a fifth of the speed, rests there, and comes back.
 /// @param scene of which organ, material and contacts are used
-[[nodiscard]] Plan plan_for_contact(const ExperimentScene& scene, const ContactRange& range,
-                                    const PlanRequest& request);
-
-/// A scene with that protocol.
 [[nodiscard]] ExperimentScene contact_scene(const ExperimentScene& scene,
                                             const ContactRange& range);
 

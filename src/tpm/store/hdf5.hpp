@@ -75,6 +75,9 @@ class Hdf5Writer {
   void commit();
 
  private:
+  void write_whole(const std::string& name, Hdf5Handle::Id stored,
+                   const std::vector<std::uint64_t>& extents, Hdf5Handle::Id type,
+                   const void* values);
   void write_part(const std::string& name, std::uint64_t first, std::uint64_t count,
                   Hdf5Handle::Id type, const void* values);
   [[nodiscard]] Hdf5Handle dataset(const std::string& name, Hdf5Handle::Id type,

@@ -261,6 +261,7 @@ ContactSetup read_setup(const Json& document, const DocumentPlace& place) {
   if (document.contains("material")) {
     read_values(document.at("material"), place.key("material"),
                 {kE1, kE2, kEprime, kEta1, kSpacing, kA0, kL0}, setup.values);
+    require_valid(element_of(setup.values), place.key("material").where);
   }
   if (document.contains("indentation")) {
     const Json& block = document.at("indentation");

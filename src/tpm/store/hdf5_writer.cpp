@@ -1,0 +1,268 @@
+#include <fmt/format.h>
+#include <hdf5_hl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "tpm/core/error.hpp"
+#include "tpm/store/hdf5_parts.hpp"
+
+namespace tpm {
+namespace fs = std::filesystem;
+namespace {
+
+/// A stretch of an array, counted row by row, put together of boxes: the rest of a row, the rest of
+/// a plane, ..., whole ones, and the same backwards.
+void select_stretch(hid_t space, const std::vector<hsize_t>& shape, std::uint64_t first,
+                    std::uint64_t count) {
+  H5Sselect_none(space);
+  const std::size_t rank = shape.size();
+  std::vector<hsize_t> start(rank), box(rank);
+  while (count > 0) {
+    std::uint64_t rest = first;
+    for (std::size_t d = rank; d-- > 0; rest /= shape[d]) start[d] = rest % shape[d];
+    // The first dimension along which more than one can be taken at once.
+    std::fill(box.begin(), box.end(), hsize_t{1});
+    std::uint64_t inner = 1;  // numbers in one step along dimension d
+    std::size_t d = rank - 1;
+    while (d > 0 && start[d] == 0 && inner * shape[d] <= count) {
+      box[d] = shape[d];
+      inner *= shape[d--];
+    }
+    box[d] = std::min<std::uint64_t>(shape[d] - start[d], count / inner);
+    H5Sselect_hyperslab(space, H5S_SELECT_OR, start.data(), nullptr, box.data(), nullptr);
+    first += box[d] * inner;
+    count -= box[d] * inner;
+  }
+}
+
+hid_t stored_type(Hdf5Writer::Number kind) {
+  switch (kind) {
+    case Hdf5Writer::Number::float64:
+      break;
+    case Hdf5Writer::Number::int64:
+      return H5T_STD_I64LE;
+    case Hdf5Writer::Number::int32:
+      return H5T_STD_I32LE;
+    case Hdf5Writer::Number::uint8:
+      return H5T_STD_U8LE;
+  }
+  return H5T_IEEE_F64LE;
+}
+
+}  // namespace
+
+Hdf5Handle::Hdf5Handle(Hdf5Handle&& other) noexcept
+    : id_(std::exchange(other.id_, -1)), closer_(other.closer_) {}
+
+Hdf5Handle& Hdf5Handle::operator=(Hdf5Handle&& other) noexcept {
+  if (this != &other) {
+    reset();
+    id_ = std::exchange(other.id_, -1);
+    closer_ = other.closer_;
+  }
+  return *this;
+}
+
+void Hdf5Handle::reset() noexcept {
+  if (valid() && closer_ != nullptr) closer_(id_);
+  id_ = -1;
+}
+
+Hdf5Writer::Hdf5Writer(fs::path path)
+    : path_(std::move(path)), temporary_(fmt::format("{}.part.{}", path_.string(), ::getpid())) {
+  const QuietErrors quiet;
+  std::error_code ec;
+  if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), ec);
+  file_ = {H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose};
+  if (!file_.valid()) fail("cannot write");
+}
+
+Hdf5Writer::~Hdf5Writer() {
+  if (committed_) return;
+  const QuietErrors quiet;
+  file_.reset();
+  std::error_code ec;
+  fs::remove(temporary_, ec);
+}
+
+void Hdf5Writer::fail(const std::string& what) const {
+  throw Error(ExitCode::environment, path_.string(), what,
+              "a folder that can be written and has room");
+}
+
+void Hdf5Writer::group(const std::string& name) {
+  const QuietErrors quiet;
+  const Hdf5Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+  H5Pset_create_intermediate_group(links.get(), 1);
+  const Hdf5Handle made(
+      H5Gcreate2(file_.get(), name.c_str(), links.get(), H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  if (!made.valid()) fail(fmt::format("cannot write group {}", name));
+}
+
+Hdf5Handle Hdf5Writer::dataset(const std::string& name, hid_t type,
+                               const std::vector<std::uint64_t>& extents) {
+  const std::vector<hsize_t> shape(extents.begin(), extents.end());
+  const Hdf5Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
+                         H5Sclose);
+  const Hdf5Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+  H5Pset_create_intermediate_group(links.get(), 1);
+  const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_obj_track_times(creation.get(), 0);
+  Hdf5Handle made(H5Dcreate2(file_.get(), name.c_str(), type, space.get(), links.get(),
+                             creation.get(), H5P_DEFAULT),
+                  H5Dclose);
+  if (!made.valid()) fail(fmt::format("cannot write dataset {}", name));
+  return made;
+}
+
+void Hdf5Writer::write_whole(const std::string& name, Hdf5Handle::Id stored,
+                             const std::vector<std::uint64_t>& extents, Hdf5Handle::Id type,
+                             const void* values) {
+  const QuietErrors quiet;
+  const Hdf5Handle set = dataset(name, stored, extents);
+  if (H5Dwrite(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::numbers(const std::string& name, const std::vector<double>& values) {
+  write_whole(name, H5T_IEEE_F64LE, {values.size()}, H5T_NATIVE_DOUBLE, values.data());
+}
+
+void Hdf5Writer::table(const std::string& name, const std::vector<double>& values,
+                       std::size_t columns) {
+  write_whole(name, H5T_IEEE_F64LE, {values.size() / columns, columns}, H5T_NATIVE_DOUBLE,
+              values.data());
+}
+
+void Hdf5Writer::integers(const std::string& name, const std::vector<std::int32_t>& values,
+                          std::size_t columns) {
+  std::vector<std::uint64_t> extents{values.size() / columns};
+  if (columns > 1) extents.push_back(columns);
+  write_whole(name, H5T_STD_I32LE, extents, H5T_NATIVE_INT32, values.data());
+}
+
+void Hdf5Writer::long_integers(const std::string& name, const std::vector<std::int64_t>& values) {
+  write_whole(name, H5T_STD_I64LE, {values.size()}, H5T_NATIVE_INT64, values.data());
+}
+
+void Hdf5Writer::bytes(const std::string& name, const std::vector<std::uint8_t>& values) {
+  write_whole(name, H5T_STD_U8LE, {values.size()}, H5T_NATIVE_UINT8, values.data());
+}
+
+void Hdf5Writer::texts(const std::string& name, const std::vector<std::string>& values) {
+  std::vector<const char*> pointers;
+  pointers.reserve(values.size());
+  for (const std::string& value : values) pointers.push_back(value.c_str());
+  const Hdf5Handle type = text_type();
+  write_whole(name, type.get(), {values.size()}, type.get(),
+              static_cast<const void*>(pointers.data()));
+}
+
+void Hdf5Writer::attach(const std::string& object, const std::string& name, hid_t type,
+                        const Hdf5Handle& space, const void* values) {
+  const Hdf5Handle made(H5Acreate_by_name(file_.get(), object.c_str(), name.c_str(), type,
+                                          space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                        H5Aclose);
+  if (!made.valid() || H5Awrite(made.get(), type, values) < 0) {
+    fail(fmt::format("cannot write attribute {} of {}", name, object));
+  }
+}
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name,
+                           const std::string& text) {
+  const QuietErrors quiet;
+  const char* pointer = text.c_str();
+  attach(object, name, text_type().get(), {H5Screate(H5S_SCALAR), H5Sclose},
+         static_cast<const void*>(&pointer));
+}
+
+void Hdf5Writer::fixed_text_attribute(const std::string& object, const std::string& name,
+                                      const std::string& text) {
+  const QuietErrors quiet;
+  const Hdf5Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.get(), text.size());
+  H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+  attach(object, name, type.get(), {H5Screate(H5S_SCALAR), H5Sclose}, text.data());
+}
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name,
+                           const std::vector<std::int64_t>& values) {
+  const QuietErrors quiet;
+  const hsize_t size = values.size();
+  const Hdf5Handle space(size == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &size, nullptr),
+                         H5Sclose);
+  attach(object, name, H5T_NATIVE_INT64, space, values.data());
+}
+
+void Hdf5Writer::array(const std::string& name, Number kind,
+                       const std::vector<std::uint64_t>& extents) {
+  const QuietErrors quiet;
+  static_cast<void>(dataset(name, stored_type(kind), extents));
+}
+
+void Hdf5Writer::write_part(const std::string& name, std::uint64_t first, std::uint64_t count,
+                            hid_t type, const void* values) {
+  if (count == 0) return;
+  const QuietErrors quiet;
+  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
+  select_stretch(space.get(), shape_of(space), first, count);
+  const hsize_t size = count;
+  const Hdf5Handle memory(H5Screate_simple(1, &size, nullptr), H5Sclose);
+  if (H5Dwrite(set.get(), type, memory.get(), space.get(), H5P_DEFAULT, values) < 0) {
+    fail(fmt::format("cannot write dataset {}", name));
+  }
+}
+
+void Hdf5Writer::part(const std::string& name, std::uint64_t first,
+                      std::span<const double> values) {
+  write_part(name, first, values.size(), H5T_NATIVE_DOUBLE, values.data());
+}
+
+void Hdf5Writer::part(const std::string& name, std::uint64_t first,
+                      std::span<const std::int64_t> values) {
+  write_part(name, first, values.size(), H5T_NATIVE_INT64, values.data());
+}
+
+void Hdf5Writer::part(const std::string& name, std::uint64_t first,
+                      std::span<const std::int32_t> values) {
+  write_part(name, first, values.size(), H5T_NATIVE_INT32, values.data());
+}
+
+void Hdf5Writer::part(const std::string& name, std::uint64_t first,
+                      std::span<const std::uint8_t> values) {
+  write_part(name, first, values.size(), H5T_NATIVE_UINT8, values.data());
+}
+
+void Hdf5Writer::dimension_scale(const std::string& name) {
+  const QuietErrors quiet;
+  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (H5DSset_scale(set.get(), name.substr(name.rfind('/') + 1).c_str()) < 0) {
+    fail(fmt::format("cannot write the scale {}", name));
+  }
+}
+
+void Hdf5Writer::attach_scale(const std::string& array, unsigned dimension,
+                              const std::string& scale) {
+  const QuietErrors quiet;
+  const Hdf5Handle set(H5Dopen2(file_.get(), array.c_str(), H5P_DEFAULT), H5Dclose);
+  const Hdf5Handle along(H5Dopen2(file_.get(), scale.c_str(), H5P_DEFAULT), H5Dclose);
+  if (H5DSattach_scale(set.get(), along.get(), dimension) < 0) {
+    fail(fmt::format("cannot write the scales of {}", array));
+  }
+}
+
+void Hdf5Writer::commit() {
+  const QuietErrors quiet;
+  if (H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) < 0) fail("cannot write");
+  file_.reset();
+  std::error_code ec;
+  fs::rename(temporary_, path_, ec);
+  if (ec) fail(fmt::format("cannot write: {}", ec.message()));
+  committed_ = true;
+}
+
+}  // namespace tpm
