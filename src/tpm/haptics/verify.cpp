@@ -144,8 +144,11 @@ void ask_cvode(Verification& v, const HilRecording& recording, const DrivenNetwo
   const std::vector<double> answer(run.response.begin(), run.response.end());
   FidelitySum sum;
   for (std::size_t k = 0; k < times.size(); ++k) sum.add(v.commanded_N[k], answer[k]);
-  v.others.push_back({"CVODE (BDF) on what the bonds remember, in balance at each evaluation",
-                      times.back(), sum.take(), apart_from_reference(v, times, answer)});
+  OtherOpinion& opinion = v.others.emplace_back();
+  opinion.name = "CVODE (BDF) on what the bonds remember, in balance at each evaluation";
+  opinion.end_s = times.back();
+  opinion.commanded = sum.take();
+  opinion.apart_N = apart_from_reference(v, times, answer);
 }
 
 /// The star's own models: in closed form on every sample, and CVODES on the reference's motion.
