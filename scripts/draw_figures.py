@@ -28,6 +28,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 PAGE_WIDTH, SINGLE_PAGE_WIDTH, PANEL_HEIGHT = 8.9, 6.1, 2.75
 LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 0.62, 0.12, 0.32, 0.66, 0.50
 LEGEND_ROW, NOTE_ROW = 0.172, 0.16
+MOST_ACROSS = 4  # panels; more go on below
 
 # Okabe and Ito's palette: told apart by people with any of the usual colour deficiencies.
 MODEL_COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
@@ -231,7 +232,7 @@ def counts(panel):
     return not panel["x"]["unit"] and not panel["x"]["logarithmic"] and places and all(x == int(x) for x in places)
 
 
-def draw_panel(axes, panel, look, handles):
+def draw_panel(axes, panel, look, handles, narrow=False):
     """Draws one panel and adds a handle per new legend text to `handles`."""
     for series in panel["series"]:
         if series["kind"] == "heat":
@@ -247,6 +248,12 @@ def draw_panel(axes, panel, look, handles):
         getattr(axes, f"set_{name}lim")(axis.get("lower"), axis.get("upper"))
         if axis["logarithmic"]:
             tick_short_log_axis(getattr(axes, f"{name}axis"), getattr(axes, f"get_{name}lim")())
+        elif max(abs(v) for v in getattr(axes, f"get_{name}lim")()) >= 1e5:
+            # No power of ten apart from the ticks: it would lie on its neighbour's.
+            getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(3 if narrow else 5))
+            getattr(axes, f"{name}axis").set_major_formatter(FuncFormatter(plain_number))
+        elif narrow and name == "x":
+            axes.xaxis.set_major_locator(MaxNLocator(3))
     if counts(panel):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     for series in panel["series"]:
@@ -279,14 +286,18 @@ def draw_figure(figure):
     notes = wrap(provenance_note(figure), 2 if len(panels) == 1 else 3)
     rows = -(-len(labels) // columns)
     below = BELOW_AXIS + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08
-    height = TOP + PANEL_HEIGHT + below
+    across = min(len(panels), MOST_ACROSS)
+    stacked = -(-len(panels) // across)
+    row_height = TOP + PANEL_HEIGHT + BELOW_AXIS
+    height = TOP + PANEL_HEIGHT + below + (stacked - 1) * row_height
     page = plt.figure(figsize=(width, height))
-    panel_width = (width - LEFT - RIGHT - (len(panels) - 1) * GAP) / len(panels)
+    panel_width = (width - LEFT - RIGHT - (across - 1) * GAP) / across
     handles = {}
     for i, panel in enumerate(panels):
-        left = LEFT + i * (panel_width + GAP)
-        axes = page.add_axes([left / width, below / height, panel_width / width, PANEL_HEIGHT / height])
-        draw_panel(axes, panel, look, handles)
+        left = LEFT + i % across * (panel_width + GAP)
+        bottom = below + (stacked - 1 - i // across) * row_height
+        axes = page.add_axes([left / width, bottom / height, panel_width / width, PANEL_HEIGHT / height])
+        draw_panel(axes, panel, look, handles, narrow=across > 3)
     page.legend(handles.values(), handles.keys(), loc="upper left", ncol=columns, frameon=False, borderaxespad=0,
                 bbox_to_anchor=(LEFT / width, (below - BELOW_AXIS) / height), handlelength=2.2, labelspacing=0.45)
     for i, note in enumerate(notes):

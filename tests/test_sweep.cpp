@@ -11,11 +11,13 @@
 #include "temp_folder.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/model/closed_form.hpp"
+#include "tpm/report/sweep_convergence_report.hpp"
 #include "tpm/report/sweep_report.hpp"
 #include "tpm/sample/point_set.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/study/tables.hpp"
+#include "tpm/sweep/best_cells.hpp"
 #include "tpm/sweep/run_sweep.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
@@ -455,6 +457,99 @@ TEST_CASE("a sweep over a star as a network is the sweep over it in closed form"
   }
   // A block by itself, without those before it: the same bits.
   CHECK(CellRunner(star).run(1).values == found[1].values);
+}
+
+TEST_CASE("convergence along an axis: order and limit of a known error, and its absence") {
+  const test::TempFolder folder;
+  // Formulas of the size stand in for an answer: 3 + 40 x^2; one that swings; one that grows.
+  const Sweep sweep = parsed(R"({"model": "single_contact",
+    "indentation": {"kind": "step_hold", "depth": "4 mm"},
+    "axes": [{"parameter": "E2", "values": ["8 kPa", "12 kPa"]},
+             {"parameter": "spacing", "name": "x", "values": ["10 mm", "40 mm", "20 mm", "80 mm"]}],
+    "outputs": ["peak_force", {"formula": "3 + E2 / 200 * x^2", "name": "second"},
+                {"formula": "x < 0.015 ? 1 : x < 0.03 ? 2 : x < 0.05 ? 0 : 5", "name": "swings"},
+                {"formula": "1 / x", "name": "grows"}]})");
+  static_cast<void>(result_of(sweep, folder / "a.h5"));
+  const SweepReader reader(folder / "a.h5");
+  const SweepConvergence c = convergence_of(reader, "second", "x", "", {{"E2", 0}});
+  CHECK(c.size == std::vector<double>{0.08, 0.04, 0.02, 0.01});
+  REQUIRE(c.threes.size() == 2);
+  for (const GridConvergence& g : c.threes) {
+    CHECK_THAT(g.order, WithinRel(2.0, 1e-6));
+    CHECK_THAT(g.extrapolated, WithinRel(3.0, 1e-9));
+  }
+  CHECK_THAT(c.threes.back().index, WithinRel(1.25 * 40.0 * 1e-4, 1e-6));
+  // As a function of the number of spheres in a volume, which falls with the cube of x.
+  const SweepConvergence by_count = convergence_of(reader, "second", "x", "(1/x^3)^(-1/3)", {});
+  CHECK_THAT(by_count.threes.back().order, WithinRel(2.0, 1e-6));
+  const SweepConvergence swings = convergence_of(reader, "swings", {}, "", {});
+  const SweepConvergence grows = convergence_of(reader, "grows", {}, "", {});
+  CHECK_FALSE((swings.monotone() || grows.monotone()));
+  const std::string text = convergence_text({c, swings, grows});
+  CHECK(text.find("no monotone convergence") != std::string::npos);
+  CHECK(text.find("no convergence: the last change") != std::string::npos);
+  const Json json = convergence_json({c, grows});
+  CHECK(json.at("convergence")[1].at("threes")[0].at("order").is_null());
+  CHECK_FALSE(to_text(to_json(convergence_figures({c, swings}, "title"))).empty());
+  CHECK(test::refusal_of([&] {
+          static_cast<void>(convergence_of(reader, "second", "E2", "", {}));
+        }).find("2 places") != std::string::npos);
+}
+
+TEST_CASE("steps of the integrator: the order of two Radau nodes is three") {
+  const test::TempFolder folder;
+  const std::string scene = R"({"model": "organ", "scene": {
+      "organ": {"kind": "block", "cells": [2, 2, 2], "spacing": "20 mm", "lattice": "cubic"},
+      "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "24 kPa s"},
+      "anchors": [{"kind": "half_space", "point": ["0 mm", "0 mm", "1 mm"], "normal": [0, 0, -1]}],
+      "contacts": [{"kind": "sphere", "number": 5}],
+      "protocol": {"kind": "ramp_hold", "depth": "6 mm", "rate": "6 mm/s", "hold": "1 s"},
+      "tolerance": 1e-12}, "outputs": ["end_force"], )";
+  const Sweep sweep = parsed(scene + R"("integrator": {"step": "1 s", "stages": 2},
+    "axes": [{"parameter": "/integrator/step", "values": ["0.5 s", "0.25 s", "0.125 s", "0.0625 s"]}]})");
+  static_cast<void>(result_of(sweep, folder / "a.h5"));
+  const SweepConvergence c = convergence_of(SweepReader(folder / "a.h5"), "end_force", {}, "", {});
+  CAPTURE(c.value, c.threes.back().order);
+  CHECK(std::abs(c.threes.back().order - 3.0) < 0.2);
+  // Without the block the steps follow the tolerance.
+  const double truth =
+      only_block(parsed(scene + R"("axes": [{"parameter": "/tolerance", "values": [1e-12]}]})"))
+          .values[0][0];
+  CHECK(std::abs(c.threes.back().extrapolated - truth) <= c.threes.back().index + 1e-10 * truth);
+}
+
+TEST_CASE("the best cell of a sweep is where a fit goes on") {
+  const test::TempFolder folder;
+  const Sweep sweep = parsed(R"({"model": "single_contact", "material": {"eta1": "240 kPa s"},
+    "indentation": {"kind": "ramp_hold", "rate": "4 mm/s", "hold": "30 s"},
+    "axes": [{"parameter": "spacing", "values": ["20 mm", "30 mm"]},
+             {"parameter": "depth", "values": ["4 mm", "8 mm"]},
+             {"name": "modulus", "together": {"E1": {"values": ["6 kPa", "12 kPa", "24 kPa"]},
+                                              "E2": {"values": ["6 kPa", "12 kPa", "24 kPa"]}}}],
+    "skip": [{"when": "spacing > 0.025 && E1 > 20000 && depth > 0.006"}],
+    "outputs": ["peak_force", {"formula": "(E1 / 12000 - 1)^2 + (spacing / 0.03 - 1)^2 + depth", "name": "misfit"}]})");
+  static_cast<void>(result_of(sweep, folder / "a.h5"));
+  const SweepReader reader(folder / "a.h5");
+  const auto best = best_cells(reader, "misfit", 2, "depth");
+  REQUIRE(best.size() == 2);
+  CHECK_THAT(best[0].value, WithinRel(0.012, 1e-12));
+  CHECK(best[0].places == std::vector<std::uint64_t>{1, 0, 1});
+  CHECK(best[0].parameters.size() == 3);
+  // What is skipped somewhere along the sum is no cell: 2 x 3 cells less one.
+  CHECK(best_cells(reader, "misfit", 100, "depth").size() == 5);
+  const Json fit =
+      read_json(std::filesystem::path(TPM_TEST_SOURCE_DIR) / "configs/organ_relaxation.json");
+  const Json started = fit_from_cell(fit, best[0], "fit");
+  // That configuration sets E1, E2 and E' at once.
+  CHECK(started.at("parameters").at("E").at("start") == "12000 Pa");
+  CHECK(started.at("parameters").at("spacing").at("start") == "0.03 m");
+  CHECK(started.at("parameters").at("eta1") == fit.at("parameters").at("eta1"));
+  CHECK(started.at("starts").at("count") == 1);
+  Json narrow = fit;
+  narrow["parameters"]["E"]["upper"] = "10 kPa";
+  CHECK(test::refusal_of([&] {
+          static_cast<void>(fit_from_cell(narrow, best[0], "fit"));
+        }).find("/parameters/E/upper") != std::string::npos);
 }
 
 TEST_CASE("a log is written by one process at a time") {

@@ -15,8 +15,10 @@
 #include "tpm/core/units.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
+#include "tpm/report/sweep_convergence_report.hpp"
 #include "tpm/report/sweep_report.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/sweep/best_cells.hpp"
 #include "tpm/sweep/sweep_ranks.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
@@ -221,6 +223,8 @@ int merge(const SweepChoice& choice, const Session& session) {
 
 struct SweepViewChoice {
   std::string file, folder = "sweep_figures", x, y, pareto;
+  std::string axis, size, convergence_folder;
+  std::string best_output, count = "1", over, fit, start;
   std::vector<std::string> variables, at;
 };
 
@@ -265,6 +269,86 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
   return 0;
 }
 
+int convergence(const SweepViewChoice& choice, const Session& session) {
+  const SweepReader sweep(choice.file);
+  HeldPlaces held;
+  for (const std::string& text : choice.at) held.push_back(parse_held(text, sweep));
+  std::optional<std::string> axis;
+  if (!choice.axis.empty()) axis = choice.axis;
+  std::vector<std::string> names = choice.variables;
+  for (const ReadVariable& v : sweep.variables()) {
+    if (!choice.variables.empty() || !v.times_s.empty() || v.name.starts_with("count_")) continue;
+    names.push_back(v.name);
+  }
+  std::vector<SweepConvergence> all;
+  for (const std::string& name : names) {
+    all.push_back(convergence_of(sweep, name, axis, choice.size, held));
+  }
+  if (session.json()) {
+    fmt::print("{}", to_text(convergence_json(all)));
+  } else {
+    fmt::print("{}", convergence_text(all));
+  }
+  if (!choice.convergence_folder.empty()) {
+    const auto files =
+        write_figures(choice.convergence_folder, convergence_figures(all, sweep.title()));
+    fmt::print(stderr, "tpm: wrote {} into {}\n", fmt::join(files, ", "),
+               choice.convergence_folder);
+  }
+  const bool none = std::none_of(all.begin(), all.end(), [](auto& c) { return c.monotone(); });
+  return static_cast<int>(none ? ExitCode::answer_is_no : ExitCode::success);
+}
+
+/// Paths in a configuration of tpm fit are relative to it: they are kept when it is moved.
+void move_scene(Json& fit, const fs::path& from, const fs::path& to) {
+  if (!fit.contains("scene") || !fit.at("scene").is_string()) return;
+  const fs::path scene = from.parent_path() / fit.at("scene").get<std::string>();
+  const fs::path folder = to.has_parent_path() ? to.parent_path() : fs::path(".");
+  fit["scene"] = fs::proximate(fs::absolute(scene), fs::absolute(folder)).string();
+}
+
+int best(const SweepViewChoice& choice, const Session& session) {
+  const SweepReader sweep(choice.file);
+  std::optional<std::string> over;
+  if (!choice.over.empty()) over = choice.over;
+  const auto count = parse_whole_number(choice.count, "--count", 1);
+  const auto cells = best_cells(sweep, choice.best_output, count, over);
+  if (choice.fit.empty() != choice.start.empty()) {
+    throw Error(ExitCode::usage, "--fit", "alone", "--fit FIT.json with --start START.json");
+  }
+  if (!choice.fit.empty()) {
+    Json fit = fit_from_cell(read_json(choice.fit), cells.front(), choice.fit);
+    move_scene(fit, choice.fit, choice.start);
+    write_file(choice.start, to_text(fit));
+  }
+  if (session.json()) {
+    Json list = Json::array();
+    for (const BestCell& cell : cells) {
+      Json parameters;
+      for (const CellParameter& p : cell.parameters) {
+        parameters[p.name] = {{"target", p.target}, {"unit", p.unit}, {"value", p.value}};
+      }
+      list.push_back({{"places", cell.places},
+                      {choice.best_output, cell.value},
+                      {"parameters", std::move(parameters)}});
+    }
+    fmt::print("{}", to_text(Json{{"best", std::move(list)}}));
+    return 0;
+  }
+  for (const BestCell& cell : cells) {
+    fmt::print("{} = {}:", choice.best_output, significant(cell.value, 6));
+    for (const CellParameter& p : cell.parameters) {
+      const Unit unit = p.unit.empty() ? Unit{"", Dimension::dimensionless, 1.0}
+                                       : shown_unit(parse_unit(p.unit, p.name).dimension);
+      fmt::print(" {} = {}{}{}", p.name, significant(p.value / unit.to_si, 6),
+                 unit.symbol.empty() ? "" : " ", unit.symbol);
+    }
+    fmt::print("\n");
+  }
+  if (!choice.start.empty()) fmt::print("wrote {}: tpm fit goes on from there\n", choice.start);
+  return 0;
+}
+
 int plot(const SweepViewChoice& choice) {
   const SweepReader sweep(choice.file);
   SweepFigures wished;
@@ -288,7 +372,7 @@ int plot(const SweepViewChoice& choice) {
 int run_command(const SweepChoice& choice, const Session& session) {
   if (choice.sweep.empty()) {
     throw Error(ExitCode::usage, "sweep", "no file",
-                "tpm sweep SWEEP.json, or merge, show, plot, sensitivity");
+                "tpm sweep SWEEP.json, or merge, show, plot, sensitivity, convergence, best");
   }
   const std::unique_ptr<SweepRanks> ranks = SweepRanks::of_this_run();
   const Sweep sweep = read_sweep(choice.sweep);
@@ -341,6 +425,32 @@ void add_views(CLI::App& sweep, Session& session) {
   judging->callback([choice, &session] {
     session.run = [choice, &session] { return sensitivity(*choice, session); };
   });
+  CLI::App* refining = sweep.add_subcommand(
+      "convergence", "Order, extrapolated value and grid convergence index along an axis");
+  refining->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  refining->add_option("--axis", choice->axis, "Axis of ever finer places (default: the last)");
+  refining->add_option(
+      "--size", choice->size,
+      "Formula of the size, such as 'count^(-1/3)' (default: the axis' parameter)");
+  refining->add_option("--variable", choice->variables,
+                       "Of what (default: all numbers but counts)");
+  refining->add_option("--at", choice->at, "AXIS=VALUE: place on another axis");
+  refining->add_option("-o,--output", choice->convergence_folder, "Folder for pictures (PNG, SVG)");
+  add_format_option(*refining, session);
+  refining->callback([choice, &session] {
+    session.run = [choice, &session] { return convergence(*choice, session); };
+  });
+  CLI::App* choosing = sweep.add_subcommand("best", "The cells with the least value of an output");
+  choosing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  choosing->add_option("--output", choice->best_output, "What is to be least, such as a misfit")
+      ->required();
+  choosing->add_option("--count", choice->count, "How many cells")->capture_default_str();
+  choosing->add_option("--over", choice->over, "Axis that the output is summed over");
+  choosing->add_option("--fit", choice->fit, "Configuration of tpm fit to be started there");
+  choosing->add_option("--start", choice->start, "File for the configuration with these starts");
+  add_format_option(*choosing, session);
+  choosing->callback(
+      [choice, &session] { session.run = [choice, &session] { return best(*choice, session); }; });
   CLI::App* plotting = sweep.add_subcommand("plot", "Maps, families of lines, Pareto fronts");
   plotting->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   plotting->add_option("-o,--output", choice->folder, "Folder for pictures (PNG, SVG)")

@@ -1,11 +1,9 @@
 // Models of the contact alone: the element, linear and with two static curves.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/plan/scalar_contact.hpp"
+#include "tpm/plan/scalar_run.hpp"
 
 namespace tpm {
 namespace {
@@ -59,89 +57,12 @@ class ScalarCandidate : public PlanModel {
   }
 };
 
-/// Moves a model through a protocol.
-class ScalarRun {
- public:
-  ScalarRun(const PlanScene& scene, ScalarModel model, double longest_step_s)
-      : protocol_(scene.protocol()),
-        by_depth_(scene.by_depth()),
-        model_(std::move(model)),
-        longest_s_(longest_step_s),
-        knots_(protocol_.knots()) {
-    time_s_ = knots_.front().time_s;
-    const double first = knots_.front().value;
-    if (protocol_.relaxed_at_start()) {
-      settle(first);
-    } else {
-      jump(first);
-    }
-    pass_jumps();
-  }
-
-  /// Goes on to a time; the response there, after all jumps.
-  double at(double time_s) {
-    while (next_ < knots_.size() && knots_[next_].time_s <= time_s) {
-      cross(knots_[next_].time_s, knots_[next_].value);
-      ++next_;
-      pass_jumps();
-    }
-    if (time_s > time_s_) cross(time_s, value_at(protocol_, time_s));
-    return response_;
-  }
-
-  [[nodiscard]] const ScalarModel& model() const { return model_; }
-  [[nodiscard]] double steps() const { return steps_; }
-
- private:
-  void jump(double value) {
-    response_ = by_depth_ ? model_.jump_to(value) : model_.jump_under(value);
-    value_ = value;
-  }
-
-  /// Relaxed under a first value: after a very long step.
-  void settle(double value) {
-    constexpr double kForever_s = 1e12;
-    jump(value);
-    model_.set_period(kForever_s);
-    response_ = by_depth_ ? model_.step_to(value) : model_.step_under(value);
-    if (!by_depth_) {
-      for (int i = 0; i < 200; ++i) response_ = model_.step_under(value);
-    }
-  }
-
-  void pass_jumps() {
-    while (next_ < knots_.size() && knots_[next_].time_s <= time_s_) jump(knots_[next_++].value);
-  }
-
-  void cross(double time_s, double value) {
-    const double length = time_s - time_s_;
-    if (!(length > 0.0)) return;
-    const double count = std::max(1.0, std::ceil(length / longest_s_ * (1.0 - 1e-9)));
-    model_.set_period(length / count);
-    const double begin = value_;
-    for (double i = 1.0; i <= count; i += 1.0) {
-      const double now = begin + (value - begin) * i / count;
-      response_ = by_depth_ ? model_.step_to(now) : model_.step_under(now);
-    }
-    steps_ += count;
-    time_s_ = time_s;
-    value_ = value;
-  }
-
-  const Protocol& protocol_;
-  bool by_depth_;
-  ScalarModel model_;
-  double longest_s_;
-  std::span<const Knot> knots_;
-  std::size_t next_ = 1;
-  double time_s_ = 0.0, value_ = 0.0, response_ = 0.0, steps_ = 0.0;
-};
-
 PlanTrajectory ScalarCandidate::run(const PlanScout& scout, const PlanBudget& budget,
                                     const std::vector<double>& times_s) const {
   constexpr double kSteps = 400.0;  // of a protocol, where no rate is given
   const PlanScene& scene = scout.scene();
-  ScalarRun run(scene, model(scout), budget.period_s().value_or(scene.duration_s() / kSteps));
+  ScalarRun run(scene.protocol(), model(scout),
+                budget.period_s().value_or(scene.duration_s() / kSteps));
   PlanTrajectory answer;
   answer.response.resize(std::ssize(times_s));
   for (std::size_t i = 0; i < times_s.size(); ++i) {
@@ -183,9 +104,7 @@ class LinearCandidate : public ScalarCandidate {
  protected:
   [[nodiscard]] double terms() const override { return branches_; }
   [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
-    const ContactSpectrum& spectrum = scout.spectrum();
-    return {straight(spectrum.relaxed()), straight(spectrum.at_once() - spectrum.relaxed()),
-            fitted_branches(spectrum, branches_), 1.0};
+    return linear_contact(scout.spectrum(), branches_);
   }
 
  private:
@@ -234,8 +153,7 @@ class CurvesCandidate final : public ScalarCandidate {
   [[nodiscard]] bool knows_field() const override { return false; }
   [[nodiscard]] double terms() const override { return branches_ + 6.0; }
   [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
-    const ContactCurves& curves = scout.curves();
-    return {curves.relaxed, curves.relaxing, fitted_branches(scout.spectrum(), branches_), 1.0};
+    return curves_contact(scout.curves(), scout.spectrum(), branches_);
   }
 
  private:

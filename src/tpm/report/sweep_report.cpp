@@ -153,6 +153,15 @@ Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const std::s
   return panel;
 }
 
+/// The parameter's samples are spread evenly in its logarithm.
+bool sampled_in_logarithm(const SweepReader& sweep, const ReadAxis& axis, const std::string& name) {
+  const Json& described = sweep.document().at("axes").at(sweep.axis(axis.name));
+  if (!described.contains("parameters")) return false;
+  const Json& parameters = described.at("parameters");
+  const std::string target = sweep.parameter_target(name);
+  return parameters.contains(target) && parameters.at(target).value("scale", "") == "log";
+}
+
 /// A number over each parameter of an axis of samples.
 std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
                                 const ReadAxis& axis, const HeldPlaces& held) {
@@ -172,8 +181,10 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
       cloud.x.push_back(values[i] / unit_x.to_si);
       cloud.y.push_back(found[i]);
     }
-    panels.push_back(
-        {name, {name, unit_x.symbol, false, {}, {}}, {v.name, unit.symbol, false, {}, {}}, {}});
+    panels.push_back({name,
+                      {name, unit_x.symbol, sampled_in_logarithm(sweep, axis, name), {}, {}},
+                      {v.name, unit.symbol, false, {}, {}},
+                      {}});
     if (!cloud.x.empty()) panels.back().series.push_back(std::move(cloud));
   }
   return panels;
@@ -280,6 +291,12 @@ std::string sweep_text(const SweepReader& sweep) {
                       tally.skipped, tally.failed);
   for (const std::string& reason : tally.reasons)
     text += fmt::format("- {}\n", printable(reason, 160));
+  if (const auto models = sweep.models(); !models.empty()) {
+    text += fmt::format("models: {}\n", sweep.choice_of_models());
+    for (const auto& [name, cells] : models) {
+      if (cells > 0) text += fmt::format("  {}: {} cells\n", name, cells);
+    }
+  }
   for (const ReadAxis& axis : sweep.axes()) {
     text += fmt::format("axis {}: {}", axis.name, axis.places.size());
     if (axis.parameters == std::vector{axis.name}) {
@@ -313,6 +330,10 @@ Json sweep_json(const SweepReader& sweep) {
   Json json{{"title", sweep.title()},   {"cells", sweep.cells()},    {"done", tally.done},
             {"skipped", tally.skipped}, {"failed", tally.failed},    {"reasons", tally.reasons},
             {"axes", Json::array()},    {"variables", Json::array()}};
+  if (const auto models = sweep.models(); !models.empty()) {
+    json["choice_of_models"] = sweep.choice_of_models();
+    for (const auto& [name, cells] : models) json["models"][name] = cells;
+  }
   for (const ReadAxis& axis : sweep.axes()) {
     json["axes"].push_back({{"name", axis.name},
                             {"unit", axis.unit},

@@ -59,8 +59,9 @@ bool unpack(const Sweep& sweep, std::string_view bytes, CellBlock& block) {
   block.status.resize(cells);
   block.reason.resize(cells);
   block.error_estimate.resize(cells);
+  block.model.resize(sweep.model->models().empty() ? 0 : cells);
   bool whole = take_all(bytes, block.status) && take_all(bytes, block.reason) &&
-               take_all(bytes, block.error_estimate);
+               take_all(bytes, block.error_estimate) && take_all(bytes, block.model);
   block.counts.assign(sweep.model->counted().size(), std::vector<std::int64_t>(cells));
   for (auto& counts : block.counts) whole = whole && take_all(bytes, counts);
   for (const SweepVariable& variable : sweep.variables) {
@@ -94,6 +95,7 @@ std::string pack(const CellBlock& block) {
   put_all(bytes, block.status);
   put_all(bytes, block.reason);
   put_all(bytes, block.error_estimate);
+  put_all(bytes, block.model);
   for (const auto& counts : block.counts) put_all(bytes, counts);
   for (const auto& values : block.values) put_all(bytes, values);
   for (const std::string& reason : block.reasons) bytes.append(reason).push_back('\0');

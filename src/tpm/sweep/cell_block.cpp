@@ -19,6 +19,7 @@ CellBlock empty_block(const Sweep& sweep, std::uint64_t number) {
   block.status.assign(cells, CellStatus::done);
   block.reason.assign(cells, 0);
   block.error_estimate.assign(cells, kNothing);
+  if (!sweep.model->models().empty()) block.model.assign(cells, kNoModel);
   block.counts.assign(sweep.model->counted().size(), std::vector<std::int64_t>(cells, 0));
   for (const SweepVariable& variable : sweep.variables) {
     block.values.emplace_back(cells * variable.width(), kNothing);
@@ -47,9 +48,7 @@ CellRunner::CellRunner(const Sweep& sweep)
       swept_(sweep.parameters.size()),
       values_(sweep.width()),
       counts_(sweep.model->counted().size()) {
-  std::vector<std::string> targets;
-  for (const SweptParameter& p : sweep.parameters) targets.push_back(p.target);
-  model_ = sweep.model->cell_model(targets);
+  model_ = sweep.model->cell_model(sweep.swept());
   if (!sweep.skip.empty() || !sweep.formulas.empty()) {
     expressions_ = std::make_unique<Expressions>(sweep);
   }
@@ -89,7 +88,7 @@ void CellRunner::run_cell(std::size_t cell, CellBlock& block) {
       }
     }
     std::fill(counts_.begin(), counts_.end(), 0);
-    const double error = model_->run(swept_, values_, counts_);
+    const CellAnswer answer = model_->run(swept_, values_, counts_);
     if (expressions_) {
       std::size_t at = 0;
       for (const SweepVariable& v : sweep_.model->variables()) {
@@ -102,7 +101,8 @@ void CellRunner::run_cell(std::size_t cell, CellBlock& block) {
         expressions_->scope.values[formula.name] = values_[at++];
       }
     }
-    block.error_estimate[cell] = error;
+    block.error_estimate[cell] = answer.error_estimate;
+    if (!block.model.empty()) block.model[cell] = answer.model;
   } catch (const Error& error) {
     // What is outside (no memory for a mesh, no file) is not the cell's own.
     if (error.code() == ExitCode::environment) throw;

@@ -11,12 +11,18 @@ namespace tpm {
 /// What became of a cell.
 enum class CellStatus : std::uint8_t { done, skipped, failed };
 
+/// The model of a cell that ran on none.
+inline constexpr std::uint8_t kNoModel = 255;
+
 /// The results of a stretch of cells: the unit of work and of storage.
 struct CellBlock {
   std::uint64_t number = 0;
   std::vector<CellStatus> status;
   std::vector<std::uint16_t> reason;   ///< of each cell: a place in `reasons`, from 1; 0: none
   std::vector<double> error_estimate;  ///< NaN where nothing was found
+  /// A place in SweepModel::models(), or kNoModel where nothing was found; empty if there is no
+  /// choice.
+  std::vector<std::uint8_t> model;
   std::vector<std::vector<std::int64_t>> counts;  ///< of each counted operation
   std::vector<std::vector<double>> values;        ///< of each variable, cell by cell; NaN as above
   std::vector<std::string> reasons;

@@ -23,6 +23,22 @@ struct SweepVariable {
   [[nodiscard]] std::size_t width() const { return times_s.empty() ? 1 : times_s.size(); }
 };
 
+/// What a cell's run says of itself besides its values.
+struct CellAnswer {
+  /// Of the error, in parts of the largest response; 0 where there is none but rounding. Where the
+  /// sweep states a tolerance the claim of the model that was chosen, else the method's estimate.
+  double error_estimate = 0.0;
+  std::uint8_t model = 0;  ///< in SweepModel::models()
+};
+
+/// What a sweep changes, and how far.
+struct SweptTarget {
+  std::string target;  ///< as the model knows it
+  std::size_t axis = 0;
+  std::uint64_t places = 1;           ///< of the axis
+  double least = 0.0, largest = 0.0;  ///< SI, as far as a few thousand places show
+};
+
 /// A worker's own model of a cell: not for two threads.
 class CellModel {
  public:
@@ -34,12 +50,10 @@ class CellModel {
   /// @param swept SI values of the swept parameters
   /// @param values of the model's variables one after the other; to be filled
   /// @param counts of the model's operations, to be filled
-  /// @returns the method's estimate of its error in parts of the largest response; 0 where there is
-  ///          none but rounding
   /// Throws Error(bad_input) or Error(numerical) where the cell has no answer. The result depends
   /// on `swept` alone, not on cells before.
-  virtual double run(std::span<const double> swept, std::span<double> values,
-                     std::span<std::int64_t> counts) = 0;
+  virtual CellAnswer run(std::span<const double> swept, std::span<double> values,
+                         std::span<std::int64_t> counts) = 0;
 };
 
 /// What a sweep is made over, as SWEEP.json describes it.
@@ -56,13 +70,20 @@ class SweepModel {
   [[nodiscard]] virtual const std::vector<SweepVariable>& variables() const = 0;
   /// Names of the operations that are counted.
   [[nodiscard]] virtual std::vector<std::string> counted() const = 0;
+  /// Names of the models that cells may run on; none where all run on one.
+  [[nodiscard]] virtual std::vector<std::string> models() const { return {}; }
+  /// How the models of cells are chosen, in words; empty where there is no choice.
+  [[nodiscard]] virtual std::string choice_of_models(
+      const std::vector<SweptTarget>& /*swept*/) const {
+    return {};
+  }
   /// Names that expressions may use besides swept parameters, with their SI values.
   [[nodiscard]] virtual std::vector<std::pair<std::string, double>> constants() const { return {}; }
   /// How many cells are worth being computed and stored together.
   [[nodiscard]] virtual std::uint64_t usual_block() const = 0;
-  /// @param targets of the swept parameters, in their order
+  /// @param swept the parameters, in their order
   [[nodiscard]] virtual std::unique_ptr<CellModel> cell_model(
-      const std::vector<std::string>& targets) const = 0;
+      const std::vector<SweptTarget>& swept) const = 0;
 };
 
 /// The paper's star in closed form: indentation, creep or both

@@ -92,8 +92,8 @@ class ContactCell final : public CellModel {
     times_.reserve(forces_);
   }
 
-  double run(std::span<const double> swept, std::span<double> values,
-             std::span<std::int64_t> counts) override {
+  CellAnswer run(std::span<const double> swept, std::span<double> values,
+                 std::span<std::int64_t> counts) override {
     for (std::size_t i = 0; i < swept.size(); ++i) values_[swept_[i]] = swept[i];
     const TpmParameters p = element_of(values_);
     require_valid(p, "material");
@@ -115,7 +115,7 @@ class ContactCell final : public CellModel {
         force += width;
       }
     }
-    return 0.0;
+    return {};
   }
 
  private:
@@ -222,11 +222,11 @@ class ContactModel final : public SweepModel {
   }
   [[nodiscard]] std::uint64_t usual_block() const override { return 8192; }
   [[nodiscard]] std::unique_ptr<CellModel> cell_model(
-      const std::vector<std::string>& targets) const override {
+      const std::vector<SweptTarget>& targets) const override {
     std::vector<std::size_t> swept;
     swept.reserve(targets.size());
-    for (const std::string& target : targets) {
-      swept.push_back(parse_word(kContactParameters, "parameter", target, "sweep"));
+    for (const SweptTarget& target : targets) {
+      swept.push_back(parse_word(kContactParameters, "parameter", target.target, "sweep"));
     }
     for (const ContactParameter& parameter : kContactParameters) {
       if (!setup_.uses(parameter.meaning) || !std::isnan(setup_.values[parameter.meaning]) ||

@@ -2,12 +2,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <mutex>
 #include <optional>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_scene.hpp"
+#include "tpm/plan/shared_plan.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
@@ -30,8 +33,12 @@ struct OrganSetup {
   Json scene;
   std::filesystem::path folder;
   bool by_depth = true;
+  std::optional<double> tolerance = std::nullopt;  ///< of the sweep; none: that of the scene
   std::vector<SweepOutput> outputs;
 };
+
+constexpr double kLeastOfSweep = 1e-6, kMostOfSweep = 0.5;
+constexpr double kLeastTolerance = 1e-12;  // of QuasiStaticOptions
 
 enum OrganCount : std::size_t { kSteps, kIterations, kFactorisations, kBackSolves, kOrganCounts };
 
@@ -101,53 +108,207 @@ class AskedTimes {
   std::vector<double> all_, watched_;
 };
 
-/// One organ after another.
-class OrganCell final : public CellModel {
- public:
-  OrganCell(const OrganSetup& setup, const std::vector<std::string>& targets)
-      : setup_(setup), targets_(targets) {
-    for (const std::string& target : targets) {
-      keys_.push_back(find_key(setup.scene, target, "sweep"));
-    }
-  }
+/// Tolerances of the network that a cell may run at, each a tenth of the one before.
+constexpr std::array<double, 3> kNetworkShares{1e-1, 1e-2, 1e-3};
 
-  double run(std::span<const double> swept, std::span<double> values,
-             std::span<std::int64_t> counts) override {
-    const PlanScene scene(scene_of(swept));
-    const AskedTimes times(scene.protocol(), setup_.outputs);
-    QuasiStaticOptions options;
-    options.tolerance = scene.scene().formulation.tolerance;
-    const DrivenNetwork& driven = scene.driven();
-    const QuasiStaticRun run =
-        QuasiStatic(driven.bonds, driven.rest, driven.freedom, driven.probes, options)
-            .run(scene.protocol(), times.all());
-    counts[kSteps] = run.work.steps;
-    counts[kIterations] = run.work.iterations;
-    counts[kFactorisations] = run.work.factorisations;
-    counts[kBackSolves] = run.work.back_solves;
-    fill(run.response, scene.protocol(), times, values);
-    return run.error_estimate / run.response.cwiseAbs().maxCoeff();
+std::vector<std::string> names_of_models(double tolerance) {
+  std::vector<std::string> names = SharedPlan::models();
+  for (const double share : kNetworkShares) {
+    names.push_back(fmt::format("collocation_{}", significant(share * tolerance, 2)));
+  }
+  return names;
+}
+
+bool is_light(const std::string& target) {
+  return target.starts_with("/material/") || target.starts_with("/protocol/") ||
+         target.starts_with("/integrator/") || target == "/tolerance";
+}
+
+/// What a shared plan answers to without being made anew.
+bool is_shared(const std::string& target) {
+  return target.starts_with("/protocol/") || target == "/material/eta1";
+}
+
+/// Whether a grid of claims for the cells that share organ and moduli costs less than running them.
+struct SharedCost {
+  double cells = 1.0;  ///< that share them
+  double runs = 0.0;   ///< of the network, for the grid
+  [[nodiscard]] bool pays() const { return runs < cells; }
+};
+
+/// Least and largest of a quantity of the scene over the sweep, SI.
+struct SceneRange {
+  double least = 0.0, largest = 0.0;
+};
+
+SceneRange range_in_scene(const Json& scene, const std::string& target,
+                          const std::vector<SweptTarget>& swept) {
+  for (const SweptTarget& s : swept) {
+    if (s.target == target) return {s.least, s.largest};
+  }
+  const Json::json_pointer pointer(target);
+  if (!scene.contains(pointer)) return {};
+  const auto text = scene.at(pointer).get<std::string>();
+  const Unit unit = parse_unit(text.substr(text.find(' ') + 1), target);
+  const double value = parse_quantity(text, unit.dimension, target);
+  return {value, value};
+}
+
+SharedCost cost_of_sharing(const Json& scene, const std::vector<SweptTarget>& swept) {
+  SharedCost cost;
+  for (const SweptTarget& s : swept) {
+    const bool counted = std::any_of(swept.begin(), swept.end(), [&](const SweptTarget& other) {
+      return other.axis == s.axis && (!is_shared(other.target) || &other < &s);
+    });
+    if (!counted) cost.cells *= static_cast<double>(s.places);
+  }
+  const auto ratio = [&](const char* target) {
+    const SceneRange r = range_in_scene(scene, target, swept);
+    return r.least > 0.0 ? r.largest / r.least : 1.0;
+  };
+  const double depths = ratio("/protocol/depth");
+  cost.runs =
+      SharedPlan::cost_in_runs(depths, depths * ratio("/protocol/rate") * ratio("/material/eta1"));
+  return cost;
+}
+
+/// Plans that cells share, by the organ and the moduli that they are made for.
+class SharedPlans {
+ public:
+  explicit SharedPlans(double tolerance) : tolerance_(tolerance) {}
+
+  std::shared_ptr<SharedPlan> of(const std::string& key, const ExperimentScene& scene) {
+    const std::scoped_lock lock(one_at_a_time_);
+    constexpr std::size_t kKept = 4;
+    const auto found = std::find_if(plans_.begin(), plans_.end(),
+                                    [&](const auto& plan) { return plan.first == key; });
+    if (found != plans_.end()) {
+      std::rotate(plans_.begin(), found, found + 1);
+      return plans_.front().second;
+    }
+    if (plans_.size() == kKept) plans_.pop_back();
+    plans_.emplace(plans_.begin(), key, std::make_shared<SharedPlan>(scene, tolerance_));
+    return plans_.front().second;
   }
 
  private:
+  double tolerance_;
+  std::mutex one_at_a_time_;
+  std::vector<std::pair<std::string, std::shared_ptr<SharedPlan>>> plans_;  ///< last used first
+};
+
+/// One organ after another.
+class OrganCell final : public CellModel {
+ public:
+  /// @param plans none: all cells run on the network
+  OrganCell(const OrganSetup& setup, const std::vector<SweptTarget>& swept, SharedPlans* plans)
+      : setup_(setup), plans_(plans) {
+    for (const SweptTarget& s : swept) {
+      if (setup.tolerance && s.target == "/tolerance") {
+        throw bad_input("sweep", "sweeps /tolerance and states a tolerance of its own",
+                        "one of the two");
+      }
+      targets_.push_back(s.target);
+      keys_.push_back(find_key(setup.scene, s.target, "sweep"));
+    }
+    if (setup.tolerance && !cost_of_sharing(setup.scene, swept).pays()) plans_ = nullptr;
+  }
+
+  CellAnswer run(std::span<const double> swept, std::span<double> values,
+                 std::span<std::int64_t> counts) override {
+    Json changed = setup_.scene;
+    for (std::size_t i = 0; i < swept.size(); ++i) {
+      put_value(changed, keys_[i], swept[i], targets_[i]);
+    }
+    std::string structure;
+    const ExperimentScene scene = scene_of(swept, changed, structure);
+    const AskedTimes times(scene.protocol, setup_.outputs);
+    if (plans_ != nullptr) {
+      if (auto answer = on_reduced(scene, structure, times, values, counts)) return *answer;
+    }
+    return on_network(PlanScene(scene), changed, times, values, counts);
+  }
+
+ private:
+  std::optional<CellAnswer> on_reduced(const ExperimentScene& scene, const std::string& structure,
+                                       const AskedTimes& times, std::span<double> values,
+                                       std::span<std::int64_t> counts) {
+    const TpmParameters& p = scene.tissue.material;
+    if (!(p.relaxation_time_s() > 0.0) || !std::isfinite(p.relaxation_time_s())) return {};
+    const std::string key =
+        fmt::format("{} {} {} {} {} {}", structure, p.E1_Pa, p.E2_Pa, p.Eprime_Pa, p.A0_m2, p.l0_m);
+    if (plan_ == nullptr || key != plan_key_) {
+      plan_ = plans_->of(key, scene);
+      plan_key_ = key;
+    }
+    const auto answer = plan_->answer(scene.protocol, p.relaxation_time_s(), times.all());
+    if (!answer) return {};
+    counts[kSteps] = static_cast<std::int64_t>(answer->steps);
+    fill(answer->response, scene.protocol, times, values);
+    return CellAnswer{answer->claim, static_cast<std::uint8_t>(answer->model)};
+  }
+
+  CellAnswer on_network(const PlanScene& scene, const Json& changed, const AskedTimes& times,
+                        std::span<double> values, std::span<std::int64_t> counts) const {
+    QuasiStaticOptions options = options_of(changed);
+    const DrivenNetwork& driven = scene.driven();
+    const auto run_at = [&](double tolerance) {
+      options.tolerance = tolerance;
+      QuasiStaticRun run =
+          QuasiStatic(driven.bonds, driven.rest, driven.freedom, driven.probes, options)
+              .run(scene.protocol(), times.all());
+      counts[kSteps] += run.work.steps;
+      counts[kIterations] += run.work.iterations;
+      counts[kFactorisations] += run.work.factorisations;
+      counts[kBackSolves] += run.work.back_solves;
+      return run;
+    };
+    const auto estimate_of = [](const QuasiStaticRun& run) {
+      return run.error_estimate / run.response.cwiseAbs().maxCoeff();
+    };
+    if (!setup_.tolerance) {
+      const QuasiStaticRun run = run_at(options.tolerance);
+      fill(run.response, scene.protocol(), times, values);
+      return {estimate_of(run), 0};
+    }
+    CellAnswer answer;
+    for (std::size_t i = 0; i < kNetworkShares.size(); ++i) {
+      const double tolerance = std::max(kNetworkShares[i] * *setup_.tolerance, kLeastTolerance);
+      const QuasiStaticRun run = run_at(tolerance);
+      // The estimate alone can be far below the error where few iterations were needed.
+      answer.error_estimate = std::max(tolerance, estimate_of(run));
+      answer.model = static_cast<std::uint8_t>(SharedPlan::models().size() + i);
+      if (answer.error_estimate > *setup_.tolerance) continue;
+      fill(run.response, scene.protocol(), times, values);
+      return answer;
+    }
+    throw Error(ExitCode::numerical, "network",
+                fmt::format("its error is estimated as {} of the peak",
+                            significant(answer.error_estimate, 2)),
+                "a smaller tolerance");
+  }
+
+  [[nodiscard]] static QuasiStaticOptions options_of(const Json& changed) {
+    QuasiStaticOptions options;
+    options.tolerance = changed.value("tolerance", options.tolerance);
+    if (!changed.contains("integrator")) return options;
+    const Json& block = changed.at("integrator");
+    options.stages = block.value("stages", options.stages);
+    options.step_s = positive_at(block, "step", Dimension::time, {"integrator"});
+    return options;
+  }
+
   /// The scene with the cell's values. Finding the spheres and their bonds takes much longer than
   /// a run: they are kept while only the material and the protocol change. They are always those
   /// of the scene's own material and protocol, so that no cell depends on which one was before.
-  ExperimentScene scene_of(std::span<const double> swept) {
-    Json changed = setup_.scene, structure = setup_.scene;
+  ExperimentScene scene_of(std::span<const double> swept, const Json& changed, std::string& key) {
+    Json structure = setup_.scene;
     for (std::size_t i = 0; i < swept.size(); ++i) {
-      put_value(changed, keys_[i], swept[i], targets_[i]);
-      const bool light =
-          targets_[i].starts_with("/material/") || targets_[i].starts_with("/protocol/");
-      if (!light) put_value(structure, keys_[i], swept[i], targets_[i]);
+      if (!is_light(targets_[i])) put_value(structure, keys_[i], swept[i], targets_[i]);
     }
-    const std::string key = structure.dump();
-    if (!base_ || key != base_key_) {
-      base_.reset();
-      base_ = parse_experiment(structure, "scene", setup_.folder);
-      base_key_ = key;
-    }
-    ExperimentScene scene = *base_;
+    structure.erase("integrator");
+    key = structure.dump();
+    ExperimentScene scene = base_of(structure, key);
     const DocumentPlace place{"scene"};
     scene.tissue.material =
         parse_material(changed.value("material", Json::object()),
@@ -155,6 +316,20 @@ class OrganCell final : public CellModel {
     scene.protocol = parse_scene_protocol(changed.at("protocol"), place.key("protocol"));
     require_possible(scene.protocol, scene.contacts, scene.tissue, place.key("protocol"));
     return scene;
+  }
+
+  /// The last few are kept: a design of sensitivities goes back and forth between two organs.
+  const ExperimentScene& base_of(const Json& structure, const std::string& key) {
+    constexpr std::size_t kKept = 4;
+    const auto found = std::find_if(bases_.begin(), bases_.end(),
+                                    [&](const auto& base) { return base.first == key; });
+    if (found != bases_.end()) {
+      std::rotate(bases_.begin(), found, found + 1);
+      return bases_.front().second;
+    }
+    if (bases_.size() == kKept) bases_.pop_back();
+    bases_.emplace(bases_.begin(), key, parse_experiment(structure, "scene", setup_.folder));
+    return bases_.front().second;
   }
 
   void fill(const Eigen::VectorXd& response, const Protocol& protocol, const AskedTimes& times,
@@ -188,15 +363,19 @@ class OrganCell final : public CellModel {
   }
 
   const OrganSetup& setup_;
+  SharedPlans* plans_;
+  std::shared_ptr<SharedPlan> plan_;
+  std::string plan_key_;
   std::vector<std::string> targets_;
   std::vector<SceneKey> keys_;
-  std::optional<ExperimentScene> base_;
-  std::string base_key_;
+  /// By their structure, the last used first.
+  std::vector<std::pair<std::string, ExperimentScene>> bases_;
 };
 
 class OrganSweepModel final : public SweepModel {
  public:
-  explicit OrganSweepModel(OrganSetup setup) : setup_(std::move(setup)) {
+  explicit OrganSweepModel(OrganSetup setup)
+      : setup_(std::move(setup)), plans_(setup_.tolerance.value_or(0.0)) {
     for (const SweepOutput& output : setup_.outputs) variables_.push_back(output.variable);
   }
 
@@ -210,12 +389,26 @@ class OrganSweepModel final : public SweepModel {
   }
   [[nodiscard]] std::uint64_t usual_block() const override { return 8; }
   [[nodiscard]] std::unique_ptr<CellModel> cell_model(
-      const std::vector<std::string>& targets) const override {
-    return std::make_unique<OrganCell>(setup_, targets);
+      const std::vector<SweptTarget>& swept) const override {
+    return std::make_unique<OrganCell>(setup_, swept, setup_.tolerance ? &plans_ : nullptr);
+  }
+  [[nodiscard]] std::vector<std::string> models() const override {
+    return setup_.tolerance ? names_of_models(*setup_.tolerance) : std::vector<std::string>{};
+  }
+  [[nodiscard]] std::string choice_of_models(const std::vector<SweptTarget>& swept) const override {
+    if (!setup_.tolerance) return {};
+    const SharedCost cost = cost_of_sharing(setup_.scene, swept);
+    return fmt::format(
+        "{} cells share organ and moduli; claims of reduced models for them cost {} "
+        "runs of the network: {}",
+        significant(cost.cells, 6), significant(cost.runs, 3),
+        cost.pays() ? "the least model that claims to be within the tolerance"
+                    : "the network, at the coarsest tolerance that is enough");
   }
 
  private:
   OrganSetup setup_;
+  mutable SharedPlans plans_;  ///< does not change what is found
   std::vector<SweepVariable> variables_;
 };
 
@@ -236,13 +429,29 @@ void require_outputs(const OrganSetup& setup, const DocumentPlace& place) {
 std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::string_view where,
                                                     const std::filesystem::path& folder) {
   const DocumentPlace place{std::string(where)};
-  OrganSetup setup{document.at("scene"), folder, true, {}};
+  OrganSetup setup{document.at("scene"), folder, true, {}, {}};
+  if (document.contains("tolerance")) {
+    const auto text = document.at("tolerance").get<std::string>();
+    setup.tolerance = parse_quantity(text, Dimension::dimensionless, place.key("tolerance").where);
+    if (!(*setup.tolerance >= kLeastOfSweep && *setup.tolerance <= kMostOfSweep)) {
+      throw bad_input(place.key("tolerance").where, printable(text), "0.0001 % to 50 %");
+    }
+    if (document.contains("integrator")) {
+      throw bad_input(place.key("tolerance").where, "beside an integrator", "one of the two");
+    }
+  }
   setup.outputs = parse_sweep_outputs(document.at("outputs"), place.key("outputs"));
   const ExperimentScene scene =
       parse_experiment(setup.scene, fmt::format("{}: scene", where), folder);
   if (scene.formulation.kind != FormulationKind::quasi_static || scene.formulation.mass_spring) {
     throw bad_input(place.key("scene").where, "another formulation than quasi_static",
                     "a scene of the quasi-static tissue");
+  }
+  // Of the sweep, not of the scene; here where pointers find it.
+  if (document.contains("integrator")) {
+    const DocumentPlace at = place.key("integrator");
+    static_cast<void>(positive_at(document.at("integrator"), "step", Dimension::time, at));
+    setup.scene["integrator"] = document.at("integrator");
   }
   setup.by_depth = scene.protocol.drive() == Drive::displacement;
   require_outputs(setup, place.key("outputs"));

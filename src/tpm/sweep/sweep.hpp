@@ -55,6 +55,8 @@ struct Sweep {
 
   [[nodiscard]] std::uint64_t cells() const;
   [[nodiscard]] std::uint64_t blocks() const;
+  /// What is changed, for the model.
+  [[nodiscard]] std::vector<SweptTarget> swept() const;
   /// The places on all axes of a cell.
   [[nodiscard]] std::vector<std::uint64_t> places(std::uint64_t cell) const;
   /// All numbers of one cell's variables, curves included.

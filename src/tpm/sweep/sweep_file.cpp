@@ -203,7 +203,8 @@ void read_formulas(const Json& outputs, Sweep& sweep, const DocumentPlace& place
 
 /// Names of variables differ from each other and from everything else in the file of results.
 void require_own_names(const Sweep& sweep, const DocumentPlace& place) {
-  std::set<std::string> taken{"status", "reason", "reason_text", "error_estimate"};
+  std::set<std::string> taken{"status",         "reason", "reason_text",
+                              "error_estimate", "model",  "model_text"};
   for (const SweepAxis& axis : sweep.axes) taken.insert(axis.name);
   for (const SweptParameter& parameter : sweep.parameters) taken.insert(parameter.name);
   for (const SweepVariable& variable : sweep.variables) {
@@ -257,6 +258,11 @@ void require_blocks_of_model(const Json& document, const DocumentPlace& place) {
     if (!organ || !document.contains(key)) continue;
     throw bad_input(place.key(key).where, "belongs to the single contact", "keys of the scene");
   }
+  for (const char* key : {"tolerance", "integrator"}) {
+    if (organ || !document.contains(key)) continue;
+    throw bad_input(place.key(key).where, "belongs to the model 'organ'",
+                    "nothing of the kind: the single contact is a closed form");
+  }
   if (organ == document.contains("scene")) return;
   throw bad_input(place.key("scene").where, organ ? "is missing" : "belongs to the model 'organ'",
                   organ ? "a scene's file, or a scene" : "");
@@ -289,6 +295,24 @@ std::uint64_t Sweep::cells() const {
   std::uint64_t cells = 1;
   for (const SweepAxis& axis : axes) cells *= axis.size;
   return cells;
+}
+
+std::vector<SweptTarget> Sweep::swept() const {
+  constexpr std::uint64_t kLooked = 4096;  // evenly: what lies between changes a range little
+  std::vector<SweptTarget> swept;
+  for (const SweptParameter& p : parameters) {
+    SweptTarget target{p.target, p.axis, axes[p.axis].size, p.values.at(0), p.values.at(0)};
+    const std::uint64_t step = (target.places + kLooked - 1) / kLooked;
+    for (std::uint64_t i = 0; i < target.places; i += step) {
+      target.least = std::min(target.least, p.values.at(i));
+      target.largest = std::max(target.largest, p.values.at(i));
+    }
+    const double last = p.values.at(target.places - 1);
+    target.least = std::min(target.least, last);
+    target.largest = std::max(target.largest, last);
+    swept.push_back(std::move(target));
+  }
+  return swept;
 }
 
 std::uint64_t Sweep::blocks() const {
@@ -329,10 +353,8 @@ Sweep parse_sweep(const Json& written, std::string_view where,
   }
   require_expressions(sweep, place);
   sweep.block_cells = document.value("block", usual_block(sweep));
-  std::vector<std::string> targets;
-  for (const SweptParameter& p : sweep.parameters) targets.push_back(p.target);
   try {
-    static_cast<void>(sweep.model->cell_model(targets));
+    static_cast<void>(sweep.model->cell_model(sweep.swept()));
   } catch (const Error& error) {
     throw error.within(where);
   }

@@ -94,6 +94,27 @@ std::string SweepReader::parameter_unit(const std::string& name) const {
   return file_.attribute(path_of(name), "units");
 }
 
+std::string SweepReader::parameter_target(const std::string& name) const {
+  return file_.attribute(path_of(name), "parameter");
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> SweepReader::models() const {
+  std::vector<std::pair<std::string, std::uint64_t>> models;
+  if (!file_.has("/model_text")) return models;
+  for (const std::string& name : file_.texts("/model_text")) models.emplace_back(name, 0);
+  each({"model"}, [&](const auto& found) {
+    for (const double model : found.front()) {
+      const auto place = static_cast<std::size_t>(model);
+      if (place < models.size()) ++models[place].second;
+    }
+  });
+  return models;
+}
+
+std::string SweepReader::choice_of_models() const {
+  return file_.has("/model_text") ? file_.attribute("/model", "choice") : std::string();
+}
+
 std::vector<std::uint64_t> SweepReader::start_at(const HeldPlaces& held) const {
   std::vector<std::uint64_t> first(axes_.size(), 0);
   for (const auto& [name, place] : held) first[axis(name)] = place;

@@ -47,6 +47,12 @@ class SweepReader {
   /// A parameter's values along its axis.
   [[nodiscard]] std::vector<double> parameter(const std::string& name) const;
   [[nodiscard]] std::string parameter_unit(const std::string& name) const;
+  /// As the model knows it.
+  [[nodiscard]] std::string parameter_target(const std::string& name) const;
+  /// How many cells ran on each model, by name, and how the models were chosen, in words; nothing
+  /// where there was no choice.
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> models() const;
+  [[nodiscard]] std::string choice_of_models() const;
 
   /// A number over one or two axes, the others held at a place each (the first, if not said).
   /// @param rows, columns names of axes; no rows: one row

@@ -89,6 +89,13 @@ class ResultWriter {
     add_array("reason", Number::int32, "", "why not done: a place in reason_text");
     add_array("error_estimate", Number::float64, "",
               "of the method, in parts of the largest response");
+    if (const auto models = sweep.model->models(); !models.empty()) {
+      add_array("model", Number::uint8, "",
+                "that the cell ran on: a place in model_text; 255: none");
+      out_.texts("/model_text", models);
+      out_.dimension_scale("/model_text");
+      out_.attribute("/model", "choice", sweep.model->choice_of_models(sweep.swept()));
+    }
     for (const std::string& name : sweep.model->counted()) {
       add_array(fmt::format("count_{}", name), Number::int64, "", "operations");
     }
@@ -109,6 +116,9 @@ class ResultWriter {
     const auto reasons = reasons_.numbers_of(block);
     out_.part("/reason", first, std::span<const std::int32_t>(reasons));
     out_.part("/error_estimate", first, std::span<const double>(block.error_estimate));
+    if (!block.model.empty()) {
+      out_.part("/model", first, std::span<const std::uint8_t>(block.model));
+    }
     const auto counted = sweep_.model->counted();
     for (std::size_t k = 0; k < counted.size(); ++k) {
       out_.part(fmt::format("/count_{}", counted[k]), first,
@@ -206,7 +216,7 @@ class ResultWriter {
 /// HDF5 does not survive a disk that gets full under it: the room is asked for before.
 void require_room(const Sweep& sweep, const fs::path& file) {
   constexpr std::uint64_t kForNames = std::uint64_t{1} << 20U;
-  const std::uint64_t cell = 1 + 4 + 8 + 8 * (sweep.model->counted().size() + sweep.width());
+  const std::uint64_t cell = 1 + 1 + 4 + 8 + 8 * (sweep.model->counted().size() + sweep.width());
   std::uint64_t bytes = cell * sweep.cells() + kForNames;
   for (const SweepAxis& axis : sweep.axes) bytes += 8 * axis.size;
   for (const SweptParameter& p : sweep.parameters) bytes += 8 * sweep.axes[p.axis].size;
@@ -228,6 +238,7 @@ void write_csv_head(const Sweep& sweep, std::string& text) {
     text += fmt::format("{}{}{},", p.name, p.unit.empty() ? "" : " ", p.unit);
   }
   text += "status,reason,error_estimate";
+  if (!sweep.model->models().empty()) text += ",model";
   for (const std::string& name : sweep.model->counted()) text += fmt::format(",count_{}", name);
   for (const SweepVariable& v : sweep.variables) {
     const char* space = v.unit.empty() ? "" : " ";
@@ -255,6 +266,10 @@ void write_csv_row(const Sweep& sweep, const CellBlock& block, std::size_t cell,
   fmt::format_to(out, "{},{},{}", kWords[static_cast<std::size_t>(block.status[cell])],
                  reason == 0 ? std::string() : quoted_field(block.reasons[reason - 1U]),
                  csv_number(block.error_estimate[cell]));
+  if (!block.model.empty()) {
+    const auto models = sweep.model->models();
+    fmt::format_to(out, ",{}", block.model[cell] < models.size() ? models[block.model[cell]] : "");
+  }
   for (const auto& counts : block.counts) fmt::format_to(out, ",{}", counts[cell]);
   for (std::size_t v = 0; v < block.values.size(); ++v) {
     const std::size_t width = sweep.variables[v].width();

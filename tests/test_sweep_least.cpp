@@ -1,0 +1,100 @@
+// The least model per cell: claims against the network, the choice, and bits that do not depend on
+// the order.
+#include <catch2/catch.hpp>
+#include <set>
+
+#include "temp_folder.hpp"
+#include "tpm/plan/shared_plan.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/sweep/run_sweep.hpp"
+#include "tpm/sweep/sweep_reader.hpp"
+
+using namespace tpm;
+
+namespace {
+
+/// A block of tissue with a ramp and hold; 8 x 6 x 6 cells that share organ and moduli.
+std::string shared_block(const std::string& tolerance, const std::string& own) {
+  return R"({"model": "organ", "block": 9, )" + tolerance + R"("scene": {
+    "organ": {"kind": "block", "cells": [4, 4, 3], "spacing": "20 mm", "lattice": "cubic"},
+    "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "24 kPa s"},
+    "anchors": [{"kind": "half_space", "point": ["0 mm", "0 mm", "1 mm"], "normal": [0, 0, -1]}],
+    "contacts": [{"kind": "sphere", "number": 13}],
+    "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "5 s"},
+    "tolerance": )" +
+         own + R"(},
+  "axes": [{"parameter": "/material/eta1", "from": "6 kPa s", "to": "96 kPa s", "count": 8, "scale": "log"},
+           {"parameter": "/protocol/rate", "from": "2 mm/s", "to": "4 mm/s", "count": 6},
+           {"parameter": "/protocol/depth", "from": "3 mm", "to": "6 mm", "count": 6}],
+  "outputs": ["peak_force", {"force_over": {"from": "0 s", "to": "5 s", "count": 26}, "name": "force"}]})";
+}
+
+Sweep parsed_block(const std::string& tolerance, const std::string& own = "1e-6") {
+  return parse_sweep(parse_json(shared_block(tolerance, own), "sweep"), "sweep", ".");
+}
+
+std::string least_result(const Sweep& sweep, const std::string& file, int workers) {
+  SweepControls controls;
+  controls.workers = workers;
+  static_cast<void>(run_sweep(sweep, log_path(file), controls));
+  const BlockLog log = BlockLog::to_read(log_path(file), sweep, {});
+  static_cast<void>(write_sweep(sweep, {&log}, file));
+  return read_file(file);
+}
+
+}  // namespace
+
+TEST_CASE("each cell is as near to the network as its model claims", "[heavy]") {
+  const Sweep truth = parsed_block("", "1e-8");
+  CellRunner network(truth);
+  for (const char* tolerance : {"5 %", "0.5 %", "0.01 %"}) {
+    const Sweep sweep = parsed_block(R"("tolerance": ")" + std::string(tolerance) + R"(", )");
+    CellRunner least(sweep);
+    std::set<int> used;
+    const double bound = parse_quantity(tolerance, Dimension::dimensionless, "test");
+    for (std::uint64_t b = 0; b < sweep.blocks(); b += 5) {
+      const CellBlock found = least.run(b), exact = network.run(b);
+      for (std::size_t i = 0; i < found.cells(); ++i) {
+        REQUIRE(found.status[i] == CellStatus::done);
+        used.insert(found.model[i]);
+        const double peak = exact.values[0][i], claim = found.error_estimate[i];
+        CAPTURE(b, i, tolerance, claim, static_cast<int>(found.model[i]));
+        CHECK(claim <= bound);
+        CHECK(std::abs(found.values[0][i] - peak) <= claim * peak);
+        for (std::size_t t = 0; t < 26; ++t) {
+          CHECK(std::abs(found.values[1][26 * i + t] - exact.values[1][26 * i + t]) <=
+                claim * peak);
+        }
+      }
+    }
+    // The loose one needs no network, the tight one does.
+    CAPTURE(tolerance);
+    const auto reduced = static_cast<int>(SharedPlan::models().size());
+    CHECK((*used.begin() < reduced) == (bound > 1e-3));
+    CHECK((*used.rbegin() >= reduced) == (bound < 1e-2));
+  }
+}
+
+TEST_CASE("a cell's model and bits do not depend on workers or on the cells before") {
+  const test::TempFolder folder;
+  const Sweep sweep = parsed_block(R"("tolerance": "0.5 %", )");
+  const std::string expected = least_result(sweep, folder / "a.h5", 1);
+  CHECK(least_result(sweep, folder / "b.h5", 3) == expected);
+  const SweepReader reader(folder / "a.h5");
+  std::uint64_t cells = 0;
+  for (const auto& [name, count] : reader.models()) cells += count;
+  CHECK(cells == sweep.cells());
+  CHECK(reader.choice_of_models().find("288 cells share") != std::string::npos);
+}
+
+TEST_CASE("where few cells share organ and moduli all run on the network, and it is said") {
+  std::string text = shared_block(R"("tolerance": "1 %", )", "1e-6");
+  const std::string eta = R"("/material/eta1", "from": "6 kPa s", "to": "96 kPa s")";
+  text.replace(text.find(eta), eta.size(), R"("/material/E1", "from": "6 kPa", "to": "96 kPa")");
+  const Sweep sweep = parse_sweep(parse_json(text, "sweep"), "sweep", ".");
+  const CellBlock block = CellRunner(sweep).run(0);
+  for (const std::uint8_t model : block.model) {
+    CHECK(sweep.model->models().at(model) == "collocation_0.001");
+  }
+  CHECK(sweep.model->choice_of_models(sweep.swept()).find("36 cells share") != std::string::npos);
+}
