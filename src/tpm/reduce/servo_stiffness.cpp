@@ -1,0 +1,71 @@
+#include "tpm/reduce/servo_stiffness.hpp"
+
+namespace tpm {
+
+ServoStiffness::ServoStiffness(const BondSystem& bonds, const Positions& rest,
+                               const Freedom& freedom)
+    : column_(bonds.spheres(), 0) {
+  std::vector<std::uint32_t> rank(bonds.spheres(), 0);
+  std::vector<char> moves(bonds.spheres(), 0);
+  for (std::size_t i = 0; i < bonds.spheres(); ++i) {
+    if (freedom.projector(i).isZero(0.0)) continue;
+    moves[i] = 1;
+    rank[i] = static_cast<std::uint32_t>(free_.size());
+    free_.push_back(i);
+  }
+  Eigen::Matrix3Xd places(3, static_cast<Eigen::Index>(free_.size()));
+  for (std::size_t i = 0; i < free_.size(); ++i) {
+    places.col(static_cast<Eigen::Index>(i)) = rest.col(static_cast<Eigen::Index>(free_[i]));
+  }
+  std::vector<FrontalPattern::Edge> edges;
+  for (std::size_t b = 0; b < bonds.size(); ++b) {
+    const std::uint32_t from = bonds.end_a()[b];
+    const std::uint32_t to = bonds.end_b()[b];
+    if (moves[from] != 0 && moves[to] != 0) edges.push_back({rank[from], rank[to]});
+  }
+  pattern_ = std::make_shared<const FrontalPattern>(places, edges);
+  auto next = static_cast<std::uint32_t>(free_.size());
+  for (std::size_t i = 0; i < bonds.spheres(); ++i) {
+    column_[i] = moves[i] != 0 ? pattern_->place()[rank[i]] : next++;
+    if (moves[i] == 0 || freedom.is_free(i)) continue;
+    partly_.push_back({column_[i], freedom.projector(i).cast<float>()});
+  }
+}
+
+bool ServoStiffness::factorise(const BondSystem& bonds, const Freedom& freedom,
+                               const Positions& position, const BondMemory& memory, bool portable) {
+  std::vector<Eigen::Matrix3d> diagonal(column_.size(), Eigen::Matrix3d::Zero());
+  std::vector<Eigen::Matrix3d> across;
+  for (std::size_t b = 0; b < bonds.size(); ++b) {
+    const std::uint32_t from = bonds.end_a()[b];
+    const std::uint32_t to = bonds.end_b()[b];
+    const Eigen::Matrix3d block = bonds.stiffness_block(b, position, memory);
+    diagonal[from] += block;
+    diagonal[to] += block;
+    if (!moves(from) || !moves(to)) continue;
+    across.emplace_back(-freedom.projector(from) * block * freedom.projector(to));
+  }
+  std::vector<Eigen::Matrix3d> of_free;
+  for (const std::size_t i : free_) {
+    const Eigen::Matrix3d& p = freedom.projector(i);
+    of_free.emplace_back(p * diagonal[i] * p +
+                         diagonal[i].trace() * (Eigen::Matrix3d::Identity() - p));
+  }
+  factor_ = std::make_unique<FrontalFactor>(pattern_, portable);
+  return factor_->factorise(of_free, across);
+}
+
+void ServoStiffness::project(float* four_per_sphere) const noexcept {
+  for (const Partly& partly : partly_) {
+    Eigen::Map<Eigen::Vector3f> v(four_per_sphere + 4 * partly.column);
+    v = (partly.projector * v).eval();
+  }
+}
+
+void ServoStiffness::solve(float* four_per_sphere) noexcept {
+  project(four_per_sphere);
+  factor_->solve(four_per_sphere);
+  project(four_per_sphere);
+}
+
+}  // namespace tpm

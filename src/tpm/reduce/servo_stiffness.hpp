@@ -1,0 +1,49 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "tpm/network/freedom.hpp"
+#include "tpm/reduce/servo_bonds.hpp"
+#include "tpm/solve/frontal_factor.hpp"
+
+namespace tpm {
+
+/// The spheres of a tissue in the order in which servo models keep them, and its stiffness at one
+/// position, factorised for many solutions (FrontalFactor).
+class ServoStiffness {
+ public:
+  /// @param rest places by which the order is chosen
+  /// @param freedom what is held does not move
+  ServoStiffness(const BondSystem& bonds, const Positions& rest, const Freedom& freedom);
+
+  /// To be called before solve(), with bonds and freedom as before. False if the tissue is not
+  /// stiff there.
+  [[nodiscard]] bool factorise(const BondSystem& bonds, const Freedom& freedom,
+                               const Positions& position, const BondMemory& memory, bool portable);
+
+  /// Spheres that move, in the order of the organ; they have the first columns.
+  [[nodiscard]] const std::vector<std::size_t>& free() const { return free_; }
+  [[nodiscard]] bool moves(std::size_t sphere) const { return column_[sphere] < free_.size(); }
+  [[nodiscard]] std::uint32_t column(std::size_t sphere) const { return column_[sphere]; }
+  [[nodiscard]] std::size_t columns() const { return column_.size(); }
+  /// Replaces forces by displacements, four floats per sphere that moves. Allocates nothing.
+  void solve(float* four_per_sphere) noexcept;
+  /// 3x3 blocks that a solution reads.
+  [[nodiscard]] std::size_t blocks_read() const { return pattern_->blocks_read(); }
+
+ private:
+  /// A sphere that may move in some directions only.
+  struct Partly {
+    std::size_t column;
+    Eigen::Matrix3f projector;
+  };
+  void project(float* four_per_sphere) const noexcept;
+
+  std::vector<std::size_t> free_;
+  std::vector<std::uint32_t> column_;
+  std::vector<Partly> partly_;
+  std::shared_ptr<const FrontalPattern> pattern_;
+  std::unique_ptr<FrontalFactor> factor_;
+};
+
+}  // namespace tpm
