@@ -198,8 +198,10 @@ int merge(const SweepChoice& choice, const Session& session) {
   }
   const auto note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
   std::vector<BlockLog> logs;
+  logs.reserve(files.size());
   for (const std::string& file : files) logs.push_back(BlockLog::to_read(file, sweep, note));
   std::vector<const BlockLog*> all;
+  all.reserve(logs.size());
   SweepRun run;
   run.blocks = sweep.blocks();
   for (const BlockLog& log : logs) {

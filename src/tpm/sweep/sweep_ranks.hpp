@@ -14,7 +14,7 @@ class SweepRanks {
   /// first fall silent: what there is to say, the first says.
   [[nodiscard]] static std::unique_ptr<SweepRanks> of_this_run();
   /// Sends the others home if they still wait.
-  ~SweepRanks();
+  ~SweepRanks();  // NOLINT(performance-trivially-destructible): with MPI it is not
   SweepRanks(const SweepRanks&) = delete;
   SweepRanks& operator=(const SweepRanks&) = delete;
 
