@@ -17,6 +17,7 @@
 #include "tpm/store/delimited.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpm/store/seal.hpp"
 
 namespace tpm {
 namespace {
@@ -74,7 +75,11 @@ std::vector<std::string> names_of(const List& list) {
 /// Writes the datasets of a sweep.
 class ResultWriter {
  public:
-  ResultWriter(const Sweep& sweep, const fs::path& file) : sweep_(sweep), out_(file) {
+  ResultWriter(const Sweep& sweep, fs::path file)
+      : sweep_(sweep),
+        file_(std::move(file)),
+        unsealed_(file_.string() + ".unsealed"),
+        out_(unsealed_) {
     for (const SweepAxis& axis : sweep.axes) shape_.push_back(axis.size);
     out_.attribute("/", "title", sweep.title);
     out_.attribute("/", "description", sweep.description);
@@ -135,6 +140,7 @@ class ResultWriter {
     out_.texts("/reason_text", reasons_.texts());
     out_.dimension_scale("/reason_text");
     out_.commit();
+    put_in_place();
     tally_.reasons.assign(reasons_.texts().begin() + 1, reasons_.texts().end());
     return tally_;
   }
@@ -206,7 +212,23 @@ class ResultWriter {
     }
   }
 
+  /// The result has its name when it is whole.
+  void put_in_place() const {
+    std::error_code ec;
+    try {
+      seal_file(unsealed_);
+    } catch (const Error&) {
+      fs::remove(unsealed_, ec);
+      throw;
+    }
+    fs::rename(unsealed_, file_, ec);
+    if (!ec) return;
+    throw Error(ExitCode::environment, file_.string(),
+                fmt::format("cannot write: {}", ec.message()), "a folder that can be written");
+  }
+
   const Sweep& sweep_;
+  fs::path file_, unsealed_;
   Hdf5Writer out_;
   std::vector<std::uint64_t> shape_;
   ReasonTable reasons_;
@@ -311,6 +333,7 @@ std::string fingerprint_of(const fs::path& file) {
   std::error_code ec;
   if (!fs::is_regular_file(file, ec)) return {};
   try {
+    require_whole(file);
     const Hdf5Reader reader(file);
     if (!reader.has_attribute("/", "sweep_fingerprint")) return {};
     return reader.attribute("/", "sweep_fingerprint");
