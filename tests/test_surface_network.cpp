@@ -67,11 +67,11 @@ Freedom standing(const Organ& organ) {
 
 /// A block of 60 spheres that stands on its lowest plane, under a ball.
 struct BallScene {
-  explicit BallScene(double tau_s)
+  explicit BallScene(double tau_s, double radius_m = 10e-3)
       : network(build_network(block_with_contact(), {}, "scene")),
         bonds(network, relaxing_in(tau_s)),
         freedom(standing(network.organ)),
-        ball(ball_on_surface(network.organ, *network.organ.contact, into, 10e-3)) {}
+        ball(ball_on_surface(network.organ, *network.organ.contact, into, radius_m)) {}
   [[nodiscard]] const Positions& rest() const { return network.organ.position; }
   [[nodiscard]] SurfaceNetwork servo(const SurfaceNetworkOptions& options = {}) const {
     return {bonds, rest(), freedom, ball, options};
@@ -281,6 +281,15 @@ TEST_CASE("A network under a ball says when it is out of its range") {
   const Eigen::Vector3d push = 1e-5 * scene.into;
   const double expected = scene.into.dot(servo.instantaneous_stiffness() * push);
   CHECK_THAT(-scene.into.dot(servo.step(push).force_N), WithinAbs(expected, 2e-3 * expected));
+
+  // So small a ball fits between four spheres, and comes to one of the next layer.
+  const BallScene small(1.0, 1e-3);
+  SurfaceNetwork fits = small.servo();
+  const Eigen::Vector3d between(10e-3, 10e-3, 5e-3);
+  CHECK(fits.step(between).trusted);
+  CHECK(fits.step(between + 36e-3 * small.into).trusted);
+  CHECK(fits.touching() == 0);
+  CHECK_FALSE(fits.step(Eigen::Vector3d(5e-3, 5e-3, -31e-3)).trusted);
 
   BallTool inside = scene.ball;
   inside.start_m += 1e-3 * scene.into;
