@@ -55,6 +55,20 @@ TEST_CASE("A hand that moves at constant speed against friction lags by friction
   CHECK_THAT(lag, WithinRel(s.damping_N_s_per_m * kSpeed / s.arm.stiffness_N_per_m, 1e-6));
 }
 
+TEST_CASE("A hand that slides across its push lags as it does along it") {
+  PlantSettings s = bare();
+  s.watchdog_s = 1e9;
+  constexpr double kSpeed = 0.01;
+  OperatorPiece slide{OperatorPiece::Aim::place, 100.0, 2e-3, 2e-3};
+  slide.across_to_m = {0.0, 0.0, 100.0 * kSpeed};
+  VirtualPlant plant(s, OperatorScript({slide}));
+  for (int i = 0; i < 5000; ++i) plant.advance();
+  const double lag = kSpeed * plant.time_s() - plant.position_m().z();
+  CHECK_THAT(lag, WithinRel(s.damping_N_s_per_m * kSpeed / s.arm.stiffness_N_per_m, 1e-6));
+  CHECK_THAT(plant.position_m().x(), WithinAbs(2e-3, 1e-12));
+  CHECK(plant.position_m().y() == 0.0);
+}
+
 TEST_CASE("A pushing hand reaches the speed at which friction takes all of its force") {
   PlantSettings s = bare();
   s.watchdog_s = 1e9;
@@ -131,11 +145,12 @@ TEST_CASE("A simulated watchdog can be told to forgive, and names that among its
 }
 
 TEST_CASE("An operator script reads back as it was written") {
-  const OperatorScript script({{OperatorPiece::Aim::place, 0.1, -0.002, 1.0 / 3.0},
-                               {OperatorPiece::Aim::force, 0.7, 0.0, 0.196}});
+  const OperatorScript script(
+      {{OperatorPiece::Aim::place, 0.1, -0.002, 1.0 / 3.0},
+       {OperatorPiece::Aim::force, 0.7, 0.0, 0.196, {0.0, 0.5, 0.0}, {0.0, 0.5, -2.0}}});
   CHECK(to_lines(script) ==
-        "place 0.10000000000000001 -0.002 0.33333333333333331\n"
-        "force 0.69999999999999996 0 0.19600000000000001\n");
+        "place 0.10000000000000001 -0.002 0.33333333333333331 0 0 0 0 0 0\n"
+        "force 0.69999999999999996 0 0.19600000000000001 0 0.5 0 0 0.5 -2\n");
 }
 
 TEST_CASE("A replay gives its motion and then ends") {

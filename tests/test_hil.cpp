@@ -51,6 +51,9 @@ TEST_CASE("Bad sessions: one line each, with the key") {
       Case{"/model/tolerance", "1%", "none but with the kind 'planned'"},
       Case{"/model", Json{{"tolerance", "70%"}, {"scene", Json::object()}},
            "key /model/tolerance: '70%'; expected a share of the peak"},
+      Case{"/model/tool_radius", "10 mm", "none but with the kind 'surface'"},
+      Case{"/slides", Json{{"depths", {"4 mm"}}, {"distance", "20 mm"}, {"rate", "10 mm/s"}},
+           "key /slides: the model does not follow a tool across its push"},
       Case{"/phase", 1, "phase"});
   CAPTURE(bad.pointer, bad.value.dump());
   CHECK_THROWS_WITH(parsed(with(short_session(), bad.pointer, bad.value)), Contains(bad.message));
@@ -88,6 +91,50 @@ TEST_CASE("A session of the element verifies against the network, the closed for
   CHECK(v.others[1].commanded.rms_N < 0.05 * kStep_N);
   CHECK(v.others[2].commanded.max_N < 0.005 * v.all.peak_N);
   CHECK(v.phases.size() == recording.session.phases.size());
+}
+
+TEST_CASE("A session over the surface verifies in all three components", "[heavy]") {
+  Json json = test::network_session("surface");
+  json.erase("indentations");
+  json["slides"] = Json::parse(R"({"depths": ["4 mm"], "press": "10 mm/s", "direction": [0, 1, -3],
+                                   "distance": "20 mm", "rate": "20 mm/s", "rest": "0.2 s"})");
+  const HilSession session = parsed(json);
+  CHECK(session.slide == Eigen::Vector3d::UnitY());
+  std::vector<std::string> names;
+  for (const SessionPhase& phase : session.phases) names.push_back(phase.name);
+  CHECK(names == std::vector<std::string>{"approach", "press to 4 mm at 10 mm/s",
+                                          "slide 20 mm at 20 mm/s, 4 mm deep",
+                                          "slide back 20 mm at 20 mm/s, 4 mm deep",
+                                          "release from 4 mm at 10 mm/s", "rest"});
+  const test::TempFolder folder;
+  SessionRunOptions options;
+  options.recording = folder / "a.tpmrec";
+  const SessionRun run = run_session(session, {}, options);
+  CHECK(run.outcome.cause == StopCause::finished);
+  CHECK(run.outcome.counts.beyond_model == 0);
+  HilRecording recording = read_recording(options.recording);
+  const VerifyOptions coarse{.spacing_s = 0.05};
+  const Verification v = verify(recording, coarse);
+  CHECK(v.phases.size() == 6);
+  CHECK(v.all.peak_N > 0.1);
+  for (const PhaseFidelity& phase : v.phases) {
+    CAPTURE(phase.phase.name);
+    CHECK(phase.force.max_N < 0.005 * v.all.peak_N);
+  }
+  CHECK(v.reference_error_N < 0.005 * v.all.peak_N);
+  // The hand was pushed aside, across the push, and a force that is wrong there is found.
+  double aside_N = 0.0;
+  for (ServoRecord& row : recording.rows) {
+    aside_N = std::max(aside_N, std::hypot(row.commanded_N[0], row.commanded_N[1]));
+    if (row.phase == 2) row.commanded_N[0] += 0.01 * v.all.peak_N;
+  }
+  CHECK(aside_N > 0.1 * v.all.peak_N);
+  const Verification wrong = verify(recording, coarse);
+  CHECK(wrong.phases[2].force.max_N > 0.0095 * v.all.peak_N);
+  CHECK(wrong.phases[1].force.max_N == v.phases[1].force.max_N);
+
+  CHECK_THROWS_WITH(parsed(with(json, "/slides/direction", Json::array({0, 0, 2}))),
+                    Contains("key /slides/direction: has no part across the push"));
 }
 
 TEST_CASE("Verification finds a force that is wrong by one percent of the peak in one phase") {

@@ -28,6 +28,7 @@ int run(const std::string& file, double hours, const std::filesystem::path& fold
   HilSession session = read_session(file);
   LoopModel loop = make_loop_model(session);
   session.servo.model_push = loop.push;
+  session.servo.to_model = loop.to_model;
   const double tau_s =
       parse_tissue(session.scene, file, session.folder).material.relaxation_time_s();
   const double period_s = session.servo.period_s;

@@ -1,6 +1,6 @@
 // Prints the measured numbers of docs/haptics.md, "What a cycle takes", as CSV:
 //     measure_hil_step SESSION... [ROUNDS]
-// A whole cycle (simulated device with its operator, model, one-sided contact, passivity, limits,
+// A whole cycle (simulated device with its operator, model, contact, passivity, limits,
 // row into the log) in virtual time, on the first 12 s of each session. Each cycle's time is the
 // least of ROUNDS equal runs (default 5), so that what else the machine does falls out; p50, p99
 // and the largest are of those.
@@ -57,6 +57,7 @@ void measure(const std::string& file, int rounds) {
   const LoopModel loop = make_loop_model(session);
   ServoSettings settings = session.servo;
   settings.model_push = loop.push;
+  settings.to_model = loop.to_model;
   const auto cycles =
       static_cast<std::size_t>(std::min(kLongest_s, session.duration_s()) / settings.period_s);
   const std::filesystem::path path =

@@ -1,11 +1,12 @@
 #pragma once
+#include <Eigen/Core>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 namespace tpm {
 
-/// A stretch of what an operator means to do, along one direction.
+/// A stretch of what an operator means to do: along one direction, and across it.
 struct OperatorPiece {
   enum class Aim {
     place,  ///< a position, m, reached through the stiffness of the arm
@@ -14,6 +15,17 @@ struct OperatorPiece {
   Aim aim = Aim::place;
   double end_s = 0.0;  ///< begins where the one before ends
   double from = 0.0, to = 0.0;
+  /// Where the hand means to be across, m, in the coordinates of the device.
+  Eigen::Vector3d across_from_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d across_to_m = Eigen::Vector3d::Zero();
+};
+
+/// What an operator means at an instant.
+struct OperatorAim {
+  OperatorPiece::Aim aim = OperatorPiece::Aim::place;
+  double value = 0.0;  ///< m or N
+  double rate = 0.0;   ///< its change, a second
+  Eigen::Vector3d across_m = Eigen::Vector3d::Zero(), across_m_per_s = Eigen::Vector3d::Zero();
 };
 
 /// What an operator means to do, for a simulated arm.
@@ -22,8 +34,8 @@ class OperatorScript {
   OperatorScript() = default;
   explicit OperatorScript(std::vector<OperatorPiece> pieces) : pieces_(std::move(pieces)) {}
 
-  /// The piece at a time; calls with rising times are cheap. There is at least one.
-  [[nodiscard]] const OperatorPiece& at(double time_s, double& value, double& rate) noexcept;
+  /// Calls with rising times are cheap. There is at least one piece.
+  [[nodiscard]] OperatorAim at(double time_s) noexcept;
   [[nodiscard]] const std::vector<OperatorPiece>& pieces() const { return pieces_; }
 
  private:
@@ -32,7 +44,8 @@ class OperatorScript {
   double start_s_ = 0.0;
 };
 
-/// One line a piece: "place|force END FROM TO", numbers that read back as they are.
+/// One line a piece: "place|force END FROM TO X Y Z X Y Z", the last six from where to where
+/// across; numbers that read back as they are.
 [[nodiscard]] std::string to_lines(const OperatorScript& script);
 /// Throws std::runtime_error for a file that is not such lines.
 [[nodiscard]] OperatorScript read_operator_script(const std::filesystem::path& file);

@@ -56,11 +56,11 @@ VirtualPlant::VirtualPlant(const PlantSettings& settings, OperatorScript script)
       to_place_(propagator(settings, settings.arm.stiffness_N_per_m)),
       free_(propagator(settings, 0.0)),
       pending_(static_cast<std::size_t>(settings.delay_periods) + 1, Eigen::Vector3d::Zero()) {
-  double value = 0.0, rate = 0.0;
   if (script_.pieces().empty())
     script_ = OperatorScript({{OperatorPiece::Aim::place, 0.0, 0.0, 0.0}});
-  (void)script_.at(0.0, value, rate);
-  along_ = meant_ = value;
+  const OperatorAim first = script_.at(0.0);
+  along_ = meant_ = first.value;
+  across_ = first.across_m;
 }
 
 double VirtualPlant::time_s() const noexcept {
@@ -93,16 +93,15 @@ void VirtualPlant::advance() noexcept {
   const bool on = forces_on_ && !watchdog_tripped_ && !too_fast_;
   const Eigen::Vector3d force = on ? pending_[oldest_] : Eigen::Vector3d::Zero();
 
-  double value = 0.0, rate = 0.0;
-  const OperatorPiece& piece = script_.at(time_s(), value, rate);
-  const bool place = piece.aim == OperatorPiece::Aim::place;
+  const OperatorAim aim = script_.at(time_s());
+  const bool place = aim.aim == OperatorPiece::Aim::place;
   const double drag = settings_.damping_N_s_per_m;
   double push = force.dot(push_);
   const Eigen::Vector3d across_force = force - push * push_;
   if (place) {
     // Coming from a push, the hand means to be where it is.
     if (!aimed_at_place_) meant_ = along_;
-    const double meant_rate = rate + settings_.arm.correction_per_s * (value - along_);
+    const double meant_rate = aim.rate + settings_.arm.correction_per_s * (aim.value - along_);
     const Eigen::Vector3d state(along_ - meant_, along_speed_ - meant_rate,
                                 push - drag * meant_rate);
     const Eigen::Vector2d next = to_place_ * state;
@@ -110,16 +109,20 @@ void VirtualPlant::advance() noexcept {
     along_ = next[0] + meant_;
     along_speed_ = next[1] + meant_rate;
   } else {
-    const Eigen::Vector2d next = free_ * Eigen::Vector3d(along_, along_speed_, push + value);
+    const Eigen::Vector2d next = free_ * Eigen::Vector3d(along_, along_speed_, push + aim.value);
     along_ = next[0];
     along_speed_ = next[1];
   }
   aimed_at_place_ = place;
+  // Across, the hand goes where it means to; no eye corrects it.
   for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector2d next =
-        to_place_ * Eigen::Vector3d(across_[axis], across_speed_[axis], across_force[axis]);
-    across_[axis] = next[0];
-    across_speed_[axis] = next[1];
+    const double meant = aim.across_m[axis];
+    const double meant_rate = aim.across_m_per_s[axis];
+    const Eigen::Vector3d state(across_[axis] - meant, across_speed_[axis] - meant_rate,
+                                across_force[axis] - drag * meant_rate);
+    const Eigen::Vector2d next = to_place_ * state;
+    across_[axis] = next[0] + (meant + meant_rate * period);
+    across_speed_[axis] = next[1] + meant_rate;
   }
   ++periods_;
   if (velocity_m_per_s().norm() > settings_.velocity_limit_m_per_s) too_fast_ = true;

@@ -44,14 +44,20 @@ Json shape_json(const TissueShape& shape) {
   }
   std::vector<std::uint32_t> ends;
   for (const auto& [a, b] : shape.bonds) ends.insert(ends.end(), {a, b});
+  Json tool;  // null: along the push only
+  if (shape.to_model) {
+    const Eigen::Vector3d& start = shape.tool_start_m;
+    tool = {{"radius_m", shape.tool_radius_m}, {"start_m", {start.x(), start.y(), start.z()}}};
+  }
   return {{"spheres", shape.rest_m.cols()},
+          {"tool", tool},
           {"rest_um", rest_um},
           {"radius_m", shape.radius_m},
           {"contact", shape.contact},
           {"push", {shape.push.x(), shape.push.y(), shape.push.z()}},
           {"bonds", ends},
           {"shown", shape.field ? fmt::format("all spheres as the model in the loop places them, "
-                                              "recomputed every {} ms from the recorded depth",
+                                              "recomputed every {} ms from the recorded motion",
                                               significant(1e3 * kDrawnEvery_s, 3))
                                 : std::string("the contact sphere as recorded; the others are "
                                               "held")}};
@@ -68,6 +74,10 @@ std::string instruction_of(const SessionPhase& phase) {
       return fmt::format("Push in to {} mm at {} mm/s", mm(phase.to), mm(phase.rate_m_per_s));
     case SessionPhaseKind::hold:
       return fmt::format("Hold the tool at {} mm", mm(phase.to));
+    case SessionPhaseKind::slide:
+      return fmt::format("Slide from {} to {} mm aside at {} mm/s, {} mm deep",
+                         mm(phase.across_from_m), mm(phase.across_to_m), mm(phase.rate_m_per_s),
+                         mm(phase.to));
     case SessionPhaseKind::release:
       return fmt::format("Draw back to {} mm above the surface at {} mm/s", mm(-phase.to),
                          mm(phase.rate_m_per_s));
@@ -146,12 +156,19 @@ void LiveView::take_times() {
 
 void LiveView::take_shape(const ServoRecord& row) {
   if (shape_.rest_m.cols() == 0 || !std::isfinite(row.surface_depth_m)) return;
-  const Eigen::Vector3d moved = shape_.push * row.surface_depth_m;
+  const Eigen::Map<const Eigen::Vector3d> at_m(row.position_m);
+  const Eigen::Vector3d moved =
+      shape_.to_model ? Eigen::Vector3d(*shape_.to_model * (at_m - session_.servo.surface_m))
+                      : Eigen::Vector3d(shape_.push * row.surface_depth_m);
   if (shape_.field) {
     (void)shape_.field->step(moved);
     shape_.field->displacements(displacement_m_);
   }
-  displacement_m_.col(static_cast<Eigen::Index>(shape_.contact)) = moved;
+  if (shape_.to_model) {
+    state_.tool_m = moved;
+  } else {
+    displacement_m_.col(static_cast<Eigen::Index>(shape_.contact)) = moved;
+  }
   state_.displacement_um.clear();
   for (const double x_m : displacement_m_.reshaped()) {
     state_.displacement_um.push_back(static_cast<std::int32_t>(std::lround(1e6 * x_m)));
@@ -159,10 +176,9 @@ void LiveView::take_shape(const ServoRecord& row) {
 }
 
 void LiveView::take_point(const ServoRecord& row) {
-  double value = 0.0, rate = 0.0;
-  const OperatorPiece& piece = script_.at(state_.time_s, value, rate);
-  state_.target_m = piece.aim == OperatorPiece::Aim::place ? value : kNone;
-  state_.target_N = piece.aim == OperatorPiece::Aim::force ? value : kNone;
+  const OperatorAim aim = script_.at(state_.time_s);
+  state_.target_m = aim.aim == OperatorPiece::Aim::place ? aim.value : kNone;
+  state_.target_N = aim.aim == OperatorPiece::Aim::force ? aim.value : kNone;
   state_.points.push_back({state_.time_s, state_.target_m, state_.target_N, row.tool_depth_m,
                            row.model_force_N, state_.commanded_N, least_N_, most_N_});
   if (state_.points.size() > kMostPoints) {
@@ -245,6 +261,7 @@ std::string LiveView::state_json(std::uint64_t after) const {
       {"target_force_N", s.target_N},
       {"tool_depth_m", row.tool_depth_m},
       {"surface_depth_m", row.surface_depth_m},
+      {"tool_m", {s.tool_m.x(), s.tool_m.y(), s.tool_m.z()}},
       {"touching", (row.flags & kTouching) != 0},
       {"model_force_N", row.model_force_N},
       {"model_error_N", row.model_error_N},

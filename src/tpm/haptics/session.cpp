@@ -32,6 +32,34 @@ Eigen::Vector3d push_of(const Json& session, const DocumentPlace& place) {
   throw bad_input(place.key("push").where, "has no direction", "three numbers that are not all 0");
 }
 
+/// The part of a direction that is square to the push.
+Eigen::Vector3d slide_of(const Json& slides, const Eigen::Vector3d& push,
+                         const DocumentPlace& place) {
+  constexpr double kLeast = 1e-6;
+  Eigen::Vector3d along = Eigen::Vector3d::UnitX();
+  if (slides.contains("direction")) {
+    const Json& list = slides.at("direction");
+    along << list[0].get<double>(), list[1].get<double>(), list[2].get<double>();
+  }
+  const Eigen::Vector3d square = along - along.dot(push) * push;
+  if (along.allFinite() && square.norm() > kLeast * along.norm()) return square.normalized();
+  throw bad_input(place.key("direction").where, "has no part across the push",
+                  "three numbers that are not all 0 and not along 'push'");
+}
+
+void parse_tool(HilSession& session, const Json& model, const DocumentPlace& place) {
+  for (const char* key : {"tool_radius", "contact_stiffness"}) {
+    if (!model.contains(key) || session.model == LoopModelKind::surface) continue;
+    throw bad_input(place.key(key).where, printable(model.at(key).get<std::string>()),
+                    "none but with the kind 'surface'");
+  }
+  session.tool_radius_m =
+      in_range(model, "tool_radius", Dimension::length, session.tool_radius_m, 1e-3, 0.2, place);
+  session.contact_stiffness_N_per_m =
+      in_range(model, "contact_stiffness", Dimension::stiffness, session.contact_stiffness_N_per_m,
+               100.0, 1e6, place);
+}
+
 void parse_limits(HilSession& session, const Json& limits, const DocumentPlace& place) {
   ServoSettings& servo = session.servo;
   constexpr double kMotor_N = 12.0, kLongest_s = 60.0;
@@ -68,6 +96,7 @@ LoopModelKind parse_model(const std::string& kind) {
   if (kind == "element") return LoopModelKind::element;
   if (kind == "network") return LoopModelKind::network;
   if (kind == "network_beside") return LoopModelKind::network_beside;
+  if (kind == "surface") return LoopModelKind::surface;
   if (kind == "condensed") return LoopModelKind::condensed;
   return LoopModelKind::planned;
 }
@@ -106,6 +135,8 @@ std::string_view word_of(SessionPhaseKind kind) {
       return "indent";
     case SessionPhaseKind::hold:
       return "hold";
+    case SessionPhaseKind::slide:
+      return "slide";
     case SessionPhaseKind::release:
       return "release";
     case SessionPhaseKind::rest:
@@ -124,7 +155,8 @@ OperatorScript HilSession::operator_script() const {
     const bool pushes =
         phase.kind == SessionPhaseKind::load || phase.kind == SessionPhaseKind::creep;
     pieces.push_back({pushes ? OperatorPiece::Aim::force : OperatorPiece::Aim::place, phase.end_s,
-                      phase.from, phase.to});
+                      phase.from, phase.to, phase.across_from_m * slide,
+                      phase.across_to_m * slide});
   }
   return OperatorScript(std::move(pieces));
 }
@@ -137,6 +169,7 @@ HilSession parse_session(const Json& json, std::string_view where,
   session.title = json.value("title", std::string("session"));
   session.model = parse_model(json.at("model").value("kind", std::string("planned")));
   session.tolerance = parse_tolerance(json.at("model"), session.model, place.key("model"));
+  parse_tool(session, json.at("model"), place.key("model"));
   session.text = to_text(json);
   session.folder = folder;
   const Json& scene = json.at("model").at("scene");
@@ -151,6 +184,14 @@ HilSession parse_session(const Json& json, std::string_view where,
   session.servo.period_s = 1.0 / in_range(json, "rate", Dimension::frequency, kUsual_Hz,
                                           kSlowest_Hz, kFastest_Hz, place);
   session.servo.push = push_of(json, place);
+  if (json.contains("slides")) {
+    const DocumentPlace slides = place.key("slides");
+    if (session.model != LoopModelKind::surface) {
+      throw bad_input(slides.where, "the model does not follow a tool across its push",
+                      "\"model\": {\"kind\": \"surface\", ...}");
+    }
+    session.slide = slide_of(json.at("slides"), session.servo.push, slides);
+  }
   if (json.contains("surface")) {
     session.servo.surface_m = parse_point(json.at("surface"), place.key("surface"));
   }

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,7 +17,7 @@
 namespace tpm {
 
 /// A stretch of a session.
-enum class SessionPhaseKind { approach, indent, hold, release, rest, load, creep };
+enum class SessionPhaseKind { approach, indent, hold, slide, release, rest, load, creep };
 
 [[nodiscard]] std::string_view word_of(SessionPhaseKind kind);
 
@@ -28,6 +29,7 @@ struct SessionPhase {
   double from = 0.0, to = 0.0;  ///< depth, m; of `load` and `creep` the push, N
   double depth_m = 0.0;         ///< of the indentation it belongs to; 0 if none
   double rate_m_per_s = 0.0;
+  double across_from_m = 0.0, across_to_m = 0.0;  ///< along HilSession::slide
 };
 
 /// What is stepped in the loop.
@@ -36,6 +38,7 @@ enum class LoopModelKind {
   condensed,       ///< a network seen from its contact sphere, reduced
   network,         ///< the whole network, every period
   network_beside,  ///< the whole network at a lower rate beside the loop
+  surface,         ///< the whole network under a ball that moves over it, every period
   planned,         ///< the cheapest of those that a plan finds accurate enough
 };
 
@@ -43,6 +46,9 @@ enum class LoopModelKind {
 struct HilSession {
   std::string title;
   LoopModelKind model = LoopModelKind::planned;
+  double tool_radius_m = 0.010;                      ///< of the model `surface`, of its ball
+  double contact_stiffness_N_per_m = 1e4;            ///< the same, of ball and sphere
+  Eigen::Vector3d slide = Eigen::Vector3d::UnitX();  ///< unit vector, square to the push, device
   std::string tolerance = "1%";  ///< of a planned model, as set_tolerance() takes it
   Json scene;                    ///< of the tissue, a mesh's path made absolute is not asked for
   std::filesystem::path folder;  ///< that paths in the scene are relative to
@@ -71,6 +77,11 @@ struct TissueShape {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> bonds;
   /// Knows where all spheres are; steps of kDrawnEvery_s. Null: the contact sphere moves alone.
   std::shared_ptr<ContactModel> field;
+  /// Of a tool that moves in space; none: it moves along the push. `field` is then a tissue under
+  /// that tool.
+  std::optional<Eigen::Matrix3d> to_model;
+  double tool_radius_m = 0.0;
+  Eigen::Vector3d tool_start_m = Eigen::Vector3d::Zero();
 };
 
 /// Between two pictures of a session.
@@ -80,6 +91,7 @@ inline constexpr double kDrawnEvery_s = 0.04;
 struct LoopModel {
   std::unique_ptr<ContactModel> model;
   Eigen::Vector3d push = Eigen::Vector3d::UnitZ();  ///< into the tissue, in its coordinates
+  std::optional<Eigen::Matrix3d> to_model;          ///< as ServoSettings::to_model
   std::string name;                                 ///< for people
   std::string error_bound;         ///< what is known of its distance from the reference, in words
   Json plan;                       ///< null, or what a plan was asked for, considered and picked

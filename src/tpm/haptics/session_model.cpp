@@ -7,6 +7,7 @@
 #include "tpm/haptics/planned_model.hpp"
 #include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/haptics/session.hpp"
+#include "tpm/haptics/surface_scene.hpp"
 #include "tpm/reduce/condensed.hpp"
 
 namespace tpm {
@@ -84,6 +85,8 @@ LoopModel model_of(const HilSession& session, bool threads) {
       return network_model(session);
     case LoopModelKind::network_beside:
       return network_beside_model(session, threads);
+    case LoopModelKind::surface:
+      return surface_model(session);
     case LoopModelKind::planned:
       return planned_model(session);
     case LoopModelKind::condensed:

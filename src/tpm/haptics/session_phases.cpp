@@ -18,8 +18,13 @@ constexpr double kLongest_s = 12.0 * 3600.0;
 class PhaseList {
  public:
   void add(SessionPhaseKind kind, std::string name, double length_s, double from, double to) {
+    slide(kind, std::move(name), length_s, from, to, 0.0, 0.0);
+  }
+  void slide(SessionPhaseKind kind, std::string name, double length_s, double from, double to,
+             double across_from_m, double across_to_m) {
     time_s_ += length_s;
-    phases_.push_back({kind, std::move(name), time_s_, from, to, depth_m, rate_m_per_s});
+    phases_.push_back({kind, std::move(name), time_s_, from, to, depth_m, rate_m_per_s,
+                       across_from_m, across_to_m});
   }
   double depth_m = 0.0, rate_m_per_s = 0.0;
   [[nodiscard]] std::vector<SessionPhase> take() { return std::move(phases_); }
@@ -70,6 +75,37 @@ void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& p
   list.depth_m = list.rate_m_per_s = 0.0;
 }
 
+void add_slides(PhaseList& list, const Json& block, const DocumentPlace& place) {
+  constexpr double kUsualPress_m_per_s = 4e-3;
+  const double rest = rest_of(block, place);
+  const double distance = positive_at(block, "distance", Dimension::length, place);
+  const double rate = positive_at(block, "rate", Dimension::speed, place);
+  const double press = block.contains("press")
+                           ? positive_at(block, "press", Dimension::speed, place)
+                           : kUsualPress_m_per_s;
+  const std::string far = significant(1e3 * distance, 4), speed = significant(1e3 * rate, 4);
+  for (const double depth : positive_list(block, "depths", Dimension::length, place)) {
+    const std::string mm = significant(1e3 * depth, 4), pressed = significant(1e3 * press, 4);
+    list.depth_m = depth;
+    list.rate_m_per_s = press;
+    add_approach(list);
+    list.add(SessionPhaseKind::indent, fmt::format("press to {} mm at {} mm/s", mm, pressed),
+             depth / press, 0.0, depth);
+    list.rate_m_per_s = rate;
+    list.slide(SessionPhaseKind::slide,
+               fmt::format("slide {} mm at {} mm/s, {} mm deep", far, speed, mm), distance / rate,
+               depth, depth, 0.0, distance);
+    list.slide(SessionPhaseKind::slide,
+               fmt::format("slide back {} mm at {} mm/s, {} mm deep", far, speed, mm),
+               distance / rate, depth, depth, distance, 0.0);
+    list.rate_m_per_s = press;
+    list.add(SessionPhaseKind::release, fmt::format("release from {} mm at {} mm/s", mm, pressed),
+             (depth + kClearance_m) / press, depth, -kClearance_m);
+    list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+  }
+  list.depth_m = list.rate_m_per_s = 0.0;
+}
+
 void add_creep(PhaseList& list, const Json& block, const DocumentPlace& place) {
   const double hold = positive_at(block, "hold", Dimension::time, place);
   const double rest = rest_of(block, place);
@@ -89,9 +125,10 @@ std::vector<SessionPhase> parse_phases(const Json& session, const DocumentPlace&
   if (session.contains("indentations")) {
     add_indentations(list, session.at("indentations"), place.key("indentations"));
   }
+  if (session.contains("slides")) add_slides(list, session.at("slides"), place.key("slides"));
   if (session.contains("creep")) add_creep(list, session.at("creep"), place.key("creep"));
   if (list.time_s() == 0.0) {
-    throw bad_input(place.where, "nothing is done in it", "indentations, creep, or both");
+    throw bad_input(place.where, "nothing is done in it", "indentations, slides or creep");
   }
   if (list.time_s() > kLongest_s) {
     throw bad_input(place.where, fmt::format("takes {} s", significant(list.time_s(), 4)),

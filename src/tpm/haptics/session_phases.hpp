@@ -4,7 +4,8 @@
 
 namespace tpm {
 
-/// The phases that the blocks `indentations` and `creep` lead to. Throws Error(bad_input).
+/// The phases that the blocks `indentations`, `slides` and `creep` lead to. Throws
+/// Error(bad_input).
 [[nodiscard]] std::vector<SessionPhase> parse_phases(const Json& session,
                                                      const DocumentPlace& place);
 

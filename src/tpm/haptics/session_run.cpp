@@ -25,6 +25,7 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
                       const SessionRunOptions& options, RowLogWriter& log) {
   ServoSettings servo = session.servo;
   servo.model_push = model.push;
+  servo.to_model = model.to_model;
   const RecordSink sink = [&](const ServoRecord& row) {
     log.append(&row);
     if (options.watcher) options.watcher(row);

@@ -6,6 +6,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/load.hpp"
+#include "tpm/haptics/surface_scene.hpp"
 #include "tpm/method/method.hpp"
 #include "tpm/model/model.hpp"
 #include "tpm/network/quasistatic.hpp"
@@ -19,7 +20,9 @@ namespace {
 class FidelitySum {
  public:
   void add(double commanded_N, double reference_N) {
-    const double error = commanded_N - reference_N;
+    add_error(commanded_N - reference_N, reference_N);
+  }
+  void add_error(double error, double reference_N) {
     squares_ += error * error;
     result_.max_N = std::max(result_.max_N, std::abs(error));
     result_.peak_N = std::max(result_.peak_N, std::abs(reference_N));
@@ -91,7 +94,8 @@ std::optional<double> asked_depth_m(const SessionPhase& phase, double start_s, d
 
 void judge_phases(Verification& v, const HilRecording& recording,
                   const std::vector<const ServoRecord*>& rows,
-                  const std::vector<std::size_t>& compared) {
+                  const std::vector<std::size_t>& compared,
+                  const std::vector<double>& reference_size_N) {
   const std::vector<SessionPhase>& phases = recording.session.phases;
   std::vector<FidelitySum> sums(phases.size());
   std::vector<double> depth_squares(phases.size(), 0.0);
@@ -99,8 +103,8 @@ void judge_phases(Verification& v, const HilRecording& recording,
   for (std::size_t k = 0; k < compared.size(); ++k) {
     const ServoRecord& row = *rows[compared[k]];
     const auto p = std::min(static_cast<std::size_t>(row.phase), phases.size() - 1);
-    sums[p].add(v.commanded_N[k], v.reference_N[k]);
-    all.add(v.commanded_N[k], v.reference_N[k]);
+    sums[p].add_error(v.error_N[k], reference_size_N[k]);
+    all.add_error(v.error_N[k], reference_size_N[k]);
     const double start = p == 0 ? 0.0 : phases[p - 1].end_s;
     const double asked = asked_depth_m(phases[p], start, v.time_s[k]).value_or(row.tool_depth_m);
     depth_squares[p] += (row.tool_depth_m - asked) * (row.tool_depth_m - asked);
@@ -215,9 +219,75 @@ void put_beside_experiment(Verification& v, const HilRecording& recording,
   }
 }
 
+/// What is compared, and what was commanded then.
+Verification begun(const HilRecording& recording, const std::vector<const ServoRecord*>& rows,
+                   const std::vector<std::size_t>& compared) {
+  Verification v;
+  v.whole = recording.closed;
+  v.end_s = recording.time_s(*rows.back());
+  for (const std::size_t i : compared) {
+    v.time_s.push_back(recording.time_s(*rows[i]));
+    v.depth_m.push_back(rows[i]->tool_depth_m);
+    v.commanded_N.push_back(recording.commanded_N(*rows[i]));
+    v.model_error_N = std::max(v.model_error_N, rows[i]->model_error_N);
+  }
+  return v;
+}
+
+/// Forces of the full network on a ball at the instants compared, in the device's coordinates; only
+/// every `stride`-th of them is a step.
+std::vector<Eigen::Vector3d> forces_on_ball(const SurfaceScene& surface,
+                                            const HilRecording& recording,
+                                            const std::vector<const ServoRecord*>& rows,
+                                            const std::vector<std::size_t>& compared,
+                                            std::size_t stride) {
+  BallOnNetwork network(surface.scene.tissue.bonds(), surface.scene.rest(),
+                        surface.scene.tissue.freedom(), surface.ball);
+  std::vector<Eigen::Vector3d> forces;
+  double before_s = recording.time_s(*rows[compared.front()]) - recording.session.servo.period_s;
+  for (std::size_t k = 0; k < compared.size(); k += stride) {
+    const ServoRecord& row = *rows[compared[k]];
+    const Eigen::Map<const Eigen::Vector3d> at_m(row.position_m);
+    const double time_s = recording.time_s(row);
+    const Eigen::Vector3d moved_m = surface.to_model * (at_m - recording.session.servo.surface_m);
+    forces.emplace_back(surface.to_model.transpose() *
+                        network.step(surface.ball.start_m + moved_m, time_s - before_s));
+    before_s = time_s;
+  }
+  return forces;
+}
+
+Verification verify_in_space(const HilRecording& recording, const VerifyOptions& options) {
+  const std::vector<const ServoRecord*> rows = moved_rows(recording);
+  const std::vector<std::size_t> compared =
+      compared_rows(recording, rows.size(), options.spacing_s);
+  const SurfaceScene surface(recording.session);
+  Verification v = begun(recording, rows, compared);
+  v.reference = "full nonlinear quasi-static network of " +
+                std::to_string(surface.scene.tissue.network.organ.size()) +
+                " spheres under the ball, Newton's method with exact tangents in every step";
+  v.knots = compared.size();
+  const std::vector<Eigen::Vector3d> fine = forces_on_ball(surface, recording, rows, compared, 1);
+  const std::vector<Eigen::Vector3d> coarse = forces_on_ball(surface, recording, rows, compared, 2);
+  std::vector<double> size_N;
+  for (std::size_t k = 0; k < compared.size(); ++k) {
+    const Eigen::Map<const Eigen::Vector3d> commanded_N(rows[compared[k]]->commanded_N);
+    v.reference_N.push_back(-recording.session.servo.push.dot(fine[k]));
+    v.error_N.push_back((commanded_N - fine[k]).norm());
+    size_N.push_back(fine[k].norm());
+    // The error falls with the square of the step.
+    if (k % 2 == 0) {
+      v.reference_error_N = std::max(v.reference_error_N, (coarse[k / 2] - fine[k]).norm() / 3.0);
+    }
+  }
+  judge_phases(v, recording, rows, compared, size_N);
+  return v;
+}
+
 }  // namespace
 
 Verification verify(const HilRecording& recording, const VerifyOptions& options) {
+  if (recording.session.model == LoopModelKind::surface) return verify_in_space(recording, options);
   const std::vector<const ServoRecord*> rows = moved_rows(recording);
   const Motion motion = motion_of(recording, rows);
   const Tissue tissue = parse_tissue(recording.session.scene, recording.name, {});
@@ -234,28 +304,23 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
   const DrivenNetwork driven = driven_network(bonds, tissue.network.organ, freedom, {probe}, {});
   const QuasiStatic network(bonds, driven.rest, freedom, probe, settings);
 
-  Verification v;
+  const std::vector<std::size_t> compared =
+      compared_rows(recording, rows.size(), options.spacing_s);
+  Verification v = begun(recording, rows, compared);
   v.reference = "full nonlinear quasi-static network of " +
                 std::to_string(tissue.network.organ.size()) + " spheres, exact exponential update";
-  v.whole = recording.closed;
-  v.end_s = motion.time_s.back();
   v.motion_tolerance_m = options.motion_tolerance_m;
   const std::vector<std::size_t> kept =
       decimated(motion.time_s, motion.surface_m, options.motion_tolerance_m);
   v.knots = kept.size();
-  const std::vector<std::size_t> compared =
-      compared_rows(recording, rows.size(), options.spacing_s);
-  for (const std::size_t i : compared) {
-    v.time_s.push_back(motion.time_s[i]);
-    v.depth_m.push_back(rows[i]->tool_depth_m);
-    v.commanded_N.push_back(recording.commanded_N(*rows[i]));
-    v.model_error_N = std::max(v.model_error_N, rows[i]->model_error_N);
-  }
   const Protocol protocol = protocol_of(motion, kept);
   const QuasiStaticRun run = network.run(protocol, v.time_s);
   v.reference_N.assign(run.response.begin(), run.response.end());
   v.reference_error_N = run.error_estimate;
-  judge_phases(v, recording, rows, compared);
+  for (std::size_t k = 0; k < compared.size(); ++k) {
+    v.error_N.push_back(v.commanded_N[k] - v.reference_N[k]);
+  }
+  judge_phases(v, recording, rows, compared, v.reference_N);
   ask_cvode(v, recording, driven, protocol, options);
   if (recording.session.model == LoopModelKind::element) {
     ask_others(v, recording, motion, protocol, rows, tissue.material, options);

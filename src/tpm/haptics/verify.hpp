@@ -56,7 +56,11 @@ struct Verification {
   double motion_error_N = 0.0;     ///< what that tolerance can cost: times the stiffness at once
   double reference_error_N = 0.0;  ///< as the reference run estimates
   double model_error_N = 0.0;      ///< largest estimate of the model itself
-  std::vector<double> time_s, reference_N, commanded_N, depth_m;  ///< at the instants compared
+  /// At the instants compared; forces against the push.
+  std::vector<double> time_s, reference_N, commanded_N, depth_m;
+  /// Commanded less reference; of a tool that moves in space the length of the difference, all
+  /// three components.
+  std::vector<double> error_N;
 };
 
 /// A motion through few of its samples, each other within the tolerance of the straight line
@@ -70,7 +74,12 @@ struct Verification {
 /// CVODE integrates what the bonds remember, forces balanced at each of its evaluations: the same
 /// equations by another integrator, with error control of its own. Like the reference it has no
 /// masses. The star's other models are asked as well.
-/// Throws Error(bad_input) for an empty recording, Error(numerical) if the reference run fails.
+///
+/// A tool that moves in space is compared with the full network under the same ball
+/// (BallOnNetwork), in all three components, its motion taken as linear between the instants
+/// compared; the reference's error is estimated with every second of them. There is no second
+/// opinion then. Throws Error(bad_input) for an empty recording, Error(numerical) if the reference
+/// run fails.
 [[nodiscard]] Verification verify(const HilRecording& recording, const VerifyOptions& options = {});
 
 }  // namespace tpm

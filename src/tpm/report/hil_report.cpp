@@ -32,8 +32,6 @@ std::vector<double> thinned(const std::vector<double>& values, double scale = 1.
 }
 
 Figure session_figure(const HilRecording& recording, const Verification& v) {
-  std::vector<double> error(v.time_s.size());
-  for (std::size_t i = 0; i < error.size(); ++i) error[i] = v.commanded_N[i] - v.reference_N[i];
   const std::vector<double> time = thinned(v.time_s);
   const Axis seconds{"time", "s", false, std::nullopt, std::nullopt};
   Figure figure;
@@ -54,7 +52,7 @@ Figure session_figure(const HilRecording& recording, const Verification& v) {
                    {"commanded less reference",
                     seconds,
                     {"force error", "mN", false, std::nullopt, std::nullopt},
-                    {line("error", time, thinned(error, 1e3))}}};
+                    {line("error", time, thinned(v.error_N, 1e3))}}};
   return figure;
 }
 

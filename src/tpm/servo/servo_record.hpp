@@ -45,7 +45,7 @@ struct ServoRecord {
   std::uint64_t cycle = 0;       ///< periods since the start, missed ones included
   double position_m[3] = {};     ///< as the device read it
   double tool_depth_m = 0.0;     ///< of the tool, negative in the air
-  double surface_depth_m = 0.0;  ///< of the tissue, given to the model
+  double surface_depth_m = 0.0;  ///< of the tissue, given to the model; in space that of the tool
   double model_force_N = 0.0;    ///< of the tissue against the push, after one-sidedness
   double model_error_N = 0.0;    ///< as the model estimates
   double commanded_N[3] = {};    ///< sent to the device, on the hand

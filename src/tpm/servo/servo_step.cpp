@@ -77,6 +77,7 @@ std::string_view word_of(StopCause cause) {
 
 ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings settings)
     : device_(device),
+      model_(model),
       settings_(std::move(settings)),
       contact_(model, settings_.model_push),
       passivity_(settings_.period_s, settings_.most_damping_N_s_per_m),
@@ -104,10 +105,22 @@ StopCause ServoStep::read(ServoRecord& row) noexcept {
 }
 
 void ServoStep::touch(int missed, ServoRecord& row) noexcept {
-  const double from = tool_m_;
-  tool_m_ = settings_.push.dot(position_m_ - settings_.surface_m);
   // The model lives through every period, also those that nobody served.
   const int steps = begun_ ? missed + 1 : 1;
+  if (settings_.to_model) {
+    touch_in_space(steps, row);
+  } else {
+    touch_along_push(steps, row);
+  }
+  row.tool_depth_m = tool_m_;
+  row.surface_depth_m = surface_m_;
+  row.leak_J = leak_J_;
+  if ((row.flags & kBeyondModel) != 0) ++counts_.beyond_model;
+}
+
+void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
+  const double from = tool_m_;
+  tool_m_ = settings_.push.dot(position_m_ - settings_.surface_m);
   OneSidedContact::Answer answer;
   for (int i = 1; i <= steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
@@ -116,16 +129,28 @@ void ServoStep::touch(int missed, ServoRecord& row) noexcept {
   const double moved = answer.touching ? answer.surface_m - surface_m_ : 0.0;
   leak_J_ += 0.5 * contact_.stiffness_N_per_m() * moved * moved;
   surface_m_ = answer.surface_m;
-  row.tool_depth_m = tool_m_;
-  row.surface_depth_m = answer.surface_m;
+  tissue_N_ = -settings_.push * answer.force_N;
   row.model_force_N = answer.force_N;
   row.model_error_N = answer.error_N;
-  row.leak_J = leak_J_;
   if (answer.touching) row.flags |= kTouching;
-  if (!answer.trusted) {
-    row.flags |= kBeyondModel;
-    ++counts_.beyond_model;
+  if (!answer.trusted) row.flags |= kBeyondModel;
+}
+
+void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
+  const Eigen::Vector3d to = position_m_ - settings_.surface_m;
+  ContactAnswer answer;
+  for (int i = 1; i <= steps; ++i) {
+    const double part = static_cast<double>(i) / static_cast<double>(steps);
+    answer = model_.step(*settings_.to_model * (to - (1.0 - part) * moved_m_));
   }
+  const Eigen::Vector3d force_N = settings_.to_model->transpose() * answer.force_N;
+  leak_J_ += 0.5 * (tissue_N_ - force_N).dot(moved_m_);
+  tissue_N_ = force_N;
+  tool_m_ = surface_m_ = settings_.push.dot(to);
+  row.model_force_N = -settings_.push.dot(force_N);
+  row.model_error_N = answer.error_N;
+  if (!force_N.isZero(0.0)) row.flags |= kTouching;
+  if (!answer.trusted) row.flags |= kBeyondModel;
 }
 
 Eigen::Vector3d ServoStep::limited(const Eigen::Vector3d& wanted_N, ServoRecord& row) noexcept {
@@ -182,7 +207,7 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   row.observed_J = passivity_.observed_J();
   touch(missed, row);
   begun_ = true;
-  if (!std::isfinite(row.model_force_N)) return StopCause::force_not_finite;
+  if (!tissue_N_.allFinite()) return StopCause::force_not_finite;
   const double time = static_cast<double>(cycle_) * settings_.period_s;
   const double ramp = settings_.ramp_in_s > 0.0 ? std::min(1.0, time / settings_.ramp_in_s) : 1.0;
   if (ramp < 1.0) row.flags |= kRampingIn;
@@ -191,7 +216,7 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
     row.flags |= kDamped;
     ++counts_.damped;
   }
-  const Eigen::Vector3d wanted = -settings_.push * (ramp * row.model_force_N) + damping;
+  const Eigen::Vector3d wanted = ramp * tissue_N_ + damping;
   cause = write(limited(wanted, row), row);
   if (cause != StopCause::none) return cause;
   const auto every = static_cast<std::uint64_t>(settings_.status_every);

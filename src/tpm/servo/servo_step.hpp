@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "tpm/device/haptic_device.hpp"
@@ -16,6 +17,10 @@ struct ServoSettings {
   Eigen::Vector3d push = -Eigen::Vector3d::UnitZ();       ///< device coordinates, unit vector
   Eigen::Vector3d surface_m = Eigen::Vector3d::Zero();    ///< where the tissue begins, device
   Eigen::Vector3d model_push = Eigen::Vector3d::UnitZ();  ///< the same in those of the model
+  /// If given, the tool moves in space and the model answers for it as it stands, contact on and
+  /// off included: it gets the tool's displacement from `surface_m`, turned by this. Otherwise only
+  /// motion along the push reaches the model, one-sided.
+  std::optional<Eigen::Matrix3d> to_model = std::nullopt;
   double force_limit_N = 8.0;
   double slew_limit_N_per_s = 400.0;
   double ramp_in_s = 0.5;  ///< forces grow to their size over the first so many seconds
@@ -52,6 +57,8 @@ class ServoStep {
  private:
   [[nodiscard]] StopCause read(ServoRecord& row) noexcept;
   void touch(int missed, ServoRecord& row) noexcept;
+  void touch_along_push(int steps, ServoRecord& row) noexcept;
+  void touch_in_space(int steps, ServoRecord& row) noexcept;
   [[nodiscard]] Eigen::Vector3d limited(const Eigen::Vector3d& wanted_N, ServoRecord& row) noexcept;
   [[nodiscard]] StopCause write(const Eigen::Vector3d& force_N, ServoRecord& row) noexcept;
   [[nodiscard]] StopCause look_at_status() noexcept;
@@ -59,6 +66,7 @@ class ServoStep {
   [[nodiscard]] StopCause work(int missed, ServoRecord& row) noexcept;
 
   HapticDevice& device_;
+  ContactModel& model_;
   ServoSettings settings_;
   OneSidedContact contact_;
   PassivityControl passivity_;
@@ -67,6 +75,7 @@ class ServoStep {
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d moved_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d sent_N_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, before ramp and limits
   double tool_m_ = 0.0, surface_m_ = 0.0, leak_J_ = 0.0;
   std::uint64_t cycle_ = 0;
   std::size_t phase_ = 0;

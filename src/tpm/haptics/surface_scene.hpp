@@ -1,0 +1,23 @@
+#pragma once
+#include "tpm/haptics/pushed_scene.hpp"
+#include "tpm/network/ball_on_network.hpp"
+
+namespace tpm {
+
+/// The smallest turn that takes one unit vector onto another.
+[[nodiscard]] Eigen::Matrix3d turn_onto(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
+/// The scene of a session with a ball on its surface.
+struct SurfaceScene {
+  /// Throws Error(bad_input) as PushedScene.
+  explicit SurfaceScene(const HilSession& session);
+
+  PushedScene scene;
+  BallTool ball;             ///< on the contact sphere of the scene
+  Eigen::Matrix3d to_model;  ///< from the coordinates of the device, the push onto the probe's
+};
+
+/// The model of a session of the kind `surface`; its stiffness is still to come.
+[[nodiscard]] LoopModel surface_model(const HilSession& session);
+
+}  // namespace tpm
