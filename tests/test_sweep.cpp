@@ -423,6 +423,7 @@ TEST_CASE("sensitivity of a sum: each term's share of the variance") {
   const SweepSensitivity peak = sensitivity_of(reader, "peak_force", {});
   CHECK(peak.indices.inputs[0].total.value == 0.0);
   CHECK(sensitivity_text({sum, peak}).find("E2") != std::string::npos);
+  CHECK_FALSE(to_text(to_json(sensitivity_figures({sum, peak}, "title"))).empty());
   const Sweep plain = parsed(kMixed);
   static_cast<void>(result_of(plain, folder / "b.h5"));
   CHECK(test::refusal_of([&] {
@@ -554,6 +555,23 @@ TEST_CASE("the best cell of a sweep is where a fit goes on") {
   CHECK(test::refusal_of([&] {
           static_cast<void>(fit_from_cell(narrow, best[0], "fit"));
         }).find("/parameters/E/upper") != std::string::npos);
+}
+
+TEST_CASE("a damaged result is refused before HDF5 reads it, and made anew") {
+  const test::TempFolder folder;
+  const Sweep sweep = parsed(kMixed);
+  const std::string file = folder / "a.h5", whole = result_of(sweep, file);
+  CHECK(fingerprint_of(file) == sweep.fingerprint);
+  for (std::size_t at = 64; at < whole.size() - 24; at += 1501) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x40);
+    std::ofstream(file, std::ios::binary) << damaged;
+    CAPTURE(at);
+    CHECK(test::refusal_of([&] { static_cast<void>(SweepReader(file)); }).find("damaged") !=
+          std::string::npos);
+    CHECK(fingerprint_of(file).empty());
+  }
+  CHECK(result_of(sweep, file) == whole);
 }
 
 TEST_CASE("a log is written by one process at a time") {

@@ -225,7 +225,7 @@ int merge(const SweepChoice& choice, const Session& session) {
 
 struct SweepViewChoice {
   std::string file, folder = "sweep_figures", x, y, pareto;
-  std::string axis, size, convergence_folder;
+  std::string axis, size, figure_folder;
   std::string best_output, count = "1", over, fit, start;
   std::vector<std::string> variables, at;
 };
@@ -254,6 +254,13 @@ std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
   return {name, static_cast<std::uint64_t>(nearest - axis.places.begin())};
 }
 
+/// Pictures beside what is printed, if a folder was named.
+void draw_into(const std::string& folder, const std::vector<Figure>& figures) {
+  if (folder.empty()) return;
+  const auto files = write_figures(folder, figures);
+  fmt::print(stderr, "tpm: wrote {} into {}\n", fmt::join(files, ", "), folder);
+}
+
 int sensitivity(const SweepViewChoice& choice, const Session& session) {
   const SweepReader sweep(choice.file);
   HeldPlaces held;
@@ -268,6 +275,7 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
   }
   for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
   fmt::print("{}", session.json() ? to_text(sensitivity_json(all)) : sensitivity_text(all));
+  draw_into(choice.figure_folder, sensitivity_figures(all, sweep.title()));
   return 0;
 }
 
@@ -291,12 +299,7 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
   } else {
     fmt::print("{}", convergence_text(all));
   }
-  if (!choice.convergence_folder.empty()) {
-    const auto files =
-        write_figures(choice.convergence_folder, convergence_figures(all, sweep.title()));
-    fmt::print(stderr, "tpm: wrote {} into {}\n", fmt::join(files, ", "),
-               choice.convergence_folder);
-  }
+  draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
   const bool none = std::none_of(all.begin(), all.end(), [](auto& c) { return c.monotone(); });
   return static_cast<int>(none ? ExitCode::answer_is_no : ExitCode::success);
 }
@@ -423,6 +426,7 @@ void add_views(CLI::App& sweep, Session& session) {
   judging->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   judging->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
   judging->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
+  judging->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
   add_format_option(*judging, session);
   judging->callback([choice, &session] {
     session.run = [choice, &session] { return sensitivity(*choice, session); };
@@ -437,7 +441,7 @@ void add_views(CLI::App& sweep, Session& session) {
   refining->add_option("--variable", choice->variables,
                        "Of what (default: all numbers but counts)");
   refining->add_option("--at", choice->at, "AXIS=VALUE: place on another axis");
-  refining->add_option("-o,--output", choice->convergence_folder, "Folder for pictures (PNG, SVG)");
+  refining->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
   add_format_option(*refining, session);
   refining->callback([choice, &session] {
     session.run = [choice, &session] { return convergence(*choice, session); };

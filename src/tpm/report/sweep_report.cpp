@@ -256,6 +256,29 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
           {std::move(panel)}};
 }
 
+Panel index_panel(const std::string& what) {
+  return {what, {"number of the parameter", "", false, 0.0, {}}, {what, "", false, {}, {}}, {}};
+}
+
+void add_index(double place, const std::string& name, const IndexEstimate& index, Panel& panel) {
+  Series interval;
+  interval.kind = Series::Kind::bracket;
+  interval.label = "95 % interval";
+  interval.provenance = "model";
+  interval.x = {place};
+  interval.lower = {index.low};
+  interval.upper = {index.high};
+  Series value;
+  value.kind = Series::Kind::mark;
+  value.label = "index";
+  value.provenance = "model";
+  value.x = {place};
+  value.y = {index.value};
+  value.text = name;
+  panel.series.push_back(std::move(interval));
+  panel.series.push_back(std::move(value));
+}
+
 struct FoundRange {
   double least = std::numeric_limits<double>::infinity();
   double largest = -std::numeric_limits<double>::infinity();
@@ -404,6 +427,26 @@ Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
                     {"inputs", std::move(inputs)}});
   }
   return Json{{"sensitivity", std::move(list)}};
+}
+
+std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all,
+                                        const std::string& title) {
+  std::vector<Figure> figures;
+  for (const SweepSensitivity& s : all) {
+    if (s.indices.inputs.empty()) continue;  // it does not vary
+    Panel first = index_panel("first-order index"), total = index_panel("total index");
+    for (std::size_t i = 0; i < s.parameters.size(); ++i) {
+      add_index(static_cast<double>(i + 1), s.parameters[i], s.indices.inputs[i].first_order,
+                first);
+      add_index(static_cast<double>(i + 1), s.parameters[i], s.indices.inputs[i].total, total);
+    }
+    figures.push_back(
+        {fmt::format("sensitivity_{}", s.variable),
+         s.variable,
+         fmt::format("{}: shares of the variance of {} with 95 % intervals.", title, s.variable),
+         {std::move(first), std::move(total)}});
+  }
+  return figures;
 }
 
 std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& wished) {

@@ -16,6 +16,10 @@ namespace tpm {
 [[nodiscard]] std::string sensitivity_text(const std::vector<SweepSensitivity>& all);
 [[nodiscard]] Json sensitivity_json(const std::vector<SweepSensitivity>& all);
 
+/// For each number its first-order and total indices, by parameter, with their intervals.
+[[nodiscard]] std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all,
+                                                      const std::string& title);
+
 /// What is drawn of a sweep.
 struct SweepFigures {
   std::vector<std::string> variables;  ///< empty: all that are no counts

@@ -53,6 +53,9 @@ SweepConvergence convergence_of(const SweepReader& sweep, const std::string& var
   require_no_samples(sweep, axis);
   found.size_text = size.empty() ? axis.name : size;
   found.size_unit = size.empty() ? axis.unit : "";
+  for (const std::string& name : axis.parameters) {
+    if (name == size) found.size_unit = sweep.parameter_unit(name);
+  }
   const std::vector<double> sizes = sizes_along(sweep, axis, size);
   const std::vector<double> values = sweep.slice(variable, {}, axis.name, held);
   std::vector<std::size_t> order(sizes.size());
