@@ -9,6 +9,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/model/model.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/shared_plan.hpp"
 #include "tpm/scene/blocks.hpp"
