@@ -52,10 +52,6 @@ void require(const ServoNetworkOptions& options, const Eigen::Vector3d& into_tis
   }
 }
 
-bool moves(const PushedContact& tissue, std::size_t sphere) {
-  return !tissue.freedom().projector(sphere).isZero(0.0);
-}
-
 }  // namespace
 
 ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
@@ -69,7 +65,8 @@ ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest, const
   relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
   const double forgotten = 1.0 - static_cast<double>(weights_.keep);
   rounding_ = kRounding + kRememberedRounding / std::max(forgotten, 1.0 / kLongestMemory);
-  number_spheres(tissue);
+  spheres_ = std::make_unique<ServoStiffness>(bonds, rest, tissue.freedom());
+  contact_ = spheres_->column(contact);
   choose_bonds(tissue);
   const auto relaxed = static_cast<double>(weights_.of_end);
   const auto count = static_cast<int>(std::ceil(options.deepest_m / kFieldStride_m));
@@ -83,82 +80,34 @@ ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest, const
   step_error_ = std::make_unique<StepError>(tissue, frozen, relaxed, options.period_s);
 }
 
-void ServoNetwork::number_spheres(const PushedContact& tissue) {
-  const BondSystem& bonds = tissue.bonds();
-  std::vector<std::uint32_t> rank(bonds.spheres(), 0);
-  for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-    if (!moves(tissue, i)) continue;
-    rank[i] = static_cast<std::uint32_t>(free_.size());
-    free_.push_back(i);
-  }
-  Eigen::Matrix3Xd places(3, static_cast<Eigen::Index>(free_.size()));
-  for (std::size_t i = 0; i < free_.size(); ++i) {
-    places.col(static_cast<Eigen::Index>(i)) =
-        tissue.rest().col(static_cast<Eigen::Index>(free_[i]));
-  }
-  std::vector<FrontalPattern::Edge> edges;
-  for (std::size_t b = 0; b < bonds.size(); ++b) {
-    const std::uint32_t from = bonds.end_a()[b];
-    const std::uint32_t to = bonds.end_b()[b];
-    if (moves(tissue, from) && moves(tissue, to)) edges.push_back({rank[from], rank[to]});
-  }
-  pattern_ = std::make_shared<const FrontalPattern>(places, edges);
-  column_.assign(bonds.spheres(), 0);
-  auto next = static_cast<std::uint32_t>(free_.size());
-  column_[tissue.contact()] = next++;
-  for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-    if (i == tissue.contact()) continue;
-    column_[i] = moves(tissue, i) ? pattern_->place()[rank[i]] : next++;
-    if (!moves(tissue, i) || tissue.freedom().is_free(i)) continue;
-    partly_.push_back({column_[i], tissue.freedom().projector(i).cast<float>()});
-  }
-}
-
 void ServoNetwork::choose_bonds(const PushedContact& tissue) {
   const BondSystem& bonds = tissue.bonds();
   std::vector<ServoBonds::Choice> near, far;
   for (std::size_t b = 0; b < bonds.size(); ++b) {
     const std::uint32_t from = bonds.end_a()[b];
     const std::uint32_t to = bonds.end_b()[b];
-    const ServoBonds::Choice choice{b, column_[from], column_[to]};
+    const ServoBonds::Choice choice{b, spheres_->column(from), spheres_->column(to)};
     if (from == tissue.contact() || to == tissue.contact()) {
       near.push_back(choice);
-    } else if (moves(tissue, from) || moves(tissue, to)) {
+    } else if (spheres_->moves(from) || spheres_->moves(to)) {
       far.push_back(choice);
     }
   }
-  const auto filler = static_cast<std::uint32_t>(column_.size());
+  const std::size_t columns = spheres_->columns();
+  const auto filler = static_cast<std::uint32_t>(columns);
   at_contact_ = ServoBonds(bonds, tissue.rest(), near, filler, options_.portable);
   elsewhere_ = ServoBonds(bonds, tissue.rest(), far, filler, options_.portable);
-  displacement_.assign(4 * (column_.size() + 1), 0.0F);
-  force_.assign(8 * (column_.size() + 1), 0.0F);
-  change_.assign(4 * (free_.size() + 1), 0.0F);
+  displacement_.assign(4 * (columns + 1), 0.0F);
+  force_.assign(8 * (columns + 1), 0.0F);
+  change_.assign(4 * (spheres_->free().size() + 1), 0.0F);
 }
 
 void ServoNetwork::factorise(PushedContact& tissue, const Positions& position) {
-  const BondSystem& bonds = tissue.bonds();
-  const Freedom& freedom = tissue.freedom();
   const auto relaxed = static_cast<double>(weights_.of_end);
   const BondMemory memory = tissue.memory(position, relaxed, relaxed);
-  std::vector<Eigen::Matrix3d> diagonal(column_.size(), Eigen::Matrix3d::Zero());
-  std::vector<Eigen::Matrix3d> across;
-  for (std::size_t b = 0; b < bonds.size(); ++b) {
-    const std::uint32_t from = bonds.end_a()[b];
-    const std::uint32_t to = bonds.end_b()[b];
-    const Eigen::Matrix3d block = bonds.stiffness_block(b, position, memory);
-    diagonal[from] += block;
-    diagonal[to] += block;
-    if (!moves(tissue, from) || !moves(tissue, to)) continue;
-    across.emplace_back(-freedom.projector(from) * block * freedom.projector(to));
+  if (spheres_->factorise(tissue.bonds(), tissue.freedom(), position, memory, options_.portable)) {
+    return;
   }
-  std::vector<Eigen::Matrix3d> of_free;
-  for (const std::size_t i : free_) {
-    const Eigen::Matrix3d& p = freedom.projector(i);
-    of_free.emplace_back(p * diagonal[i] * p +
-                         diagonal[i].trace() * (Eigen::Matrix3d::Identity() - p));
-  }
-  factor_ = std::make_unique<FrontalFactor>(pattern_, options_.portable);
-  if (factor_->factorise(of_free, across)) return;
   throw Error(ExitCode::numerical, "contact",
               fmt::format("the tissue is not stiff at {} mm of depth",
                           significant(1e3 * options_.frozen_depth_m, 4)));
@@ -168,10 +117,10 @@ ServoNetwork::Field ServoNetwork::field_of(const std::array<Eigen::Matrix3Xd, 3>
                                            double depth_m) const {
   Field field{depth_m, {}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    field.along[axis].assign(8 * ((free_.size() + 1) / 2), 0.0F);
-    for (const std::size_t i : free_) {
+    field.along[axis].assign(8 * ((spheres_->free().size() + 1) / 2), 0.0F);
+    for (const std::size_t i : spheres_->free()) {
       const Eigen::Vector3f at = displacement[axis].col(static_cast<Eigen::Index>(i)).cast<float>();
-      std::copy_n(at.data(), 3, field.along[axis].data() + std::size_t{4} * column_[i]);
+      std::copy_n(at.data(), 3, field.along[axis].data() + std::size_t{4} * spheres_->column(i));
     }
   }
   return field;
@@ -211,21 +160,12 @@ void ServoNetwork::reset() noexcept {
   source_.setZero();
 }
 
-void ServoNetwork::project(float* four_per_sphere) const noexcept {
-  for (const Partly& partly : partly_) {
-    Eigen::Map<Eigen::Vector3f> v(four_per_sphere + 4 * partly.column);
-    v = (partly.projector * v).eval();
-  }
-}
-
 void ServoNetwork::balance(std::size_t first) noexcept {
-  for (std::size_t i = 0; i < free_.size(); ++i) {
+  for (std::size_t i = 0; i < spheres_->free().size(); ++i) {
     std::copy_n(force_.data() + 8 * i + first, 4, change_.data() + 4 * i);
   }
-  project(change_.data());
-  factor_->solve(change_.data());
-  project(change_.data());
-  for (std::size_t i = 0; i < 4 * free_.size(); ++i) displacement_[i] += change_[i];
+  spheres_->solve(change_.data());
+  for (std::size_t i = 0; i < 4 * spheres_->free().size(); ++i) displacement_[i] += change_[i];
   std::fill(force_.begin(), force_.end(), 0.0F);
   at_contact_.advance_now(displacement_.data(), weights_, force_.data());
   elsewhere_.advance(displacement_.data(), weights_, force_.data());
@@ -237,7 +177,7 @@ std::array<Eigen::Vector3d, 3> ServoNetwork::weighed(
   std::array<Eight, kSums> sum{};
   run_wide([&] {
     const float* force = force_.data();
-    for (std::size_t at = 0; at < 4 * free_.size(); at += 8, force += 16) {
+    for (std::size_t at = 0; at < 4 * spheres_->free().size(); at += 8, force += 16) {
       Eight two;  // spheres
       std::memcpy(&two, force, 4 * sizeof(float));
       std::memcpy(reinterpret_cast<float*>(&two) + 4, force + 8, 4 * sizeof(float));
@@ -268,7 +208,7 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
   const Eigen::Vector3d change = below - above;
   source_ = source;
   const Eigen::Vector3f at_contact =
-      Eigen::Map<const Eigen::Vector3f>(force_.data() + 8 * free_.size());
+      Eigen::Map<const Eigen::Vector3f>(force_.data() + 8 * contact_);
   answer_.force_N = at_contact.cast<double>() + above + share * change;
   largest_N_ = std::max(largest_N_, answer_.force_N.norm());
   const double beyond_m = std::abs(depth_m - at * stride_m);
@@ -284,7 +224,7 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
 
 ContactAnswer ServoNetwork::step(const Eigen::Vector3d& displacement_m) noexcept {
   const FlushDenormals flush;
-  float* const contact = displacement_.data() + 4 * free_.size();
+  float* const contact = displacement_.data() + 4 * contact_;
   for (Eigen::Index c = 0; c < 3; ++c) contact[c] = static_cast<float>(displacement_m[c]);
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
   const double step_error_N = step_error_->advance(displacement_m).norm();
@@ -310,7 +250,7 @@ ContactAnswer ServoNetwork::step(const Eigen::Vector3d& displacement_m) noexcept
 
 double ServoNetwork::residual_N() const noexcept {
   double square = 0.0;
-  for (std::size_t i = 0; i < free_.size(); ++i) {
+  for (std::size_t i = 0; i < spheres_->free().size(); ++i) {
     square +=
         static_cast<double>(Eigen::Map<const Eigen::Vector3f>(force_.data() + 8 * i).squaredNorm());
   }
@@ -320,15 +260,15 @@ double ServoNetwork::residual_N() const noexcept {
 BalanceWork ServoNetwork::work() const noexcept {
   constexpr std::size_t kFields = 3;  // two depths' in the answer, and `remembering_`
   constexpr std::size_t kAxes = 3, kFloats = 4;
-  return {ServoBonds::kWide * (at_contact_.groups() + elsewhere_.groups()), pattern_->blocks_read(),
-          kFields * kAxes * kFloats * free_.size()};
+  return {ServoBonds::kWide * (at_contact_.groups() + elsewhere_.groups()), spheres_->blocks_read(),
+          kFields * kAxes * kFloats * spheres_->free().size()};
 }
 
 // A Ref is a view: what it shows is changed.
 // NOLINTNEXTLINE(performance-unnecessary-value-param)
 void ServoNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
   for (Eigen::Index s = 0; s < spheres(); ++s) {
-    const std::size_t at = std::size_t{4} * column_[static_cast<std::size_t>(s)];
+    const std::size_t at = std::size_t{4} * spheres_->column(static_cast<std::size_t>(s));
     all.col(s) = Eigen::Map<const Eigen::Vector3f>(displacement_.data() + at).cast<double>();
   }
 }

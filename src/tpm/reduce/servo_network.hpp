@@ -3,9 +3,8 @@
 #include <vector>
 
 #include "tpm/reduce/contact_model.hpp"
-#include "tpm/reduce/servo_bonds.hpp"
+#include "tpm/reduce/servo_stiffness.hpp"
 #include "tpm/reduce/step_error.hpp"
-#include "tpm/solve/frontal_factor.hpp"
 
 namespace tpm {
 
@@ -49,7 +48,7 @@ class ServoNetwork final : public ContactModel {
   }
   [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
   [[nodiscard]] Eigen::Index spheres() const noexcept override {
-    return static_cast<Eigen::Index>(column_.size());
+    return static_cast<Eigen::Index>(spheres_->columns());
   }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
 
@@ -65,12 +64,6 @@ class ServoNetwork final : public ContactModel {
     double depth_m;
     std::array<AlignedFloats, 3> along;
   };
-  /// A sphere that may move in some directions only.
-  struct Partly {
-    std::size_t column;
-    Eigen::Matrix3f projector;
-  };
-  void number_spheres(const PushedContact& tissue);
   void choose_bonds(const PushedContact& tissue);
   void factorise(PushedContact& tissue, const Positions& position);
   void add_field(PushedContact& tissue, const Positions& position, double depth_m);
@@ -79,7 +72,6 @@ class ServoNetwork final : public ContactModel {
                                double depth_m) const;
   /// Solves for the part of the forces that starts at `first`, and moves the free spheres.
   void balance(std::size_t first) noexcept;
-  void project(float* four_per_sphere) const noexcept;
   /// What each of three fields makes of the forces left, N.
   [[nodiscard]] std::array<Eigen::Vector3d, 3> weighed(
       const std::array<const Field*, 3>& fields) const noexcept;
@@ -88,12 +80,9 @@ class ServoNetwork final : public ContactModel {
   ServoNetworkOptions options_;
   Eigen::Vector3d into_;
   ServoWeights weights_;
-  std::shared_ptr<const FrontalPattern> pattern_;
-  std::vector<std::size_t> free_;      ///< spheres that the factor works on
-  std::vector<std::uint32_t> column_;  ///< of each sphere: the free ones, the contact, the others
-  std::vector<Partly> partly_;
+  std::unique_ptr<ServoStiffness> spheres_;  ///< with the contact held
+  std::size_t contact_ = 0;                  ///< its column
   ServoBonds at_contact_, elsewhere_;
-  std::unique_ptr<FrontalFactor> factor_;
   std::vector<Field> fields_;  ///< at even depths from rest on
   Field remembering_;          ///< what forces left do through what is remembered of the places
   std::unique_ptr<StepError> step_error_;
