@@ -46,10 +46,10 @@ CellBlock only_block(const Sweep& sweep) {
 /// Runs to the end and writes; the bytes of the HDF5 file.
 std::string result_of(const Sweep& sweep, const std::string& file,
                       const SweepControls& controls = {}) {
-  const SweepRun run = run_sweep(sweep, log_path(file), controls);
+  BlockLog log(log_path(file), sweep, {});
+  const SweepRun run = run_sweep(sweep, log, controls);
   REQUIRE_FALSE(run.interrupted);
-  const BlockLog log = BlockLog::to_read(log_path(file), sweep, {});
-  static_cast<void>(write_sweep(sweep, {&log}, file));
+  static_cast<void>(write_sweep(sweep, {&log}, file, controls.workers));
   return read_file(file);
 }
 
@@ -216,7 +216,8 @@ TEST_CASE("any number of workers, any interruptions: the same bytes") {
   for (std::uint64_t b = 1; b < sweep.blocks(); ++b) {
     int asked = 0;
     stopping.interrupted = [&] { return ++asked > 1; };
-    const SweepRun run = run_sweep(sweep, log_path(file), stopping);
+    BlockLog log(log_path(file), sweep, {});
+    const SweepRun run = run_sweep(sweep, log, stopping);
     CHECK(run.interrupted);
     CHECK(run.resumed_blocks == b - 1);
   }
@@ -232,11 +233,10 @@ TEST_CASE("a log that is cut, damaged or another sweep's") {
   const auto left_of = [&](const std::string& bytes) {
     std::ofstream(log_path(file), std::ios::binary) << bytes;
     std::string noted;
-    SweepControls controls;
-    controls.note = [&](const std::string& text) { noted += text; };
-    const SweepRun run = run_sweep(sweep, log_path(file), controls);
+    const std::uint64_t found =
+        BlockLog(log_path(file), sweep, [&](const std::string& text) { noted += text; }).size();
     CHECK(result_of(sweep, file) == expected);
-    return std::pair{run.resumed_blocks, noted};
+    return std::pair{found, noted};
   };
   CHECK(left_of(log) == std::pair{std::uint64_t{9}, std::string()});
   CHECK(left_of(log.substr(0, log.size() - 1)).first == 8);
@@ -256,12 +256,11 @@ TEST_CASE("a log that is cut, damaged or another sweep's") {
   other[20] = other[20] == 'a' ? 'b' : 'a';
   std::ofstream(log_path(file), std::ios::binary) << other;
   CHECK(test::refusal_of([&] {
-          static_cast<void>(run_sweep(sweep, log_path(file), {}));
+          const BlockLog again(log_path(file), sweep, {});
         }).find("another sweep") != std::string::npos);
   std::ofstream(log_path(file), std::ios::binary) << "what somebody else has written";
-  CHECK(test::refusal_of([&] {
-          static_cast<void>(run_sweep(sweep, log_path(file), {}));
-        }).find("no log") != std::string::npos);
+  CHECK(test::refusal_of([&] { const BlockLog again(log_path(file), sweep, {}); }).find("no log") !=
+        std::string::npos);
   CHECK(read_file(log_path(file)) == "what somebody else has written");
 }
 
@@ -276,7 +275,8 @@ TEST_CASE("shards put together are the whole sweep, to the byte") {
       const std::string file = folder / fmt::format("{}-of-{}", i, count);
       SweepControls controls;
       controls.shard = {i, count};
-      blocks += run_sweep(sweep, file, controls).blocks;
+      BlockLog log(file, sweep, {});
+      blocks += run_sweep(sweep, log, controls).blocks;
       logs.push_back(BlockLog::to_read(file, sweep, {}));
       CHECK(logs.back().size() == controls.shard.size(sweep.blocks()));
     }

@@ -36,8 +36,8 @@ Sweep parsed_block(const std::string& tolerance, const std::string& own = "1e-6"
 std::string least_result(const Sweep& sweep, const std::string& file, int workers) {
   SweepControls controls;
   controls.workers = workers;
-  static_cast<void>(run_sweep(sweep, log_path(file), controls));
-  const BlockLog log = BlockLog::to_read(log_path(file), sweep, {});
+  BlockLog log(log_path(file), sweep, {});
+  static_cast<void>(run_sweep(sweep, log, controls));
   static_cast<void>(write_sweep(sweep, {&log}, file));
   return read_file(file);
 }

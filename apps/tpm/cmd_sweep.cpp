@@ -47,8 +47,12 @@ struct WrittenSweep {
   double seconds = 0.0, cpu_seconds = 0.0;
 };
 
+void say_note(const std::string& text) {
+  fmt::print(stderr, "tpm: {}\n", text);
+}
+
 /// @param ranks none: this process alone
-SweepRun run_watched(const Sweep& sweep, const fs::path& log, SweepControls controls,
+SweepRun run_watched(const Sweep& sweep, BlockLog& log, SweepControls controls,
                      SweepRanks* ranks = nullptr) {
   const InterruptWatch interrupts;
   std::optional<Progress> progress;
@@ -62,7 +66,6 @@ SweepRun run_watched(const Sweep& sweep, const fs::path& log, SweepControls cont
     before = done;
   };
   controls.interrupted = InterruptWatch::seen;
-  controls.note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
   return ranks != nullptr ? ranks->run(sweep, log, controls) : run_sweep(sweep, log, controls);
 }
 
@@ -98,11 +101,13 @@ int stopped(const fs::path& log) {
 }
 
 WrittenSweep write_results(const Sweep& sweep, const SweepRun& run,
-                           const std::vector<const BlockLog*>& logs, const fs::path& output) {
+                           const std::vector<const BlockLog*>& logs, const fs::path& output,
+                           int workers = 0) {
   WrittenSweep written;
   std::map<std::string, double> seconds;
   const std::clock_t cpu_start = std::clock();
-  written.tally = timed(seconds, "writing", [&] { return write_sweep(sweep, logs, output); });
+  written.tally =
+      timed(seconds, "writing", [&] { return write_sweep(sweep, logs, output, workers); });
   written.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
   written.seconds = seconds["writing"];
   written.files.push_back(output.string());
@@ -174,16 +179,17 @@ std::vector<std::string> shards_beside(const fs::path& output) {
 
 int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls,
               const Session& session) {
-  const fs::path log = shard_path(output, controls.shard);
+  const fs::path file = shard_path(output, controls.shard);
   const Shard shard = controls.shard;
+  BlockLog log(file, sweep, say_note);
   const SweepRun run = run_watched(sweep, log, std::move(controls));
-  if (run.interrupted) return stopped(log);
-  write_file(log.string() + ".run.json", to_text(sidecar(sweep, run, {})));
+  if (run.interrupted) return stopped(file);
+  write_file(file.string() + ".run.json", to_text(sidecar(sweep, run, {})));
   if (session.json()) {
-    fmt::print("{}", to_text(Json{{"file", log.string()}, {"blocks", run.blocks}}));
+    fmt::print("{}", to_text(Json{{"file", file.string()}, {"blocks", run.blocks}}));
   } else {
     fmt::print("shard {} of {}: {} of {} blocks in {}\n", shard.index + 1, shard.count, run.blocks,
-               sweep.blocks(), log.string());
+               sweep.blocks(), file.string());
   }
   return 0;
 }
@@ -196,10 +202,9 @@ int merge(const SweepChoice& choice, const Session& session) {
   if (files.empty()) {
     throw bad_input(output.string(), "no shards beside it", "files of tpm sweep --shard I/N");
   }
-  const auto note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
   std::vector<BlockLog> logs;
   logs.reserve(files.size());
-  for (const std::string& file : files) logs.push_back(BlockLog::to_read(file, sweep, note));
+  for (const std::string& file : files) logs.push_back(BlockLog::to_read(file, sweep, say_note));
   std::vector<const BlockLog*> all;
   all.reserve(logs.size());
   SweepRun run;
@@ -386,10 +391,10 @@ int run_command(const SweepChoice& choice, const Session& session) {
     ranks->serve(sweep);
     return 0;
   }
-  const fs::path output = choice.output, log = log_path(output);
+  const fs::path output = choice.output, log_file = log_path(output);
   if (fingerprint_of(output) == sweep.fingerprint) {
     std::error_code ignored;
-    fs::remove(log, ignored);  // left where a run was killed after its last step
+    fs::remove(log_file, ignored);  // left where a run was killed after its last step
     fmt::print(stderr, "tpm: {} holds this sweep already\n", output.string());
     return 0;
   }
@@ -407,11 +412,12 @@ int run_command(const SweepChoice& choice, const Session& session) {
     controls.shard = parse_shard(choice.shard);
     return run_shard(sweep, output, std::move(controls), session);
   }
+  const int workers = controls.workers;
+  BlockLog log(log_file, sweep, say_note);
   const SweepRun run = run_watched(sweep, log, std::move(controls), ranks.get());
-  if (run.interrupted) return stopped(log);
-  const BlockLog blocks = BlockLog::to_read(log, sweep, {});
-  const WrittenSweep written = write_results(sweep, run, {&blocks}, output);
-  fs::remove(log);
+  if (run.interrupted) return stopped(log_file);
+  const WrittenSweep written = write_results(sweep, run, {&log}, output, workers);
+  fs::remove(log_file);
   return print_results(sweep, written.tally, written.files, session);
 }
 

@@ -5,11 +5,11 @@
 #include <unistd.h>
 
 #include <bit>
-#include <boost/crc.hpp>
 #include <cerrno>
 #include <cstring>
 
 #include "tpm/core/error.hpp"
+#include "tpm/store/check_sum.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -22,10 +22,7 @@ constexpr std::uint32_t kClosing = 0xffffffffU;  // in place of a row's number
 constexpr std::size_t kBlock = 1U << 16U;
 
 std::uint32_t crc_of(const void* bytes, std::size_t size, std::uint32_t number = 0) {
-  boost::crc_32_type crc;
-  crc.process_bytes(&number, sizeof number);
-  crc.process_bytes(bytes, size);
-  return crc.checksum();
+  return check_sum(bytes, size, check_sum(&number, sizeof number));
 }
 
 void put(std::vector<std::byte>& to, const void* bytes, std::size_t size) {

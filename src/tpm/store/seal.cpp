@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <boost/crc.hpp>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "tpm/core/error.hpp"
+#include "tpm/store/check_sum.hpp"
 
 namespace tpm {
 namespace {
@@ -32,14 +32,13 @@ bool crc_of(const fs::path& file, std::uint64_t size, std::uint32_t& crc) {
   constexpr std::uint64_t kAtOnce = std::uint64_t{1} << 20U;
   std::ifstream in(file, std::ios::binary);
   std::vector<char> bytes(static_cast<std::size_t>(std::min(size, kAtOnce)));
-  boost::crc_32_type sum;
+  crc = 0;
   for (std::uint64_t done = 0; done < size;) {
     const std::uint64_t part = std::min(size - done, kAtOnce);
     if (!in.read(bytes.data(), static_cast<std::streamsize>(part))) return false;
-    sum.process_bytes(bytes.data(), static_cast<std::size_t>(part));
+    crc = check_sum(bytes.data(), static_cast<std::size_t>(part), crc);
     done += part;
   }
-  crc = sum.checksum();
   return true;
 }
 

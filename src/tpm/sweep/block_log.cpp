@@ -8,12 +8,12 @@
 
 #include <algorithm>
 #include <bit>
-#include <boost/crc.hpp>
 #include <cerrno>
 #include <cstring>
 #include <utility>
 
 #include "tpm/core/error.hpp"
+#include "tpm/store/check_sum.hpp"
 
 namespace tpm {
 namespace {
@@ -32,12 +32,6 @@ struct RecordHead {
   std::uint32_t crc_of_payload;
   std::uint32_t crc_of_head;  ///< of all before it
 };
-
-std::uint32_t checksum(const void* bytes, std::size_t size) {
-  boost::crc_32_type crc;
-  crc.process_bytes(bytes, size);
-  return crc.checksum();
-}
 
 template <class T>
 void put_all(std::string& to, const std::vector<T>& values) {
@@ -90,8 +84,9 @@ Error cannot_write_log(const std::filesystem::path& path) {
 
 }  // namespace
 
-std::string pack(const CellBlock& block) {
-  std::string bytes;
+std::string log_record(const CellBlock& block) {
+  RecordHead head{};
+  std::string bytes(sizeof head, '\0');
   put_all(bytes, block.status);
   put_all(bytes, block.reason);
   put_all(bytes, block.error_estimate);
@@ -99,6 +94,12 @@ std::string pack(const CellBlock& block) {
   for (const auto& counts : block.counts) put_all(bytes, counts);
   for (const auto& values : block.values) put_all(bytes, values);
   for (const std::string& reason : block.reasons) bytes.append(reason).push_back('\0');
+  std::copy(kRecordMagic.begin(), kRecordMagic.end(), head.magic);
+  head.number = block.number;
+  head.size = bytes.size() - sizeof head;
+  head.crc_of_payload = check_sum(bytes.data() + sizeof head, head.size);
+  head.crc_of_head = check_sum(&head, sizeof head - sizeof head.crc_of_head);
+  std::memcpy(bytes.data(), &head, sizeof head);
   return bytes;
 }
 
@@ -199,12 +200,12 @@ bool BlockLog::record_at(std::uint64_t offset, std::uint64_t& number, std::strin
   if (!read_at(offset, bytes, sizeof head)) return false;
   std::memcpy(&head, bytes.data(), sizeof head);
   if (std::string_view(head.magic, sizeof head.magic) != kRecordMagic ||
-      head.crc_of_head != checksum(&head, sizeof head - sizeof head.crc_of_head) ||
+      head.crc_of_head != check_sum(&head, sizeof head - sizeof head.crc_of_head) ||
       head.size > kLargestRecord || head.number >= place_.size()) {
     return false;
   }
   if (!read_at(offset + sizeof head, payload, head.size) ||
-      checksum(payload.data(), payload.size()) != head.crc_of_payload) {
+      check_sum(payload.data(), payload.size()) != head.crc_of_payload) {
     return false;
   }
   number = head.number;
@@ -255,18 +256,10 @@ void BlockLog::find_blocks(const std::function<void(const std::string&)>& note) 
   }
 }
 
-void BlockLog::append(std::uint64_t number, const std::string& payload) {
-  RecordHead head{};
-  std::copy(kRecordMagic.begin(), kRecordMagic.end(), head.magic);
-  head.number = number;
-  head.size = payload.size();
-  head.crc_of_payload = checksum(payload.data(), payload.size());
-  head.crc_of_head = checksum(&head, sizeof head - sizeof head.crc_of_head);
-  std::string bytes(reinterpret_cast<const char*>(&head), sizeof head);
-  bytes += payload;
+void BlockLog::append(std::uint64_t number, std::string_view record) {
   std::uint64_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t n = ::pwrite(file_, bytes.data() + done, bytes.size() - done,
+  while (done < record.size()) {
+    const ssize_t n = ::pwrite(file_, record.data() + done, record.size() - done,
                                static_cast<off_t>(length_ + done));
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
@@ -279,7 +272,7 @@ void BlockLog::append(std::uint64_t number, const std::string& payload) {
     done += static_cast<std::uint64_t>(n);
   }
   place_[number] = length_;
-  length_ += bytes.size();
+  length_ += record.size();
   ++size_;
 }
 

@@ -3,14 +3,16 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tpm/sweep/cell_block.hpp"
 
 namespace tpm {
 
-/// A block as the log holds it.
-[[nodiscard]] std::string pack(const CellBlock& block);
+/// A block as a log holds it, check sums included: made where the block was computed, so that who
+/// writes the log has nothing left to do but that.
+[[nodiscard]] std::string log_record(const CellBlock& block);
 
 /// Blocks of a sweep in the order in which they were finished, each with a check sum. What stands
 /// in the file survives the process; a block that was cut short or damaged is not there.
@@ -37,8 +39,8 @@ class BlockLog {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
   /// Throws Error(environment); the log is then as it was before.
-  void append(const CellBlock& block) { append(block.number, pack(block)); }
-  void append(std::uint64_t block, const std::string& packed);
+  /// @param record of this block, from log_record()
+  void append(std::uint64_t block, std::string_view record);
   /// Throws Error(bad_input) if the block was damaged since the log was opened.
   [[nodiscard]] CellBlock read(std::uint64_t block) const;
   /// Passes everything to the disk: from here on it survives the machine.

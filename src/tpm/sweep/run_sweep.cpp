@@ -1,15 +1,12 @@
 #include "tpm/sweep/run_sweep.hpp"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/global_control.h>
-#include <tbb/info.h>
 #include <tbb/parallel_pipeline.h>
-#include <tbb/task_arena.h>
 
 #include <chrono>
 #include <ctime>
 
-#include "tpm/sweep/block_log.hpp"
+#include "tpm/sweep/workers.hpp"
 
 namespace tpm {
 namespace {
@@ -38,6 +35,12 @@ class MissingBlocks {
   std::uint64_t blocks_, next_;
 };
 
+/// A computed block on its way into the log.
+struct Finished {
+  std::uint64_t block = 0, cells = 0;
+  std::string record;
+};
+
 /// Numbers of blocks go in at one end, one at a time; workers compute them; blocks come out at the
 /// other end, one at a time, in the order in which they were finished. No more are under way than
 /// twice the workers, which bounds the memory.
@@ -56,33 +59,32 @@ void compute_missing(const Sweep& sweep, int workers, BlockLog& log, SweepRun& r
         if (!next) flow.stop();
         return next.value_or(0);
       });
-  const auto compute = tbb::make_filter<std::uint64_t, CellBlock>(
-      tbb::filter_mode::parallel, [&](std::uint64_t block) { return runners.local().run(block); });
-  const auto store = tbb::make_filter<CellBlock, void>(
-      tbb::filter_mode::serial_out_of_order, [&](const CellBlock& block) {
-        log.append(block);
-        run.cells += block.cells();
-        if (controls.progress) controls.progress(log.size(), run.blocks);
+  const auto compute = tbb::make_filter<std::uint64_t, Finished>(
+      tbb::filter_mode::parallel, [&](std::uint64_t number) {
+        const CellBlock block = runners.local().run(number);
+        return Finished{number, block.cells(), log_record(block)};
       });
+  const auto store = tbb::make_filter<Finished, void>(tbb::filter_mode::serial_out_of_order,
+                                                      [&](const Finished& finished) {
+                                                        log.append(finished.block, finished.record);
+                                                        run.cells += finished.cells;
+                                                        if (controls.progress)
+                                                          controls.progress(log.size(), run.blocks);
+                                                      });
   tbb::parallel_pipeline(2 * static_cast<std::size_t>(workers), number & compute & store);
 }
 
 }  // namespace
 
-SweepRun run_sweep(const Sweep& sweep, const std::filesystem::path& log_file,
-                   const SweepControls& controls) {
+SweepRun run_sweep(const Sweep& sweep, BlockLog& log, const SweepControls& controls) {
   SweepRun run;
-  run.workers = controls.workers > 0 ? controls.workers : tbb::info::default_concurrency();
+  run.workers = worker_count(controls.workers);
   run.blocks = controls.shard.size(sweep.blocks());
-  BlockLog log(log_file, sweep, controls.note);
   run.resumed_blocks = log.size();
   if (controls.progress) controls.progress(log.size(), run.blocks);
   const auto start = std::chrono::steady_clock::now();
   const double cpu_start = processor_seconds();
-  const tbb::global_control most(tbb::global_control::max_allowed_parallelism,
-                                 static_cast<std::size_t>(run.workers));
-  tbb::task_arena arena(run.workers);
-  arena.execute([&] { compute_missing(sweep, run.workers, log, run, controls); });
+  on_workers(run.workers, [&] { compute_missing(sweep, run.workers, log, run, controls); });
   log.sync();
   run.cpu_seconds = processor_seconds() - cpu_start;
   run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "tpm/sweep/sweep.hpp"
+#include "tpm/sweep/block_log.hpp"
 
 namespace tpm {
 
@@ -25,8 +25,7 @@ struct SweepControls {
   int workers = 0;  ///< threads; 0: all processors that this process may use
   Shard shard;
   std::function<void(std::uint64_t blocks_done, std::uint64_t blocks)> progress;
-  std::function<bool()> interrupted;             ///< asked before each block
-  std::function<void(const std::string&)> note;  ///< told what was found damaged
+  std::function<bool()> interrupted;  ///< asked before each block
 };
 
 /// How a sweep went: for the sidecar, not for the results.
@@ -40,14 +39,12 @@ struct SweepRun {
   double cpu_seconds = 0.0;  ///< of all threads, in the same time
 };
 
-/// Computes the blocks that the log beside `output` does not have yet. Whatever the number of
-/// workers and the order, each block holds the same bits. Throws Error(environment) where the log
-/// cannot be written; what was computed before is kept.
-/// @param log file of the log: log_path(output), or a shard's own file
-[[nodiscard]] SweepRun run_sweep(const Sweep& sweep, const std::filesystem::path& log,
-                                 const SweepControls& controls);
+/// Computes the blocks that the log does not have yet, and puts them into it. Whatever the number
+/// of workers and the order, each block holds the same bits. Throws Error(environment) where the
+/// log cannot be written; what was computed before is kept.
+[[nodiscard]] SweepRun run_sweep(const Sweep& sweep, BlockLog& log, const SweepControls& controls);
 
-/// The log of a sweep whose results go into `output`.
+/// File of the log of a sweep whose results go into `output`.
 [[nodiscard]] std::filesystem::path log_path(const std::filesystem::path& output);
 
 }  // namespace tpm

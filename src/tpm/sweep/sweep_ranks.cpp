@@ -22,8 +22,7 @@ std::unique_ptr<SweepRanks> SweepRanks::of_this_run() {
   return nullptr;
 }
 SweepRanks::~SweepRanks() = default;
-SweepRun SweepRanks::run(const Sweep& sweep, const std::filesystem::path& log,
-                         const SweepControls& controls) {
+SweepRun SweepRanks::run(const Sweep& sweep, BlockLog& log, const SweepControls& controls) {
   return run_sweep(sweep, log, controls);
 }
 void SweepRanks::serve(const Sweep& /*sweep*/) {}
@@ -76,7 +75,7 @@ class Distribution {
       if (waiting != 0) {
         take();
       } else if (const auto block = next()) {
-        store(pack(own_.run(*block)), *block);
+        store(log_record(own_.run(*block)), *block);
       } else if (under_way_ > 0) {
         take();
       } else {
@@ -113,11 +112,11 @@ class Distribution {
     std::uint64_t number = 0;
     std::memcpy(&number, message.bytes.data(), sizeof number);
     hand_out(message.from);  // first: the other process must not wait for the disk
-    store(message.bytes.substr(sizeof number), number);
+    store(std::string_view(message.bytes).substr(sizeof number), number);
   }
 
-  void store(const std::string& payload, std::uint64_t number) {
-    log_.append(number, payload);
+  void store(std::string_view record, std::uint64_t number) {
+    log_.append(number, record);
     run_.cells += std::min(sweep_.block_cells, sweep_.cells() - number * sweep_.block_cells);
     if (controls_.progress) controls_.progress(log_.size(), run_.blocks);
   }
@@ -156,12 +155,10 @@ SweepRanks::~SweepRanks() {
   MPI_Finalize();
 }
 
-SweepRun SweepRanks::run(const Sweep& sweep, const std::filesystem::path& log_file,
-                         const SweepControls& controls) {
+SweepRun SweepRanks::run(const Sweep& sweep, BlockLog& log, const SweepControls& controls) {
   SweepRun run;
   run.workers = size_;
   run.blocks = sweep.blocks();
-  BlockLog log(log_file, sweep, controls.note);
   run.resumed_blocks = log.size();
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t cpu_start = std::clock();
@@ -190,7 +187,7 @@ void SweepRanks::serve(const Sweep& sweep) {
     int tag = kResultTag;
     try {
       if (!runner) runner.emplace(sweep);
-      bytes += pack(runner->run(number));
+      bytes += log_record(runner->run(number));
     } catch (const std::exception& error) {
       bytes = error.what();
       tag = kFailureTag;

@@ -21,8 +21,7 @@ class SweepRanks {
   [[nodiscard]] bool first() const { return rank_ == 0; }
 
   /// As run_sweep, with one worker in each process. Throws on the first process alone.
-  [[nodiscard]] SweepRun run(const Sweep& sweep, const std::filesystem::path& log,
-                             const SweepControls& controls);
+  [[nodiscard]] SweepRun run(const Sweep& sweep, BlockLog& log, const SweepControls& controls);
   /// Computes what the first one hands out, until it sends home.
   void serve(const Sweep& sweep);
 

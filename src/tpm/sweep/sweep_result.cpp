@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <tbb/parallel_pipeline.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/seal.hpp"
+#include "tpm/sweep/workers.hpp"
 
 namespace tpm {
 namespace {
@@ -305,10 +307,26 @@ void write_csv_row(const Sweep& sweep, const CellBlock& block, std::size_t cell,
 }  // namespace
 
 CellTally write_sweep(const Sweep& sweep, const std::vector<const BlockLog*>& logs,
-                      const fs::path& file) {
+                      const fs::path& file, int workers) {
   require_room(sweep, file);
   ResultWriter writer(sweep, file);
-  for (std::uint64_t b = 0; b < sweep.blocks(); ++b) writer.add(block_of(logs, b));
+  std::uint64_t next = 0;
+  const auto number = tbb::make_filter<void, std::uint64_t>(
+      tbb::filter_mode::serial_in_order, [&](tbb::flow_control& flow) -> std::uint64_t {
+        if (next == sweep.blocks()) {
+          flow.stop();
+          return 0;
+        }
+        return next++;
+      });
+  const auto read = tbb::make_filter<std::uint64_t, CellBlock>(
+      tbb::filter_mode::parallel, [&](std::uint64_t block) { return block_of(logs, block); });
+  const auto write = tbb::make_filter<CellBlock, void>(
+      tbb::filter_mode::serial_in_order, [&](const CellBlock& block) { writer.add(block); });
+  const int threads = worker_count(workers);
+  on_workers(threads, [&] {
+    tbb::parallel_pipeline(2 * static_cast<std::size_t>(threads), number & read & write);
+  });
   return writer.finish();
 }
 

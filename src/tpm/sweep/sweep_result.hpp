@@ -16,13 +16,14 @@ struct CellTally {
 inline constexpr std::size_t kMostReasons = 1000;
 
 /// Writes the results of a whole sweep as one HDF5 file (docs/sweep.md): each variable as an array
-/// over the axes, with dimension scales, so that any reader of netCDF 4 names them. One block is
-/// held in memory at a time. Equal logs give equal bytes, whatever the order of their blocks.
+/// over the axes, with dimension scales, so that any reader of netCDF 4 names them. Two blocks for
+/// each worker are held in memory. Equal logs give equal bytes, whatever the order of their blocks.
 /// Throws Error(environment) if there is no room, Error(bad_input) if a block is missing or
 /// damaged.
 /// @param logs that hold all blocks together
+/// @param workers threads that read blocks and try their check sums; 0: all processors
 CellTally write_sweep(const Sweep& sweep, const std::vector<const BlockLog*>& logs,
-                      const std::filesystem::path& file);
+                      const std::filesystem::path& file, int workers = 0);
 
 /// Above this many numbers no CSV is written.
 inline constexpr std::uint64_t kMostCsvNumbers = 2'000'000;
