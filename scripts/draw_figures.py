@@ -232,6 +232,18 @@ def counts(panel):
     return not panel["x"]["unit"] and not panel["x"]["logarithmic"] and places and all(x == int(x) for x in places)
 
 
+def name_places(axes, names):
+    """Names in place of the numbers 1, 2, ...; aslant where they would touch each other."""
+    room = axes.get_position().width * axes.figure.get_figwidth() * 72 / len(names)
+    aslant = max(len(name) for name in names) * 5.0 > room
+    axes.set_xticks(range(1, len(names) + 1), names, rotation=35 if aslant else 0, ha="right" if aslant else "center",
+                    rotation_mode="anchor")
+    axes.tick_params(axis="x", length=0, labelsize=8)
+    axes.grid(False, axis="x")
+    if aslant:
+        axes.set_xlabel("")  # its place is taken by the names
+
+
 def draw_panel(axes, panel, look, handles, narrow=False):
     """Draws one panel and adds a handle per new legend text to `handles`."""
     for series in panel["series"]:
@@ -254,7 +266,9 @@ def draw_panel(axes, panel, look, handles, narrow=False):
             getattr(axes, f"{name}axis").set_major_formatter(FuncFormatter(plain_number))
         elif narrow and name == "x":
             axes.xaxis.set_major_locator(MaxNLocator(3))
-    if counts(panel):
+    if "names" in panel["x"]:
+        name_places(axes, [plain_name(name) for name in panel["x"]["names"]])
+    elif counts(panel):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     for series in panel["series"]:
         if series["kind"] == "bracket":

@@ -93,10 +93,11 @@ Json sidecar(const Sweep& sweep, const SweepRun& run, const WrittenSweep& writte
   return record;
 }
 
-int stopped(const fs::path& log) {
+int stopped(BlockLog& log) {
+  log.sync();
   constexpr int kStoppedBySignal = 128;
   fmt::print(stderr, "tpm: stopped; what was computed is in {}: the same command goes on\n",
-             log.string());
+             log.path().string());
   return kStoppedBySignal + InterruptWatch::signal();
 }
 
@@ -183,7 +184,8 @@ int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls
   const Shard shard = controls.shard;
   BlockLog log(file, sweep, say_note);
   const SweepRun run = run_watched(sweep, log, std::move(controls));
-  if (run.interrupted) return stopped(file);
+  if (run.interrupted) return stopped(log);
+  log.sync();
   write_file(file.string() + ".run.json", to_text(sidecar(sweep, run, {})));
   if (session.json()) {
     fmt::print("{}", to_text(Json{{"file", file.string()}, {"blocks", run.blocks}}));
@@ -415,7 +417,7 @@ int run_command(const SweepChoice& choice, const Session& session) {
   const int workers = controls.workers;
   BlockLog log(log_file, sweep, say_note);
   const SweepRun run = run_watched(sweep, log, std::move(controls), ranks.get());
-  if (run.interrupted) return stopped(log_file);
+  if (run.interrupted) return stopped(log);
   const WrittenSweep written = write_results(sweep, run, {&log}, output, workers);
   fs::remove(log_file);
   return print_results(sweep, written.tally, written.files, session);

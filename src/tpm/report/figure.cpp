@@ -94,6 +94,7 @@ Json axis_json(const Axis& axis) {
   Json json{{"quantity", axis.quantity}, {"unit", axis.unit}, {"logarithmic", axis.logarithmic}};
   if (axis.lower) json["lower"] = rounded(*axis.lower, kFigureDigits);
   if (axis.upper) json["upper"] = rounded(*axis.upper, kFigureDigits);
+  if (!axis.names.empty()) json["names"] = axis.names;
   return json;
 }
 

@@ -40,6 +40,7 @@ struct Axis {
   bool logarithmic = false;
   std::optional<double> lower;  ///< limits; what is not given follows the data
   std::optional<double> upper;
+  std::vector<std::string> names{};  ///< what stands at 1, 2, ...: for things that have no number
 };
 
 struct Panel {

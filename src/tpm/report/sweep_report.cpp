@@ -256,27 +256,28 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
           {std::move(panel)}};
 }
 
-Panel index_panel(const std::string& what) {
-  return {what, {"number of the parameter", "", false, 0.0, {}}, {what, "", false, {}, {}}, {}};
-}
-
-void add_index(double place, const std::string& name, const IndexEstimate& index, Panel& panel) {
+/// Indices beside each other, with their intervals; `of` picks one of the two kinds.
+Panel index_panel(const std::string& what, const SweepSensitivity& s,
+                  IndexEstimate InputSensitivity::*of) {
   Series interval;
   interval.kind = Series::Kind::bracket;
   interval.label = "95 % interval";
   interval.provenance = "model";
-  interval.x = {place};
-  interval.lower = {index.low};
-  interval.upper = {index.high};
   Series value;
-  value.kind = Series::Kind::mark;
+  value.kind = Series::Kind::points;
   value.label = "index";
   value.provenance = "model";
-  value.x = {place};
-  value.y = {index.value};
-  value.text = name;
-  panel.series.push_back(std::move(interval));
-  panel.series.push_back(std::move(value));
+  for (std::size_t i = 0; i < s.parameters.size(); ++i) {
+    const IndexEstimate& index = s.indices.inputs[i].*of;
+    interval.x.push_back(static_cast<double>(i + 1));
+    interval.lower.push_back(index.low);
+    interval.upper.push_back(index.high);
+    value.y.push_back(index.value);
+  }
+  value.x = interval.x;
+  const Axis parameters{"parameter", "", false, 0.5, static_cast<double>(value.x.size()) + 0.5,
+                        s.parameters};
+  return {what, parameters, {what, "", false, {}, {}}, {std::move(interval), std::move(value)}};
 }
 
 struct FoundRange {
@@ -434,17 +435,12 @@ std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all
   std::vector<Figure> figures;
   for (const SweepSensitivity& s : all) {
     if (s.indices.inputs.empty()) continue;  // it does not vary
-    Panel first = index_panel("first-order index"), total = index_panel("total index");
-    for (std::size_t i = 0; i < s.parameters.size(); ++i) {
-      add_index(static_cast<double>(i + 1), s.parameters[i], s.indices.inputs[i].first_order,
-                first);
-      add_index(static_cast<double>(i + 1), s.parameters[i], s.indices.inputs[i].total, total);
-    }
     figures.push_back(
         {fmt::format("sensitivity_{}", s.variable),
          s.variable,
          fmt::format("{}: shares of the variance of {} with 95 % intervals.", title, s.variable),
-         {std::move(first), std::move(total)}});
+         {index_panel("first-order index", s, &InputSensitivity::first_order),
+          index_panel("total index", s, &InputSensitivity::total)}});
   }
   return figures;
 }

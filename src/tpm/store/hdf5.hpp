@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -61,14 +62,19 @@ class Hdf5Writer {
   void attribute(const std::string& object, const std::string& name,
                  const std::vector<std::int64_t>& values);
 
-  /// Numbers over several dimensions, to be written in parts.
+  /// Numbers over several dimensions, to be written in parts. What is never written is zero.
   enum class Number { float64, int64, int32, uint8 };
   void array(const std::string& name, Number kind, const std::vector<std::uint64_t>& extents);
-  /// Writes the numbers from `first` on, counted row by row through all dimensions.
-  void part(const std::string& name, std::uint64_t first, std::span<const double> values);
-  void part(const std::string& name, std::uint64_t first, std::span<const std::int64_t> values);
-  void part(const std::string& name, std::uint64_t first, std::span<const std::int32_t> values);
-  void part(const std::string& name, std::uint64_t first, std::span<const std::uint8_t> values);
+  /// Writes the numbers from `first` on, counted row by row through all dimensions, of the kind
+  /// that the array has. Straight to where they stand in the file, past HDF5, which does one thing
+  /// at a time: several threads may write while nobody calls another function.
+  void part(const std::string& name, std::uint64_t first, std::span<const double> values) const;
+  void part(const std::string& name, std::uint64_t first,
+            std::span<const std::int64_t> values) const;
+  void part(const std::string& name, std::uint64_t first,
+            std::span<const std::int32_t> values) const;
+  void part(const std::string& name, std::uint64_t first,
+            std::span<const std::uint8_t> values) const;
   /// Makes a list the coordinate of a dimension: readers name the dimension after it.
   void dimension_scale(const std::string& name);
   void attach_scale(const std::string& array, unsigned dimension, const std::string& scale);
@@ -78,10 +84,11 @@ class Hdf5Writer {
   void write_whole(const std::string& name, Hdf5Handle::Id stored,
                    const std::vector<std::uint64_t>& extents, Hdf5Handle::Id type,
                    const void* values);
-  void write_part(const std::string& name, std::uint64_t first, std::uint64_t count,
-                  Hdf5Handle::Id type, const void* values);
+  void write_part(const std::string& name, std::uint64_t place, std::size_t size,
+                  const void* values) const;
   [[nodiscard]] Hdf5Handle dataset(const std::string& name, Hdf5Handle::Id type,
-                                   const std::vector<std::uint64_t>& extents);
+                                   const std::vector<std::uint64_t>& extents,
+                                   const Hdf5Handle& creation);
   void attach(const std::string& object, const std::string& name, Hdf5Handle::Id type,
               const Hdf5Handle& space, const void* values);
   [[noreturn]] void fail(const std::string& what) const;
@@ -89,6 +96,8 @@ class Hdf5Writer {
   std::filesystem::path path_;
   std::filesystem::path temporary_;
   Hdf5Handle file_;
+  int raw_ = -1;                                 ///< the same file, for parts
+  std::map<std::string, std::uint64_t> places_;  ///< of arrays, in bytes from the file's beginning
   bool committed_ = false;
 };
 

@@ -1,8 +1,11 @@
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <hdf5_hl.h>
 #include <unistd.h>
 
-#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 #include "tpm/core/error.hpp"
@@ -12,30 +15,7 @@ namespace tpm {
 namespace fs = std::filesystem;
 namespace {
 
-/// A stretch of an array, counted row by row, put together of boxes: the rest of a row, the rest of
-/// a plane, ..., whole ones, and the same backwards.
-void select_stretch(hid_t space, const std::vector<hsize_t>& shape, std::uint64_t first,
-                    std::uint64_t count) {
-  H5Sselect_none(space);
-  const std::size_t rank = shape.size();
-  std::vector<hsize_t> start(rank), box(rank);
-  while (count > 0) {
-    std::uint64_t rest = first;
-    for (std::size_t d = rank; d-- > 0; rest /= shape[d]) start[d] = rest % shape[d];
-    // The first dimension along which more than one can be taken at once.
-    std::fill(box.begin(), box.end(), hsize_t{1});
-    std::uint64_t inner = 1;  // numbers in one step along dimension d
-    std::size_t d = rank - 1;
-    while (d > 0 && start[d] == 0 && inner * shape[d] <= count) {
-      box[d] = shape[d];
-      inner *= shape[d--];
-    }
-    box[d] = std::min<std::uint64_t>(shape[d] - start[d], count / inner);
-    H5Sselect_hyperslab(space, H5S_SELECT_OR, start.data(), nullptr, box.data(), nullptr);
-    first += box[d] * inner;
-    count -= box[d] * inner;
-  }
-}
+static_assert(std::endian::native == std::endian::little, "arrays hold little-endian numbers");
 
 hid_t stored_type(Hdf5Writer::Number kind) {
   switch (kind) {
@@ -76,10 +56,12 @@ Hdf5Writer::Hdf5Writer(fs::path path)
   std::error_code ec;
   if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), ec);
   file_ = {H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose};
-  if (!file_.valid()) fail("cannot write");
+  raw_ = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC);
+  if (!file_.valid() || raw_ < 0) fail("cannot write");
 }
 
 Hdf5Writer::~Hdf5Writer() {
+  if (raw_ >= 0) ::close(raw_);
   if (committed_) return;
   const QuietErrors quiet;
   file_.reset();
@@ -102,13 +84,13 @@ void Hdf5Writer::group(const std::string& name) {
 }
 
 Hdf5Handle Hdf5Writer::dataset(const std::string& name, hid_t type,
-                               const std::vector<std::uint64_t>& extents) {
+                               const std::vector<std::uint64_t>& extents,
+                               const Hdf5Handle& creation) {
   const std::vector<hsize_t> shape(extents.begin(), extents.end());
   const Hdf5Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
                          H5Sclose);
   const Hdf5Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
   H5Pset_create_intermediate_group(links.get(), 1);
-  const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   H5Pset_obj_track_times(creation.get(), 0);
   Hdf5Handle made(H5Dcreate2(file_.get(), name.c_str(), type, space.get(), links.get(),
                              creation.get(), H5P_DEFAULT),
@@ -121,7 +103,8 @@ void Hdf5Writer::write_whole(const std::string& name, Hdf5Handle::Id stored,
                              const std::vector<std::uint64_t>& extents, Hdf5Handle::Id type,
                              const void* values) {
   const QuietErrors quiet;
-  const Hdf5Handle set = dataset(name, stored, extents);
+  const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  const Hdf5Handle set = dataset(name, stored, extents, creation);
   if (H5Dwrite(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
     fail(fmt::format("cannot write dataset {}", name));
   }
@@ -200,41 +183,47 @@ void Hdf5Writer::attribute(const std::string& object, const std::string& name,
 void Hdf5Writer::array(const std::string& name, Number kind,
                        const std::vector<std::uint64_t>& extents) {
   const QuietErrors quiet;
-  static_cast<void>(dataset(name, stored_type(kind), extents));
+  const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);  // it has a place before it is written
+  H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
+  const Hdf5Handle made = dataset(name, stored_type(kind), extents, creation);
+  const haddr_t place = H5Dget_offset(made.get());
+  if (place == HADDR_UNDEF) fail(fmt::format("cannot write dataset {}", name));
+  places_[name] = place;
 }
 
-void Hdf5Writer::write_part(const std::string& name, std::uint64_t first, std::uint64_t count,
-                            hid_t type, const void* values) {
-  if (count == 0) return;
-  const QuietErrors quiet;
-  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
-  const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
-  select_stretch(space.get(), shape_of(space), first, count);
-  const hsize_t size = count;
-  const Hdf5Handle memory(H5Screate_simple(1, &size, nullptr), H5Sclose);
-  if (H5Dwrite(set.get(), type, memory.get(), space.get(), H5P_DEFAULT, values) < 0) {
-    fail(fmt::format("cannot write dataset {}", name));
+void Hdf5Writer::write_part(const std::string& name, std::uint64_t place, std::size_t size,
+                            const void* values) const {
+  const char* bytes = static_cast<const char*>(values);
+  place += places_.at(name);
+  while (size > 0) {
+    const ssize_t n = ::pwrite(raw_, bytes, size, static_cast<off_t>(place));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) fail(fmt::format("cannot write dataset {}: {}", name, std::strerror(errno)));
+    bytes += n;
+    place += static_cast<std::uint64_t>(n);
+    size -= static_cast<std::size_t>(n);
   }
 }
 
 void Hdf5Writer::part(const std::string& name, std::uint64_t first,
-                      std::span<const double> values) {
-  write_part(name, first, values.size(), H5T_NATIVE_DOUBLE, values.data());
+                      std::span<const double> values) const {
+  write_part(name, first * sizeof(double), values.size_bytes(), values.data());
 }
 
 void Hdf5Writer::part(const std::string& name, std::uint64_t first,
-                      std::span<const std::int64_t> values) {
-  write_part(name, first, values.size(), H5T_NATIVE_INT64, values.data());
+                      std::span<const std::int64_t> values) const {
+  write_part(name, first * sizeof(std::int64_t), values.size_bytes(), values.data());
 }
 
 void Hdf5Writer::part(const std::string& name, std::uint64_t first,
-                      std::span<const std::int32_t> values) {
-  write_part(name, first, values.size(), H5T_NATIVE_INT32, values.data());
+                      std::span<const std::int32_t> values) const {
+  write_part(name, first * sizeof(std::int32_t), values.size_bytes(), values.data());
 }
 
 void Hdf5Writer::part(const std::string& name, std::uint64_t first,
-                      std::span<const std::uint8_t> values) {
-  write_part(name, first, values.size(), H5T_NATIVE_UINT8, values.data());
+                      std::span<const std::uint8_t> values) const {
+  write_part(name, first, values.size_bytes(), values.data());
 }
 
 void Hdf5Writer::dimension_scale(const std::string& name) {

@@ -59,10 +59,10 @@ void compute_missing(const Sweep& sweep, int workers, BlockLog& log, SweepRun& r
         if (!next) flow.stop();
         return next.value_or(0);
       });
-  const auto compute = tbb::make_filter<std::uint64_t, Finished>(
-      tbb::filter_mode::parallel, [&](std::uint64_t number) {
-        const CellBlock block = runners.local().run(number);
-        return Finished{number, block.cells(), log_record(block)};
+  const auto compute =
+      tbb::make_filter<std::uint64_t, Finished>(tbb::filter_mode::parallel, [&](std::uint64_t b) {
+        const CellBlock block = runners.local().run(b);
+        return Finished{b, block.cells(), log_record(block)};
       });
   const auto store = tbb::make_filter<Finished, void>(tbb::filter_mode::serial_out_of_order,
                                                       [&](const Finished& finished) {
@@ -85,7 +85,6 @@ SweepRun run_sweep(const Sweep& sweep, BlockLog& log, const SweepControls& contr
   const auto start = std::chrono::steady_clock::now();
   const double cpu_start = processor_seconds();
   on_workers(run.workers, [&] { compute_missing(sweep, run.workers, log, run, controls); });
-  log.sync();
   run.cpu_seconds = processor_seconds() - cpu_start;
   run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return run;

@@ -41,7 +41,7 @@ struct SweepRun {
 
 /// Computes the blocks that the log does not have yet, and puts them into it. Whatever the number
 /// of workers and the order, each block holds the same bits. Throws Error(environment) where the
-/// log cannot be written; what was computed before is kept.
+/// log cannot be written; what was computed before is kept. BlockLog::sync() is the caller's.
 [[nodiscard]] SweepRun run_sweep(const Sweep& sweep, BlockLog& log, const SweepControls& controls);
 
 /// File of the log of a sweep whose results go into `output`.

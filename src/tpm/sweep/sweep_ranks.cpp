@@ -171,7 +171,6 @@ SweepRun SweepRanks::run(const Sweep& sweep, BlockLog& log, const SweepControls&
   }
   for (int rank = 1; rank < size_; ++rank) send_number(kGoHome, rank);
   sent_home_ = true;
-  log.sync();
   run.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
   run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return run;

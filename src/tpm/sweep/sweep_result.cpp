@@ -109,19 +109,13 @@ class ResultWriter {
     for (const SweepVariable& variable : sweep.variables) add_variable(variable);
   }
 
-  void add(const CellBlock& block) {
+  /// Writes what does not depend on other blocks; any number of threads at once.
+  void store(const CellBlock& block) const {
     const std::uint64_t first = block.number * sweep_.block_cells;
     std::vector<std::uint8_t> status;
     status.reserve(block.cells());
-    for (const CellStatus s : block.status) {
-      status.push_back(static_cast<std::uint8_t>(s));
-      tally_.done += s == CellStatus::done ? 1 : 0;
-      tally_.skipped += s == CellStatus::skipped ? 1 : 0;
-      tally_.failed += s == CellStatus::failed ? 1 : 0;
-    }
+    for (const CellStatus s : block.status) status.push_back(static_cast<std::uint8_t>(s));
     out_.part("/status", first, std::span<const std::uint8_t>(status));
-    const auto reasons = reasons_.numbers_of(block);
-    out_.part("/reason", first, std::span<const std::int32_t>(reasons));
     out_.part("/error_estimate", first, std::span<const double>(block.error_estimate));
     if (!block.model.empty()) {
       out_.part("/model", first, std::span<const std::uint8_t>(block.model));
@@ -136,6 +130,17 @@ class ResultWriter {
       out_.part(path_to(variable.name), first * variable.width(),
                 std::span<const double>(block.values[v]));
     }
+  }
+
+  /// One block after the other, in the order of the cells: it decides on the numbers of reasons.
+  void count(const CellBlock& block) {
+    for (const CellStatus s : block.status) {
+      tally_.done += s == CellStatus::done ? 1 : 0;
+      tally_.skipped += s == CellStatus::skipped ? 1 : 0;
+      tally_.failed += s == CellStatus::failed ? 1 : 0;
+    }
+    const auto reasons = reasons_.numbers_of(block);
+    out_.part("/reason", block.number * sweep_.block_cells, std::span<const std::int32_t>(reasons));
   }
 
   CellTally finish() {
@@ -319,15 +324,21 @@ CellTally write_sweep(const Sweep& sweep, const std::vector<const BlockLog*>& lo
         }
         return next++;
       });
-  const auto read = tbb::make_filter<std::uint64_t, CellBlock>(
-      tbb::filter_mode::parallel, [&](std::uint64_t block) { return block_of(logs, block); });
-  const auto write = tbb::make_filter<CellBlock, void>(
-      tbb::filter_mode::serial_in_order, [&](const CellBlock& block) { writer.add(block); });
+  const auto store =
+      tbb::make_filter<std::uint64_t, CellBlock>(tbb::filter_mode::parallel, [&](std::uint64_t b) {
+        CellBlock block = block_of(logs, b);
+        writer.store(block);
+        return block;
+      });
+  const auto count = tbb::make_filter<CellBlock, void>(
+      tbb::filter_mode::serial_in_order, [&](const CellBlock& block) { writer.count(block); });
   const int threads = worker_count(workers);
+  CellTally tally;
   on_workers(threads, [&] {
-    tbb::parallel_pipeline(2 * static_cast<std::size_t>(threads), number & read & write);
+    tbb::parallel_pipeline(2 * static_cast<std::size_t>(threads), number & store & count);
+    tally = writer.finish();
   });
-  return writer.finish();
+  return tally;
 }
 
 bool write_sweep_csv(const Sweep& sweep, const std::vector<const BlockLog*>& logs,

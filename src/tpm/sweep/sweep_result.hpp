@@ -21,7 +21,7 @@ inline constexpr std::size_t kMostReasons = 1000;
 /// Throws Error(environment) if there is no room, Error(bad_input) if a block is missing or
 /// damaged.
 /// @param logs that hold all blocks together
-/// @param workers threads that read blocks and try their check sums; 0: all processors
+/// @param workers threads; 0: all processors
 CellTally write_sweep(const Sweep& sweep, const std::vector<const BlockLog*>& logs,
                       const std::filesystem::path& file, int workers = 0);
 
