@@ -499,6 +499,10 @@ TEST_CASE("convergence along an axis: order and limit of a known error, and its 
   CHECK(test::refusal_of([&] {
           static_cast<void>(convergence_of(reader, "second", "E2", "", {}));
         }).find("2 places") != std::string::npos);
+  CHECK(text.find("over axis x at E2 = ") != std::string::npos);
+  CHECK(test::refusal_of([&] {
+          static_cast<void>(convergence_of(reader, "second", "x", "", {{"x", 0}}));
+        }).find("looked along") != std::string::npos);
 }
 
 TEST_CASE("steps of the integrator: the order of two Radau nodes is three") {
@@ -612,6 +616,10 @@ TEST_CASE("mistakes in a sweep are told in one line before anything is computed"
       {R"("end_force",)", R"("end_farce",)", "unknown output 'end_farce'"},
       {R"("end_force",)", R"("creep_depth",)", "without creep"},
       {R"("name": "share")", R"("name": "force")", "the name 'force' is taken"},
+      {R"("name": "share")", R"("name": "sweep")", "the name 'sweep' is taken"},
+      {R"("name": "share")", R"("name": "force_time")", "the name 'force_time' is taken"},
+      {R"("name": "share")", R"("name": "count_creep_depths")", "is taken"},
+      {R"("parameter": "E1")", R"("parameter": "E1", "name": "status")", "'status' is taken"},
       {R"("hold": "10 s")", R"("kind2": "10 s")", "kind2"},
       {R"(, "hold": "10 s")", "", "no 'hold'"},
       {R"("to": "10 s")", R"("to": "-10 s")", "rising times"},

@@ -196,10 +196,24 @@ int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls
   return 0;
 }
 
+/// What goes beside the results is neither the results themselves nor the sweep.
+void require_apart(const fs::path& output, const fs::path& sweep) {
+  for (const char* ending : {".csv", ".run.json"}) {
+    const fs::path other = beside(output, ending);
+    std::error_code ignored;
+    if (other == output || fs::equivalent(other, sweep, ignored)) {
+      throw Error(ExitCode::usage, "-o " + output.string(),
+                  fmt::format("{} goes beside it", other.string()),
+                  "a name that leaves that one free, such as results.h5");
+    }
+  }
+}
+
 /// Puts shards together.
 int merge(const SweepChoice& choice, const Session& session) {
   const Sweep sweep = read_sweep(choice.sweep);
   const fs::path output = choice.output;
+  require_apart(output, choice.sweep);
   const auto files = choice.shards.empty() ? shards_beside(output) : choice.shards;
   if (files.empty()) {
     throw bad_input(output.string(), "no shards beside it", "files of tpm sweep --shard I/N");
@@ -255,6 +269,13 @@ std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
   const Dimension dimension =
       axis.unit.empty() ? Dimension::dimensionless : parse_unit(axis.unit, "--at").dimension;
   const double wished = parse_quantity(text.substr(equals + 1), dimension, "--at " + name);
+  const auto [least, largest] = std::minmax_element(axis.places.begin(), axis.places.end());
+  constexpr double kRounding = 1e-9;
+  const double slack = kRounding * std::max(std::abs(*least), std::abs(*largest));
+  if (!(wished >= *least - slack && wished <= *largest + slack)) {
+    throw Error(ExitCode::usage, "--at " + name, fmt::format("{} {}", shortest(wished), axis.unit),
+                fmt::format("{} to {} {}", shortest(*least), shortest(*largest), axis.unit));
+  }
   const auto nearest = std::min_element(
       axis.places.begin(), axis.places.end(),
       [&](double a, double b) { return std::abs(a - wished) < std::abs(b - wished); });
@@ -329,7 +350,9 @@ int best(const SweepViewChoice& choice, const Session& session) {
     throw Error(ExitCode::usage, "--fit", "alone", "--fit FIT.json with --start START.json");
   }
   if (!choice.fit.empty()) {
-    Json fit = fit_from_cell(read_json(choice.fit), cells.front(), choice.fit);
+    Json fit = read_json(choice.fit);
+    check_schema(fit, "fit", choice.fit);
+    fit = fit_from_cell(std::move(fit), cells.front(), choice.fit);
     move_scene(fit, choice.fit, choice.start);
     write_file(choice.start, to_text(fit));
   }
@@ -394,7 +417,8 @@ int run_command(const SweepChoice& choice, const Session& session) {
     return 0;
   }
   const fs::path output = choice.output, log_file = log_path(output);
-  if (fingerprint_of(output) == sweep.fingerprint) {
+  require_apart(output, choice.sweep);
+  if (choice.shard.empty() && fingerprint_of(output) == sweep.fingerprint) {
     std::error_code ignored;
     fs::remove(log_file, ignored);  // left where a run was killed after its last step
     fmt::print(stderr, "tpm: {} holds this sweep already\n", output.string());

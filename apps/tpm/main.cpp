@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
@@ -37,6 +38,29 @@ std::uint64_t parse_whole_number(const std::string& text, const char* option,
 }
 
 namespace {
+
+/// No command writes over a file that it was given to read.
+void require_output_apart(const CLI::App& app) {
+  for (const CLI::App* command : app.get_subcommands()) {
+    require_output_apart(*command);
+    const CLI::Option* output = command->get_option_no_throw("--output");
+    if (output == nullptr) continue;
+    const std::string file =
+        output->count() > 0 ? output->results().front() : output->get_default_str();
+    for (const CLI::Option* option : command->get_options()) {
+      if (option == output) continue;
+      for (const std::string& given : option->results()) {
+        std::error_code ignored;
+        if (!std::filesystem::is_regular_file(given, ignored) ||
+            !std::filesystem::equivalent(given, file, ignored)) {
+          continue;
+        }
+        throw Error(ExitCode::usage, fmt::format("-o {}", printable(file)),
+                    fmt::format("is {} itself", option->get_name()), "another file");
+      }
+    }
+  }
+}
 
 int run(int argc, char** argv) {
   CLI::App app{"tpm: check a viscoelastic soft-tissue model against data", "tpm"};
@@ -76,6 +100,7 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "tpm: {}; see tpm --help\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
+  require_output_apart(app);
   return session.run();
 }
 

@@ -7,10 +7,18 @@
 
 namespace tpm {
 
+/// Where another axis is held.
+struct HeldValue {
+  std::string axis;
+  double value = 0.0;  ///< SI
+  std::string unit;
+};
+
 /// A number of a sweep over ever finer places of one axis.
 struct SweepConvergence {
   std::string variable, unit;
   std::string axis;
+  std::vector<HeldValue> held;  ///< on the other axes
   std::string size_text;       ///< what the size of a place is, such as "spacing" or "count^(-1/3)"
   std::string size_unit;       ///< SI; empty where the size is a formula
   std::vector<double> size;    ///< falling
@@ -28,8 +36,8 @@ struct SweepConvergence {
 /// @param axis none: the last
 /// @param size formula of the axis' parameters; empty: the parameter of the axis itself
 /// @param held places on the other axes
-/// Throws Error(bad_input) for curves, axes of samples, sizes that are not above 0 or coincide, and
-/// fewer than three places with a number.
+/// Throws Error(bad_input) if the axis itself is held, for curves, axes of samples, sizes that are
+/// not above 0 or coincide, and fewer than three places with a number.
 [[nodiscard]] SweepConvergence convergence_of(const SweepReader& sweep, const std::string& variable,
                                               const std::optional<std::string>& axis,
                                               const std::string& size, const HeldPlaces& held);

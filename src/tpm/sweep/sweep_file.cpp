@@ -201,17 +201,26 @@ void read_formulas(const Json& outputs, Sweep& sweep, const DocumentPlace& place
   }
 }
 
-/// Names of variables differ from each other and from everything else in the file of results.
-void require_own_names(const Sweep& sweep, const DocumentPlace& place) {
-  std::set<std::string> taken{"status",         "reason", "reason_text",
+/// Names of axes, parameters and variables differ from everything else in the file of results.
+/// Those of axes and parameters differ from each other already.
+void require_own_names(const Sweep& sweep, const DocumentPlace& axes,
+                       const DocumentPlace& outputs) {
+  std::set<std::string> taken{"sweep",          "status", "reason",    "reason_text",
                               "error_estimate", "model",  "model_text"};
-  for (const SweepAxis& axis : sweep.axes) taken.insert(axis.name);
-  for (const SweptParameter& parameter : sweep.parameters) taken.insert(parameter.name);
-  for (const SweepVariable& variable : sweep.variables) {
-    require_identifier(variable.name, place.where);
-    if (taken.insert(variable.name).second) continue;
-    throw bad_input(place.where, fmt::format("the name '{}' is taken", variable.name),
+  for (const std::string& name : sweep.model->counted()) taken.insert("count_" + name);
+  const auto take = [&](const std::string& name, const DocumentPlace& place) {
+    if (taken.insert(name).second) return;
+    throw bad_input(place.where, fmt::format("the name '{}' is taken", name),
                     "a name that nothing else has");
+  };
+  for (const SweepAxis& axis : sweep.axes) take(axis.name, axes);
+  for (const SweptParameter& parameter : sweep.parameters) {
+    if (parameter.name != sweep.axes[parameter.axis].name) take(parameter.name, axes);
+  }
+  for (const SweepVariable& variable : sweep.variables) {
+    require_identifier(variable.name, outputs.where);
+    take(variable.name, outputs);
+    if (!variable.times_s.empty()) take(variable.name + "_time", outputs);
   }
 }
 
@@ -346,7 +355,7 @@ Sweep parse_sweep(const Json& written, std::string_view where,
   read_axes(document, sweep, place);
   sweep.variables = sweep.model->variables();
   read_formulas(document.at("outputs"), sweep, place.key("outputs"));
-  require_own_names(sweep, place.key("outputs"));
+  require_own_names(sweep, place.key("axes"), place.key("outputs"));
   for (const Json& skip : document.value("skip", Json::array())) {
     const auto when = skip.at("when").get<std::string>();
     sweep.skip.push_back({when, skip.value("reason", when)});
