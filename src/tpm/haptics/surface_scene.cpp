@@ -24,7 +24,7 @@ class SurfaceAlong {
       return surface.ball.depth_to_touch_m(surface.scene.rest(), i * kStep_m * aside,
                                            surface.scene.probe.direction);
     };
-    met_m_.assign(static_cast<std::size_t>(count + kReach + 1), 0.0);
+    met_m_.assign(static_cast<std::size_t>(count) + std::size_t{kReach} + 1, 0.0);
     for (int i = 1; i <= count; ++i) value(i) = met(i).value_or(value(i - 1));
     for (int i = -1; i >= -kReach; --i) value(i) = met(i).value_or(value(i + 1));
     begin_m_ = averaged(0);
@@ -43,7 +43,7 @@ class SurfaceAlong {
   // To either side: what a hand makes of the edge where one sphere ends and the next begins.
   static constexpr int kAverage = 4, kReach = kAverage + 1;
 
-  [[nodiscard]] double& value(int i) { return met_m_[static_cast<std::size_t>(i + kReach)]; }
+  [[nodiscard]] double& value(int i) { return *(met_m_.begin() + (i + kReach)); }
   [[nodiscard]] double averaged(int i) const {
     const auto first = met_m_.begin() + (i + kReach - kAverage);
     constexpr int kCount = 2 * kAverage + 1;
