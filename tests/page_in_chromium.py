@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Opens the page of a session in headless Chromium and watches it: numbers change, phases follow each other,
-the tissue and the curves move, and nothing but this machine is asked.
+"""Opens the page of sessions in headless Chromium and watches it: numbers change, phases follow each other,
+the tissue and the curves move, a tool that slides does so with the arrow of its force beside it, and nothing
+but this machine is asked.
 
     page_in_chromium.py TPM [SESSION.json [SCREENSHOT.png SECONDS]]
 """
@@ -27,10 +28,23 @@ SESSION = {
     "creep": {"loads": ["0.2 N"], "hold": "2 s", "rest": "1 s"},
 }
 
-LOOK = """document.readyState !== "complete" ? "null" : JSON.stringify({
+SLIDE = {
+    "title": "a slide that is looked at",
+    "model": {"kind": "surface", "scene": {
+        "organ": {"kind": "liver", "count": 60},
+        "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"},
+        "anchors": [{"kind": "far_side", "fraction": 0.3}]}},
+    "rate": "500 Hz",
+    "limits": SESSION["limits"],
+    "virtual_device": SESSION["virtual_device"],
+    "slides": {"depths": ["4 mm"], "direction": [1, 0, 0], "distance": "25 mm", "rate": "10 mm/s", "rest": "1 s"},
+}
+
+LOOK = """document.readyState !== "complete" || !document.getElementById("served") ? "null" : JSON.stringify({
   texts: Object.fromEntries(["title", "device", "status", "phase", "instruction", "tool_depth", "commanded", "clock",
                              "target_depth", "target_force", "served"]
                             .map(id => [id, document.getElementById(id).textContent])),
+  tool: document.getElementById("scene").dataset.tool, force: document.getElementById("scene").dataset.force,
   received: Number(document.body.dataset.received || 0),
   ink: ["scene", "depth_plot", "force_plot"].map(id => {
     const c = document.getElementById(id), d = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
@@ -161,7 +175,24 @@ def watched(chromium, address, seconds, shot):
     return seen
 
 
-def check(seen, address, chromium):
+def check_tool(running, slides):
+    """Where the tool and the arrow of its force were drawn."""
+    tools = [tuple(map(int, s["tool"].split(","))) for s in running if s["tool"]]
+    arrows = [(tool, tuple(map(int, s["force"].split(","))))
+              for tool, s in zip(tools, (s for s in running if s["tool"])) if s["force"]]
+    assert len(arrows) >= 4, arrows
+    for tool, (x, y, end_x, end_y) in arrows:
+        assert 0 < x - tool[0] < 120 and y == tool[1], (tool, x, y)
+        assert end_y < y, "the force pushes the hand out"
+    aside = max(x for x, _ in tools) - min(x for x, _ in tools)
+    if slides:
+        assert aside >= 20 and len({x for x, _ in tools}) >= 5, tools
+        assert any(abs(end_x - x) >= 3 for _, (x, _, end_x, _) in arrows), arrows
+    else:
+        assert aside <= 3 and max(y for _, y in tools) > min(y for _, y in tools), tools
+
+
+def check(seen, address, chromium, session):
     running = [s for s in seen if s["texts"]["status"] == "running"]
     assert len(running) >= 5, [s["texts"] for s in seen]
 
@@ -173,10 +204,11 @@ def check(seen, address, chromium):
     assert different("phase") >= 3 and different("instruction") >= 3, [s["texts"]["phase"] for s in running]
     for k, canvas in enumerate(("scene", "depth_plot", "force_plot")):
         assert len({s["ink"][k] for s in running}) >= 4, canvas
+    check_tool(running, "slides" in session)
     last = seen[-1]
     assert last["received"] > len(running), last
     assert last["texts"]["device"] == "SIMULATED DEVICE", last
-    assert last["texts"]["title"] == SESSION["title"], last
+    assert last["texts"]["title"] == session["title"], last
     assert last["texts"]["status"] == "finished", last
     assert "Let go of the device" in last["texts"]["instruction"], last
     assert not last["overflow"]
@@ -185,10 +217,10 @@ def check(seen, address, chromium):
     assert not strangers, strangers
 
 
-def attempt(tpm, program, given, shot):
+def attempt(tpm, program, told, given, shot):
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder = Path(name)
-        (folder / "session.json").write_text(json.dumps(SESSION))
+        (folder / "session.json").write_text(json.dumps(told))
         session, address = begun(tpm, given or folder / "session.json", folder)
         chromium = Chromium(program, folder / "profile")
         try:
@@ -196,7 +228,7 @@ def attempt(tpm, program, given, shot):
             # A machine that stalls for longer than the loop allows ends the session, and the page says so.
             stalled = seen[-1]["texts"]["status"].startswith(("stopped: watchdog", "stopped: overrun", "stopped: hang"))
             if shot is None and not stalled:
-                check(seen, address, chromium)
+                check(seen, address, chromium, told)
             return stalled, len(seen)
         finally:
             chromium.close()
@@ -217,13 +249,15 @@ def main():
     except CannotStart as e:
         print(f"SKIPPED: Chromium does not run on this machine: {e}")
         sys.exit(77)
-    for _ in range(8):
-        stalled, looks = attempt(sys.argv[1], program, given, shot)
-        if not stalled:
-            print(f"looked {looks} times")
-            return
-    print("SKIPPED: this machine stalled for longer than the device's watchdog in each of eight sessions")
-    sys.exit(77)
+    for told in [SESSION] if given else [SESSION, SLIDE]:
+        for _ in range(8):
+            stalled, looks = attempt(sys.argv[1], program, told, given, shot)
+            if not stalled:
+                print(f"looked {looks} times at {given or told['title']}")
+                break
+        else:
+            print("SKIPPED: this machine stalled for longer than the device's watchdog in each of eight sessions")
+            sys.exit(77)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@
 #include "tpm/haptics/recording_export.hpp"
 #include "tpm/haptics/rendering_border.hpp"
 #include "tpm/haptics/session_run.hpp"
+#include "tpm/haptics/surface_scene.hpp"
 #include "tpm/haptics/verify.hpp"
 #include "tpm/report/hil_report.hpp"
 #include "tpm/store/file.hpp"
@@ -93,12 +94,72 @@ TEST_CASE("A session of the element verifies against the network, the closed for
   CHECK(v.phases.size() == recording.session.phases.size());
 }
 
-TEST_CASE("A session over the surface verifies in all three components", "[heavy]") {
+Json slide_session() {
   Json json = test::network_session("surface");
   json.erase("indentations");
   json["slides"] = Json::parse(R"({"depths": ["4 mm"], "press": "10 mm/s", "direction": [0, 1, -3],
                                    "distance": "20 mm", "rate": "20 mm/s", "rest": "0.2 s"})");
-  const HilSession session = parsed(json);
+  return json;
+}
+
+/// How deep the operator of a session means to be under where the ball would touch the organ at
+/// rest, while sliding: least and most. Found by halving, sphere by sphere.
+std::pair<double, double> depths_while_sliding(const HilSession& session) {
+  const SurfaceScene surface(session);
+  const Positions& rest = surface.scene.rest();
+  const Eigen::Vector3d into = surface.scene.probe.direction;
+  OperatorScript script = session.operator_script();
+  std::pair<double, double> depths{1.0, -1.0};
+  const double from_s = session.phases[1].end_s, to_s = session.phases[3].end_s;
+  for (int i = 0; i <= 50; ++i) {
+    const OperatorAim aim = script.at(from_s + i * (to_s - from_s) / 50);
+    const Eigen::Vector3d aside = surface.to_model * aim.across_m;
+    double out = -0.03, in = 0.03;
+    for (int halvings = 0; halvings < 20; ++halvings) {
+      const double middle = 0.5 * (out + in);
+      const Eigen::Vector3d ball = surface.ball.start_m + aside + middle * into;
+      const double nearest = (rest.colwise() - ball).colwise().norm().minCoeff();
+      (nearest < surface.ball.reach_m() ? in : out) = middle;
+    }
+    depths.first = std::min(depths.first, aim.value - in);
+    depths.second = std::max(depths.second, aim.value - in);
+  }
+  return depths;
+}
+
+TEST_CASE("A slide follows the surface of the organ") {
+  HilSession session = parsed(slide_session());
+  const auto [straight_least, straight_most] = depths_while_sliding(session);
+  follow_surface(session);
+  const auto [least, most] = depths_while_sliding(session);
+  CAPTURE(straight_least, straight_most, least, most);
+  CHECK(most - least < 0.25 * (straight_most - straight_least));
+  CHECK(least > 3.3e-3);
+  CHECK(most < 4.2e-3);
+  const std::vector<double>& there = session.phases[2].surface_m;
+  const std::vector<double>& back = session.phases[3].surface_m;
+  REQUIRE(there.size() > 20);
+  CHECK(there.front() == 0.0);
+  REQUIRE(back.size() == there.size());
+  for (std::size_t i = 0; i < there.size(); ++i) {
+    CHECK_THAT(back[back.size() - 1 - i], WithinAbs(there[i], 1e-12));
+  }
+  // Nothing else has changed, and nothing jumps.
+  CHECK(session.phases[1].surface_m.empty());
+  const auto pieces = session.operator_script().pieces();
+  for (std::size_t i = 1; i < pieces.size(); ++i) {
+    CHECK(pieces[i].from == pieces[i - 1].to);
+    CHECK(pieces[i].across_from_m == pieces[i - 1].across_to_m);
+  }
+  HilSession other = parsed(short_session());
+  follow_surface(other);
+  CHECK(other.phases.front().surface_m.empty());
+}
+
+TEST_CASE("A session over the surface verifies in all three components", "[heavy]") {
+  const Json json = slide_session();
+  HilSession session = parsed(json);
+  follow_surface(session);
   CHECK(session.slide == Eigen::Vector3d::UnitY());
   std::vector<std::string> names;
   for (const SessionPhase& phase : session.phases) names.push_back(phase.name);
@@ -113,6 +174,7 @@ TEST_CASE("A session over the surface verifies in all three components", "[heavy
   CHECK(run.outcome.cause == StopCause::finished);
   CHECK(run.outcome.counts.beyond_model == 0);
   HilRecording recording = read_recording(options.recording);
+  CHECK(recording.session.phases[2].surface_m == session.phases[2].surface_m);
   const VerifyOptions coarse{.spacing_s = 0.05};
   const Verification v = verify(recording, coarse);
   CHECK(v.phases.size() == 6);
@@ -122,6 +184,13 @@ TEST_CASE("A session over the surface verifies in all three components", "[heavy
     CHECK(phase.force.max_N < 0.005 * v.all.peak_N);
   }
   CHECK(v.reference_error_N < 0.005 * v.all.peak_N);
+  // CVODE, from the first touch to the end: as far from the reference as that is from the truth.
+  REQUIRE(v.others.size() == 1);
+  CHECK(v.others[0].start_s > 0.5);
+  CHECK(v.others[0].start_s < 1.5);
+  CHECK(v.others[0].end_s > v.phases.back().start_s);
+  CHECK(v.others[0].apart_N < 2.0 * v.reference_error_N);
+  CHECK(v.others[0].apart_N > 0.0);
   // The hand was pushed aside, across the push, and a force that is wrong there is found.
   double aside_N = 0.0;
   for (ServoRecord& row : recording.rows) {
@@ -129,7 +198,7 @@ TEST_CASE("A session over the surface verifies in all three components", "[heavy
     if (row.phase == 2) row.commanded_N[0] += 0.01 * v.all.peak_N;
   }
   CHECK(aside_N > 0.1 * v.all.peak_N);
-  const Verification wrong = verify(recording, coarse);
+  const Verification wrong = verify(recording, {.spacing_s = 0.05, .window_s = 0.0});
   CHECK(wrong.phases[2].force.max_N > 0.0095 * v.all.peak_N);
   CHECK(wrong.phases[1].force.max_N == v.phases[1].force.max_N);
 

@@ -17,6 +17,7 @@ using Catch::Matchers::Contains;
 struct Ran {
   HilRecording recording;
   std::string bytes;
+  TissueShape shape;
 };
 
 Ran ran(const Json& session) {
@@ -25,7 +26,7 @@ Ran ran(const Json& session) {
   options.recording = folder / "r";
   const SessionRun run = run_session(test::parsed(session), {}, options);
   REQUIRE(run.outcome.cause == StopCause::finished);
-  return {read_recording(folder / "r"), read_file(folder / "r")};
+  return {read_recording(folder / "r"), read_file(folder / "r"), run.model.shape};
 }
 
 Ran ran(const char* kind) {
@@ -51,6 +52,7 @@ TEST_CASE("A session of the whole network verifies, stepped in the loop and besi
 struct Picked {
   Json plan;
   double error = 0.0;  ///< largest, in parts of the peak
+  std::shared_ptr<ContactModel> drawn;
 };
 
 Picked picked(const char* tolerance) {
@@ -60,7 +62,7 @@ Picked picked(const char* tolerance) {
   options.motion_tolerance_m = 2e-6;
   options.window_s = 0.0;
   const Verification v = verify(run.recording, options);
-  return {run.recording.header.at("model").at("plan"), v.all.max_N / v.all.peak_N};
+  return {run.recording.header.at("model").at("plan"), v.all.max_N / v.all.peak_N, run.shape.field};
 }
 
 TEST_CASE("A planned model keeps to the tolerance, and a tighter one picks another") {
@@ -72,12 +74,19 @@ TEST_CASE("A planned model keeps to the tolerance, and a tighter one picks anoth
   // What letting go within a period costs is none of the model's.
   CHECK(tight.error < 0.003);
   CHECK(tight.error < wide.error);
+  // The picture has the same model, in steps of its own.
+  REQUIRE(tight.drawn);
+  CHECK(tight.drawn->period_s() == kDrawnEvery_s);
+  CHECK(tight.drawn->spheres() == 60);
 }
 
 TEST_CASE("A session without a kind is planned for 1 %, of the star it is the element") {
   Json json = test::short_session();
   json.at("model").erase("kind");
-  const LoopModel loop = make_loop_model(test::parsed(json));
+  std::size_t told = 0;
+  const LoopModel loop =
+      make_loop_model(test::parsed(json), false, [&told](const std::string&) { ++told; });
+  CHECK(told == kPlanningSteps);
   CHECK(loop.plan.at("choice") == "element");
   CHECK(loop.plan.at("tolerance") == 0.01);
   Json known = json;

@@ -1,6 +1,7 @@
 // The page of a session: what it says, to whom, and that nobody who asks gets in the way.
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <thread>
 
 #include "hil_scenes.hpp"
@@ -66,6 +67,8 @@ TEST_CASE("The view tells the last cycle, the target, the counts, and each point
   CHECK(state.at("cycle") == 1199);
   CHECK_THAT(state.at("time_s").get<double>(), WithinAbs(1.199, 1e-12));
   CHECK(state.at("commanded_N") == 0.4);
+  const auto hand_N = state.at("hand_N").get<std::vector<double>>();
+  CHECK(std::hypot(hand_N[0], hand_N[1], hand_N[2]) == Approx(0.4));
   CHECK(state.at("over") == false);
   CHECK(state.at("counts").at("late") == 0);
   CHECK_THAT(state.at("loop").at("busy_p99_s").get<double>(), WithinAbs(20e-6, 1.1e-6));

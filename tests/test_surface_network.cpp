@@ -10,6 +10,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/surface_scene.hpp"
+#include "tpm/method/ball_by_cvode.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/reduce/surface_network.hpp"
@@ -204,6 +205,48 @@ TEST_CASE("The ball's work is stored or dissipated, in the second order of the s
   CHECK(coarse / fine > 3.0);
 }
 
+TEST_CASE("Steps under a ball approach what CVODE finds, in the second order", "[heavy]") {
+  constexpr double kKnot_s = 0.01;
+  const BallScene scene(0.05);
+  std::vector<BallPlace> places{{0.0, scene.ball.start_m}};
+  for (const Eigen::Vector3d& at : scene.slide(4e-3, 10)) {
+    places.push_back({kKnot_s * static_cast<double>(places.size()), scene.ball.start_m + at});
+  }
+  const auto by_cvode = [&](double tolerance) {
+    return ball_forces_by_cvode(scene.bonds, scene.rest(), scene.freedom, scene.ball, places,
+                                tolerance);
+  };
+  const std::vector<Eigen::Vector3d> expected = by_cvode(1e-9);
+  double peak = 0.0;
+  for (const Eigen::Vector3d& force : expected) peak = std::max(peak, force.norm());
+  const auto apart = [&](int parts) {
+    BallOnNetwork full = scene.full();
+    double most = 0.0;
+    for (std::size_t k = 1; k < places.size(); ++k) {
+      Eigen::Vector3d force;
+      for (int i = 1; i <= parts; ++i) {
+        const double part = static_cast<double>(i) / parts;
+        force = full.step(places[k - 1].at_m + part * (places[k].at_m - places[k - 1].at_m),
+                          kKnot_s / parts);
+      }
+      most = std::max(most, (force - expected[k]).norm());
+    }
+    return most / peak;
+  };
+  const double coarse = apart(2), fine = apart(8);
+  CAPTURE(coarse, fine, peak);
+  CHECK(peak > 0.05);
+  CHECK(fine < 1e-4);
+  CHECK(coarse / fine > 10.0);
+  // Its tolerance is what limits it.
+  const std::vector<Eigen::Vector3d> rough = by_cvode(1e-6);
+  double off = 0.0;
+  for (std::size_t k = 0; k < rough.size(); ++k)
+    off = std::max(off, (rough[k] - expected[k]).norm());
+  CHECK(off > 0.0);
+  CHECK(off < 1e-3 * peak);
+}
+
 TEST_CASE("A servo network under a ball converges in the second order of its period", "[heavy]") {
   const BallScene scene(0.05);
   const auto force_with = [&](int steps) {
@@ -220,6 +263,39 @@ TEST_CASE("A servo network under a ball converges in the second order of its per
   const double ratio = (a - b).norm() / (b - c).norm();
   CHECK(ratio > 3.4);
   CHECK(ratio < 4.6);
+}
+
+TEST_CASE("The estimate knows what linear elongations cost where tissue relaxes in a few periods",
+          "[heavy]") {
+  const double tau_s = GENERATE(1e-3, 4e-3, 0.1);
+  constexpr int kParts = 8;
+  const BallScene scene(tau_s);
+  // Balanced to the last digits, so that nothing else is left of the error.
+  SurfaceNetwork servo = scene.servo({.balance_again_above = 1e-9, .most_balances = 20});
+  BallOnNetwork full = scene.full();
+  double peak = 0.0, worst = 0.0, estimate = 0.0;
+  int beyond = 0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  Way way = scene.slide(4e-3, 40);
+  way.resize(80);  // drawn out as fast as this, relaxed tissue snaps
+  for (const Eigen::Vector3d& at : way) {
+    const ContactAnswer answer = servo.step(at);
+    Eigen::Vector3d force;
+    for (int i = 1; i <= kParts; ++i) {
+      const double part = static_cast<double>(i) / kParts;
+      force =
+          full.step(scene.ball.start_m + before + part * (at - before), servo.period_s() / kParts);
+    }
+    before = at;
+    const double error = (answer.force_N - force).norm();
+    peak = std::max(peak, force.norm());
+    worst = std::max(worst, error);
+    estimate = std::max(estimate, servo.linear_error_N());
+    beyond += error > answer.error_N + 1e-5 * peak ? 1 : 0;
+  }
+  CAPTURE(tau_s, peak, worst, estimate, beyond);
+  CHECK(beyond == 0);
+  CHECK(estimate < 20.0 * worst);
 }
 
 TEST_CASE("Random motions of a ball draw nothing, repeat to the bit and allocate nothing",

@@ -50,11 +50,18 @@ int list_devices(const DeviceOptions& options, const Session& session) {
   return 0;
 }
 
-/// Tells the operator what to do, or how far a simulated session is.
+/// Tells how far the planning of a model is, and then the operator what to do or how far a
+/// simulated session is.
 class Guide {
  public:
-  Guide(const HilSession& session, bool real_time) : session_(session), real_time_(real_time) {
-    if (!real_time) progress_.emplace("session", session.phases.size());
+  Guide(const HilSession& session, bool real_time) : session_(session), real_time_(real_time) {}
+  void plan() {
+    if (!progress_) progress_.emplace("planning the model of the loop", kPlanningSteps);
+    progress_->advance();
+  }
+  void begin() {
+    progress_.reset();
+    if (!real_time_) progress_.emplace("session", session_.phases.size());
   }
   void see(const ServoRecord& row) {
     if (row.phase == phase_ || row.phase >= static_cast<std::int32_t>(session_.phases.size()))
@@ -100,6 +107,12 @@ int run_hil(const RunChoice& choice, const Session& session) {
   options.watcher = [&guide, &page](const ServoRecord& row) {
     guide->see(row);
     if (page) page->see(row);
+  };
+  options.planning = [&guide](const std::string&) { guide->plan(); };
+  options.opened = [&guide, opened = options.opened](const DeviceIdentity& identity,
+                                                     const LoopModel& model) {
+    guide->begin();
+    if (opened) opened(identity, model);
   };
   const SessionRun run = run_session(hil, device, options);
   guide.reset();

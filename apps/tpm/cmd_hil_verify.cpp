@@ -63,7 +63,11 @@ std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {
       ->capture_default_str();
   command.add_option("--spacing", choice->spacing, "Of the instants that are compared")
       ->capture_default_str();
-  command.add_option("--window", choice->window, "From the start, of the second opinion by CVODES")
+  command
+      .add_option(
+          "--window", choice->window,
+          "Of the second opinion by CVODE: from the start, of a ball over the surface from the "
+          "first touch")
       ->capture_default_str();
   add_format_option(command, session);
   return choice;

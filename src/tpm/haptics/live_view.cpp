@@ -202,6 +202,10 @@ void LiveView::see(const ServoRecord& row) {
   state_.last = row;
   state_.least_J = std::min(state_.least_J, row.observed_J);
   state_.commanded_N = -session_.servo.push.dot(Eigen::Map<const Eigen::Vector3d>(row.commanded_N));
+  state_.hand_N =
+      shape_.to_model
+          ? Eigen::Vector3d(*shape_.to_model * Eigen::Map<const Eigen::Vector3d>(row.commanded_N))
+          : Eigen::Vector3d(-state_.commanded_N * shape_.push);
   least_N_ = std::min(least_N_, state_.commanded_N);
   most_N_ = std::max(most_N_, state_.commanded_N);
   if (row.cycle >= next_point_) {
@@ -266,6 +270,7 @@ std::string LiveView::state_json(std::uint64_t after) const {
       {"model_force_N", row.model_force_N},
       {"model_error_N", row.model_error_N},
       {"commanded_N", s.commanded_N},
+      {"hand_N", {s.hand_N.x(), s.hand_N.y(), s.hand_N.z()}},
       {"flags",
        {{"force_limited", (row.flags & kForceLimited) != 0},
         {"slew_limited", (row.flags & kSlewLimited) != 0},

@@ -44,6 +44,7 @@ class LiveView {
     std::uint64_t first_point = 0;
     std::deque<Point> points;
     std::vector<std::int32_t> displacement_um;         ///< x, y, z of each sphere
+    Eigen::Vector3d hand_N = Eigen::Vector3d::Zero();  ///< commanded, in the scene's coordinates
     Eigen::Vector3d tool_m = Eigen::Vector3d::Zero();  ///< from its start, if it moves in space
     bool begun = false, over = false;
     StopCause cause = StopCause::none;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -53,8 +54,9 @@ ExperimentScene scene_of(const PushedScene& pushed, const ContactRange& range) {
   return contact_scene(scene, range);
 }
 
-PlanRequest request_of(const HilSession& session) {
+PlanRequest request_of(const HilSession& session, const PlanningTold& told) {
   PlanRequest request;
+  request.progress = told;
   set_tolerance(request, session.tolerance);
   request.for_loop = true;
   request.relevance = request.changes = false;
@@ -109,11 +111,11 @@ Error no_model(const Plan& plan) {
 
 }  // namespace
 
-LoopModel planned_model(const HilSession& session) {
+LoopModel planned_model(const HilSession& session, const PlanningTold& told) {
   const PushedScene pushed(session);
   const ContactRange range = range_of(session, pushed.deepest_m);
   const ExperimentScene scene = scene_of(pushed, range);
-  const Plan plan = make_plan(scene, request_of(session));
+  const Plan plan = make_plan(scene, request_of(session, told));
   if (!plan.choice) throw no_model(plan);
   const PlannedCandidate& chosen = plan.chosen();
   LoopModel loop = pushed.begun(chosen.name, "seen from");
@@ -132,8 +134,10 @@ LoopModel planned_model(const HilSession& session) {
                                     percent(*plan.masses_left_out));
   }
   loop.plan = json_of(plan);
-  loop.model = planned_contact(plan, scene, session.servo.period_s);
-  if (loop.model->spheres() > 0) loop.shape.field = planned_contact(plan, scene, kDrawnEvery_s);
+  if (told) told("model for the loop");
+  auto models = planned_contacts(plan, scene, std::array{session.servo.period_s, kDrawnEvery_s});
+  loop.model = std::move(models.front());
+  if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
   return loop;
 }
 

@@ -20,6 +20,15 @@ Json times_json(const TimeHistogram& times) {
           {"max_s", times.max_s()}};
 }
 
+void set_surface(HilSession& session, const Json& by_phase, const std::string& where) {
+  if (by_phase.size() != session.phases.size()) {
+    throw bad_input(where, "has surfaces for another number of phases", "one list for each");
+  }
+  for (std::size_t i = 0; i < by_phase.size(); ++i) {
+    session.phases[i].surface_m = by_phase[i].get<std::vector<double>>();
+  }
+}
+
 }  // namespace
 
 Json to_json(const ServoCounts& counts) {
@@ -49,6 +58,8 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
                       const LoopModel& model, bool real_time) {
   Json said = parse_json(session.text, "session");
   said["model"]["scene"] = session.scene;
+  Json surface = Json::array();
+  for (const SessionPhase& phase : session.phases) surface.push_back(phase.surface_m);
   return {{"format", kFormat},
           {"version", version()},
           {"simulated_device", !device.hardware},
@@ -59,6 +70,7 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
             {"error_bound", model.error_bound},
             {"stiffness_at_once_N_per_m", model.stiffness_N_per_m},
             {"plan", model.plan}}},
+          {"surface_by_phase_m", std::move(surface)},
           {"session", std::move(said)}};
 }
 
@@ -102,6 +114,9 @@ HilRecording read_recording(const std::filesystem::path& file) {
     throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
   }
   recording.session = parse_session(recording.header.at("session"), file.string(), {});
+  if (recording.header.contains("surface_by_phase_m")) {  // before, slides went straight
+    set_surface(recording.session, recording.header.at("surface_by_phase_m"), file.string());
+  }
   recording.rows.resize(log.rows);
   if (log.rows > 0) std::memcpy(recording.rows.data(), log.bytes.data(), log.bytes.size());
   recording.closed = log.closed;

@@ -8,6 +8,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/session_phases.hpp"
+#include "tpm/haptics/surface_scene.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/store/file.hpp"
@@ -151,12 +152,25 @@ std::string_view word_of(SessionPhaseKind kind) {
 
 OperatorScript HilSession::operator_script() const {
   std::vector<OperatorPiece> pieces;
+  double start_s = 0.0;
   for (const SessionPhase& phase : phases) {
     const bool pushes =
         phase.kind == SessionPhaseKind::load || phase.kind == SessionPhaseKind::creep;
-    pieces.push_back({pushes ? OperatorPiece::Aim::force : OperatorPiece::Aim::place, phase.end_s,
-                      phase.from, phase.to, phase.across_from_m * slide,
-                      phase.across_to_m * slide});
+    const auto aim = pushes ? OperatorPiece::Aim::force : OperatorPiece::Aim::place;
+    const std::size_t parts = std::max<std::size_t>(phase.surface_m.size(), 2) - 1;
+    const auto at = [parts](std::size_t i, double from, double to) {
+      return i == parts ? to
+                        : from + static_cast<double>(i) / static_cast<double>(parts) * (to - from);
+    };
+    const auto place = [&](std::size_t i) {
+      return at(i, phase.from, phase.to) + (phase.surface_m.empty() ? 0.0 : phase.surface_m[i]);
+    };
+    for (std::size_t i = 0; i < parts; ++i) {
+      pieces.push_back({aim, at(i + 1, start_s, phase.end_s), place(i), place(i + 1),
+                        at(i, phase.across_from_m, phase.across_to_m) * slide,
+                        at(i + 1, phase.across_from_m, phase.across_to_m) * slide});
+    }
+    start_s = phase.end_s;
   }
   return OperatorScript(std::move(pieces));
 }
@@ -208,7 +222,9 @@ HilSession parse_session(const Json& json, std::string_view where,
 }
 
 HilSession read_session(const std::filesystem::path& file) {
-  return parse_session(read_json(file), file.string(), file.parent_path());
+  HilSession session = parse_session(read_json(file), file.string(), file.parent_path());
+  follow_surface(session);
+  return session;
 }
 
 }  // namespace tpm

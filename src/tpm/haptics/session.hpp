@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +31,9 @@ struct SessionPhase {
   double depth_m = 0.0;         ///< of the indentation it belongs to; 0 if none
   double rate_m_per_s = 0.0;
   double across_from_m = 0.0, across_to_m = 0.0;  ///< along HilSession::slide
+  /// Depth of the organ's surface at even parts of the phase, both ends included, m: what `from`
+  /// and `to` are counted from there. Empty: 0 throughout.
+  std::vector<double> surface_m = {};
 };
 
 /// What is stepped in the loop.
@@ -66,6 +70,7 @@ struct HilSession {
 /// Reads a session (schemas/hil.schema.json). Throws Error(bad_input) with the key.
 [[nodiscard]] HilSession parse_session(const Json& json, std::string_view where,
                                        const std::filesystem::path& folder);
+/// The same of a file, slides following the surface (follow_surface).
 [[nodiscard]] HilSession read_session(const std::filesystem::path& file);
 
 /// The tissue of a session as it is drawn, in the coordinates of its scene.
@@ -99,9 +104,14 @@ struct LoopModel {
   TissueShape shape;
 };
 
+/// Told what is being done while a model is planned, kPlanningSteps times.
+using PlanningTold = std::function<void(const std::string& what)>;
+inline constexpr std::size_t kPlanningSteps = 5;
+
 /// @param threads the model may work in a thread of its own; else all happens in its steps
 /// Throws Error(bad_input) if the scene is not one that the model can stand for; of a planned model
 /// Error(answer_is_no) if none is accurate and fast enough, Error(numerical) as make_plan().
-[[nodiscard]] LoopModel make_loop_model(const HilSession& session, bool threads = false);
+[[nodiscard]] LoopModel make_loop_model(const HilSession& session, bool threads = false,
+                                        const PlanningTold& told = {});
 
 }  // namespace tpm

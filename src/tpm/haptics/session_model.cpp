@@ -77,7 +77,7 @@ LoopModel network_beside_model(const HilSession& session, bool threads) {
   return loop;
 }
 
-LoopModel model_of(const HilSession& session, bool threads) {
+LoopModel model_of(const HilSession& session, bool threads, const PlanningTold& told) {
   switch (session.model) {
     case LoopModelKind::element:
       return element_model(session);
@@ -88,7 +88,7 @@ LoopModel model_of(const HilSession& session, bool threads) {
     case LoopModelKind::surface:
       return surface_model(session);
     case LoopModelKind::planned:
-      return planned_model(session);
+      return planned_model(session, told);
     case LoopModelKind::condensed:
       break;
   }
@@ -97,8 +97,8 @@ LoopModel model_of(const HilSession& session, bool threads) {
 
 }  // namespace
 
-LoopModel make_loop_model(const HilSession& session, bool threads) {
-  LoopModel loop = model_of(session, threads);
+LoopModel make_loop_model(const HilSession& session, bool threads, const PlanningTold& told) {
+  LoopModel loop = model_of(session, threads, told);
   loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
   return loop;
 }

@@ -68,7 +68,7 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
 SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                        const SessionRunOptions& options) {
   SessionRun run;
-  run.model = make_loop_model(session, options.real_time);
+  run.model = make_loop_model(session, options.real_time, options.planning);
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
   const std::shared_ptr<HapticDevice> device = make_device(choice, session);
   DevicePreparation preparation = session.preparation;

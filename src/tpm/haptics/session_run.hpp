@@ -28,6 +28,7 @@ struct SessionRunOptions {
   std::function<void(const ServoRecord&)> watcher;
   /// Called when the device is open and its forces are still off.
   std::function<void(const DeviceIdentity&, const LoopModel&)> opened;
+  PlanningTold planning;  ///< see make_loop_model()
 };
 
 struct SessionRun {

@@ -3,11 +3,58 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include "tpm/core/text.hpp"
 #include "tpm/reduce/surface_network.hpp"
 
 namespace tpm {
+namespace {
+
+/// Depth of an organ's surface along a straight way across the push, from where a ball touches it.
+class SurfaceAlong {
+ public:
+  static constexpr double kStep_m = 0.5e-3;
+
+  /// @param aside unit vector, in the coordinates of the scene
+  SurfaceAlong(const SurfaceScene& surface, const Eigen::Vector3d& aside, double way_m) {
+    const auto count = static_cast<int>(std::ceil(way_m / kStep_m)) + kReach;
+    const auto met = [&](int i) {
+      return surface.ball.depth_to_touch_m(surface.scene.rest(), i * kStep_m * aside,
+                                           surface.scene.probe.direction);
+    };
+    met_m_.assign(static_cast<std::size_t>(count) + std::size_t{kReach} + 1, 0.0);
+    for (int i = 1; i <= count; ++i) value(i) = met(i).value_or(value(i - 1));
+    for (int i = -1; i >= -kReach; --i) value(i) = met(i).value_or(value(i + 1));
+    begin_m_ = averaged(0);
+  }
+
+  /// 0 at the start.
+  [[nodiscard]] double at(double across_m) const {
+    const double place = across_m / kStep_m;
+    const double below = std::floor(place), part = place - below;
+    const int i = static_cast<int>(below);
+    const double here = averaged(i);
+    return here + (part > 0.0 ? part * (averaged(i + 1) - here) : 0.0) - begin_m_;
+  }
+
+ private:
+  // To either side: what a hand makes of the edge where one sphere ends and the next begins.
+  static constexpr int kAverage = 4, kReach = kAverage + 1;
+
+  [[nodiscard]] double& value(int i) { return *(met_m_.begin() + (i + kReach)); }
+  [[nodiscard]] double averaged(int i) const {
+    const auto first = met_m_.begin() + (i + kReach - kAverage);
+    constexpr int kCount = 2 * kAverage + 1;
+    return std::accumulate(first, first + kCount, 0.0) / kCount;
+  }
+
+  std::vector<double> met_m_;
+  double begin_m_ = 0.0;
+};
+
+}  // namespace
 
 Eigen::Matrix3d turn_onto(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   constexpr double kOpposite = 1e-9;
@@ -27,6 +74,27 @@ SurfaceScene::SurfaceScene(const HilSession& session)
       ball(ball_on_surface(scene.tissue.network.organ, scene.probe.sphere, scene.probe.direction,
                            session.tool_radius_m, session.contact_stiffness_N_per_m)),
       to_model(turn_onto(session.servo.push, scene.probe.direction)) {}
+
+void follow_surface(HilSession& session) {
+  double way_m = 0.0;
+  for (const SessionPhase& phase : session.phases) {
+    way_m = std::max({way_m, phase.across_from_m, phase.across_to_m});
+  }
+  if (session.model != LoopModelKind::surface || !(way_m > 0.0)) return;
+  const SurfaceScene surface(session);
+  const SurfaceAlong along(surface, surface.to_model * session.slide, way_m);
+  for (SessionPhase& phase : session.phases) {
+    const double length_m = std::abs(phase.across_to_m - phase.across_from_m);
+    if (!(length_m > 0.0)) continue;
+    const auto parts = static_cast<std::size_t>(std::ceil(length_m / SurfaceAlong::kStep_m));
+    phase.surface_m.clear();
+    for (std::size_t i = 0; i <= parts; ++i) {
+      const double part = static_cast<double>(i) / static_cast<double>(parts);
+      phase.surface_m.push_back(
+          along.at(phase.across_from_m + part * (phase.across_to_m - phase.across_from_m)));
+    }
+  }
+}
 
 LoopModel surface_model(const HilSession& session) {
   // A sphere that the ball touches on its flank moves further than the ball is deep.

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/load.hpp"
 #include "tpm/haptics/surface_scene.hpp"
+#include "tpm/method/ball_by_cvode.hpp"
 #include "tpm/method/method.hpp"
 #include "tpm/model/model.hpp"
 #include "tpm/network/quasistatic.hpp"
@@ -84,14 +86,6 @@ std::vector<std::size_t> compared_rows(const HilRecording& recording, std::size_
   return chosen;
 }
 
-/// Depth asked for at a time of a phase; none in phases that ask for a push.
-std::optional<double> asked_depth_m(const SessionPhase& phase, double start_s, double time_s) {
-  if (phase.kind == SessionPhaseKind::load || phase.kind == SessionPhaseKind::creep)
-    return std::nullopt;
-  const double part = (time_s - start_s) / (phase.end_s - start_s);
-  return phase.from + std::clamp(part, 0.0, 1.0) * (phase.to - phase.from);
-}
-
 void judge_phases(Verification& v, const HilRecording& recording,
                   const std::vector<const ServoRecord*>& rows,
                   const std::vector<std::size_t>& compared,
@@ -100,13 +94,15 @@ void judge_phases(Verification& v, const HilRecording& recording,
   std::vector<FidelitySum> sums(phases.size());
   std::vector<double> depth_squares(phases.size(), 0.0);
   FidelitySum all;
+  OperatorScript script = recording.session.operator_script();
   for (std::size_t k = 0; k < compared.size(); ++k) {
     const ServoRecord& row = *rows[compared[k]];
     const auto p = std::min(static_cast<std::size_t>(row.phase), phases.size() - 1);
     sums[p].add_error(v.error_N[k], reference_size_N[k]);
     all.add_error(v.error_N[k], reference_size_N[k]);
-    const double start = p == 0 ? 0.0 : phases[p - 1].end_s;
-    const double asked = asked_depth_m(phases[p], start, v.time_s[k]).value_or(row.tool_depth_m);
+    const OperatorAim aim = script.at(v.time_s[k]);
+    const bool place = aim.aim == OperatorPiece::Aim::place;  // phases that ask for a push: none
+    const double asked = place ? aim.value : row.tool_depth_m;
     depth_squares[p] += (row.tool_depth_m - asked) * (row.tool_depth_m - asked);
   }
   v.all = all.take();
@@ -150,6 +146,7 @@ void ask_cvode(Verification& v, const HilRecording& recording, const DrivenNetwo
   for (std::size_t k = 0; k < times.size(); ++k) sum.add(v.commanded_N[k], answer[k]);
   OtherOpinion& opinion = v.others.emplace_back();
   opinion.name = "CVODE (BDF) on what the bonds remember, in balance at each evaluation";
+  opinion.start_s = times.front();
   opinion.end_s = times.back();
   opinion.commanded = sum.take();
   opinion.apart_N = apart_from_reference(v, times, answer);
@@ -171,7 +168,8 @@ void ask_others(Verification& v, const HilRecording& recording, const Motion& ev
       sum.add(recording.commanded_N(*rows[i]), response.value[static_cast<Eigen::Index>(i)]);
     }
     const std::vector<double> answer(response.value.begin(), response.value.end());
-    v.others.push_back({name, times.back(), sum.take(), apart_from_reference(v, times, answer)});
+    v.others.push_back(
+        {name, times.front(), times.back(), sum.take(), apart_from_reference(v, times, answer)});
   };
   ask("closed_form", "closed form of the star at every sample",
       measured_history(Drive::displacement, every_sample.time_s, every_sample.surface_m),
@@ -234,27 +232,72 @@ Verification begun(const HilRecording& recording, const std::vector<const ServoR
   return v;
 }
 
-/// Forces of the full network on a ball at the instants compared, in the device's coordinates; only
-/// every `stride`-th of them is a step.
+/// Where the ball was at the instants compared, in the coordinates of the scene, after where it was
+/// a period before the first.
+std::vector<BallPlace> places_of_ball(const SurfaceScene& surface, const HilRecording& recording,
+                                      const std::vector<const ServoRecord*>& rows,
+                                      const std::vector<std::size_t>& compared) {
+  const ServoSettings& servo = recording.session.servo;
+  std::vector<BallPlace> places{
+      {recording.time_s(*rows[compared.front()]) - servo.period_s, surface.ball.start_m}};
+  for (const std::size_t i : compared) {
+    const Eigen::Map<const Eigen::Vector3d> at_m(rows[i]->position_m);
+    places.push_back({recording.time_s(*rows[i]),
+                      surface.ball.start_m + surface.to_model * (at_m - servo.surface_m)});
+  }
+  return places;
+}
+
+/// Forces of the full network on a ball at the places after the first; only every `stride`-th of
+/// them is a step.
 std::vector<Eigen::Vector3d> forces_on_ball(const SurfaceScene& surface,
-                                            const HilRecording& recording,
-                                            const std::vector<const ServoRecord*>& rows,
-                                            const std::vector<std::size_t>& compared,
+                                            const std::vector<BallPlace>& places,
                                             std::size_t stride) {
   BallOnNetwork network(surface.scene.tissue.bonds(), surface.scene.rest(),
                         surface.scene.tissue.freedom(), surface.ball);
   std::vector<Eigen::Vector3d> forces;
-  double before_s = recording.time_s(*rows[compared.front()]) - recording.session.servo.period_s;
-  for (std::size_t k = 0; k < compared.size(); k += stride) {
-    const ServoRecord& row = *rows[compared[k]];
-    const Eigen::Map<const Eigen::Vector3d> at_m(row.position_m);
-    const double time_s = recording.time_s(row);
-    const Eigen::Vector3d moved_m = surface.to_model * (at_m - recording.session.servo.surface_m);
-    forces.emplace_back(surface.to_model.transpose() *
-                        network.step(surface.ball.start_m + moved_m, time_s - before_s));
-    before_s = time_s;
+  double before_s = places.front().time_s;
+  for (std::size_t k = 1; k < places.size(); k += stride) {
+    forces.push_back(network.step(places[k].at_m, places[k].time_s - before_s));
+    before_s = places[k].time_s;
   }
   return forces;
+}
+
+/// The network under the ball again, by an integrator of its own, from the instant before it is
+/// touched: nothing is remembered until then.
+/// @param reference forces at the places after the first
+void ask_cvode_in_space(Verification& v, const SurfaceScene& surface,
+                        const std::vector<BallPlace>& places,
+                        const std::vector<Eigen::Vector3d>& reference,
+                        const std::vector<const ServoRecord*>& rows,
+                        const std::vector<std::size_t>& compared, const VerifyOptions& options) {
+  const auto touched = static_cast<std::size_t>(
+      std::find_if(reference.begin(), reference.end(),
+                   [](const Eigen::Vector3d& force) { return !force.isZero(0.0); }) -
+      reference.begin());
+  if (!(options.window_s > 0.0) || touched == reference.size()) return;
+  const double end_s = places[touched].time_s + options.window_s;
+  std::size_t past = touched + 2;
+  while (past < places.size() && places[past].time_s <= end_s) ++past;
+  const std::span<const BallPlace> window(places.data() + touched, past - touched);
+  // Its error control sees every corner of the motion: finer than this it takes minutes.
+  constexpr double kFinest = 1e-8;
+  const std::vector<Eigen::Vector3d> answer = ball_forces_by_cvode(
+      surface.scene.tissue.bonds(), surface.scene.rest(), surface.scene.tissue.freedom(),
+      surface.ball, window, std::max(kFinest, options.window_tolerance));
+  FidelitySum sum;
+  OtherOpinion& opinion = v.others.emplace_back();
+  for (std::size_t i = 1; i < answer.size(); ++i) {
+    const std::size_t k = touched + i - 1;
+    const Eigen::Map<const Eigen::Vector3d> commanded_N(rows[compared[k]]->commanded_N);
+    sum.add_error((surface.to_model * commanded_N - answer[i]).norm(), answer[i].norm());
+    opinion.apart_N = std::max(opinion.apart_N, (answer[i] - reference[k]).norm());
+  }
+  opinion.name = "CVODE (Adams) on what the bonds remember, in balance at each evaluation";
+  opinion.start_s = window.front().time_s;
+  opinion.end_s = window.back().time_s;
+  opinion.commanded = sum.take();
 }
 
 Verification verify_in_space(const HilRecording& recording, const VerifyOptions& options) {
@@ -267,13 +310,15 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
                 std::to_string(surface.scene.tissue.network.organ.size()) +
                 " spheres under the ball, Newton's method with exact tangents in every step";
   v.knots = compared.size();
-  const std::vector<Eigen::Vector3d> fine = forces_on_ball(surface, recording, rows, compared, 1);
-  const std::vector<Eigen::Vector3d> coarse = forces_on_ball(surface, recording, rows, compared, 2);
+  const std::vector<BallPlace> places = places_of_ball(surface, recording, rows, compared);
+  const std::vector<Eigen::Vector3d> fine = forces_on_ball(surface, places, 1);
+  const std::vector<Eigen::Vector3d> coarse = forces_on_ball(surface, places, 2);
   std::vector<double> size_N;
   for (std::size_t k = 0; k < compared.size(); ++k) {
     const Eigen::Map<const Eigen::Vector3d> commanded_N(rows[compared[k]]->commanded_N);
-    v.reference_N.push_back(-recording.session.servo.push.dot(fine[k]));
-    v.error_N.push_back((commanded_N - fine[k]).norm());
+    const Eigen::Vector3d felt_N = surface.to_model.transpose() * fine[k];
+    v.reference_N.push_back(-recording.session.servo.push.dot(felt_N));
+    v.error_N.push_back((commanded_N - felt_N).norm());
     size_N.push_back(fine[k].norm());
     // The error falls with the square of the step.
     if (k % 2 == 0) {
@@ -281,6 +326,7 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
     }
   }
   judge_phases(v, recording, rows, compared, size_N);
+  ask_cvode_in_space(v, surface, places, fine, rows, compared, options);
   return v;
 }
 

@@ -1,5 +1,4 @@
 #pragma once
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +10,10 @@ struct VerifyOptions {
   double motion_tolerance_m = 5e-6;  ///< of the decimated motion, > 0
   double spacing_s = 0.01;           ///< of the instants compared, >= the period
   double tolerance = 1e-9;           ///< of the reference run, see QuasiStaticOptions
-  double window_s = 10.0;            ///< from the start, of the second opinion; 0: none
-  double window_tolerance = 1e-9;    ///< of its integrator, relative
+  /// Of the second opinion, from the start; of a tool that moves in space from the first touch; 0:
+  /// none.
+  double window_s = 10.0;
+  double window_tolerance = 1e-9;  ///< of its integrator, relative
 };
 
 /// How far the forces commanded are from the reference over some stretch.
@@ -31,7 +32,7 @@ struct PhaseFidelity {
 /// A second opinion on the same motion.
 struct OtherOpinion {
   std::string name;
-  double end_s = 0.0;
+  double start_s = 0.0, end_s = 0.0;
   ForceFidelity commanded;  ///< against this opinion
   double apart_N = 0.0;     ///< between this opinion and the reference, at most
 };
@@ -77,9 +78,9 @@ struct Verification {
 ///
 /// A tool that moves in space is compared with the full network under the same ball
 /// (BallOnNetwork), in all three components, its motion taken as linear between the instants
-/// compared; the reference's error is estimated with every second of them. There is no second
-/// opinion then. Throws Error(bad_input) for an empty recording, Error(numerical) if the reference
-/// run fails.
+/// compared; the reference's error is estimated with every second of them. CVODE is asked there as
+/// well (ball_forces_by_cvode). Throws Error(bad_input) for an empty recording, Error(numerical) if
+/// the reference run fails.
 [[nodiscard]] Verification verify(const HilRecording& recording, const VerifyOptions& options = {});
 
 }  // namespace tpm

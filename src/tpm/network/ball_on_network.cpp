@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -41,6 +42,22 @@ Positions with_ball_at(const Positions& rest, const Eigen::Vector3d& ball_m) {
 
 }  // namespace
 
+std::optional<double> BallTool::depth_to_touch_m(const Positions& rest,
+                                                 const Eigen::Vector3d& aside_m,
+                                                 const Eigen::Vector3d& into) const {
+  constexpr double kFlank = 0.8;  // of the reach, aside
+  std::optional<double> depth_m;
+  for (const std::size_t sphere : touchable) {
+    const Eigen::Vector3d apart = rest.col(static_cast<Eigen::Index>(sphere)) - start_m - aside_m;
+    const double along_m = apart.dot(into);
+    const double across2 = (apart - along_m * into).squaredNorm();
+    if (across2 > kFlank * kFlank * reach_m() * reach_m()) continue;
+    const double met_m = along_m - std::sqrt(reach_m() * reach_m() - across2);
+    depth_m = std::min(met_m, depth_m.value_or(met_m));
+  }
+  return depth_m;
+}
+
 BallTool ball_on_surface(const Organ& organ, std::size_t aim, const Eigen::Vector3d& into,
                          double radius_m, double stiffness_N_per_m) {
   BallTool ball;
@@ -54,24 +71,28 @@ BallTool ball_on_surface(const Organ& organ, std::size_t aim, const Eigen::Vecto
   return ball;
 }
 
+NetworkUnderBall::NetworkUnderBall(const BondSystem& organ_bonds, const Positions& rest,
+                                   const Freedom& organ_freedom, const BallTool& ball)
+    : bonds(with_ball(organ_bonds, ball)),
+      freedom(with_ball_held(organ_freedom)),
+      position(with_ball_at(rest, ball.start_m)) {}
+
 BallOnNetwork::BallOnNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
                              const BallTool& ball, double tolerance_N)
-    : bonds_(with_ball(bonds, ball)),
-      freedom_(with_ball_held(freedom)),
-      equilibrium_(bonds_, freedom_),
-      tolerance_N_(tolerance_N),
-      position_(with_ball_at(rest, ball.start_m)) {
-  bonds_.elongations(position_, elongation_);
+    : network_(bonds, rest, freedom, ball),
+      equilibrium_(network_.bonds, network_.freedom),
+      tolerance_N_(tolerance_N) {
+  network_.bonds.elongations(network_.position, elongation_);
   remembered_ = Eigen::VectorXd::Zero(elongation_.size());
 }
 
 bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const BondMemory& memory) {
   constexpr int kMostParts = 64;
-  const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, position_.cols());
-  const Eigen::Vector3d from = position_.rightCols<1>();
+  const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, network_.position.cols());
+  const Eigen::Vector3d from = network_.position.rightCols<1>();
   // A place too far for one search is approached along a line, under the same memory.
   for (int parts = 1; parts <= kMostParts; parts *= 4) {
-    Positions next = position_;
+    Positions next = network_.position;
     bool found = true;
     for (int i = 1; i <= parts && found; ++i) {
       next.rightCols<1>() = from + static_cast<double>(i) / parts * (ball_m - from);
@@ -79,14 +100,14 @@ bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const BondMemory& mem
       found = search.converged && search.stable;
     }
     if (!found) continue;
-    position_ = std::move(next);
+    network_.position = std::move(next);
     return true;
   }
   return false;
 }
 
 Eigen::Vector3d BallOnNetwork::step(const Eigen::Vector3d& ball_m, double step_s) {
-  const RelaxationWeights w = relaxation_weights(step_s / bonds_.relaxation_time_s());
+  const RelaxationWeights w = relaxation_weights(step_s / network_.bonds.relaxation_time_s());
   BondMemory memory;
   memory.offset = w.r * remembered_ + w.w0 * elongation_;
   memory.following = w.w1;
@@ -96,24 +117,25 @@ Eigen::Vector3d BallOnNetwork::step(const Eigen::Vector3d& ball_m, double step_s
                             significant(1e3 * ball_m.x(), 5), significant(1e3 * ball_m.y(), 5),
                             significant(1e3 * ball_m.z(), 5)));
   }
-  bonds_.elongations(position_, elongation_);
+  network_.bonds.elongations(network_.position, elongation_);
   remembered_ = memory.offset + memory.following * elongation_;
   Eigen::Matrix3Xd force;
-  equilibrium_.forces(position_, memory, Eigen::Matrix3Xd::Zero(3, position_.cols()), force);
+  equilibrium_.forces(network_.position, memory,
+                      Eigen::Matrix3Xd::Zero(3, network_.position.cols()), force);
   return force.rightCols<1>();
 }
 
 int BallOnNetwork::touching() const {
-  const std::vector<char> closed = bonds_.closed_contacts(position_);
+  const std::vector<char> closed = network_.bonds.closed_contacts(network_.position);
   return static_cast<int>(std::count(closed.begin(), closed.end(), 1));
 }
 
 double BallOnNetwork::stored_J() const {
-  return bonds_.stored_energy_J(position_, remembered_);
+  return network_.bonds.stored_energy_J(network_.position, remembered_);
 }
 
 double BallOnNetwork::dissipation_W() const {
-  return bonds_.dissipation_W(position_, remembered_);
+  return network_.bonds.dissipation_W(network_.position, remembered_);
 }
 
 }  // namespace tpm

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "tpm/network/equilibrium.hpp"
@@ -16,6 +17,12 @@ struct BallTool {
 
   /// Distance of centres at which they touch.
   [[nodiscard]] double reach_m() const { return radius_m + sphere_radius_m; }
+  /// How far the ball, moved aside from its start, goes along a direction until it touches a sphere
+  /// that it may touch; none if it meets none but on a flank, where it would slide off.
+  /// @param into unit vector
+  [[nodiscard]] std::optional<double> depth_to_touch_m(const Positions& rest,
+                                                       const Eigen::Vector3d& aside_m,
+                                                       const Eigen::Vector3d& into) const;
 };
 
 /// How stiff the overlap of ball and sphere is where nothing else is asked for, N/m: so much more
@@ -28,6 +35,18 @@ inline constexpr double kUsualBallStiffness_N_per_m = 1e4;
 [[nodiscard]] BallTool ball_on_surface(const Organ& organ, std::size_t aim,
                                        const Eigen::Vector3d& into, double radius_m,
                                        double stiffness_N_per_m = kUsualBallStiffness_N_per_m);
+
+/// An organ with a ball: what its equilibria need.
+struct NetworkUnderBall {
+  /// @param organ_bonds, rest, organ_freedom of the organ, without tools
+  /// Throws Error(bad_input) for a ball without radius or stiffness.
+  NetworkUnderBall(const BondSystem& organ_bonds, const Positions& rest,
+                   const Freedom& organ_freedom, const BallTool& ball);
+
+  BondSystem bonds;    ///< with the contacts of the ball
+  Freedom freedom;     ///< the ball is held where it is put
+  Positions position;  ///< of all spheres at rest, then of the ball
+};
 
 /// The quasi-static network under a ball that moves in space: double precision, every step balanced
 /// by Newton's method with exact tangents, elongations linear in a step, under which what is
@@ -48,7 +67,7 @@ class BallOnNetwork {
   Eigen::Vector3d step(const Eigen::Vector3d& ball_m, double step_s);
 
   /// Of all spheres, then of the ball, m.
-  [[nodiscard]] const Positions& position() const { return position_; }
+  [[nodiscard]] const Positions& position() const { return network_.position; }
   [[nodiscard]] int touching() const;
   /// In springs and overlaps.
   [[nodiscard]] double stored_J() const;
@@ -57,11 +76,9 @@ class BallOnNetwork {
  private:
   [[nodiscard]] bool balance(const Eigen::Vector3d& ball_m, const BondMemory& memory);
 
-  BondSystem bonds_;
-  Freedom freedom_;
+  NetworkUnderBall network_;
   Equilibrium equilibrium_;
   double tolerance_N_;
-  Positions position_;
   Eigen::VectorXd elongation_, remembered_;
 };
 

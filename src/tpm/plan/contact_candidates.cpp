@@ -155,9 +155,13 @@ class ContactCandidate : public PlanModel {
   }
 
   [[nodiscard]] bool for_loop() const override { return true; }
-  [[nodiscard]] std::unique_ptr<ContactModel> contact(const PlanScout& scout,
-                                                      double period_s) const override {
-    return build(scout.scene(), period_s, !kPortable).model;
+  [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
+      const PlanScout& scout, std::span<const double> periods_s) const override {
+    std::vector<std::unique_ptr<ContactModel>> models;
+    for (const double period_s : periods_s) {
+      models.push_back(build(scout.scene(), period_s, !kPortable).model);
+    }
+    return models;
   }
 
  protected:
@@ -191,10 +195,28 @@ class CondensedCandidate final : public ContactCandidate {
   [[nodiscard]] std::string name() const override { return "condensed"; }
   [[nodiscard]] std::string formulation() const override { return "condensed"; }
   [[nodiscard]] std::string settings() const override { return "potential of a slow manifold"; }
+  [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
+      const PlanScout& scout, std::span<const double> periods_s) const override {
+    std::vector<std::unique_ptr<ContactModel>> models;
+    if (periods_s.empty()) return models;
+    const CondensedContact fitted = condensed(scout.scene(), periods_s.front());
+    for (const double period_s : periods_s) {
+      models.push_back(std::make_unique<CondensedContact>(fitted.with_period(period_s)));
+    }
+    return models;
+  }
 
  protected:
   [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s,
                                    bool /*portable*/) const override {
+    BuiltContact built;
+    built.model = std::make_unique<CondensedContact>(condensed(scene, period_s));
+    built.of_step.add(Operation::condensed_step, 1.0);
+    return built;
+  }
+
+ private:
+  [[nodiscard]] static CondensedContact condensed(const PlanScene& scene, double period_s) {
     constexpr double kAside = 0.25;  // of the depth, across
     const double depth = scene.protocol().peak();
     CondensedOptions options;
@@ -203,11 +225,8 @@ class CondensedCandidate final : public ContactCandidate {
     options.period_s = period_s;
     const DrivenNetwork& driven = scene.driven();
     const Probe& probe = scene.scene().probe();
-    BuiltContact built;
-    built.model = std::make_unique<CondensedContact>(build_condensed(
-        driven.bonds, driven.rest, freedom_around(scene), probe.sphere, probe.direction, options));
-    built.of_step.add(Operation::condensed_step, 1.0);
-    return built;
+    return build_condensed(driven.bonds, driven.rest, freedom_around(scene), probe.sphere,
+                           probe.direction, options);
   }
 };
 

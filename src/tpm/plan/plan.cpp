@@ -271,12 +271,14 @@ PlanTrajectory run_planned(const Plan& plan, const ExperimentScene& scene,
   return chosen.model->run(chosen.scout, plan.request.budget, times_s);
 }
 
-std::unique_ptr<ContactModel> planned_contact(const Plan& plan, const ExperimentScene& scene,
-                                              double period_s) {
+std::vector<std::unique_ptr<ContactModel>> planned_contacts(const Plan& plan,
+                                                            const ExperimentScene& scene,
+                                                            std::span<const double> periods_s) {
   const Chosen chosen(plan, scene);
-  std::unique_ptr<ContactModel> contact = chosen.model->contact(chosen.scout, period_s);
-  if (!contact) throw bad_input("plan", "chose nothing that a loop steps", "a plan for a loop");
-  return contact;
+  if (!chosen.model->for_loop()) {
+    throw bad_input("plan", "chose nothing that a loop steps", "a plan for a loop");
+  }
+  return chosen.model->contacts(chosen.scout, periods_s);
 }
 
 ExperimentScene contact_scene(const ExperimentScene& scene, const ContactRange& range) {

@@ -2,6 +2,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -116,11 +117,11 @@ struct ContactRange {
 [[nodiscard]] ExperimentScene contact_scene(const ExperimentScene& scene,
                                             const ContactRange& range);
 
-/// The planned model for a servo loop to step, at rest.
+/// The planned model for a servo loop to step, at rest, once for each period: what does not depend
+/// on the period is found once.
 /// @param plan made `for_loop`, with a choice, of the same scene
-/// @param period_s may be another than that of the plan's rate
-[[nodiscard]] std::unique_ptr<ContactModel> planned_contact(const Plan& plan,
-                                                            const ExperimentScene& scene,
-                                                            double period_s);
+/// @param periods_s may be others than that of the plan's rate
+[[nodiscard]] std::vector<std::unique_ptr<ContactModel>> planned_contacts(
+    const Plan& plan, const ExperimentScene& scene, std::span<const double> periods_s);
 
 }  // namespace tpm

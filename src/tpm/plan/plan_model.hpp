@@ -1,6 +1,7 @@
 #pragma once
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -54,12 +55,13 @@ class PlanModel {
                                                            const PlanBudget& budget) const = 0;
   /// Why a servo cannot step it, whatever it costs; none if it can.
   [[nodiscard]] virtual std::optional<std::string> why_no_servo() const { return std::nullopt; }
-  /// contact() has a model.
+  /// contacts() has models.
   [[nodiscard]] virtual bool for_loop() const { return false; }
-  /// What a servo loop steps, at rest; null unless for_loop(). Throws as claim() does.
-  [[nodiscard]] virtual std::unique_ptr<ContactModel> contact(const PlanScout& /*scout*/,
-                                                              double /*period_s*/) const {
-    return nullptr;
+  /// What a servo loop steps, at rest, one for each period; none unless for_loop(). Throws as
+  /// claim() does.
+  [[nodiscard]] virtual std::vector<std::unique_ptr<ContactModel>> contacts(
+      const PlanScout& /*scout*/, std::span<const double> /*periods_s*/) const {
+    return {};
   }
   /// Throws Error(numerical) where the model fails.
   [[nodiscard]] virtual ModelClaim claim(const PlanScout& scout,

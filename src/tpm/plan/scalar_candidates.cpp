@@ -27,15 +27,18 @@ class ScalarCandidate : public PlanModel {
                                    const std::vector<double>& times_s) const override;
 
   [[nodiscard]] bool for_loop() const override { return true; }
-  [[nodiscard]] std::unique_ptr<ContactModel> contact(const PlanScout& scout,
-                                                      double period_s) const override {
+  [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
+      const PlanScout& scout, std::span<const double> periods_s) const override {
     constexpr double kRange = 1.05;  // as of other contact models
     const ContactSpectrum& spectrum = scout.spectrum();
-    return std::make_unique<ScalarContact>(
-        model(scout), scout.scene().scene().probe().direction,
-        ScalarContact::Range{spectrum.at_once(), spectrum.relaxed(),
-                             kRange * scout.scene().protocol().peak()},
-        period_s);
+    const ScalarContact::Range range{spectrum.at_once(), spectrum.relaxed(),
+                                     kRange * scout.scene().protocol().peak()};
+    std::vector<std::unique_ptr<ContactModel>> models;
+    for (const double period_s : periods_s) {
+      models.push_back(std::make_unique<ScalarContact>(
+          model(scout), scout.scene().scene().probe().direction, range, period_s));
+    }
+    return models;
   }
 
  protected:

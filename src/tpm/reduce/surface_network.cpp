@@ -12,6 +12,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/core/wide_vectors.hpp"
 #include "tpm/reduce/flush_denormals.hpp"
+#include "tpm/solve/relaxation_filter.hpp"
 
 namespace tpm {
 namespace {
@@ -97,6 +98,14 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   }
   add_skin();
   find_stiffness(bonds, freedom);
+  // An elongation that bends by b between periods lies b v (1 - v)/2 off the line, v from the end;
+  // what it leaves in the memory is the integral of that over exp(-z v) z dv.
+  const double z = options.period_s / bonds.relaxation_time_s();
+  const RelaxationWeights w = relaxation_weights(z);
+  const double lasting = at_once_.norm() > 0.0 ? relaxed_.norm() / at_once_.norm() : 1.0;
+  // Not all of a bond relaxes: all of its force is taken.
+  bend_ = (w.w1 - w.w0) / (2.0 * z);
+  bend_kept_ = std::exp(-lasting * z);
 }
 
 void SurfaceNetwork::add_skin() {
@@ -109,7 +118,10 @@ void SurfaceNetwork::add_skin() {
     const std::size_t column = stiffness_.column(sphere);
     const bool moves = stiffness_.moves(sphere);
     const Eigen::Vector3d rest_m = rest_.col(static_cast<Eigen::Index>(sphere)) - ball_.start_m;
-    skin_.push_back({column, rest_m, moves ? field : nullptr, Eigen::Vector3d::Zero()});
+    skin_.push_back({.column = column,
+                     .rest_m = rest_m,
+                     .fields = moves ? field : nullptr,
+                     .pushed_N = Eigen::Vector3d::Zero()});
     for (std::size_t axis = 0; moves && axis < 3; ++axis, field += stride_) {
       field[4 * column + axis] = 1.0F;
       stiffness_.solve(field);
@@ -153,9 +165,14 @@ void SurfaceNetwork::reset() noexcept {
   bonds_.forget();
   std::fill(displacement_.begin(), displacement_.end(), 0.0F);
   std::fill(force_.begin(), force_.end(), 0.0F);
-  for (Skin& skin : skin_) skin.pushed_N.setZero();
+  for (Skin& skin : skin_) {
+    skin.pushed_N.setZero();
+    skin.before_N.setZero();
+    skin.change_N.setZero();
+    skin.bent_N.setZero();
+  }
   ball_at_.setZero();
-  largest_N_ = held_error_N_ = 0.0;
+  largest_N_ = held_error_N_ = linear_error_N_ = 0.0;
 }
 
 Eigen::Vector3d SurfaceNetwork::displacement_of(std::size_t column) const noexcept {
@@ -354,6 +371,19 @@ void SurfaceNetwork::answer() noexcept {
                     answer_.error_N <= kTrustedError * scale_N();
 }
 
+void SurfaceNetwork::add_linear_error() noexcept {
+  linear_error_N_ = 0.0;
+  for (Skin& skin : skin_) {
+    const Eigen::Vector3d change_N = skin.pushed_N - skin.before_N;
+    skin.bent_N = bend_kept_ * skin.bent_N + bend_ * (change_N - skin.change_N);
+    skin.before_N = skin.pushed_N;
+    skin.change_N = change_N;
+    linear_error_N_ += skin.bent_N.norm();
+  }
+  answer_.error_N += linear_error_N_;
+  if (!(answer_.error_N <= kTrustedError * scale_N())) answer_.trusted = false;
+}
+
 double SurfaceNetwork::scale_N() const noexcept {
   return std::max(largest_N_, kScaleAtDepth_m * relaxed_.norm());
 }
@@ -384,6 +414,7 @@ ContactAnswer SurfaceNetwork::step(const Eigen::Vector3d& displacement_m) noexce
     answer();
   }
   held_error_N_ = answer_.error_N;
+  add_linear_error();
   if (has_fallen_in()) answer_.trusted = false;
   bonds_.accept();
   return answer_;

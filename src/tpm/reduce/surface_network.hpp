@@ -26,6 +26,10 @@ struct SurfaceNetworkOptions {
 /// forces of the ball are part of that solution: they are balanced by Newton's method against the
 /// compliance of the touched spheres alone, kept from beforehand. The force answered is corrected
 /// for what is left unbalanced afterwards, weighed with the fields of the touched spheres.
+///
+/// Its error estimate is by how much it had to be corrected, and what it costs to take elongations
+/// as linear within a period: they curve about as the forces on the touched spheres do from period
+/// to period, and what that leaves in the bonds' memory fades as the contact relaxes.
 class SurfaceNetwork final : public ContactModel {
  public:
   /// The most spheres touched, or nearly so, at a time.
@@ -53,6 +57,8 @@ class SurfaceNetwork final : public ContactModel {
   /// Of the last step.
   [[nodiscard]] int touching() const noexcept;
   [[nodiscard]] int balances() const noexcept { return balances_; }
+  /// The part of the last error estimate that is of elongations taken as linear.
+  [[nodiscard]] double linear_error_N() const noexcept { return linear_error_N_; }
 
  private:
   /// A sphere that the ball may touch.
@@ -61,6 +67,10 @@ class SurfaceNetwork final : public ContactModel {
     Eigen::Vector3d rest_m;    ///< its centre at rest, from the ball's start
     const float* fields;       ///< its displacements per force on it, x, y and z; null: it is held
     Eigen::Vector3d pushed_N;  ///< with what the ball pushes it
+    /// At the end of the last period, and its change in that.
+    Eigen::Vector3d before_N = Eigen::Vector3d::Zero(), change_N = Eigen::Vector3d::Zero();
+    /// What taking elongations as linear has cost so far.
+    Eigen::Vector3d bent_N = Eigen::Vector3d::Zero();
   };
   /// A sphere in reach of the ball while forces are balanced.
   struct Near {
@@ -84,6 +94,8 @@ class SurfaceNetwork final : public ContactModel {
   /// The displacement that forces in `change_` give a sphere with these fields.
   [[nodiscard]] Eigen::Vector3d weighed(const float* fields) const noexcept;
   void answer() noexcept;
+  /// Adds to the answer what a period with linear elongations has cost.
+  void add_linear_error() noexcept;
   [[nodiscard]] double scale_N() const noexcept;
   [[nodiscard]] bool has_fallen_in() const noexcept;
   [[nodiscard]] Eigen::Vector3d total_N() const noexcept;
@@ -107,7 +119,8 @@ class SurfaceNetwork final : public ContactModel {
   Eigen::Vector3d ball_at_ = Eigen::Vector3d::Zero();  ///< from its start
   Eigen::Vector3d moved_with_N_ = Eigen::Vector3d::Zero();
   ContactAnswer answer_;
-  double largest_N_ = 0.0, held_error_N_ = 0.0;
+  double bend_ = 0.0, bend_kept_ = 0.0;  ///< of a change of the change of a force; a period later
+  double largest_N_ = 0.0, held_error_N_ = 0.0, linear_error_N_ = 0.0;
   int balances_ = 0;
 };
 

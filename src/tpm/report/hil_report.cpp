@@ -141,9 +141,10 @@ void add_fidelity(Document& d, const Verification& v) {
       percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)));
   std::vector<Cell> others;
   for (const OtherOpinion& o : v.others) {
-    others.push_back({fmt::format(
-        "{}, first {} s: {} mN rms, {} mN at most; {} mN from the reference at most", o.name,
-        significant(o.end_s, 4), mN(o.commanded.rms_N), mN(o.commanded.max_N), mN(o.apart_N))});
+    others.push_back(
+        {fmt::format("{}, {} to {} s: {} mN rms, {} mN at most; {} mN from the reference at most",
+                     o.name, significant(o.start_s, 4), significant(o.end_s, 4),
+                     mN(o.commanded.rms_N), mN(o.commanded.max_N), mN(o.apart_N))});
   }
   if (!others.empty()) d.bullets(std::move(others));
   d.picture({"session", "The session", ""});

@@ -158,6 +158,7 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
   for (const OtherOpinion& o : v.others) {
     Json json = fidelity_json(o.commanded);
     json["name"] = o.name;
+    json["start_s"] = rounded(o.start_s, kHilDigits);
     json["end_s"] = rounded(o.end_s, kHilDigits);
     json["apart_from_reference_N"] = rounded(o.apart_N, kHilDigits);
     others.push_back(std::move(json));
@@ -221,8 +222,9 @@ std::string verification_text(const HilRecording& recording, const Verification&
                       significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
                       share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
   for (const OtherOpinion& o : v.others) {
-    text += fmt::format("beside: {}, first {} s: rms {} mN, max {} mN; {} mN from the reference\n",
-                        o.name, significant(o.end_s, 4), significant(1e3 * o.commanded.rms_N, 3),
+    text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
+                        o.name, significant(o.start_s, 4), significant(o.end_s, 4),
+                        significant(1e3 * o.commanded.rms_N, 3),
                         significant(1e3 * o.commanded.max_N, 3), significant(1e3 * o.apart_N, 3));
   }
   for (const BesideExperiment& e : v.experiment) {
