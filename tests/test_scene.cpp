@@ -102,6 +102,34 @@ TEST_CASE("three layers, more spheres, and a solid filling stand too", "[heavy]"
   }
 }
 
+TEST_CASE("a mesh's spheres listed in its place are the same tissue without the file") {
+  const TempFolder folder;
+  std::string cube = "o cube\n";
+  for (int i = 0; i < 8; ++i) cube += fmt::format("v {} {} {}\n", i & 1, (i >> 1) & 1, i >> 2);
+  for (const char* face : {"1 3 4", "1 4 2", "5 6 8", "5 8 7", "1 2 6", "1 6 5", "3 7 8", "3 8 4",
+                           "1 5 7", "1 7 3", "2 4 8", "2 8 6"}) {
+    cube += fmt::format("f {}\n", face);
+  }
+  write_file(folder / "cube.obj", cube);
+  const Json scene = parse_json(R"({"description": "A cube.", "organ": {"kind": "mesh",
+    "mesh": "cube.obj", "unit": "dm", "count": 60, "layers": 2},
+    "anchors": [{"kind": "inner_layer"}]})",
+                                "scene");
+  const Tissue filled = parse_tissue(scene, "scene", folder.path());
+  const Json alone = with_mesh_listed(scene, "scene", folder.path());
+  std::filesystem::remove(folder / "cube.obj");
+  const Tissue listed = parse_tissue(alone, "scene", {});
+  const Organ &a = filled.network.organ, &b = listed.network.organ;
+  CHECK(a.position == b.position);
+  CHECK((a.normal - b.normal).cwiseAbs().maxCoeff() < 1e-15);
+  CHECK((a.layer == b.layer && a.contact == b.contact && filled.anchors == listed.anchors));
+  CHECK_THAT(b.radius, WithinRel(a.radius, 1e-15));
+  CHECK((filled.bonds().rest_length_m() == listed.bonds().rest_length_m()));
+  CHECK_THAT(alone.at("description").get<std::string>(),
+             StartsWith("A cube. Its spheres fill the mesh cube.obj, SHA-256 "));
+  CHECK(with_mesh_listed(alone, "scene", {}) == alone);
+}
+
 TEST_CASE("a load must be able to move its sphere") {
   const Tissue tissue = tissue_of(R"({"organ": {"kind": "star"}})");
   CHECK_NOTHROW(require_loadable(tissue, 1, Vector3d::UnitZ(), "contacts/0"));

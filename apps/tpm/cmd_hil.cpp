@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -22,6 +23,7 @@ struct RunChoice {
   DeviceOptions device;
   std::string time;
   std::string output = "session.tpmrec";
+  bool force = false;
   PageOptions page;
 };
 
@@ -90,6 +92,10 @@ int exit_code_of(const ServoOutcome& outcome) {
 }
 
 int run_hil(const RunChoice& choice, const Session& session) {
+  if (!choice.force && std::filesystem::is_regular_file(choice.output)) {
+    throw Error(ExitCode::usage, "-o " + choice.output, "the file exists",
+                "another --output, or --force");
+  }
   const HilSession hil = read_session(choice.session);
   const DeviceChoice device = chosen_device(choice.device);
   SessionRunOptions options;
@@ -181,6 +187,7 @@ void add_hil_command(CLI::App& app, Session& session) {
                   "default: real with omega7, else virtual")
       ->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
+  run->add_flag("--force", choice->force, "Replace a recording that exists");
   run->add_option("--page", choice->page.port,
                   "Show the session in a browser on this machine: port, 0 for one that is free");
   run->add_option("--page-wait", choice->page.wait,

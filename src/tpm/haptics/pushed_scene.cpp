@@ -32,8 +32,7 @@ TissueShape shape_of(const Network& network, std::size_t contact, const Eigen::V
 }
 
 PushedScene::PushedScene(const HilSession& session)
-    : tissue(parse_tissue(session.scene, kScenePlace, session.folder)),
-      deepest_m(deepest_of(session)) {
+    : tissue(parse_tissue(session.scene, kScenePlace, {})), deepest_m(deepest_of(session)) {
   require_standing(tissue, kScenePlace);
   probe = parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{kScenePlace})
               .front()

@@ -29,7 +29,7 @@ Eigen::Vector3d push_of(const Json& session, const DocumentPlace& place) {
   if (!session.contains("push")) return -Eigen::Vector3d::UnitZ();
   const Json& list = session.at("push");
   const Eigen::Vector3d push(list[0].get<double>(), list[1].get<double>(), list[2].get<double>());
-  if (push.allFinite() && push.norm() > 0.0) return push.normalized();
+  if (push.allFinite() && !push.isZero(0.0)) return push.stableNormalized();
   throw bad_input(place.key("push").where, "has no direction", "three numbers that are not all 0");
 }
 
@@ -185,14 +185,12 @@ HilSession parse_session(const Json& json, std::string_view where,
   session.tolerance = parse_tolerance(json.at("model"), session.model, place.key("model"));
   parse_tool(session, json.at("model"), place.key("model"));
   session.text = to_text(json);
-  session.folder = folder;
   const Json& scene = json.at("model").at("scene");
   if (scene.is_string()) {
     const std::filesystem::path file = folder / scene.get<std::string>();
-    session.scene = read_json(file);
-    session.folder = file.parent_path();
+    session.scene = with_mesh_listed(read_json(file), file.string(), file.parent_path());
   } else {
-    session.scene = scene;
+    session.scene = with_mesh_listed(scene, place.key("model").key("scene").where, folder);
   }
   constexpr double kSlowest_Hz = 500.0, kUsual_Hz = 1000.0, kFastest_Hz = 4000.0;
   session.servo.period_s = 1.0 / in_range(json, "rate", Dimension::frequency, kUsual_Hz,
@@ -207,7 +205,11 @@ HilSession parse_session(const Json& json, std::string_view where,
     session.slide = slide_of(json.at("slides"), session.servo.push, slides);
   }
   if (json.contains("surface")) {
+    constexpr double kReach_m = 1.0;  // no device of this kind reaches further
     session.servo.surface_m = parse_point(json.at("surface"), place.key("surface"));
+    if (!(session.servo.surface_m.cwiseAbs().maxCoeff() <= kReach_m)) {
+      throw bad_input(place.key("surface").where, "out of a device's reach", "-1 to 1 m");
+    }
   }
   parse_limits(session, json.value("limits", Json::object()), place.key("limits"));
   session.phases = parse_phases(json, place);

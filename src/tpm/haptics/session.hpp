@@ -54,8 +54,7 @@ struct HilSession {
   double contact_stiffness_N_per_m = 1e4;            ///< the same, of ball and sphere
   Eigen::Vector3d slide = Eigen::Vector3d::UnitX();  ///< unit vector, square to the push, device
   std::string tolerance = "1%";  ///< of a planned model, as set_tolerance() takes it
-  Json scene;                    ///< of the tissue, a mesh's path made absolute is not asked for
-  std::filesystem::path folder;  ///< that paths in the scene are relative to
+  Json scene;                    ///< of the tissue; needs no file
   std::vector<SessionPhase> phases;
   ServoSettings servo;
   DevicePreparation preparation;
@@ -68,6 +67,7 @@ struct HilSession {
 };
 
 /// Reads a session (schemas/hil.schema.json). Throws Error(bad_input) with the key.
+/// @param folder that paths in the session are relative to
 [[nodiscard]] HilSession parse_session(const Json& json, std::string_view where,
                                        const std::filesystem::path& folder);
 /// The same of a file, slides following the surface (follow_surface).

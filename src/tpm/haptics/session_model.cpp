@@ -14,7 +14,7 @@ namespace tpm {
 namespace {
 
 LoopModel element_model(const HilSession& session) {
-  const Tissue tissue = parse_tissue(session.scene, kScenePlace, session.folder);
+  const Tissue tissue = parse_tissue(session.scene, kScenePlace, {});
   if (session.scene.at("organ").value("kind", "") != "star") {
     throw bad_input(kScenePlace, "is no star", "an organ of the kind star for the model 'element'");
   }

@@ -1,5 +1,7 @@
 #include "tpm/haptics/verify.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -227,9 +229,19 @@ Verification begun(const HilRecording& recording, const std::vector<const ServoR
     v.time_s.push_back(recording.time_s(*rows[i]));
     v.depth_m.push_back(rows[i]->tool_depth_m);
     v.commanded_N.push_back(recording.commanded_N(*rows[i]));
-    v.model_error_N = std::max(v.model_error_N, rows[i]->model_error_N);
+  }
+  for (const ServoRecord* row : rows) {
+    v.model_error_N = std::max(v.model_error_N, row->model_error_N);
   }
   return v;
+}
+
+/// In the coordinates of the scene.
+BallPlace place_of_ball(const SurfaceScene& surface, const HilRecording& recording,
+                        const ServoRecord& row) {
+  const Eigen::Map<const Eigen::Vector3d> at_m(row.position_m);
+  return {recording.time_s(row),
+          surface.ball.start_m + surface.to_model * (at_m - recording.session.servo.surface_m)};
 }
 
 /// Where the ball was at the instants compared, in the coordinates of the scene, after where it was
@@ -237,15 +249,31 @@ Verification begun(const HilRecording& recording, const std::vector<const ServoR
 std::vector<BallPlace> places_of_ball(const SurfaceScene& surface, const HilRecording& recording,
                                       const std::vector<const ServoRecord*>& rows,
                                       const std::vector<std::size_t>& compared) {
-  const ServoSettings& servo = recording.session.servo;
   std::vector<BallPlace> places{
-      {recording.time_s(*rows[compared.front()]) - servo.period_s, surface.ball.start_m}};
+      {recording.time_s(*rows[compared.front()]) - recording.session.servo.period_s,
+       surface.ball.start_m}};
   for (const std::size_t i : compared) {
-    const Eigen::Map<const Eigen::Vector3d> at_m(rows[i]->position_m);
-    places.push_back({recording.time_s(*rows[i]),
-                      surface.ball.start_m + surface.to_model * (at_m - servo.surface_m)});
+    places.push_back(place_of_ball(surface, recording, *rows[i]));
   }
   return places;
+}
+
+/// How far the ball was from the lines between these places, at most.
+double off_the_lines_m(const SurfaceScene& surface, const HilRecording& recording,
+                       const std::vector<const ServoRecord*>& rows,
+                       const std::vector<BallPlace>& places) {
+  double largest_m = 0.0;
+  std::size_t next = 1;
+  for (const ServoRecord* row : rows) {
+    const double time_s = recording.time_s(*row);
+    while (next < places.size() && places[next].time_s < time_s) ++next;
+    if (next == places.size()) break;
+    const BallPlace &a = places[next - 1], &b = places[next];
+    const double share = (time_s - a.time_s) / (b.time_s - a.time_s);
+    const Eigen::Vector3d at_m = place_of_ball(surface, recording, *row).at_m;
+    largest_m = std::max(largest_m, (at_m - a.at_m - share * (b.at_m - a.at_m)).norm());
+  }
+  return largest_m;
 }
 
 /// Forces of the full network on a ball at the places after the first; only every `stride`-th of
@@ -304,6 +332,11 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
   const std::vector<const ServoRecord*> rows = moved_rows(recording);
   const std::vector<std::size_t> compared =
       compared_rows(recording, rows.size(), options.spacing_s);
+  constexpr std::size_t kFewest = 4;  // the reference's error is told from every second of them
+  if (compared.size() < kFewest) {
+    throw bad_input(recording.name, fmt::format("{} instants to compare", compared.size()),
+                    "a --spacing that leaves four or more");
+  }
   const SurfaceScene surface(recording.session);
   Verification v = begun(recording, rows, compared);
   v.reference = "full nonlinear quasi-static network of " +
@@ -311,6 +344,7 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
                 " spheres under the ball, Newton's method with exact tangents in every step";
   v.knots = compared.size();
   const std::vector<BallPlace> places = places_of_ball(surface, recording, rows, compared);
+  v.motion_tolerance_m = off_the_lines_m(surface, recording, rows, places);
   const std::vector<Eigen::Vector3d> fine = forces_on_ball(surface, places, 1);
   const std::vector<Eigen::Vector3d> coarse = forces_on_ball(surface, places, 2);
   std::vector<double> size_N;

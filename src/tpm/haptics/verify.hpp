@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -7,7 +8,7 @@
 namespace tpm {
 
 struct VerifyOptions {
-  double motion_tolerance_m = 5e-6;  ///< of the decimated motion, > 0
+  double motion_tolerance_m = 5e-6;  ///< of the decimated motion, > 0; not of a ball in space
   double spacing_s = 0.01;           ///< of the instants compared, >= the period
   double tolerance = 1e-9;           ///< of the reference run, see QuasiStaticOptions
   /// Of the second opinion, from the start; of a tool that moves in space from the first touch; 0:
@@ -52,11 +53,14 @@ struct Verification {
   std::vector<PhaseFidelity> phases;
   std::vector<OtherOpinion> others;
   std::vector<BesideExperiment> experiment;
-  std::size_t knots = 0;  ///< of the decimated motion
+  std::size_t knots = 0;  ///< of the motion that the reference was moved through
+  /// How far what was recorded lies from the lines between the knots, at most.
   double motion_tolerance_m = 0.0;
-  double motion_error_N = 0.0;     ///< what that tolerance can cost: times the stiffness at once
+  /// What that can cost: times the stiffness at once. None where every instant compared is a knot:
+  /// what lies between is then part of the reference's error.
+  std::optional<double> motion_error_N;
   double reference_error_N = 0.0;  ///< as the reference run estimates
-  double model_error_N = 0.0;      ///< largest estimate of the model itself
+  double model_error_N = 0.0;      ///< largest estimate of the model itself, in any period
   /// At the instants compared; forces against the push.
   std::vector<double> time_s, reference_N, commanded_N, depth_m;
   /// Commanded less reference; of a tool that moves in space the length of the difference, all
@@ -79,8 +83,8 @@ struct Verification {
 /// A tool that moves in space is compared with the full network under the same ball
 /// (BallOnNetwork), in all three components, its motion taken as linear between the instants
 /// compared; the reference's error is estimated with every second of them. CVODE is asked there as
-/// well (ball_forces_by_cvode). Throws Error(bad_input) for an empty recording, Error(numerical) if
-/// the reference run fails.
+/// well (ball_forces_by_cvode). Throws Error(bad_input) for an empty recording, or fewer than four
+/// instants to compare in space, Error(numerical) if the reference run fails.
 [[nodiscard]] Verification verify(const HilRecording& recording, const VerifyOptions& options = {});
 
 }  // namespace tpm

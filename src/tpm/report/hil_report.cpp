@@ -133,10 +133,10 @@ void add_plan(Document& d, const Json& plan) {
 void add_fidelity(Document& d, const Verification& v) {
   d.heading(2, "Fidelity");
   d.paragraph(fmt::format(
-      "Reference: {}, under the motion of the surface as recorded ({} knots within {} um, which "
-      "can cost {} mN; its own error estimate is {} mN). Over {} instants the commanded force is "
+      "Reference: {}, under the motion of the surface as recorded ({} knots within {} um, "
+      "{}; its own error estimate is {} mN). Over {} instants the commanded force is "
       "off by {} mN rms and {} mN at most, {} of the session's peak of {} N.",
-      v.reference, v.knots, significant(1e6 * v.motion_tolerance_m, 3), mN(v.motion_error_N),
+      v.reference, v.knots, significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1e3, "mN"),
       mN(v.reference_error_N), v.all.instants, mN(v.all.rms_N), mN(v.all.max_N),
       percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)));
   std::vector<Cell> others;

@@ -18,6 +18,9 @@ namespace tpm {
 [[nodiscard]] std::string run_text(const HilSession& session, const SessionRun& run);
 
 [[nodiscard]] Json verification_json(const HilRecording& recording, const Verification& v);
+/// What the difference between motion recorded and motion compared can cost, in words.
+[[nodiscard]] std::string motion_cost(const Verification& v, double per_newton,
+                                      std::string_view unit);
 [[nodiscard]] std::string verification_text(const HilRecording& recording, const Verification& v);
 
 /// What a recording says about energy and limits, from its rows.

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <map>
+#include <string_view>
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/hil_report.hpp"
@@ -170,32 +171,37 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
                           {"measured_N", e.measured_N},
                           {"commanded_N", rounded(e.commanded_N, kHilDigits)}});
   }
-  return {{"simulated_device", recording.simulated()},
-          {"recording", recording.name},
-          {"device", recording.header.at("device")},
-          {"model", recording.header.at("model")},
-          {"reference", v.reference},
-          {"whole", v.whole},
-          {"end_s", rounded(v.end_s, kHilDigits)},
-          {"knots", v.knots},
-          {"motion_tolerance_m", v.motion_tolerance_m},
-          {"motion_error_N", rounded(v.motion_error_N, kHilDigits)},
-          {"reference_error_N", rounded(v.reference_error_N, kHilDigits)},
-          {"model_error_N", rounded(v.model_error_N, kHilDigits)},
-          {"all", fidelity_json(v.all)},
-          {"phases", phases},
-          {"others", others},
-          {"experiment", experiment}};
+  return {
+      {"simulated_device", recording.simulated()},
+      {"recording", recording.name},
+      {"device", recording.header.at("device")},
+      {"model", recording.header.at("model")},
+      {"reference", v.reference},
+      {"whole", v.whole},
+      {"end_s", rounded(v.end_s, kHilDigits)},
+      {"knots", v.knots},
+      {"motion_tolerance_m", v.motion_tolerance_m},
+      {"motion_error_N", v.motion_error_N ? Json(rounded(*v.motion_error_N, kHilDigits)) : Json()},
+      {"reference_error_N", rounded(v.reference_error_N, kHilDigits)},
+      {"model_error_N", rounded(v.model_error_N, kHilDigits)},
+      {"all", fidelity_json(v.all)},
+      {"phases", phases},
+      {"others", others},
+      {"experiment", experiment}};
+}
+
+std::string motion_cost(const Verification& v, double per_newton, std::string_view unit) {
+  if (!v.motion_error_N) return "the instants compared among them";
+  return fmt::format("which can cost {} {}", significant(per_newton * *v.motion_error_N, 3), unit);
 }
 
 std::string verification_text(const HilRecording& recording, const Verification& v) {
   std::string text = fmt::format(
-      "{}\n{}\nverified {} s{} against: {}\nmotion through {} knots within {} um, which can cost "
-      "{} "
-      "N; the reference's own error estimate {} N\n",
+      "{}\n{}\nverified {} s{} against: {}\nmotion through {} knots within {} um, {}; the "
+      "reference's own error estimate {} N\n",
       recording.session.title, device_line(recording), significant(v.end_s, 6),
       v.whole ? "" : " (the recording is cut off there)", v.reference, v.knots,
-      significant(1e6 * v.motion_tolerance_m, 3), significant(v.motion_error_N, 3),
+      significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1.0, "N"),
       significant(v.reference_error_N, 3));
   text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", "phase", "count", "rms mN", "max mN",
                       "max/peak");

@@ -6,9 +6,11 @@
 #include <array>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
 #include "tpm/network/local_support.hpp"
 #include "tpm/network/rigidity.hpp"
 #include "tpm/scene/blocks.hpp"
+#include "tpm/store/file.hpp"
 
 namespace tpm {
 namespace {
@@ -92,6 +94,31 @@ Tissue parse_tissue(const Json& scene, std::string_view where,
     if (scene.contains(key)) tissue.unused_blocks.emplace_back(key);
   }
   return tissue;
+}
+
+Json with_mesh_listed(Json scene, std::string_view where, const std::filesystem::path& folder) {
+  check_schema(scene, "scene", where);
+  if (scene.at("organ").at("kind") != "mesh") return scene;
+  const Organ organ = parse_tissue(scene, where, folder).network.organ;
+  Json spheres = Json::array();
+  for (std::size_t i = 0; i < organ.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    const Eigen::Vector3d at = organ.position.col(column), normal = organ.normal.col(column);
+    spheres.push_back({{"at", {at.x(), at.y(), at.z()}},
+                       {"layer", organ.layer[i] + 1},
+                       {"normal", {normal.x(), normal.y(), normal.z()}}});
+  }
+  const auto mesh = scene.at("organ").at("mesh").get<std::string>();
+  const std::string said = scene.value("description", "");
+  scene["description"] =
+      fmt::format("{}{}Its spheres fill the mesh {}, SHA-256 {}.", said, said.empty() ? "" : " ",
+                  mesh, sha256_hex(read_file(folder / mesh)));
+  scene["organ"] = {{"kind", "listed"},
+                    {"unit", "m"},
+                    {"spacing", shortest(organ.spacing) + " m"},
+                    {"spheres", std::move(spheres)}};
+  if (organ.contact) scene["organ"]["contact"] = *organ.contact + 1;
+  return scene;
 }
 
 Tissue read_tissue(const std::filesystem::path& scene) {

@@ -42,6 +42,12 @@ struct Tissue {
 [[nodiscard]] Tissue parse_tissue(const Json& scene, std::string_view where,
                                   const std::filesystem::path& folder);
 
+/// The scene with the spheres that fill a mesh listed in the mesh's place, its name and SHA-256 in
+/// the description: it needs no file beside it any more. Other scenes are returned as they are.
+/// Throws as parse_tissue does.
+[[nodiscard]] Json with_mesh_listed(Json scene, std::string_view where,
+                                    const std::filesystem::path& folder);
+
 /// read_json and parse_tissue.
 [[nodiscard]] Tissue read_tissue(const std::filesystem::path& scene);
 
