@@ -127,7 +127,7 @@ std::pair<double, double> depths_while_sliding(const HilSession& session) {
   return depths;
 }
 
-TEST_CASE("A slide follows the surface of the organ") {
+TEST_CASE("A slide follows the surface of the organ", "[heavy]") {
   HilSession session = parsed(slide_session());
   const auto [straight_least, straight_most] = depths_while_sliding(session);
   follow_surface(session);

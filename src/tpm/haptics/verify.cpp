@@ -309,7 +309,8 @@ void ask_cvode_in_space(Verification& v, const SurfaceScene& surface,
   std::size_t past = touched + 2;
   while (past < places.size() && places[past].time_s <= end_s) ++past;
   const std::span<const BallPlace> window(places.data() + touched, past - touched);
-  // Its error control sees every corner of the motion: finer than this it takes minutes.
+  // Its error control meets a corner of the motion at each instant compared; this tells forces to
+  // some micronewtons already.
   constexpr double kFinest = 1e-8;
   const std::vector<Eigen::Vector3d> answer = ball_forces_by_cvode(
       surface.scene.tissue.bonds(), surface.scene.rest(), surface.scene.tissue.freedom(),
