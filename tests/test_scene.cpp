@@ -112,7 +112,7 @@ TEST_CASE("a mesh's spheres listed in its place are the same tissue without the 
   }
   write_file(folder / "cube.obj", cube);
   const Json scene = parse_json(R"({"description": "A cube.", "organ": {"kind": "mesh",
-    "mesh": "cube.obj", "unit": "dm", "count": 60, "layers": 2},
+    "mesh": "cube.obj", "unit": "cm", "count": 60, "layers": 2},
     "anchors": [{"kind": "inner_layer"}]})",
                                 "scene");
   const Tissue filled = parse_tissue(scene, "scene", folder.path());
