@@ -209,16 +209,18 @@ TEST_CASE("any number of workers, any interruptions: the same bytes") {
   const std::string expected = result_of(sweep, folder / "a.h5", controls);
   controls.workers = 3;
   CHECK(result_of(sweep, folder / "b.h5", controls) == expected);
-  // Stopped after each block once, then to the end.
+  // Stopped in each block once after its first cells, then to the end: what is not whole is lost.
   const std::string file = folder / "c.h5";
   SweepControls stopping;
   stopping.workers = 1;
   for (std::uint64_t b = 1; b < sweep.blocks(); ++b) {
-    int asked = 0;
-    stopping.interrupted = [&] { return ++asked > 1; };
+    std::uint64_t asked = 0;
+    stopping.interrupted = [&] { return ++asked > sweep.block_cells + b % 3; };
     BlockLog log(log_path(file), sweep, {});
     const SweepRun run = run_sweep(sweep, log, stopping);
     CHECK(run.interrupted);
+    CHECK(asked == sweep.block_cells + b % 3 + 1);
+    CHECK(run.cells == sweep.block_cells);
     CHECK(run.resumed_blocks == b - 1);
   }
   CHECK(result_of(sweep, file) == expected);

@@ -5,6 +5,8 @@
 
 #include "temp_folder.hpp"
 #include "tpm/plan/shared_plan.hpp"
+#include "tpm/scene/experiment_blocks.hpp"
+#include "tpm/simulate/static_path.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/sweep/run_sweep.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
@@ -31,6 +33,39 @@ std::string shared_block(const std::string& tolerance, const std::string& own) {
 
 Sweep parsed_block(const std::string& tolerance, const std::string& own = "1e-6") {
   return parse_sweep(parse_json(shared_block(tolerance, own), "sweep"), "sweep", ".");
+}
+
+/// A liver of 80 spheres whose dashpots let bonds creep for long: E2 is much larger than E1.
+Json creeping_liver(const char* E1, const char* Eprime, const char* eta1, const char* hold) {
+  return {
+      {"organ",
+       {{"kind", "liver"}, {"count", 80}, {"layers", 2}, {"spacing", "20 mm"}, {"seed", 1}}},
+      {"material",
+       {{"E1", E1},
+        {"E2", "60 kPa"},
+        {"Eprime", Eprime},
+        {"eta1", eta1},
+        {"A0", "12.56 mm^2"},
+        {"l0", "1 mm"}}},
+      {"anchors", {{{"kind", "far_side"}, {"fraction", 0.3}}}},
+      {"contacts", {{{"kind", "sphere"}, {"number", 71}}}},
+      {"protocol", {{"kind", "ramp_hold"}, {"depth", "4 mm"}, {"rate", "4 mm/s"}, {"hold", hold}}},
+      {"tolerance", 1e-8}};
+}
+
+Sweep over_depths(const Json& scene, const char* from, const char* to, const char* forces_to,
+                  const char* tolerance) {
+  Json document{
+      {"model", "organ"},
+      {"scene", scene},
+      {"block", 4},
+      {"axes", {{{"parameter", "/protocol/depth"}, {"from", from}, {"to", to}, {"count", 48}}}},
+      {"outputs",
+       {"peak_force",
+        {{"force_over", {{"from", "1 s"}, {"to", forces_to}, {"count", 200}}},
+         {"name", "force"}}}}};
+  if (tolerance != nullptr) document["tolerance"] = tolerance;
+  return parse_sweep(document, "sweep", ".");
 }
 
 std::string least_result(const Sweep& sweep, const std::string& file, int workers) {
@@ -97,4 +132,61 @@ TEST_CASE("where few cells share organ and moduli all run on the network, and it
     CHECK(sweep.model->models().at(model) == "collocation_0.001");
   }
   CHECK(sweep.model->choice_of_models(sweep.swept()).find("36 cells share") != std::string::npos);
+}
+
+TEST_CASE("a claim holds early in a long hold too", "[heavy]") {
+  // A ramp of 0.02 relaxation times; the longest of the contact are 31. Largest errors: after 0.9.
+  const Json scene = creeping_liver("2 kPa", "60 kPa", "3739375 Pa s", "180.9 s");
+  const Sweep sweep = over_depths(scene, "4.05 mm", "5.6 mm", "180 s", "20 %");
+  const Sweep truth = over_depths(scene, "4.05 mm", "5.6 mm", "180 s", nullptr);
+  const std::uint64_t deepest = sweep.blocks() - 1;
+  const CellBlock found = CellRunner(sweep).run(deepest), exact = CellRunner(truth).run(deepest);
+  for (std::size_t i = 0; i < found.cells(); ++i) {
+    CAPTURE(i, found.error_estimate[i]);
+    REQUIRE(found.status[i] == CellStatus::done);
+    CHECK(found.model[i] < SharedPlan::models().size());
+    double worst = 0.0;
+    for (std::size_t t = 200 * i; t < 200 * (i + 1); ++t) {
+      worst = std::max(worst, std::abs(found.values[1][t] - exact.values[1][t]));
+    }
+    const double of_claim = worst / exact.values[0][i] / found.error_estimate[i];
+    CHECK(of_claim <= 1.0);
+    CHECK(of_claim > 0.3);  // and it is not much larger than it has to be
+  }
+}
+
+TEST_CASE("claims that would take far longer than the cells are not made", "[heavy]") {
+  // Through hours of creep, E2 = 1000 E1, the network takes 20,000 iterations.
+  const Json scene = creeping_liver("0.06 kPa", "12 kPa", "412912.5 Pa s", "30 s");
+  const Sweep sweep = over_depths(scene, "2.7 mm", "2.82 mm", "30 s", "5 %");
+  const std::string choice = sweep.model->choice_of_models(sweep.swept());
+  CHECK(choice.find("the least model") != std::string::npos);
+  const CellBlock found = CellRunner(sweep).run(0);
+  for (std::size_t i = 0; i < found.cells(); ++i) {
+    REQUIRE(found.status[i] == CellStatus::done);
+    CHECK(sweep.model->models().at(found.model[i]) == "collocation_0.005");
+  }
+}
+
+TEST_CASE("static curves are the equilibria, at once and relaxed, also where E2 is 1000 E1") {
+  constexpr double kDepth_m = 2.8e-3;
+  const Json text = creeping_liver("0.06 kPa", "12 kPa", "412912.5 Pa s", "30 s");
+  const PlanScene scene = PlanScene(parse_experiment(text, "scene", "."))
+                              .with_protocol(ramp_and_hold(kDepth_m, kDepth_m, 0.0));
+  const PlanScout scout(scene, {}, false);
+  const ContactCurves& curves = scout.curves();
+  const DrivenNetwork& driven = scene.driven();
+  StaticPath relaxed(driven.bonds, driven.rest, 0.020, driven.freedom, driven.probes,
+                     Drive::displacement, kDepth_m, 1e-8);
+  for (const double share : {0.1, 0.5, 1.0}) {
+    const double depth = share * kDepth_m;
+    CAPTURE(depth);
+    CHECK(curves.relaxed(depth) ==
+          Approx(relaxed.move_to(depth, 0.0).response).epsilon(1e-4 / share));
+    const Protocol jump(Drive::displacement, {{0.0, depth}, {1.0, depth}}, "jump");
+    const std::vector<double> start{0.0};
+    const PlanTrajectory at_once = scene.with_protocol(jump).quasi_static({}, start, false);
+    CHECK(curves.relaxed(depth) + curves.relaxing(depth) ==
+          Approx(at_once.response[0]).epsilon(1e-4 / share));
+  }
 }

@@ -21,6 +21,7 @@ constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
 constexpr double kLeastMove = 1e-9;  // of a jump
 constexpr double kFirstStep = 3.0;   // after a change of rate, in relaxation times
 constexpr double kSafety = 0.8;
+constexpr int kUnlimited = std::numeric_limits<int>::max();
 constexpr double kMostGrowth = 30.0;           // from one step to the next
 constexpr double kLanded = 1.0 - 1e-6;         // of a step that was to end where a contact changes
 constexpr std::size_t kMostChangesAtOnce = 4;  // of a contact at one time
@@ -203,6 +204,9 @@ class Run {
       if (last) h = left;
       const StepOutcome outcome =
           stages_.try_step(state_, h, rate, kStepShare * options_.tolerance);
+      if (stages_.work().iterations > options_.most_iterations.value_or(kUnlimited)) {
+        throw failed(state_.imposed, "the run has taken all the iterations that it may");
+      }
       const double factor = growth.after(h, outcome);
       const bool kept = outcome.accepted || (options_.step_s && outcome.balanced);
       if (!kept) {

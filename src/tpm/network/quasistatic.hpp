@@ -59,6 +59,8 @@ struct QuasiStaticOptions {
   /// If given, s: all steps are that long (but for the last of a piece of the protocol), whatever
   /// their error, and what is left unbalanced is still judged by the tolerance.
   std::optional<double> step_s = std::nullopt;
+  /// If given, a run that takes more iterations throws Error(numerical).
+  std::optional<int> most_iterations = std::nullopt;
   bool energies = false;                          ///< work and dissipation are integrated along
   std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
   /// What is left unbalanced of a derivative, as `tolerance`; none: that.

@@ -26,9 +26,11 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
                              double tolerance) {
   VerifiedTruth truth;
   const bool field = measure.output == PlanOutput::field;
+  const double tau_s = scene.scene().tissue.material.relaxation_time_s();
   PlanTrajectory judge;
   if (inertial) {
-    truth.times_s = sampled_times(scene.protocol(), kTimesOfPieceWithMasses, kMostTimesWithMasses);
+    truth.times_s =
+        sampled_times(scene.protocol(), kTimesOfPieceWithMasses, kMostTimesWithMasses, tau_s);
     // Errors gather over the periods of ringing, which few steps of a rise do not show: as tight as
     // it takes for the two to agree.
     for (double own = kInertialTolerance;; own *= kTighter) {
@@ -44,7 +46,7 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
       if (apart <= kAgreement * tolerance || own < kTightest * (1.0 + kTighter)) break;
     }
   } else {
-    truth.times_s = sampled_times(scene.protocol(), kTimesOfPiece, kMostTimes);
+    truth.times_s = sampled_times(scene.protocol(), kTimesOfPiece, kMostTimes, tau_s);
     QuasiStaticOptions options;
     options.tolerance = kTolerance;
     truth.trajectory = scene.quasi_static(options, truth.times_s, field);

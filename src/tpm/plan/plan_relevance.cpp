@@ -40,16 +40,10 @@ PlanRelevance switched_off(const PlanScout& scout, std::string part, std::string
 }
 
 PlanRelevance relevance_of_viscosity(const PlanScout& scout) {
-  const double duration = scout.scene().duration_s();
-  const auto at = [&](double tau_s) {
-    return switched_off(scout, "viscosity", "", [&](const PlanScene& scene) {
-      TpmParameters material = scene.scene().tissue.material;
-      material.eta1_Pa_s = tau_s * (material.E1_Pa + material.E2_Pa);
-      return scene.with_material(material);
-    });
-  };
-  PlanRelevance relaxed = at(1e-7 * duration);
-  PlanRelevance elastic = at(1e7 * duration);
+  PlanRelevance relaxed = switched_off(scout, "viscosity", "",
+                                       [](const PlanScene& scene) { return scene.all_relaxed(); });
+  PlanRelevance elastic = switched_off(
+      scout, "viscosity", "", [](const PlanScene& scene) { return scene.nothing_relaxing(); });
   if (relaxed.error && elastic.error) {
     const double of_relaxed = *relaxed.error, of_elastic = *elastic.error;
     PlanRelevance& less = of_relaxed <= of_elastic ? relaxed : elastic;

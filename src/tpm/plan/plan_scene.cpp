@@ -69,6 +69,28 @@ std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int m
   return times;
 }
 
+std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int most, double tau_s) {
+  constexpr double kFirst = 0.1;   // in relaxation times
+  constexpr double kRatio = 1.35;  // of one time to the one before
+  std::vector<double> times = sampled_times(protocol, per_piece, most);
+  if (!(tau_s > 0.0) || !std::isfinite(tau_s)) return times;
+  const auto knots = protocol.knots();
+  const int pieces = std::max(1, static_cast<int>(knots.size()) - 1);
+  const double parts = std::max(most / pieces, 1);
+  for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+    const double length = knots[k + 1].time_s - knots[k].time_s;
+    const double span = std::log(length / (kFirst * tau_s));
+    if (!(span > 0.0)) continue;
+    const double count = std::min(std::ceil(span / std::log(kRatio)), parts);
+    for (double i = 0.0; i < count; i += 1.0) {
+      times.push_back(knots[k].time_s + kFirst * tau_s * std::exp(span * i / count));
+    }
+  }
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
+}
+
 PlanScene::PlanScene(ExperimentScene scene)
     : scene_(plannable(std::move(scene))), network_(network_to_run(scene_)) {}
 
@@ -202,6 +224,22 @@ PlanScene PlanScene::stiffer(double factor) const {
   material.E2_Pa *= factor;
   material.Eprime_Pa *= factor;
   return with_material(material);
+}
+
+PlanScene PlanScene::nothing_relaxing() const {
+  constexpr double kNever = 1e9;  // durations
+  TpmParameters material = scene_.tissue.material;
+  const double lasts_s = duration_s() > 0.0 ? duration_s() : 1.0;
+  material.eta1_Pa_s = kNever * lasts_s * (material.E1_Pa + material.E2_Pa);
+  return with_material(material);
+}
+
+PlanScene PlanScene::all_relaxed() const {
+  TpmParameters material = scene_.tissue.material;
+  material.E2_Pa = material.E1_Pa * material.E2_Pa / (material.E1_Pa + material.E2_Pa);
+  // E1 decides only how far bonds would relax, which they do not; above 0, as eta1 follows from it.
+  material.E1_Pa = scene_.tissue.material.E1_Pa + scene_.tissue.material.E2_Pa;
+  return with_material(material).nothing_relaxing();
 }
 
 PlanScene PlanScene::with_material(const TpmParameters& material) const {

@@ -38,6 +38,10 @@ struct PlanTrajectory {
 /// The protocol's pieces sampled densely near their ends, where rates change: 1 to `per_piece`
 /// times a piece of positive length, and the corners; at most about `most` in all.
 [[nodiscard]] std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int most);
+/// These, and as many others at most, even in the logarithm of the time since each piece began,
+/// from a tenth of the relaxation time on: a long piece would pass over what calms down early.
+[[nodiscard]] std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int most,
+                                                double tau_s);
 
 /// A scene with its network, and the runs of the full nonlinear network on it.
 class PlanScene {
@@ -78,6 +82,10 @@ class PlanScene {
   [[nodiscard]] PlanScene deeper(double factor) const;   ///< what is imposed times a factor
   [[nodiscard]] PlanScene faster(double factor) const;   ///< the protocol in less time
   [[nodiscard]] PlanScene stiffer(double factor) const;  ///< E1, E2, E' times a factor
+  [[nodiscard]] PlanScene nothing_relaxing() const;      ///< bonds as stiff as at once, for ever
+  /// Bonds as stiff as when all has relaxed, from the first instant on. An elastic network like the
+  /// other, not one that relaxes fast: following that takes steps without end where E2 >> E1.
+  [[nodiscard]] PlanScene all_relaxed() const;
   [[nodiscard]] PlanScene with_protocol(Protocol protocol) const;
   [[nodiscard]] PlanScene with_material(const TpmParameters& material) const;
   /// Spheres of deeper layers held: `layers` outer ones move.

@@ -10,32 +10,31 @@ constexpr int kScoutedTimesOfPiece = 20;
 constexpr int kMostScoutedTimes = 160;
 constexpr int kCurvePoints = 33;
 constexpr double kCurveTolerance = 1e-5;
-constexpr double kRamp_s = 1.0;   // in which static curves are followed
-constexpr double kNever_s = 1e9;  // relaxation times against that
-constexpr double kAtOnce_s = 1e-7;
+constexpr double kRamp_s = 1.0;      // in which static curves are followed
 constexpr double kMargin = 1.02;     // of the depths of curves
 constexpr double kRounding = 1e-12;  // what no run shows
 
-PlanScene with_relaxation_time(const PlanScene& scene, double tau_s) {
-  TpmParameters material = scene.scene().tissue.material;
-  material.eta1_Pa_s = tau_s * (material.E1_Pa + material.E2_Pa);
-  return scene.with_material(material);
-}
+/// How much of what can relax has done so.
+enum class Relaxed { nothing, all };
 
 /// Forces at `points` even depths from 0 to `last_m`.
-Eigen::VectorXd static_forces(const PlanScene& scene, double last_m, int points, double tau_s) {
+Eigen::VectorXd static_forces(const PlanScene& scene, double last_m, int points, Relaxed relaxed,
+                              std::optional<int> most_iterations) {
   const Protocol ramp(Drive::displacement, {{0.0, 0.0}, {kRamp_s, last_m}}, "ramp");
   std::vector<double> times;
   for (int i = 0; i < points; ++i) times.push_back(kRamp_s * i / (points - 1));
   QuasiStaticOptions options;
   options.tolerance = kCurveTolerance;
-  return with_relaxation_time(scene.with_protocol(ramp), tau_s)
+  options.most_iterations = most_iterations;
+  const PlanScene driven = scene.with_protocol(ramp);
+  return (relaxed == Relaxed::all ? driven.all_relaxed() : driven.nothing_relaxing())
       .quasi_static(options, times, false)
       .response;
 }
 
 /// A static curve from a depth of 0 or less to one above.
-DepthCurve static_curve(const PlanScene& scene, double least_m, double most_m, double tau_s) {
+DepthCurve static_curve(const PlanScene& scene, double least_m, double most_m, Relaxed relaxed,
+                        std::optional<int> most_iterations) {
   DepthCurve curve;
   const double spacing = (most_m - least_m) / (kCurvePoints - 1);
   // Even points of which one is at rest.
@@ -45,12 +44,14 @@ DepthCurve static_curve(const PlanScene& scene, double least_m, double most_m, d
   curve.first_m = -below * spacing;
   curve.last_m = above * spacing;
   if (below > 0) {
-    const Eigen::VectorXd force = static_forces(scene, curve.first_m, below + 1, tau_s);
+    const Eigen::VectorXd force =
+        static_forces(scene, curve.first_m, below + 1, relaxed, most_iterations);
     for (Eigen::Index i = below; i > 0; --i) curve.force_N.push_back(force[i]);
   }
   curve.force_N.push_back(0.0);
   if (above > 0) {
-    const Eigen::VectorXd force = static_forces(scene, curve.last_m, above + 1, tau_s);
+    const Eigen::VectorXd force =
+        static_forces(scene, curve.last_m, above + 1, relaxed, most_iterations);
     for (Eigen::Index i = 1; i <= above; ++i) curve.force_N.push_back(force[i]);
   }
   return curve;
@@ -65,19 +66,23 @@ InertialOptions inertial_options(const PlanScene& scene, double tolerance) {
   return options;
 }
 
-PlanScout::PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial)
+PlanScout::PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial,
+                     std::optional<int> most_iterations)
     : scene_(std::move(scene)),
       measure_(measure),
       inertial_(inertial),
+      most_iterations_(most_iterations),
       times_(sampled_times(scene_.protocol(),
                            inertial ? 8 * kScoutedTimesOfPiece : kScoutedTimesOfPiece,
-                           inertial ? 8 * kMostScoutedTimes : kMostScoutedTimes)) {}
+                           inertial ? 8 * kMostScoutedTimes : kMostScoutedTimes,
+                           scene_.scene().tissue.material.relaxation_time_s())) {}
 
 const PlanTrajectory& PlanScout::collocation(double tolerance) const {
   const auto found = collocation_.find(tolerance);
   if (found != collocation_.end()) return found->second;
   QuasiStaticOptions options;
   options.tolerance = tolerance;
+  options.most_iterations = most_iterations_;
   return collocation_.emplace(tolerance, scene_.quasi_static(options, times_, wants_field()))
       .first->second;
 }
@@ -126,8 +131,8 @@ const ContactCurves& PlanScout::curves() const {
     for (const double depth : coarse().response) see(depth);
   }
   ContactCurves curves;
-  curves.relaxed = static_curve(scene_, least, most, kAtOnce_s);
-  curves.relaxing = static_curve(scene_, least, most, kNever_s);
+  curves.relaxed = static_curve(scene_, least, most, Relaxed::all, most_iterations_);
+  curves.relaxing = static_curve(scene_, least, most, Relaxed::nothing, most_iterations_);
   for (std::size_t i = 0; i < curves.relaxed.force_N.size(); ++i) {
     curves.relaxing.force_N[i] -= curves.relaxed.force_N[i];
   }

@@ -20,7 +20,9 @@ struct ContactCurves {
 class PlanScout {
  public:
   /// @param inertial what is asked for is the network with masses
-  PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial);
+  /// @param most_iterations of each run without masses, if given: QuasiStaticOptions
+  PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial,
+            std::optional<int> most_iterations = std::nullopt);
 
   [[nodiscard]] const PlanScene& scene() const { return scene_; }
   [[nodiscard]] const PlanMeasure& measure() const { return measure_; }
@@ -56,6 +58,7 @@ class PlanScout {
   PlanScene scene_;
   PlanMeasure measure_;
   bool inertial_;
+  std::optional<int> most_iterations_;
   std::vector<double> times_;
   mutable std::map<double, PlanTrajectory> collocation_, with_masses_;
   mutable std::optional<ContactSpectrum> spectrum_;

@@ -33,8 +33,8 @@ class SharedPlan {
   /// Names of the models that may answer, from the cheapest on.
   [[nodiscard]] static const std::vector<std::string>& models();
 
-  /// None where no reduced model claims to be within the tolerance, and for what is no ramp and
-  /// hold of one sphere.
+  /// None where no reduced model claims to be within the tolerance or claims would take too long,
+  /// and for what is no ramp and hold of one sphere.
   /// @param tau_s relaxation time of the bonds
   /// @param times_s rising, within the protocol
   [[nodiscard]] std::optional<SharedAnswer> answer(const Protocol& protocol, double tau_s,
@@ -46,7 +46,7 @@ class SharedPlan {
 
  private:
   struct OfDepth {
-    std::vector<ScalarModel> models;  ///< none: the network has no answer so deep
+    std::vector<ScalarModel> models;  ///< none: no answer so deep, or not soon
   };
   using Place = std::pair<int, int>;  ///< on the grid: depth, length of the ramp
 

@@ -57,12 +57,18 @@ CellRunner::CellRunner(const Sweep& sweep)
 CellRunner::~CellRunner() = default;
 
 CellBlock CellRunner::run(std::uint64_t number) {
+  return run_unless(number, {}).value();
+}
+
+std::optional<CellBlock> CellRunner::run_unless(std::uint64_t number,
+                                                const std::function<bool()>& interrupted) {
   CellBlock block = empty_block(sweep_, number);
   places_ = sweep_.places(number * sweep_.block_cells);
   for (std::size_t i = 0; i < swept_.size(); ++i) {
     swept_[i] = sweep_.parameters[i].values.at(places_[sweep_.parameters[i].axis]);
   }
   for (std::size_t cell = 0; cell < block.cells(); ++cell) {
+    if (interrupted && interrupted()) return std::nullopt;
     run_cell(cell, block);
     // On to the next cell: axes change from the last one on.
     std::size_t changed = places_.size();

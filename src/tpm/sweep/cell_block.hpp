@@ -1,6 +1,8 @@
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +44,9 @@ class CellRunner {
   /// A cell without an answer is recorded with its reason. What it holds depends on the sweep and
   /// the block's number alone.
   [[nodiscard]] CellBlock run(std::uint64_t block);
+  /// The same; none as soon as `interrupted`, asked before each cell, says so.
+  [[nodiscard]] std::optional<CellBlock> run_unless(std::uint64_t block,
+                                                    const std::function<bool()>& interrupted);
 
  private:
   struct Expressions;

@@ -3,6 +3,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_pipeline.h>
 
+#include <atomic>
 #include <chrono>
 #include <ctime>
 
@@ -35,7 +36,7 @@ class MissingBlocks {
   std::uint64_t blocks_, next_;
 };
 
-/// A computed block on its way into the log.
+/// A computed block on its way into the log; one without cells was interrupted.
 struct Finished {
   std::uint64_t block = 0, cells = 0;
   std::string record;
@@ -48,30 +49,32 @@ void compute_missing(const Sweep& sweep, int workers, BlockLog& log, SweepRun& r
                      const SweepControls& controls) {
   MissingBlocks missing(log, controls.shard, sweep.blocks());
   tbb::enumerable_thread_specific<CellRunner> runners([&] { return CellRunner(sweep); });
+  std::atomic<bool> stopped = false;
+  const auto interrupted = [&] {
+    if (controls.interrupted && !stopped && controls.interrupted()) stopped = true;
+    return stopped.load();
+  };
   const auto number = tbb::make_filter<void, std::uint64_t>(
       tbb::filter_mode::serial_in_order, [&](tbb::flow_control& flow) -> std::uint64_t {
-        if (controls.interrupted && controls.interrupted()) {
-          run.interrupted = true;
-          flow.stop();
-          return 0;
-        }
-        const auto next = missing.next();
+        const auto next = stopped ? std::nullopt : missing.next();
         if (!next) flow.stop();
         return next.value_or(0);
       });
   const auto compute =
       tbb::make_filter<std::uint64_t, Finished>(tbb::filter_mode::parallel, [&](std::uint64_t b) {
-        const CellBlock block = runners.local().run(b);
-        return Finished{b, block.cells(), log_record(block)};
+        const auto block = runners.local().run_unless(b, interrupted);
+        return block ? Finished{b, block->cells(), log_record(*block)} : Finished{};
       });
   const auto store = tbb::make_filter<Finished, void>(tbb::filter_mode::serial_out_of_order,
                                                       [&](const Finished& finished) {
+                                                        if (finished.cells == 0) return;
                                                         log.append(finished.block, finished.record);
                                                         run.cells += finished.cells;
                                                         if (controls.progress)
                                                           controls.progress(log.size(), run.blocks);
                                                       });
   tbb::parallel_pipeline(2 * static_cast<std::size_t>(workers), number & compute & store);
+  run.interrupted = stopped;
 }
 
 }  // namespace

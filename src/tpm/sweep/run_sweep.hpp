@@ -25,7 +25,8 @@ struct SweepControls {
   int workers = 0;  ///< threads; 0: all processors that this process may use
   Shard shard;
   std::function<void(std::uint64_t blocks_done, std::uint64_t blocks)> progress;
-  std::function<bool()> interrupted;  ///< asked before each block
+  /// Asked before each cell, by any worker; a block that is not whole then is not stored.
+  std::function<bool()> interrupted;
 };
 
 /// How a sweep went: for the sidecar, not for the results.

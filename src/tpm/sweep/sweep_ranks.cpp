@@ -75,7 +75,11 @@ class Distribution {
       if (waiting != 0) {
         take();
       } else if (const auto block = next()) {
-        store(log_record(own_.run(*block)), *block);
+        if (const auto own = own_.run_unless(*block, controls_.interrupted)) {
+          store(log_record(*own), *block);
+        } else {
+          run_.interrupted = true;
+        }
       } else if (under_way_ > 0) {
         take();
       } else {
