@@ -77,7 +77,7 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
   result.part = "inertia";
   try {
     if (scout.inertial()) {
-      PlanTrajectory massless = scout.coarse();
+      const PlanTrajectory& massless = scout.coarse();
       result.error =
           trajectory_error(massless, scout.with_masses(kInertiaTolerance), scout.measure());
       return result;

@@ -76,13 +76,14 @@ std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int m
   if (!(tau_s > 0.0) || !std::isfinite(tau_s)) return times;
   const auto knots = protocol.knots();
   const int pieces = std::max(1, static_cast<int>(knots.size()) - 1);
-  const double parts = std::max(most / pieces, 1);
+  const int parts = std::max(most / pieces, 1);
   for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
     const double length = knots[k + 1].time_s - knots[k].time_s;
     const double span = std::log(length / (kFirst * tau_s));
     if (!(span > 0.0)) continue;
-    const double count = std::min(std::ceil(span / std::log(kRatio)), parts);
-    for (double i = 0.0; i < count; i += 1.0) {
+    const double wanted = std::ceil(span / std::log(kRatio));
+    const int count = wanted < parts ? static_cast<int>(wanted) : parts;
+    for (int i = 0; i < count; ++i) {
       times.push_back(knots[k].time_s + kFirst * tau_s * std::exp(span * i / count));
     }
   }

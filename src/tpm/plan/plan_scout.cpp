@@ -22,6 +22,7 @@ Eigen::VectorXd static_forces(const PlanScene& scene, double last_m, int points,
                               std::optional<int> most_iterations) {
   const Protocol ramp(Drive::displacement, {{0.0, 0.0}, {kRamp_s, last_m}}, "ramp");
   std::vector<double> times;
+  times.reserve(static_cast<std::size_t>(points));
   for (int i = 0; i < points; ++i) times.push_back(kRamp_s * i / (points - 1));
   QuasiStaticOptions options;
   options.tolerance = kCurveTolerance;

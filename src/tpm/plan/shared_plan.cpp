@@ -13,9 +13,8 @@ namespace {
 constexpr double kUnitDepth_m = 1e-3;    // of the grid; the next is sqrt(2) times deeper
 constexpr double kHoldOfLongest = 10.0;  // of a hold that leaves nothing to relax
 constexpr double kStepsOfRamp = 64.0;
-// Of a run for claims; E2 = E1 takes some 40, E2 = 30 E1 200. One of soft dashpots' long creep, E2
-// = 1000 E1, takes 20,000, far more than the cells that claims are to spare: nothing is claimed
-// there.
+// Of a run for claims; most take less than 200. Where E2 is 1000 E1 the long creep takes 20,000,
+// far more than the cells that claims are to spare: nothing is claimed there.
 constexpr int kMostIterations = 600;
 // Counted in runs of the network: two at each place of the grid and the judging of the models; the
 // two static curves of a depth; the spectrum.
