@@ -72,6 +72,7 @@ std::string path_to(const std::string& dataset) {
 template <class List>
 std::vector<std::string> names_of(const List& list) {
   std::vector<std::string> names;
+  names.reserve(list.size());
   for (const auto& entry : list) names.push_back(entry.name);
   return names;
 }
