@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <ctime>
 #include <filesystem>
 #include <memory>
@@ -12,13 +11,8 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
-#include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
-#include "tpm/report/sweep_convergence_report.hpp"
-#include "tpm/report/sweep_report.hpp"
 #include "tpm/store/file.hpp"
-#include "tpm/sweep/best_cells.hpp"
 #include "tpm/sweep/sweep_ranks.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
@@ -244,166 +238,6 @@ int merge(const SweepChoice& choice, const Session& session) {
   return print_results(sweep, written.tally, written.files, session);
 }
 
-struct SweepViewChoice {
-  std::string file, folder = "sweep_figures", x, y, pareto;
-  std::string axis, size, figure_folder;
-  std::string best_output, count = "1", over, fit, start;
-  std::vector<std::string> variables, at;
-};
-
-int show(const SweepViewChoice& choice, const Session& session) {
-  const SweepReader sweep(choice.file);
-  fmt::print("{}", session.json() ? to_text(sweep_json(sweep)) : sweep_text(sweep));
-  return 0;
-}
-
-/// "rate=4 mm/s": the nearest place on that axis.
-std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
-                                                 const SweepReader& sweep) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos) {
-    throw Error(ExitCode::usage, "--at", fmt::format("'{}'", printable(text)), "AXIS=VALUE");
-  }
-  const std::string name = text.substr(0, equals);
-  const ReadAxis& axis = sweep.axes()[sweep.axis(name)];
-  const Dimension dimension =
-      axis.unit.empty() ? Dimension::dimensionless : parse_unit(axis.unit, "--at").dimension;
-  const double wished = parse_quantity(text.substr(equals + 1), dimension, "--at " + name);
-  const auto [least, largest] = std::minmax_element(axis.places.begin(), axis.places.end());
-  constexpr double kRounding = 1e-9;
-  const double slack = kRounding * std::max(std::abs(*least), std::abs(*largest));
-  if (!(wished >= *least - slack && wished <= *largest + slack)) {
-    throw Error(ExitCode::usage, "--at " + name, fmt::format("{} {}", shortest(wished), axis.unit),
-                fmt::format("{} to {} {}", shortest(*least), shortest(*largest), axis.unit));
-  }
-  const auto nearest = std::min_element(
-      axis.places.begin(), axis.places.end(),
-      [&](double a, double b) { return std::abs(a - wished) < std::abs(b - wished); });
-  return {name, static_cast<std::uint64_t>(nearest - axis.places.begin())};
-}
-
-/// Pictures beside what is printed, if a folder was named.
-void draw_into(const std::string& folder, const std::vector<Figure>& figures) {
-  if (folder.empty()) return;
-  const auto files = write_figures(folder, figures);
-  fmt::print(stderr, "tpm: wrote {} into {}\n", fmt::join(files, ", "), folder);
-}
-
-int sensitivity(const SweepViewChoice& choice, const Session& session) {
-  const SweepReader sweep(choice.file);
-  HeldPlaces held;
-  for (const std::string& text : choice.at) held.push_back(parse_held(text, sweep));
-  std::vector<SweepSensitivity> all;
-  for (const ReadVariable& v : sweep.variables()) {
-    const bool wished =
-        choice.variables.empty()
-            ? v.times_s.empty() && !v.name.starts_with("count_")
-            : std::count(choice.variables.begin(), choice.variables.end(), v.name) > 0;
-    if (wished) all.push_back(sensitivity_of(sweep, v.name, held));
-  }
-  for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
-  fmt::print("{}", session.json() ? to_text(sensitivity_json(all)) : sensitivity_text(all));
-  draw_into(choice.figure_folder, sensitivity_figures(all, sweep.title()));
-  return 0;
-}
-
-int convergence(const SweepViewChoice& choice, const Session& session) {
-  const SweepReader sweep(choice.file);
-  HeldPlaces held;
-  for (const std::string& text : choice.at) held.push_back(parse_held(text, sweep));
-  std::optional<std::string> axis;
-  if (!choice.axis.empty()) axis = choice.axis;
-  std::vector<std::string> names = choice.variables;
-  for (const ReadVariable& v : sweep.variables()) {
-    if (!choice.variables.empty() || !v.times_s.empty() || v.name.starts_with("count_")) continue;
-    names.push_back(v.name);
-  }
-  std::vector<SweepConvergence> all;
-  for (const std::string& name : names) {
-    all.push_back(convergence_of(sweep, name, axis, choice.size, held));
-  }
-  if (session.json()) {
-    fmt::print("{}", to_text(convergence_json(all)));
-  } else {
-    fmt::print("{}", convergence_text(all));
-  }
-  draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
-  const bool none = std::none_of(all.begin(), all.end(), [](auto& c) { return c.monotone(); });
-  return static_cast<int>(none ? ExitCode::answer_is_no : ExitCode::success);
-}
-
-/// Paths in a configuration of tpm fit are relative to it: they are kept when it is moved.
-void move_scene(Json& fit, const fs::path& from, const fs::path& to) {
-  if (!fit.contains("scene") || !fit.at("scene").is_string()) return;
-  const fs::path scene = from.parent_path() / fit.at("scene").get<std::string>();
-  const fs::path folder = to.has_parent_path() ? to.parent_path() : fs::path(".");
-  fit["scene"] = fs::proximate(fs::absolute(scene), fs::absolute(folder)).string();
-}
-
-int best(const SweepViewChoice& choice, const Session& session) {
-  const SweepReader sweep(choice.file);
-  std::optional<std::string> over;
-  if (!choice.over.empty()) over = choice.over;
-  const auto count = parse_whole_number(choice.count, "--count", 1);
-  const auto cells = best_cells(sweep, choice.best_output, count, over);
-  if (choice.fit.empty() != choice.start.empty()) {
-    throw Error(ExitCode::usage, "--fit", "alone", "--fit FIT.json with --start START.json");
-  }
-  if (!choice.fit.empty()) {
-    Json fit = read_json(choice.fit);
-    check_schema(fit, "fit", choice.fit);
-    fit = fit_from_cell(std::move(fit), cells.front(), choice.fit);
-    move_scene(fit, choice.fit, choice.start);
-    write_file(choice.start, to_text(fit));
-  }
-  if (session.json()) {
-    Json list = Json::array();
-    for (const BestCell& cell : cells) {
-      Json parameters;
-      for (const CellParameter& p : cell.parameters) {
-        parameters[p.name] = {{"target", p.target}, {"unit", p.unit}, {"value", p.value}};
-      }
-      list.push_back({{"places", cell.places},
-                      {choice.best_output, cell.value},
-                      {"parameters", std::move(parameters)}});
-    }
-    fmt::print("{}", to_text(Json{{"best", std::move(list)}}));
-    return 0;
-  }
-  for (const BestCell& cell : cells) {
-    fmt::print("{} = {}:", choice.best_output, significant(cell.value, 6));
-    for (const CellParameter& p : cell.parameters) {
-      const Unit unit = p.unit.empty() ? Unit{"", Dimension::dimensionless, 1.0}
-                                       : shown_unit(parse_unit(p.unit, p.name).dimension);
-      fmt::print(" {} = {}{}{}", p.name, significant(p.value / unit.to_si, 6),
-                 unit.symbol.empty() ? "" : " ", unit.symbol);
-    }
-    fmt::print("\n");
-  }
-  if (!choice.start.empty()) fmt::print("wrote {}: tpm fit goes on from there\n", choice.start);
-  return 0;
-}
-
-int plot(const SweepViewChoice& choice) {
-  const SweepReader sweep(choice.file);
-  SweepFigures wished;
-  wished.variables = choice.variables;
-  if (!choice.x.empty()) wished.x = choice.x;
-  if (!choice.y.empty()) wished.y = choice.y;
-  for (const std::string& text : choice.at) wished.held.push_back(parse_held(text, sweep));
-  if (!choice.pareto.empty()) {
-    const std::size_t comma = choice.pareto.find(',');
-    if (comma == std::string::npos) {
-      throw Error(ExitCode::usage, "--pareto", fmt::format("'{}'", printable(choice.pareto)),
-                  "MISFIT,COST: two variables");
-    }
-    wished.pareto = {choice.pareto.substr(0, comma), choice.pareto.substr(comma + 1)};
-  }
-  const auto files = write_figures(choice.folder, sweep_figures(sweep, wished));
-  fmt::print("wrote {} into {}\n", fmt::join(files, ", "), choice.folder);
-  return 0;
-}
-
 int run_command(const SweepChoice& choice, const Session& session) {
   if (choice.sweep.empty()) {
     throw Error(ExitCode::usage, "sweep", "no file",
@@ -447,61 +281,6 @@ int run_command(const SweepChoice& choice, const Session& session) {
   return print_results(sweep, written.tally, written.files, session);
 }
 
-void add_views(CLI::App& sweep, Session& session) {
-  auto choice = std::make_shared<SweepViewChoice>();
-  CLI::App* showing = sweep.add_subcommand("show", "What a file of results holds");
-  showing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  add_format_option(*showing, session);
-  showing->callback(
-      [choice, &session] { session.run = [choice, &session] { return show(*choice, session); }; });
-  CLI::App* judging = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
-  judging->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  judging->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
-  judging->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
-  judging->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
-  add_format_option(*judging, session);
-  judging->callback([choice, &session] {
-    session.run = [choice, &session] { return sensitivity(*choice, session); };
-  });
-  CLI::App* refining = sweep.add_subcommand(
-      "convergence", "Order, extrapolated value and grid convergence index along an axis");
-  refining->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  refining->add_option("--axis", choice->axis, "Axis of ever finer places (default: the last)");
-  refining->add_option(
-      "--size", choice->size,
-      "Formula of the size, such as 'count^(-1/3)' (default: the axis' parameter)");
-  refining->add_option("--variable", choice->variables,
-                       "Of what (default: all numbers but counts)");
-  refining->add_option("--at", choice->at, "AXIS=VALUE: place on another axis");
-  refining->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
-  add_format_option(*refining, session);
-  refining->callback([choice, &session] {
-    session.run = [choice, &session] { return convergence(*choice, session); };
-  });
-  CLI::App* choosing = sweep.add_subcommand("best", "The cells with the least value of an output");
-  choosing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  choosing->add_option("--output", choice->best_output, "What is to be least, such as a misfit")
-      ->required();
-  choosing->add_option("--count", choice->count, "How many cells")->capture_default_str();
-  choosing->add_option("--over", choice->over, "Axis that the output is summed over");
-  choosing->add_option("--fit", choice->fit, "Configuration of tpm fit to be started there");
-  choosing->add_option("--start", choice->start, "File for the configuration with these starts");
-  add_format_option(*choosing, session);
-  choosing->callback(
-      [choice, &session] { session.run = [choice, &session] { return best(*choice, session); }; });
-  CLI::App* plotting = sweep.add_subcommand("plot", "Maps, families of lines, Pareto fronts");
-  plotting->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  plotting->add_option("-o,--output", choice->folder, "Folder for pictures (PNG, SVG)")
-      ->capture_default_str();
-  plotting->add_option("--variable", choice->variables, "What is drawn (default: all but counts)");
-  plotting->add_option("--x", choice->x, "Axis drawn across (default: the last)");
-  plotting->add_option("--y", choice->y, "Axis drawn upwards, and of families");
-  plotting->add_option("--at", choice->at, "AXIS=VALUE: place on an axis that is not drawn");
-  plotting->add_option("--pareto", choice->pareto,
-                       "MISFIT,COST: cells that no other betters in both");
-  plotting->callback([choice, &session] { session.run = [choice] { return plot(*choice); }; });
-}
-
 }  // namespace
 
 void add_sweep_command(CLI::App& app, Session& session) {
@@ -527,7 +306,7 @@ void add_sweep_command(CLI::App& app, Session& session) {
   add_format_option(*merging, session);
   merging->callback(
       [choice, &session] { session.run = [choice, &session] { return merge(*choice, session); }; });
-  add_views(*command, session);
+  add_sweep_views(*command, session);
   command->callback([command, choice, &session] {
     if (!command->get_subcommands().empty()) return;
     session.run = [choice, &session] { return run_command(*choice, session); };
