@@ -29,6 +29,15 @@ inline Json network_session(const char* kind, const char* eta1 = "2.4e4 Pa s") {
   return json;
 }
 
+/// A ball that presses into the same liver and slides over it.
+inline Json slide_session() {
+  Json json = network_session("surface");
+  json.erase("indentations");
+  json["slides"] = Json::parse(R"({"depths": ["4 mm"], "press": "10 mm/s", "direction": [0, 1, -3],
+                                   "distance": "20 mm", "rate": "20 mm/s", "rest": "0.2 s"})");
+  return json;
+}
+
 inline HilSession parsed(const Json& json) {
   return parse_session(json, "session", {});
 }

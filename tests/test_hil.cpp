@@ -94,14 +94,6 @@ TEST_CASE("A session of the element verifies against the network, the closed for
   CHECK(v.phases.size() == recording.session.phases.size());
 }
 
-Json slide_session() {
-  Json json = test::network_session("surface");
-  json.erase("indentations");
-  json["slides"] = Json::parse(R"({"depths": ["4 mm"], "press": "10 mm/s", "direction": [0, 1, -3],
-                                   "distance": "20 mm", "rate": "20 mm/s", "rest": "0.2 s"})");
-  return json;
-}
-
 /// How deep the operator of a session means to be under where the ball would touch the organ at
 /// rest, while sliding: least and most. Found by halving, sphere by sphere.
 std::pair<double, double> depths_while_sliding(const HilSession& session) {
@@ -128,7 +120,7 @@ std::pair<double, double> depths_while_sliding(const HilSession& session) {
 }
 
 TEST_CASE("A slide follows the surface of the organ", "[heavy]") {
-  HilSession session = parsed(slide_session());
+  HilSession session = parsed(test::slide_session());
   const auto [straight_least, straight_most] = depths_while_sliding(session);
   follow_surface(session);
   const auto [least, most] = depths_while_sliding(session);
@@ -157,7 +149,7 @@ TEST_CASE("A slide follows the surface of the organ", "[heavy]") {
 }
 
 TEST_CASE("A session over the surface verifies in all three components", "[heavy]") {
-  const Json json = slide_session();
+  const Json json = test::slide_session();
   HilSession session = parsed(json);
   follow_surface(session);
   CHECK(session.slide == Eigen::Vector3d::UnitY());

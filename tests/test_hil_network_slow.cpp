@@ -1,12 +1,16 @@
 // Sessions with a whole network in the loop, or beside it.
 #include <catch2/catch.hpp>
 
+#include "counted_allocations.hpp"
 #include "endless_motion.hpp"
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/session_run.hpp"
+#include "tpm/haptics/surface_scene.hpp"
 #include "tpm/haptics/verify.hpp"
+#include "tpm/servo/servo_step.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -46,6 +50,37 @@ TEST_CASE("A session of the whole network verifies, stepped in the loop and besi
   const Verification v = verify(beside.recording, options);
   CHECK(v.all.max_N < 0.004 * v.all.peak_N);
   CHECK(beside.bytes == ran("network_beside").bytes);
+}
+
+TEST_CASE("No model of the loop takes from the heap or gives back while it is stepped") {
+  const Json session =
+      GENERATE_COPY(test::network_session("network"), test::network_session("network_beside"),
+                    test::network_session("condensed"), test::network_session("planned"),
+                    test::with(test::network_session("planned"), "/model/tolerance", "0.2%"),
+                    test::short_session(), test::slide_session());
+  CAPTURE(session.at("model").dump());
+  HilSession parsed = test::parsed(session);
+  follow_surface(parsed);
+  const LoopModel model = make_loop_model(parsed);
+  VirtualOmega7 device(parsed.plant, parsed.operator_script());
+  device.prepare(parsed.preparation);
+  ServoSettings settings = parsed.servo;
+  settings.model_push = model.push;
+  settings.to_model = model.to_model;
+  ServoStep step(device, *model.model, settings);
+  ServoRecord row;
+  double most_N = 0.0;
+  StopCause cause = StopCause::none;
+  const testing::HeapWatch heap;
+  while (cause == StopCause::none) {
+    cause = step.cycle(0, row);
+    device.advance(settings.period_s);
+    most_N = std::max(most_N, Eigen::Map<const Eigen::Vector3d>(row.commanded_N).norm());
+  }
+  const long calls = heap.calls();
+  CHECK(calls == 0);
+  CHECK(cause == StopCause::finished);
+  CHECK(most_N > 0.05);
 }
 
 /// One session with each tolerance: what was picked, and how far it was from the reference.

@@ -1,10 +1,9 @@
 // The servo step: what it renders, limits, counts and refuses.
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <new>
 
+#include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
@@ -15,33 +14,6 @@
 #include "tpm/haptics/verify.hpp"
 #include "tpm/servo/servo_loop.hpp"
 #include "tpm/store/file.hpp"
-
-namespace {
-
-// Counts every allocation of this program while it is asked to.
-bool counting = false;
-long allocations = 0;
-
-}  // namespace
-
-// NOLINTBEGIN: replaced for the whole program, which is the point
-// Not inlined, or g++ sees malloc meet delete.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  if (counting) ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t& /*how*/) noexcept {
-  if (counting) ++allocations;
-  return std::malloc(size);
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-// NOLINTEND
 
 namespace tpm {
 namespace {
@@ -90,6 +62,15 @@ ServoSettings plain(std::uint64_t cycles = 1'000'000) {
   return s;
 }
 
+TEST_CASE("What is taken from the heap is counted, by new and by Eigen") {
+  const testing::HeapWatch heap;
+  const auto text = std::make_unique<std::string>(100, 'x');
+  const Eigen::VectorXd vector = Eigen::VectorXd::Random(100);
+  const long taken = heap.calls();
+  CHECK(taken == 3);  // a string, its text, a vector
+  CHECK(text->size() + static_cast<std::size_t>(vector.size()) == 200);
+}
+
 TEST_CASE("A step neither allocates nor frees") {
   const HilSession session = test::parsed(test::short_session());
   VirtualOmega7 device(session.plant, session.operator_script());
@@ -98,21 +79,15 @@ TEST_CASE("A step neither allocates nor frees") {
   ServoSettings settings = session.servo;
   ServoStep step(device, model, settings);
   ServoRecord row;
-  allocations = 0;
-  counting = true;
   StopCause cause = StopCause::none;
+  const testing::HeapWatch heap;
   while (cause == StopCause::none) {
     cause = step.cycle(0, row);
     device.advance(settings.period_s);
   }
-  counting = false;
+  const long calls = heap.calls();
   CHECK(cause == StopCause::finished);
-  CHECK(allocations == 0);
-  delete new int(1);  // the counter itself works
-  counting = true;
-  delete new std::string(100, 'x');
-  counting = false;
-  CHECK(allocations >= 1);
+  CHECK(calls == 0);
 }
 
 TEST_CASE("A ramp and hold renders Eq. 11's ramp in closed form") {

@@ -1,10 +1,8 @@
 // The servo network on a small organ, and what it is made of.
 #include <Eigen/Cholesky>
-#include <atomic>
 #include <catch2/catch.hpp>
-#include <cstdlib>
-#include <new>
 
+#include "counted_allocations.hpp"
 #include "organ_scene.hpp"
 #include "star_network.hpp"
 #include "tpm/benchmark/contact_reference.hpp"
@@ -18,8 +16,6 @@ using namespace tpm;
 using tpm::testing::OrganScene;
 
 namespace {
-
-std::atomic<long> allocations{0};
 
 const OrganScene& small_liver() {
   static const OrganScene scene = [] {
@@ -61,23 +57,6 @@ double largest(const Eigen::Matrix3Xd& vectors) {
 }
 
 }  // namespace
-
-// Not inlined, or g++ sees malloc meet delete.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* const memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t& /*how*/) noexcept {
-  ++allocations;
-  return std::malloc(size);
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t /*size*/) noexcept {
-  std::free(memory);
-}
 
 TEST_CASE("a factor in fronts solves as a dense one does", "[frontal]") {
   Random random(3);
@@ -282,9 +261,10 @@ TEST_CASE("a step of the servo network allocates nothing, and runs repeat", "[se
   const Answers first = follow(servo, motion);
   const Answers again = follow(servo, motion);
   CHECK(first.force_N == again.force_N);
-  const long before = allocations;
+  const tpm::testing::HeapWatch heap;
   for (Eigen::Index i = 0; i < motion.steps(); ++i) servo.step(motion.displacement_m.col(i));
-  CHECK(allocations == before);
+  const long calls = heap.calls();
+  CHECK(calls == 0);
   Eigen::Matrix3Xd all(3, servo.spheres());
   servo.displacements(all);
   const Eigen::Vector3d at = motion.displacement_m.rightCols<1>();

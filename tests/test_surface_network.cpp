@@ -1,12 +1,10 @@
 // A ball that moves over the surface of a small block: the servo model against the full network,
 // and both against what they have to obey.
-#include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <new>
 
+#include "counted_allocations.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/surface_scene.hpp"
@@ -14,31 +12,6 @@
 #include "tpm/network/network.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/reduce/surface_network.hpp"
-
-namespace {
-
-std::atomic<long> allocations{0};
-
-}  // namespace
-
-// NOLINTBEGIN: replaced for the whole program, which is the point
-// Not inlined, or g++ sees malloc meet delete.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* const memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t& /*how*/) noexcept {
-  ++allocations;
-  return std::malloc(size);
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t /*size*/) noexcept {
-  std::free(memory);
-}
-// NOLINTEND
 
 namespace tpm {
 namespace {
@@ -321,9 +294,10 @@ TEST_CASE("Random motions of a ball draw nothing, repeat to the bit and allocate
   };
   std::vector<Eigen::Vector3d> first(way.size()), again(way.size()), plain(way.size());
   follow(servo, first);
-  const long before = allocations;
+  const tpm::testing::HeapWatch heap;
   follow(servo, again);
-  CHECK(allocations == before);
+  const long calls = heap.calls();
+  CHECK(calls == 0);
   CHECK(first == again);
   SurfaceNetwork portable = scene.servo({.portable = true});
   follow(portable, plain);

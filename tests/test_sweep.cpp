@@ -505,6 +505,9 @@ TEST_CASE("convergence along an axis: order and limit of a known error, and its 
   CHECK(test::refusal_of([&] {
           static_cast<void>(convergence_of(reader, "second", "x", "", {{"x", 0}}));
         }).find("looked along") != std::string::npos);
+  CHECK(test::refusal_of([&] {
+          static_cast<void>(convergence_of(reader, "second", "x", "1/n", {}));
+        }).find("unknown symbol 'n'; expected x") != std::string::npos);
 }
 
 TEST_CASE("steps of the integrator: the order of two Radau nodes is three") {

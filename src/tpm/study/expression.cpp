@@ -97,6 +97,15 @@ struct Evaluator::Impl {
     return definition == definitions.end() ? nullptr : &definition->second;
   }
 
+  /// What may be named: all of it where the scope is all there is, else where to look.
+  std::string known(const Scope& scope) const {
+    if (!symbols.empty() || !definitions.empty()) return "a name from 'symbols' or 'definitions'";
+    std::vector<std::string> names;
+    for (const auto& [name, value] : scope.values) names.push_back(name);
+    for (const auto& [name, formula] : scope.formulas) names.push_back(name);
+    return names.empty() ? "numbers only" : fmt::format("{}", fmt::join(names, ", "));
+  }
+
   double lookup(const std::string& name, const Scope& scope, std::string_view where, int depth) {
     if (const auto value = scope.values.find(name); value != scope.values.end()) {
       return value->second;
@@ -104,8 +113,7 @@ struct Evaluator::Impl {
     const std::string* formula = formula_of(name, scope);
     if (formula == nullptr) {
       if (const auto symbol = symbols.find(name); symbol != symbols.end()) return symbol->second;
-      throw bad_input(where, fmt::format("unknown symbol '{}'", printable(name)),
-                      "a name from 'symbols' or 'definitions'");
+      throw bad_input(where, fmt::format("unknown symbol '{}'", printable(name)), known(scope));
     }
     if (depth >= kDeepestDefinition) {
       throw bad_input(where, fmt::format("'{}' refers to itself", printable(name)),
