@@ -18,12 +18,6 @@ namespace tpm_test {
 
 using namespace tpm;
 
-inline TpmParameters with_tau(double tau_s) {
-  TpmParameters p;
-  p.eta1_Pa_s = tau_s * (p.E1_Pa + p.E2_Pa);
-  return p;
-}
-
 /// A problem with its true answers.
 struct Judged {
   std::string name;

@@ -21,9 +21,8 @@ struct SmallOrgan {
   CondensedOptions options{4e-3, 1e-3, 1e-3};
 
   [[nodiscard]] BondSystem bonds(double relaxation_time_s) const {
-    TpmParameters material = tissue.material;
-    material.eta1_Pa_s = relaxation_time_s * (material.E1_Pa + material.E2_Pa);
-    return {tissue.network, material, tissue.lateral};
+    return {tissue.network, tissue.material.with_relaxation_time(relaxation_time_s),
+            tissue.lateral};
   }
   [[nodiscard]] CondensedContact build(double relaxation_time_s) const {
     return build_condensed(bonds(relaxation_time_s), tissue.network.organ.position,

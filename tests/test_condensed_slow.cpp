@@ -25,8 +25,7 @@ struct Liver {
 
 /// Ramp to 8 mm and hold, against the quasi-static network in fixed steps.
 double error_of_ramp(const Liver& liver, double relaxation_time_s, double ramp_s, double hold_s) {
-  TpmParameters material = liver.tissue.material;
-  material.eta1_Pa_s = relaxation_time_s * (material.E1_Pa + material.E2_Pa);
+  const TpmParameters material = liver.tissue.material.with_relaxation_time(relaxation_time_s);
   const BondSystem bonds(liver.tissue.network, material, liver.tissue.lateral);
   Freedom freedom = liver.tissue.freedom();
   freedom.guide(liver.contact, liver.into);

@@ -21,9 +21,7 @@ using tpm_test::Star;
 namespace {
 
 TpmParameters material(double relaxation_time_s) {
-  TpmParameters p;
-  p.eta1_Pa_s = relaxation_time_s * (p.E1_Pa + p.E2_Pa);
-  return p;
+  return TpmParameters{}.with_relaxation_time(relaxation_time_s);
 }
 
 Tool tool_at(const Organ& organ, std::size_t sphere, const Eigen::Vector3d& direction,

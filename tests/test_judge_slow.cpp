@@ -39,9 +39,7 @@ TEST_CASE("an independent solver finds the same contact force of the liver, push
   const Probe probe{contact, -organ.normal.col(static_cast<Eigen::Index>(contact))};
   for (const double tau : {0.5, 10.0}) {
     CAPTURE(tau);
-    TpmParameters material;
-    material.eta1_Pa_s = tau * (material.E1_Pa + material.E2_Pa);
-    const BondSystem bonds(tissue.network, material);
+    const BondSystem bonds(tissue.network, TpmParameters{}.with_relaxation_time(tau));
     const Eigen::VectorXd force =
         QuasiStatic(bonds, organ.position, tissue.freedom(), probe, {.tolerance = 1e-8})
             .run(ramp_and_hold(8e-3, 4e-3, 29.0), std::vector<double>{2.0, 31.0})

@@ -73,20 +73,20 @@ bool done(const MethodRun& run) {
 }  // namespace
 
 TEST_CASE("method: orders on the element under an imposed depth") {
-  const TpmParameters p = with_tau(0.1);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const Judged judged =
       judged_element("ramp and hold", p, ramp_and_hold(0.004, 0.02, 0.2), tenths(0.4));
   check_orders(judged, 0.00125, {StepRule::exponential});
 }
 
 TEST_CASE("method: orders on the element under a load") {
-  const TpmParameters p = with_tau(0.1);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const Judged judged = judged_element("creep", p, creep(0.3, 1.0), tenths(0.4));
   check_orders(judged, 0.00125);
 }
 
 TEST_CASE("method: orders on the element with mass") {
-  TpmParameters p = with_tau(0.02);
+  TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   p.Eprime_Pa = 0.0;
   // 10 Hz or so, damped enough for forward Euler.
   const Judged judged = judged_moving_element(p, 0.03, 40.0, 0.1, tenths(0.2));
@@ -94,7 +94,7 @@ TEST_CASE("method: orders on the element with mass") {
 }
 
 TEST_CASE("method: orders on the star") {
-  const TpmParameters p = with_tau(0.1);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const Star star(p);
   const DrivenNetwork network{
       star.bonds, star.network.organ.position, star.freedom, Probes(Star::probe()), {}};
@@ -108,7 +108,7 @@ TEST_CASE("method: orders on the star") {
 }
 
 TEST_CASE("method: the element and the star answer alike under every rule") {
-  const TpmParameters p = with_tau(0.1);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const Star star(p);
   const DrivenNetwork network{
       star.bonds, star.network.organ.position, star.freedom, Probes(Star::probe()), {}};
@@ -142,7 +142,7 @@ TEST_CASE("method: the element and the star answer alike under every rule") {
 }
 
 TEST_CASE("method: what orders fall to where the step is far above the relaxation time") {
-  const TpmParameters p = with_tau(1e-5);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(1e-5);
   SECTION("a load that rises: elongations are not linear in time") {
     const Protocol protocol(Drive::force, {{0.0, 0.0}, {1.0, 0.5}});
     const std::vector<double> times = tenths(1.0);
@@ -182,7 +182,7 @@ TEST_CASE("method: what orders fall to where the step is far above the relaxatio
 }
 
 TEST_CASE("method: stability limits of memory alone are those of theory") {
-  const TpmParameters p = with_tau(0.1);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const auto limit = [&](StepRule rule) {
     return bisected_limit(0.01, 10.0, 2e-3,
                           [&](double h) { return done(held(p, rule, h, 4000.0)); });
@@ -192,7 +192,7 @@ TEST_CASE("method: stability limits of memory alone are those of theory") {
 }
 
 TEST_CASE("method: stability limits of a vibrating sphere are those of theory") {
-  TpmParameters p = with_tau(1e9);  // elastic
+  TpmParameters p = TpmParameters{}.with_relaxation_time(1e9);  // elastic
   p.Eprime_Pa = 0.0;
   const double mass = 0.0044;
   const double omega = std::sqrt(p.E2_Pa * p.modulus_to_stiffness_m() / mass);
@@ -211,8 +211,8 @@ TEST_CASE("method: stability limits of a vibrating sphere are those of theory") 
 }
 
 TEST_CASE("method: implicit rules have no stability limit") {
-  const TpmParameters p = with_tau(0.1);
-  TpmParameters elastic = with_tau(1e9);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
+  TpmParameters elastic = TpmParameters{}.with_relaxation_time(1e9);
   elastic.Eprime_Pa = 0.0;
   for (const StepRule rule :
        {StepRule::backward_euler, StepRule::implicit_midpoint, StepRule::newmark, StepRule::tr_bdf2,
@@ -255,7 +255,7 @@ TEST_CASE("method: which rules hold the paper's element at 1 kHz, and how well")
 }
 
 TEST_CASE("method: steps end at kinks and jumps, and times between steps are answered") {
-  const TpmParameters p = with_tau(0.1);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const Protocol jumps(
       Drive::displacement,
       {{0.0, 0.0}, {0.1, 0.002}, {0.1, 0.004}, {0.25, 0.004}, {0.25, 0.001}, {0.4, 0.003}});
@@ -271,7 +271,7 @@ TEST_CASE("method: steps end at kinks and jumps, and times between steps are ans
 }
 
 TEST_CASE("method: a preload held for ever is where a run begins") {
-  const TpmParameters p = with_tau(0.1);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   for (const Drive drive : {Drive::displacement, Drive::force}) {
     const double value = drive == Drive::displacement ? 0.003 : 0.2;
     Protocol protocol(drive, {{0.0, value}, {1.0, value}});
@@ -290,7 +290,7 @@ TEST_CASE("method: a preload held for ever is where a run begins") {
 }
 
 TEST_CASE("method: failures say what happened") {
-  const TpmParameters p = with_tau(0.1);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   MethodSettings settings;
   const std::vector<double> times{1.0};
   const auto problem = element_problem(p, step_and_hold(0.004, 1.0));

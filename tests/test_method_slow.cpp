@@ -40,7 +40,7 @@ void check_orders(const Judged& judged, const std::map<int, double>& step_s, dou
 }  // namespace
 
 TEST_CASE("method on an organ: orders without masses") {
-  const SmallOrgan organ(with_tau(0.1));
+  const SmallOrgan organ(TpmParameters{}.with_relaxation_time(0.1));
   const std::map<int, double> steps{{1, 0.003125}, {2, 0.0125}, {4, 0.0125}};
   check_orders(organ.resting("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4)), steps, 0.0);
   const Protocol load(Drive::force, {{0.0, 0.0}, {0.2, 0.1}, {0.5, 0.1}});
@@ -48,7 +48,7 @@ TEST_CASE("method on an organ: orders without masses") {
 }
 
 TEST_CASE("method on an organ: orders with masses") {
-  const SmallOrgan organ(with_tau(0.1));
+  const SmallOrgan organ(TpmParameters{}.with_relaxation_time(0.1));
   const std::map<int, double> steps{{1, 1.25e-4}, {2, 5e-4}, {4, 5e-4}};
   // The judge itself is good to some 1e-9.
   check_orders(organ.moving("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4), 0.5), steps,
@@ -56,7 +56,7 @@ TEST_CASE("method on an organ: orders with masses") {
 }
 
 TEST_CASE("method on an organ: XPBD lags without masses, and less the more it sweeps") {
-  const SmallOrgan organ(with_tau(0.1));
+  const SmallOrgan organ(TpmParameters{}.with_relaxation_time(0.1));
   const Judged judged = organ.resting("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4));
   MethodSettings settings;
   settings.rule = StepRule::xpbd;
@@ -79,7 +79,7 @@ TEST_CASE("method on an organ: XPBD lags without masses, and less the more it sw
 }
 
 TEST_CASE("method on an organ: a tissue that buckles says so") {
-  const TpmParameters p = with_tau(0.02);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   const Star star(p);
   Freedom unguided(4);
   for (const std::size_t i : {1, 2, 3}) unguided.hold(i);

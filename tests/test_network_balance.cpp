@@ -24,12 +24,6 @@ const Organ& small_liver() {
   return organ;
 }
 
-TpmParameters relaxing_in(double relaxation_time_s) {
-  TpmParameters p;
-  p.eta1_Pa_s = relaxation_time_s * (p.E1_Pa + p.E2_Pa);
-  return p;
-}
-
 /// Ramps between random depths, from rest and back to it.
 Protocol closed_protocol(Random& random) {
   std::vector<Knot> knots{{0.0, 0.0}};
@@ -67,8 +61,8 @@ TEST_CASE("work done is stored or dissipated, over random closed protocols", "[h
     const double tau = std::pow(10.0, 4.0 * random.uniform() - 2.0);
     const Protocol protocol = closed_protocol(random);
     const std::vector<double> end{protocol.knots().back().time_s};
-    const QuasiStaticRun run =
-        scene.run(relaxing_in(tau), protocol, end, {.tolerance = 1e-11, .energies = true});
+    const QuasiStaticRun run = scene.run(TpmParameters{}.with_relaxation_time(tau), protocol, end,
+                                         {.tolerance = 1e-11, .energies = true});
     REQUIRE(run.energy);
     CAPTURE(i, tau, run.energy->work_J, run.energy->stored_J, run.energy->dissipated_J);
     CHECK(run.energy->dissipated_J > 0.0);
@@ -83,8 +77,9 @@ TEST_CASE("the work of a load is stored or dissipated, at once and for ever") {
   const double inf = std::numeric_limits<double>::infinity();
   const Protocol protocol(Drive::force, {{0.0, 0.0}, {0.0, 0.05}, {1.0, 0.15}, {3.0, 0.02}},
                           "loads", true);
-  const QuasiStaticRun run = scene.run(relaxing_in(0.7), protocol, std::vector<double>{5.0, inf},
-                                       {.tolerance = 1e-11, .energies = true});
+  const QuasiStaticRun run =
+      scene.run(TpmParameters{}.with_relaxation_time(0.7), protocol, std::vector<double>{5.0, inf},
+                {.tolerance = 1e-11, .energies = true});
   REQUIRE(run.energy);
   CHECK(run.energy->dissipated_J > 0.0);
   CHECK_THAT(run.energy->stored_J + run.energy->dissipated_J, WithinRel(run.energy->work_J, 1e-9));
@@ -92,7 +87,7 @@ TEST_CASE("the work of a load is stored or dissipated, at once and for ever") {
 
 TEST_CASE("the error falls with the power of the step that the collocation has") {
   const OrganScene scene(small_liver());
-  const TpmParameters material = relaxing_in(0.5);
+  const TpmParameters material = TpmParameters{}.with_relaxation_time(0.5);
   const Protocol protocol(Drive::displacement, {{0.0, 0.0}, {1.0, 6e-3}});
   const std::vector<double> end{1.0};
   const double exact = scene.run(material, protocol, end, {.tolerance = 1e-12}).response[0];
@@ -109,7 +104,7 @@ TEST_CASE("the error falls with the power of the step that the collocation has")
 
 TEST_CASE("the load and the reactions of the anchors balance, in force and in moment") {
   const OrganScene scene(small_liver());
-  const TpmParameters material = relaxing_in(2.0);
+  const TpmParameters material = TpmParameters{}.with_relaxation_time(2.0);
   const Protocol protocol = creep(0.1, 10.0);
   const std::vector<double> end{1.0};
   const QuasiStaticRun run = scene.run(material, protocol, end, {.tolerance = 1e-12});
@@ -136,7 +131,7 @@ TEST_CASE(
   const Organ& organ = small_liver();
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
-  const TpmParameters material = relaxing_in(1.0);
+  const TpmParameters material = TpmParameters{}.with_relaxation_time(1.0);
   const Protocol protocol = ramp_and_hold(6e-3, 4e-3, 5.0);
   const std::vector<double> times{0.3, 1.5, 2.0, 6.5};
   const QuasiStaticOptions options{.tolerance = 1e-11};

@@ -27,11 +27,7 @@ struct Scene {
     request.count = 60;
     return fill_liver(request);
   }
-  static TpmParameters material() {
-    TpmParameters p;
-    p.eta1_Pa_s = 0.7 * (p.E1_Pa + p.E2_Pa);
-    return p;
-  }
+  static TpmParameters material() { return TpmParameters{}.with_relaxation_time(0.7); }
   [[nodiscard]] SeenRun see(const Protocol& protocol, const std::vector<double>& times,
                             const QuasiStaticState* from = nullptr) const {
     SeenRun seen;

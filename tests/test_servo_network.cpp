@@ -26,12 +26,6 @@ const OrganScene& small_liver() {
   return scene;
 }
 
-TpmParameters material_with(double relaxation_time_s) {
-  TpmParameters material;
-  material.eta1_Pa_s = relaxation_time_s * (material.E1_Pa + material.E2_Pa);
-  return material;
-}
-
 /// What a model answered along a motion.
 struct Answers {
   Eigen::Matrix3Xd force_N;
@@ -120,7 +114,8 @@ TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const double z = 0.3;
-  const BondSystem bonds(scene.network, material_with(1.0), LateralBond::tension_only);
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(1.0),
+                         LateralBond::tension_only);
   std::vector<ServoBonds::Choice> all;
   for (std::size_t b = 0; b < bonds.size(); ++b) {
     all.push_back({b, bonds.end_a()[b], bonds.end_b()[b]});
@@ -181,7 +176,7 @@ TEST_CASE("the servo network follows the network along the normal and in space",
   const Eigen::Vector3d into = scene.probe.direction;
   const ContactAxes axes = contact_axes(into);
   for (const double tau : {2e-4, 0.05, 100.0}) {
-    const BondSystem bonds(scene.network, material_with(tau));
+    const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(tau));
     const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
     ServoNetwork servo(bonds, rest, scene.freedom, scene.probe.sphere, into);
     const ContactMotion ramp = ramp_motion(into, 6e-3, 0.05, 0.1, servo.period_s());
@@ -209,7 +204,7 @@ TEST_CASE("the servo network follows the network along the normal and in space",
 
 TEST_CASE("the fine reference is the quasi-static network", "[servo][heavy]") {
   const OrganScene& scene = small_liver();
-  const BondSystem bonds(scene.network, material_with(5e-3));
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(5e-3));
   const TouchedTissue tissue{bonds, scene.network.organ.position, scene.freedom,
                              scene.probe.sphere};
   const ContactAxes axes = contact_axes(scene.probe.direction);
@@ -229,7 +224,7 @@ TEST_CASE("the fine reference is the quasi-static network", "[servo][heavy]") {
 TEST_CASE("the cost of linear elongations is what halving the step says", "[servo]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
-  const BondSystem bonds(scene.network, material_with(2e-3));
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(2e-3));
   const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
   const double period_s = 1e-3;
   // So small that the network is linear.
@@ -254,7 +249,7 @@ TEST_CASE("the cost of linear elongations is what halving the step says", "[serv
 
 TEST_CASE("a step of the servo network allocates nothing, and runs repeat", "[servo][heavy]") {
   const OrganScene& scene = small_liver();
-  const BondSystem bonds(scene.network, material_with(0.01));
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.01));
   const Eigen::Vector3d into = scene.probe.direction;
   ServoNetwork servo(bonds, scene.network.organ.position, scene.freedom, scene.probe.sphere, into);
   const ContactMotion motion = random_motion_in_space(contact_axes(into), 6e-3, 1e-3, 50, 0, 1e-3);
@@ -278,7 +273,7 @@ TEST_CASE("a step of the servo network allocates nothing, and runs repeat", "[se
 
 TEST_CASE("the servo network says when it is out of its range", "[servo]") {
   const OrganScene& scene = small_liver();
-  const BondSystem bonds(scene.network, material_with(0.01));
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.01));
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
   ServoNetwork servo(bonds, rest, scene.freedom, scene.probe.sphere, into, {.deepest_m = 5e-3});
@@ -298,7 +293,7 @@ TEST_CASE("the servo network says when it is out of its range", "[servo]") {
 
 TEST_CASE("a guided sphere stays on its guide in the servo network", "[servo]") {
   const OrganScene& scene = small_liver();
-  const BondSystem bonds(scene.network, material_with(0.01));
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.01));
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
   std::size_t guided = 0;

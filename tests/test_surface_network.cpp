@@ -19,12 +19,6 @@ namespace {
 using Catch::Matchers::WithinAbs;
 using Way = std::vector<Eigen::Vector3d>;
 
-TpmParameters relaxing_in(double tau_s) {
-  TpmParameters material;
-  material.eta1_Pa_s = tau_s * (material.E1_Pa + material.E2_Pa);
-  return material;
-}
-
 Organ block_with_contact() {
   Organ organ = block(4, 3, 2, 0.020, Lattice::cubic);
   organ.contact = 6;  // in the middle of the top but for one row
@@ -43,7 +37,7 @@ Freedom standing(const Organ& organ) {
 struct BallScene {
   explicit BallScene(double tau_s, double radius_m = 10e-3)
       : network(build_network(block_with_contact(), {}, "scene")),
-        bonds(network, relaxing_in(tau_s)),
+        bonds(network, TpmParameters{}.with_relaxation_time(tau_s)),
         freedom(standing(network.organ)),
         ball(ball_on_surface(network.organ, *network.organ.contact, into, radius_m)) {}
   [[nodiscard]] const Positions& rest() const { return network.organ.position; }

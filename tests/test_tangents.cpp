@@ -36,8 +36,7 @@ TpmParameters unequal(double relaxation_time_s) {
   p.E1_Pa = 9e3;
   p.E2_Pa = 14e3;
   p.Eprime_Pa = 11e3;
-  p.eta1_Pa_s = relaxation_time_s * (p.E1_Pa + p.E2_Pa);
-  return p;
+  return p.with_relaxation_time(relaxation_time_s);
 }
 
 void check_star(const Protocol& protocol, const std::vector<double>& times) {

@@ -23,12 +23,6 @@ const OrganScene& small_liver() {
   return scene;
 }
 
-TpmParameters material_with(double relaxation_time_s) {
-  TpmParameters material;
-  material.eta1_Pa_s = relaxation_time_s * (material.E1_Pa + material.E2_Pa);
-  return material;
-}
-
 struct Followed {
   Eigen::Matrix3Xd force_N;
   double estimate_N = 0.0;
@@ -51,7 +45,7 @@ Followed follow(ContactModel& model, const ContactMotion& motion) {
 TEST_CASE("a zone that holds the whole organ is the servo network", "[zone][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
-  const BondSystem bonds(scene.network, material_with(0.02));
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.02));
   const Eigen::Vector3d into = scene.probe.direction;
   ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, into, {.rings = 50});
   ServoNetwork whole(bonds, rest, scene.freedom, scene.probe.sphere, into);
@@ -72,7 +66,7 @@ TEST_CASE("the surroundings of a zone are exact where the network is linear", "[
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
   for (const double tau : {2e-3, 10.0}) {
-    const BondSystem bonds(scene.network, material_with(tau));
+    const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(tau));
     const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
     ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, into,
                      {.rings = 1, .linear_depth_m = 0.0, .frozen_depth_m = 0.0});
@@ -101,7 +95,7 @@ TEST_CASE("a zone's error falls with its rings, and the estimate follows", "[zon
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
-  const BondSystem bonds(scene.network, material_with(0.02));
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.02));
   const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
   const ContactMotion ramp = ramp_motion(into, 6e-3, 0.05, 0.05, 1e-3);
   const Eigen::VectorXd exact = line_reference(tissue, ramp, 1e-9);
@@ -122,7 +116,7 @@ TEST_CASE("a zone's error falls with its rings, and the estimate follows", "[zon
 TEST_CASE("a zone refuses what it cannot do", "[zone][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
-  const BondSystem bonds(scene.network, material_with(0.02));
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.02));
   const Eigen::Vector3d into = scene.probe.direction;
   CHECK_THROWS_AS(ZoneNetwork(bonds, rest, scene.freedom, scene.probe.sphere, into, {.rings = 0}),
                   Error);

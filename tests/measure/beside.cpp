@@ -49,8 +49,7 @@ void measure(const std::string& file, Eigen::Index steps, std::uint64_t seed) {
       "tau_s,peak_N,off_of_peak,rms_off_of_peak,estimate_of_peak,least_work_J,largest_work_J,"
       "least_work_in_loop_J\n");
   for (const double tau_s : {0.1, 1.0, 10.0}) {
-    TpmParameters material = tissue.material;
-    material.eta1_Pa_s = tau_s * (material.E1_Pa + material.E2_Pa);
+    const TpmParameters material = tissue.material.with_relaxation_time(tau_s);
     const BondSystem bonds(tissue.network, material, tissue.lateral);
     const auto network = [&](double period_s) {
       return std::make_unique<ServoNetwork>(

@@ -68,9 +68,8 @@ struct Scene {
   Eigen::Vector3d into;
 
   [[nodiscard]] BondSystem bonds(double relaxation_time_s) const {
-    TpmParameters material = tissue.material;
-    material.eta1_Pa_s = relaxation_time_s * (material.E1_Pa + material.E2_Pa);
-    return {tissue.network, material, tissue.lateral};
+    return {tissue.network, tissue.material.with_relaxation_time(relaxation_time_s),
+            tissue.lateral};
   }
 };
 

@@ -66,8 +66,7 @@ void measure(const OrganScene& scene) {
              "end, N");
   const Protocol protocol = ramp_and_hold(8e-3, 4e-3, 29.0);
   for (const double tau : {2e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0}) {
-    TpmParameters material;
-    material.eta1_Pa_s = tau * (material.E1_Pa + material.E2_Pa);
+    const TpmParameters material = TpmParameters{}.with_relaxation_time(tau);
     const std::vector<double> times = output_times(tau);
     const BondSystem bonds(scene.network, material);
     const Positions& rest = scene.network.organ.position;

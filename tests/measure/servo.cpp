@@ -35,9 +35,7 @@ struct Setup {
     into = -tissue.network.organ.normal.col(static_cast<Eigen::Index>(contact));
   }
   [[nodiscard]] BondSystem bonds(double tau_s) const {
-    TpmParameters material = tissue.material;
-    material.eta1_Pa_s = tau_s * (material.E1_Pa + material.E2_Pa);
-    return {tissue.network, material, tissue.lateral};
+    return {tissue.network, tissue.material.with_relaxation_time(tau_s), tissue.lateral};
   }
   [[nodiscard]] const Positions& rest() const { return tissue.network.organ.position; }
 

@@ -55,8 +55,7 @@ class ServoCase {
         line(along_line),
         compared(motions(into)) {
     for (const double tau_s : taus_s) {
-      TpmParameters material = tissue.material;
-      material.eta1_Pa_s = tau_s * (material.E1_Pa + material.E2_Pa);
+      const TpmParameters material = tissue.material.with_relaxation_time(tau_s);
       bonds_.push_back(std::make_unique<BondSystem>(tissue.network, material, tissue.lateral));
     }
   }

@@ -120,8 +120,7 @@ TpmParameters RenderedContact::material() const {
   TpmParameters p;
   p.Eprime_Pa = 0.0;
   p.E1_Pa = p.E2_Pa = stiffness_N_per_m / p.modulus_to_stiffness_m();
-  p.eta1_Pa_s = relaxation_time_s * (p.E1_Pa + p.E2_Pa);
-  return p;
+  return p.with_relaxation_time(relaxation_time_s);
 }
 
 double RenderedContact::dashpot_N_s_per_m() const {

@@ -29,6 +29,12 @@ struct TpmParameters {
 
   /// tau = eta1 / (E1 + E2), s: decay time of the force at constant elongation.
   [[nodiscard]] double relaxation_time_s() const { return eta1_Pa_s / (E1_Pa + E2_Pa); }
+  /// The same springs with another relaxation time.
+  [[nodiscard]] TpmParameters with_relaxation_time(double time_s) const {
+    TpmParameters other = *this;
+    other.eta1_Pa_s = time_s * (E1_Pa + E2_Pa);
+    return other;
+  }
   /// P2 = E1 E2 / (E1 + E2), Pa: modulus after full relaxation, without tension.
   [[nodiscard]] double relaxed_modulus_Pa() const { return E1_Pa * E2_Pa / (E1_Pa + E2_Pa); }
   /// g = E2^2 / (E1 + E2), Pa: the part of E2 that relaxes; E2 = P2 + g.

@@ -229,10 +229,8 @@ PlanScene PlanScene::stiffer(double factor) const {
 
 PlanScene PlanScene::nothing_relaxing() const {
   constexpr double kNever = 1e9;  // durations
-  TpmParameters material = scene_.tissue.material;
   const double lasts_s = duration_s() > 0.0 ? duration_s() : 1.0;
-  material.eta1_Pa_s = kNever * lasts_s * (material.E1_Pa + material.E2_Pa);
-  return with_material(material);
+  return with_material(scene_.tissue.material.with_relaxation_time(kNever * lasts_s));
 }
 
 PlanScene PlanScene::all_relaxed() const {

@@ -36,8 +36,7 @@ std::optional<RampAndHold> as_ramp_and_hold(const Protocol& protocol) {
 }
 
 ExperimentScene with_unit_relaxation(ExperimentScene scene) {
-  TpmParameters& material = scene.tissue.material;
-  material.eta1_Pa_s = (material.E1_Pa + material.E2_Pa) * 1.0;
+  scene.tissue.material = scene.tissue.material.with_relaxation_time(1.0);
   return scene;
 }
 

@@ -94,9 +94,9 @@ void add_relaxation_times(std::vector<StabilityCorner>& corners) {
   corners.push_back(depth_at_once("eta1 -> infinity (1e15 Pa s)", p, kCornerDepth_m, kStep_s,
                                   "an elastic element: all hold"));
   for (const double ratio : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
-    StabilityCorner corner =
-        depth_at_once("h/tau = " + significant(ratio, 2), with_relaxation_time(kStep_s / ratio),
-                      kCornerDepth_m, kStep_s, kByTheory);
+    StabilityCorner corner = depth_at_once("h/tau = " + significant(ratio, 2),
+                                           TpmParameters{}.with_relaxation_time(kStep_s / ratio),
+                                           kCornerDepth_m, kStep_s, kByTheory);
     for (CornerCell& cell : corner.cells) {
       if (cell.rule != StepRule::cvode_adams || ratio < 1e4) continue;
       cell.expected = StabilityClass::too_much_work;
@@ -108,7 +108,7 @@ void add_relaxation_times(std::vector<StabilityCorner>& corners) {
 
 void add_moduli(std::vector<StabilityCorner>& corners) {
   constexpr double kTau_s = 0.02;
-  TpmParameters maxwell = with_relaxation_time(kTau_s);
+  TpmParameters maxwell = TpmParameters{}.with_relaxation_time(kTau_s);
   maxwell.E1_Pa = 0.0;
   maxwell.eta1_Pa_s = kTau_s * maxwell.E2_Pa;
   corners.push_back(depth_at_once("E1 = 0, a depth", maxwell, kCornerDepth_m, kStep_s,
@@ -134,7 +134,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
                                        ? StabilityClass::wrong_steady_state
                                        : StabilityClass::holds;
                           }));
-  TpmParameters loose = with_relaxation_time(kTau_s);
+  TpmParameters loose = TpmParameters{}.with_relaxation_time(kTau_s);
   loose.E2_Pa = 0.0;
   loose.eta1_Pa_s = kTau_s * loose.E1_Pa;
   corners.push_back(
@@ -160,7 +160,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
 }
 
 void add_depths(std::vector<StabilityCorner>& corners) {
-  const TpmParameters p = with_relaxation_time(0.02);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   corners.push_back(depth_at_once(
       "beyond 12 mm", p, 0.015, kStep_s,
       "all hold: no rule fails at the depth where liver is damaged, results carry a flag"));
@@ -231,7 +231,7 @@ void set_star_truth(const TpmParameters& p, double rate, double end_s, JudgedPro
 
 StabilityCorner pushed_star(std::string name, std::string setup, std::string expected,
                             double depth_m, const Expect& expect) {
-  const TpmParameters p = with_relaxation_time(0.02);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   const CornerStar star(p, true);
   const double end = kStudySteps * kStep_s;
   JudgedProblem judged;
@@ -257,7 +257,7 @@ void add_stars(std::vector<StabilityCorner>& corners) {
       "the law of the bond goes on with the other sign: fixed steps hold; a rule that controls its "
       "error sees the jump",
       0.02504, all_hold));
-  const TpmParameters p = with_relaxation_time(0.02);
+  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   const CornerStar star(p, false);
   const double end = kStudySteps * kStep_s;
   JudgedProblem judged;
@@ -274,7 +274,7 @@ void add_stars(std::vector<StabilityCorner>& corners) {
 }
 
 void add_masses(std::vector<StabilityCorner>& corners) {
-  TpmParameters p = with_relaxation_time(0.02);
+  TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   p.Eprime_Pa = 0.0;
   for (const double mass : {1e-9, 1e3}) {
     constexpr double kDrag_per_s = 20.0;

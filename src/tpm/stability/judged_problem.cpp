@@ -49,12 +49,6 @@ JudgedProblem judged_motion(const TpmParameters& p, double mass_kg, double drag_
   return judged;
 }
 
-TpmParameters with_relaxation_time(double tau_s) {
-  TpmParameters p;
-  p.eta1_Pa_s = tau_s * (p.E1_Pa + p.E2_Pa);
-  return p;
-}
-
 namespace {
 
 Network small_liver(std::size_t spheres) {

@@ -36,9 +36,6 @@ inline constexpr int kJudgedSteps = 32;
 [[nodiscard]] JudgedProblem judged_motion(const TpmParameters& p, double mass_kg, double drag_per_s,
                                           double load_N, double end_s, double step_s);
 
-/// The paper's parameters with eta1 such that the relaxation time is this.
-[[nodiscard]] TpmParameters with_relaxation_time(double tau_s);
-
 /// kg, of a sphere of 10 mm radius and 1060 kg/m^3.
 inline constexpr double kSphereMass_kg = 1060.0 * 4.0 / 3.0 * 3.14159265358979 * 1e-6;
 

@@ -53,7 +53,7 @@ constexpr double kMotionSteps = 400000.0;  // forward Euler's growth with drag i
 
 void add_rest_limits(std::vector<StabilityLimit>& limits) {
   const TpmParameters paper;
-  const TpmParameters slow = with_relaxation_time(0.1);
+  const TpmParameters slow = TpmParameters{}.with_relaxation_time(0.1);
   constexpr double kLoad_N = 0.3;
   const double depth = equilibrium_depth_m(slow, slow.relaxed_modulus_Pa(), kLoad_N);
   LinearElement imposed = linear_element(paper, 0.0);
@@ -75,9 +75,9 @@ void add_rest_limits(std::vector<StabilityLimit>& limits) {
 }
 
 void add_motion_limits(std::vector<StabilityLimit>& limits) {
-  TpmParameters elastic = with_relaxation_time(1e9);
+  TpmParameters elastic = TpmParameters{}.with_relaxation_time(1e9);
   elastic.Eprime_Pa = 0.0;
-  TpmParameters relaxing = with_relaxation_time(0.01);
+  TpmParameters relaxing = TpmParameters{}.with_relaxation_time(0.01);
   relaxing.Eprime_Pa = 0.0;
   struct Case {
     std::string problem;
@@ -137,7 +137,7 @@ double highest_frequency(const DrivenNetwork& network, const Eigen::VectorXd& ma
 void add_organ_limits(std::vector<StabilityLimit>& limits) {
   constexpr std::size_t kSmall = 24;
   constexpr double kOrganSteps = 600.0;
-  const StudyOrgan rest(with_relaxation_time(0.1), kSmall);
+  const StudyOrgan rest(TpmParameters{}.with_relaxation_time(0.1), kSmall);
   for (const auto& [rule, factor, theory] :
        {std::tuple{StepRule::forward_euler, 2.0, "2 tau"},
         std::tuple{StepRule::rk4, 2.785293563405282, "2.785 tau"}}) {
@@ -150,7 +150,7 @@ void add_organ_limits(std::vector<StabilityLimit>& limits) {
               });
   }
   // So small a load that what grows is found before it is large enough to change its frequency.
-  const StudyOrgan elastic(with_relaxation_time(1e9), 424);
+  const StudyOrgan elastic(TpmParameters{}.with_relaxation_time(1e9), 424);
   const MethodMasses mass{sphere_masses_kg(elastic.network.organ), 0.0};
   const double omega = highest_frequency(elastic.driven, mass.mass_kg);
   for (const auto& [rule, factor, theory] :

@@ -39,18 +39,18 @@ MapPlan over_relaxation_time() {
           decades(1e-4, 1e2),
           decades(1e-5, 1e3),
           [](double tau, double h) {
-            return judged_rest(with_relaxation_time(tau), step_and_hold(kDepth_m, kStudySteps * h),
-                               h);
+            return judged_rest(TpmParameters{}.with_relaxation_time(tau),
+                               step_and_hold(kDepth_m, kStudySteps * h), h);
           },
           [](double tau) {
-            LinearElement e = linear_element(with_relaxation_time(tau), 0.0);
+            LinearElement e = linear_element(TpmParameters{}.with_relaxation_time(tau), 0.0);
             e.depth_imposed = true;
             return e;
           }};
 }
 
 TpmParameters without_tension(double tau_s) {
-  TpmParameters p = with_relaxation_time(tau_s);
+  TpmParameters p = TpmParameters{}.with_relaxation_time(tau_s);
   p.Eprime_Pa = 0.0;
   return p;
 }
@@ -75,7 +75,7 @@ MapPlan over_load_rate() {
 
 MapPlan over_depth() {
   const auto load = [](double depth) {
-    const TpmParameters p = with_relaxation_time(kTau_s);
+    const TpmParameters p = TpmParameters{}.with_relaxation_time(kTau_s);
     const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
     return p.modulus_to_stiffness_m() * (p.relaxed_modulus_Pa() * depth + tension.value(depth));
   };
@@ -86,10 +86,12 @@ MapPlan over_depth() {
           decades(1e-3, 4e-2),
           decades(1e-3, 1e3),
           [load](double depth, double h) {
-            return judged_rest(with_relaxation_time(kTau_s), creep(load(depth), kStudySteps * h),
-                               h);
+            return judged_rest(TpmParameters{}.with_relaxation_time(kTau_s),
+                               creep(load(depth), kStudySteps * h), h);
           },
-          [](double depth) { return linear_element(with_relaxation_time(kTau_s), depth); }};
+          [](double depth) {
+            return linear_element(TpmParameters{}.with_relaxation_time(kTau_s), depth);
+          }};
 }
 
 /// A sphere of an element without tension, under a load that leads to 4 mm.

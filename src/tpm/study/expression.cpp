@@ -103,7 +103,7 @@ struct Evaluator::Impl {
     std::vector<std::string> names;
     for (const auto& [name, value] : scope.values) names.push_back(name);
     for (const auto& [name, formula] : scope.formulas) names.push_back(name);
-    return names.empty() ? "numbers only" : fmt::format("{}", fmt::join(names, ", "));
+    return names.empty() ? "a formula of numbers" : fmt::format("{}", fmt::join(names, ", "));
   }
 
   double lookup(const std::string& name, const Scope& scope, std::string_view where, int depth) {

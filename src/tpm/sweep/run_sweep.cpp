@@ -49,6 +49,7 @@ void compute_missing(const Sweep& sweep, int workers, BlockLog& log, SweepRun& r
                      const SweepControls& controls) {
   MissingBlocks missing(log, controls.shard, sweep.blocks());
   tbb::enumerable_thread_specific<CellRunner> runners([&] { return CellRunner(sweep); });
+  FirstFault fault;
   std::atomic<bool> stopped = false;
   const auto interrupted = [&] {
     if (controls.interrupted && !stopped && controls.interrupted()) stopped = true;
@@ -56,24 +57,30 @@ void compute_missing(const Sweep& sweep, int workers, BlockLog& log, SweepRun& r
   };
   const auto number = tbb::make_filter<void, std::uint64_t>(
       tbb::filter_mode::serial_in_order, [&](tbb::flow_control& flow) -> std::uint64_t {
-        const auto next = stopped ? std::nullopt : missing.next();
+        const auto next = stopped || fault.seen() ? std::nullopt : missing.next();
         if (!next) flow.stop();
         return next.value_or(0);
       });
   const auto compute =
       tbb::make_filter<std::uint64_t, Finished>(tbb::filter_mode::parallel, [&](std::uint64_t b) {
-        const auto block = runners.local().run_unless(b, interrupted);
-        return block ? Finished{b, block->cells(), log_record(*block)} : Finished{};
+        Finished finished;
+        fault.guard([&] {
+          const auto block = runners.local().run_unless(b, interrupted);
+          if (block) finished = {b, block->cells(), log_record(*block)};
+        });
+        return finished;
       });
-  const auto store = tbb::make_filter<Finished, void>(tbb::filter_mode::serial_out_of_order,
-                                                      [&](const Finished& finished) {
-                                                        if (finished.cells == 0) return;
-                                                        log.append(finished.block, finished.record);
-                                                        run.cells += finished.cells;
-                                                        if (controls.progress)
-                                                          controls.progress(log.size(), run.blocks);
-                                                      });
+  const auto store = tbb::make_filter<Finished, void>(
+      tbb::filter_mode::serial_out_of_order, [&](const Finished& finished) {
+        if (finished.cells == 0 || fault.seen()) return;
+        fault.guard([&] {
+          log.append(finished.block, finished.record);
+          run.cells += finished.cells;
+          if (controls.progress) controls.progress(log.size(), run.blocks);
+        });
+      });
   tbb::parallel_pipeline(2 * static_cast<std::size_t>(workers), number & compute & store);
+  fault.rethrow();
   run.interrupted = stopped;
 }
 

@@ -10,10 +10,8 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <exception>
 #include <iterator>
 #include <map>
-#include <mutex>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -318,17 +316,11 @@ CellTally write_sweep(const Sweep& sweep, const std::vector<const BlockLog*>& lo
                       const fs::path& file, int workers) {
   require_room(sweep, file);
   ResultWriter writer(sweep, file);
-  // An exception that left a filter would leak the blocks that wait between filters (oneTBB 2021).
-  std::exception_ptr fault;
-  std::mutex fault_lock;
-  const auto stopped = [&] {
-    const std::scoped_lock hold(fault_lock);
-    return fault != nullptr;
-  };
+  FirstFault fault;
   std::uint64_t next = 0;
   const auto number = tbb::make_filter<void, std::uint64_t>(
       tbb::filter_mode::serial_in_order, [&](tbb::flow_control& flow) -> std::uint64_t {
-        if (next == sweep.blocks() || stopped()) {
+        if (next == sweep.blocks() || fault.seen()) {
           flow.stop();
           return 0;
         }
@@ -337,26 +329,23 @@ CellTally write_sweep(const Sweep& sweep, const std::vector<const BlockLog*>& lo
   const auto store =
       tbb::make_filter<std::uint64_t, CellBlock>(tbb::filter_mode::parallel, [&](std::uint64_t b) {
         CellBlock block;
-        try {
+        fault.guard([&] {
           block = block_of(logs, b);
           writer.store(block);
-        } catch (...) {
-          const std::scoped_lock hold(fault_lock);
-          if (!fault) fault = std::current_exception();
-        }
+        });
         return block;
       });
   const auto count = tbb::make_filter<CellBlock, void>(tbb::filter_mode::serial_in_order,
                                                        [&](const CellBlock& block) {
-                                                         if (!stopped()) writer.count(block);
+                                                         if (!fault.seen()) writer.count(block);
                                                        });
   const int threads = worker_count(workers);
   CellTally tally;
   on_workers(threads, [&] {
     tbb::parallel_pipeline(2 * static_cast<std::size_t>(threads), number & store & count);
-    if (!fault) tally = writer.finish();
+    if (!fault.seen()) tally = writer.finish();
   });
-  if (fault) std::rethrow_exception(fault);
+  fault.rethrow();
   return tally;
 }
 

@@ -3,7 +3,38 @@
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
 
+#include <exception>
+#include <mutex>
+
 namespace tpm {
+
+/// The first exception of a pipeline's filters, kept until the pipeline is through: one that left a
+/// filter would leak what waits between filters (oneTBB 2021).
+class FirstFault {
+ public:
+  /// Does work; what it throws is kept if it is the first.
+  template <class Work>
+  void guard(const Work& work) noexcept {
+    try {
+      work();
+    } catch (...) {
+      const std::scoped_lock hold(lock_);
+      if (!fault_) fault_ = std::current_exception();
+    }
+  }
+  [[nodiscard]] bool seen() const {
+    const std::scoped_lock hold(lock_);
+    return fault_ != nullptr;
+  }
+  void rethrow() const {
+    const std::scoped_lock hold(lock_);
+    if (fault_) std::rethrow_exception(fault_);
+  }
+
+ private:
+  mutable std::mutex lock_;
+  std::exception_ptr fault_;
+};
 
 /// How many threads are meant: all processors that this process may use if none are named.
 [[nodiscard]] inline int worker_count(int named) {
