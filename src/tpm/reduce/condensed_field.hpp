@@ -13,7 +13,7 @@ namespace tpm {
 /// linear in q with polynomials of w. In single precision.
 class CondensedField {
  public:
-  static constexpr int kModes = 16;
+  static constexpr int kModes = 14;
 
   CondensedField() = default;
   /// @param rest 3 x n, m
