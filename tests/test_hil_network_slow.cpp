@@ -10,6 +10,8 @@
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/surface_scene.hpp"
 #include "tpm/haptics/verify.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/report/hil_report.hpp"
 #include "tpm/servo/servo_step.hpp"
 #include "tpm/store/file.hpp"
 
@@ -183,6 +185,27 @@ TEST_CASE("The loop itself forgets to the last digits") {
   const Endless run = endless(json, 10);
   CHECK(run.drift.late_rounds_N == 0.0);
   CHECK(run.drift.end_start_N < 1e-14 * run.drift.peak_N);
+}
+
+TEST_CASE("The report of a session says how it ended and whether the model was trusted") {
+  const test::TempFolder folder;
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  const SessionRun run = run_session(test::parsed(test::short_session()), {}, options);
+  CHECK(run.outcome.counts.beyond_model == 0);
+  HilRecording recording = read_recording(folder / "r");
+  const Verification v = verify(recording);
+  write_hil_report(recording, v, folder / "trusted", find_drawing_python());
+  const std::string trusted = read_file(folder / "trusted/report.md");
+  CHECK_THAT(trusted, Contains("end: finished") && Contains("SIMULATED DEVICE") &&
+                          Contains("the model trusted its answer in every cycle"));
+  CHECK(std::filesystem::exists(folder / "trusted/report.html"));
+  for (const std::size_t row : {500, 700}) recording.rows.at(row).flags |= kBeyondModel;
+  CHECK(summary_of(recording).beyond_model == 2);
+  CHECK(summary_of(recording).first_beyond_s == 0.5);
+  write_hil_report(recording, v, folder / "not", find_drawing_python());
+  CHECK_THAT(read_file(folder / "not/report.md"),
+             Contains("the model did not trust its answer in 2 cycles, first at 0.5 s"));
 }
 
 TEST_CASE("A network beside the loop is for tissues that relax slowly") {

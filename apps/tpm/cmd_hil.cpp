@@ -82,6 +82,12 @@ class Guide {
   std::optional<Progress> progress_;
 };
 
+void warn_of_distrust(const ServoOutcome& outcome) {
+  if (outcome.counts.beyond_model == 0) return;
+  fmt::print(stderr, "tpm: warning: the model did not trust its answer in {} of {} cycles\n",
+             outcome.counts.beyond_model, outcome.cycles);
+}
+
 int exit_code_of(const ServoOutcome& outcome) {
   if (outcome.cause == StopCause::finished) return 0;
   constexpr int kStoppedBySignal = 128;
@@ -129,6 +135,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   } else {
     fmt::print("{}wrote {}\n", run_text(hil, run), choice.output);
   }
+  warn_of_distrust(run.outcome);
   if (page) page->end(run.outcome, options.interrupted);
   return exit_code_of(run.outcome);
 }

@@ -229,9 +229,16 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
   }
   lines.push_back({fmt::format(
       "{} cycles; missed periods {}; time guards {}; saturations {}; limited by force {}, by slew "
-      "{}; damped {}; beyond the model {}",
-      s.cycles, s.missed, s.time_guards, s.saturations, s.force_limited, s.slew_limited, s.damped,
-      s.beyond_model)});
+      "{}; damped {}",
+      s.cycles, s.missed, s.time_guards, s.saturations, s.force_limited, s.slew_limited,
+      s.damped)});
+  if (s.beyond_model == 0) {
+    lines.push_back({"the model trusted its answer in every cycle"});
+  } else {
+    lines.push_back({fmt::format("the model did not trust its answer in {} cycles, first at {} s",
+                                 s.beyond_model, significant(s.first_beyond_s, 6)),
+                     Tone::bad});
+  }
   d.bullets(std::move(lines));
   d.heading(2, "Energy");
   d.paragraph(fmt::format(
@@ -259,7 +266,9 @@ RecordingSummary summary_of(const HilRecording& recording) {
     s.force_limited += has(kForceLimited);
     s.slew_limited += has(kSlewLimited);
     s.damped += has(kDamped);
-    s.beyond_model += has(kBeyondModel);
+    if (has(kBeyondModel) != 0 && s.beyond_model++ == 0) {
+      s.first_beyond_s = static_cast<double>(row.cycle) * recording.session.servo.period_s;
+    }
     if (row.stop != StopCause::none) continue;  // nothing was rendered in the last one
     s.observed_end_J = row.observed_J;
     s.observed_least_J = std::min(s.observed_least_J, row.observed_J);
