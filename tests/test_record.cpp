@@ -1,10 +1,16 @@
 // Recordings: what is read back, and what survives damage.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <filesystem>
 
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/hdf5.hpp"
 #include "tpm/store/row_log.hpp"
 
 namespace tpm {
@@ -80,6 +86,37 @@ TEST_CASE("What is no log is refused in one line") {
   write_file(path, "time,force\n0,1\n");
   CHECK_THROWS_WITH(read_row_log(path), Catch::Matchers::Contains("is no recording; expected"));
   CHECK_THROWS_AS(RowLogWriter("/proc/no/such", "{}", 8), Error);
+}
+
+TEST_CASE("A log that has its name has its header, and leaves nothing else behind") {
+  const test::TempFolder folder;
+  const RowLogWriter log(folder / "rows", "{\"header\": 1}", sizeof(Row));
+  CHECK(read_row_log(folder / "rows").header == "{\"header\": 1}");
+  const std::filesystem::directory_iterator files(
+      std::filesystem::path(folder / "rows").parent_path());
+  CHECK(std::distance(begin(files), end(files)) == 1);
+}
+
+TEST_CASE("A pipe is written into, not replaced") {
+  const test::TempFolder folder;
+  const std::string pipe = folder / "pipe";
+  REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  REQUIRE(reader >= 0);
+  const auto received = [reader] {
+    std::string bytes(100, '\0');
+    const ssize_t got = ::read(reader, bytes.data(), bytes.size());
+    bytes.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
+    return bytes;
+  };
+  write_file(pipe, "text");
+  CHECK(received() == "text");
+  { const RowLogWriter log(pipe, "{}", sizeof(Row)); }
+  CHECK_THAT(received(), Catch::Matchers::StartsWith("TPMROWS1"));
+  CHECK_THROWS_WITH(Hdf5Writer(pipe), Catch::Matchers::Contains("is a device or a pipe"));
+  CHECK(is_device_or_pipe(pipe));
+  CHECK_FALSE(is_device_or_pipe(folder / "none"));
+  (void)::close(reader);
 }
 
 }  // namespace

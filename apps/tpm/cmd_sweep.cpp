@@ -258,8 +258,10 @@ int run_command(const SweepChoice& choice, const Session& session) {
     fmt::print(stderr, "tpm: {} holds this sweep already\n", output.string());
     return 0;
   }
-  if (fs::is_directory(output)) {
-    throw Error(ExitCode::environment, output.string(), "is a folder", "a file to write");
+  if (fs::exists(output) && !fs::is_regular_file(output)) {
+    throw Error(ExitCode::environment, output.string(),
+                fs::is_directory(output) ? "is a folder" : "is a device or a pipe",
+                "a file to write");
   }
   SweepControls controls;
   if (!choice.workers.empty()) {

@@ -80,7 +80,20 @@ std::string read_file(const fs::path& path) {
   return bytes;
 }
 
+bool is_device_or_pipe(const fs::path& path) {
+  std::error_code ec;
+  const auto status = fs::status(path, ec);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
 void write_file(const fs::path& path, std::string_view bytes) {
+  if (is_device_or_pipe(path)) {
+    Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+    if (device.get() < 0 || !write_all(device.get(), bytes) || device.close() != 0) {
+      throw cannot_write(path, errno);
+    }
+    return;
+  }
   std::error_code ec;
   if (path.has_parent_path()) {
     fs::create_directories(path.parent_path(), ec);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tpm/core/error.hpp"
+#include "tpm/store/file.hpp"
 #include "tpm/store/hdf5_parts.hpp"
 
 namespace tpm {
@@ -52,6 +53,9 @@ void Hdf5Handle::reset() noexcept {
 
 Hdf5Writer::Hdf5Writer(fs::path path)
     : path_(std::move(path)), temporary_(fmt::format("{}.part.{}", path_.string(), ::getpid())) {
+  if (is_device_or_pipe(path_)) {
+    throw Error(ExitCode::environment, path_.string(), "is a device or a pipe", "a file");
+  }
   const QuietErrors quiet;
   std::error_code ec;
   if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), ec);

@@ -75,13 +75,25 @@ RowLogWriter::RowLogWriter(std::filesystem::path path, std::string_view header,
     : path_(std::move(path)), row_bytes_(row_bytes) {
   std::error_code ignored;
   if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), ignored);
-  file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const bool in_place = is_device_or_pipe(path_);
+  const std::string begun =
+      in_place ? path_.string() : fmt::format("{}.part.{}", path_.string(), ::getpid());
+  file_ = ::open(begun.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file_ < 0) throw cannot_write(path_, "cannot be written");
   kept_.reserve(2 * kBlock);
   put(kept_, kMagic.data(), kMagic.size());
   put_number(kept_, static_cast<std::uint32_t>(row_bytes));
   put_text(kept_, header);
-  flush();
+  try {
+    flush();
+    if (!in_place && ::rename(begun.c_str(), path_.c_str()) != 0) {
+      throw cannot_write(path_, "cannot be written");
+    }
+  } catch (...) {
+    (void)::close(file_);
+    if (!in_place) (void)::unlink(begun.c_str());
+    throw;
+  }
 }
 
 RowLogWriter::~RowLogWriter() {

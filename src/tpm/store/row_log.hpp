@@ -11,7 +11,7 @@ namespace tpm {
 /// Appends rows of one size to a file, each with its number and a check sum, so that what was
 /// written stands even if the process is killed. After the rows a closing text says that the
 /// file is whole. Bytes are those of the machine that writes (little endian is asked for).
-/// Writing begins under the final name: an unfinished file is meant to be found.
+/// An unfinished file is meant to be found: it has its name as soon as its header is written.
 class RowLogWriter {
  public:
   /// Throws Error(environment) if the file cannot be written.
