@@ -111,7 +111,8 @@ TEST_CASE("A pipe is written into, not replaced") {
   };
   write_file(pipe, "text");
   CHECK(received() == "text");
-  { const RowLogWriter log(pipe, "{}", sizeof(Row)); }
+  RowLogWriter log(pipe, "{}", sizeof(Row));
+  log.close("{}");
   CHECK_THAT(received(), Catch::Matchers::StartsWith("TPMROWS1"));
   CHECK_THROWS_WITH(Hdf5Writer(pipe), Catch::Matchers::Contains("is a device or a pipe"));
   CHECK(is_device_or_pipe(pipe));
