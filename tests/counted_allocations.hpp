@@ -1,6 +1,7 @@
 #pragma once
 // Counts what the whole program takes from the heap and gives back: by new, by C's functions, and
 // so by Eigen, which calls malloc. To be included by one source of a program.
+#include <Eigen/Core>  // before the definitions: clang's declares posix_memalign otherwise
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>

@@ -21,7 +21,7 @@ struct Row {
 };
 
 std::string written(const test::TempFolder& folder, int rows, bool closed) {
-  const std::string path = folder / "rows";
+  std::string path = folder / "rows";
   RowLogWriter log(path, "{\"header\": 1}", sizeof(Row));
   for (int i = 0; i < rows; ++i) {
     const Row row{0.1 * i, -1.0 * i};

@@ -96,6 +96,7 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
     names.push_back(v.name);
   }
   std::vector<SweepConvergence> all;
+  all.reserve(names.size());
   for (const std::string& name : names) {
     all.push_back(convergence_of(sweep, name, axis, choice.size, held));
   }

@@ -103,7 +103,7 @@ LoopModelKind parse_model(const std::string& kind) {
 }
 
 std::string parse_tolerance(const Json& model, LoopModelKind kind, const DocumentPlace& place) {
-  const std::string text = model.value("tolerance", std::string("1%"));
+  std::string text = model.value("tolerance", std::string("1%"));
   const DocumentPlace at = place.key("tolerance");
   if (model.contains("tolerance") && kind != LoopModelKind::planned) {
     throw bad_input(at.where, printable(text), "none but with the kind 'planned'");
@@ -120,6 +120,7 @@ std::string parse_tolerance(const Json& model, LoopModelKind kind, const Documen
 
 std::vector<std::uint64_t> ends_of(const std::vector<SessionPhase>& phases, double period_s) {
   std::vector<std::uint64_t> ends;
+  ends.reserve(phases.size());
   for (const SessionPhase& phase : phases) {
     ends.push_back(static_cast<std::uint64_t>(std::llround(phase.end_s / period_s)));
   }

@@ -13,6 +13,7 @@ constexpr int kAlong = 21;  // points along each axis
 /// From `first` to `last`, evenly in the logarithm.
 std::vector<double> decades(double first, double last) {
   std::vector<double> values;
+  values.reserve(kAlong);
   for (int i = 0; i < kAlong; ++i) {
     values.push_back(first * std::pow(last / first, static_cast<double>(i) / (kAlong - 1)));
   }
