@@ -187,7 +187,7 @@ TEST_CASE("The loop itself forgets to the last digits") {
   CHECK(run.drift.end_start_N < 1e-14 * run.drift.peak_N);
 }
 
-TEST_CASE("The report of a session says how it ended and whether the model was trusted") {
+TEST_CASE("The report of a session says how it ended and where it left the range of the model") {
   const test::TempFolder folder;
   SessionRunOptions options;
   options.recording = folder / "r";
@@ -198,14 +198,14 @@ TEST_CASE("The report of a session says how it ended and whether the model was t
   write_hil_report(recording, v, folder / "trusted", find_drawing_python());
   const std::string trusted = read_file(folder / "trusted/report.md");
   CHECK_THAT(trusted, Contains("end: finished") && Contains("SIMULATED DEVICE") &&
-                          Contains("the model trusted its answer in every cycle"));
+                          Contains("within the range that the model is good for in every cycle"));
   CHECK(std::filesystem::exists(folder / "trusted/report.html"));
   for (const std::size_t row : {500, 700}) recording.rows.at(row).flags |= kBeyondModel;
   CHECK(summary_of(recording).beyond_model == 2);
   CHECK(summary_of(recording).first_beyond_s == 0.5);
   write_hil_report(recording, v, folder / "not", find_drawing_python());
   CHECK_THAT(read_file(folder / "not/report.md"),
-             Contains("the model did not trust its answer in 2 cycles, first at 0.5 s"));
+             Contains("beyond the range that the model is good for in 2 cycles, first at 0.5 s"));
 }
 
 TEST_CASE("A network beside the loop is for tissues that relax slowly") {

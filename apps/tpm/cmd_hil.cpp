@@ -82,10 +82,13 @@ class Guide {
   std::optional<Progress> progress_;
 };
 
-void warn_of_distrust(const ServoOutcome& outcome) {
+void warn_if_beyond_model(const ServoOutcome& outcome) {
   if (outcome.counts.beyond_model == 0) return;
-  fmt::print(stderr, "tpm: warning: the model did not trust its answer in {} of {} cycles\n",
-             outcome.counts.beyond_model, outcome.cycles);
+  fmt::print(
+      stderr,
+      "tpm: warning: beyond the range that the model is good for in {} of {} cycles; tpm hil "
+      "report says from when on\n",
+      outcome.counts.beyond_model, outcome.cycles);
 }
 
 int exit_code_of(const ServoOutcome& outcome) {
@@ -135,7 +138,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   } else {
     fmt::print("{}wrote {}\n", run_text(hil, run), choice.output);
   }
-  warn_of_distrust(run.outcome);
+  warn_if_beyond_model(run.outcome);
   if (page) page->end(run.outcome, options.interrupted);
   return exit_code_of(run.outcome);
 }

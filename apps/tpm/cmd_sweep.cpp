@@ -258,11 +258,7 @@ int run_command(const SweepChoice& choice, const Session& session) {
     fmt::print(stderr, "tpm: {} holds this sweep already\n", output.string());
     return 0;
   }
-  if (fs::exists(output) && !fs::is_regular_file(output)) {
-    throw Error(ExitCode::environment, output.string(),
-                fs::is_directory(output) ? "is a folder" : "is a device or a pipe",
-                "a file to write");
-  }
+  require_replaceable(output);
   SweepControls controls;
   if (!choice.workers.empty()) {
     controls.workers = static_cast<int>(parse_whole_number(choice.workers, "--workers", 1));

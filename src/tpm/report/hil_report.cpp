@@ -233,11 +233,12 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
       s.cycles, s.missed, s.time_guards, s.saturations, s.force_limited, s.slew_limited,
       s.damped)});
   if (s.beyond_model == 0) {
-    lines.push_back({"the model trusted its answer in every cycle"});
+    lines.push_back({"within the range that the model is good for in every cycle"});
   } else {
-    lines.push_back({fmt::format("the model did not trust its answer in {} cycles, first at {} s",
-                                 s.beyond_model, significant(s.first_beyond_s, 6)),
-                     Tone::bad});
+    lines.push_back(
+        {fmt::format("beyond the range that the model is good for in {} cycles, first at {} s",
+                     s.beyond_model, significant(s.first_beyond_s, 6)),
+         Tone::bad});
   }
   d.bullets(std::move(lines));
   d.heading(2, "Energy");

@@ -86,6 +86,14 @@ bool is_device_or_pipe(const fs::path& path) {
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
 
+void require_replaceable(const fs::path& path) {
+  const bool device = is_device_or_pipe(path);
+  std::error_code ec;
+  if (!device && !fs::is_directory(path, ec)) return;
+  throw Error(ExitCode::environment, path.string(),
+              device ? "is a device or a pipe" : "is a folder", "a file to write");
+}
+
 void write_file(const fs::path& path, std::string_view bytes) {
   if (is_device_or_pipe(path)) {
     Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));

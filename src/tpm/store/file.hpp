@@ -11,6 +11,10 @@ namespace tpm {
 /// A device, a pipe or a socket: it is written into, and never replaced by a file of its name.
 [[nodiscard]] bool is_device_or_pipe(const std::filesystem::path& path);
 
+/// Throws Error(environment) if what has the name is no file that a result could replace: a folder,
+/// a device or a pipe.
+void require_replaceable(const std::filesystem::path& path);
+
 /// Writes under a temporary name in the same folder, flushes to the disk and renames, so that a
 /// reader sees the old file or the new one and a full disk leaves the old one alone; into a device
 /// or pipe as it stands. Creates the parent folders. Throws Error(environment).

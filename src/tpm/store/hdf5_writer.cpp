@@ -53,9 +53,7 @@ void Hdf5Handle::reset() noexcept {
 
 Hdf5Writer::Hdf5Writer(fs::path path)
     : path_(std::move(path)), temporary_(fmt::format("{}.part.{}", path_.string(), ::getpid())) {
-  if (is_device_or_pipe(path_)) {
-    throw Error(ExitCode::environment, path_.string(), "is a device or a pipe", "a file");
-  }
+  require_replaceable(path_);
   const QuietErrors quiet;
   std::error_code ec;
   if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), ec);

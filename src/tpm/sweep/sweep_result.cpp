@@ -245,9 +245,7 @@ class ResultWriter {
 
 /// HDF5 does not survive a disk that gets full under it: the room is asked for before.
 void require_room(const Sweep& sweep, const fs::path& file) {
-  if (is_device_or_pipe(file)) {
-    throw Error(ExitCode::environment, file.string(), "is a device or a pipe", "a file");
-  }
+  require_replaceable(file);
   constexpr std::uint64_t kForNames = std::uint64_t{1} << 20U;
   const std::uint64_t cell = 1 + 1 + 4 + 8 + 8 * (sweep.model->counted().size() + sweep.width());
   std::uint64_t bytes = cell * sweep.cells() + kForNames;
