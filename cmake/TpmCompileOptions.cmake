@@ -1,7 +1,13 @@
 # Compile options of our own code only; dependencies come in as system headers.
+# Whoever only uses the program is not shown warnings; scripts/check.sh turns them on, as errors.
+option(TPM_WARNINGS "Ask the compiler for its warnings" OFF)
 add_library(tpm_options INTERFACE)
-target_compile_options(tpm_options INTERFACE -Wall -Wextra -Wconversion -Wshadow
-  $<$<BOOL:${TPM_WARNINGS_AS_ERRORS}>:-Werror>)
+if(TPM_WARNINGS)
+  target_compile_options(tpm_options INTERFACE -Wall -Wextra -Wconversion -Wshadow
+    $<$<BOOL:${TPM_WARNINGS_AS_ERRORS}>:-Werror>)
+else()
+  target_compile_options(tpm_options INTERFACE -w)
+endif()
 # g++ 12 reports overlapping copies inside std::string::replace that cannot happen (GCC bug 105651).
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(tpm_options INTERFACE -Wno-restrict)
@@ -41,3 +47,7 @@ function(tpm_compile_together target)
 endfunction()
 
 option(TPM_QUICK_TO_BUILD "Do not optimise what only reads, arranges and writes, nor the tests' own code" OFF)
+set(TPM_ARRANGING_FLAGS $<$<CONFIG:Release>:-O1>)
+if(TPM_QUICK_TO_BUILD)
+  set(TPM_ARRANGING_FLAGS -O0)
+endif()

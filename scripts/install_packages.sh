@@ -1,8 +1,9 @@
 # shellcheck shell=bash
-# Sourced by run.sh and test.sh from the project's folder: installs what is missing, finds a Python
+# Sourced by run.sh, test.sh and check.sh from the project's folder: installs what is missing, finds a Python
 # that has the modules, configures and builds.
 
 say() { printf '== %s\n' "$*"; }
+step() { say "[$((SECONDS / 60)) min $((SECONDS % 60)) s] $*"; }
 
 die() {
   printf '%s: %s\n' "${0##*/}" "$*" >&2
@@ -75,4 +76,10 @@ configure() {
   die "cmake could not configure the preset '$preset' (its words stand above)"
 }
 
-build() { cmake --build "build/$1" --parallel "$(nproc)" -- --quiet; }
+# build PRESET [TARGET...]: shows its progress on a terminal, quiet in a pipe
+build() {
+  local folder=build/$1 quiet=()
+  shift
+  [ -t 1 ] || quiet=(--quiet)
+  NINJA_STATUS='   [%f of %t, %e s] ' ninja -C "$folder" -j "$(nproc)" "${quiet[@]}" "$@"
+}

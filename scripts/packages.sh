@@ -16,7 +16,7 @@ packages_test=(
   catch2 python3-scipy python3-h5py python3-xarray python3-h5netcdf
 )
 
-# What checks the sources.
-packages_lint=(
-  git clang-format clang-tidy
+# What checks the sources, and programs that have to read what tpm writes.
+packages_check=(
+  git clang-format clang-tidy chromium python3-paraview
 )

@@ -8,11 +8,11 @@ source scripts/install_packages.sh
 install_missing "to build and run tpm" "${packages_run[@]}"
 find_python numpy matplotlib
 
-configure release -DTPM_BUILD_TESTS=OFF
-say "building (build/release)"
-build release
+configure release
+step "building tpm (build/release); some minutes the first time"
+build release tpm
 
-say "recomputing the paper"
+step "recomputing the paper"
 build/release/tpm report --output out/paper
-say "the report; open it in a browser:"
+step "done. The report; open it in a browser:"
 echo "$PWD/out/paper/report.html"

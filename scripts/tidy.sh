@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced by test.sh: clang-tidy on the sources that changed since a base commit.
+# Sourced by check.sh: clang-tidy on the sources that changed since a base commit.
 
 # The commit to compare with: $TPM_TIDY_BASE, else the merge base with origin's branch, else the
 # commit before. Prints nothing if there is none, or for `all`.

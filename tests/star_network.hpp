@@ -1,5 +1,5 @@
 #pragma once
-// The four-sphere star of MODEL.md, section 4, as a network.
+// The four-sphere star of docs/notation.md as a network.
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
 

@@ -161,7 +161,7 @@ TEST_CASE("creep with frozen lambda1 is Eq. 14 with its limits") {
 
 TEST_CASE("creep with the true lambda1 ends where the springs balance the load") {
   TpmParameters paper;
-  // MODEL.md section 3, item 5: 10.59 mm at 0.98 N, 2.56 mm at 0.196 N
+  // Ends of creep (docs/notation.md): 10.59 mm at 0.98 N, 2.56 mm at 0.196 N
   CHECK_THAT(CreepUnderConstantLoad(paper, 0.98).final_depth_m(), WithinAbs(10.59e-3, 5e-6));
   CHECK_THAT(CreepUnderConstantLoad(paper, 0.196).final_depth_m(), WithinAbs(2.56e-3, 5e-6));
   const CreepUnderConstantLoad creep_(paper, 0.98);

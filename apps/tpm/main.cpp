@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <vector>
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
@@ -62,6 +63,35 @@ void require_output_apart(const CLI::App& app) {
   }
 }
 
+/// The commands in the groups that `tpm --help` and README.md show.
+void add_commands(CLI::App& app, Session& session) {
+  using Adder = void (*)(CLI::App&, Session&);
+  struct Group {
+    const char* name;
+    std::vector<Adder> commands;
+  };
+  const std::vector<Group> groups = {
+      {"Data: recordings, laws and fits",
+       {add_data_command, add_fit_command, add_select_command, add_laws_command,
+        add_spectrum_command, add_export_command, add_design_command}},
+      {"Tissue: organs of spheres",
+       {add_network_command, add_simulate_command, add_plan_command, add_sweep_command}},
+      {"Hand: haptic devices", {add_hil_command}},
+      {"Evidence: the paper, and tpm itself",
+       {add_report_command, add_tables_command, add_audit_command, add_experiments_command,
+        add_benchmark_command, add_stability_command, add_recovery_command, add_coverage_command,
+        add_check_gradient_command, add_version_command}}};
+  for (const Group& group : groups) {
+    for (const Adder add : group.commands) {
+      const std::size_t before = app.get_subcommands({}).size();
+      add(app, session);
+      for (std::size_t i = before; i < app.get_subcommands({}).size(); ++i) {
+        app.get_subcommand(static_cast<int>(i))->group(group.name);
+      }
+    }
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"tpm: check a viscoelastic soft-tissue model against data", "tpm"};
   app.require_subcommand(1);
@@ -69,28 +99,7 @@ int run(int argc, char** argv) {
       "Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
       "Each command explains itself: tpm COMMAND --help");
   Session session;
-  add_version_command(app, session);
-  add_fit_command(app, session);
-  add_select_command(app, session);
-  add_recovery_command(app, session);
-  add_check_gradient_command(app, session);
-  add_design_command(app, session);
-  add_laws_command(app, session);
-  add_spectrum_command(app, session);
-  add_export_command(app, session);
-  add_coverage_command(app, session);
-  add_tables_command(app, session);
-  add_audit_command(app, session);
-  add_data_command(app, session);
-  add_network_command(app, session);
-  add_simulate_command(app, session);
-  add_plan_command(app, session);
-  add_report_command(app, session);
-  add_experiments_command(app, session);
-  add_benchmark_command(app, session);
-  add_stability_command(app, session);
-  add_sweep_command(app, session);
-  add_hil_command(app, session);
+  add_commands(app, session);
 
   try {
     app.parse(argc, argv);

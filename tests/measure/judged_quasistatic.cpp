@@ -1,5 +1,5 @@
 // Prints the quasi-static run of the paper's liver beside scripts/judge_quasistatic.py, force and
-// time in one run: build/ci/tests/measure_judged_quasistatic
+// time in one run: build/release/tests/measure_judged_quasistatic
 #include <algorithm>
 #include <ctime>
 #include <filesystem>

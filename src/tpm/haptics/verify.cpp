@@ -184,7 +184,6 @@ void ask_others(Verification& v, const HilRecording& recording, const Motion& ev
   }
 }
 
-/// Commanded force at the end of the ramp and of the hold, beside the readings of the same depth.
 /// The first row after a phase.
 std::vector<const ServoRecord*>::const_iterator after_phase(
     const std::vector<const ServoRecord*>& rows, std::int32_t phase) {
@@ -192,6 +191,8 @@ std::vector<const ServoRecord*>::const_iterator after_phase(
                               [phase](const ServoRecord* row) { return row->phase <= phase; });
 }
 
+/// Puts the largest commanded force of a ramp, and the one at the end of a hold, beside the
+/// readings of the same depth.
 void put_beside_experiment(Verification& v, const HilRecording& recording,
                            const std::vector<const ServoRecord*>& rows) {
   const PointSet readings = load_points("evren_relaxation");

@@ -31,7 +31,7 @@ struct BondMemory {
 ///     N = k l - g y,    l = L - L0,    dy/dt = (l - y) / tau                   (N, m, s)
 ///
 /// where for a radial bond k = w E2 A0/l0 and g = w E2^2/(E1 + E2) A0/l0, so that y = e1 (E1 +
-/// E2)/E2 is the elongation that the Kelvin-Voigt unit has caught up with (MODEL.md, section 1),
+/// E2)/E2 is the elongation that the Kelvin-Voigt unit has caught up with (docs/notation.md),
 /// and for a lateral bond k = w E' A0/l0 and g = 0; w is the bond's factor. The force acts along
 /// the bond as it lies now.
 ///

@@ -85,7 +85,7 @@ struct InertialRun {
   InertialState end;
 };
 
-/// The inertial network (MODEL.md, section 4, formulation 6): spheres with mass, joined by bonds
+/// The inertial network (docs/inertial.md): spheres with mass, joined by bonds
 /// with memory, damped:
 ///
 ///     dx/dt = v,   m dv/dt = f(x, y) - alpha m v - beta sum of k_w (dl/dt) along the bond,

@@ -5,7 +5,7 @@
 namespace tpm {
 
 /// kg, one per sphere: a density times the volume of the spheres.
-/// @param density_kg_per_m3 > 0; 1060 is that of liver (MODEL.md, section 4)
+/// @param density_kg_per_m3 > 0; 1060 is that of liver (docs/notation.md)
 [[nodiscard]] Eigen::VectorXd sphere_masses_kg(const Organ& organ,
                                                double density_kg_per_m3 = 1060.0);
 

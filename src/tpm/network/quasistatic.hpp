@@ -106,8 +106,8 @@ struct QuasiStaticRun {
   Eigen::VectorXd remembered;               ///< y of each bond there, m
 };
 
-/// The quasi-static network: force balance on every free sphere at each instant (MODEL.md, section
-/// 4, formulation 5). The elongations of a step are a polynomial through its Radau nodes, under
+/// The quasi-static network: force balance on every free sphere at each instant
+/// (docs/notation.md). The elongations of a step are a polynomial through its Radau nodes, under
 /// which what the bonds remember is advanced exactly; the stages are balanced together with one
 /// factorisation, that many steps share. Steps follow an estimate of the error of the response,
 /// found with the displacement field of the probe as its own adjoint.

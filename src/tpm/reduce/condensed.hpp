@@ -24,8 +24,8 @@ struct CondensedMemory {
   Eigen::Vector3d q_m = Eigen::Vector3d::Zero();  ///< along the second mode
 };
 
-/// A network with one relaxation time seen from one contact sphere (MODEL.md, section 4,
-/// formulation 3; docs/reduction.md): the memory of all bonds is held on that of the relaxed
+/// A network with one relaxation time seen from one contact sphere
+/// (docs/reduction.md): the memory of all bonds is held on that of the relaxed
 /// equilibrium under a fictitious displacement w of the contact, and one linear mode q more for
 /// each direction.
 class CondensedContact final : public ContactModel {

@@ -21,9 +21,9 @@ struct ZoneNetworkOptions {
   bool portable = false;            ///< as ServoNetworkOptions
 };
 
-/// The network near a contact, and what surrounds it as a linear tissue (MODEL.md, section 4,
-/// formulation 4). Bonds of which every movable end lies within some rings of the contact are kept
-/// as they are; all others have the stiffness that they have at a depth, and no force at rest.
+/// The network near a contact, and what surrounds it as a linear tissue
+/// (docs/notation.md). Bonds of which every movable end lies within some rings of the contact are
+/// kept as they are; all others have the stiffness that they have at a depth, and no force at rest.
 ///
 /// The spheres outside follow those at the edge of the zone as they do in a step of the linear
 /// tissue, and have a few displacements of their own beside that: those by which the fields of the

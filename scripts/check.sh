@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# What a maintainer checks beyond scripts/test.sh: formatting, the slow tests (with Chromium, ParaView and
+# full disks), every source compiled with warnings as errors, the fast tests with the floors of
+# TPM_SANITIZED_FLOORS (cmake/TpmFloors.cmake) under AddressSanitizer and UndefinedBehaviorSanitizer, those
+# with threads under ThreadSanitizer, clang-tidy on what changed. Stops at the first failure; ends with the
+# closing lines of the slow tests. Everything under sanitizers: presets asan-ubsan and tsan.
+#
+#   TPM_TIDY_BASE=COMMIT  clang-tidy checks the sources changed since COMMIT; `all` checks all.
+#                         Default: since the merge base with origin's branch, or the last commit.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+source scripts/install_packages.sh
+source scripts/tidy.sh
+
+install_missing "to build, run and test tpm" "${packages_run[@]}" "${packages_test[@]}"
+install_missing "to check its sources and to show its results to other programs" "${packages_check[@]}"
+find_python numpy matplotlib scipy h5py
+
+step "formatting (clang-format)"
+git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror
+
+step "one name, one type"  # two types of one name link without a word and break at run time
+twice=$(git ls-files 'src/tpm/*.hpp' | xargs grep -hoE '^(struct|class|enum class) \w+( final)?( :.*)? ?\{' |
+        awk '{print $1 == "enum" ? $3 : $2}' | sort | uniq -d)
+[[ -z "$twice" ]] || die "src/tpm defines more than one type named: $twice; expected one of a name"
+
+step "building the slow tests (build/release)"
+configure release -DTPM_SLOW_TESTS=ON
+build release
+step "slow tests"
+slow_log=build/ctest-slow.log
+ctest --preset slow --parallel "$(nproc)" --no-tests=error | tee "$slow_log"
+
+step "clang-tidy on $(tidy_scope)"
+configure tidy
+tidy_changed build/tidy
+
+step "building with warnings as errors, and with sanitizers (build/check)"
+configure check
+build check
+step "fast tests with sanitized floors, tests with threads under ThreadSanitizer"
+ctest --preset sanitized --parallel "$(nproc)" --no-tests=error | tail -n 4
+
+step "all checks passed; the slow tests ended with:"
+sed -n '/% tests passed/,$p' "$slow_log"

@@ -1,0 +1,113 @@
+#!/usr/bin/env python3
+"""Checks that the pages hold together.
+
+    documentation.py ROOT TPM
+
+- every relative link in a Markdown page leads to a file, and its anchor to a heading;
+- every docs/PAGE.md named in a source, a script or a page exists;
+- docs/README.md links every page of docs;
+- a folder of src/tpm includes only those below it in the list of docs/architecture.md;
+- the groups of `tpm --help` and of the README hold the same commands, each once.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+
+def tracked(root, *suffixes):
+    skipped = {"build", "out", ".git", "__pycache__"}
+    for folder, inner, names in os.walk(root):
+        inner[:] = sorted(d for d in inner if d not in skipped and not d.startswith("build"))
+        yield from (Path(folder) / n for n in sorted(names) if n.endswith(suffixes))
+
+
+def anchors(page):
+    """The anchors of a page's headings, as GitHub makes them."""
+    found, code = set(), False
+    for line in page.read_text(encoding="utf-8").splitlines():
+        if line.startswith("```"):
+            code = not code
+        match = None if code else re.match(r"#+ +(.*)", line)
+        if match:
+            text = re.sub(r"[^\w\- ]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", match[1]).lower())
+            found.add(text.strip().replace(" ", "-"))
+    return found
+
+
+def broken_links(root):
+    for page in tracked(root, ".md"):
+        for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+            if re.match(r"[a-z]+:", target):
+                continue
+            name, _, anchor = target.partition("#")
+            file = (page.parent / name).resolve() if name else page
+            if not file.exists():
+                yield f"{page.relative_to(root)}: link to {target}: no such file"
+            elif anchor and file.suffix == ".md" and anchor not in anchors(file):
+                yield f"{page.relative_to(root)}: link to {target}: no such heading"
+
+
+def lost_pages(root):
+    sources = (".md", ".cpp", ".hpp", ".sh", ".py", ".cmake", ".txt", ".json", ".html")
+    for file in tracked(root, *sources):
+        if file.name == "documentation.py":
+            continue
+        for name in set(re.findall(r"\bdocs/[\w/]+\.md\b", file.read_text(encoding="utf-8"))):
+            if not (root / name).exists():
+                yield f"{file.relative_to(root)}: names {name}: no such page"
+
+
+def unlisted_pages(root):
+    index = (root / "docs/README.md").read_text(encoding="utf-8")
+    for page in sorted((root / "docs").glob("*.md")):
+        if page.name != "README.md" and f"({page.name})" not in index:
+            yield f"docs/README.md: does not list {page.name}"
+
+
+def upward_includes(root):
+    text = (root / "docs/architecture.md").read_text(encoding="utf-8")
+    order = re.findall(r"^    (\w+)/ +\w", text, re.M)
+    folders = sorted(d.name for d in (root / "src/tpm").iterdir() if d.is_dir())
+    for folder in folders:
+        if folder not in order:
+            yield f"docs/architecture.md: does not list src/tpm/{folder}"
+    for name in order:
+        if name not in folders:
+            yield f"docs/architecture.md: lists {name}, which is not in src/tpm"
+    for file in tracked(root / "src/tpm", ".hpp", ".cpp"):
+        here = file.relative_to(root / "src/tpm").parts[0]
+        for other in re.findall(r'#include "tpm/(\w+)/', file.read_text(encoding="utf-8")):
+            if here in order and other in order and order.index(other) < order.index(here):
+                yield f"{file.relative_to(root)}: includes {other}, which is above {here}"
+
+
+def differing_groups(root, program):
+    text = subprocess.run([program, "--help"], capture_output=True, text=True, check=True).stdout
+    shown = {}
+    for group, rows in re.findall(r"^(Data|Tissue|Hand|Evidence)\b[^\n]*:\n((?:  .*\n)+)", text, re.M):
+        shown[group] = re.findall(r"^  (\S+)", rows, re.M)
+    if list(shown) != ["Data", "Tissue", "Hand", "Evidence"]:
+        yield f"tpm --help: has the groups {list(shown)}; expected Data, Tissue, Hand, Evidence"
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    for group, commands in shown.items():
+        row = re.search(rf"^\| \*\*{group}\*\* \|.*$", readme, re.M)
+        named = re.findall(r"`tpm ([a-z-]+)`", row[0]) if row else []
+        if named != commands:
+            yield f"README.md: group {group} lists {named}; tpm --help lists {commands}"
+
+
+def main():
+    root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
+    faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *upward_includes(root),
+              *differing_groups(root, program)]
+    for fault in faults:
+        print(fault)
+    print(f"{len(faults)} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
