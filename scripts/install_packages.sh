@@ -55,7 +55,7 @@ find_python() {
   imports=$(printf 'import %s;' "$@")
   for candidate in ${TPMKIT_PYTHON:+"$TPMKIT_PYTHON"} python3 /usr/bin/python3 /usr/local/bin/python3; do
     tried+=("$candidate")
-    "$candidate" -c "$imports" >/dev/null 2>&1 || continue
+    (cd / && "$candidate" -c "$imports") >/dev/null 2>&1 || continue  # imports nothing from here
     TPMKIT_PYTHON=$(command -v "$candidate")
     export TPMKIT_PYTHON
     say "Python with $*: $TPMKIT_PYTHON"

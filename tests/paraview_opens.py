@@ -45,9 +45,9 @@ def check_step(output, result, time):
     fields = arrays(spheres.GetPointData())
     assert {"number", "layer", "held", "contact", "displacement_m", "displacement_magnitude_m", "validity", "force_N",
             "largest_bond_force_N"} == set(fields), fields.keys()
-    contact = result["contact"]["sphere"] - 1
+    contact = result["contacts"][0]["sphere"] - 1
     assert fields["number"][contact] == contact + 1
-    depth = fields["displacement_m"][contact] @ result["contact"]["direction"]
+    depth = fields["displacement_m"][contact] @ result["contacts"][0]["direction"]
     assert abs(depth - min(2e-3 * time, 4e-3)) < 1e-10, (time, depth)
     assert np.allclose(np.linalg.norm(fields["displacement_m"], axis=1), fields["displacement_magnitude_m"], 1e-12)
     on_bonds = arrays(bonds.GetCellData())

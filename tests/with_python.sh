@@ -4,7 +4,7 @@
 modules=$1
 shift
 for python in "${TPMKIT_PYTHON:-python3}" python3 /usr/bin/python3; do
-  if "$python" -c "import $modules" >/dev/null 2>&1; then
+  if (cd / && "$python" -c "import $modules") >/dev/null 2>&1; then
     exec "$python" "$@"
   fi
 done

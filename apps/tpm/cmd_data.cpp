@@ -72,7 +72,7 @@ int check(const Session& session, const std::vector<std::string>& files) {
     } catch (const Error& error) {
       sound = false;
       report.push_back({{"file", file}, {"ok", false}, {"error", error.what()}});
-      if (!session.json()) fmt::print(stderr, "tpm: {}\n", error.what());
+      if (!session.json()) tell_user("tpm: {}\n", error.what());
     }
   }
   if (session.json()) fmt::print("{}", to_text(report));

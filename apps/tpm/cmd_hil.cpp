@@ -71,8 +71,8 @@ class Guide {
     phase_ = row.phase;
     if (progress_) progress_->advance();
     if (!real_time_ || isatty(STDERR_FILENO) == 0) return;
-    fmt::print(stderr, "{:8.1f} s  {}\n", static_cast<double>(row.cycle) * session_.servo.period_s,
-               session_.phases[static_cast<std::size_t>(phase_)].name);
+    tell_user("{:8.1f} s  {}\n", static_cast<double>(row.cycle) * session_.servo.period_s,
+              session_.phases[static_cast<std::size_t>(phase_)].name);
   }
 
  private:
@@ -84,8 +84,7 @@ class Guide {
 
 void warn_if_beyond_model(const ServoOutcome& outcome) {
   if (outcome.counts.beyond_model == 0) return;
-  fmt::print(
-      stderr,
+  tell_user(
       "tpm: warning: beyond the range that the model is good for in {} of {} cycles; tpm hil "
       "report says from when on\n",
       outcome.counts.beyond_model, outcome.cycles);
@@ -95,8 +94,8 @@ int exit_code_of(const ServoOutcome& outcome) {
   if (outcome.cause == StopCause::finished) return 0;
   constexpr int kStoppedBySignal = 128;
   if (outcome.cause == StopCause::signal) return kStoppedBySignal + InterruptWatch::signal();
-  fmt::print(stderr, "tpm: session stopped: {}{}{}\n", word_of(outcome.cause),
-             outcome.detail.empty() ? "" : ": ", outcome.detail);
+  tell_user("tpm: session stopped: {}{}{}\n", word_of(outcome.cause),
+            outcome.detail.empty() ? "" : ": ", outcome.detail);
   return static_cast<int>(ExitCode::environment);
 }
 

@@ -102,7 +102,7 @@ int check(const NetworkChoice& choice, const Session& session) {
     }
   }
   if (fault.empty()) return 0;
-  fmt::print(stderr, "tpm: {}\n", fault);
+  tell_user("tpm: {}\n", fault);
   return static_cast<int>(ExitCode::answer_is_no);
 }
 

@@ -64,7 +64,7 @@ SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& networ
   controls.interrupted = InterruptWatch::seen;
   controls.checkpoint = checkpoint;
   controls.checkpoint_every_s = checkpoint_every_s;
-  controls.note = [](const std::string& text) { fmt::print(stderr, "tpm: {}\n", text); };
+  controls.note = [](const std::string& text) { tell_user("tpm: {}\n", text); };
   return simulate(scene, network, controls);
 }
 
@@ -176,7 +176,7 @@ int run_command(const SimulateChoice& choice, const Session& session) {
     return simulate_and_report(choice, session);
   } catch (const Interrupted& stop) {
     constexpr int kStoppedBySignal = 128;
-    fmt::print(stderr, "tpm: {}\n", stop.what());
+    tell_user("tpm: {}\n", stop.what());
     return kStoppedBySignal + InterruptWatch::signal();
   }
 }

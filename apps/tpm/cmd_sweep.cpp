@@ -42,7 +42,7 @@ struct WrittenSweep {
 };
 
 void say_note(const std::string& text) {
-  fmt::print(stderr, "tpm: {}\n", text);
+  tell_user("tpm: {}\n", text);
 }
 
 /// @param ranks none: this process alone
@@ -90,8 +90,8 @@ Json sidecar(const Sweep& sweep, const SweepRun& run, const WrittenSweep& writte
 int stopped(BlockLog& log) {
   log.sync();
   constexpr int kStoppedBySignal = 128;
-  fmt::print(stderr, "tpm: stopped; what was computed is in {}: the same command goes on\n",
-             log.path().string());
+  tell_user("tpm: stopped; what was computed is in {}: the same command goes on\n",
+            log.path().string());
   return kStoppedBySignal + InterruptWatch::signal();
 }
 
@@ -255,7 +255,7 @@ int run_command(const SweepChoice& choice, const Session& session) {
   if (choice.shard.empty() && fingerprint_of(output) == sweep.fingerprint) {
     std::error_code ignored;
     fs::remove(log_file, ignored);  // left where a run was killed after its last step
-    fmt::print(stderr, "tpm: {} holds this sweep already\n", output.string());
+    tell_user("tpm: {} holds this sweep already\n", output.string());
     return 0;
   }
   require_replaceable(output);

@@ -63,7 +63,7 @@ std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
 void draw_into(const std::string& folder, const std::vector<Figure>& figures) {
   if (folder.empty()) return;
   const auto files = write_figures(folder, figures);
-  fmt::print(stderr, "tpm: wrote {} into {}\n", fmt::join(files, ", "), folder);
+  tell_user("tpm: wrote {} into {}\n", fmt::join(files, ", "), folder);
 }
 
 int sensitivity(const SweepViewChoice& choice, const Session& session) {

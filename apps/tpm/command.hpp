@@ -1,8 +1,12 @@
 #pragma once
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <cstdio>
 #include <functional>
 #include <string>
+#include <utility>
 
 namespace tpm::app {
 
@@ -25,6 +29,14 @@ void deliver(const std::string& text, const std::string& file);
 /// Reads a whole number from `smallest` to 1e9. Throws Error(usage) naming the option.
 [[nodiscard]] std::uint64_t parse_whole_number(const std::string& text, const char* option,
                                                std::uint64_t smallest);
+
+/// Writes a warning or an error to standard error. A full disk behind it, or nobody who reads it,
+/// changes nothing else.
+template <class... Arguments>
+void tell_user(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
+  const std::string line = fmt::format(text, std::forward<Arguments>(arguments)...);
+  (void)std::fputs(line.c_str(), stderr);
+}
 
 // One function per file cmd_*.cpp.
 void add_version_command(CLI::App& app, Session& session);

@@ -43,7 +43,7 @@ HilPage::HilPage(const HilSession& session, bool real_time, const PageOptions& o
       wait_s_(page_time_s(options.wait, "--page-wait")),
       keep_s_(page_time_s(options.keep, "--page-keep")),
       server_(view_, page_port(options.port)) {
-  fmt::print(stderr, "page: {}\n", server_.address());
+  tell_user("page: {}\n", server_.address());
 }
 
 void HilPage::show(SessionRunOptions& options) {

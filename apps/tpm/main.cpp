@@ -1,10 +1,14 @@
 // The program `tpm`: reads the command line, runs one command, turns errors into one line.
+#include <fcntl.h>
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <charconv>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <filesystem>
+#include <system_error>
 #include <vector>
 
 #include "command.hpp"
@@ -106,11 +110,29 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& wanted) {  // --help
     return app.exit(wanted);
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "tpm: {}; see tpm --help\n", error.what());
+    tell_user("tpm: {}; see tpm --help\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
   require_output_apart(app);
   return session.run();
+}
+
+/// A closed standard stream would hand its number to the next file that is opened, and messages
+/// would be written into that file.
+void occupy_closed_streams() {
+  for (int stream = 0; stream <= 2; ++stream) {
+    if (::fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
+    // Opened the wrong way round, so that writing to a closed output still fails.
+    (void)::open("/dev/null", stream == 0 ? O_WRONLY : O_RDONLY);
+  }
+}
+
+/// What was printed has to have arrived before the exit code says so.
+void require_output_written() {
+  const bool flushed = std::fflush(stdout) == 0;
+  if (flushed && std::ferror(stdout) == 0) return;
+  throw Error(ExitCode::environment, "standard output",
+              fmt::format("cannot be written: {}", std::strerror(errno)), "room for the answer");
 }
 
 }  // namespace
@@ -118,13 +140,22 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return tpm::app::run(argc, argv);
+    tpm::app::occupy_closed_streams();
+    const int code = tpm::app::run(argc, argv);
+    tpm::app::require_output_written();
+    return code;
   } catch (const tpm::Error& error) {
-    fmt::print(stderr, "tpm: {}\n", error.what());
+    tpm::app::tell_user("tpm: {}\n", error.what());
     return static_cast<int>(error.code());
+  } catch (const std::system_error& error) {
+    // fmt::print throws these where standard output takes nothing more.
+    const bool output = std::ferror(stdout) != 0;
+    tpm::app::tell_user("tpm: {}: {}\n", output ? "standard output" : "internal error",
+                        error.what());
+    return static_cast<int>(output ? tpm::ExitCode::environment : tpm::ExitCode::numerical);
   } catch (const std::exception& error) {
     // Nothing in the library throws anything else on purpose: this is a defect of tpm.
-    fmt::print(stderr, "tpm: internal error: {}; please report it\n", error.what());
+    tpm::app::tell_user("tpm: internal error: {}; please report it\n", error.what());
     return static_cast<int>(tpm::ExitCode::numerical);
   }
 }

@@ -1,5 +1,7 @@
 // A stand-in for the vendor's library: the same C interface, an Omega.7 that is simulated, and
-// faults on demand. The file named in $TPM_STAND_IN_SCRIPT is read at dhdOpenID; its lines are
+// faults on demand. As strict as the original: the drd calls know only a device that drdOpenID
+// opened, and drdAutoInit of another answers error 5. The file named in $TPM_STAND_IN_SCRIPT is
+// read when devices are counted; its lines are
 //   version|com_mode|entries|devices|type|initialised|period|delay_periods|encoder_step NUMBER
 //   operator FILE     pieces as written by to_lines(OperatorScript)
 //   events FILE       what happened, with the time of the clock: "NAME NANOSECONDS"
@@ -36,7 +38,7 @@ struct StandIn {
   std::string operator_file, events_file;
   std::vector<Fault> faults;
   int version = 3, com_mode = 0, entries = 17, devices = 1, type = 35;
-  bool initialised = true, read_once = false;
+  bool initialised = true, read_once = false, opened_by_drd = false;
   long reads = 0, writes = 0;
   int watchdog_ticks = 0;
   std::atomic<bool> expert{false}, unplugged{false};
@@ -307,11 +309,23 @@ const char* dhdErrorGetLastStr() {
 }
 
 #ifndef STAND_IN_WITHOUT_DRD
+int drdOpenID(char index) {
+  const int id = dhdOpenID(index);
+  here().opened_by_drd = id >= 0;
+  return id;
+}
+
+int drdClose(char id) {
+  here().opened_by_drd = false;
+  return dhdClose(id);
+}
+
 bool drdIsInitialized(char) {
-  return here().initialised;
+  return here().opened_by_drd && here().initialised;
 }
 
 int drdAutoInit(char) {
+  if (!here().opened_by_drd) return failed(5);
   event("moved");
   here().initialised = true;
   return 0;

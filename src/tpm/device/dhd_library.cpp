@@ -102,10 +102,12 @@ void DhdLibrary::find_symbols() {
   find(handle_, "dhdStop", c.stop, missing);
   find(handle_, "dhdErrorGetLast", c.error_get_last, missing);
   find(handle_, "dhdErrorGetLastStr", c.error_get_last_text, missing);
+  find(handle_, "drdOpenID", c.drd_open_id, without_drd);
+  find(handle_, "drdClose", c.drd_close, without_drd);
   find(handle_, "drdIsInitialized", c.drd_is_initialized, without_drd);
   find(handle_, "drdAutoInit", c.drd_auto_init, without_drd);
   find(handle_, "drdStop", c.drd_stop, without_drd);
-  if (missing.empty() && !without_drd.empty() && without_drd.size() < 3) missing = without_drd;
+  if (missing.empty() && !without_drd.empty() && without_drd.size() < 5) missing = without_drd;
   if (missing.empty()) return;
   throw Error(ExitCode::environment, file_, fmt::format("has no {}", fmt::join(missing, ", ")),
               "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");

@@ -32,7 +32,10 @@ struct DhdCalls {
   int (*stop)(char id);
   int (*error_get_last)();
   const char* (*error_get_last_text)();
-  // Of libdrd; null if the library is libdhd alone.
+  // Of libdrd; null if the library is libdhd alone. drd_is_initialized and drd_auto_init know only
+  // a device that drd_open_id opened; after open_id they answer as if no device were there.
+  int (*drd_open_id)(char index);
+  int (*drd_close)(char id);
   bool (*drd_is_initialized)(char id);
   int (*drd_auto_init)(char id);
   int (*drd_stop)(bool keep_force, char id);

@@ -62,8 +62,10 @@ const DeviceIdentity& Omega7::open() {
     throw device_error(count < 0 ? "cannot look for devices: " + last_words() : "no device found",
                        "an Omega.7, switched on and plugged in, that this user may open");
   }
-  const int id = call_.open_id(0);
-  require(id, "dhdOpenID");
+  // The drd calls know only a device that drdOpenID opened.
+  const bool with_drd = library_->initialises();
+  const int id = with_drd ? call_.drd_open_id(0) : call_.open_id(0);
+  require(id, with_drd ? "drdOpenID" : "dhdOpenID");
   id_ = static_cast<char>(id);
   open_ = true;
 
@@ -183,7 +185,7 @@ void Omega7::stop() noexcept {
     (void)call_.stop(id_);
     (void)call_.enable_force(0, id_);
   }
-  (void)call_.close(id_);
+  (void)(library_->initialises() ? call_.drd_close(id_) : call_.close(id_));
 }
 
 void Omega7::cut_forces() noexcept {

@@ -10,6 +10,8 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <sstream>
+#include <string_view>
 #include <vector>
 
 #include "tpm/core/error.hpp"
@@ -43,12 +45,41 @@ int wait_for(pid_t child) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
+/// The environment for a Python: PYTHONPATH without empty and relative parts, which would stand for
+/// the current folder. Nothing that lies where the user stands may be imported.
+std::vector<std::string> safe_environment() {
+  constexpr std::string_view kKey = "PYTHONPATH=";
+  std::vector<std::string> variables;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string_view text(*variable);
+    if (!text.starts_with(kKey)) {
+      variables.emplace_back(text);
+      continue;
+    }
+    std::string kept;
+    std::istringstream parts{std::string(text.substr(kKey.size()))};
+    for (std::string part; std::getline(parts, part, ':');) {
+      if (part.starts_with('/')) kept += (kept.empty() ? "" : ":") + part;
+    }
+    if (!kept.empty()) variables.push_back(std::string(kKey) + kept);
+  }
+  return variables;
+}
+
+/// Pointers to the words, with a null at the end, as the system takes them.
+std::vector<char*> pointers_to(const std::vector<std::string>& words) {
+  std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
+  for (const std::string& word : words) pointers.push_back(const_cast<char*>(word.c_str()));
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
 /// Runs a program (searched for on the path) without a shell, its standard output discarded.
 Outcome run(const std::vector<std::string>& words) {
-  std::vector<char*> arguments;
-  arguments.reserve(words.size() + 1);
-  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
+  const std::vector<std::string> variables = safe_environment();
+  const std::vector<char*> arguments = pointers_to(words);
+  const std::vector<char*> environment = pointers_to(variables);
 
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
@@ -61,7 +92,7 @@ Outcome run(const std::vector<std::string>& words) {
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
   pid_t child = 0;
   const int failed =
-      ::posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+      ::posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
   ::close(ends[1]);
   Outcome outcome;
@@ -103,7 +134,10 @@ std::string find_drawing_python() {
     candidates = {chosen};
   }
   for (const std::string& python : candidates) {
-    if (run({python, "-c", "import matplotlib"}).status == 0) return python;
+    // With -c the current folder comes first in sys.path; sys itself is built in.
+    constexpr const char* kImport =
+        "import sys; sys.path[:] = [p for p in sys.path if p.startswith('/')]; import matplotlib";
+    if (run({python, "-c", kImport}).status == 0) return python;
   }
   throw Error(ExitCode::environment, "figures",
               fmt::format("no Python with matplotlib; tried {}", fmt::join(candidates, ", ")),

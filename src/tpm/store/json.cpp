@@ -31,6 +31,10 @@ class DuplicateKeys {
   std::string duplicate_;
 };
 
+/// Readers of JSON call themselves once for each level; no file of the project has more than a
+/// dozen.
+constexpr int kDeepestNesting = 200;
+
 void require_finite(const Json& value, const std::string& key) {
   if (value.is_number_float() && !std::isfinite(value.get<double>())) {
     throw Error(ExitCode::numerical, key, "the result is not a finite number");
@@ -46,10 +50,15 @@ Json parse_json(std::string_view text, std::string_view where) {
   DuplicateKeys watcher;
   Json value;
   try {
-    value = Json::parse(text.begin(), text.end(),
-                        [&watcher](int depth, Json::parse_event_t event, Json& parsed) {
-                          return watcher(depth, event, parsed);
-                        });
+    value = Json::parse(
+        text.begin(), text.end(), [&](int depth, Json::parse_event_t event, Json& parsed) {
+          if (depth > kDeepestNesting) {
+            throw bad_input(where,
+                            fmt::format("is nested more than {} levels deep", kDeepestNesting),
+                            "objects and arrays within each other a few times");
+          }
+          return watcher(depth, event, parsed);
+        });
   } catch (const nlohmann::json::exception& error) {
     std::string what = error.what();
     if (const auto end = what.find("] "); end != std::string::npos) what = what.substr(end + 2);
