@@ -130,6 +130,30 @@ TEST_CASE(
   CHECK(best_ms <= 10.0);
 }
 
+TEST_CASE(
+    "A stall stands in the record with its whole length, and agrees with the missed periods") {
+  const test::TempFolder folder;
+  write_file(folder / "script", "events " + (folder / "events") + "\nfault hang 100 30\n");
+  (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
+  HilSession session = patient_session();
+  session.hang_limit_s = 1.0;
+  DeviceChoice device;
+  device.kind = "omega7";
+  device.library = TPM_STAND_IN_DHD;
+  (void)run_session(session, device, on_the_clock(folder / "r"));
+  (void)unsetenv("TPM_STAND_IN_SCRIPT");
+  const HilRecording recording = read_recording(folder / "r");
+  const double period_s = session.servo.period_s;
+  double longest_s = 0.0;
+  for (const ServoRecord& row : recording.rows) {
+    INFO("cycle " << row.cycle << " woke late by " << row.woke_late_s << " s");
+    CHECK(row.woke_late_s >= (1.0 - 1e-6) * row.missed * period_s);
+    CHECK(row.woke_late_s <= (1.0 + 1e-6) * (row.missed + 1) * period_s);
+    longest_s = std::max(longest_s, static_cast<double>(row.woke_late_s));
+  }
+  CHECK(longest_s > 0.030 - 2.0 * period_s);
+}
+
 TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as its cause") {
   double best_ms = 1e9;
   for (int attempt = 0; attempt < 10 && best_ms > 10.0; ++attempt) {

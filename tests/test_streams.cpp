@@ -1,4 +1,5 @@
 // Standard output and error that take nothing, and programs that lie where the user stands.
+#include <hdf5.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -6,11 +7,13 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/hdf5.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm {
@@ -84,6 +87,57 @@ TEST_CASE("JSON that is nested without end is refused in one line") {
                       Contains("deep.json: is nested more than 200 levels deep"));
   }
   CHECK_NOTHROW(parse_json(std::string(200, '[') + std::string(200, ']'), "flat.json"));
+}
+
+TEST_CASE("Slurm tasks that are submitted again alone run the shards of the first submission") {
+  const test::TempFolder folder;
+  const std::string output = folder / "s.h5", source = TPM_TEST_SOURCE_DIR;
+  const auto task = [&](int id, int least, int most, int count) {
+    return exit_code_of("export TPM SLURM_ARRAY_TASK_ID=" + std::to_string(id) +
+                        " SLURM_ARRAY_TASK_MIN=" + std::to_string(least) +
+                        " SLURM_ARRAY_TASK_MAX=" + std::to_string(most) +
+                        " SLURM_ARRAY_TASK_COUNT=" + std::to_string(count) + "; bash '" + source +
+                        "/scripts/sweep.sbatch' '" + source + "/configs/sweep_x_depth.json' '" +
+                        output + "' > /dev/null 2>&1");
+  };
+  CHECK(task(3, 3, 3, 1) == 2);  // nothing says yet into how many shards
+  CHECK(task(1, 1, 4, 4) == 0);
+  CHECK(task(3, 3, 3, 1) == 0);  // --array=3
+  CHECK(task(4, 2, 4, 2) == 0);  // --array=2,4
+  for (const int shard : {1, 3, 4}) {
+    CHECK(std::filesystem::exists(output + ".shard-" + std::to_string(shard) + "-of-4"));
+  }
+  CHECK(task(5, 5, 5, 1) == 2);  // there are only four
+  const std::string by_hand =
+      "$TPM sweep '" + source + "/configs/sweep_x_depth.json' -o '" + output + "' --shard ";
+  CHECK(exit_code_of(by_hand + "1/2 2> /dev/null") == 2);
+  CHECK(task(2, 2, 2, 1) == 0);
+  CHECK(exit_code_of("$TPM sweep merge '" + source + "/configs/sweep_x_depth.json' -o '" + output +
+                     "' > /dev/null") == 0);
+}
+
+/// A file whose attribute `text` of the root holds so many texts.
+void write_attribute(const std::string& file, hsize_t count) {
+  const hid_t made = H5Fcreate(file.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate_simple(1, &count, nullptr);
+  H5Tset_size(type, H5T_VARIABLE);
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  const hid_t attribute = H5Acreate2(made, "text", type, space, H5P_DEFAULT, H5P_DEFAULT);
+  const std::vector<const char*> texts(count, "word");
+  H5Awrite(attribute, type, static_cast<const void*>(texts.data()));
+  H5Aclose(attribute);
+  H5Sclose(space);
+  H5Tclose(type);
+  H5Fclose(made);
+}
+
+TEST_CASE("An attribute of many texts is refused, not read into the room for one") {
+  const test::TempFolder folder;
+  write_attribute(folder / "one.h5", 1);
+  CHECK(Hdf5Reader(folder / "one.h5").attribute("/", "text") == "word");
+  write_attribute(folder / "many.h5", 2000);
+  CHECK_THROWS_WITH(Hdf5Reader(folder / "many.h5").attribute("/", "text"),
+                    Contains("not a single text"));
 }
 
 }  // namespace

@@ -172,8 +172,21 @@ std::vector<std::string> shards_beside(const fs::path& output) {
   return files;
 }
 
+/// Tasks of an array that are submitted again alone must cut the sweep as the first submission did:
+/// the files that stand beside the output say into how many.
+void require_same_count(const fs::path& output, const Shard& shard) {
+  const std::string ending = fmt::format("-of-{}", shard.count);
+  for (const std::string& file : shards_beside(output)) {
+    if (file.ends_with(ending)) continue;
+    throw Error(ExitCode::usage, fmt::format("--shard {}/{}", shard.index + 1, shard.count),
+                fmt::format("{} is a shard of another number of shards", file),
+                "the same number for all, or that file removed");
+  }
+}
+
 int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls,
               const Session& session) {
+  require_same_count(output, controls.shard);
   const fs::path file = shard_path(output, controls.shard);
   const Shard shard = controls.shard;
   BlockLog log(file, sweep, say_note);

@@ -49,7 +49,8 @@ void serve(Shared& s) noexcept {
     sleep_until_ns(deadline);
     const std::int64_t woke = now_ns();
     s.busy_since_ns.store(woke, std::memory_order_release);
-    const std::int64_t missed = std::max<std::int64_t>((woke - deadline) / period_ns, 0);
+    const std::int64_t late_ns = woke - deadline;  // of the first period that went by
+    const std::int64_t missed = std::max<std::int64_t>(late_ns / period_ns, 0);
     deadline += missed * period_ns;
     const StopCause wanted = s.wanted.load(std::memory_order_acquire);
     if (wanted != StopCause::none) {
@@ -60,9 +61,9 @@ void serve(Shared& s) noexcept {
       cause = s.step.cycle(static_cast<int>(std::min<std::int64_t>(missed, 1'000'000)), row);
       s.device->advance(period_s);
       const std::int64_t done = now_ns();
-      row.woke_late_s = static_cast<float>(static_cast<double>(woke - deadline) * 1e-9);
+      row.woke_late_s = static_cast<float>(static_cast<double>(late_ns) * 1e-9);
       row.busy_s = static_cast<float>(static_cast<double>(done - woke) * 1e-9);
-      s.woke_late.note(woke - (deadline - missed * period_ns));
+      s.woke_late.note(late_ns);
       s.busy.note(done - woke);
       if (!s.ring.push(row)) s.dropped.fetch_add(1, std::memory_order_relaxed);
       s.cycle.store(row.cycle, std::memory_order_release);

@@ -199,6 +199,10 @@ std::string Hdf5Reader::attribute(const std::string& object, const std::string& 
   }
   const Hdf5Handle type = text_type();
   const Hdf5Handle space(H5Aget_space(opened.get()), H5Sclose);
+  // HDF5 writes as many texts as the file says into the room for one.
+  if (H5Sget_simple_extent_npoints(space.get()) != 1) {
+    fail(object, fmt::format("attribute '{}' is not a single text", name), "one text");
+  }
   BorrowedTexts borrowed(type, space, 1);
   if (H5Aread(opened.get(), type.get(), borrowed.buffer()) < 0) {
     fail(object, fmt::format("attribute '{}' cannot be read", name), "a whole HDF5 file");
