@@ -1,4 +1,5 @@
-// Prints the tables of refinement and moduli of docs/growth.md: build/release/tests/measure_refinement
+// Prints the tables of refinement and moduli of docs/growth.md:
+// build/release/tests/measure_refinement
 #include <fmt/format.h>
 
 #include <numbers>
