@@ -25,7 +25,7 @@ twice=$(git ls-files 'src/tpm/*.hpp' | xargs grep -hoE '^(struct|class|enum clas
 [[ -z "$twice" ]] || die "src/tpm defines more than one type named: $twice; expected one of a name"
 
 step "building the slow tests (build/release)"
-configure release -DTPM_SLOW_TESTS=ON
+configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=ON
 build release
 step "slow tests"
 slow_log=build/ctest-slow.log

@@ -8,7 +8,7 @@ source scripts/install_packages.sh
 install_missing "to build and run tpm" "${packages_run[@]}"
 find_python numpy matplotlib
 
-configure release
+configure release -DTPM_BUILD_TESTS=OFF
 step "building tpm (build/release); some minutes the first time"
 build release tpm
 

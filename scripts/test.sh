@@ -8,7 +8,7 @@ source scripts/install_packages.sh
 install_missing "to build, run and test tpm" "${packages_run[@]}" "${packages_test[@]}"
 find_python numpy matplotlib scipy h5py
 
-configure release -DTPM_SLOW_TESTS=OFF
+configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=OFF
 step "building tpm and its tests (build/release)"
 build release
 
