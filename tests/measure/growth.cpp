@@ -1,7 +1,7 @@
 // Prints the measured numbers of docs/growth.md and writes its figure:
 //
-//     build/release/tests/measure_growth FOLDER                      everything;
-//     FOLDER/figures.json build/release/tests/measure_growth KIND COUNT SOLVER [STRIDES] one case
+//     measure_growth FOLDER                         everything; FOLDER/figures.json
+//     measure_growth KIND COUNT SOLVER [STRIDES]    one case
 //
 // Every case runs in a process of its own, so that its peak of memory is its own.
 #include <fmt/format.h>
