@@ -23,6 +23,47 @@ TEST_CASE("a quantity is a number and a unit of the right dimension") {
   }
 }
 
+TEST_CASE("units take the prefixes of the SI, powers, products and quotients") {
+  const auto si = [](const char* text) { return parse_unit(text, "here").to_si; };
+  struct Expected {
+    const char* text;
+    double to_si;
+    Dimension dimension;
+  };
+  for (const Expected& e :
+       {Expected{"fN", 1e-15, Dimension::force},
+        {"pN", 1e-12, Dimension::force},
+        {"nN", 1e-9, Dimension::force},
+        {"\xC2\xB5N", 1e-6, Dimension::force},
+        {"GPa", 1e9, Dimension::stress},
+        {"mmHg", 133.322387415, Dimension::stress},
+        {"hPa", 100.0, Dimension::stress},
+        {"kgf/cm^2", 98066.5, Dimension::stress},
+        {"N mm^-2", 1e6, Dimension::stress},
+        {"N/mm\xC2\xB2", 1e6, Dimension::stress},
+        {"mPa\xC2\xB7s", 1e-3, Dimension::viscosity},
+        {"deg", 3.141592653589793 / 180.0, Dimension::angle},
+        {"\xC2\xB0", 3.141592653589793 / 180.0, Dimension::angle},
+        {"mrad", 1e-3, Dimension::angle},
+        {"1/kPa", 1e-3, Dimension::compliance},
+        {"Pa^-1", 1.0, Dimension::compliance},
+        {"m/min", 1.0 / 60.0, Dimension::speed},
+        {"deg/s", 1.0 / 360.0, Dimension::frequency},
+        {"rad s\xE2\x81\xBB\xC2\xB9", 0.5 / 3.141592653589793, Dimension::frequency},
+        {"N / m", 1.0, Dimension::stiffness}}) {
+    INFO(e.text);
+    CHECK_THAT(si(e.text), WithinRel(e.to_si, 1e-14));
+    CHECK(parse_unit(e.text, "here").dimension == e.dimension);
+  }
+  CHECK(parse_unit("N/mm^2", "here").symbol == "MPa");
+  CHECK(parse_unit("mN/mm", "here").symbol == "N/m");
+  for (const char* wrong : {"10", "12", "x", "lbf", "N//m", "N/", "/s", "kkPa", "kg", "MM", "N^",
+                            "mm^9", "k", "PA", "m^2^2", "k%"}) {
+    INFO(wrong);
+    CHECK_FALSE(is_unit(wrong));
+  }
+}
+
 TEST_CASE("JSON that nlohmann-json would let pass is refused") {
   CHECK_THROWS_WITH(parse_json(R"({"a": 1, "a": 2})", "f.json"),
                     "f.json: key 'a' stands twice in one object; expected each key once");

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
@@ -139,8 +141,10 @@ TEST_CASE("stress over relative length: what the file does not say has to be sai
   ImportOptions options;
   CHECK_THROWS_WITH(
       import_curves(fixture("strip_no_units.csv"), options),
-      Catch::Contains("column 1 'Time', column 3 'F', column 4 'SD': have no unit; expected "
-                      "--unit \"Time=s\" --unit \"F=N\" --unit \"SD=N\""));
+      Catch::Contains(
+          "column 1 'Time', column 3 'F', column 4 'SD': have no unit; expected "
+          "--unit \"Time=UNIT\" with a unit of time: s, ms, us, min, h; --unit \"F=UNIT\" "
+          "with a unit of force: N, mN"));
   options.units = {{"Time", "s"}, {"3", "kPa"}, {"SD", "kPa"}};
   options.drive_column = "L";
   options.drive_quantity = Quantity::relative_length;
@@ -162,6 +166,75 @@ TEST_CASE("plain x and y are a recording without time") {
   CHECK(recording.time_s.empty());
   CHECK(recording.drive_quantity == Quantity::abscissa);
   CHECK(recording.response == std::vector<double>{2, 4, 6});
+}
+
+TEST_CASE("titles, units and blank rows stand in any order above the samples") {
+  const std::string title = "Tensile test 7\n";
+  const std::string blank = ",,\n";
+  const std::string names = "Time,Stretch,Stress\n";
+  const std::string units = "s,%,kPa\n";
+  const std::string samples = "0,100,0\n1,105,2\n2,110,4\n";
+  const TempFolder folder;
+  std::vector<std::string> rows{title, blank, names, units};
+  std::sort(rows.begin(), rows.end());
+  int orders = 0;
+  do {
+    ++orders;
+    write_file(folder / "f.csv", rows[0] + rows[1] + rows[2] + rows[3] + samples);
+    INFO(rows[0] + rows[1] + rows[2] + rows[3]);
+    const auto series = import_series(folder / "f.csv", {}).series;
+    REQUIRE(series.at(0).columns.size() == 3);
+    const ImportedColumn& stretch = series[0].columns[1];
+    CHECK(stretch.unit.symbol == "%");
+    CHECK(stretch.unit.to_si == 0.01);
+    CHECK(series[0].columns[2].unit.to_si == 1e3);
+  } while (std::next_permutation(rows.begin(), rows.end()));
+  CHECK(orders == 24);
+}
+
+TEST_CASE("a unit that is not known stops the import, and none is suggested") {
+  const TempFolder folder;
+  const auto fault = [&folder](const std::string& text) -> std::string {
+    write_file(folder / "f.csv", text + "0,0,0\n1,1,1\n");
+    try {
+      static_cast<void>(import_curves(folder / "f.csv", {}));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  CHECK_THAT(
+      fault("time [s],force [blob],depth [mm]\n"),
+      Catch::Contains("column 2 'force': unknown unit 'blob'; expected --unit \"force=UNIT\" "
+                      "with a unit of force"));
+  CHECK_THAT(fault("time,force,depth\ns,lbs,mm\n"), Catch::Contains("unknown unit 'lbs'"));
+  CHECK_THAT(fault("time,force,stretch\n[s],[N],[pc]\n"), Catch::Contains("unknown unit 'pc'"));
+  CHECK_THAT(fault("time [s],force (blob),depth [mm]\n"),
+             Catch::Contains("column 2 'force (blob)': has no unit"));
+  write_file(folder / "g.csv", "time [s],force [nN],depth [um]\n0,0,0\n1,2,3\n");
+  const auto nano = import_series(folder / "g.csv", {}).series;
+  CHECK(nano.at(0).columns.at(2).unit.to_si == 1e-9);
+  CHECK(nano.at(0).columns.at(1).unit.to_si == 1e-6);
+}
+
+TEST_CASE("a spectrum may come as magnitude and phase, and over an angular frequency") {
+  constexpr double kPi = 3.14159265358979323846;
+  const TempFolder folder;
+  // |G*| = 2 kPa at 30 degrees; 1/s of omega is rad/s.
+  write_file(folder / "polar.csv",
+             "omega [1/s],|G*| [kPa],delta [deg]\n1,2,30\n6.283185307179586,4,60\n");
+  const auto polar = import_curves(folder / "polar.csv", {});
+  CHECK(finding(polar.at(0), "converted") == "magnitude and phase to storage and loss");
+  const auto spectrum = std::get<Spectrum>(written_and_loaded(polar.at(0)));
+  check_values(spectrum.frequency_Hz, {0.5 / kPi, 1.0});
+  check_values(spectrum.storage, {2e3 * std::sqrt(0.75), 2e3});
+  check_values(spectrum.loss, {1e3, 4e3 * std::sqrt(0.75)});
+
+  write_file(folder / "tangent.csv", "freq [Hz],G' [Pa],tan(\xCE\xB4)\n1,200,0.5\n2,300,0.1\n");
+  const auto tangent =
+      std::get<Spectrum>(written_and_loaded(import_curves(folder / "tangent.csv", {}).at(0)));
+  check_values(tangent.storage, {200, 300});
+  check_values(tangent.loss, {100, 30});
 }
 
 TEST_CASE("machine files that do not hold a recording are refused") {

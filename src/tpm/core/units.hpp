@@ -9,15 +9,17 @@ namespace tpm {
 /// the edges (files, tables, messages) and are converted here and nowhere else.
 enum class Dimension {
   dimensionless,
-  time,       // s
-  length,     // m
-  area,       // m^2
-  force,      // N
-  stress,     // Pa, also moduli
-  viscosity,  // Pa s
-  speed,      // m/s
-  frequency,  // Hz
-  stiffness,  // N/m
+  time,        // s
+  length,      // m
+  area,        // m^2
+  force,       // N
+  stress,      // Pa, also moduli
+  viscosity,   // Pa s
+  speed,       // m/s
+  frequency,   // Hz
+  stiffness,   // N/m
+  angle,       // rad
+  compliance,  // 1/Pa
 };
 
 /// A unit of measurement: value_SI = value * to_si.
@@ -27,9 +29,11 @@ struct Unit {
   double to_si;
 };
 
-/// Looks a unit up by the ways people write it ("mm", "Pa.s", "Pa s", "mm/s", "mm^2", "mm2", "N",
-/// "sec"). Case matters where it does in SI (mN is not MN). Throws Error(bad_input) naming the
-/// known units of `expected` if the text is unknown or of another dimension.
+/// Reads a unit as people write it: "mm", "Pa.s", "Pa s", "mm/min", "mm^2", "mm2", "N m^-1",
+/// "kgf/cm^2", "1/Pa", "rad/s", with the SI prefixes f to G. Case matters where it does in SI (mN
+/// is not MN); rad/s is converted to Hz. The symbol is the project's own where it has one. Throws
+/// Error(bad_input) naming common units of `expected` if the text is unknown or of another
+/// dimension.
 /// @param where place for the error message
 [[nodiscard]] Unit parse_unit(std::string_view text, Dimension expected, std::string_view where);
 
@@ -37,7 +41,10 @@ struct Unit {
 [[nodiscard]] Unit parse_unit(std::string_view text, std::string_view where);
 
 /// True if `text` is a unit that parse_unit knows.
-[[nodiscard]] bool is_unit(std::string_view text) noexcept;
+[[nodiscard]] bool is_unit(std::string_view text);
+
+/// Common units of a dimension, for messages: "N, mN, kN".
+[[nodiscard]] std::string units_of(Dimension dimension);
 
 /// The SI unit symbol of a dimension ("" for dimensionless).
 [[nodiscard]] std::string_view si_symbol(Dimension dimension) noexcept;

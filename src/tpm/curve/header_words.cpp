@@ -73,6 +73,9 @@ constexpr Recognized kSd{ColumnRole::sd, Quantity::contact_force, 0};
 constexpr Recognized kFrequency{ColumnRole::frequency, Quantity::frequency, 0};
 constexpr Recognized kStorage{ColumnRole::storage, Quantity::storage_modulus, 0};
 constexpr Recognized kLoss{ColumnRole::loss, Quantity::loss_modulus, 0};
+constexpr Recognized kMagnitude{ColumnRole::magnitude, Quantity::storage_modulus, 0};
+constexpr Recognized kPhase{ColumnRole::phase, Quantity::abscissa, 0};
+constexpr Recognized kLossTangent{ColumnRole::loss_tangent, Quantity::abscissa, 1};
 
 constexpr auto kWords = std::to_array<TitleWord>({
     {"time", kTime},
@@ -126,6 +129,13 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"frequence", kFrequency},
     {"frecuencia", kFrequency},
     {"frequenza", kFrequency},
+    {"omega", kFrequency},
+    {"complex", kMagnitude},
+    {"magnitude", kMagnitude},
+    {"delta", kPhase},
+    {"phase", kPhase},
+    {"phasenwinkel", kPhase},
+    {"tandelta", kLossTangent},
     {"storage", kStorage},
     {"speichermodul", kStorage},
     {"conservation", kStorage},
@@ -144,12 +154,16 @@ constexpr auto kWords = std::to_array<TitleWord>({
 });
 
 /// G', G'', E', E" and the like, with straight or typographic primes: a letter and one or two of
-/// them.
+/// them. G* and |G*| are the magnitude.
 std::optional<Recognized> recognize_primes(std::string_view name) {
-  const std::u32string text = utf8::utf8to32(std::string(trimmed(name)));
+  std::u32string text = utf8::utf8to32(std::string(trimmed(name)));
+  if (text.size() > 3 && text.front() == U'|' && text.back() == U'|') {
+    text = text.substr(1, text.size() - 2);
+  }
   if (text.size() < 2 || std::u32string_view(U"GEKgek").find(text[0]) == std::u32string::npos) {
     return std::nullopt;
   }
+  if (text.substr(1) == U"*") return kMagnitude;
   int primes = 0;
   for (const char32_t c : std::u32string_view(text).substr(1)) {
     if (c == U'\'' || c == U'\u2032' || c == U'\u2019') {
@@ -162,6 +176,25 @@ std::optional<Recognized> recognize_primes(std::string_view name) {
   }
   if (primes == 1) return kStorage;
   return primes == 2 ? std::optional(kLoss) : std::nullopt;
+}
+
+/// Greek letters by their names, as words of their own.
+std::string spelled_out(std::string_view name) {
+  std::string text;
+  for (const char32_t c : utf8::utf8to32(std::string(name))) {
+    if (c == U'\u03C9') {
+      text += " omega ";
+    } else if (c == U'\u03B4') {
+      text += " delta ";
+    } else {
+      utf8::append(c, text);
+    }
+  }
+  return text;
+}
+
+bool has_word(const std::vector<std::string>& words, std::string_view word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
 }
 
 /// The text before and after the last separator, if a unit stands after it.
@@ -187,7 +220,10 @@ ColumnTitle split_title(std::string_view title) {
   const auto open = text.find_last_of("([");
   if (open != std::string_view::npos && open > 0) {
     const auto unit = without_brackets(text.substr(open));
-    if (is_unit(unit)) return {std::string(trimmed(text.substr(0, open))), std::string(unit)};
+    const bool square = text[open] == '[' && text.back() == ']' && !unit.empty();
+    if (square || is_unit(unit)) {
+      return {std::string(trimmed(text.substr(0, open))), std::string(unit)};
+    }
   }
   for (const std::string_view separator : {" / ", ", ", " in ", "_"}) {
     if (auto split = split_at(text, separator)) return *split;
@@ -197,8 +233,14 @@ ColumnTitle split_title(std::string_view title) {
 
 std::optional<Recognized> recognize_title(std::string_view name) {
   if (const auto primes = recognize_primes(name)) return primes;
+  const std::vector<std::string> words = words_of(spelled_out(name));
+  // "tan delta", "loss tangent", "loss factor"; "complex viscosity" is no modulus.
+  const bool tangent = has_word(words, "tan") || has_word(words, "tangent") ||
+                       (has_word(words, "loss") && has_word(words, "factor"));
+  if (tangent) return kLossTangent;
+  if (has_word(words, "viscosity")) return std::nullopt;
   std::optional<Recognized> found;
-  for (const std::string& word : words_of(name)) {
+  for (const std::string& word : words) {
     const auto known = std::find_if(kWords.begin(), kWords.end(),
                                     [&word](const TitleWord& w) { return w.word == word; });
     if (known == kWords.end()) continue;
@@ -206,6 +248,11 @@ std::optional<Recognized> recognize_title(std::string_view name) {
     if (!found || known->meaning.rank > found->rank) found = known->meaning;
   }
   return found;
+}
+
+bool is_angular(std::string_view name) {
+  const std::vector<std::string> words = words_of(spelled_out(name));
+  return has_word(words, "omega") || has_word(words, "angular") || has_word(words, "kreisfrequenz");
 }
 
 }  // namespace tpm

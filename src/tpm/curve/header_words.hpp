@@ -8,7 +8,8 @@
 namespace tpm {
 
 /// A column title taken apart: "Force [N]", "Force (N)", "Force / N", "Force, N", "Kraft in N" and
-/// "force_N" all give {"Force", "N"}. The unit is empty if there is none that parse_unit knows.
+/// "force_N" all give {"Force", "N"}. The unit is empty if there is none that parse_unit knows,
+/// except in square brackets: "Force [foo]" gives "foo", for whoever reads the column to refuse.
 struct ColumnTitle {
   std::string name;
   std::string unit;
@@ -20,7 +21,18 @@ struct ColumnTitle {
 [[nodiscard]] std::string_view without_brackets(std::string_view cell) noexcept;
 
 /// What a column of a testing machine may be used for.
-enum class ColumnRole { time, drive, response, sd, frequency, storage, loss };
+enum class ColumnRole {
+  time,
+  drive,
+  response,
+  sd,
+  frequency,
+  storage,
+  loss,
+  magnitude,     ///< of the complex modulus, |G*|
+  phase,         ///< the angle delta by which the stress leads the strain
+  loss_tangent,  ///< tan delta
+};
 
 /// What a title says in English, French, German, Spanish or Italian, or as G', G", E' and E".
 struct Recognized {
@@ -30,5 +42,9 @@ struct Recognized {
 };
 
 [[nodiscard]] std::optional<Recognized> recognize_title(std::string_view name);
+
+/// True for an angular frequency ("omega", "angular frequency", "Kreisfrequenz"): there 1/s means
+/// rad/s.
+[[nodiscard]] bool is_angular(std::string_view name);
 
 }  // namespace tpm

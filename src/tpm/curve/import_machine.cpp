@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <tuple>
 
 #include "tpm/core/error.hpp"
@@ -59,14 +60,35 @@ std::size_t count_header_rows(const DelimitedTable& table, const std::string& fi
                   "samples, or another separator or decimal sign");
 }
 
+bool is_bracketed(std::string_view cell) {
+  return without_brackets(cell).size() < cell.size();
+}
+
+/// A row of units: all cells are units or stand in brackets, or at least half of them are units and
+/// none is a title. A cell that is no unit is refused by whoever reads its column.
 bool is_unit_row(const DelimitedRow& row) {
-  std::size_t units = 0;
+  std::size_t filled = 0, units = 0, brackets = 0, titles = 0;
   for (const std::string_view field : row.fields) {
     if (field.empty() || field == "-") continue;
-    if (!is_unit(without_brackets(field))) return false;
-    ++units;
+    ++filled;
+    const bool unit = is_unit(without_brackets(field));
+    if (unit) ++units;
+    if (is_bracketed(field)) ++brackets;
+    if (!unit && recognize_title(split_title(field).name)) ++titles;
   }
-  return units > 0;
+  if (filled == 0) return false;
+  return units == filled || brackets == filled || (2 * units >= filled && titles == 0);
+}
+
+bool is_blank(const DelimitedRow& row) {
+  return std::all_of(row.fields.begin(), row.fields.end(),
+                     [](std::string_view field) { return field.empty(); });
+}
+
+std::size_t recognized_titles(const DelimitedRow& row) {
+  return static_cast<std::size_t>(std::count_if(
+      row.fields.begin(), row.fields.end(),
+      [](std::string_view field) { return recognize_title(split_title(field).name).has_value(); }));
 }
 
 std::string field_or_empty(const DelimitedRow& row, std::size_t index) {
@@ -92,6 +114,33 @@ std::string chosen_unit(const Column& column, const ImportOptions& options) {
   return column.unit;
 }
 
+/// Where titles and units stand; null if nowhere.
+struct HeaderRows {
+  const DelimitedRow* titles = nullptr;
+  const DelimitedRow* units = nullptr;
+};
+
+/// Units and titles stand in any order, with blank rows and rows of other things between them.
+/// Titles are the row with the most names that are known; of several, the one nearest to the
+/// samples.
+HeaderRows header_rows(const DelimitedTable& table, std::size_t count) {
+  HeaderRows found;
+  std::size_t most = 0;
+  for (std::size_t i = count; i-- > 0;) {
+    const DelimitedRow& row = table.rows[i];
+    if (is_blank(row)) continue;
+    if (is_unit_row(row)) {
+      if (found.units == nullptr) found.units = &row;
+      continue;
+    }
+    const std::size_t names = recognized_titles(row);
+    if (found.titles != nullptr && names <= most) continue;
+    found.titles = &row;
+    most = names;
+  }
+  return found;
+}
+
 Header read_header(const DelimitedTable& table, const std::string& file,
                    const ImportOptions& options) {
   Header header;
@@ -102,24 +151,21 @@ Header read_header(const DelimitedTable& table, const std::string& file,
                     fmt::format("{} header rows but only {} rows", header.rows, table.rows.size()),
                     "samples below the header");
   }
-  const DelimitedRow none;
-  const DelimitedRow* units = &none;
-  const DelimitedRow* titles = &none;
-  for (std::size_t i = header.rows; i-- > 0;) {
+  const HeaderRows rows = header_rows(table, header.rows);
+  for (std::size_t i = header.rows; i-- > 0 && header.sheet.empty();) {
     const DelimitedRow& row = table.rows[i];
-    if (units == &none && titles == &none && is_unit_row(row)) {
-      units = &row;
-    } else if (titles == &none) {
-      titles = &row;
-    } else if (header.sheet.empty()) {
-      header.sheet = sheet_name(row);
-    }
+    if (&row != rows.units && &row != rows.titles) header.sheet = sheet_name(row);
   }
   for (std::size_t i = 0; i < table.rows[header.rows].fields.size(); ++i) {
-    const ColumnTitle title = split_title(field_or_empty(*titles, i));
-    const std::string unit(without_brackets(field_or_empty(*units, i)));
+    const ColumnTitle title =
+        split_title(rows.titles == nullptr ? std::string() : field_or_empty(*rows.titles, i));
+    const std::string cell = rows.units == nullptr ? std::string() : field_or_empty(*rows.units, i);
+    const std::string unit(without_brackets(cell));
     Column column{i, title.name, unit.empty() ? title.unit : unit, recognize_title(title.name)};
     column.unit = chosen_unit(column, options);
+    const bool per_second = is_unit(column.unit) && parse_unit(column.unit, {}).symbol == "Hz" &&
+                            column.unit.find("Hz") == std::string::npos;
+    if (per_second && is_angular(column.name)) column.unit = "rad/s";
     header.columns.push_back(std::move(column));
   }
   return header;
@@ -163,10 +209,20 @@ const Column* find_column(const Header& header, ColumnRole role, const std::stri
   return column_by_title(header, role);
 }
 
-Unit unit_of(const Column& column, Quantity quantity, const std::string& file) {
-  const Dimension dimension = quantity_dimension(quantity);
+/// What to add to the command line. The unit itself is for the user to say.
+std::string unit_option(const Column& column, Dimension dimension) {
+  const std::string units = units_of(dimension);
+  return fmt::format(
+      "--unit \"{}=UNIT\" with a unit of {}{}{}",
+      column.name.empty() ? std::to_string(column.index + 1) : printable(column.name),
+      dimension_name(dimension), units.empty() ? "" : ": ", units);
+}
+
+Unit unit_of(const Column& column, Dimension dimension, const std::string& file) {
   const std::string where = fmt::format("{}: {}", file, column.label());
-  return parse_unit(column.unit, dimension, where);
+  if (is_unit(column.unit) || column.unit.empty()) return parse_unit(column.unit, dimension, where);
+  throw bad_input(where, fmt::format("unknown unit '{}'", printable(column.unit)),
+                  unit_option(column, dimension));
 }
 
 /// A column that is going to be read.
@@ -175,7 +231,12 @@ struct Use {
   Quantity quantity;
   Bound bound;
   bool negate;
+  std::optional<Dimension> dimension = std::nullopt;  ///< if it is not that of the quantity
 };
+
+Dimension dimension_of(const Use& use) {
+  return use.dimension.value_or(quantity_dimension(use.quantity));
+}
 
 /// One message for all columns: what to add to the command line is said once.
 void require_units(const std::vector<Use>& uses, const std::string& file) {
@@ -183,19 +244,16 @@ void require_units(const std::vector<Use>& uses, const std::string& file) {
   std::string options;
   std::size_t missing = 0;
   for (const Use& use : uses) {
-    const Dimension dimension = quantity_dimension(use.quantity);
+    const Dimension dimension = dimension_of(use);
     if (!use.column->unit.empty() || dimension == Dimension::dimensionless) continue;
     ++missing;
     labels += fmt::format("{}{}", labels.empty() ? "" : ", ", use.column->label());
-    options += fmt::format("{}--unit \"{}={}\"", options.empty() ? "" : " ",
-                           use.column->name.empty() ? std::to_string(use.column->index + 1)
-                                                    : printable(use.column->name),
-                           si_symbol(dimension));
+    options +=
+        fmt::format("{}{}", options.empty() ? "" : "; ", unit_option(*use.column, dimension));
   }
   if (missing == 0) return;
   throw bad_input(fmt::format("{}: {}", file, labels),
-                  missing == 1 ? "has no unit" : "have no unit",
-                  fmt::format("{} (or other units)", options));
+                  missing == 1 ? "has no unit" : "have no unit", options);
 }
 
 /// A column titled "F" in kPa holds a stress: the unit says what the title cannot.
@@ -222,6 +280,14 @@ Quantity drive_quantity(const Column& column, const ImportOptions& options) {
                                                                      : Quantity::indentation_depth;
 }
 
+std::string finding_name(const Use& use) {
+  if (use.dimension == Dimension::angle) return "phase_angle";
+  if (use.column->meaning && use.column->meaning->role == ColumnRole::loss_tangent) {
+    return "loss_tangent";
+  }
+  return std::string(quantity_name(use.quantity));
+}
+
 /// Builds the series column by column and says which column became what.
 class SeriesReader {
  public:
@@ -239,12 +305,13 @@ class SeriesReader {
   }
 
   void add(const Use& use) {
-    const auto& [used, quantity, bound, negate] = use;
-    const Column& column = *used;
+    const Column& column = *use.column;
+    const Bound bound = use.bound;
+    const bool negate = use.negate;
     ImportedColumn imported;
-    imported.quantity = quantity;
+    imported.quantity = use.quantity;
     imported.bound = bound;
-    imported.unit = unit_of(column, quantity, file_);
+    imported.unit = unit_of(column, dimension_of(use), file_);
     imported.values.reserve(series_.lines.size());
     for (std::size_t i = header_.rows; i < table_.rows.size(); ++i) {
       const DelimitedRow& row = table_.rows[i];
@@ -254,9 +321,10 @@ class SeriesReader {
       imported.values.push_back(negate ? 0.0 - value : value);  // 0, not -0
     }
     series_.findings.push_back(
-        {bound == Bound::sd ? "standard deviation" : std::string(quantity_name(quantity)),
-         fmt::format("{}{}{}{}", column.label(), imported.unit.symbol.empty() ? "" : ", ",
-                     imported.unit.symbol, negate ? ", negated" : "")});
+        {bound == Bound::sd ? "standard deviation" : finding_name(use),
+         fmt::format("{}, {}{}", column.label(),
+                     imported.unit.symbol.empty() ? "plain number" : imported.unit.symbol,
+                     negate ? ", negated" : "")});
     used_.push_back(column.index);
     series_.columns.push_back(std::move(imported));
   }
@@ -292,7 +360,25 @@ std::vector<Use> spectrum_uses(const Header& header, const std::string& file,
       find_column(header, ColumnRole::frequency, options.frequency_column, file);
   const Column* storage = find_column(header, ColumnRole::storage, options.storage_column, file);
   const Column* loss = find_column(header, ColumnRole::loss, options.loss_column, file);
-  if (!chosen && (frequency == nullptr || (storage == nullptr && loss == nullptr))) return {};
+  const Column* magnitude = chosen ? nullptr : column_by_title(header, ColumnRole::magnitude);
+  const Column* angle = chosen ? nullptr : column_by_title(header, ColumnRole::phase);
+  const Column* tangent = chosen ? nullptr : column_by_title(header, ColumnRole::loss_tangent);
+  const bool polar = magnitude != nullptr && (angle != nullptr || tangent != nullptr);
+  if (!chosen && (frequency == nullptr || (storage == nullptr && loss == nullptr && !polar))) {
+    return {};
+  }
+  if (frequency != nullptr && storage != nullptr && loss == nullptr && tangent != nullptr) {
+    return {{frequency, Quantity::frequency, Bound::value, false},
+            {storage, spectrum_quantity(*storage, false), Bound::value, false},
+            {tangent, Quantity::abscissa, Bound::value, false}};
+  }
+  if (polar && storage == nullptr && loss == nullptr) {
+    Use second{angle, Quantity::abscissa, Bound::value, false, Dimension::angle};
+    if (angle == nullptr) second = {tangent, Quantity::abscissa, Bound::value, false};
+    return {{frequency, Quantity::frequency, Bound::value, false},
+            {magnitude, spectrum_quantity(*magnitude, false), Bound::value, false},
+            second};
+  }
   for (const auto& [column, words, option] : {std::tuple{frequency, "a frequency", "--frequency"},
                                               std::tuple{storage, "a storage modulus", "--storage"},
                                               std::tuple{loss, "a loss modulus", "--loss"}}) {
@@ -303,6 +389,28 @@ std::vector<Use> spectrum_uses(const Header& header, const std::string& file,
   return {{frequency, Quantity::frequency, Bound::value, false},
           {storage, spectrum_quantity(*storage, false), Bound::value, false},
           {loss, spectrum_quantity(*loss, true), Bound::value, false}};
+}
+
+/// Storage and loss from the magnitude, or the storage, and from the phase angle or its tangent.
+void resolve_phase(ImportedSeries& series, const std::vector<Use>& uses) {
+  ImportedColumn& first = series.columns.at(1);
+  ImportedColumn& second = series.columns.at(2);
+  if (second.quantity != Quantity::abscissa) return;
+  const bool polar = uses[1].column->meaning->role == ColumnRole::magnitude;
+  const bool angle = second.unit.dimension == Dimension::angle;
+  for (std::size_t i = 0; i < first.values.size(); ++i) {
+    const double given = second.values[i] * second.unit.to_si;
+    const double delta = angle ? given : std::atan(given);
+    const double size = polar ? first.values[i] : first.values[i] / std::cos(delta);
+    if (polar) first.values[i] = size * std::cos(delta);
+    second.values[i] = size * std::sin(delta);
+  }
+  first.shifted = polar;
+  second.shifted = true;  // converted: not the digits of the file
+  second.quantity = spectrum_quantities(first.unit.dimension).loss;
+  second.unit = first.unit;
+  series.findings.push_back({"converted", polar ? "magnitude and phase to storage and loss"
+                                                : "storage and loss tangent to loss"});
 }
 
 std::vector<Use> recording_uses(const Header& header, const std::string& file,
@@ -343,6 +451,7 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   SeriesReader reader(table, header, file);
   for (const Use& use : uses) reader.add(use);
   ImportedSeries series = reader.take();
+  if (spectrum) resolve_phase(series, uses);
   series.name = header.sheet;
   series.findings.insert(
       series.findings.begin(),
