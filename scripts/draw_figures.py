@@ -13,6 +13,7 @@ import json
 import math
 import re
 import sys
+import textwrap
 from pathlib import Path
 
 import matplotlib
@@ -298,6 +299,8 @@ def draw_figure(figure):
     columns = 1 if len(panels) == 1 else 2
     width = SINGLE_PAGE_WIDTH if len(panels) == 1 else PAGE_WIDTH
     notes = wrap(provenance_note(figure), 2 if len(panels) == 1 else 3)
+    if figure.get("note"):
+        notes = textwrap.wrap(figure["note"], 70 if len(panels) == 1 else 120) + notes
     rows = -(-len(labels) // columns)
     below = BELOW_AXIS + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08
     across = min(len(panels), MOST_ACROSS)

@@ -3,6 +3,8 @@
 #include <map>
 
 #include "method_problems.hpp"
+#include "tpm/material/tpm_element.hpp"
+#include "tpm/model/closed_form.hpp"
 #include "tpm/stability/study.hpp"
 
 using namespace tpm;
@@ -125,6 +127,41 @@ TEST_CASE("stability study: what is above the limit fails and what is below does
     }
   }
   CHECK(cells == 9 * 21 * 21);
+}
+
+TEST_CASE("stability study: at servo rate the error is that on the servo's own grid") {
+  // Backward Euler on the paper's element, written down once more: the servo samples 4 mm at 90
+  // mm/s at its ticks and goes straight in between, past the corner at 44.4 ms.
+  const TpmParameters p;
+  const double end_s = 1.0, corner_s = 0.004 / 0.09;
+  const ClosedForm exact{ModelOptions{}};
+  const Protocol protocol = ramp_and_hold(0.004, 0.09, end_s - corner_s);
+  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
+  int compared = 0;
+  for (const ServoRow& row : stability_at_servo_rates()) {
+    if (row.problem != "element" || (row.rate_Hz != 1000.0 && row.rate_Hz != 4000.0)) continue;
+    const double h = 1.0 / row.rate_Hz, r = h / p.relaxation_time_s();
+    std::vector<double> times;
+    std::vector<double> force;
+    double y = 0.0;
+    for (int i = 1; i <= static_cast<int>(row.rate_Hz); ++i) {
+      times.push_back(std::min(i * h, end_s));
+      const double depth = std::min(0.09 * times.back(), 0.004);
+      y = (y + r * depth) / (1.0 + r);
+      force.push_back((p.E2_Pa * depth - p.relaxing_modulus_Pa() * y + tension.value(depth)) *
+                      p.modulus_to_stiffness_m());
+    }
+    const Eigen::VectorXd truth = exact.respond(protocol, times, to_vector(p), Want::values).value;
+    const Eigen::Map<const Eigen::VectorXd> found(force.data(), std::ssize(force));
+    const double error = (found - truth).cwiseAbs().maxCoeff() / truth.cwiseAbs().maxCoeff();
+    if (row.rate_Hz == 1000.0) CHECK_THAT(error, WithinRel(0.00213, 0.005));
+    for (const ServoCell& cell : row.cells) {
+      if (cell.rule != StepRule::backward_euler) continue;
+      CHECK_THAT(cell.verdict.error, WithinRel(error, 1e-6));
+      ++compared;
+    }
+  }
+  CHECK(compared == 2);
 }
 
 TEST_CASE("stability study: every corner is as expected") {

@@ -9,6 +9,7 @@
 #include "tpm/plan/plan.hpp"
 #include "tpm/report/plan_report.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/hdf5.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;
@@ -257,4 +258,67 @@ TEST_CASE("a contact that a hand moves is planned for") {
       make_plan(contact_scene(star(ramp("1 mm")), {3e-3, 5e-3, 0.5}), request(0.01, 1000.0));
   REQUIRE(plan.choice);
   CHECK(plan.chosen().name == "element");
+}
+
+TEST_CASE("a claim names its quantity, and what is not claimed stands beside it") {
+  PlanRequest wanted = request(0.02);
+  wanted.measure = {PlanOutput::field, 0.0};
+  const ExperimentScene scene = liver(ramp("3 mm"));
+  const Plan plan = make_plan(scene, wanted);
+  REQUIRE(plan.choice);
+  CHECK(claim_of(plan).quantity == "displacements of all spheres");
+  REQUIRE(plan.chosen().verified_response_error);
+  CHECK(plan_json(plan)["claim"]["quantity"] == "displacements of all spheres");
+  CHECK_THAT(plan_text(plan), Contains("nothing is claimed of the contact force: verified error"));
+  // The error of the force, found once more: the pick against the nonlinear network at 1e-9.
+  const std::vector<double> times{0.3, 0.9, 1.4, 1.6, 2.0, 3.5};
+  const PlanTrajectory answer = run_planned(plan, scene, times);
+  QuasiStaticOptions tight;
+  tight.tolerance = 1e-9;
+  const PlanTrajectory truth = PlanScene(scene).quasi_static(tight, times, false);
+  CHECK(trajectory_error(answer, truth, {}) <= 1.05 * *plan.chosen().verified_response_error);
+  const test::TempFolder folder;
+  write_planned_run(plan, scene, times, answer, folder / "p.h5");
+  const Hdf5Reader file(folder / "p.h5");
+  CHECK(file.attribute("/claim", "quantity") == "displacements of all spheres");
+  CHECK_THAT(file.numbers("/claim/verified_response_error").at(0),
+             WithinRel(*plan.chosen().verified_response_error, 1e-5));
+  CHECK(file.numbers("/steps/time_s") == times);
+}
+
+TEST_CASE("of masses that scene and reference leave out there is one number and one sentence") {
+  PlanRequest wanted = request(1e-4);
+  wanted.relevance = true;
+  const Plan plan = make_plan(liver(ramp("3 mm", "10 mm/s")), wanted);
+  REQUIRE_FALSE(plan.inertial);
+  REQUIRE(plan.masses_left_out);
+  const PlanRelevance& inertia = plan.relevance.front();
+  CHECK(inertia.part == "inertia");
+  CHECK(inertia.matters);
+  CHECK(*plan.masses_left_out == *inertia.error);
+  const std::string text = plan_text(plan);
+  const std::string words = "inertia matters";
+  CHECK(text.find(words) != std::string::npos);
+  CHECK(text.find(words) == text.rfind(words));
+  CHECK_THAT(text, !Contains("masses do not matter"));
+  CHECK_THAT(text, !Contains("inertia: matters"));
+}
+
+TEST_CASE("finer networks are tried where no coarser one meets the tolerance") {
+  const ExperimentScene scene = liver(ramp("3 mm"));
+  const Plan usual = make_plan(scene, request(1e-3));
+  CHECK_THAT(named(usual, "collocation_1e-06").reason, Contains("a coarser one meets"));
+  const Plan tight = make_plan(scene, request(1e-6));
+  REQUIRE(tight.choice);
+  CHECK(*tight.chosen().verified_error <= 1e-6);
+}
+
+TEST_CASE("a load is called a load, and depth and rate grow together") {
+  PlanRequest wanted = request(0.02);
+  wanted.changes = true;
+  const Plan deep = make_plan(star(ramp("3 mm")), wanted);
+  CHECK(deep.changes.front().change == "deeper, and as much faster");
+  const Plan loaded = make_plan(
+      star(R"("protocol": {"kind": "creep", "load": "0.1 N", "duration": "3 s"})"), wanted);
+  CHECK(loaded.changes.front().change == "the load, put on as much faster");
 }

@@ -201,11 +201,22 @@ TEST_CASE("a load put on at once does not step over an instability", "[heavy]") 
 }
 
 TEST_CASE("limits of validity are dated and name their spheres", "[heavy]") {
-  const auto deep = [](const std::string& depth) {
-    return run_of(small_scene(R"("protocol": {"kind": "ramp_hold", "depth": ")" + depth +
-                              R"(", "rate": "1 mm/s", "hold": "1 s"})"))
+  const auto deep_in = [](const std::string& organ, const std::string& depth) {
+    return run_of(experiment(R"({"organ": {"kind": "liver", "count": 60)" + organ +
+                             R"(}, "material": {"eta1": "16800 Pa s"},
+           "protocol": {"kind": "ramp_hold", "depth": ")" +
+                             depth + R"(", "rate": "1 mm/s", "hold": "1 s"}})"))
         .record.validity;
   };
+  const auto deep = [&](const std::string& depth) {
+    return deep_in(R"(, "shape": {"width": "210 mm"})", depth);
+  };
+  // A liver of half the paper's width: 10 and 12 mm say nothing of it.
+  const Validity small =
+      deep_in(R"(, "shape": {"width": "105 mm", "height": "80 mm", "depth": "50 mm"})", "13 mm");
+  CHECK_THAT(small.deepest_m, WithinRel(0.013, 1e-12));
+  CHECK_FALSE(small.of(ValidityLimit::indentation).first_time_s);
+  CHECK_FALSE(small.of(ValidityLimit::damage).first_time_s);
   CHECK(deep("9.9 mm").whole());
   const Validity seen = deep("13 mm");
   CHECK_THAT(seen.deepest_m, WithinRel(0.013, 1e-12));

@@ -334,6 +334,19 @@ TEST_CASE("a file of results is read back by axes, either way round, and drawn")
   const Series& map = figures[0].panels[0].series[0];
   CHECK(map.kind == Series::Kind::heat);
   CHECK(map.z.size() == map.x.size() * map.y.size());
+  // Which slice is drawn stands in the picture; a place on an axis that is drawn whole is refused.
+  CHECK(figures[0].note.find("At rate = ") == 0);
+  CHECK(to_json(figures).at("figures")[0].at("note") == figures[0].note);
+  SweepFigures refused = wished;
+  refused.x = "rate";
+  CHECK(test::refusal_of([&] {
+          static_cast<void>(sweep_figures(reader, refused));
+        }).find("--at rate: the figure of") != std::string::npos);
+  // Axes that are held are not drawn over unless that is asked for.
+  SweepFigures along;
+  along.held = {{"x", 1}};
+  along.variables = {"end_force"};
+  CHECK(sweep_figures(reader, along)[0].panels[0].x.quantity == "E1");
   CHECK_FALSE(to_text(to_json(figures)).empty());  // it can be drawn
   CHECK(sweep_text(reader).find("12 skipped, 16 failed") != std::string::npos);
 }
@@ -421,6 +434,9 @@ TEST_CASE("sensitivity of a sum: each term's share of the variance") {
       CHECK(index.high - index.low < 0.03);
     }
   }
+  REQUIRE(sum.held.size() == 1);
+  CHECK_THAT(sum.held[0].value, WithinRel(8e-3, 1e-12));
+  CHECK(sensitivity_text({sum}).find(", at depth = 8 mm") != std::string::npos);
   // A step's first force does not know E1.
   const SweepSensitivity peak = sensitivity_of(reader, "peak_force", {});
   CHECK(peak.indices.inputs[0].total.value == 0.0);

@@ -60,6 +60,7 @@ class CollocationCandidate final : public LayeredCandidate {
   [[nodiscard]] std::optional<std::string> why_no_servo() const override {
     return "its steps need the protocol beforehand";
   }
+  [[nodiscard]] bool last_resort() const override { return tolerance_ < kUsualFinest; }
 
   [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
     if (layers() > 0) {
@@ -69,7 +70,8 @@ class CollocationCandidate final : public LayeredCandidate {
     const PlanTrajectory& answer = scout.collocation(tolerance_);
     if (scout.inertial()) return {scout.claim_of(answer), answer.work, {}};
     // Against a run much finer: one at a tenth of the tolerance may well take the same steps.
-    const PlanTrajectory& finer = scout.collocation(std::max(0.01 * tolerance_, kFinest));
+    const PlanTrajectory& finer =
+        scout.collocation(std::max(0.01 * tolerance_, last_resort() ? kFinest : kUsual));
     const double error = trajectory_error(answer, finer, scout.measure());
     return {kSafety * error + kFloor * tolerance_, answer.work, {}};
   }
@@ -84,8 +86,10 @@ class CollocationCandidate final : public LayeredCandidate {
  private:
   // Between the times of the scout errors have been seen to be 3.5 times those at them.
   static constexpr double kSafety = 5.0;
-  static constexpr double kFloor = 1e-3;  // of the tolerance: what forces left unbalanced may hide
-  static constexpr double kFinest = 1e-6;
+  static constexpr double kFloor = 1e-3;   // of the tolerance: what forces left unbalanced may hide
+  static constexpr double kFinest = 1e-9;  // ten times that of the reference
+  static constexpr double kUsual = 1e-6;
+  static constexpr double kUsualFinest = 0.9e-5;
   double tolerance_;
 };
 
@@ -158,9 +162,10 @@ class InertialCandidate final : public PlanModel {
   }
   [[nodiscard]] ModelReach reach() const override { return ModelReach::full; }
   [[nodiscard]] bool has_masses() const override { return true; }
+  [[nodiscard]] bool last_resort() const override { return tolerance_ < kUsualFinest; }
   [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
                                                    const PlanBudget& /*budget*/) const override {
-    if (!scout.inertial()) return "masses do not matter here";
+    if (!scout.inertial()) return "has masses, which scene and reference leave out";
     return std::nullopt;
   }
   [[nodiscard]] std::optional<std::string> why_no_servo() const override {
@@ -180,6 +185,7 @@ class InertialCandidate final : public PlanModel {
 
  private:
   static constexpr double kSafety = 4.0;  // errors gather over many periods of ringing
+  static constexpr double kUsualFinest = 0.9e-5;
   double tolerance_;
 };
 
@@ -191,13 +197,13 @@ void add_network_models(PlanModels& models, const PlanScene& scene) {
     models.push_back(std::make_unique<CollocationCandidate>(1e-3, layers));
   }
   models.push_back(std::make_unique<NetworkStepCandidate>(0));
-  for (const double tolerance : {1e-2, 1e-3, 1e-4, 1e-5}) {
+  for (const double tolerance : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7}) {
     models.push_back(std::make_unique<CollocationCandidate>(tolerance, 0));
   }
 }
 
 void add_inertial_models(PlanModels& models) {
-  for (const double tolerance : {1e-3, 1e-4, 1e-5}) {
+  for (const double tolerance : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7}) {
     models.push_back(std::make_unique<InertialCandidate>(tolerance));
   }
 }

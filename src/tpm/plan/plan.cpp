@@ -93,6 +93,7 @@ class Planning {
     if (plan_.request.relevance) {
       tell("what does not matter");
       plan_.relevance = plan_relevance(*scout_, plan_.request.tolerance);
+      settle_masses_left_out();
     }
     if (plan_.request.changes && plan_.choice) {
       tell("what would break first");
@@ -122,6 +123,8 @@ class Planning {
       candidate.reason = "nothing that a loop steps";
     } else if (const auto reason = model.why_not(*scout_, request.budget)) {
       candidate.reason = *reason;
+    } else if (model.last_resort() && network_found_) {
+      candidate.reason = "not tried: a coarser one meets the tolerance";
     } else if (model.has_masses() && with_masses_found_) {
       candidate.reason = "not tried: a cheaper one with masses meets the tolerance";
     } else {
@@ -149,6 +152,7 @@ class Planning {
       return;
     }
     with_masses_found_ = with_masses_found_ || model.has_masses();
+    network_found_ = network_found_ || model.reach() == ModelReach::full;
     const auto over = over_budget(model, claim, plan_.duration_s, request.budget, request.costs);
     candidate.feasible = !over;
     if (over) candidate.reason = *over;
@@ -170,6 +174,17 @@ class Planning {
         model_of(candidate).run(*scout_, plan_.request.budget, truth_.times_s);
     candidate.verified_error = trajectory_error(answer, truth_.trajectory, plan_.request.measure) +
                                truth_.reference.difference;
+    if (plan_.request.measure.output == PlanOutput::force) return;
+    candidate.verified_response_error =
+        trajectory_error(answer, truth_.trajectory, {}) + truth_.reference.response_difference;
+  }
+
+  /// What a run says of masses goes before the estimate: there is one number.
+  void settle_masses_left_out() {
+    const PlanRelevance& inertia = plan_.relevance.front();
+    if (plan_.inertial || !inertia.error) return;
+    plan_.masses_left_out.reset();
+    if (inertia.matters) plan_.masses_left_out = inertia.error;
   }
 
   /// All that take less than the reference, so that the frontier shows how far claims are off.
@@ -208,6 +223,7 @@ class Planning {
   std::optional<PlanScout> scout_;
   VerifiedTruth truth_;
   bool with_masses_found_ = false;
+  bool network_found_ = false;  ///< a nonlinear network whose claim meets the tolerance
 };
 
 }  // namespace
@@ -218,7 +234,7 @@ void set_tolerance(PlanRequest& request, const std::string& text) {
     request.measure.relative_weight = kForceJnd / kStiffnessJnd;
     request.tolerance_source =
         fmt::format("just noticeable differences: force {} %, stiffness {} %",
-                    shortest(100.0 * kForceJnd), shortest(100.0 * kStiffnessJnd));
+                    significant(100.0 * kForceJnd, 3), significant(100.0 * kStiffnessJnd, 3));
     return;
   }
   const bool percent = !text.empty() && text.back() == '%';
@@ -241,6 +257,26 @@ double parse_wall_budget(const std::string& text) {
   }
   throw Error(ExitCode::usage, "--wall", fmt::format("'{}'", printable(text)),
               "computing time above 0 per simulated second, such as \"0.1 s per s\"");
+}
+
+PlanClaim claim_of(const Plan& plan) {
+  const PlanMeasure& measure = plan.request.measure;
+  const bool field = measure.output == PlanOutput::field;
+  PlanClaim claim;
+  claim.quantity = field           ? "displacements of all spheres"
+                   : plan.by_depth ? "contact force"
+                                   : "indentation depth";
+  claim.norm =
+      fmt::format("largest absolute difference over the protocol{}, in parts of the {}",
+                  field ? " and all spheres" : "", field ? "largest displacement" : "peak");
+  if (measure.relative_weight > 0.0) {
+    claim.norm += fmt::format(
+        "; or {} times the relative difference where the response is above a "
+        "tenth of the peak, if that is larger",
+        shortest(rounded(measure.relative_weight, 4)));
+  }
+  claim.protocol = "the scene's own protocol, no other";
+  return claim;
 }
 
 Plan make_plan(const ExperimentScene& scene, const PlanRequest& request) {

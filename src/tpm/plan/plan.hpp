@@ -37,18 +37,22 @@ struct PlannedCandidate {
   ModelReach reach = ModelReach::reduced;
   std::optional<double> claimed_error;   ///< bound before verification, in parts of the peak
   std::optional<double> verified_error;  ///< against the reference, its own uncertainty added
-  std::optional<double> cost_s_per_s;    ///< computing time per simulated second
-  std::optional<double> period_s;        ///< computing time of the costliest servo period
-  bool feasible = false;                 ///< meets tolerance and budget
-  bool accurate = false;                 ///< meets the tolerance, whatever it costs
-  std::string reason;                    ///< why it is not feasible
+  /// The same of the response, where the tolerance is about displacements: nothing was claimed of
+  /// it.
+  std::optional<double> verified_response_error;
+  std::optional<double> cost_s_per_s;  ///< computing time per simulated second
+  std::optional<double> period_s;      ///< computing time of the costliest servo period
+  bool feasible = false;               ///< meets tolerance and budget
+  bool accurate = false;               ///< meets the tolerance, whatever it costs
+  std::string reason;                  ///< why it is not feasible
 };
 
 /// What the pick is verified against.
 struct PlanReference {
-  std::string method, judge;  ///< in words
-  double difference = 0.0;    ///< between the two, in parts of the peak
-  double peak = 0.0;          ///< of the response, N or m
+  std::string method, judge;         ///< in words
+  double difference = 0.0;           ///< between the two, in parts of the peak
+  double response_difference = 0.0;  ///< the same of the response
+  double peak = 0.0;                 ///< of the response, N or m
 };
 
 /// What switching a part of the physics off would change.
@@ -62,7 +66,7 @@ struct PlanRelevance {
 
 /// By how much a scene can change before the pick no longer does.
 struct PlanChange {
-  std::string change;            ///< deeper, faster, stiffer
+  std::string change;            ///< "deeper, and as much faster", "faster", "stiffer"
   std::optional<double> factor;  ///< none: not within `kMostChange`
   std::string breaks;            ///< what breaks there
 };
@@ -76,8 +80,9 @@ struct Plan {
   std::string title;
   PlanRequest request;
   bool inertial = false;  ///< the reference has masses
-  /// Where it has none: what they would change by the linear network, in parts of the peak, if that
-  /// is above the tolerance.
+  /// Where it has none: what they would change, in parts of the peak, if that is above the
+  /// tolerance. The same number as that of inertia in `relevance`; without that, by the linear
+  /// network.
   std::optional<double> masses_left_out;
   bool by_depth = true;
   double duration_s = 0.0;
@@ -94,6 +99,14 @@ struct Plan {
 
   [[nodiscard]] const PlannedCandidate& chosen() const { return candidates.at(choice.value()); }
 };
+
+/// What the errors of a plan are about, in words.
+struct PlanClaim {
+  std::string quantity;  ///< "contact force", "indentation depth" or "displacements of all spheres"
+  std::string norm;
+  std::string protocol;
+};
+[[nodiscard]] PlanClaim claim_of(const Plan& plan);
 
 /// The least model for a scene. Throws Error(bad_input) for scenes and requests that no plan is
 /// made for, Error(numerical) where the reference itself cannot be computed or its judge disagrees.

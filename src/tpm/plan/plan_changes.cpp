@@ -47,7 +47,8 @@ class Survival {
       if (!(claim.error <= request_.tolerance)) return "tolerance: the claimed error leaves it";
       if (!scout_.inertial() && masses_known() &&
           changed.inertia_share() >= std::max(request_.tolerance, kMassesFelt)) {
-        return "inertia: masses begin to matter";
+        return fmt::format("inertia: masses then change the answer by {} % of the peak",
+                           significant(100.0 * changed.inertia_share(), 2));
       }
       if (const auto reason =
               over_budget(model_, claim, scene.duration_s(), request_.budget, request_.costs)) {
@@ -119,8 +120,11 @@ std::vector<PlanChange> plan_changes(const PlanScout& scout, const PlanModel& mo
                                      const PlanRequest& request) {
   const Survival survival(scout, model, request);
   const PlanScene& scene = scout.scene();
-  return {survival.first("deeper", [&](double f) { return scene.deeper(f); }),
-          survival.first("faster", [&](double f) { return scene.faster(f); }),
+  return {survival.first(
+              scene.by_depth() ? "deeper, and as much faster" : "the load, put on as much faster",
+              [&](double f) { return scene.deeper(f); }),
+          survival.first(scene.by_depth() ? "faster" : "the speed of loading",
+                         [&](double f) { return scene.faster(f); }),
           survival.first("stiffer", [&](double f) { return scene.stiffer(f); })};
 }
 

@@ -49,6 +49,8 @@ class PlanModel {
   [[nodiscard]] virtual ModelReach reach() const { return ModelReach::reduced; }
   /// It has masses.
   [[nodiscard]] virtual bool has_masses() const { return false; }
+  /// Tried only if no coarser network meets the tolerance: nearly as dear as the reference.
+  [[nodiscard]] virtual bool last_resort() const { return false; }
 
   /// Why the model has no answer to a scene at all; none if it has.
   [[nodiscard]] virtual std::optional<std::string> why_not(const PlanScout& scout,

@@ -64,6 +64,7 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
     throw bad_input("scene", "nothing is imposed, or nothing answers", "a protocol with a peak");
   }
   truth.reference.difference = trajectory_error(judge, truth.trajectory, measure);
+  truth.reference.response_difference = trajectory_error(judge, truth.trajectory, {});
   if (truth.reference.difference <= kAgreement * tolerance) return truth;
   throw Error(
       ExitCode::numerical, "reference",

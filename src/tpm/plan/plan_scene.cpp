@@ -154,7 +154,7 @@ PlanTrajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
   const QuasiStatic equations(driven().bonds, driven().rest, driven().freedom, driven().probes,
                               options);
   PlanTrajectory result;
-  ValidityWatch watch(network(), scene_.probe());
+  ValidityWatch watch(network(), scene_.probe(), depth_limits_apply(scene_.tissue));
   const Eigen::Index spheres = network().organ.position.cols();
   const auto see = [&](const QuasiStaticState& state) {
     watch.see(state.time_s, network_.spheres(state.position));

@@ -136,6 +136,7 @@ Json to_json(const std::vector<Figure>& figures) {
                         {"title", figure.title},
                         {"caption", figure.caption},
                         {"panels", std::move(panels)}});
+    if (!figure.note.empty()) list.back()["note"] = figure.note;
   }
   return Json{{"figures", std::move(list)}};
 }

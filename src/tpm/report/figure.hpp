@@ -56,6 +56,7 @@ struct Figure {
   std::string title;
   std::string caption;
   std::vector<Panel> panels;
+  std::string note{};  ///< one line drawn below the panels: what the numbers depend on
 };
 
 /// The content of figures.json. Throws Error(numerical) if the arrays of a series differ in length

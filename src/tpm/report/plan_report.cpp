@@ -37,6 +37,7 @@ Json candidate_json(const PlannedCandidate& c) {
           {"period_s", number(c.period_s)},
           {"claimed_error", number(c.claimed_error)},
           {"verified_error", number(c.verified_error)},
+          {"verified_response_error", number(c.verified_response_error)},
           {"accurate", c.accurate},
           {"feasible", c.feasible},
           {"reason", c.reason.empty() ? Json(nullptr) : Json(c.reason)}};
@@ -76,8 +77,17 @@ std::string budget_text(const PlanBudget& budget) {
 std::string relevance_text(const PlanRelevance& r) {
   const std::string note = r.note.empty() ? "" : fmt::format(" ({})", r.note);
   if (!r.error) return fmt::format("  {}: {}\n", r.part, r.note);
-  return fmt::format("  {} {}: without it the answer changes by {} of the peak{}\n", r.part,
+  return fmt::format("  {}: {}, {} of the peak{}\n", r.part,
                      r.matters ? "matters" : "does not matter", share_text(*r.error), note);
+}
+
+/// How the number of masses_left_out was found.
+std::string masses_note(const Plan& plan) {
+  std::string note = "by the linear network";
+  for (const PlanRelevance& r : plan.relevance) {
+    if (r.part == "inertia") note = r.note;
+  }
+  return note.empty() ? note : fmt::format(" ({})", note);
 }
 
 std::string choice_text(const Plan& plan) {
@@ -92,6 +102,11 @@ std::string choice_text(const Plan& plan) {
         significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
         time_text(*c.cost_s_per_s),
         c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
+    if (c.verified_response_error) {
+      text += fmt::format("  nothing is claimed of the {}: verified error {}\n",
+                          plan.by_depth ? "contact force" : "indentation depth",
+                          share_text(*c.verified_response_error));
+    }
     if (plan.needs_full) {
       text += "  the scene needs the full nonlinear model: no reduced one meets the tolerance\n";
     }
@@ -118,13 +133,18 @@ std::string frontier_text(const Plan& plan) {
     };
     text += fmt::format("{:<26} {:>10} {:>10} {:>10} {:>10}  {}\n", c.name,
                         or_dash(c.cost_s_per_s, time_text), or_dash(c.period_s, time_text),
-                        or_dash(c.claimed_error, percent), or_dash(c.verified_error, percent),
+                        or_dash(c.claimed_error, share_text), or_dash(c.verified_error, share_text),
                         c.feasible ? "meets both" : c.reason);
   }
   return text;
 }
 
 }  // namespace
+
+Json claim_json(const Plan& plan) {
+  const PlanClaim claim = claim_of(plan);
+  return {{"quantity", claim.quantity}, {"norm", claim.norm}, {"protocol", claim.protocol}};
+}
 
 Json plan_json(const Plan& plan) {
   const PlanRequest& request = plan.request;
@@ -141,6 +161,7 @@ Json plan_json(const Plan& plan) {
             {"wall_s_per_s", number(request.budget.wall_s_per_s)},
             {"costs", request.costs.source},
             {"response", plan.by_depth ? "force_N" : "depth_m"}};
+  json["claim"] = claim_json(plan);
   json["choice"] = plan.choice ? candidate_json(plan.chosen()) : Json(nullptr);
   json["margin"] =
       plan.choice ? Json(rounded(request.tolerance / std::max(*plan.chosen().verified_error, 1e-12),
@@ -169,8 +190,7 @@ std::string plan_text(const Plan& plan) {
                                  plan.bonds, significant(plan.duration_s, 4));
   text +=
       fmt::format("{} within {} of the peak{}, {}; operations cost what {} says\n",
-                  request.measure.output == PlanOutput::field ? "displacements" : "response",
-                  share_text(request.tolerance),
+                  claim_of(plan).quantity, share_text(request.tolerance),
                   request.tolerance_source.empty() ? std::string()
                                                    : fmt::format(" ({})", request.tolerance_source),
                   budget_text(request.budget),
@@ -183,20 +203,22 @@ std::string plan_text(const Plan& plan) {
       "\nreference: {}; peak {} {}; differs from its judge ({}) by {}\n", plan.reference.method,
       significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
       plan.by_depth ? "N" : "mm", plan.reference.judge, share_text(plan.reference.difference));
-  if (!plan.relevance.empty()) text += "what matters:\n";
-  for (const PlanRelevance& r : plan.relevance) text += relevance_text(r);
+  if (!plan.relevance.empty()) text += "what leaving a part out changes:\n";
+  for (const PlanRelevance& r : plan.relevance) {
+    // Of masses that scene and reference leave out there is one sentence, below.
+    if (r.part != "inertia" || plan.inertial || !r.matters) text += relevance_text(r);
+  }
   if (!plan.changes.empty()) text += "what would break first:\n";
   for (const PlanChange& c : plan.changes) {
     text += c.factor
-                ? fmt::format("  {} by {}: {}\n", c.change, significant(*c.factor, 3), c.breaks)
-                : fmt::format("  {}: nothing up to {} times\n", c.change, shortest(kMostChange));
+                ? fmt::format("  {} times {}: {}\n", significant(*c.factor, 3), c.change, c.breaks)
+                : fmt::format("  {} times {}: nothing breaks\n", shortest(kMostChange), c.change);
   }
   if (plan.masses_left_out) {
     text += fmt::format(
-        "WARNING: masses would change the answer by {} of the peak where the rate changes; scene "
-        "and "
-        "plan leave them out\n",
-        share_text(*plan.masses_left_out));
+        "WARNING: inertia matters, and scene and reference leave it out: masses would change the "
+        "answer by {} of the peak{}\n",
+        share_text(*plan.masses_left_out), masses_note(plan));
   }
   for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
   return text;

@@ -11,6 +11,9 @@ namespace tpm {
 [[nodiscard]] Json plan_json(const Plan& plan);
 [[nodiscard]] std::string plan_text(const Plan& plan);
 
+/// What the errors of a plan are about.
+[[nodiscard]] Json claim_json(const Plan& plan);
+
 /// What the planned model answered, and the same in words.
 [[nodiscard]] Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
                                     const std::vector<double>& times_s,

@@ -23,6 +23,31 @@ std::string model_words(const PlannedCandidate& c) {
                      c.settings);
 }
 
+/// What is known of the response where the claim is about displacements; else empty.
+std::string response_words(const Plan& plan) {
+  const auto& error = plan.chosen().verified_response_error;
+  if (!error) return {};
+  return fmt::format("{}: nothing claimed, verified error {} %\n",
+                     plan.by_depth ? "contact force" : "indentation depth",
+                     significant(100.0 * *error, 3));
+}
+
+/// Under /claim: what is claimed of which quantity, in numbers and words.
+void write_claim(const Plan& plan, Hdf5Writer& file) {
+  const PlannedCandidate& c = plan.chosen();
+  const PlanClaim claim = claim_of(plan);
+  file.group("/claim");
+  file.attribute("/claim", "quantity", claim.quantity);
+  file.attribute("/claim", "norm", claim.norm);
+  file.attribute("/claim", "protocol", claim.protocol);
+  file.numbers("/claim/claimed_error", {rounded(*c.claimed_error, 6)});
+  file.numbers("/claim/verified_error", {rounded(*c.verified_error, 6)});
+  if (c.verified_response_error) {
+    file.numbers("/claim/verified_response_error", {rounded(*c.verified_response_error, 6)});
+  }
+  file.numbers("/claim/tolerance", {plan.request.tolerance});
+}
+
 }  // namespace
 
 Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
@@ -34,21 +59,25 @@ Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
                 {"imposed", rounded(value_at(scene.protocol, time), kPlannedDigits)},
                 {"response", rounded(answer.response[i], kPlannedDigits)}};
   };
-  return {{"title", plan.title},
-          {"version", version()},
-          {"scene_sha256", sha256_hex(scene.text)},
-          {"model", c.name},
-          {"formulation", c.formulation},
-          {"settings", c.settings},
-          {"claimed_error", rounded(c.claimed_error.value(), 6)},
-          {"verified_error", rounded(c.verified_error.value(), 6)},
-          {"tolerance", plan.request.tolerance},
-          {"imposed", plan.by_depth ? "depth_m" : "load_N"},
-          {"response", plan.by_depth ? "force_N" : "depth_m"},
-          {"largest", point(largest_of(answer))},
-          {"last", point(answer.response.size() - 1)},
-          {"outputs", answer.displacement.size()},
-          {"validity_passed", plan.validity}};
+  return {
+      {"title", plan.title},
+      {"version", version()},
+      {"scene_sha256", sha256_hex(scene.text)},
+      {"model", c.name},
+      {"formulation", c.formulation},
+      {"settings", c.settings},
+      {"claim", claim_json(plan)},
+      {"claimed_error", rounded(c.claimed_error.value(), 6)},
+      {"verified_error", rounded(c.verified_error.value(), 6)},
+      {"verified_response_error",
+       c.verified_response_error ? Json(rounded(*c.verified_response_error, 6)) : Json(nullptr)},
+      {"tolerance", plan.request.tolerance},
+      {"imposed", plan.by_depth ? "depth_m" : "load_N"},
+      {"response", plan.by_depth ? "force_N" : "depth_m"},
+      {"largest", point(largest_of(answer))},
+      {"last", point(answer.response.size() - 1)},
+      {"outputs", answer.displacement.size()},
+      {"validity_passed", plan.validity}};
 }
 
 std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
@@ -61,12 +90,13 @@ std::string planned_run_text(const Plan& plan, const std::vector<double>& times_
                        significant(times_s[static_cast<std::size_t>(i)], 4));
   };
   std::string text = fmt::format(
-      "{}: planned model {}\nclaimed error at most {} % of the peak, verified {} %\nlargest {}: "
-      "{}; at "
+      "{}: planned model {}\n{}: claimed error at most {} %, verified {} % ({})\n{}largest {}: {}; "
+      "at "
       "the end: {}\n",
-      plan.title, model_words(c), significant(100.0 * *c.claimed_error, 3),
-      significant(100.0 * *c.verified_error, 3), plan.by_depth ? "force" : "depth",
-      point(largest_of(answer)), point(answer.response.size() - 1));
+      plan.title, model_words(c), claim_of(plan).quantity, significant(100.0 * *c.claimed_error, 3),
+      significant(100.0 * *c.verified_error, 3), claim_of(plan).norm, response_words(plan),
+      plan.by_depth ? "force" : "depth", point(largest_of(answer)),
+      point(answer.response.size() - 1));
   for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
   return text;
 }
@@ -82,16 +112,15 @@ void write_planned_run(const Plan& plan, const ExperimentScene& scene,
   file.attribute("/", "written_by", fmt::format("tpm {}", version()));
   file.attribute("/", "formulation", c.formulation);
   file.attribute("/", "model", model_words(c));
-  file.attribute("/", "claimed_error", shortest(rounded(*c.claimed_error, 6)));
-  file.attribute("/", "verified_error", shortest(rounded(*c.verified_error, 6)));
-  file.attribute("/", "tolerance", shortest(plan.request.tolerance));
   file.attribute("/", "provenance", "model");
+  write_claim(plan, file);
   std::vector<double> imposed;
   for (const double time : times_s) imposed.push_back(value_at(scene.protocol, time));
   const std::vector<double> response(answer.response.begin(), answer.response.end());
   file.numbers("/curve/time_s", times_s);
   file.numbers(plan.by_depth ? "/curve/depth_m" : "/curve/load_N", imposed);
   file.numbers(plan.by_depth ? "/curve/force_N" : "/curve/depth_m", response);
+  if (!answer.displacement.empty()) file.numbers("/steps/time_s", times_s);
   for (std::size_t i = 0; i < answer.displacement.size(); ++i) {
     const Eigen::Matrix3Xd& u = answer.displacement[i];
     file.table(fmt::format("/steps/{:05}/displacement_m", i), {u.data(), u.data() + u.size()}, 3);

@@ -30,8 +30,9 @@ const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
   });
 }
 
-Json validity_json(const Validity& validity) {
+Json validity_json(const Validity& validity, bool depth_limits) {
   Json json{{"kept", validity.whole()},
+            {"depth_limits_apply", depth_limits},
             {"deepest_m", rounded(validity.deepest_m, kSimulationDigits)},
             {"most_turned_rad", rounded(validity.most_turned_rad, kSimulationDigits)}};
   json["limits"] = Json::array();
@@ -98,13 +99,25 @@ Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
   return list;
 }
 
+/// A driven sphere is no tool: nothing holds it across the push unless the scene does.
+std::string sideways_words(const ExperimentScene& scene, const Probe& probe) {
+  const std::vector<Guide>& guides = scene.tissue.guides;
+  const bool guided = std::any_of(guides.begin(), guides.end(),
+                                  [&](const Guide& g) { return g.sphere == probe.sphere; });
+  return fmt::format("sphere {} is driven along its push and {} across it\n", probe.sphere + 1,
+                     guided ? "guided" : "free");
+}
+
 std::string contacts_text(const ExperimentScene& scene, const RunNetwork& network,
                           const SimulationRun& run) {
   const auto states = tool_states(network.driven, run.record.outputs.back().position);
   std::size_t tool = 0;
   std::string text;
   for (const SceneContact& contact : scene.contacts) {
-    if (contact.kind == ContactKind::sphere && scene.contacts.size() == 1) continue;
+    if (contact.kind == ContactKind::sphere && scene.contacts.size() == 1) {
+      text += sideways_words(scene, contact.probe);
+      continue;
+    }
     text += fmt::format("{}", word_of(contact.kind));
     if (contact.kind != ContactKind::sphere) {
       text += fmt::format(" of {} mm radius", significant(1e3 * contact.radius_m, 4));
@@ -164,7 +177,7 @@ std::string named(const std::vector<std::size_t>& spheres) {
   return text;
 }
 
-std::string validity_text(const Validity& validity) {
+std::string validity_text(const Validity& validity, bool depth_limits) {
   std::string text =
       fmt::format("deepest indentation of a sphere {} mm, most turned lateral bond {} degrees\n",
                   significant(1e3 * validity.deepest_m, 4),
@@ -178,6 +191,10 @@ std::string validity_text(const Validity& validity) {
                         named(breach.spheres));
   }
   if (validity.whole()) text += "no limit of validity is passed\n";
+  if (!depth_limits) {
+    text +=
+        "the limits of 10 and 12 mm are those of the paper's liver: not applied to this organ\n";
+  }
   return text;
 }
 
@@ -228,7 +245,7 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                                ? Json(rounded(record.error_estimate, 3))
                                : Json(nullptr);
   json["resumed_at_s"] = run.resumed_at_s ? Json(*run.resumed_at_s) : Json(nullptr);
-  json["validity"] = validity_json(record.validity);
+  json["validity"] = validity_json(record.validity, depth_limits_apply(scene.tissue));
   return json;
 }
 
@@ -256,7 +273,7 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
   text += fmt::format("at the end, {} s: {}\n", significant(record.curve.back().time_s, 4),
                       response(record.curve.back()));
   text += smoothness_text(smoothness_of(scene, record.outputs.back().position));
-  return text + validity_text(record.validity);
+  return text + validity_text(record.validity, depth_limits_apply(scene.tissue));
 }
 
 }  // namespace tpm

@@ -28,7 +28,7 @@ const StabilityMap* map_of(const StabilityStudy& study, const std::string& id, S
 
 Panel map_panel(const StabilityMap& map) {
   Panel panel;
-  panel.title = "step against " + map.quantity;
+  panel.title = fmt::format("{}: step against {}", step_rule_name(map.rule), map.quantity);
   panel.x = {map.quantity, map.unit, true, std::nullopt, std::nullopt};
   panel.y = {"step", "s", true, std::nullopt, std::nullopt};
   for (const StabilityClassEntry& entry : kStabilityClasses) {

@@ -55,11 +55,13 @@ Table limits_table(const StabilityStudy& study) {
 }
 
 Table servo_table(const StabilityStudy& study, const std::string& problem) {
-  Table table{fmt::format("{}, the paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 90 mm/s and "
-                          "held: largest force error at the servo ticks, of the peak.",
-                          problem),
-              {{"rate, Hz", true}},
-              {}};
+  Table table{
+      fmt::format(
+          "{}, the paper's eta1 = 5 Pa s (tau = 0.208 ms), 4 mm at 90 mm/s and "
+          "held, as a servo samples it at its ticks: largest force error there, of the peak.",
+          problem),
+      {{"rate, Hz", true}},
+      {}};
   for (const ServoRow& row : study.servo) {
     if (row.problem != problem) continue;
     if (table.columns.size() == 1) {
@@ -209,6 +211,7 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
   for (const std::string& s : stability_sentences(study)) items.push_back({s});
   document.bullets(std::move(items));
   document.heading(2, "Limits");
+  document.paragraph(study_organ_words());
   document.table(limits_table(study));
   document.heading(2, "At servo rate");
   std::vector<std::string> problems;
@@ -294,6 +297,7 @@ std::string stability_servo_csv(const StabilityStudy& study) {
 Json to_json(const StabilityStudy& study) {
   Json json;
   json["summary"] = stability_sentences(study);
+  json["networks"] = study_organ_words();
   for (const StabilityLimit& l : study.limits) {
     Json limit{{"problem", l.problem},
                {"rule", step_rule_name(l.rule)},

@@ -73,6 +73,17 @@ std::string held_words(const SweepReader& sweep, const std::vector<std::string>&
   return words.empty() ? words : words + ".";
 }
 
+/// A place on an axis that the figure draws as a whole says nothing.
+void refuse_free(const std::vector<std::string>& free, const HeldPlaces& held,
+                 const std::string& variable) {
+  for (const auto& [name, place] : held) {
+    if (std::find(free.begin(), free.end(), name) == free.end()) continue;
+    throw Error(ExitCode::usage, "--at " + name,
+                fmt::format("the figure of {} is drawn over that axis", variable),
+                "a place on another axis, or other axes with --x and --y");
+  }
+}
+
 /// Lines need numbers: a cell without one ends a line, and the next begins another of its label.
 void add_lines(const std::string& label, const std::vector<double>& x, const std::vector<double>& y,
                std::vector<Series>& series) {
@@ -192,11 +203,18 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
 
 Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const SweepFigures& wished) {
   const auto& axes = sweep.axes();
-  const std::string x = wished.x.value_or(axes.back().name);
+  const auto is_held = [&](const std::string& name) {
+    return std::any_of(wished.held.begin(), wished.held.end(),
+                       [&](const auto& h) { return h.first == name; });
+  };
+  std::string x = wished.x.value_or(axes.back().name);
+  for (std::size_t a = axes.size(); a-- > 0 && !wished.x && is_held(x);) {
+    if (!is_held(axes[a].name)) x = axes[a].name;
+  }
   const ReadAxis& across = axes[sweep.axis(x)];
   std::optional<std::string> y = wished.y;
   for (std::size_t a = axes.size(); a-- > 0 && !y;) {
-    if (axes[a].name != x) y = axes[a].name;
+    if (axes[a].name != x && !is_held(axes[a].name)) y = axes[a].name;
   }
   Figure figure{v.name, v.name, fmt::format("{}: {}.", sweep.title(), v.meaning), {}};
   std::vector<std::string> free{x};
@@ -211,7 +229,11 @@ Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const Sweep
     }
     figure.panels.push_back(sweep_family(sweep, v, x, y, wished.held));
   }
-  figure.caption += held_words(sweep, free, wished.held);
+  if (!v.times_s.empty() || across.parameters != std::vector{across.name}) free = {x};
+  refuse_free(free, wished.held, v.name);
+  const std::string slice = held_words(sweep, free, wished.held);
+  figure.caption += slice;
+  figure.note = slice.empty() ? slice : slice.substr(1);
   return figure;
 }
 
@@ -254,6 +276,26 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
           fmt::format("{} against {}", first, second),
           fmt::format("{} cells that no other betters in both.", front.size()),
           {std::move(panel)}};
+}
+
+/// ", at depth = 4 mm, rate = 2 mm/s"; empty if there is no other axis.
+std::string held_values_words(const std::vector<HeldValue>& held) {
+  std::string words;
+  for (const HeldValue& h : held) {
+    const Unit unit = read_in(h.unit);
+    words += fmt::format("{}{} = {}{}{}", words.empty() ? ", at " : ", ", h.axis,
+                         significant(h.value / unit.to_si, 4), unit.symbol.empty() ? "" : " ",
+                         unit.symbol);
+  }
+  return words;
+}
+
+Json held_json(const std::vector<HeldValue>& held) {
+  Json list = Json::array();
+  for (const HeldValue& h : held) {
+    list.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
+  }
+  return list;
 }
 
 /// Indices beside each other, with their intervals; `of` picks one of the two kinds.
@@ -390,6 +432,7 @@ std::string sensitivity_text(const std::vector<SweepSensitivity>& all) {
                         significant(s.indices.standard_deviation, 4), s.design.replicates,
                         s.design.points);
     if (s.indices.left_out > 0) text += fmt::format(", {} points left out", s.indices.left_out);
+    text += held_values_words(s.held);
     text += "\n";
     if (s.indices.inputs.empty()) {
       text += "it does not vary\n";
@@ -425,6 +468,7 @@ Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
                     {"points", s.design.points},
                     {"replicates", s.design.replicates},
                     {"points_left_out", s.indices.left_out},
+                    {"held", held_json(s.held)},
                     {"inputs", std::move(inputs)}});
   }
   return Json{{"sensitivity", std::move(list)}};
@@ -440,7 +484,8 @@ std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all
          s.variable,
          fmt::format("{}: shares of the variance of {} with 95 % intervals.", title, s.variable),
          {index_panel("first-order index", s, &InputSensitivity::first_order),
-          index_panel("total index", s, &InputSensitivity::total)}});
+          index_panel("total index", s, &InputSensitivity::total)},
+         s.held.empty() ? std::string() : held_values_words(s.held).substr(2)});
   }
   return figures;
 }

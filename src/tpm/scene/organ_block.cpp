@@ -4,6 +4,7 @@
 #include <array>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/liver.hpp"
@@ -166,6 +167,19 @@ Organ parse_liver(const Json& block, const DocumentPlace& place) {
   return made(place, [&] { return fill_liver(request); });
 }
 
+/// The probe lands on the surface; a place given roughly may lie a tenth of the organ's size off
+/// it.
+void require_near(const Surface& surface, const Eigen::Vector3d& landing,
+                  const DocumentPlace& place) {
+  constexpr double kRoughly = 0.1;
+  const double off_m = std::abs(surface.signed_distance(landing));
+  const double most_m = kRoughly * surface.bounds().diagonal().norm();
+  if (off_m <= most_m) return;
+  throw bad_input(place.where,
+                  fmt::format("lies {} mm off the surface", significant(1e3 * off_m, 4)),
+                  fmt::format("a point on it, or within {} mm", significant(1e3 * most_m, 3)));
+}
+
 Organ parse_mesh(const Json& block, const DocumentPlace& place, const fs::path& folder) {
   require_key(block, "mesh", place, "a path of an STL or OBJ file");
   require_key(block, "unit", place, "the length that a coordinate of 1 means, such as \"mm\"");
@@ -174,7 +188,10 @@ Organ parse_mesh(const Json& block, const DocumentPlace& place, const fs::path& 
   const ClosedMesh closed = read_closed_mesh(folder / block.at("mesh").get<std::string>(), unit);
   const MeshSurface surface(closed.mesh);
   std::optional<Eigen::Vector3d> landing;
-  if (block.contains("landing")) landing = parse_point(block.at("landing"), place.key("landing"));
+  if (block.contains("landing")) {
+    landing = parse_point(block.at("landing"), place.key("landing"));
+    require_near(surface, *landing, place.key("landing"));
+  }
   Organ organ;
   if (is_solid(block, place)) {
     organ = solid_filling(surface, block, landing, place);

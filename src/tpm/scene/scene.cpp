@@ -83,6 +83,7 @@ Tissue parse_tissue(const Json& scene, std::string_view where,
   const Json guides = scene.value("guides", organ.star ? Json::array({2}) : Json::array());
   Tissue tissue;
   tissue.liver = organ.liver;
+  tissue.star = organ.star;
   tissue.title = scene.value("title", organ.organ.name);
   tissue.material = parse_material(block("material"), organ.organ.spacing, place.key("material"));
   tissue.lateral = parse_lateral(block("bonds"), place.key("bonds"));

@@ -21,6 +21,7 @@ struct Guide {
 struct Tissue {
   std::string title;
   bool liver = false;  ///< x is to the patient's right, y up, z to the back
+  bool star = false;   ///< the paper's element of four spheres
   Network network;
   TpmParameters material;
   LateralBond lateral = LateralBond::elastic;

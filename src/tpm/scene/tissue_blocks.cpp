@@ -40,8 +40,10 @@ std::vector<std::size_t> beyond(const Organ& organ, const Eigen::Vector3d& norma
 
 AnchorBlock far_side(const Json& entry, const Organ& organ, const DocumentPlace& place) {
   if (!organ.contact) {
-    throw bad_input(place.where, "far_side of an organ without a contact sphere",
-                    "a contact, or another kind of anchor");
+    throw bad_input(
+        place.where, "far_side of an organ without a contact sphere",
+        "a key landing in the organ, which says where the probe lands, or another kind of "
+        "anchor");
   }
   const double fraction = entry.value("fraction", kFarSide);
   if (!(fraction > 0.0) || fraction > 1.0) {

@@ -33,7 +33,7 @@ Recorder::Recorder(const ExperimentScene& scene, const RunNetwork& network,
       controls_(controls),
       parts_(parts),
       identity_(checkpoint_identity(scene)),
-      watch_(scene.tissue.network, scene.probe()),
+      watch_(scene.tissue.network, scene.probe(), depth_limits_apply(scene.tissue)),
       times_(times_to_watch(scene)),
       saved_(Clock::now()) {}
 

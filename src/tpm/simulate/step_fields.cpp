@@ -14,7 +14,9 @@ StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
   const Eigen::Matrix3Xd moved = displacements_m(network, state);
   fields.of_spheres = {{"displacement_m", 3, list_of(moved)},
                        {"displacement_magnitude_m", 1, list_of(moved.colwise().norm())}};
-  fields.validity = ValidityWatch(scene.tissue.network, scene.probe()).flags(state.position);
+  fields.validity =
+      ValidityWatch(scene.tissue.network, scene.probe(), depth_limits_apply(scene.tissue))
+          .flags(state.position);
   const Eigen::VectorXd bond_force = bond_forces_N(network.driven.bonds, state);
   if (scene.outputs.force) {
     const std::vector<char> open(network.driven.bonds.contact_count(), 0);

@@ -45,8 +45,17 @@ bool Validity::whole() const {
                       [](const ValidityBreach& b) { return b.first_time_s.has_value(); });
 }
 
-ValidityWatch::ValidityWatch(const Network& network, const Probe& probe)
-    : network_(network), probe_(probe) {}
+bool depth_limits_apply(const Tissue& tissue) {
+  constexpr double kPaperWidth_m = 0.21, kAlike = 1.5;  // no narrower or wider by more than this
+  if (tissue.star) return true;
+  if (!tissue.liver) return false;
+  const Eigen::RowVectorXd across = tissue.network.organ.position.row(0);
+  const double width_m = across.maxCoeff() - across.minCoeff();
+  return width_m * kAlike > kPaperWidth_m && width_m < kAlike * kPaperWidth_m;
+}
+
+ValidityWatch::ValidityWatch(const Network& network, const Probe& probe, bool depth_limits)
+    : network_(network), probe_(probe), depth_limits_(depth_limits) {}
 
 double ValidityWatch::turned_rad(const Bond& bond, const Positions& position) const {
   const Positions& rest = network_.organ.position;
@@ -61,7 +70,7 @@ double ValidityWatch::indentation_m(Eigen::Index sphere, const Positions& positi
 
 std::vector<std::int32_t> ValidityWatch::flags(const Positions& position) const {
   std::vector<std::int32_t> flags(network_.organ.size(), 0);
-  for (std::size_t i = 0; i < flags.size(); ++i) {
+  for (std::size_t i = 0; depth_limits_ && i < flags.size(); ++i) {
     const double indentation = indentation_m(static_cast<Eigen::Index>(i), position);
     if (indentation > kValidIndentation_m + kRounding_m) flags[i] |= 1;
     if (indentation > kDamageIndentation_m + kRounding_m) flags[i] |= 2;

@@ -8,6 +8,7 @@
 #include "tpm/model/validity_limits.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
+#include "tpm/scene/scene.hpp"
 
 namespace tpm {
 
@@ -40,12 +41,17 @@ struct Validity {
   [[nodiscard]] bool whole() const;
 };
 
+/// True for the paper's element and for a liver of a size like the paper's: 10 and 12 mm are depths
+/// of such a liver. They say nothing about an organ of another shape or size.
+[[nodiscard]] bool depth_limits_apply(const Tissue& tissue);
+
 /// Judges the positions of a network against the limits. The indentation of a sphere is its
 /// displacement along the probe's direction.
 class ValidityWatch {
  public:
   /// @param network must live as long as this
-  ValidityWatch(const Network& network, const Probe& probe);
+  /// @param depth_limits the limits of depth apply (depth_limits_apply)
+  ValidityWatch(const Network& network, const Probe& probe, bool depth_limits);
 
   /// For each sphere the sum of 1 (indentation), 2 (damage) and 4 (an end of a turned bond).
   [[nodiscard]] std::vector<std::int32_t> flags(const Positions& position) const;
@@ -62,6 +68,7 @@ class ValidityWatch {
 
   const Network& network_;
   Probe probe_;
+  bool depth_limits_;
   Validity seen_;
 };
 

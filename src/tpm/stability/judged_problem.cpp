@@ -1,7 +1,11 @@
 #include "tpm/stability/judged_problem.hpp"
 
+#include <fmt/format.h>
+
+#include "tpm/core/text.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/network/liver.hpp"
+#include "tpm/stability/study.hpp"
 
 namespace tpm {
 
@@ -57,8 +61,9 @@ Network small_liver(std::size_t spheres) {
   return build_network(fill_liver(request), {}, "study");
 }
 
+constexpr double kFarShare = 0.6;  // of the organ's extent along the push: fixed from there on
+
 DrivenNetwork pushed(const Network& network, const BondSystem& bonds) {
-  constexpr double kFarShare = 0.6;  // of the organ's extent along the push: held from there on
   const Organ& organ = network.organ;
   const std::size_t contact = organ.contact.value_or(0);
   const Eigen::Vector3d direction = -organ.normal.col(static_cast<Eigen::Index>(contact));
@@ -73,6 +78,16 @@ DrivenNetwork pushed(const Network& network, const BondSystem& bonds) {
 }
 
 }  // namespace
+
+std::string study_organ_words() {
+  return fmt::format(
+      "The networks of 24 and 424 spheres are livers of two layers. Spheres of the outer layer "
+      "further "
+      "than {} of the organ's extent along the push are fixed; all others, the inner layer "
+      "included, are "
+      "free. Limits of a network hold for these supports.",
+      shortest(kFarShare));
+}
 
 StudyOrgan::StudyOrgan(const TpmParameters& p, std::size_t spheres)
     : network(small_liver(spheres)), bonds(network, p), driven(pushed(network, bonds)) {}

@@ -29,7 +29,7 @@ struct StabilityMap {
 
 /// A limit found by bisection beside that of theory.
 struct StabilityLimit {
-  std::string problem;
+  std::string problem;  ///< with what is held of a network
   StepRule rule = StepRule::forward_euler;
   std::string theory;  ///< its formula
   double theory_s = 0.0;
@@ -76,6 +76,8 @@ struct StabilityStudy {
 [[nodiscard]] std::vector<StabilityLimit> stability_limits();
 [[nodiscard]] std::vector<StabilityCorner> stability_corners();
 [[nodiscard]] std::vector<ServoRow> stability_at_servo_rates();
+/// How the networks of the study are held, in a sentence.
+[[nodiscard]] std::string study_organ_words();
 /// All of it; deterministic.
 [[nodiscard]] StabilityStudy run_stability_study();
 

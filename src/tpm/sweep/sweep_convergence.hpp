@@ -7,13 +7,6 @@
 
 namespace tpm {
 
-/// Where another axis is held.
-struct HeldValue {
-  std::string axis;
-  double value = 0.0;  ///< SI
-  std::string unit;
-};
-
 /// A number of a sweep over ever finer places of one axis.
 struct SweepConvergence {
   std::string variable, unit;

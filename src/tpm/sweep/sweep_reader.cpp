@@ -177,4 +177,21 @@ void SweepReader::each(
   }
 }
 
+std::vector<HeldValue> other_places(const SweepReader& sweep, const ReadAxis& along,
+                                    const HeldPlaces& held) {
+  std::vector<HeldValue> others;
+  for (const ReadAxis& axis : sweep.axes()) {
+    const auto named = std::find_if(held.begin(), held.end(),
+                                    [&](const auto& place) { return place.first == axis.name; });
+    if (axis.name != along.name) {
+      const std::uint64_t place = named == held.end() ? 0 : named->second;
+      others.push_back({axis.name, axis.places[place], axis.unit});
+    } else if (named != held.end()) {
+      throw bad_input("--at", fmt::format("'{}' is the axis that is looked along", axis.name),
+                      "another axis");
+    }
+  }
+  return others;
+}
+
 }  // namespace tpm

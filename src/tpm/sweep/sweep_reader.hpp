@@ -25,6 +25,13 @@ struct ReadVariable {
   std::vector<double> times_s;  ///< of a curve
 };
 
+/// Where another axis is held.
+struct HeldValue {
+  std::string axis;
+  double value = 0.0;  ///< SI
+  std::string unit;
+};
+
 /// A place on each axis that is held, by name.
 using HeldPlaces = std::vector<std::pair<std::string, std::uint64_t>>;
 
@@ -75,5 +82,10 @@ class SweepReader {
   std::vector<ReadAxis> axes_;
   std::vector<ReadVariable> variables_;
 };
+
+/// Where all axes but one are held (at the first place, if not said).
+/// Throws Error(bad_input) naming `--at` if that one is held too.
+[[nodiscard]] std::vector<HeldValue> other_places(const SweepReader& sweep, const ReadAxis& along,
+                                                  const HeldPlaces& held);
 
 }  // namespace tpm

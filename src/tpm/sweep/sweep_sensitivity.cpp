@@ -10,7 +10,7 @@ SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& var
   for (std::size_t a = 0; a < axes.size(); ++a) {
     if (axes[a].value("samples", "") != "sensitivity") continue;
     const ReadAxis& axis = sweep.axes().at(a);
-    SweepSensitivity found{variable, axis.parameters, {}, {}};
+    SweepSensitivity found{variable, axis.parameters, {}, {}, other_places(sweep, axis, held)};
     found.design = {
         static_cast<int>(axis.parameters.size()), axes[a].at("count").get<std::uint64_t>(),
         axes[a].at("replicates").get<std::uint64_t>(), axes[a].value("seed", std::uint64_t{0})};

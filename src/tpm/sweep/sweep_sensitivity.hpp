@@ -12,6 +12,7 @@ struct SweepSensitivity {
   std::vector<std::string> parameters;  ///< in the order of `indices.inputs`
   SensitivityDesign design;
   SensitivityResult indices;
+  std::vector<HeldValue> held;  ///< on the other axes
 };
 
 /// Throws Error(bad_input) if the file has no such axis, or as sobol_indices does.
