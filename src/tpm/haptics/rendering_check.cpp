@@ -35,7 +35,7 @@ double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth
   const ContactAnswer further = model.step(push * (depth_m + kFurther_m));
   if (!stays.trusted || !further.trusted) return 0.0;
   // What relaxes in a period is left out: it did so in the period before as well.
-  const double relaxed_N = push.dot(there.force_N - stays.force_N);
+  const double relaxed_N = push.dot(stays.force_N - there.force_N);
   return (push.dot(stays.force_N - further.force_N) + relaxed_N) / kFurther_m;
 }
 
