@@ -59,6 +59,8 @@ ServoSettings plain(std::uint64_t cycles = 1'000'000) {
   s.slew_limit_N_per_s = 1e9;
   s.force_limit_N = 1e9;
   s.most_damping_N_s_per_m = 0.0;
+  s.energy_allowance_J = std::numeric_limits<double>::infinity();
+  s.watch_oscillation = false;
   return s;
 }
 
@@ -158,7 +160,7 @@ TEST_CASE("A tool that touches and lets go at random gains nothing from a soft t
   CHECK(least > -1e-9);
 }
 
-TEST_CASE("Limits: force, slew, ramp-in; each is counted") {
+TEST_CASE("Limits: force, rise, ramp-in: the model's tool slips, falls pass, each is counted") {
   Puppet device;
   ElementContact model(slow_liver(), 1e-3);
   ServoSettings settings = plain();
@@ -166,19 +168,47 @@ TEST_CASE("Limits: force, slew, ramp-in; each is counted") {
   settings.slew_limit_N_per_s = 100.0;
   ServoStep step(device, model, settings);
   ServoRecord row;
-  device.at.z() = 8e-3;  // a jump: above 1 N at once
-  for (int i = 1; i <= 10; ++i) {
+  double before_N = 0.0;
+  for (int i = 1; i <= 200; ++i) {  // in at 100 mm/s, 15 N/s at first: below the limit of rises
+    device.at.z() = std::min(8e-3, 1e-4 * i);
     (void)step.cycle(0, row);
-    REQUIRE_THAT(-device.force.z(), WithinAbs(std::min(0.1 * i, 0.5), 1e-12));
+    REQUIRE(-device.force.z() <= 0.5 + 1e-12);
+    REQUIRE(-device.force.z() - before_N <= 0.1 + 1e-12);
+    // What is felt is what the model answers: its tool slips, its force is not cut.
+    REQUIRE_THAT(-device.force.z(), WithinRel(row.model_force_N, 0.02));
+    before_N = -device.force.z();
   }
-  CHECK(step.counts().slew_limited == 4);  // 0.1 to 0.4, the fifth fits
-  CHECK(step.counts().force_limited == 10);
+  CHECK(before_N > 0.45);
+  CHECK(step.counts().slipped == 0);
+  CHECK(step.counts().force_limited > 20);
+  // Withdrawn, the force falls at once and by its whole stiffness, from where the tool slipped to.
+  device.at.z() = 7e-3;
+  (void)step.cycle(0, row);
+  CHECK_THAT(-device.force.z(), WithinAbs(before_N - 1e-3 * 151.0, 0.02));
+  device.at.z() = 2e-3;
+  (void)step.cycle(0, row);
+  CHECK(device.force.z() == 0.0);
+  CHECK(step.counts().slipped == 0);
+
+  ElementContact jumped(slow_liver(), 1e-3);
+  ServoStep jump(device, jumped, settings);
+  device.at.z() = 8e-3;  // a jump: above 1 N
+  for (int i = 1; i <= 10; ++i) {
+    (void)jump.cycle(0, row);
+    REQUIRE(-device.force.z() <= 0.1 * i + 1e-12);
+  }
+  CHECK(jump.counts().slipped > 0);
   settings = plain();
+  settings.force_limit_N = 0.5;
   settings.ramp_in_s = 1.0;
   ElementContact other(slow_liver(), 1e-3);
   ServoStep ramped(device, other, settings);
-  for (int i = 0; i <= 500; ++i) (void)ramped.cycle(0, row);
-  CHECK_THAT(-device.force.z(), WithinRel(0.5 * row.model_force_N, 1e-12));
+  for (int i = 0; i <= 500; ++i) {
+    device.at.z() = 2e-5 * i;
+    (void)ramped.cycle(0, row);
+    REQUIRE(-device.force.z() <= 0.5e-3 * i + 1e-12);
+  }
+  CHECK(ramped.counts().ramping_in > 100);
 }
 
 TEST_CASE("A force that is no number stops the session before it is sent") {
@@ -317,6 +347,8 @@ TEST_CASE("The passivity controller takes back what a delay gives away") {
     ElementContact model(slow_liver(), 1e-3);
     ServoSettings settings = plain(20'000);
     settings.most_damping_N_s_per_m = damping;
+    settings.energy_allowance_J = 1e3;
+    settings.delay_periods = plant.delay_periods;
     double least = 0.0;
     DevicePreparation preparation;
     device.prepare(preparation);

@@ -33,6 +33,12 @@ HilSession patient_session() {
   return session;
 }
 
+/// A hand that is where a session can begin, and then does what it asks.
+std::string hand_in_place(const test::TempFolder& folder) {
+  write_file(folder / "operator", to_lines(test::parsed(test::short_session()).operator_script()));
+  return "operator " + (folder / "operator") + "\nwait 250\n";
+}
+
 SessionRunOptions on_the_clock(const std::string& file) {
   SessionRunOptions options;
   options.real_time = true;
@@ -100,7 +106,8 @@ TEST_CASE(
   for (int attempt = 0; attempt < 10 && best_ms > 10.0; ++attempt) {
     const test::TempFolder folder;
     const std::string events = folder / "events";
-    write_file(folder / "script", "events " + events + "\nfault hang 100 800\n");
+    write_file(folder / "script",
+               hand_in_place(folder) + "events " + events + "\nfault hang 350 800\n");
     (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
     HilSession session = patient_session();
     session.hang_limit_s = 0.006;
@@ -133,7 +140,8 @@ TEST_CASE(
 TEST_CASE(
     "A stall stands in the record with its whole length, and agrees with the missed periods") {
   const test::TempFolder folder;
-  write_file(folder / "script", "events " + (folder / "events") + "\nfault hang 100 30\n");
+  write_file(folder / "script",
+             hand_in_place(folder) + "events " + (folder / "events") + "\nfault hang 350 30\n");
   (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
   HilSession session = patient_session();
   session.hang_limit_s = 1.0;
@@ -162,7 +170,8 @@ TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as
   for (int attempt = 0; attempt < 10 && best_ms > 10.0; ++attempt) {
     const test::TempFolder folder;
     const std::string events = folder / "events";
-    write_file(folder / "script", "events " + events + "\nfault slow 100 100000\n");
+    write_file(folder / "script",
+               hand_in_place(folder) + "events " + events + "\nfault slow 350 100000\n");
     (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
     HilSession session = patient_session();
     session.servo.most_late = 20;

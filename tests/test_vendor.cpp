@@ -73,9 +73,12 @@ Ran ran(const HilSession& session, const DeviceChoice& device, const std::string
   return {std::move(run), read_recording(file)};
 }
 
+/// Cycles before the session begins, in which the tool is at rest.
+constexpr std::uint64_t kWaited = 250;
+
 std::string operator_lines(const HilSession& session, const test::TempFolder& folder) {
   write_file(folder / "operator", to_lines(session.operator_script()));
-  return "operator " + (folder / "operator") + "\n";
+  return "operator " + (folder / "operator") + "\nwait " + std::to_string(kWaited) + "\n";
 }
 
 TEST_CASE("A missing library is told with all that was tried") {
@@ -177,8 +180,8 @@ TEST_CASE("A session through the library gives the forces of the simulated devic
 
 TEST_CASE("An older status with 16 entries is read") {
   const HilSession session = test::parsed(test::short_session());
-  const Script script("entries 16\n");
   const test::TempFolder folder;
+  const Script script(operator_lines(session, folder) + "entries 16\n");
   CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
 }
 
@@ -186,7 +189,7 @@ TEST_CASE("Time guards and saturation are counted and the session goes on") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
   const Script script(operator_lines(session, folder) +
-                      "fault time_guard 100 40\nfault time_guard 500 3\nfault saturated 200 7\n");
+                      "fault time_guard 350 40\nfault time_guard 750 3\nfault saturated 450 7\n");
   const Ran r = ran(session, stand_in(), folder / "r");
   CHECK(r.run.outcome.cause == StopCause::finished);
   CHECK(r.run.outcome.counts.time_guards == 43);
@@ -213,7 +216,7 @@ TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its caus
   const test::TempFolder folder;
   constexpr std::uint64_t kAt = 1777;
   const Script script(operator_lines(session, folder) + "fault " + fault.fault + " " +
-                      std::to_string(kAt) + " 1\n");
+                      std::to_string(kAt + kWaited) + " 1\n");
   const Ran r = ran(session, stand_in(), folder / "r");
   CHECK(script.happened(fault.event));
   CHECK(r.run.outcome.cause == fault.cause);
@@ -231,7 +234,7 @@ TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its caus
 TEST_CASE("A recording of the stand-in behind a network is labelled as simulated") {
   const HilSession session = test::parsed(test::short_session());
   const test::TempFolder folder;
-  const Script script("com_mode 4\n");
+  const Script script(operator_lines(session, folder) + "com_mode 4\n");
   const Ran r = ran(session, stand_in(), folder / "r");
   CHECK(r.recording.simulated());
   CHECK_THAT(device_line(r.recording), Contains("SIMULATED DEVICE"));

@@ -23,7 +23,7 @@ struct RunChoice {
   DeviceOptions device;
   std::string time;
   std::string output = "session.tpmrec";
-  bool force = false;
+  bool force = false, accept_unstable = false;
   PageOptions page;
 };
 
@@ -66,6 +66,7 @@ class Guide {
     if (!real_time_) progress_.emplace("session", session_.phases.size());
   }
   void see(const ServoRecord& row) {
+    if (row.phase < 0) return wait(row);
     if (row.phase == phase_ || row.phase >= static_cast<std::int32_t>(session_.phases.size()))
       return;
     phase_ = row.phase;
@@ -76,9 +77,18 @@ class Guide {
   }
 
  private:
+  /// Says what is missing before the session can begin, once for each thing.
+  void wait(const ServoRecord& row) {
+    const std::uint32_t missing = row.flags & (kOutOfReach | kInTissue | kMoving);
+    if (missing == missing_ || row.stop != StopCause::none) return;
+    missing_ = missing;
+    if (real_time_ || (missing & ~kMoving) != 0) tell_user("tpm: {}\n", instruction_of(row));
+  }
+
   const HilSession& session_;
   bool real_time_;
   std::int32_t phase_ = -1;
+  std::uint32_t missing_ = 0;
   std::optional<Progress> progress_;
 };
 
@@ -110,6 +120,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   options.real_time = choice.time.empty() ? device.kind == "omega7" : choice.time == "real";
   options.wish = chosen_wish(choice.device);
   options.recording = choice.output;
+  options.accept_unstable = choice.accept_unstable;
   const InterruptWatch interrupts;
   options.interrupted = InterruptWatch::seen;
   std::optional<HilPage> page;
@@ -136,6 +147,9 @@ int run_hil(const RunChoice& choice, const Session& session) {
     fmt::print("{}", to_text(json));
   } else {
     fmt::print("{}wrote {}\n", run_text(hil, run), choice.output);
+  }
+  for (const std::string& warning : run.rendering.warnings) {
+    tell_user("tpm: warning: {}\n", warning);
   }
   warn_if_beyond_model(run.outcome);
   if (page) page->end(run.outcome, options.interrupted);
@@ -197,6 +211,8 @@ void add_hil_command(CLI::App& app, Session& session) {
       ->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
   run->add_flag("--force", choice->force, "Replace a recording that exists");
+  run->add_flag("--accept-unstable", choice->accept_unstable,
+                "Run what would be unstable, on the virtual device only");
   run->add_option("--page", choice->page.port,
                   "Show the session in a browser on this machine: port, 0 for one that is free");
   run->add_option("--page-wait", choice->page.wait,

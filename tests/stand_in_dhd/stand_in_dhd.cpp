@@ -3,6 +3,7 @@
 // opened, and drdAutoInit of another answers error 5. The file named in $TPM_STAND_IN_SCRIPT is
 // read when devices are counted; its lines are
 //   version|com_mode|entries|devices|type|initialised|period|delay_periods|encoder_step NUMBER
+//   wait NUMBER       forces set before the operator begins
 //   operator FILE     pieces as written by to_lines(OperatorScript)
 //   events FILE       what happened, with the time of the clock: "NAME NANOSECONDS"
 //   fault NAME FIRST COUNT   at the calls of dhdGetPosition (dhdSetForce for saturated) numbered
@@ -39,7 +40,7 @@ struct StandIn {
   std::vector<Fault> faults;
   int version = 3, com_mode = 0, entries = 17, devices = 1, type = 35;
   bool initialised = true, read_once = false, opened_by_drd = false;
-  long reads = 0, writes = 0;
+  long reads = 0, writes = 0, wait = 0;
   int watchdog_ticks = 0;
   std::atomic<bool> expert{false}, unplugged{false};
   std::atomic<int> cause{0};
@@ -101,6 +102,7 @@ void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
     if (key == "devices") s.devices = whole;
     if (key == "type") s.type = whole;
     if (key == "initialised") s.initialised = whole != 0;
+    if (key == "wait") s.wait = whole;
     if (key == "period") s.plant_settings.period_s = value;
     if (key == "delay_periods") s.plant_settings.delay_periods = whole;
     if (key == "encoder_step") s.plant_settings.encoder_step_m = value;
@@ -168,6 +170,7 @@ int dhdOpenID(char /*index*/) {
   tpm::OperatorScript script;
   if (!s.operator_file.empty()) script = tpm::read_operator_script(s.operator_file);
   s.plant = std::make_unique<tpm::VirtualPlant>(s.plant_settings, std::move(script));
+  if (s.wait > 0) s.plant->await();
   event("open");
   return 0;
 }
@@ -271,6 +274,7 @@ int dhdSetForce(double x, double y, double z, char) {
   const bool clipped = s.plant->command({x, y, z});
   if (!s.read_once) return 0;  // still being prepared
   const long call = s.writes++;
+  if (call + 1 == s.wait) s.plant->begin();
   s.plant->forces(s.cause == 0);
   s.plant->advance();
   return clipped || due("saturated", call) ? 2 : 0;

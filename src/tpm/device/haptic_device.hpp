@@ -94,6 +94,10 @@ class HapticDevice {
   /// @param force_N on the hand, in the coordinates of the device
   virtual DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept = 0;
   virtual DeviceStatus status() noexcept = 0;
+  /// The session waits until the tool is in place: a simulated operator holds still meanwhile.
+  virtual void await() noexcept {}
+  /// The first phase begins.
+  virtual void begin() noexcept {}
   /// Lets time pass for a device that is simulated; others do nothing.
   virtual void advance(double /*seconds*/) noexcept {}
   /// Zero force, forces off, closed. More than one call does no harm.

@@ -59,8 +59,21 @@ VirtualPlant::VirtualPlant(const PlantSettings& settings, OperatorScript script)
   if (script_.pieces().empty())
     script_ = OperatorScript({{OperatorPiece::Aim::place, 0.0, 0.0, 0.0}});
   const OperatorAim first = script_.at(0.0);
-  along_ = meant_ = first.value;
+  along_ = meant_ = settings_.limp_m.value_or(first.value);
   across_ = first.across_m;
+}
+
+void VirtualPlant::begin() noexcept {
+  waiting_ = false;
+  began_ = periods_;
+}
+
+OperatorAim VirtualPlant::aim() noexcept {
+  if (settings_.limp_m) return {OperatorPiece::Aim::place, *settings_.limp_m};
+  if (!waiting_) return script_.at(static_cast<double>(periods_ - began_) * settings_.period_s);
+  const OperatorPiece& first = script_.pieces().front();
+  return {OperatorPiece::Aim::place, first.aim == OperatorPiece::Aim::place ? first.from : along_,
+          0.0, first.across_from_m};
 }
 
 double VirtualPlant::time_s() const noexcept {
@@ -93,7 +106,7 @@ void VirtualPlant::advance() noexcept {
   const bool on = forces_on_ && !watchdog_tripped_ && !too_fast_;
   const Eigen::Vector3d force = on ? pending_[oldest_] : Eigen::Vector3d::Zero();
 
-  const OperatorAim aim = script_.at(time_s());
+  const OperatorAim aim = this->aim();
   const bool place = aim.aim == OperatorPiece::Aim::place;
   const double drag = settings_.damping_N_s_per_m;
   double push = force.dot(push_);

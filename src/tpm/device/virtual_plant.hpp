@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,14 +20,16 @@ struct ArmSettings {
 
 /// A simulated Omega.7 and the arm that holds it.
 struct PlantSettings {
-  double period_s = 1e-3;               ///< of the commands
-  double mass_kg = 0.3;                 ///< moved by the hand, > 0
-  double damping_N_s_per_m = 0.3;       ///< friction, >= 0
-  double encoder_step_m = 1e-5;         ///< 0: positions as they are
-  double motor_limit_N = 12.0;          ///< of the length of the force
-  double watchdog_s = 0.008;            ///< forces are cut without a command for so long
-  double least_watchdog_s = 0.0;        ///< what is asked of the watchdog counts only above it
-  int delay_periods = 0;                ///< from a command to its force
+  double period_s = 1e-3;          ///< of the commands
+  double mass_kg = 0.3;            ///< moved by the hand, > 0
+  double damping_N_s_per_m = 0.3;  ///< friction, >= 0
+  double encoder_step_m = 1e-5;    ///< 0: positions as they are
+  double motor_limit_N = 12.0;     ///< of the length of the force
+  double watchdog_s = 0.008;       ///< forces are cut without a command for so long
+  double least_watchdog_s = 0.0;   ///< what is asked of the watchdog counts only above it
+  int delay_periods = 0;           ///< from a command to its force
+  /// If given: the hand hangs at this place along `push` and follows nothing.
+  std::optional<double> limp_m = std::nullopt;
   double velocity_limit_m_per_s = 2.0;  ///< above it forces are cut
   ArmSettings arm;
   Eigen::Vector3d push = -Eigen::Vector3d::UnitZ();    ///< unit vector along which the script goes
@@ -63,6 +66,10 @@ class VirtualPlant {
   [[nodiscard]] bool watchdog_tripped() const noexcept { return watchdog_tripped_; }
   [[nodiscard]] bool too_fast() const noexcept { return too_fast_; }
   void forces(bool on) noexcept { forces_on_ = on; }
+  /// The hand holds still where its script begins, until begin().
+  void await() noexcept { waiting_ = true; }
+  /// The script begins now.
+  void begin() noexcept;
   /// Puts the place that the hand means somewhere; the device stays.
   void put_hand(double along_m) noexcept { meant_ = along_m; }
 
@@ -79,8 +86,11 @@ class VirtualPlant {
   Eigen::Vector3d across_ = Eigen::Vector3d::Zero(), across_speed_ = Eigen::Vector3d::Zero();
   double along_ = 0.0, along_speed_ = 0.0;
   double meant_ = 0.0;  ///< place, m
-  bool aimed_at_place_ = true;
+  [[nodiscard]] OperatorAim aim() noexcept;
+
+  bool aimed_at_place_ = true, waiting_ = false;
   long periods_ = 0, since_command_ = 0;
+  long began_ = 0;  ///< the period in which the script began
   bool forces_on_ = true, watchdog_tripped_ = false, too_fast_ = false;
 };
 

@@ -39,7 +39,8 @@ ContactAnswer ElementContact::step(const Eigen::Vector3d& displacement_m) noexce
   depth_m_ = depth;
   ContactAnswer answer;
   answer.force_N.z() = -force;
-  answer.trusted = std::abs(depth) <= kValidIndentation_m;
+  // Exact at any depth; beyond this the liver that it stands for is damaged.
+  answer.trusted = std::abs(depth) <= kDamageIndentation_m;
   return answer;
 }
 

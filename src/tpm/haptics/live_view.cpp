@@ -91,6 +91,21 @@ std::string instruction_of(const SessionPhase& phase) {
   return fmt::format("Keep pushing with {} N while the tissue gives way", significant(phase.to, 4));
 }
 
+std::string instruction_of(const ServoRecord& waiting) {
+  if ((waiting.flags & kOutOfReach) != 0) {
+    const Eigen::Map<const Eigen::Vector3d> at_m(waiting.position_m);
+    return fmt::format("Bring the tool to the middle of the workspace: it is {} mm away",
+                       significant(1e3 * at_m.norm(), 3));
+  }
+  if ((waiting.flags & kInTissue) != 0) {
+    return fmt::format("Draw the tool back, out of the tissue: it is {} mm {} the surface",
+                       significant(1e3 * std::abs(waiting.tool_depth_m), 3),
+                       waiting.tool_depth_m < 0.0 ? "above" : "below");
+  }
+  if ((waiting.flags & kMoving) != 0) return "Hold the tool still";
+  return "The session begins";
+}
+
 LiveView::LiveView(const HilSession& session, bool real_time)
     : session_(session), real_time_(real_time), script_(session.operator_script()) {
   state_.served_Hz = 1.0 / session_.servo.period_s;
@@ -124,7 +139,8 @@ void LiveView::count(const ServoRecord& row) {
   counts.time_guards += flagged(kTimeGuarded);
   counts.saturations += flagged(kSaturated);
   counts.force_limited += flagged(kForceLimited);
-  counts.slew_limited += flagged(kSlewLimited);
+  counts.slipped += flagged(kSlipping);
+  counts.ramping_in += flagged(kRampingIn);
   counts.damped += flagged(kDamped);
   counts.beyond_model += flagged(kBeyondModel);
   counts.late += flagged(kLate);
@@ -190,6 +206,17 @@ void LiveView::take_point(const ServoRecord& row) {
 
 void LiveView::see(const ServoRecord& row) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (row.phase < 0) {
+    state_.last.tool_depth_m = row.tool_depth_m;
+    state_.place = instruction_of(row);
+    state_.cause = row.stop;
+    return;
+  }
+  if (!state_.begun && session_.servo.surface_before_hand_m) {
+    session_.servo.surface_m = Eigen::Map<const Eigen::Vector3d>(row.position_m) +
+                               *session_.servo.surface_before_hand_m * session_.servo.push;
+  }
+  state_.place.clear();
   count(row);
   state_.time_s = static_cast<double>(row.cycle) * session_.servo.period_s;
   state_.begun = true;
@@ -255,6 +282,7 @@ std::string LiveView::state_json(std::uint64_t after) const {
   const ServoRecord& row = s.last;
   const Json json{
       {"begun", s.begun},
+      {"place", s.place},
       {"over", s.over},
       {"cause", word_of(s.cause)},
       {"detail", s.detail},
@@ -273,7 +301,7 @@ std::string LiveView::state_json(std::uint64_t after) const {
       {"hand_N", {s.hand_N.x(), s.hand_N.y(), s.hand_N.z()}},
       {"flags",
        {{"force_limited", (row.flags & kForceLimited) != 0},
-        {"slew_limited", (row.flags & kSlewLimited) != 0},
+        {"slipped", (row.flags & kSlipping) != 0},
         {"ramping_in", (row.flags & kRampingIn) != 0},
         {"damped", (row.flags & kDamped) != 0},
         {"beyond_model", (row.flags & kBeyondModel) != 0}}},

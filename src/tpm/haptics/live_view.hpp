@@ -46,6 +46,7 @@ class LiveView {
     std::vector<std::int32_t> displacement_um;         ///< x, y, z of each sphere
     Eigen::Vector3d hand_N = Eigen::Vector3d::Zero();  ///< commanded, in the scene's coordinates
     Eigen::Vector3d tool_m = Eigen::Vector3d::Zero();  ///< from its start, if it moves in space
+    std::string place;  ///< what is missing before the session can begin
     bool begun = false, over = false;
     StopCause cause = StopCause::none;
     std::string detail;
@@ -55,7 +56,7 @@ class LiveView {
   void take_shape(const ServoRecord& row);
   void take_times();
 
-  const HilSession session_;
+  HilSession session_;
   const bool real_time_;
   mutable std::mutex mutex_;  ///< of all that follows
   State state_;
@@ -71,5 +72,7 @@ class LiveView {
 
 /// What the operator is asked to do, a sentence.
 [[nodiscard]] std::string instruction_of(const SessionPhase& phase);
+/// The same before the session begins, from a row of waiting.
+[[nodiscard]] std::string instruction_of(const ServoRecord& waiting);
 
 }  // namespace tpm

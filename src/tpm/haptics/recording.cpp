@@ -35,7 +35,8 @@ Json to_json(const ServoCounts& counts) {
   return {{"time_guards", counts.time_guards},
           {"saturations", counts.saturations},
           {"force_limited", counts.force_limited},
-          {"slew_limited", counts.slew_limited},
+          {"slipped", counts.slipped},
+          {"ramping_in", counts.ramping_in},
           {"damped", counts.damped},
           {"beyond_model", counts.beyond_model},
           {"late", counts.late},
@@ -55,7 +56,7 @@ Json to_json(const DeviceIdentity& device) {
 }
 
 Json recording_header(const HilSession& session, const DeviceIdentity& device,
-                      const LoopModel& model, bool real_time) {
+                      const LoopModel& model, bool real_time, const Json& rendering) {
   Json said = parse_json(session.text, "session");
   said["model"]["scene"] = session.scene;
   Json surface = Json::array();
@@ -70,6 +71,7 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
             {"error_bound", model.error_bound},
             {"stiffness_at_once_N_per_m", model.stiffness_N_per_m},
             {"plan", model.plan}}},
+          {"rendering", rendering},
           {"surface_by_phase_m", std::move(surface)},
           {"session", std::move(said)}};
 }
@@ -119,6 +121,11 @@ HilRecording read_recording(const std::filesystem::path& file) {
   }
   recording.rows.resize(log.rows);
   if (log.rows > 0) std::memcpy(recording.rows.data(), log.bytes.data(), log.bytes.size());
+  if (recording.session.servo.surface_before_hand_m && log.rows > 0) {
+    const Eigen::Map<const Eigen::Vector3d> hand_m(recording.rows.front().position_m);
+    recording.session.servo.surface_m =
+        hand_m + *recording.session.servo.surface_before_hand_m * recording.session.servo.push;
+  }
   recording.closed = log.closed;
   if (log.closed) recording.closing = parse_json(log.closing, file.string());
   return recording;

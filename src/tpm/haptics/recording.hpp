@@ -8,9 +8,11 @@
 
 namespace tpm {
 
-/// What stands before the rows of a recording: format, session with its scene, device, model.
+/// What stands before the rows of a recording: format, session with its scene, device, model, what
+/// was known of its rendering before (RenderingCheck).
 [[nodiscard]] Json recording_header(const HilSession& session, const DeviceIdentity& device,
-                                    const LoopModel& model, bool real_time);
+                                    const LoopModel& model, bool real_time,
+                                    const Json& rendering = {});
 
 /// What stands behind them: how the session ended.
 [[nodiscard]] Json recording_closing(const ServoOutcome& outcome);

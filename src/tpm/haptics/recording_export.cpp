@@ -19,7 +19,7 @@ constexpr FlagWord kFlagWords[] = {{kTouching, "touching"},
                                    {kTimeGuarded, "time_guarded"},
                                    {kSaturated, "saturated"},
                                    {kForceLimited, "force_limited"},
-                                   {kSlewLimited, "slew_limited"},
+                                   {kSlipping, "slipped"},
                                    {kRampingIn, "ramping_in"},
                                    {kDamped, "damped"},
                                    {kBeyondModel, "beyond_model"},
@@ -105,6 +105,9 @@ void write_rows(Hdf5Writer& file, const HilRecording& recording) {
                   [](const ServoRecord& row) { return static_cast<double>(row.busy_s); });
   columns.whole<std::int32_t>("missed", "periods before this one without a command",
                               [](const ServoRecord& row) { return row.missed; });
+  columns.whole<std::int32_t>(
+      "stop", "0, or in the last row the number of the cause: see /causes",
+      [](const ServoRecord& row) { return static_cast<std::int32_t>(row.stop); });
   for (const FlagWord& flag : kFlagWords) {
     columns.whole<std::int32_t>(flag.word, "1: so in this cycle", [&flag](const ServoRecord& row) {
       return (row.flags & flag.flag) != 0 ? 1 : 0;
@@ -170,6 +173,11 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
   attribute("cause", recording.closed ? recording.closing.value("cause", "") : "cut off");
   write_rows(writer, recording);
   write_phases(writer, recording.session);
+  std::vector<std::string> causes;
+  for (auto i = 0; i <= static_cast<std::int32_t>(StopCause::oscillation); ++i) {
+    causes.emplace_back(word_of(static_cast<StopCause>(i)));
+  }
+  writer.texts("/causes", causes);
   // Texts of any length: an attribute holds 64 KB at most.
   writer.texts("/header_json", {to_text(recording.header)});
   if (recording.closed) writer.texts("/closing_json", {to_text(recording.closing)});

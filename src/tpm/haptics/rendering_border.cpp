@@ -119,7 +119,10 @@ bool comes_to_rest(const RenderedContact& contact, PlantSettings plant) {
 TpmParameters RenderedContact::material() const {
   TpmParameters p;
   p.Eprime_Pa = 0.0;
-  p.E1_Pa = p.E2_Pa = stiffness_N_per_m / p.modulus_to_stiffness_m();
+  constexpr double kLeast = 1e-6;  // neither spring of the element may vanish
+  const double share = std::clamp(relaxed_share, kLeast, 1.0 - kLeast);
+  p.E2_Pa = stiffness_N_per_m / p.modulus_to_stiffness_m();
+  p.E1_Pa = p.E2_Pa * (share / (1.0 - share));  // E1 E2 / (E1 + E2) is that share of E2
   return p.with_relaxation_time(relaxation_time_s);
 }
 
@@ -127,7 +130,7 @@ double RenderedContact::dashpot_N_s_per_m() const {
   constexpr double kRatio = 0.1, kDensity_kg_m3 = 1060.0, kRadius_m = 0.010;
   const double mass =
       kDensity_kg_m3 * 4.0 / 3.0 * std::numbers::pi * kRadius_m * kRadius_m * kRadius_m;
-  return 2.0 * kRatio * std::sqrt(0.5 * stiffness_N_per_m * mass);
+  return 2.0 * kRatio * std::sqrt(relaxed_share * stiffness_N_per_m * mass);
 }
 
 ElementContact RenderedContact::model() const {

@@ -7,6 +7,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/device/device_limits.hpp"
 #include "tpm/haptics/session_phases.hpp"
 #include "tpm/haptics/surface_scene.hpp"
 #include "tpm/plan/plan.hpp"
@@ -23,6 +24,14 @@ double in_range(const Json& block, const char* key, Dimension dimension, double 
   const std::string_view unit = si_symbol(dimension);
   throw bad_input(place.key(key).where, fmt::format("{} {}", shortest(value), unit),
                   fmt::format("{} to {} {}", shortest(least), shortest(most), unit));
+}
+
+double number_in_range(const Json& block, const char* key, double usual, double least, double most,
+                       const DocumentPlace& place) {
+  const double value = block.value(key, usual);
+  if (value >= least && value <= most) return value;
+  throw bad_input(place.key(key).where, shortest(value),
+                  fmt::format("{} to {}", shortest(least), shortest(most)));
 }
 
 Eigen::Vector3d push_of(const Json& session, const DocumentPlace& place) {
@@ -61,19 +70,92 @@ void parse_tool(HilSession& session, const Json& model, const DocumentPlace& pla
                100.0, 1e6, place);
 }
 
-void parse_limits(HilSession& session, const Json& limits, const DocumentPlace& place) {
+void parse_limits(HilSession& session, const Json& limits, const DeviceLimits& device,
+                  const DocumentPlace& place) {
   ServoSettings& servo = session.servo;
-  constexpr double kMotor_N = 12.0, kLongest_s = 60.0;
+  constexpr double kLongest_s = 60.0, kLeastSlew_N_per_s = 1.0, kMostUntrusted_s = 2.0;
   servo.force_limit_N =
-      in_range(limits, "force", Dimension::force, servo.force_limit_N, 1e-3, kMotor_N, place);
-  servo.slew_limit_N_per_s = limits.value("slew_N_per_s", servo.slew_limit_N_per_s);
-  servo.ramp_in_s =
-      in_range(limits, "ramp_in", Dimension::time, servo.ramp_in_s, 0.0, kLongest_s, place);
-  servo.most_damping_N_s_per_m = limits.value("damping_N_s_per_m", servo.most_damping_N_s_per_m);
+      in_range(limits, "force", Dimension::force, servo.force_limit_N, 1e-3, device.force_N, place);
+  servo.slew_limit_N_per_s = number_in_range(limits, "slew_N_per_s", servo.slew_limit_N_per_s,
+                                             kLeastSlew_N_per_s, device.slew_N_per_s, place);
+  servo.ramp_in_s = in_range(limits, "ramp_in", Dimension::time, servo.ramp_in_s,
+                             device.least_ramp_in_s, kLongest_s, place);
+  servo.most_damping_N_s_per_m =
+      number_in_range(limits, "damping_N_s_per_m", servo.most_damping_N_s_per_m, 0.0,
+                      device.damping_N_s_per_m, place);
+  servo.untrusted_limit_s = in_range(limits, "untrusted", Dimension::time, servo.untrusted_limit_s,
+                                     servo.period_s, kMostUntrusted_s, place);
   servo.most_late = limits.value("late_cycles", servo.most_late);
   session.preparation.watchdog_s =
       in_range(limits, "watchdog", Dimension::time, 0.008, 0.004, 0.016, place);
+  // The device is asked for no more than the session, whatever it could.
+  session.preparation.max_force_N = servo.force_limit_N;
   session.hang_limit_s = in_range(limits, "hang", Dimension::time, 0.008, 0.002, 1.0, place);
+}
+
+/// What has to be before the session begins.
+void parse_start(ServoSettings& servo, const Json& json, const DeviceLimits& device,
+                 const DocumentPlace& place) {
+  StartGateSettings gate;
+  gate.reach_m = device.reach_m;
+  const Json start = json.value("start", Json::object());
+  const DocumentPlace at = place.key("start");
+  constexpr double kMostClearance_m = 0.05, kLeastStill_s = 0.1, kMostStill_s = 5.0;
+  constexpr double kLeastLimit_s = 1.0, kMostLimit_s = 3600.0;
+  gate.clearance_m =
+      in_range(start, "clearance", Dimension::length, gate.clearance_m, 1e-4, kMostClearance_m, at);
+  gate.still_s =
+      in_range(start, "still", Dimension::time, gate.still_s, kLeastStill_s, kMostStill_s, at);
+  gate.limit_s =
+      in_range(start, "limit", Dimension::time, gate.limit_s, kLeastLimit_s, kMostLimit_s, at);
+  servo.gate = gate;
+  if (!json.contains("surface_before_hand")) return;
+  if (json.contains("surface")) {
+    throw bad_input(place.key("surface_before_hand").where, "the surface is already given",
+                    "'surface' or 'surface_before_hand'");
+  }
+  constexpr double kNearest_m = 1e-3, kFurthest_m = 0.05;
+  servo.surface_before_hand_m =
+      in_range(json, "surface_before_hand", Dimension::length, 0.0, kNearest_m, kFurthest_m, place);
+}
+
+/// How far the tool goes beyond the place where the tissue begins, m: along the push and across.
+double furthest_of(const HilSession& session, const Eigen::Vector3d& surface_m) {
+  constexpr double kUnderLoads_m = 0.012;  // where the tissue is damaged
+  double furthest = surface_m.norm();
+  for (const SessionPhase& phase : session.phases) {
+    const bool pushes =
+        phase.kind == SessionPhaseKind::load || phase.kind == SessionPhaseKind::creep;
+    const std::pair<double, double> depths =
+        pushes ? std::pair(0.0, kUnderLoads_m) : std::pair(phase.from, phase.to);
+    for (const double depth : {depths.first, depths.second}) {
+      for (const double across : {phase.across_from_m, phase.across_to_m}) {
+        const Eigen::Vector3d at = surface_m + depth * session.servo.push + across * session.slide;
+        furthest = std::max(furthest, at.norm());
+      }
+    }
+  }
+  return furthest;
+}
+
+void require_within_reach(HilSession& session, const DeviceLimits& device,
+                          const DocumentPlace& place) {
+  const bool before_hand = session.servo.surface_before_hand_m.has_value();
+  const double furthest = furthest_of(session, session.servo.surface_m);
+  if (furthest > device.reach_m) {
+    throw bad_input(place.where,
+                    fmt::format("the tool would go {} m from the centre of the workspace",
+                                significant(furthest, 4)),
+                    fmt::format("{} m at most ({})", shortest(device.reach_m), device.kind));
+  }
+  // Wherever the hand is then, the session has to fit in from there.
+  if (before_hand) {
+    session.servo.gate->reach_m -= furthest + *session.servo.surface_before_hand_m;
+    if (!(session.servo.gate->reach_m > 0.0)) {
+      throw bad_input(place.key("surface_before_hand").where, "leaves no room for the session",
+                      "a nearer surface, or shorter ways");
+    }
+  }
 }
 
 void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& place) {
@@ -90,6 +172,9 @@ void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& p
   plant.arm.damping_N_s_per_m = block.value("arm_damping_N_s_per_m", plant.arm.damping_N_s_per_m);
   plant.arm.stiffness_N_per_m = in_range(block, "arm_stiffness", Dimension::stiffness,
                                          plant.arm.stiffness_N_per_m, 0.0, 1e5, place);
+  if (block.contains("limp_at")) {
+    plant.limp_m = in_range(block, "limp_at", Dimension::length, 0.0, -0.1, 0.1, place);
+  }
   plant.arm.correction_per_s = block.value("correction_per_s", plant.arm.correction_per_s);
 }
 
@@ -180,6 +265,7 @@ HilSession parse_session(const Json& json, std::string_view where,
                          const std::filesystem::path& folder) {
   check_schema(json, "hil", where);
   const DocumentPlace place{std::string(where)};
+  const DeviceLimits& device = limits_of("omega7");  // the simulated one has the same
   HilSession session;
   session.title = json.value("title", std::string("session"));
   session.model = parse_model(json.at("model").value("kind", std::string("planned")));
@@ -206,14 +292,20 @@ HilSession parse_session(const Json& json, std::string_view where,
     session.slide = slide_of(json.at("slides"), session.servo.push, slides);
   }
   if (json.contains("surface")) {
-    constexpr double kReach_m = 1.0;  // no device of this kind reaches further
     session.servo.surface_m = parse_point(json.at("surface"), place.key("surface"));
-    if (!(session.servo.surface_m.cwiseAbs().maxCoeff() <= kReach_m)) {
-      throw bad_input(place.key("surface").where, "out of a device's reach", "-1 to 1 m");
+    if (!(session.servo.surface_m.norm() <= device.reach_m)) {
+      throw bad_input(
+          place.key("surface").where, "out of the device's reach",
+          fmt::format("{} m from the centre of the workspace at most", shortest(device.reach_m)));
     }
   }
-  parse_limits(session, json.value("limits", Json::object()), place.key("limits"));
+  parse_limits(session, json.value("limits", Json::object()), device, place.key("limits"));
+  parse_start(session.servo, json, device, place);
   session.phases = parse_phases(json, place);
+  if (session.servo.surface_before_hand_m) {
+    session.phases.front().from = -*session.servo.surface_before_hand_m;
+  }
+  require_within_reach(session, device, place);
   session.servo.phase_ends = ends_of(session.phases, session.servo.period_s);
   session.plant.period_s = session.servo.period_s;
   session.plant.watchdog_s = session.preparation.watchdog_s;

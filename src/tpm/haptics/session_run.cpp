@@ -1,6 +1,9 @@
 #include "tpm/haptics/session_run.hpp"
 
+#include <limits>
+
 #include "tpm/core/error.hpp"
+#include "tpm/device/device_limits.hpp"
 #include "tpm/device/omega7.hpp"
 #include "tpm/device/replay_device.hpp"
 #include "tpm/device/virtual_omega7.hpp"
@@ -22,12 +25,21 @@ Eigen::Matrix3Xd motion_of(const HilRecording& recording) {
 
 ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
                       const LoopModel& model, const std::shared_ptr<ContactModel>& stepped,
+                      const RenderingCheck& rendering, bool guided,
                       const SessionRunOptions& options, RowLogWriter& log) {
   ServoSettings servo = session.servo;
+  servo.friction_N_s_per_m = rendering.friction_N_s_per_m;
+  servo.delay_periods = guided ? rendering.delay_periods : 0;
+  if (!guided) {  // a recorded motion begins where it began, and nobody feels it
+    servo.gate.reset();
+    servo.energy_allowance_J = std::numeric_limits<double>::infinity();
+    servo.watch_oscillation = false;
+  }
   servo.model_push = model.push;
   servo.to_model = model.to_model;
   const RecordSink sink = [&](const ServoRecord& row) {
-    log.append(&row);
+    const bool waits = row.phase < 0 && row.stop == StopCause::none;
+    if (!waits) log.append(&row);
     if (options.watcher) options.watcher(row);
   };
   if (!options.real_time) {
@@ -44,6 +56,18 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
     passed_on_ns = now_ns();
   };
   return run_in_real_time(device, stepped, servo, sink, real);
+}
+
+void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& choice,
+                        const SessionRunOptions& options) {
+  if (options.accept_unstable && choice.kind != "virtual") {
+    throw Error(ExitCode::usage, "--accept-unstable", "is not for the device '" + choice.kind + "'",
+                "--device virtual");
+  }
+  if (rendering.acceptable() || options.accept_unstable || choice.kind == "replay") return;
+  throw Error(ExitCode::answer_is_no, "stability", rendering.verdict(),
+              "a softer tissue, a higher rate or a shorter delay; --accept-unstable with --device "
+              "virtual");
 }
 
 }  // namespace
@@ -70,6 +94,8 @@ SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
   SessionRun run;
   run.model = make_loop_model(session, options.real_time, options.planning);
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
+  run.rendering = check_rendering(session, *stepped, run.model, choice.kind);
+  require_acceptable(run.rendering, choice, options);
   const std::shared_ptr<HapticDevice> device = make_device(choice, session);
   DevicePreparation preparation = session.preparation;
   preparation.may_move = choice.may_move;
@@ -78,10 +104,12 @@ SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
     run.device = device->open();
     if (options.opened) options.opened(run.device, run.model);
     RowLogWriter log(options.recording,
-                     to_text(recording_header(session, run.device, run.model, options.real_time)),
+                     to_text(recording_header(session, run.device, run.model, options.real_time,
+                                              to_json(run.rendering))),
                      sizeof(ServoRecord));
     device->prepare(preparation);
-    run.outcome = run_loop(session, device, run.model, stepped, options, log);
+    run.outcome = run_loop(session, device, run.model, stepped, run.rendering,
+                           choice.kind != "replay", options, log);
     log.close(to_text(recording_closing(run.outcome)));
   } catch (...) {
     device->stop();

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "tpm/haptics/recording.hpp"
+#include "tpm/haptics/rendering_check.hpp"
 
 namespace tpm {
 
@@ -23,6 +24,7 @@ struct SessionRunOptions {
   bool real_time = false;
   RealTimeWish wish = RealTimeWish::ignore;
   std::filesystem::path recording;
+  bool accept_unstable = false;  ///< of a simulated device only
   std::function<bool()> interrupted;
   /// Sees every record, on the thread that writes them.
   std::function<void(const ServoRecord&)> watcher;
@@ -34,12 +36,17 @@ struct SessionRunOptions {
 struct SessionRun {
   DeviceIdentity device;
   LoopModel model;  ///< its `model` is with the run
+  RenderingCheck rendering;
   ServoOutcome outcome;
 };
 
-/// Runs a session and records it. In real time the rows written by now are passed to the system
+/// Runs a session and records it. A rendering that would be unstable is refused, forces and phases
+/// begin when the tool is in place (StartGate; rows until then are shown and not recorded).
+/// In real time the rows written by now are passed to the system
 /// every 50 ms.
-/// Throws Error(environment) before the loop begins; what happens later is in the outcome.
+/// Throws Error(answer_is_no) for a rendering that is refused, Error(usage) for one that is
+/// accepted on a device that is not simulated, Error(environment) before the loop begins; what
+/// happens later is in the outcome.
 [[nodiscard]] SessionRun run_session(const HilSession& session, const DeviceChoice& device,
                                      const SessionRunOptions& options);
 

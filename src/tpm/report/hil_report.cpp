@@ -77,6 +77,24 @@ Figure energy_figure(const HilRecording& recording) {
   return figure;
 }
 
+/// First of all: how it ended, and whether it could be rendered safely.
+void add_rendering(Document& d, const HilRecording& r, const RecordingSummary& s) {
+  d.heading(2, "Stability");
+  std::vector<Cell> lines{{fmt::format("the session ended: {}", s.cause),
+                           s.cause == "finished" ? Tone::good : Tone::bad}};
+  const Json rendering = r.header.value("rendering", Json());
+  if (rendering.is_object()) {
+    lines.push_back({rendering.at("verdict").get<std::string>(),
+                     rendering.at("passive").get<bool>()  ? Tone::good
+                     : rendering.at("stable").get<bool>() ? Tone::plain
+                                                          : Tone::bad});
+    for (const Json& warning : rendering.at("warnings")) {
+      lines.push_back({warning.get<std::string>(), Tone::bad});
+    }
+  }
+  d.bullets(std::move(lines));
+}
+
 void add_identity(Document& d, const HilRecording& r) {
   const Json& device = r.header.at("device");
   if (r.simulated()) {
@@ -228,9 +246,9 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
          Tone::bad});
   }
   lines.push_back({fmt::format(
-      "{} cycles; missed periods {}; time guards {}; saturations {}; limited by force {}, by slew "
-      "{}; damped {}",
-      s.cycles, s.missed, s.time_guards, s.saturations, s.force_limited, s.slew_limited,
+      "{} cycles; missed periods {}; time guards {}; saturations {}; limited by force {}, "
+      "slipped {}, limited while ramping in {}; damped {}",
+      s.cycles, s.missed, s.time_guards, s.saturations, s.force_limited, s.slipped, s.ramping_in,
       s.damped)});
   if (s.beyond_model == 0) {
     lines.push_back({"within the range that the model is good for in every cycle"});
@@ -265,7 +283,8 @@ RecordingSummary summary_of(const HilRecording& recording) {
     s.time_guards += has(kTimeGuarded);
     s.saturations += has(kSaturated);
     s.force_limited += has(kForceLimited);
-    s.slew_limited += has(kSlewLimited);
+    s.slipped += has(kSlipping);
+    s.ramping_in += has(kRampingIn);
     s.damped += has(kDamped);
     if (has(kBeyondModel) != 0 && s.beyond_model++ == 0) {
       s.first_beyond_s = static_cast<double>(row.cycle) * recording.session.servo.period_s;
@@ -286,6 +305,7 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   Document d;
   d.title = recording.session.title;
   d.subtitle = device_line(recording);
+  add_rendering(d, recording, summary);
   add_identity(d, recording);
   add_plan(d, recording.header.at("model").value("plan", Json()));
   add_fidelity(d, v);
@@ -296,6 +316,7 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   write_file(folder / "report.html", to_html(d, drawings));
   Json json = verification_json(recording, v);
   json["end"] = summary.cause;
+  json["rendering"] = recording.header.value("rendering", Json());
   json["closing"] = recording.closing;
   json["observed_end_J"] = rounded(summary.observed_end_J, 6);
   json["observed_least_J"] = rounded(summary.observed_least_J, 6);

@@ -114,6 +114,7 @@ Json run_json(const HilSession& session, const SessionRun& run) {
            {{"name", run.model.name},
             {"error_bound", run.model.error_bound},
             {"plan", run.model.plan}}},
+          {"rendering", to_json(run.rendering)},
           {"rate_Hz", rounded(1.0 / session.servo.period_s, kHilDigits)},
           {"duration_s", rounded(session.duration_s(), kHilDigits)},
           {"phases", session.phases.size()},
@@ -125,19 +126,20 @@ std::string run_text(const HilSession& session, const SessionRun& run) {
   const ServoOutcome& o = run.outcome;
   const double lived_s = static_cast<double>(o.cycles) * session.servo.period_s;
   std::string text = fmt::format(
-      "{}\n{}\nmodel: {}; error: {}\n{} of {} s at {} Hz in {} time, {} phases\n", session.title,
-      device_words(run.device), run.model.name, run.model.error_bound, significant(lived_s, 6),
-      significant(session.duration_s(), 6), significant(1.0 / session.servo.period_s, 4),
-      o.real_time ? "real" : "virtual", session.phases.size());
+      "{}\n{}\nrendering: {}\nmodel: {}; error: {}\n{} of {} s at {} Hz in {} time, {} phases\n",
+      session.title, device_words(run.device), run.rendering.verdict(), run.model.name,
+      run.model.error_bound, significant(lived_s, 6), significant(session.duration_s(), 6),
+      significant(1.0 / session.servo.period_s, 4), o.real_time ? "real" : "virtual",
+      session.phases.size());
   if (o.real_time) {
     text += o.scheduling + "\n" + times_text("woke after the deadline", o.woke_late) +
             times_text("work of a cycle", o.busy);
   }
   text += fmt::format(
-      "late cycles {}, missed periods {}, time guards {}, saturations {}, limited by force {}, by "
-      "slew {}, damped {}, beyond the model {}, records dropped {}\n",
+      "late cycles {}, missed periods {}, time guards {}, saturations {}, limited by force {}, "
+      "slipped {}, damped {}, beyond the model {}, records dropped {}\n",
       o.counts.late, o.counts.missed, o.counts.time_guards, o.counts.saturations,
-      o.counts.force_limited, o.counts.slew_limited, o.counts.damped, o.counts.beyond_model,
+      o.counts.force_limited, o.counts.slipped, o.counts.damped, o.counts.beyond_model,
       o.dropped_records);
   text += fmt::format("end: {}{}{}\n", word_of(o.cause), o.detail.empty() ? "" : ": ", o.detail);
   if (o.device.error != 0) {

@@ -24,7 +24,11 @@ class OneSidedContact {
   void reset() noexcept;
   /// One period. @param tool_m depth of the tool at its end, moving linearly
   Answer step(double tool_m) noexcept;
-  /// Stiffness against the push at once, at rest, N/m.
+  /// Depth of the surface: where the tool is while it touches, else where it would touch next.
+  [[nodiscard]] double surface_m() const noexcept {
+    return touching_ ? surface_m_ : surface_m_ - left_N_ / stiffness_N_per_m_;
+  }
+  /// Instantaneous stiffness along the push, at rest, N/m.
   [[nodiscard]] double stiffness_N_per_m() const noexcept { return stiffness_N_per_m_; }
 
  private:

@@ -3,10 +3,10 @@
 
 namespace tpm {
 
-/// Counts the work that the hand does on what is rendered, and adds damping while the count is
-/// negative, so that what was given away too much is taken back (time-domain passivity control,
-/// Hannaford and Ryu 2002). A held force gives energy away in each period even if the tissue does
-/// not: the count alone falls below zero, the device's own friction makes up for it.
+/// Counts the work that the hand does on what is rendered, and adds damping while the rendering has
+/// given the hand energy that its tissue did not have (EnergyWatch), so that it is taken back
+/// (time-domain passivity control after Hannaford and Ryu 2002, whose controller waits until the
+/// count itself is negative: energy put in earlier then hides what is given away later).
 class PassivityControl {
  public:
   /// @param most_damping_N_s_per_m 0: observe only
@@ -15,8 +15,11 @@ class PassivityControl {
 
   /// The hand moved by `moved_m` while `held_N` pushed on it.
   void observe(const Eigen::Vector3d& held_N, const Eigen::Vector3d& moved_m) noexcept;
-  /// What to add to the next force on the hand. @param moved_m in the last period
-  [[nodiscard]] Eigen::Vector3d damping_N(const Eigen::Vector3d& moved_m) const noexcept;
+  /// What to add to the next force on the hand.
+  /// @param moved_m in the last period
+  /// @param given_J to be taken back
+  [[nodiscard]] Eigen::Vector3d damping_N(const Eigen::Vector3d& moved_m,
+                                          double given_J) const noexcept;
   [[nodiscard]] double observed_J() const noexcept { return observed_J_; }
 
  private:

@@ -22,6 +22,10 @@ enum class StopCause : std::int32_t {
   force_not_finite,
   overrun_storm,  ///< too many cycles were late
   hang,           ///< a cycle did not end
+  not_in_place,   ///< the operator did not bring the tool to where a session can begin
+  untrusted,      ///< the model did not trust its forces for too long
+  energy,         ///< what was rendered gave the hand energy that the tissue did not have
+  oscillation,    ///< the force went up and down by itself
 };
 
 [[nodiscard]] std::string_view word_of(StopCause cause);
@@ -32,21 +36,28 @@ enum ServoFlag : std::uint32_t {
   kTimeGuarded = 1U << 1U,   ///< position of an earlier call
   kSaturated = 1U << 2U,     ///< clipped by the motors
   kForceLimited = 1U << 3U,  ///< clipped by the session's limit
-  kSlewLimited = 1U << 4U,
-  kRampingIn = 1U << 5U,
-  kDamped = 1U << 6U,       ///< by the passivity controller
+  kSlipping = 1U << 4U,   ///< the model's tool slipped, because the force rose faster than allowed
+  kRampingIn = 1U << 5U,  ///< the same, because forces are still growing to their limit
+  kDamped = 1U << 6U,     ///< by the passivity controller
   kBeyondModel = 1U << 7U,  ///< the model does not trust its answer
   kLate = 1U << 8U,         ///< woke after the next deadline
+  // Before the session begins (StartGate); the rows have phase -1.
+  kWaiting = 1U << 9U,      ///< for the operator; forces are zero
+  kOutOfReach = 1U << 10U,  ///< the tool is outside the workspace
+  kInTissue = 1U << 11U,    ///< or too close to it
+  kMoving = 1U << 12U,      ///< the tool is not at rest
 };
 
 /// One cycle of the servo loop. Plain data, written as it stands. Depths are along the push, from
-/// the surface at rest, positive into the tissue.
+/// the surface at rest, positive into the tissue. The row of a stop holds what was known last; its
+/// command is zero.
 struct ServoRecord {
   std::uint64_t cycle = 0;       ///< periods since the start, missed ones included
   double position_m[3] = {};     ///< as the device read it
   double tool_depth_m = 0.0;     ///< of the tool, negative in the air
   double surface_depth_m = 0.0;  ///< of the tissue, given to the model; in space that of the tool
-  double model_force_N = 0.0;    ///< of the tissue against the push, after one-sidedness
+  double model_force_N = 0.0;    ///< of the tissue against the push, after one-sidedness, whether
+                                 ///< trusted or not
   double model_error_N = 0.0;    ///< as the model estimates
   double commanded_N[3] = {};    ///< sent to the device, on the hand
   double observed_J = 0.0;       ///< work of the hand on what is rendered, since the start
@@ -54,8 +65,8 @@ struct ServoRecord {
   float woke_late_s = 0.0F;      ///< after the deadline; 0 in virtual time
   float busy_s = 0.0F;           ///< the cycle's work; 0 in virtual time
   std::uint32_t flags = 0;       ///< ServoFlag
-  std::int32_t phase = 0;
-  std::int32_t missed = 0;  ///< periods before this one that went by without a command
+  std::int32_t phase = 0;        ///< -1 before the session begins
+  std::int32_t missed = 0;       ///< periods before this one that went by without a command
   StopCause stop = StopCause::none;
 };
 

@@ -30,6 +30,14 @@ StopCause cause_of(ForcesOff off) {
   return StopCause::forces_off;
 }
 
+/// Along the push; in space the largest of any direction.
+double stiffness_of(const ContactModel& model, const ServoSettings& settings) {
+  constexpr double kLeast_N_per_m = 1.0;
+  const Eigen::Matrix3d k = model.instantaneous_stiffness();
+  const Eigen::Vector3d push = settings.model_push.normalized();
+  return std::max(kLeast_N_per_m, settings.to_model ? k.norm() : push.dot(k * push));
+}
+
 /// The vendor's numbers for "no device" and "not available".
 bool is_gone(int error) {
   return error == 5 || error == 6;
@@ -71,6 +79,14 @@ std::string_view word_of(StopCause cause) {
       return "overrun storm";
     case StopCause::hang:
       return "hang";
+    case StopCause::not_in_place:
+      return "operator not in place";
+    case StopCause::untrusted:
+      return "model not trusted";
+    case StopCause::energy:
+      return "energy given to the hand";
+    case StopCause::oscillation:
+      return "oscillation";
   }
   return "unknown";
 }
@@ -81,8 +97,18 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
       settings_(std::move(settings)),
       contact_(model, settings_.model_push),
       passivity_(settings_.period_s, settings_.most_damping_N_s_per_m),
+      energy_({.period_s = settings_.period_s,
+               .friction_N_s_per_m = settings_.friction_N_s_per_m,
+               .delay_periods = settings_.delay_periods,
+               .allowance_J = settings_.energy_allowance_J}),
+      oscillation_({.period_s = settings_.period_s}),
+      stiffness_N_per_m_(stiffness_of(model, settings_)),
+      least_stiffness_N_per_m_(stiffness_N_per_m_),
       late_(kLateWindow, 0) {
   contact_.reset();
+  if (!settings_.gate) return;
+  gate_.emplace(*settings_.gate, settings_.period_s);
+  device_.await();
 }
 
 StopCause ServoStep::read(ServoRecord& row) noexcept {
@@ -106,7 +132,9 @@ StopCause ServoStep::read(ServoRecord& row) noexcept {
 
 void ServoStep::touch(int missed, ServoRecord& row) noexcept {
   // The model lives through every period, also those that nobody served.
-  const int steps = begun_ ? missed + 1 : 1;
+  owed_ += begun_ ? missed : 0;
+  const int steps = 1 + std::min(owed_, kMostSteps - 1);
+  owed_ -= steps - 1;
   if (settings_.to_model) {
     touch_in_space(steps, row);
   } else {
@@ -115,60 +143,160 @@ void ServoStep::touch(int missed, ServoRecord& row) noexcept {
   row.tool_depth_m = tool_m_;
   row.surface_depth_m = surface_m_;
   row.leak_J = leak_J_;
-  if ((row.flags & kBeyondModel) != 0) ++counts_.beyond_model;
+}
+
+/// The largest force that may be sent now, and the flag that says what it is limited by.
+ServoStep::Cap ServoStep::cap() const noexcept {
+  const double before_N = tissue_N_.norm();
+  const double time = static_cast<double>(cycle_) * settings_.period_s;
+  const double ramp = settings_.ramp_in_s > 0.0 ? std::min(1.0, time / settings_.ramp_in_s) : 1.0;
+  const double limit = ramp * settings_.force_limit_N;
+  // The model comes back from a time of doubt at the force that is being sent.
+  const double rising =
+      doubted_before_ ? before_N : before_N + settings_.slew_limit_N_per_s * settings_.period_s;
+  if (rising < limit) return {rising, kSlipping};
+  return {limit, ramp < 1.0 ? kRampingIn : kForceLimited};
+}
+
+/// How far the model's tool comes back to the hand in a cycle in which nothing is felt: no faster
+/// than a force may rise.
+double ServoStep::recovery_m() const noexcept {
+  return settings_.slew_limit_N_per_s * settings_.period_s / stiffness_N_per_m_;
+}
+
+/// The stiffness that the next slip is foretold with, from a motion into the tissue.
+void ServoStep::learn_stiffness(double rise_N, double moved_m) noexcept {
+  constexpr double kLeastMove_m = 1e-7, kMost = 10.0;
+  if (!(moved_m > kLeastMove_m)) return;
+  stiffness_N_per_m_ =
+      std::clamp(rise_N / moved_m, least_stiffness_N_per_m_, kMost * least_stiffness_N_per_m_);
+}
+
+/// What is sent of a force that the model answers.
+double ServoStep::felt_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept {
+  constexpr double kForgetting = 0.1;
+  doubted_before_ = !felt.trusted;
+  if (felt.trusted) {
+    doubted_ = std::max(0.0, doubted_ - kForgetting * static_cast<double>(felt.steps));
+    if (felt.model_N > cap.force_N) row.flags |= cap.flag;
+    return std::min(felt.model_N, cap.force_N);
+  }
+  doubted_ += static_cast<double>(felt.steps);
+  row.flags |= kBeyondModel;
+  if (!felt.touching) return 0.0;
+  const double before_N = tissue_N_.norm();
+  const double fallen = before_N - stiffness_N_per_m_ * std::max(0.0, felt.withdrawn_m);
+  const double faded =
+      before_N * std::exp(-static_cast<double>(felt.steps) * settings_.period_s / settings_.fade_s);
+  return std::max(0.0, std::min(fallen, faded));
 }
 
 void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
-  const double from = tool_m_;
+  const Cap most = cap();
+  const double from_m = tool_m_ - slip_m_;
   tool_m_ = settings_.push.dot(position_m_ - settings_.surface_m);
+  if (model_N_ == 0.0) slip_m_ = std::max(0.0, slip_m_ - recovery_m());
+  const double foretold_N =
+      model_N_ + stiffness_N_per_m_ * (tool_m_ - slip_m_ - contact_.surface_m());
+  if (foretold_N > most.force_N && !doubted_before_) {
+    slip_m_ += (foretold_N - most.force_N) / stiffness_N_per_m_;
+    row.flags |= most.flag;
+  }
+  const double to_m = tool_m_ - slip_m_;
   OneSidedContact::Answer answer;
+  const bool touched = model_N_ > 0.0;
   for (int i = 1; i <= steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
-    answer = contact_.step(begun_ ? from + part * (tool_m_ - from) : tool_m_);
+    answer = contact_.step(begun_ ? from_m + part * (to_m - from_m) : to_m);
   }
-  const double moved = answer.touching ? answer.surface_m - surface_m_ : 0.0;
-  leak_J_ += 0.5 * contact_.stiffness_N_per_m() * moved * moved;
+  if (touched && answer.touching && answer.trusted && !doubted_before_) {
+    learn_stiffness(answer.force_N - model_N_, to_m - from_m);
+  }
+  const double before_N = tissue_N_.norm();
+  const double moved = answer.surface_m - surface_m_;
+  const double now_N =
+      felt_N({answer.force_N, from_m - to_m, steps, answer.touching, answer.trusted}, most, row);
+  if (answer.touching) leak_J_ += 0.5 * contact_.stiffness_N_per_m() * moved * moved;
+  tissue_work_J_ = 0.5 * (before_N + now_N) * moved;
   surface_m_ = answer.surface_m;
-  tissue_N_ = -settings_.push * answer.force_N;
+  model_N_ = answer.force_N;
+  tissue_N_ = -settings_.push * now_N;
   row.model_force_N = answer.force_N;
   row.model_error_N = answer.error_N;
   if (answer.touching) row.flags |= kTouching;
-  if (!answer.trusted) row.flags |= kBeyondModel;
 }
 
 void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
-  const Eigen::Vector3d to = position_m_ - settings_.surface_m;
+  const Cap most = cap();
+  const Eigen::Vector3d hand_m = position_m_ - settings_.surface_m;
+  const double slipped_m = slip_in_space_m_.norm();
+  if (model_N_ == 0.0 && slipped_m > 0.0) {
+    slip_in_space_m_ *= std::max(0.0, 1.0 - recovery_m() / slipped_m);
+  }
+  Eigen::Vector3d to_m = hand_m - slip_in_space_m_;
+  const Eigen::Vector3d from_m = begun_ ? model_tool_m_ : to_m;
+  const bool touched = model_N_ > 0.0;
+  if (touched && !doubted_before_) {
+    const Eigen::Vector3d into = -model_force_N_ / model_N_;
+    const double foretold_N = model_N_ + stiffness_N_per_m_ * into.dot(to_m - from_m);
+    if (foretold_N > most.force_N) {
+      const Eigen::Vector3d slip = into * ((foretold_N - most.force_N) / stiffness_N_per_m_);
+      slip_in_space_m_ += slip;
+      to_m -= slip;
+      row.flags |= most.flag;
+    }
+  }
   ContactAnswer answer;
   for (int i = 1; i <= steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
-    answer = model_.step(*settings_.to_model * (to - (1.0 - part) * moved_m_));
+    answer = model_.step(*settings_.to_model * (from_m + part * (to_m - from_m)));
   }
   const Eigen::Vector3d force_N = settings_.to_model->transpose() * answer.force_N;
-  leak_J_ += 0.5 * (tissue_N_ - force_N).dot(moved_m_);
-  tissue_N_ = force_N;
-  tool_m_ = surface_m_ = settings_.push.dot(to);
+  const double size_N = force_N.norm();
+  if (touched && size_N > 0.0 && answer.trusted && !doubted_before_) {
+    learn_stiffness(size_N - model_N_, (-model_force_N_ / model_N_).dot(to_m - from_m));
+  }
+  const Eigen::Vector3d before_N = tissue_N_;
+  const Eigen::Vector3d along =
+      before_N.isZero(0.0) ? Eigen::Vector3d::Zero() : Eigen::Vector3d(before_N.normalized());
+  const double now_N =
+      felt_N({size_N, along.dot(to_m - from_m), steps, size_N > 0.0, answer.trusted}, most, row);
+  // Only the size is limited; a force in doubt keeps the direction that was trusted last.
+  tissue_N_ = !answer.trusted ? Eigen::Vector3d(now_N * along)
+              : size_N > 0.0  ? Eigen::Vector3d(force_N * (now_N / size_N))
+                              : force_N;
+  tissue_work_J_ = -0.5 * (before_N + tissue_N_).dot(to_m - from_m);
+  leak_J_ += 0.5 * (before_N - tissue_N_).dot(moved_m_);
+  model_tool_m_ = to_m;
+  model_force_N_ = force_N;
+  model_N_ = size_N;
+  tool_m_ = surface_m_ = settings_.push.dot(hand_m);
   row.model_force_N = -settings_.push.dot(force_N);
   row.model_error_N = answer.error_N;
   if (!force_N.isZero(0.0)) row.flags |= kTouching;
-  if (!answer.trusted) row.flags |= kBeyondModel;
 }
 
-Eigen::Vector3d ServoStep::limited(const Eigen::Vector3d& wanted_N, ServoRecord& row) noexcept {
-  Eigen::Vector3d force = wanted_N;
-  const double size = force.norm();
-  if (size > settings_.force_limit_N) {
-    force *= settings_.force_limit_N / size;
-    row.flags |= kForceLimited;
-    ++counts_.force_limited;
-  }
-  const Eigen::Vector3d change = force - sent_N_;
-  const double most = settings_.slew_limit_N_per_s * settings_.period_s;
-  if (change.norm() > most) {
-    force = sent_N_ + change * (most / change.norm());
-    row.flags |= kSlewLimited;
-    ++counts_.slew_limited;
-  }
-  return force;
+/// The tissue's force and, once energy has been given away, damping; never above the limit.
+Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
+  constexpr double kTolerated = 0.1;  // of what ends the session
+  const Eigen::Vector3d damping =
+      passivity_.damping_N(moved_m_, energy_.given_J() - kTolerated * settings_.energy_allowance_J);
+  if (damping.isZero(0.0)) return tissue_N_;
+  row.flags |= kDamped;
+  const Eigen::Vector3d force_N = tissue_N_ + damping;
+  const double size_N = force_N.norm();
+  if (size_N <= settings_.force_limit_N) return force_N;
+  row.flags |= kForceLimited;
+  return force_N * (settings_.force_limit_N / size_N);
+}
+
+StopCause ServoStep::judge_rendering(int periods) noexcept {
+  energy_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
+  oscillation_.observe(sent_N_.norm(), periods);
+  if (energy_.too_much()) return StopCause::energy;
+  if (settings_.watch_oscillation && oscillation_.found()) return StopCause::oscillation;
+  const double limit = settings_.untrusted_limit_s / settings_.period_s;
+  return doubted_ > limit ? StopCause::untrusted : StopCause::none;
 }
 
 StopCause ServoStep::write(const Eigen::Vector3d& force_N, ServoRecord& row) noexcept {
@@ -199,49 +327,108 @@ bool ServoStep::storm(int missed) noexcept {
   return late_now_ > settings_.most_late || missed > settings_.most_missed;
 }
 
+void ServoStep::count_limits(std::uint32_t flags) noexcept {
+  const auto count = [flags](ServoFlag flag) -> std::uint64_t {
+    return (flags & flag) != 0 ? 1 : 0;
+  };
+  counts_.beyond_model += count(kBeyondModel);
+  counts_.force_limited += count(kForceLimited);
+  counts_.slipped += count(kSlipping);
+  counts_.ramping_in += count(kRampingIn);
+  counts_.damped += count(kDamped);
+}
+
 StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   if (storm(missed)) return StopCause::overrun_storm;
   StopCause cause = read(row);
   if (cause != StopCause::none) return cause;
+  if (!begun_ && settings_.surface_before_hand_m) {
+    settings_.surface_m = position_m_ + *settings_.surface_before_hand_m * settings_.push;
+  }
   passivity_.observe(sent_N_, moved_m_);
   row.observed_J = passivity_.observed_J();
   touch(missed, row);
   begun_ = true;
-  if (!tissue_N_.allFinite()) return StopCause::force_not_finite;
-  const double time = static_cast<double>(cycle_) * settings_.period_s;
-  const double ramp = settings_.ramp_in_s > 0.0 ? std::min(1.0, time / settings_.ramp_in_s) : 1.0;
-  if (ramp < 1.0) row.flags |= kRampingIn;
-  const Eigen::Vector3d damping = passivity_.damping_N(moved_m_);
-  if (!damping.isZero(0.0)) {
-    row.flags |= kDamped;
-    ++counts_.damped;
-  }
-  const Eigen::Vector3d wanted = ramp * tissue_N_ + damping;
-  cause = write(limited(wanted, row), row);
+  if (!std::isfinite(model_N_) || !tissue_N_.allFinite()) return StopCause::force_not_finite;
+  cause = judge_rendering(missed + 1);
+  if (cause != StopCause::none) return cause;
+  cause = write(with_damping(row), row);
+  count_limits(row.flags);
   if (cause != StopCause::none) return cause;
   const auto every = static_cast<std::uint64_t>(settings_.status_every);
   return cycle_ % every == 0 ? look_at_status() : StopCause::none;
 }
 
-StopCause ServoStep::cycle(int missed, ServoRecord& row) noexcept {
-  row = ServoRecord{};
-  cycle_ += static_cast<std::uint64_t>(missed);
-  while (phase_ < settings_.phase_ends.size() && cycle_ >= settings_.phase_ends[phase_]) ++phase_;
+/// A tool that moves in space may touch the tissue above the plane of its surface.
+bool ServoStep::free_in_space() noexcept {
+  const ContactAnswer answer =
+      model_.step(*settings_.to_model * (position_m_ - settings_.surface_m));
+  const bool free = answer.force_N.isZero(0.0);
+  contact_.reset();
+  return free;
+}
+
+StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
+  row.phase = -1;
+  row.flags |= kWaiting;
+  gate_->count(static_cast<std::uint64_t>(missed) + 1);
+  StopCause cause = read(row);
+  if (cause != StopCause::none) return cause;
+  row.tool_depth_m = settings_.push.dot(position_m_ - settings_.surface_m);
+  const bool with_surface = !settings_.surface_before_hand_m;
+  const std::uint32_t missing = gate_->see(position_m_, row.tool_depth_m, with_surface);
+  row.flags |= missing;
+  cause = write(Eigen::Vector3d::Zero(), row);
+  if (cause != StopCause::none) return cause;
+  cause = look_at_status();
+  if (cause != StopCause::none) return cause;
+  if (missing == 0) {
+    if (!settings_.to_model || !with_surface || free_in_space()) {
+      gate_.reset();
+      device_.begin();
+      return StopCause::none;
+    }
+    row.flags |= kInTissue;
+    gate_->restart();
+  }
+  return gate_->given_up() ? StopCause::not_in_place : StopCause::none;
+}
+
+/// A row that holds what was known last, and no command.
+ServoRecord ServoStep::begun_row() const noexcept {
+  ServoRecord row = last_;
+  std::fill_n(row.commanded_N, 3, 0.0);
+  row.woke_late_s = row.busy_s = 0.0F;
+  row.flags = 0;
   row.cycle = cycle_;
   row.phase = static_cast<std::int32_t>(phase_);
+  return row;
+}
+
+StopCause ServoStep::cycle(int missed, ServoRecord& row) noexcept {
+  const bool waiting = gate_.has_value();
+  if (!waiting) {
+    cycle_ += static_cast<std::uint64_t>(missed);
+    while (phase_ < settings_.phase_ends.size() && cycle_ >= settings_.phase_ends[phase_]) ++phase_;
+  }
+  row = begun_row();
   row.missed = missed;
-  if (missed > 0) {
+  if (missed > 0 && !waiting) {
     row.flags |= kLate;
     ++counts_.late;
     counts_.missed += static_cast<std::uint64_t>(missed);
   }
   const bool over = phase_ >= settings_.phase_ends.size();
-  const StopCause cause = over ? StopCause::finished : work(missed, row);
+  const StopCause cause = over      ? StopCause::finished
+                          : waiting ? wait(missed, row)
+                                    : work(missed, row);
   if (cause == StopCause::none) {
-    ++cycle_;
+    if (!waiting) ++cycle_;
+    last_ = row;
     return cause;
   }
   row.stop = cause;
+  std::fill_n(row.commanded_N, 3, 0.0);
   stop(cause);
   return cause;
 }

@@ -4,9 +4,12 @@
 #include <vector>
 
 #include "tpm/device/haptic_device.hpp"
+#include "tpm/servo/energy_watch.hpp"
 #include "tpm/servo/one_sided_contact.hpp"
+#include "tpm/servo/oscillation_watch.hpp"
 #include "tpm/servo/passivity.hpp"
 #include "tpm/servo/servo_record.hpp"
+#include "tpm/servo/start_gate.hpp"
 
 namespace tpm {
 
@@ -22,9 +25,20 @@ struct ServoSettings {
   /// motion along the push reaches the model, one-sided.
   std::optional<Eigen::Matrix3d> to_model = std::nullopt;
   double force_limit_N = 8.0;
+  /// A force that rises faster makes the model's tool slip back; falls are never limited.
   double slew_limit_N_per_s = 400.0;
-  double ramp_in_s = 0.5;  ///< forces grow to their size over the first so many seconds
+  double ramp_in_s = 0.5;               ///< over which the limit of the force grows to its value
   double most_damping_N_s_per_m = 2.0;  ///< of the passivity controller; 0: it only observes
+  /// What has to be before the session begins; none: it begins with the first cycle.
+  std::optional<StartGateSettings> gate = std::nullopt;
+  /// If given, the surface is put so far before the tool, along the push, when the session begins.
+  std::optional<double> surface_before_hand_m = std::nullopt;
+  double fade_s = 0.1;               ///< time constant in which a force fades that is not trusted
+  double untrusted_limit_s = 0.5;    ///< of a model that does not trust its forces; then it stops
+  double friction_N_s_per_m = 0.1;   ///< of the device, see EnergyWatchSettings
+  int delay_periods = 0;             ///< of the device, as far as it is known
+  double energy_allowance_J = 2e-3;  ///< see EnergyWatchSettings; infinite: it only counts
+  bool watch_oscillation = true;
   /// Stop if so many of the last 1000 cycles were late, or so many periods were missed at once.
   int most_late = 100;
   int most_missed = 50;
@@ -32,18 +46,35 @@ struct ServoSettings {
 };
 
 struct ServoCounts {
-  std::uint64_t time_guards = 0, saturations = 0, force_limited = 0, slew_limited = 0, damped = 0,
-                beyond_model = 0, late = 0, missed = 0;
+  std::uint64_t time_guards = 0, saturations = 0, force_limited = 0, slipped = 0, ramping_in = 0,
+                damped = 0, beyond_model = 0, late = 0, missed = 0;
 };
 
 /// One cycle of the loop: read, model, limits, passivity, write. Neither allocates nor locks nor
 /// throws.
+///
+/// **Slip.** Forces are limited by a slip element between the hand and the model's tool, not by
+/// changing what the model answers: with the cap
+///
+///     C = min(limit, F_before + s T),   limit = ramp-in's part of force_limit_N,
+///
+/// the model's tool is set back by d >= 0 along the push so that F <= C as far as the stiffness
+/// foretells; what is sent is min(F, C). The work of the hand is that of the model's tool plus
+/// F d >= 0: a slip takes energy and never gives any (exact where F <= C; where the tissue is
+/// stiffer than foretold, F - C lasts one period). While the force is zero the model's tool
+/// recovers towards the hand, which costs nothing.
+///
+/// **Trust.** A force that the model does not trust is not sent. The force that was trusted last
+/// stays, fades with `fade_s`, falls as the hand withdraws (by K dx, so that no more than F^2/2K
+/// comes back) and never rises. When the model trusts itself again its tool slips to the force that
+/// is being sent.
 class ServoStep {
  public:
   /// @param device, model must live as long as this
   ServoStep(HapticDevice& device, ContactModel& model, ServoSettings settings);
 
-  /// @param missed periods that went by without a cycle: the model lives through them too
+  /// @param missed periods that went by without a cycle: the model lives through them too, in this
+  ///        cycle and the next ones, at most kMostSteps periods in each
   /// @return none to go on; the row is filled either way, and the device is stopped if not none
   StopCause cycle(int missed, ServoRecord& row) noexcept;
   /// Zero force, forces off. Bounded. Remembers the first cause.
@@ -53,13 +84,36 @@ class ServoStep {
   [[nodiscard]] const DeviceStatus& device_status() const noexcept { return status_; }
   [[nodiscard]] StopCause cause() const noexcept { return cause_; }
   [[nodiscard]] std::uint64_t cycles() const noexcept { return cycle_; }
+  [[nodiscard]] const EnergyWatch& energy() const noexcept { return energy_; }
+
+  /// Periods of the model in one cycle, at most.
+  static constexpr int kMostSteps = 8;
 
  private:
+  /// A force of the model and how it came about.
+  struct Felt {
+    double model_N = 0.0, withdrawn_m = 0.0;
+    int steps = 1;
+    bool touching = false, trusted = true;
+  };
+  struct Cap {
+    double force_N = 0.0;
+    std::uint32_t flag = 0;
+  };
+  [[nodiscard]] StopCause wait(int missed, ServoRecord& row) noexcept;
+  [[nodiscard]] ServoRecord begun_row() const noexcept;
+  [[nodiscard]] bool free_in_space() noexcept;
   [[nodiscard]] StopCause read(ServoRecord& row) noexcept;
   void touch(int missed, ServoRecord& row) noexcept;
   void touch_along_push(int steps, ServoRecord& row) noexcept;
   void touch_in_space(int steps, ServoRecord& row) noexcept;
-  [[nodiscard]] Eigen::Vector3d limited(const Eigen::Vector3d& wanted_N, ServoRecord& row) noexcept;
+  [[nodiscard]] Cap cap() const noexcept;
+  [[nodiscard]] double recovery_m() const noexcept;
+  void learn_stiffness(double rise_N, double moved_m) noexcept;
+  [[nodiscard]] double felt_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept;
+  void count_limits(std::uint32_t flags) noexcept;
+  [[nodiscard]] Eigen::Vector3d with_damping(ServoRecord& row) noexcept;
+  [[nodiscard]] StopCause judge_rendering(int periods) noexcept;
   [[nodiscard]] StopCause write(const Eigen::Vector3d& force_N, ServoRecord& row) noexcept;
   [[nodiscard]] StopCause look_at_status() noexcept;
   [[nodiscard]] bool storm(int missed) noexcept;
@@ -70,13 +124,28 @@ class ServoStep {
   ServoSettings settings_;
   OneSidedContact contact_;
   PassivityControl passivity_;
+  EnergyWatch energy_;
+  OscillationWatch oscillation_;
+  std::optional<StartGate> gate_;
   ServoCounts counts_;
   DeviceStatus status_;
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d moved_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d sent_N_ = Eigen::Vector3d::Zero();
-  Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, before ramp and limits
+  Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, after slip and trust
   double tool_m_ = 0.0, surface_m_ = 0.0, leak_J_ = 0.0;
+  double stiffness_N_per_m_;        ///< that a slip is foretold with
+  double least_stiffness_N_per_m_;  ///< at rest
+  double model_N_ = 0.0;            ///< size of the model's last force, trusted or not
+  double slip_m_ = 0.0;             ///< of the model's tool behind the hand, along the push
+  Eigen::Vector3d slip_in_space_m_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d model_tool_m_ = Eigen::Vector3d::Zero();   ///< in space, from surface_m
+  Eigen::Vector3d model_force_N_ = Eigen::Vector3d::Zero();  ///< on it, device coordinates
+  double tissue_work_J_ = 0.0;                               ///< on the surface in this cycle
+  double doubted_ = 0.0;  ///< periods without trust, forgotten ten times as slowly
+  bool doubted_before_ = false;
+  int owed_ = 0;  ///< periods that the model has not lived through yet
+  ServoRecord last_;
   std::uint64_t cycle_ = 0;
   std::size_t phase_ = 0;
   std::vector<char> late_;  ///< of the last cycles served, a ring

@@ -1,0 +1,23 @@
+#pragma once
+#include <string_view>
+
+namespace tpm {
+
+/// What may be asked of a kind of device. Numbers that nobody has measured here are marked.
+struct DeviceLimits {
+  std::string_view kind;
+  double force_N;             ///< data sheet
+  double reach_m;             ///< radius of the workspace, as commonly used
+  double stiffness_N_per_m;   ///< recommended maximum, CHAI3D 3.3's software limit
+  double damping_N_s_per_m;   ///< CHAI3D 3.3's software limit
+  double slew_N_per_s;        ///< assumed: full force within 6 ms
+  double least_ramp_in_s;     ///< assumed: longer than a hand takes to stiffen
+  double friction_N_s_per_m;  ///< assumed: the least of what is usual, 0.1 to 1
+  int delay_periods;          ///< assumed, from a command to its force
+};
+
+/// Of the kind that a session is run on, "omega7" or what simulates or replays one; the simulated
+/// device has the limits of the real one. Throws Error(usage) for another.
+[[nodiscard]] const DeviceLimits& limits_of(std::string_view kind);
+
+}  // namespace tpm

@@ -1,0 +1,36 @@
+#include "tpm/servo/start_gate.hpp"
+
+#include <cmath>
+
+#include "tpm/servo/servo_record.hpp"
+
+namespace tpm {
+namespace {
+
+std::uint64_t gate_periods(double time_s, double period_s) noexcept {
+  return static_cast<std::uint64_t>(std::llround(time_s / period_s));
+}
+
+}  // namespace
+
+StartGate::StartGate(const StartGateSettings& settings, double period_s) noexcept
+    : settings_(settings),
+      needed_(gate_periods(settings.still_s, period_s)),
+      limit_(gate_periods(settings.limit_s, period_s)) {}
+
+std::uint32_t StartGate::see(const Eigen::Vector3d& position_m, double depth_m,
+                             bool with_surface) noexcept {
+  std::uint32_t missing = 0;
+  // Written so that a position that is no number is never in place.
+  if (!((position_m - settings_.centre_m).norm() <= settings_.reach_m)) missing |= kOutOfReach;
+  if (with_surface && !(depth_m <= -settings_.clearance_m)) missing |= kInTissue;
+  if (still_ == 0 || !((position_m - anchor_m_).norm() <= settings_.still_m)) {
+    anchor_m_ = position_m;
+    still_ = 0;
+  }
+  ++still_;
+  if (still_ < needed_) missing |= kMoving;
+  return missing;
+}
+
+}  // namespace tpm

@@ -1,0 +1,41 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+
+namespace tpm {
+
+/// Where the tool has to be before a session begins, and for how long.
+struct StartGateSettings {
+  double clearance_m = 0.5e-3;                         ///< least distance above the surface
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< of the workspace, device coordinates
+  double reach_m = 0.075;                              ///< from there
+  double still_m = 0.5e-3;                             ///< how far a tool at rest may move
+  double still_s = 0.25;                               ///< for how long it has to be at rest
+  double limit_s = 60.0;                               ///< after which the session is given up
+};
+
+/// Watches the tool before a session: forces stay at zero until it is in free air, inside the
+/// workspace and at rest. Neither allocates nor throws.
+class StartGate {
+ public:
+  /// @param period_s between two calls of see(), > 0
+  StartGate(const StartGateSettings& settings, double period_s) noexcept;
+
+  /// @param depth_m of the tool, negative in the air; ignored unless `with_surface`
+  /// @returns what is missing, ServoFlag bits; 0: the session can begin
+  [[nodiscard]] std::uint32_t see(const Eigen::Vector3d& position_m, double depth_m,
+                                  bool with_surface) noexcept;
+  /// The time to get into place is over.
+  [[nodiscard]] bool given_up() const noexcept { return waited_ >= limit_; }
+  void count(std::uint64_t periods) noexcept { waited_ += periods; }
+  /// The tool was not as free as it seemed: the time at rest starts anew.
+  void restart() noexcept { still_ = 0; }
+
+ private:
+  StartGateSettings settings_;
+  std::uint64_t needed_, limit_;
+  std::uint64_t still_ = 0, waited_ = 0;
+  Eigen::Vector3d anchor_m_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace tpm
