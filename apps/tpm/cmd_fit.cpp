@@ -11,6 +11,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/tables.hpp"
 #include "tpm/report/fit_report.hpp"
+#include "tpm/report/function_report.hpp"
 #include "tpm/report/recording_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/specimens.hpp"
@@ -172,6 +173,23 @@ int fit_recordings(const FitOptions& options, const Session& session) {
   return 0;
 }
 
+/// A spectrum, a relaxation modulus or a creep compliance, without a configuration.
+int fit_function(const FitOptions& options, const MaterialFunction& function,
+                 const Session& session) {
+  const Selection selection = select_law(function, selection_options(options));
+  const FitResult& best = selection.candidates[selection.recommended].fit;
+  std::string text =
+      session.json() ? to_text(to_json(selection))
+                     : fmt::format("{}\n{}", to_terminal_text(selection), to_terminal_text(best));
+  if (!options.no_draw) {
+    const std::string folder = figure_folder(options, function.name);
+    const auto files = write_function_report(folder, function, selection);
+    if (!session.json()) text += written(folder, files);
+  }
+  deliver(text, options.output);
+  return 0;
+}
+
 int fit(const FitOptions& options, const Session& session) {
   const std::vector<std::string>& files = options.recordings.files;
   if (is_configuration(files)) return fit_configuration(options, session);
@@ -181,6 +199,10 @@ int fit(const FitOptions& options, const Session& session) {
   }
   if (files.size() == 1 && std::filesystem::is_directory(files.front())) {
     return fit_folder(options, session);
+  }
+  if (files.size() == 1) {
+    const auto function = find_material_function(files.front(), import_options(options.recordings));
+    if (function) return fit_function(options, *function, session);
   }
   return fit_recordings(options, session);
 }
@@ -194,7 +216,8 @@ void add_fit_command(CLI::App& app, Session& session) {
   command
       ->add_option("FILE", options->recordings.files,
                    "A configuration (schemas/fit.schema.json), a problem of tables "
-                   "(schemas/fit_tables.schema.json), recordings to be fitted together, or "
+                   "(schemas/fit_tables.schema.json), recordings to be fitted together, a spectrum "
+                   "(G', G''; |G*| and delta), a relaxation modulus G(t) or compliance J(t), or "
                    "a folder of recordings to be fitted one by one and pooled")
       ->required();
   command->add_option(

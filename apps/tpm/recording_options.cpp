@@ -32,8 +32,12 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
   add("--drive", options.drive, "Column of the depth or relative length");
   add("--response", options.response, "Column of the force or stress");
   add("--sd", options.sd, "Column of the response's standard deviation");
+  add("--frequency", options.frequency, "Column of the frequency of a spectrum");
+  add("--storage", options.storage, "Column of the storage modulus");
+  add("--loss", options.loss, "Column of the loss modulus");
   add("--drive-quantity", options.drive_quantity, "indentation_depth or relative_length");
-  add("--response-quantity", options.response_quantity, "contact_force or stress");
+  add("--response-quantity", options.response_quantity,
+      "contact_force, stress, relaxation_modulus or creep_compliance");
   command
       .add_option("--unit", options.units, "Unit of a column, e.g. \"Force=N\" (may be repeated)")
       ->group("What the files do not say");
@@ -47,6 +51,9 @@ ImportOptions import_options(const RecordingOptions& options) {
   import.drive_column = options.drive;
   import.response_column = options.response;
   import.sd_column = options.sd;
+  import.frequency_column = options.frequency;
+  import.storage_column = options.storage;
+  import.loss_column = options.loss;
   if (!options.drive_quantity.empty()) {
     import.drive_quantity = parse_quantity_name(options.drive_quantity, "--drive-quantity");
   }

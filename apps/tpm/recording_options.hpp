@@ -13,6 +13,7 @@ namespace tpm::app {
 struct RecordingOptions {
   std::vector<std::string> files;
   std::string time, drive, response, sd;
+  std::string frequency, storage, loss;
   std::string drive_quantity, response_quantity;
   std::vector<std::string> units;
   std::string contact_response;

@@ -93,7 +93,7 @@ void add_time_findings(const ImportedColumn& time, std::vector<ImportFinding>& f
 }
 
 bool is_spectrum(const ImportedSeries& series) {
-  return find(series, Quantity::frequency) != nullptr;
+  return holds_spectrum(series);
 }
 
 /// Storage or loss, whatever their dimension.
@@ -210,6 +210,32 @@ std::vector<double> in_si(ImportedColumn& column) {
 }
 
 }  // namespace
+
+bool holds_spectrum(const ImportedSeries& series) {
+  return find(series, Quantity::frequency) != nullptr;
+}
+
+Spectrum assemble_spectrum(ImportedSeries series, const std::string& file,
+                           const ImportOptions& options, Provenance usual) {
+  check_and_measure(series, file);
+  if (!is_spectrum(series))
+    throw bad_input(file, "holds no spectrum", "frequency, storage and loss");
+  Spectrum spectrum;
+  spectrum.header = options.header;
+  spectrum.provenance = options.provenance.value_or(usual);
+  for (ImportedColumn& column : series.columns) {
+    const Dimension dimension = column.unit.dimension;
+    if (column.quantity == Quantity::frequency) {
+      spectrum.frequency_Hz = in_si(column);
+    } else if (column.quantity == spectrum_quantities(dimension).storage) {
+      spectrum.dimension = dimension;
+      spectrum.storage = in_si(column);
+    } else if (column.quantity == spectrum_quantities(dimension).loss) {
+      spectrum.loss = in_si(column);
+    }
+  }
+  return spectrum;
+}
 
 RecordingFile assemble_recording(ImportedSeries series, const std::string& file,
                                  const ImportOptions& options, Provenance usual) {

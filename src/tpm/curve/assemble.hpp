@@ -17,4 +17,12 @@ namespace tpm {
 [[nodiscard]] RecordingFile assemble_recording(ImportedSeries series, const std::string& file,
                                                const ImportOptions& options, Provenance usual);
 
+/// True for a table of frequency, storage and loss.
+[[nodiscard]] bool holds_spectrum(const ImportedSeries& series);
+
+/// A spectrum in SI. Throws Error(bad_input) for a series without frequency, storage and loss, or
+/// one that find_spectrum_fault refuses. header.sha256 stays empty.
+[[nodiscard]] Spectrum assemble_spectrum(ImportedSeries series, const std::string& file,
+                                         const ImportOptions& options, Provenance usual);
+
 }  // namespace tpm

@@ -48,6 +48,8 @@ constexpr auto kQuantities = std::to_array<QuantityWords>({
     {Quantity::loss_modulus, "loss_modulus", "loss", Dimension::stress},
     {Quantity::storage_stiffness, "storage_stiffness", "storage", Dimension::stiffness},
     {Quantity::loss_stiffness, "loss_stiffness", "loss", Dimension::stiffness},
+    {Quantity::relaxation_modulus, "relaxation_modulus", "relaxation_modulus", Dimension::stress},
+    {Quantity::creep_compliance, "creep_compliance", "creep_compliance", Dimension::compliance},
     {Quantity::abscissa, "abscissa", "x", Dimension::dimensionless},
     {Quantity::ordinate, "ordinate", "y", Dimension::dimensionless},
 });
@@ -78,6 +80,10 @@ Quantity parse_quantity_name(std::string_view text, std::string_view where) {
 
 Dimension quantity_dimension(Quantity quantity) noexcept {
   return entry_of(kQuantities, quantity).dimension;
+}
+
+bool is_step_response(Quantity quantity) noexcept {
+  return quantity == Quantity::relaxation_modulus || quantity == Quantity::creep_compliance;
 }
 
 std::string_view quantity_short_name(Quantity quantity) noexcept {

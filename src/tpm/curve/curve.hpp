@@ -19,19 +19,21 @@ enum class Provenance { table, text, abstract, derived, assumed, digitized, meas
 
 /// What a column of measured numbers holds.
 enum class Quantity {
-  time,               ///< s
-  indentation_depth,  ///< m, positive into the tissue
-  contact_force,      ///< N, positive in compression
-  load,               ///< N, imposed
-  relative_length,    ///< length over reference length, dimensionless
-  stress,             ///< Pa
-  frequency,          ///< Hz (cycles per second; rad/s is converted)
-  storage_modulus,    ///< Pa, in phase with the strain
-  loss_modulus,       ///< Pa, a quarter of a cycle ahead of it
-  storage_stiffness,  ///< N/m, the same for force over displacement
-  loss_stiffness,     ///< N/m
-  abscissa,           ///< x of a problem without physical meaning, a plain number
-  ordinate,           ///< its y
+  time,                ///< s
+  indentation_depth,   ///< m, positive into the tissue
+  contact_force,       ///< N, positive in compression
+  load,                ///< N, imposed
+  relative_length,     ///< length over reference length, dimensionless
+  stress,              ///< Pa
+  frequency,           ///< Hz (cycles per second; rad/s is converted)
+  storage_modulus,     ///< Pa, in phase with the strain
+  loss_modulus,        ///< Pa, a quarter of a cycle ahead of it
+  storage_stiffness,   ///< N/m, the same for force over displacement
+  loss_stiffness,      ///< N/m
+  relaxation_modulus,  ///< Pa, stress after a unit step of strain at time 0
+  creep_compliance,    ///< 1/Pa, strain after a unit step of stress at time 0
+  abscissa,            ///< x of a problem without physical meaning, a plain number
+  ordinate,            ///< its y
 };
 
 /// The word used in files: "indentation_depth".
@@ -41,6 +43,10 @@ enum class Quantity {
 [[nodiscard]] Quantity parse_quantity_name(std::string_view text, std::string_view where);
 
 [[nodiscard]] Dimension quantity_dimension(Quantity quantity) noexcept;
+
+/// The answer to a unit step at time 0: relaxation modulus or creep compliance. A recording of one
+/// has times and no drive.
+[[nodiscard]] bool is_step_response(Quantity quantity) noexcept;
 
 /// The short name that begins a column header or a JSON key: "depth", "force", "time".
 [[nodiscard]] std::string_view quantity_short_name(Quantity quantity) noexcept;

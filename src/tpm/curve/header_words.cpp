@@ -68,6 +68,8 @@ constexpr Recognized kDisplacement{ColumnRole::drive, Quantity::indentation_dept
 constexpr Recognized kTravel{ColumnRole::drive, Quantity::indentation_depth, 2};
 constexpr Recognized kCrosshead{ColumnRole::drive, Quantity::indentation_depth, 3};
 constexpr Recognized kStretch{ColumnRole::drive, Quantity::relative_length, 4};
+constexpr Recognized kRelaxation{ColumnRole::response, Quantity::relaxation_modulus, 2};
+constexpr Recognized kCompliance{ColumnRole::response, Quantity::creep_compliance, 2};
 constexpr Recognized kSd{ColumnRole::sd, Quantity::contact_force, 0};
 
 constexpr Recognized kFrequency{ColumnRole::frequency, Quantity::frequency, 0};
@@ -178,6 +180,17 @@ std::optional<Recognized> recognize_primes(std::string_view name) {
   return primes == 2 ? std::optional(kLoss) : std::nullopt;
 }
 
+/// G(t) and E(t) are relaxation moduli, J(t) and D(t) creep compliances.
+std::optional<Recognized> recognize_step_response(std::string_view name) {
+  std::string text;
+  for (const char c : name) {
+    if (c != ' ') text += c;
+  }
+  if (text == "G(t)" || text == "E(t)") return kRelaxation;
+  if (text == "J(t)" || text == "D(t)") return kCompliance;
+  return std::nullopt;
+}
+
 /// Greek letters by their names, as words of their own.
 std::string spelled_out(std::string_view name) {
   std::string text;
@@ -233,12 +246,15 @@ ColumnTitle split_title(std::string_view title) {
 
 std::optional<Recognized> recognize_title(std::string_view name) {
   if (const auto primes = recognize_primes(name)) return primes;
+  if (const auto function = recognize_step_response(name)) return function;
   const std::vector<std::string> words = words_of(spelled_out(name));
   // "tan delta", "loss tangent", "loss factor"; "complex viscosity" is no modulus.
   const bool tangent = has_word(words, "tan") || has_word(words, "tangent") ||
                        (has_word(words, "loss") && has_word(words, "factor"));
   if (tangent) return kLossTangent;
   if (has_word(words, "viscosity")) return std::nullopt;
+  if (has_word(words, "compliance")) return kCompliance;
+  if (has_word(words, "modulus") && has_word(words, "relaxation")) return kRelaxation;
   std::optional<Recognized> found;
   for (const std::string& word : words) {
     const auto known = std::find_if(kWords.begin(), kWords.end(),

@@ -259,11 +259,16 @@ void require_units(const std::vector<Use>& uses, const std::string& file) {
 /// A column titled "F" in kPa holds a stress: the unit says what the title cannot.
 Quantity response_quantity(const Column& column, const ImportOptions& options) {
   if (options.response_quantity) return *options.response_quantity;
-  const bool stress_unit =
-      is_unit(column.unit) && parse_unit(column.unit, column.name).dimension == Dimension::stress;
-  if (stress_unit) return Quantity::stress;
-  return column.meaning && column.meaning->role == ColumnRole::response ? column.meaning->quantity
-                                                                        : Quantity::contact_force;
+  const Quantity titled = column.meaning && column.meaning->role == ColumnRole::response
+                              ? column.meaning->quantity
+                              : Quantity::contact_force;
+  if (is_step_response(titled)) return titled;
+  const auto dimension = is_unit(column.unit)
+                             ? std::optional(parse_unit(column.unit, column.name).dimension)
+                             : std::nullopt;
+  if (dimension == Dimension::compliance) return Quantity::creep_compliance;
+  if (dimension == Dimension::stress) return Quantity::stress;
+  return titled;
 }
 
 /// Storage and loss in N/m are dynamic stiffnesses, else moduli.
@@ -420,7 +425,7 @@ std::vector<Use> recording_uses(const Header& header, const std::string& file,
   const Column* response = find_column(header, ColumnRole::response, options.response_column, file);
   const Column* sd = find_column(header, ColumnRole::sd, options.sd_column, file);
   if (response == nullptr) {
-    throw bad_input(file, "no column is recognised as a force or stress",
+    throw bad_input(file, "no column is recognised as a force, stress, modulus or compliance",
                     fmt::format("--response with one of {}", column_list(header)));
   }
   if (time == nullptr && drive == nullptr) {
@@ -431,7 +436,7 @@ std::vector<Use> recording_uses(const Header& header, const std::string& file,
   const Quantity observed = response_quantity(*response, options);
   std::vector<Use> uses;
   if (time != nullptr) uses.push_back({time, Quantity::time, Bound::value, false});
-  if (drive != nullptr) {
+  if (drive != nullptr && !is_step_response(observed)) {
     uses.push_back({drive, drive_quantity(*drive, options), Bound::value, options.negate_drive});
   }
   uses.push_back({response, observed, Bound::value, options.negate_response});
@@ -457,7 +462,10 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
       series.findings.begin(),
       {"header rows", fmt::format("{}{}{}", header.rows, header.sheet.empty() ? "" : ", sheet ",
                                   printable(header.sheet))});
-  if (!spectrum) start_at_contact(series, file, options);
+  const bool step = !spectrum && is_step_response(series.columns.back().bound == Bound::sd
+                                                      ? series.columns.at(1).quantity
+                                                      : series.columns.back().quantity);
+  if (!spectrum && !step) start_at_contact(series, file, options);
   return series;
 }
 

@@ -7,6 +7,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/curve/assemble.hpp"
 #include "tpm/curve/load.hpp"
+#include "tpm/store/json.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;
@@ -32,6 +33,12 @@ bool says_something_about_columns(const ImportOptions& options) {
          !options.units.empty() || options.negate_drive || options.negate_response ||
          options.contact_force_N || options.x || options.y || !options.dataset.empty() ||
          options.depth_m || options.load_N;
+}
+
+/// The kind that a description names; an id is one of the shipped curves.
+std::string curve_kind_of(const fs::path& path) {
+  if (!path.has_extension()) return std::string(curve_kind(load_curve(path.string())));
+  return read_json(with_ending(path, ".json")).value("kind", "");
 }
 
 RecordingFile read_described(const fs::path& path, const ImportOptions& options) {
@@ -73,20 +80,43 @@ void require_no_imposed_value(const ImportOptions& options, const std::string& f
 
 }  // namespace
 
-RecordingFile read_recording_file(const fs::path& path, const ImportOptions& options) {
-  if (is_described(path)) return read_described(path, options);
+MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& options) {
   const std::string file = path.string();
+  if (is_described(path)) {
+    if (curve_kind_of(path) == "spectrum") return load_spectrum(file);
+    return read_described(path, options);
+  }
   require_no_imposed_value(options, file);
   ImportedFile imported = import_series(path, options);
   require_one(imported, file);
   ImportedSeries& series = imported.series.front();
   const std::string name = printable(series.name, 200);
+  const auto name_it = [&](CurveHeader& header) {
+    header.id = path.stem().string();
+    if (header.title.empty()) header.title = name.empty() ? header.id : name;
+    header.sha256 = imported.sha256;
+  };
+  if (holds_spectrum(series)) {
+    Spectrum spectrum = assemble_spectrum(std::move(series), file, options, imported.usual);
+    name_it(spectrum.header);
+    return spectrum;
+  }
   RecordingFile result = assemble_recording(std::move(series), file, options, imported.usual);
-  CurveHeader& header = result.recording.header;
-  header.id = path.stem().string();
-  if (header.title.empty()) header.title = name.empty() ? header.id : name;
-  header.sha256 = imported.sha256;
+  name_it(result.recording.header);
   return result;
+}
+
+RecordingFile read_recording_file(const fs::path& path, const ImportOptions& options) {
+  MeasuredFile measured = read_measured_file(path, options);
+  if (auto* file = std::get_if<RecordingFile>(&measured)) return std::move(*file);
+  throw bad_input(path.string(), "holds a spectrum (storage and loss over frequency)",
+                  "a recording");
+}
+
+Spectrum read_spectrum_file(const fs::path& path, const ImportOptions& options) {
+  MeasuredFile measured = read_measured_file(path, options);
+  if (auto* spectrum = std::get_if<Spectrum>(&measured)) return std::move(*spectrum);
+  throw bad_input(path.string(), "holds a recording", "a spectrum: frequency, storage and loss");
 }
 
 }  // namespace tpm

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <variant>
 
 #include "tpm/curve/import.hpp"
 
@@ -18,5 +19,14 @@ namespace tpm {
 /// column, or naming the option that says what the file does not.
 [[nodiscard]] RecordingFile read_recording_file(const std::filesystem::path& path,
                                                 const ImportOptions& options = {});
+
+/// A recording or a spectrum from one path in the same way.
+using MeasuredFile = std::variant<RecordingFile, Spectrum>;
+[[nodiscard]] MeasuredFile read_measured_file(const std::filesystem::path& path,
+                                              const ImportOptions& options = {});
+
+/// As read_measured_file; Error(bad_input) if the file holds a recording.
+[[nodiscard]] Spectrum read_spectrum_file(const std::filesystem::path& path,
+                                          const ImportOptions& options = {});
 
 }  // namespace tpm

@@ -97,6 +97,9 @@ ImportOptions parse_import(const Json& j, const DocumentPlace& place) {
   import.drive_column = j.value("drive", "");
   import.response_column = j.value("response", "");
   import.sd_column = j.value("sd", "");
+  import.frequency_column = j.value("frequency", "");
+  import.storage_column = j.value("storage", "");
+  import.loss_column = j.value("loss", "");
   if (j.contains("drive_quantity")) {
     import.drive_quantity = parse_quantity_name(j.at("drive_quantity").get<std::string>(),
                                                 place.key("drive_quantity").where);
@@ -126,8 +129,13 @@ DataChoice parse_data(const Json& j, const FitConfig& config, const DocumentPlac
   if (j.contains("from")) data.from_s = quantity_at(j, "from", Dimension::time, place);
   if (j.contains("to")) data.to_s = quantity_at(j, "to", Dimension::time, place);
   const bool recording = data.protocol.kind == Kind::measured;
-  if (!recording && (j.contains("from") || j.contains("to") || j.contains("import"))) {
-    throw bad_input(place.where, "'from', 'to' or 'import' without a recording",
+  const bool importable = recording || data.protocol.kind == Kind::oscillation;
+  if (!importable && j.contains("import")) {
+    throw bad_input(place.where, "'import' for separate readings",
+                    "it only with the protocol 'measured' or 'oscillation'");
+  }
+  if (!recording && (j.contains("from") || j.contains("to"))) {
+    throw bad_input(place.where, "'from' or 'to' without a recording",
                     "them only with the protocol 'measured'");
   }
   if (!(data.from_s < data.to_s)) {

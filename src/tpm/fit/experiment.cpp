@@ -160,8 +160,49 @@ void add_points(ExperimentSet& set, const FitConfig& config, std::size_t choice,
   }
 }
 
+/// Relaxation modulus or creep compliance: readings after a unit step at time 0.
+void add_step_response(ExperimentSet& set, const FitConfig& config, std::size_t choice,
+                       const Recording& recording) {
+  const DataChoice& data = config.data[choice];
+  const std::string where = fmt::format("recording '{}'", data.dataset);
+  if (!config.law || config.law->drive != Quantity::relative_length) {
+    throw bad_input(where,
+                    fmt::format("{} and another law", quantity_name(recording.response_quantity)),
+                    "a law with \"drive\": \"relative_length\", of stress over strain");
+  }
+  if (recording.time_s.empty() || !(recording.time_s.front() >= 0.0)) {
+    throw bad_input(where, "no times, or times before the step", "times from 0 on");
+  }
+  const bool relaxation = recording.response_quantity == Quantity::relaxation_modulus;
+  constexpr double kUnit = 1.0;  // of strain, or of stress in Pa
+  TimeCourse course{relaxation ? step_and_hold(kUnit, std::numeric_limits<double>::infinity())
+                               : creep(kUnit, std::numeric_limits<double>::infinity()),
+                    {}};
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < recording.response.size(); ++i) {
+    FitDatum datum;
+    datum.choice = choice;
+    datum.quantity = recording.response_quantity;
+    datum.time_s = recording.time_s[i];
+    datum.value = recording.response[i];
+    datum.held_out = datum.time_s < data.from_s || datum.time_s > data.to_s;
+    datum.provenance = recording.provenance;
+    const auto& sd = recording.response_sd;
+    datum.sigma =
+        sample_sigma(data, *datum.value, sd.empty() ? std::nullopt : std::optional(sd[i]), i);
+    course.times_s.push_back(datum.time_s);
+    places.push_back(set.data.size());
+    set.data.push_back(std::move(datum));
+  }
+  set.experiments.push_back({std::move(course), std::move(places), choice});
+}
+
 void add_recording(ExperimentSet& set, const FitConfig& config, std::size_t choice,
                    const Recording& recording) {
+  if (is_step_response(recording.response_quantity)) {
+    add_step_response(set, config, choice, recording);
+    return;
+  }
   const DataChoice& data = config.data[choice];
   require_drive(config, recording, data.dataset);
   const std::vector<double>& sd = recording.response_sd;
@@ -233,7 +274,7 @@ std::vector<DataSet> load_data(const FitConfig& config) {
     if (choice.protocol.kind == Kind::measured) {
       data.emplace_back(read_recording_file(path, choice.import).recording);
     } else if (choice.protocol.kind == Kind::oscillation) {
-      data.emplace_back(load_spectrum(path));
+      data.emplace_back(read_spectrum_file(path, choice.import));
     } else {
       data.emplace_back(load_points(path));
     }

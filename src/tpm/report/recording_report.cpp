@@ -215,7 +215,6 @@ LawFile fitted_law(const FitResult& fit) {
   return law;
 }
 
-/// The configuration with its data sets as a file in the folder finds them.
 FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
   for (DataChoice& data : config.data) {
     const std::filesystem::path path(data.dataset);

@@ -23,6 +23,9 @@ namespace tpm {
 /// The fitted law without what belongs to the recording, for law files (tpm spectrum, tpm export).
 [[nodiscard]] LawFile fitted_law(const FitResult& fit);
 
+/// The configuration with its data sets as a file in the folder finds them.
+[[nodiscard]] FitConfig seen_from(const std::filesystem::path& folder, FitConfig config);
+
 /// Writes config.json (rerun it with tpm fit), law.json, selection.json, figures.json and the
 /// figures as SVG and PNG into `folder`. Returns the names of the files. Throws Error(environment)
 /// if drawing is not possible; the other files are then already there.

@@ -293,6 +293,9 @@ Json import_json(const ImportOptions& import) {
   put("drive", import.drive_column);
   put("response", import.response_column);
   put("sd", import.sd_column);
+  put("frequency", import.frequency_column);
+  put("storage", import.storage_column);
+  put("loss", import.loss_column);
   if (import.drive_quantity) j["drive_quantity"] = quantity_name(*import.drive_quantity);
   if (import.response_quantity) j["response_quantity"] = quantity_name(*import.response_quantity);
   if (!import.units.empty()) j["units"] = import.units;
@@ -353,6 +356,7 @@ Json config_json(const FitConfig& config) {
       const Dimension response = quantity_dimension(config.law->response);
       entry["noise"]["absolute"] = text(d.noise.absolute, shown_unit(response));
     }
+    if (d.noise.kind == NoiseKind::relative_to_datum) entry["noise"]["relative"] = d.noise.relative;
     entry["noise"]["scale"] = d.noise.scale_known ? "known" : "estimated";
     if (const Json import = import_json(d.import); !import.empty()) entry["import"] = import;
     if (std::isfinite(d.from_s)) entry["from"] = text(d.from_s, shown_unit(Dimension::time));

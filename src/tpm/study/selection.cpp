@@ -62,7 +62,8 @@ bool may_vanish(const LawSpec& law, const std::string& parameter) {
   return parameter == "k_inf" && (law.branches > 0 || law.fractional != Fractional::none);
 }
 
-/// The first reason why a material parameter of the fit is not known, or nothing.
+}  // namespace
+
 std::string not_identified(const Candidate& candidate) {
   constexpr double kLeastStandardErrors = 2.0;
   const auto table = law_parameters(candidate.fit.config.law.value());
@@ -86,6 +87,8 @@ std::string not_identified(const Candidate& candidate) {
   }
   return {};
 }
+
+namespace {
 
 Candidate fit_candidate(const LawSpec& law, std::span<const PreparedRecording> recordings,
                         const std::vector<DataSet>& data, SetupOptions setup) {
@@ -123,6 +126,8 @@ void score(Candidate& c, int samples, double effective) {
   c.bic = log_likelihood + k * std::log(effective);
 }
 
+}  // namespace
+
 bool plateau_is_not_told(const FitResult& fit) {
   for (const ParameterResult& p : fit.parameters) {
     if (p.parameter.name != "k_inf") continue;
@@ -130,6 +135,8 @@ bool plateau_is_not_told(const FitResult& fit) {
   }
   return false;
 }
+
+namespace {
 
 /// Where the lasting stiffness is not told from 0, the law without it is a lesser one.
 void add_laws_without_plateau(Selection& s, std::span<const PreparedRecording> recordings,
@@ -333,6 +340,27 @@ std::size_t least_within(const std::vector<Candidate>& candidates, double margin
   throw Error(ExitCode::numerical, "select", "no law could be fitted");
 }
 
+void rank_candidates(Selection& s) {
+  double best_aicc = std::numeric_limits<double>::infinity();
+  double best_bic = best_aicc;
+  for (Candidate& c : s.candidates) {
+    if (c.failed) continue;
+    score(c, s.samples, s.effective_count);
+    best_aicc = std::min(best_aicc, c.aicc);
+    best_bic = std::min(best_bic, c.bic);
+  }
+  for (Candidate& c : s.candidates) {
+    c.delta_aicc = c.aicc - best_aicc;
+    c.delta_bic = c.bic - best_bic;
+  }
+  std::stable_sort(s.candidates.begin(), s.candidates.end(),
+                   [](const Candidate& a, const Candidate& b) {
+                     if (a.failed != b.failed) return b.failed;
+                     return a.bic < b.bic;
+                   });
+  s.recommended = least_within(s.candidates, s.margin);
+}
+
 Selection select_law(std::span<const PreparedRecording> recordings,
                      const SelectionOptions& options) {
   const std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
@@ -359,24 +387,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   s.samples = closest->fit.value_count;
   s.correlation = correlation_of(closest->fit);
   s.effective_count = s.correlation.effective_count;
-  double best_aicc = std::numeric_limits<double>::infinity();
-  double best_bic = best_aicc;
-  for (Candidate& c : s.candidates) {
-    if (c.failed) continue;
-    score(c, s.samples, s.effective_count);
-    best_aicc = std::min(best_aicc, c.aicc);
-    best_bic = std::min(best_bic, c.bic);
-  }
-  for (Candidate& c : s.candidates) {
-    c.delta_aicc = c.aicc - best_aicc;
-    c.delta_bic = c.bic - best_bic;
-  }
-  std::stable_sort(s.candidates.begin(), s.candidates.end(),
-                   [](const Candidate& a, const Candidate& b) {
-                     if (a.failed != b.failed) return b.failed;
-                     return a.bic < b.bic;
-                   });
-  s.recommended = least_within(s.candidates, options.margin);
+  rank_candidates(s);
   if (options.held_out) {
     Progress predicting("predicting what was held out", s.candidates.size());
     for (Candidate& c : s.candidates) {

@@ -88,6 +88,16 @@ struct Selection {
 /// @return place in candidates. Throws Error(numerical) if no law could be fitted.
 [[nodiscard]] std::size_t least_within(const std::vector<Candidate>& candidates, double margin);
 
+/// The first reason why a material parameter of a fit is not known; empty if all are.
+[[nodiscard]] std::string not_identified(const Candidate& candidate);
+
+/// True if the lasting stiffness k_inf is not told from 0.
+[[nodiscard]] bool plateau_is_not_told(const FitResult& fit);
+
+/// Scores the candidates by s.samples and s.effective_count, sorts them by BIC and recommends one
+/// (least_within s.margin).
+void rank_candidates(Selection& s);
+
 /// What the fitted law does with the samples outside the window: "unloading and after: rms 12 % of
 /// the peak; the law does not describe it", and which of them it does not predict. Empty if there
 /// are none.
