@@ -74,6 +74,11 @@ std::string not_identified(const Candidate& candidate) {
       return fmt::format("{} ends at its {} bound", p.parameter.name,
                          p.at_lower_bound ? "lower" : "upper");
     }
+    for (const Condition& c : p.conditional_on) {
+      if (!c.at_estimate) continue;
+      return fmt::format("{} ends at its {} bound, and {} depends on it", c.parameter,
+                         c.upper ? "upper" : "lower", p.parameter.name);
+    }
     if (!p.standard_error) return fmt::format("{} is not determined", p.parameter.name);
     const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0 &&
                            !may_vanish(candidate.law, law->name);

@@ -129,6 +129,7 @@ std::vector<PooledParameter> pool(const std::vector<SpecimenRow>& rows, double l
       if (!row.fit) continue;
       const ParameterResult& r = row.parameter(i);
       const bool usable = r.standard_error && !r.at_lower_bound && !r.at_upper_bound &&
+                          r.conditional_on.empty() &&
                           (p.parameter.scale == Scale::linear || r.estimate > 0.0);
       if (!usable) {
         ++p.left_out;
