@@ -278,6 +278,11 @@ void add_likelihood(Json& j, const std::optional<Likelihood>& likelihood) {
 Json to_json(const FitResult& result) {
   Json j{{"title", result.config.title},
          {"model", result.config.law ? law_name(*result.config.law) : result.config.model}};
+  if (result.config.law) {
+    const LawSpec& law = *result.config.law;
+    j[tpm::si_key(law.drive, "reference")] = number(law.reference);
+    j["coefficients_depend_on_reference"] = depends_on_reference(law);
+  }
   j["choices"] = assumptions_json(result.config);
   j["values_fitted"] = result.value_count;
   j["bands_fitted"] = result.band_count;

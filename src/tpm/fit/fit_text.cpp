@@ -119,7 +119,11 @@ constexpr std::size_t kMostRows = 40;
 }  // namespace
 
 std::string to_terminal_text(const FitResult& result) {
-  std::string text = result.config.title + "\n\n" + parameter_table(result) + "\n";
+  std::string text = result.config.title + "\n\n" + parameter_table(result);
+  if (result.config.law && depends_on_reference(*result.config.law)) {
+    text += reference_words(*result.config.law) + "\n";
+  }
+  text += "\n";
   text += fmt::format("chi-square {} from {} values and {} bands, {} degrees of freedom",
                       significant(result.chi_square, 6), result.value_count, result.band_count,
                       result.degrees_of_freedom > 0 ? std::to_string(result.degrees_of_freedom)

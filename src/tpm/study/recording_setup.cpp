@@ -260,13 +260,21 @@ double reference_drive(std::span<const PreparedRecording> recordings) {
   return rounded(sizes_of(recordings).drive, 2);
 }
 
+double common_reference(std::span<const PreparedRecording> recordings) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    least = std::min(least, reference_drive(recordings.subspan(i, 1)));
+  }
+  return least;
+}
+
 FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recordings,
                            const SetupOptions& options) {
   require_alike(recordings);
   law.drive = recordings.front().recording.drive_quantity;
   law.response = recordings.front().recording.response_quantity;
   const Sizes sizes = sizes_of(recordings);
-  law.reference = reference_drive(recordings);
+  law.reference = options.reference.value_or(reference_drive(recordings));
   const LawModel model(law);
   FitConfig config;
   config.law = law;

@@ -219,12 +219,15 @@ HeldOut predict_second_half(const Candidate& candidate, const PreparedRecording&
 void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
               const SelectionOptions& options) {
   if (c.failed) return;
+  // Coefficients go from one recording to another only at one reference depth.
+  SetupOptions setup = options.setup;
+  setup.reference = c.law.reference;
   try {
     if (recordings.size() == 1) {
-      c.held_out.push_back(predict_second_half(c, recordings.front(), options.setup));
+      c.held_out.push_back(predict_second_half(c, recordings.front(), setup));
     } else {
       for (std::size_t i = 0; i < recordings.size(); ++i) {
-        c.held_out.push_back(predict_one(c, recordings, i, options.setup));
+        c.held_out.push_back(predict_one(c, recordings, i, setup));
       }
     }
   } catch (const Error& error) {
