@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <regex>
 
 #include "command.hpp"
 #include "recording_options.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/tables.hpp"
@@ -31,6 +34,8 @@ struct FitOptions {
   std::string seed;
   std::string bootstrap;
   std::string resample;
+  std::string reference;
+  std::string group_by;
 };
 
 /// --bootstrap and --resample, over what the configuration says.
@@ -89,6 +94,51 @@ SelectionOptions selection_options(const FitOptions& options) {
   return selection;
 }
 
+/// --reference for recordings: a depth, or a change of relative length.
+void set_reference(const FitOptions& options, const std::vector<PreparedRecording>& recordings,
+                   SelectionOptions& selection) {
+  if (options.reference.empty()) return;
+  const Dimension drive = quantity_dimension(recordings.front().recording.drive_quantity);
+  selection.setup.reference = parse_quantity(options.reference, drive, "--reference");
+  if (*selection.setup.reference > 0.0) return;
+  throw Error(ExitCode::usage, "--reference", fmt::format("'{}'", printable(options.reference)),
+              "a depth above 0, such as \"4 mm\"");
+}
+
+/// Which specimen each recording is of: what the group of a name pattern matches, or what the file
+/// says under a key.
+void set_specimens(const FitOptions& options, std::vector<PreparedRecording>& recordings) {
+  const std::string& by = options.group_by;
+  if (by.empty()) return;
+  if (by.find('(') == std::string::npos) {
+    for (PreparedRecording& r : recordings) {
+      r.specimen = recording_label(r.name, by, import_options(options.recordings));
+    }
+    return;
+  }
+  std::regex pattern;
+  try {
+    pattern = std::regex(by);
+  } catch (const std::regex_error&) {
+    throw Error(ExitCode::usage, "--group-by", fmt::format("'{}' is no pattern", printable(by)),
+                "a regular expression such as \"(liver[0-9]+)_\"");
+  }
+  if (pattern.mark_count() != 1) {
+    throw Error(ExitCode::usage, "--group-by",
+                fmt::format("{} groups in '{}'", pattern.mark_count(), printable(by)), "one");
+  }
+  for (PreparedRecording& r : recordings) {
+    const std::string name = std::filesystem::path(r.name).filename().string();
+    std::smatch match;
+    if (!std::regex_search(name, match, pattern) || match[1].length() == 0) {
+      throw Error(ExitCode::usage, "--group-by",
+                  fmt::format("'{}' is not matched by '{}'", printable(name), printable(by)),
+                  "a pattern that every file name matches");
+    }
+    r.specimen = match[1].str();
+  }
+}
+
 /// Recordings in a folder, in alphabetical order.
 std::vector<std::string> recordings_in(const std::filesystem::path& folder) {
   std::vector<std::string> files;
@@ -131,10 +181,13 @@ int fit_configuration(const FitOptions& options, const Session& session) {
 int fit_folder(const FitOptions& options, const Session& session) {
   RecordingOptions input = options.recordings;
   input.files = recordings_in(options.recordings.files.front());
-  const SelectionOptions selection = selection_options(options);
+  SelectionOptions selection = selection_options(options);
   const std::optional<LawSpec> law =
       selection.laws.empty() ? std::nullopt : std::optional<LawSpec>(selection.laws.front());
-  const SpecimenStudy study = study_specimens(read_recordings(input), law, selection);
+  std::vector<PreparedRecording> recordings = read_recordings(input);
+  set_reference(options, recordings, selection);
+  set_specimens(options, recordings);
+  const SpecimenStudy study = study_specimens(recordings, law, selection);
   std::string text = session.json() ? to_text(to_json(study)) : to_terminal_text(study);
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, options.recordings.files.front());
@@ -147,7 +200,9 @@ int fit_folder(const FitOptions& options, const Session& session) {
 
 int fit_recordings(const FitOptions& options, const Session& session) {
   const auto recordings = read_recordings(options.recordings);
-  const Selection selection = select_law(recordings, selection_options(options));
+  SelectionOptions choices = selection_options(options);
+  set_reference(options, recordings, choices);
+  const Selection selection = select_law(recordings, choices);
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::string text;
   if (session.json()) {
@@ -192,13 +247,23 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
 
 int fit(const FitOptions& options, const Session& session) {
   const std::vector<std::string>& files = options.recordings.files;
-  if (is_configuration(files)) return fit_configuration(options, session);
+  if (is_configuration(files)) {
+    if (!options.reference.empty() || !options.group_by.empty()) {
+      throw Error(ExitCode::usage, "--reference, --group-by", "with a configuration",
+                  "them only with recordings; a configuration has its own reference");
+    }
+    return fit_configuration(options, session);
+  }
   if (!options.rate.empty() || !options.hold_out_depth.empty()) {
     throw Error(ExitCode::usage, "--rate, --hold-out", "without a configuration",
                 "them only with a CONFIG.json");
   }
   if (files.size() == 1 && std::filesystem::is_directory(files.front())) {
     return fit_folder(options, session);
+  }
+  if (!options.group_by.empty()) {
+    throw Error(ExitCode::usage, "--group-by", "without a folder of recordings",
+                "it only with one folder");
   }
   if (files.size() == 1) {
     const auto function = find_material_function(files.front(), import_options(options.recordings));
@@ -238,6 +303,13 @@ void add_fit_command(CLI::App& app, Session& session) {
                       "Refit this many resampled data sets, 20 or more");
   command->add_option("--resample", options->resample,
                       "What is drawn: residuals, blocks or recordings");
+  command->add_option("--reference", options->reference,
+                      "Recordings: the depth at which coefficients are secants, e.g. \"4 mm\" "
+                      "(default: the largest; of a folder the largest that all reach)");
+  command->add_option(
+      "--group-by", options->group_by,
+      "Folder: what tells the specimens apart: a pattern of the file names with one "
+      "group, e.g. \"(liver[0-9]+)_\", or a column or key of the files");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm fit configs/liver_relaxation.json\n"

@@ -2,11 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
 #include "tpm/curve/assemble.hpp"
 #include "tpm/curve/load.hpp"
+#include "tpm/store/delimited.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm {
@@ -79,6 +83,50 @@ void require_no_imposed_value(const ImportOptions& options, const std::string& f
 }
 
 }  // namespace
+
+namespace {
+
+std::string described_label(const fs::path& path, std::string_view key) {
+  const fs::path description = with_ending(path, ".json");
+  const Json json = read_json(description);
+  const auto value = json.find(std::string(key));
+  if (value != json.end() && value->is_string()) return value->get<std::string>();
+  if (value != json.end() && value->is_number()) return value->dump();
+  throw bad_input(description.string(), fmt::format("no text or number '{}'", printable(key)),
+                  "a key that every description has");
+}
+
+}  // namespace
+
+std::string recording_label(const fs::path& path, std::string_view key,
+                            const ImportOptions& options) {
+  if (is_described(path)) return described_label(path, key);
+  const DelimitedTable table = read_delimited(path, options.text);
+  std::optional<std::size_t> column;
+  std::string label;
+  for (const DelimitedRow& row : table.rows) {
+    if (!column) {
+      const auto title = std::find(row.fields.begin(), row.fields.end(), key);
+      if (title != row.fields.end()) column = static_cast<std::size_t>(title - row.fields.begin());
+      continue;
+    }
+    // Units may stand between the titles and the samples.
+    const auto numbers = std::count_if(row.fields.begin(), row.fields.end(), [&](auto field) {
+      return is_number(field, table.decimal_comma);
+    });
+    if (numbers < 2 || *column >= row.fields.size()) continue;
+    const std::string_view field = row.fields[*column];
+    if (label.empty()) label = std::string(field);
+    if (field == label && !field.empty()) continue;
+    throw bad_input(fmt::format("{}, line {}", path.string(), row.line),
+                    fmt::format("'{}' in the column '{}' that began with '{}'", printable(field),
+                                printable(key), printable(label)),
+                    "one value in all samples");
+  }
+  if (!label.empty()) return label;
+  throw bad_input(path.string(), fmt::format("no column is called '{}'", printable(key)),
+                  "a column that every recording has, or a name pattern with one group, ()");
+}
 
 MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& options) {
   const std::string file = path.string();

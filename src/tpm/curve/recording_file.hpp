@@ -1,5 +1,7 @@
 #pragma once
 #include <filesystem>
+#include <string>
+#include <string_view>
 #include <variant>
 
 #include "tpm/curve/import.hpp"
@@ -27,6 +29,12 @@ using MeasuredFile = std::variant<RecordingFile, Spectrum>;
 
 /// As read_measured_file; Error(bad_input) if the file holds a recording.
 [[nodiscard]] Spectrum read_spectrum_file(const std::filesystem::path& path,
+                                          const ImportOptions& options = {});
+
+/// What a file says under a key: the text or number at the top of its description or, without a
+/// description, the one value that the column of that title holds. Throws Error(bad_input) naming
+/// the file if there is no such key or the column does not hold one value.
+[[nodiscard]] std::string recording_label(const std::filesystem::path& path, std::string_view key,
                                           const ImportOptions& options = {});
 
 }  // namespace tpm

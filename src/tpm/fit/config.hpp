@@ -77,12 +77,20 @@ struct Target {
   [[nodiscard]] bool applies_to(std::size_t choice) const;
 };
 
+/// How far automatic bounds may be moved out, SI.
+struct WidestBounds {
+  double lower = 0.0, upper = 0.0;
+};
+
 /// An estimated parameter and the model parameters that take its value.
 struct EstimatedParameter {
   FitParameter fit;
   std::vector<Target> sets;  ///< empty for a parameter of the noise
   /// A noise parameter whose start and bounds follow from the size of the data.
   bool from_data = false;
+  /// Set where nobody stated the bounds: run_fit widens them up to these while the best fit or the
+  /// limit of an interval presses on them.
+  std::optional<WidestBounds> widest;
 };
 
 /// A claim about parameters, tested by holding them: "eta1 = 5 Pa s".

@@ -35,8 +35,10 @@ double simulated(const ExperimentResiduals& function, std::size_t datum, double 
   return scattered(law, truth, scale, draw_error(law, random));
 }
 
+/// A profile that failed is no interval.
 bool holds(const ParameterResult& p, double truth) {
-  return (!p.lower || *p.lower <= truth) && (!p.upper || truth <= *p.upper);
+  return p.verdict != Verdict::failed && (!p.lower || *p.lower <= truth) &&
+         (!p.upper || truth <= *p.upper);
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 #include "tpm/fit/fit.hpp"
 
+#include <algorithm>
+
+#include "tpm/fit/conditional.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit_flags.hpp"
 #include "tpm/fit/fitted_data.hpp"
@@ -56,11 +59,11 @@ Approach approach_to(const ExperimentResiduals& function,
 
 /// Where no start can be evaluated, the reason is said if it lies in the recording.
 FitResult search(const ExperimentResiduals& function, const std::vector<FitParameter>& parameters,
-                 const Threshold& threshold) {
+                 const Threshold& threshold, bool profiles) {
   try {
     const Approach approach = approach_to(function, parameters);
     return fit_residuals(
-        function, parameters, approach.starts, threshold, function.config().profiles, approach.kind,
+        function, parameters, approach.starts, threshold, profiles, approach.kind,
         [&](std::span<const double> best) { return inflation_at(function, best); });
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical) throw;
@@ -69,6 +72,37 @@ FitResult search(const ExperimentResiduals& function, const std::vector<FitParam
     for (const FitParameter& p : parameters) nominal.push_back(p.start);
     if (const auto reason = unpredicted_window(function, nominal)) throw *reason;
     throw;
+  }
+}
+
+/// The search, with automatic bounds widened until the fit no longer presses on them.
+/// @param parameters their bounds are changed
+FitResult widened_search(const ExperimentResiduals& function, std::vector<FitParameter>& parameters,
+                         const Threshold& threshold) {
+  const FitConfig& config = function.config();
+  const bool automatic =
+      std::any_of(config.parameters.begin(), config.parameters.end(),
+                  [](const EstimatedParameter& p) { return p.widest.has_value(); });
+  for (;;) {
+    // Profiles are walked only from an estimate that stays.
+    if (automatic && config.profiles) {
+      while (widen_pressed_bounds(search(function, parameters, threshold, false), config,
+                                  parameters)) {
+      }
+    }
+    FitResult result = search(function, parameters, threshold, config.profiles);
+    if (!automatic || !widen_pressed_bounds(result, config, parameters)) return result;
+  }
+}
+
+/// The configuration with the bounds that were used at last.
+void keep_bounds(FitResult& result, const std::vector<FitParameter>& parameters) {
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    FitParameter& first = result.config.parameters[i].fit;
+    if (first.lower != parameters[i].lower || first.upper != parameters[i].upper) {
+      result.parameters[i].first_bounds = Limits{first.lower, first.upper};
+    }
+    first = parameters[i];
   }
 }
 
@@ -92,9 +126,10 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
   threshold.data_count = function.value_count();
   threshold.parameter_count = static_cast<int>(parameters.size());
 
-  FitResult result = search(function, parameters, threshold);
+  FitResult result = widened_search(function, parameters, threshold);
   threshold.inflation = result.inflation;
   result.config = config;
+  keep_bounds(result, parameters);
   result.value_count = function.value_count();
   result.band_count = function.band_count();
   result.likelihood = likelihood_at(function, result.best.natural);
@@ -107,6 +142,7 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
   if (config.bootstrap) {
     result.bootstrap = bootstrap_experiments(function, parameters, result.best, *config.bootstrap);
   }
+  mark_conditions(result, function);
   add_flags(result, function);
   return result;
 }

@@ -23,14 +23,34 @@ enum class Verdict {
   lower_only,   ///< only a lower limit: larger values up to the bound cannot be told apart
   upper_only,   ///< only an upper limit
   flat,         ///< no limit within the bounds
+  failed,       ///< a walk along the profile ended in neither a limit nor a bound
   not_profiled  ///< profiles were switched off
 };
 
 [[nodiscard]] std::string_view verdict_name(Verdict verdict) noexcept;
 
+/// Symmetric limits, SI.
+struct Limits {
+  double lower = 0.0, upper = 0.0;
+};
+
+/// A nuisance parameter that stands on one of its bounds: what depends on it holds only there.
+struct Condition {
+  std::string parameter;
+  bool upper = false;       ///< else the lower bound
+  double value = 0.0;       ///< of the bound, SI
+  bool at_estimate = true;  ///< false: only where the interval of the dependent parameter ends
+
+  bool operator==(const Condition&) const = default;
+};
+
 /// Result for one estimated parameter; SI.
 struct ParameterResult {
   FitParameter parameter;
+  bool nuisance = false;  ///< belongs to the recording or its noise, not to the material
+  /// The automatic bounds, where the best fit or an interval pressed on them and they were widened.
+  std::optional<Limits> first_bounds;
+  std::vector<Condition> conditional_on;
   double estimate = 0.0;
   std::optional<double> standard_error;  ///< linearised, in natural units
   std::optional<double> lower, upper;    ///< confidence limits by profile likelihood
@@ -54,11 +74,6 @@ struct HypothesisResult {
   double p_value = 1.0;
   bool excluded = false;  ///< p < 1 - level
   std::string words;
-};
-
-/// Symmetric limits, SI.
-struct Limits {
-  double lower = 0.0, upper = 0.0;
 };
 
 /// One reading with the fitted model's answer.

@@ -6,6 +6,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/verdict.hpp"
 
 namespace tpm {
 namespace {
@@ -74,6 +75,17 @@ Json correlation_json(const Correlation& c) {
           {"words", c.words}};
 }
 
+Json conditions_json(const ParameterResult& p) {
+  Json list = Json::array();
+  for (const Condition& c : p.conditional_on) {
+    list.push_back({{"parameter", c.parameter},
+                    {"bound", c.upper ? "upper" : "lower"},
+                    {"bound_SI", number(c.value)},
+                    {"at_estimate", c.at_estimate}});
+  }
+  return list;
+}
+
 Json parameter_json(const ParameterResult& p) {
   const Dimension dimension = p.parameter.unit.dimension;
   Json j{{"name", p.parameter.name}, {"SI_unit", si_symbol(dimension)}};
@@ -84,13 +96,22 @@ Json parameter_json(const ParameterResult& p) {
   j["interval_SI"] = {optional_number(p.lower), optional_number(p.upper)};
   j["interval_connected"] = p.profile.connected;
   j["at_bound"] = p.at_lower_bound ? "lower" : p.at_upper_bound ? "upper" : "no";
-  j["verdict"] = verdict_name(p.verdict);
+  j["verdict"] = verdict_text(p);
+  if (p.nuisance) j["nuisance"] = true;
+  if (p.first_bounds) {
+    j["bounds_widened_from_SI"] = pair_json(p.first_bounds->lower, p.first_bounds->upper);
+  }
+  if (!p.conditional_on.empty()) j["conditional_on"] = conditions_json(p);
   j["words"] = p.words;
   Json points = Json::array();
   for (const ProfilePoint& point : p.profile.points) {
     points.push_back({number(point.natural), number(point.deviance)});
   }
   j["profile_SI_and_deviance"] = std::move(points);
+  Json failed = Json::array();
+  if (has_failed(p.profile.below)) failed.push_back("lower");
+  if (has_failed(p.profile.above)) failed.push_back("upper");
+  if (!failed.empty()) j["profile_failed"] = std::move(failed);
   j["profile_failures"] = p.profile.failures;
   if (p.profile.cut_short) j["interval_cut_short"] = true;
   return j;
@@ -257,6 +278,11 @@ void add_likelihood(Json& j, const std::optional<Likelihood>& likelihood) {
 Json to_json(const FitResult& result) {
   Json j{{"title", result.config.title},
          {"model", result.config.law ? law_name(*result.config.law) : result.config.model}};
+  if (result.config.law) {
+    const LawSpec& law = *result.config.law;
+    j[tpm::si_key(law.drive, "reference")] = number(law.reference);
+    j["coefficients_depend_on_reference"] = depends_on_reference(law);
+  }
   j["choices"] = assumptions_json(result.config);
   j["values_fitted"] = result.value_count;
   j["bands_fitted"] = result.band_count;

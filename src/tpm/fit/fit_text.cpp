@@ -4,16 +4,14 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/fit/verdict.hpp"
 
 namespace tpm {
 namespace {
 
 std::string interval_text(const ParameterResult& p) {
   if (p.verdict == Verdict::not_profiled) return "-";
-  const auto side = [&](const std::optional<double>& limit) {
-    return limit ? significant(*limit / p.parameter.unit.to_si, 4) : std::string("open");
-  };
-  return fmt::format("{} .. {}", side(p.lower), side(p.upper));
+  return fmt::format("{} .. {}", limit_text(p, false), limit_text(p, true));
 }
 
 std::string parameter_table(const FitResult& result) {
@@ -25,7 +23,7 @@ std::string parameter_table(const FitResult& result) {
     text += fmt::format("{:<10} {:>12} {:>12}  {:<24} {:<8} {}\n", p.parameter.name,
                         significant(p.estimate / unit, 5),
                         p.standard_error ? significant(*p.standard_error / unit, 3) : "-",
-                        interval_text(p), p.parameter.unit.symbol, verdict_name(p.verdict));
+                        interval_text(p), p.parameter.unit.symbol, verdict_text(p));
   }
   return text;
 }
@@ -121,7 +119,11 @@ constexpr std::size_t kMostRows = 40;
 }  // namespace
 
 std::string to_terminal_text(const FitResult& result) {
-  std::string text = result.config.title + "\n\n" + parameter_table(result) + "\n";
+  std::string text = result.config.title + "\n\n" + parameter_table(result);
+  if (result.config.law && depends_on_reference(*result.config.law)) {
+    text += reference_words(*result.config.law) + "\n";
+  }
+  text += "\n";
   text += fmt::format("chi-square {} from {} values and {} bands, {} degrees of freedom",
                       significant(result.chi_square, 6), result.value_count, result.band_count,
                       result.degrees_of_freedom > 0 ? std::to_string(result.degrees_of_freedom)

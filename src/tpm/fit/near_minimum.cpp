@@ -13,8 +13,8 @@ namespace {
 constexpr double kFirstDamping = 1e-4;
 constexpr double kLeastDamping = 1e-12;
 constexpr double kMostDamping = 1e8;
-constexpr double kLower = 0.1;  // the damping, after a step down
-constexpr double kRaise = 8.0;  // after a step up
+constexpr double kLowerDamping = 0.1;  // the damping, after a step down
+constexpr double kRaiseDamping = 8.0;  // after a step up
 constexpr double kFarCorrection = 0.3;
 constexpr double kRidge = 1e-12;  // keeps linear parameters that the data do not tell apart
 
@@ -218,7 +218,7 @@ bool NearSearch::try_step(const std::vector<Eigen::Index>& free) {
   constexpr double kSmallStep = 1e-4;  // of sigma: 1e-8 of the deviance's natural unit
   const auto length = damped_step(free);
   if (!length) {
-    damping_ = std::max(damping_ * kRaise, kFirstDamping);
+    damping_ = std::max(damping_ * kRaiseDamping, kFirstDamping);
     return false;
   }
   ++iterations_;
@@ -227,7 +227,8 @@ bool NearSearch::try_step(const std::vector<Eigen::Index>& free) {
   const double corrected = evaluated ? solve_linear(next_) : 0.0;
   const bool accepted = evaluated && next_.cost <= here_.cost;
   converged_ = *length <= kSmallStep * sigma && damping_ < 1e-2;
-  damping_ = accepted ? std::max(damping_ * kLower, kLeastDamping) : damping_ * kRaise;
+  damping_ =
+      accepted ? std::max(damping_ * kLowerDamping, kLeastDamping) : damping_ * kRaiseDamping;
   if (!accepted) return converged_;
   std::swap(here_, next_);
   if (converged_) return true;

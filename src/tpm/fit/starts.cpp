@@ -42,14 +42,15 @@ std::vector<double> projected(const ResidualFunction& function,
 /// Minimum over the free columns while the others keep their x.
 Eigen::VectorXd with_free(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right,
                           const std::vector<Eigen::Index>& free, Eigen::VectorXd x) {
-  constexpr double kRidge = 1e-12;  // columns that repeat each other share, instead of a pivot of 0
+  constexpr double kSharingRidge =
+      1e-12;  // columns that repeat each other share, instead of a pivot of 0
   Eigen::VectorXd held = x;
   for (const Eigen::Index k : free) held[k] = 0.0;
   const Eigen::VectorXd rest = right - gram * held;
   Eigen::MatrixXd a = gram(free, free);
   const Eigen::VectorXd scale = a.diagonal().cwiseSqrt().cwiseInverse();
   a = scale.asDiagonal() * a * scale.asDiagonal();
-  a.diagonal().array() += kRidge;
+  a.diagonal().array() += kSharingRidge;
   const Eigen::VectorXd b = scale.asDiagonal() * rest(free);
   const Eigen::VectorXd y = scale.asDiagonal() * a.ldlt().solve(b);
   for (std::size_t i = 0; i < free.size(); ++i) x[free[i]] = y[static_cast<Eigen::Index>(i)];

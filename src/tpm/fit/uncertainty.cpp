@@ -120,16 +120,26 @@ class ProfileWalk {
     fixed_[index] = true;
   }
 
+  /// How the walk ended; theta of the limit if it is one.
+  struct End {
+    ProfileEnd how;
+    double theta;
+  };
+
   /// @param direction +1 or -1 in theta
-  /// @return theta of the limit, or nothing if the bound comes first or a better minimum was met
-  std::optional<double> run(int direction, double first_step, Profile& profile) {
+  /// @return nothing if a better minimum was met, which is then profile.better
+  std::optional<End> run(int direction, double first_step, Profile& profile) {
     const FitParameter& p = parameters_[index_];
     const double bound = direction > 0 ? p.theta_upper() : p.theta_lower();
     double step = first_step;
     last_ = {p.theta(minimum_.natural[index_]), minimum_.deviance - best_deviance_,
              minimum_.natural};
     before_ = last_;
-    for (int steps = 0; steps < 400 && (bound - last_.theta) * direction > 0.0; ++steps) {
+    const double rounding = kRounding * std::max(1.0, std::abs(last_.theta));
+    constexpr int kMostSteps = 400;
+    for (int steps = 0; (bound - last_.theta) * direction > 0.0; ++steps) {
+      if (step < rounding) return End{ProfileEnd::rounding, last_.theta};
+      if (steps == kMostSteps) return End{ProfileEnd::steps, last_.theta};
       double next = last_.theta + direction * step;
       if ((bound - next) * direction < 1e-3 * step) next = bound;
       const Minimum m = constrained(next, true);
@@ -138,7 +148,7 @@ class ProfileWalk {
         step *= 0.25;
         if (step > kLeastStep * first_step) continue;
         profile.cut_short = true;
-        return last_.theta;
+        return End{ProfileEnd::limit, last_.theta};
       }
       const double risen_next = m.deviance - best_deviance_;
       if (risen_next < -kBetterBy * (1.0 + best_deviance_)) {
@@ -153,16 +163,21 @@ class ProfileWalk {
       if (risen_next < rise_) profile.inside.push_back(m);
       const double gained = risen_next - last_.risen;
       before_ = std::exchange(last_, {next, risen_next, m.natural});
-      if (risen_next >= rise_) return limit_between(before_, last_);
+      if (risen_next >= rise_) {
+        const double limit = limit_between(before_, last_);
+        note_bounds(before_.natural, profile);
+        return End{ProfileEnd::limit, limit};
+      }
       if (gained < 0.08 * rise_) step *= 2.0;
       if (gained > 0.35 * rise_) step *= 0.5;
     }
-    return std::nullopt;
+    return End{ProfileEnd::bound, bound};
   }
 
  private:
   static constexpr double kBetterBy = 1e-7;
   static constexpr double kLeastStep = 1e-3;  ///< of the first one, towards where the model ends
+  static constexpr double kRounding = 1e-13;  ///< shorter steps in theta are no steps
 
   /// A point of the profile.
   struct Place {
@@ -202,6 +217,17 @@ class ProfileWalk {
       if (other.usable && (!m.usable || other.deviance < m.deviance)) m = other;
     }
     return m;
+  }
+
+  /// Which other parameters stand on a bound at the last point within the limit.
+  void note_bounds(const std::vector<double>& natural, Profile& profile) const {
+    for (std::size_t j = 0; j < natural.size(); ++j) {
+      const bool upper = parameters_[j].at_upper(natural[j]);
+      if (j == index_ || (!upper && !parameters_[j].at_lower(natural[j]))) continue;
+      const LimitingBound bound{j, upper};
+      auto& known = profile.limited_by;
+      if (std::find(known.begin(), known.end(), bound) == known.end()) known.push_back(bound);
+    }
   }
 
   double limit_between(const Place& inside, const Place& outside) {
@@ -306,11 +332,14 @@ Profile profile_likelihood(const ResidualFunction& function,
     ProfileWalk walk(function, parameters, minimum, best, index, rise);
     Range range;
     for (const int direction : {-1, +1}) {
-      const std::optional<double> theta = walk.run(direction, step, profile);
-      if (profile.better) return profile;
-      if (!theta) continue;
+      const auto end = walk.run(direction, step, profile);
+      if (!end) return profile;
       const bool is_upper = (direction > 0) != p.reversed();
-      (is_upper ? range.upper : range.lower) = p.natural(*theta);
+      ProfileEnd& known = is_upper ? profile.above : profile.below;
+      // Of several minima a walk that failed, or went on to the bound, decides.
+      known = std::max(known, end->how);
+      if (end->how != ProfileEnd::limit) continue;
+      (is_upper ? range.upper : range.lower) = p.natural(end->theta);
     }
     if (!all) {
       all = range;

@@ -56,12 +56,38 @@ struct ProfilePoint {
   double deviance;
 };
 
+/// How the walk along a profile ended on one side.
+enum class ProfileEnd {
+  not_walked,
+  limit,     ///< the deviance rose by the threshold there
+  bound,     ///< the bound came first: every value up to it fits
+  rounding,  ///< failed: the interval is as narrow as the rounding of numbers
+  steps,     ///< failed: neither limit nor bound was reached within the allowed number of steps
+};
+
+/// The walk found neither a limit nor that there is none.
+[[nodiscard]] constexpr bool has_failed(ProfileEnd end) noexcept {
+  return end == ProfileEnd::rounding || end == ProfileEnd::steps;
+}
+
+/// Another parameter that stood on a bound where a profile met its limit: with other bounds the
+/// limit would lie elsewhere.
+struct LimitingBound {
+  std::size_t parameter = 0;
+  bool upper = false;
+
+  bool operator==(const LimitingBound&) const = default;
+};
+
 /// The profile of one parameter and the confidence interval it gives. A limit that is missing was
-/// not reached within the bounds.
+/// not reached within the bounds, or the walk failed: `below` and `above` tell.
 struct Profile {
   std::vector<ProfilePoint> points;  ///< rising in the natural value
   std::optional<double> lower;
   std::optional<double> upper;
+  ProfileEnd below = ProfileEnd::not_walked;  ///< towards smaller natural values
+  ProfileEnd above = ProfileEnd::not_walked;
+  std::vector<LimitingBound> limited_by;  ///< at either limit, each once
   bool connected = true;          ///< false: the values between the limits do not all belong
   std::optional<Minimum> better;  ///< a deeper minimum met on the way; the profile is then void
   std::vector<Minimum> inside;    ///< ends of the constrained fits below the threshold
@@ -72,7 +98,8 @@ struct Profile {
 /// Walks outwards from each minimum in theta with adaptive steps until the deviance has risen by
 /// the threshold above the best one (then the limit is found to 1e-7 of its distance from the
 /// minimum, in theta) or the bound is reached. Where the model can no longer be evaluated the range
-/// ends, too: what cannot carry the load does not fit. Several minima within the threshold may give
+/// ends, too: what cannot carry the load does not fit. A walk that ends in none of these ways has
+/// failed, which is not the same as a flat profile. Several minima within the threshold may give
 /// separate ranges: the limits then enclose them all and `connected` is false.
 /// @param minima rising deviance, the best first
 [[nodiscard]] Profile profile_likelihood(const ResidualFunction& function,

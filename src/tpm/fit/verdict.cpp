@@ -38,6 +38,8 @@ std::string_view verdict_name(Verdict verdict) noexcept {
       return "one-sided: upper limit only";
     case Verdict::flat:
       return "flat";
+    case Verdict::failed:
+      return "profile failed";
     case Verdict::not_profiled:
       return "not profiled";
   }
@@ -50,6 +52,7 @@ std::string in_unit(const FitParameter& parameter, double natural) {
 }
 
 Verdict verdict_of(const ParameterResult& p) {
+  if (has_failed(p.profile.below) || has_failed(p.profile.above)) return Verdict::failed;
   if (p.lower && p.upper) return Verdict::identified;
   if (p.lower) return Verdict::lower_only;
   if (p.upper) return Verdict::upper_only;
@@ -57,6 +60,28 @@ Verdict verdict_of(const ParameterResult& p) {
 }
 
 namespace {
+
+/// Why a profile failed, and what is known all the same.
+std::string failure_words(const ParameterResult& p, double level) {
+  const FitParameter& f = p.parameter;
+  const Profile& profile = p.profile;
+  const bool below = has_failed(profile.below);
+  const bool above = has_failed(profile.above);
+  const char* side = below && above ? "on both sides" : below ? "below the best value" : "above it";
+  const bool rounding =
+      profile.below == ProfileEnd::rounding || profile.above == ProfileEnd::rounding;
+  std::string words = fmt::format(
+      "{} = {}: its profile failed {} ({}), which does not mean that it is unknown", f.name,
+      in_unit(f, p.estimate), side,
+      rounding ? "an interval as narrow as the rounding of numbers: the data are met exactly"
+               : "the walk reached neither a limit nor a bound");
+  if (p.lower) words += fmt::format("; lower {} limit {}", percent(level), in_unit(f, *p.lower));
+  if (p.upper) words += fmt::format("; upper {} limit {}", percent(level), in_unit(f, *p.upper));
+  words += p.standard_error
+               ? fmt::format("; linearised standard error {}", in_unit(f, *p.standard_error))
+               : std::string("; no linearised standard error either");
+  return words;
+}
 
 std::string range_words(const ParameterResult& p, double level) {
   const FitParameter& f = p.parameter;
@@ -77,6 +102,8 @@ std::string range_words(const ParameterResult& p, double level) {
     case Verdict::flat:
       return fmt::format("{} cannot be told from these data: every value from {} to {} fits{}",
                          f.name, in_unit(f, f.lower), in_unit(f, f.upper), bound_note(p));
+    case Verdict::failed:
+      return failure_words(p, level);
     case Verdict::not_profiled:
       break;
   }
@@ -89,6 +116,25 @@ std::string range_words(const ParameterResult& p, double level) {
 std::string parameter_words(const ParameterResult& p, double level) {
   return range_words(p, level) +
          (p.profile.cut_short ? "; a limit is where the model can no longer be evaluated" : "");
+}
+
+std::string verdict_text(const ParameterResult& p) {
+  std::string text(verdict_name(p.verdict));
+  for (std::size_t i = 0; i < p.conditional_on.size(); ++i) {
+    const Condition& c = p.conditional_on[i];
+    text += fmt::format("{} {} at its {} bound", i == 0 ? ", conditional on" : " and", c.parameter,
+                        c.upper ? "upper" : "lower");
+  }
+  if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {
+    text += fmt::format("; on its {} bound", p.at_lower_bound ? "lower" : "upper");
+  }
+  return text;
+}
+
+std::string limit_text(const ParameterResult& p, bool upper) {
+  const std::optional<double>& limit = upper ? p.upper : p.lower;
+  if (limit) return significant(*limit / p.parameter.unit.to_si, 4);
+  return has_failed(upper ? p.profile.above : p.profile.below) ? "failed" : "open";
 }
 
 std::string hypothesis_words(const HypothesisResult& result, double level) {

@@ -9,6 +9,13 @@ namespace tpm {
 /// From which limits the profile reached.
 [[nodiscard]] Verdict verdict_of(const ParameterResult& parameter);
 
+/// The verdict with what it rests on: "identified, conditional on contact at its lower bound".
+[[nodiscard]] std::string verdict_text(const ParameterResult& parameter);
+
+/// One limit of the interval in the parameter's own unit, "open" where the bound came first, or
+/// "failed" where the profile did.
+[[nodiscard]] std::string limit_text(const ParameterResult& parameter, bool upper);
+
 /// One sentence for a reader, made from the numbers.
 [[nodiscard]] std::string parameter_words(const ParameterResult& parameter, double level);
 

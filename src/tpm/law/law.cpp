@@ -121,6 +121,20 @@ std::string law_words(const LawSpec& spec) {
   return words;
 }
 
+bool depends_on_reference(const LawSpec& spec) noexcept {
+  return spec.kernel != Kernel::linear || spec.tension != Tension::none;
+}
+
+std::string reference_words(const LawSpec& spec) {
+  if (!depends_on_reference(spec)) return {};
+  if (is_stretch(spec)) {
+    return fmt::format("coefficients are secants at a stretch of {} above the slack length",
+                       significant(spec.reference, 4));
+  }
+  return fmt::format("coefficients are secants at a depth of {} mm",
+                     significant(1e3 * spec.reference, 4));
+}
+
 void require_valid(const LawSpec& spec, std::string_view where) {
   if (spec.branches < 0 || spec.branches > kMostBranches) {
     throw bad_input(where, fmt::format("{} branches", spec.branches),

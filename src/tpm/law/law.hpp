@@ -76,6 +76,13 @@ struct LawSpec {
 /// Error(bad_input).
 [[nodiscard]] LawSpec parse_law_name(std::string_view text, std::string_view where);
 
+/// Whether the coefficients are secants at the reference depth: kernels and tensions that are no
+/// straight lines. They can be compared only at one reference.
+[[nodiscard]] bool depends_on_reference(const LawSpec& spec) noexcept;
+
+/// "coefficients are secants at a depth of 4 mm"; empty if they do not depend on it.
+[[nodiscard]] std::string reference_words(const LawSpec& spec);
+
 /// A sentence: "power-law kernel, two relaxing branches, no tension".
 [[nodiscard]] std::string law_words(const LawSpec& spec);
 

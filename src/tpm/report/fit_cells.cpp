@@ -16,6 +16,7 @@ Tone tone_of(Verdict verdict) {
     case Verdict::upper_only:
       return Tone::fair;
     case Verdict::flat:
+    case Verdict::failed:
       return Tone::bad;
     case Verdict::not_profiled:
       break;

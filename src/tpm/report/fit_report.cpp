@@ -151,8 +151,9 @@ std::string numbered_recordings(const SpecimenStudy& study) {
   std::vector<std::string> names;
   for (std::size_t i = 0; i < study.rows.size(); ++i) {
     const SpecimenRow& row = study.rows[i];
-    names.push_back(fmt::format("{} {}{}", i + 1,
+    names.push_back(fmt::format("{} {}{}{}", i + 1,
                                 std::filesystem::path(row.name).filename().string(),
+                                row.specimen.empty() ? "" : fmt::format(" [{}]", row.specimen),
                                 row.fit ? "" : " (not fitted)"));
   }
   return fmt::format("{}", fmt::join(names, ", "));
@@ -206,7 +207,9 @@ std::vector<Figure> specimen_figures(const SpecimenStudy& study) {
       figure.title = fmt::format("{} recordings: {}", study.rows.size(), law_name(study.law));
       figure.caption = fmt::format(
           "Each recording fitted by itself, and what they have in common (random effects). "
-          "An estimate without a bar has an interval that is open. Recordings: {}.",
+          "An estimate without a bar has an interval that is open.{} Recordings: {}.",
+          depends_on_reference(study.law) ? fmt::format(" The {}.", reference_words(study.law))
+                                          : std::string(),
           numbered_recordings(study));
       figures.push_back(std::move(figure));
     }

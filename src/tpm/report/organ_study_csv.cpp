@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "tpm/core/text.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpm/report/organ_study_report.hpp"
 #include "tpm/report/table_document.hpp"
 
@@ -86,9 +87,8 @@ std::string fits_csv(const OrganStudy& study) {
       text += csv_line({study.config.fits[made.fit].name, study.config.tissues[made.tissue].name,
                         p.parameter.name, std::string(si_symbol(p.parameter.unit.dimension)),
                         text_of(p.estimate), p.lower ? text_of(*p.lower) : "",
-                        p.upper ? text_of(*p.upper) : "", std::string(verdict_name(p.verdict)),
-                        text_of(fit.chi_square), std::to_string(fit.value_count),
-                        std::to_string(fit.band_count)});
+                        p.upper ? text_of(*p.upper) : "", verdict_text(p), text_of(fit.chi_square),
+                        std::to_string(fit.value_count), std::to_string(fit.band_count)});
     }
   }
   return text;

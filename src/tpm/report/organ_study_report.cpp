@@ -183,6 +183,8 @@ Cell estimate_cell(const FitResult& fit, const ParameterResult& p) {
       return {fmt::format("below {} {}{}", text(*p.upper), symbol, best), tone};
     case Verdict::flat:
       return {"cannot be told" + best, tone};
+    case Verdict::failed:
+      return {"profile failed" + best, tone};
     case Verdict::not_profiled:
       break;
   }

@@ -151,6 +151,12 @@ Figure recording_figure(const FitResult& fit, std::size_t recording) {
     figure.caption += fmt::format(
         " The law's line ends where it predicts nothing: {} samples beyond.", r.not_predicted);
   }
+  for (const ParameterResult& p : fit.parameters) {
+    if (!p.nuisance || !(p.at_lower_bound || p.at_upper_bound)) continue;
+    const double bound = p.at_upper_bound ? p.parameter.upper : p.parameter.lower;
+    figure.caption += fmt::format(" The fit presses on a bound of {} ({}): it holds only there.",
+                                  p.parameter.name, in_unit(p.parameter, bound));
+  }
   figure.panels = {response_panel(r, true), response_panel(r, false), residual_panel(r)};
   return figure;
 }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "tpm/core/text.hpp"
+#include "tpm/fit/verdict.hpp"
 #include "tpm/report/fit_cells.hpp"
 #include "tpm/report/fit_figures.hpp"
 #include "tpm/report/sections.hpp"
@@ -9,14 +10,12 @@
 namespace tpm {
 namespace {
 
-std::string in_unit_or_open(const FitParameter& p, const std::optional<double>& limit) {
-  return limit ? in_unit(p, *limit) : "open";
-}
-
 std::string interval(const ParameterResult& p) {
   if (p.verdict == Verdict::not_profiled) return "not profiled";
-  return fmt::format("{} to {}", in_unit_or_open(p.parameter, p.lower),
-                     in_unit_or_open(p.parameter, p.upper));
+  const auto side = [&](const std::optional<double>& limit, bool upper) {
+    return limit ? in_unit(p.parameter, *limit) : limit_text(p, upper);
+  };
+  return fmt::format("{} to {}", side(p.lower, false), side(p.upper, true));
 }
 
 Table estimates_table(const FitResult& fit) {
@@ -32,7 +31,7 @@ Table estimates_table(const FitResult& fit) {
                           {in_unit(p.parameter, p.estimate)},
                           {p.standard_error ? in_unit(p.parameter, *p.standard_error) : "-"},
                           {interval(p)},
-                          {std::string(verdict_name(p.verdict)), tone_of(p.verdict)}});
+                          {verdict_text(p), tone_of(p.verdict)}});
   }
   return table;
 }

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
+#include <vector>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -113,9 +115,57 @@ std::string effects_words(const RandomEffects& r) {
       r.tau_at_zero ? std::string("no spread between specimens beyond their standard errors")
                     : fmt::format("specimens spread with a standard deviation of {} in theta",
                                   significant(std::sqrt(*r.tau_squared), 3));
-  return fmt::format("{} specimens: {} (I^2 = {:.0f} %, Cochran's Q p = {}){}", r.specimens, spread,
-                     100.0 * *r.i_squared, significant(*r.q_p_value, 2),
-                     r.new_specimen ? "" : "; too few to predict a new one");
+  return fmt::format(
+      "{} specimens: {} (I^2 = {:.0f} %, {} p = {}){}", r.specimens, spread, 100.0 * *r.i_squared,
+      r.repeat_degrees > 0 ? "F test against the repeats" : "Cochran's Q",
+      significant(*r.q_p_value, 2), r.new_specimen ? "" : "; too few to predict a new one");
+}
+
+std::string repeat_words(const RandomEffects& r) {
+  return *r.repeat_variance > 0.0
+             ? fmt::format(
+                   "; repeats of a specimen differ with a standard deviation of {} in theta",
+                   significant(std::sqrt(*r.repeat_variance), 3))
+             : std::string("; repeats of a specimen agree within their standard errors");
+}
+
+/// Sums over the repeats of all specimens, with weights 1/s^2.
+struct RepeatSums {
+  double within = 0.0;   ///< sum w (y - mean of the specimen)^2
+  double between = 0.0;  ///< sum W (mean of the specimen - mean)^2
+  double scale = 0.0;    ///< sum over the specimens of sum w - sum w^2 / sum w
+  int degrees = 0;       ///< repeats less specimens
+};
+
+using Repeats = std::vector<std::vector<SpecimenEstimate>>;
+
+/// The specimens in the order of their first repeats.
+Repeats by_specimen(std::span<const SpecimenEstimate> repeats) {
+  const auto specimen_of = [](const SpecimenEstimate& e) {
+    return e.specimen.empty() ? e.name : e.specimen;
+  };
+  Repeats groups;
+  for (const SpecimenEstimate& e : repeats) {
+    const auto known = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
+      return specimen_of(group.front()) == specimen_of(e);
+    });
+    (known == groups.end() ? groups.emplace_back() : *known).push_back(e);
+  }
+  return groups;
+}
+
+RepeatSums repeat_sums(const Repeats& groups, double mean) {
+  RepeatSums sums;
+  for (const auto& group : groups) {
+    const WeightedMean own = weighted_mean(group, 0.0);
+    double squared_weights = 0.0;
+    for (const SpecimenEstimate& e : group) squared_weights += std::pow(e.standard_error, -4.0);
+    sums.within += own.squares;
+    sums.between += own.weights * std::pow(own.mean - mean, 2);
+    sums.scale += own.weights - squared_weights / own.weights;
+    sums.degrees += static_cast<int>(group.size()) - 1;
+  }
+  return sums;
 }
 
 }  // namespace
@@ -141,6 +191,34 @@ RandomEffects random_effects(std::span<const SpecimenEstimate> specimens, double
     r.new_specimen = around(r.mean, t * std::hypot(std::sqrt(*r.tau_squared), r.standard_error));
   }
   r.words = effects_words(r);
+  return r;
+}
+
+RandomEffects random_effects_of_repeats(std::span<const SpecimenEstimate> repeats, double level) {
+  require_valid(repeats, level);
+  const Repeats groups = by_specimen(repeats);
+  const RepeatSums sums = repeat_sums(groups, weighted_mean(repeats, 0.0).mean);
+  if (sums.degrees == 0) return random_effects(repeats, level);
+  const double variance = std::max(0.0, (sums.within - sums.degrees) / sums.scale);
+  std::vector<SpecimenEstimate> specimens;
+  for (const auto& group : groups) {
+    const WeightedMean own = weighted_mean(group, variance);
+    const SpecimenEstimate& first = group.front();
+    specimens.push_back({first.specimen.empty() ? first.name : first.specimen, own.mean,
+                         1.0 / std::sqrt(own.weights)});
+  }
+  RandomEffects r = random_effects(specimens, level);
+  r.repeat_variance = variance;
+  r.repeat_degrees = sums.degrees;
+  if (r.specimens > 1) {
+    const double f = (sums.between / static_cast<double>(r.specimens - 1)) /
+                     (sums.within / static_cast<double>(sums.degrees));
+    const boost::math::fisher_f distribution(static_cast<double>(r.specimens - 1), sums.degrees);
+    r.q = f;
+    r.q_p_value = std::isfinite(f) ? boost::math::cdf(boost::math::complement(distribution, f)) : 0;
+    r.words = effects_words(r);
+  }
+  r.words += repeat_words(r);
   return r;
 }
 

@@ -10,6 +10,7 @@ struct SpecimenEstimate {
   std::string name;
   double estimate = 0.0;
   double standard_error = 0.0;  ///< > 0
+  std::string specimen = {};    ///< whose repeat this is; empty: the name says it
 };
 
 /// Limits in theta.
@@ -20,14 +21,18 @@ struct EffectInterval {
 /// The estimate over specimens that differ, y_i = mu + u_i + e_i with u_i ~ N(0, tau^2) and
 /// e_i ~ N(0, s_i^2). Everything in theta; for a log parameter exp(mu) is the typical specimen.
 struct RandomEffects {
-  std::size_t specimens = 0;           ///< k
-  double mean = 0.0;                   ///< mu
-  double standard_error = 0.0;         ///< of mu, Hartung-Knapp
-  EffectInterval interval;             ///< of mu
-  std::optional<double> tau_squared;   ///< between specimens, by REML; empty for k = 1
-  bool tau_at_zero = false;            ///< the boundary: no spread beyond the standard errors
-  std::optional<double> q, q_p_value;  ///< Cochran's Q and its p-value (chi-square, k - 1)
-  std::optional<double> i_squared;     ///< max(0, (Q - (k - 1)) / Q), 0 .. 1
+  std::size_t specimens = 0;          ///< k
+  double mean = 0.0;                  ///< mu
+  double standard_error = 0.0;        ///< of mu, Hartung-Knapp
+  EffectInterval interval;            ///< of mu
+  std::optional<double> tau_squared;  ///< between specimens, by REML; empty for k = 1
+  bool tau_at_zero = false;           ///< the boundary: no spread beyond the standard errors
+  /// Test of spread between specimens: Cochran's Q and its p-value (chi-square, k - 1); with
+  /// repeats Q over the mean square between repeats (F, k - 1 and repeat_degrees).
+  std::optional<double> q, q_p_value;
+  std::optional<double> repeat_variance;       ///< between repeats, beyond their standard errors
+  int repeat_degrees = 0;                      ///< repeats less the specimens that have them
+  std::optional<double> i_squared;             ///< max(0, (Q - (k - 1)) / Q), 0 .. 1
   std::optional<EffectInterval> new_specimen;  ///< prediction interval; empty for k < 3
   std::string words;                           ///< one sentence
 };
@@ -44,5 +49,14 @@ struct RandomEffects {
 /// standard error is not positive.
 [[nodiscard]] RandomEffects random_effects(std::span<const SpecimenEstimate> specimens,
                                            double level = 0.95);
+
+/// The same where specimens were recorded repeatedly (SpecimenEstimate::specimen). Repeats differ
+/// by more than their standard errors: y_ij = mu + u_i + r_ij + e_ij with r_ij ~ N(0, rho^2), rho^2
+/// by moments within the specimens (DerSimonian and Laird 1986, pooled). A specimen is the weighted
+/// mean of its repeats, w = 1/(s^2 + rho^2). Spread between specimens is tested against the mean
+/// square between repeats, which is exact for equal standard errors whatever rho is. Without any
+/// repeats it is random_effects().
+[[nodiscard]] RandomEffects random_effects_of_repeats(std::span<const SpecimenEstimate> repeats,
+                                                      double level = 0.95);
 
 }  // namespace tpm

@@ -66,8 +66,16 @@ FitParameter readable(FitParameter fit) {
   return fit;
 }
 
-FitParameter law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int branches) {
+/// Automatic bounds, and how far they may be moved out.
+struct AutomaticBounds {
   FitParameter fit;
+  WidestBounds widest;
+};
+
+AutomaticBounds law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int branches) {
+  constexpr double kFurther = 1e3;  // on a log scale
+  FitParameter fit;
+  WidestBounds widest{p.lower, p.upper};
   fit.name = p.name;
   fit.unit = shown_unit(p.dimension);
   const double stiffness = sizes.response / sizes.drive;
@@ -76,6 +84,8 @@ FitParameter law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int
     fit.lower = 0.5 * sizes.shortest_s;
     fit.upper = 10.0 * sizes.longest_s;
     fit.start = std::clamp(0.1 * sizes.longest_s, fit.lower, fit.upper);
+    // What relaxes between two samples is not seen, however far the bound is moved.
+    widest = {fit.lower, kFurther * fit.upper};
   } else if (p.name == "exponent") {
     fit.scale = Scale::linear;
     fit.lower = 1.0;
@@ -96,8 +106,10 @@ FitParameter law_parameter_bounds(const LawParameter& p, const Sizes& sizes, int
     fit.lower = p.linear ? 0.0 : 1e-4 * stiffness;
     fit.upper = 1e3 * stiffness;
     fit.start = stiffness / (branches + 1);
+    widest = {fit.lower / (p.linear ? 1.0 : kFurther), kFurther * fit.upper};
   }
-  return readable(std::move(fit));
+  fit = readable(std::move(fit));
+  return {fit, {std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
 }
 
 bool is_stretch(const LawSpec& law) {
@@ -117,8 +129,11 @@ bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
          contact_s > r.from_s;
 }
 
-FitParameter contact_bounds(const LawSpec& law, std::span<const PreparedRecording> recordings,
-                            std::string name) {
+/// Contact may lie this many times the depth of the recording before its start at most.
+constexpr double kFurthestContact = 2.0;
+
+AutomaticBounds contact_bounds(const LawSpec& law, std::span<const PreparedRecording> recordings,
+                               std::string name) {
   FitParameter fit;
   fit.name = std::move(name);
   fit.scale = Scale::linear;
@@ -132,13 +147,19 @@ FitParameter contact_bounds(const LawSpec& law, std::span<const PreparedRecordin
   fit.lower = bends(law) || !stretch ? begin - (stretch ? 0.5 : 0.25) * range : begin;
   fit.upper = begin + (stretch ? 0.6 : 0.1) * range;
   if (preloaded && !stretch) fit.start = begin - 0.05 * range;
+  WidestBounds widest{begin - kFurthestContact * range, begin + 0.9 * range};
   // Under a straight kernel that was in contact from the start, depth and offset say the same.
-  if (!bends(law)) fit.lower = std::max(fit.lower, r.recording.drive.front());
+  if (!bends(law)) {
+    fit.lower = std::max(fit.lower, r.recording.drive.front());
+    widest.lower = fit.lower;
+  }
+  if (stretch) widest.lower = std::min(fit.lower, std::max(widest.lower, 0.1 * begin));
   fit.start = std::max(fit.start, fit.lower);
-  return readable(std::move(fit));
+  fit = readable(std::move(fit));
+  return {fit, {std::min(widest.lower, fit.lower), std::max(widest.upper, fit.upper)}};
 }
 
-FitParameter offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
+AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, std::string name) {
   FitParameter fit;
   fit.name = std::move(name);
   fit.scale = Scale::linear;
@@ -147,7 +168,8 @@ FitParameter offset_bounds(const LawSpec& law, const PreparedRecording& r, std::
   fit.start = 0.0;
   fit.lower = -peak;
   fit.upper = peak;
-  return readable(std::move(fit));
+  constexpr double kFurther = 10.0;
+  return {readable(std::move(fit)), {-kFurther * peak, kFurther * peak}};
 }
 
 Noise noise_of(const PreparedRecording& r) {
@@ -180,6 +202,10 @@ void require_alike(std::span<const PreparedRecording> recordings) {
   }
 }
 
+void add_automatic(FitConfig& config, AutomaticBounds bounds, std::vector<Target> sets) {
+  config.parameters.push_back({std::move(bounds.fit), std::move(sets), false, bounds.widest});
+}
+
 /// Adds the nuisance parameters of all recordings to a configuration.
 void add_nuisance(FitConfig& config, const LawModel& model,
                   std::span<const PreparedRecording> recordings, Nuisance nuisance) {
@@ -196,16 +222,15 @@ void add_nuisance(FitConfig& config, const LawModel& model,
   const bool shared_contact = is_stretch(law);
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     const PreparedRecording& r = recordings[i];
-    config.parameters.push_back(
-        {offset_bounds(law, r, named("offset", r)), {{model.index("offset"), scope(i)}}});
+    add_automatic(config, offset_bounds(law, r, named("offset", r)),
+                  {{model.index("offset"), scope(i)}});
     if (nuisance == Nuisance::offset || (shared_contact && i > 0)) continue;
     if (nuisance == Nuisance::automatic && !shared_contact && !contact_is_seen(law, r)) continue;
-    FitParameter contact =
+    add_automatic(
+        config,
         contact_bounds(law, recordings.subspan(i, 1),
-                       shared_contact ? std::string("slack_length") : named("contact", r));
-    config.parameters.push_back(
-        {std::move(contact),
-         {{model.index("contact"), shared_contact ? std::vector<std::size_t>{} : scope(i)}}});
+                       shared_contact ? std::string("slack_length") : named("contact", r)),
+        {{model.index("contact"), shared_contact ? std::vector<std::size_t>{} : scope(i)}});
   }
 }
 
@@ -235,13 +260,21 @@ double reference_drive(std::span<const PreparedRecording> recordings) {
   return rounded(sizes_of(recordings).drive, 2);
 }
 
+double common_reference(std::span<const PreparedRecording> recordings) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    least = std::min(least, reference_drive(recordings.subspan(i, 1)));
+  }
+  return least;
+}
+
 FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recordings,
                            const SetupOptions& options) {
   require_alike(recordings);
   law.drive = recordings.front().recording.drive_quantity;
   law.response = recordings.front().recording.response_quantity;
   const Sizes sizes = sizes_of(recordings);
-  law.reference = reference_drive(recordings);
+  law.reference = options.reference.value_or(reference_drive(recordings));
   const LawModel model(law);
   FitConfig config;
   config.law = law;
@@ -258,7 +291,7 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
   for (std::size_t i = 0; i < model.law_parameters().size(); ++i) {
     const LawParameter& p = model.law_parameters()[i];
     if (p.nuisance || p.preset) continue;
-    config.parameters.push_back({law_parameter_bounds(p, sizes, law.branches), {{i, {}}}});
+    add_automatic(config, law_parameter_bounds(p, sizes, law.branches), {{i, {}}});
   }
   for (const PreparedRecording& r : recordings) {
     DataChoice data;

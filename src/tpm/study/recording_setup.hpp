@@ -14,9 +14,10 @@ struct PreparedRecording {
   std::string name;  ///< unique within a fit; a path where the configuration is to be rerun
   Recording recording;
   RecordingPhases phases;
-  double from_s = 0.0;   ///< window that is fitted: from the start
-  double to_s = 0.0;     ///< to the end of the first hold (before the drive first falls back)
-  ImportOptions import;  ///< with which it was read, for the configuration
+  double from_s = 0.0;        ///< window that is fitted: from the start
+  double to_s = 0.0;          ///< to the end of the first hold (before the drive first falls back)
+  ImportOptions import;       ///< with which it was read, for the configuration
+  std::string specimen = {};  ///< whose repeat it is, in a folder; empty: a specimen of its own
 };
 
 /// Finds the phases and chooses the window. Throws Error(bad_input) if there is nothing to fit.
@@ -38,11 +39,17 @@ struct SetupOptions {
   std::uint64_t seed = 0;
   double level = 0.95;
   bool profiles = true;
+  /// Depth (or change of relative length) that the coefficients refer to; reference_drive() if
+  /// nobody says.
+  std::optional<double> reference;
 };
 
 /// A reference depth for the kernels: the largest drive above contact among the recordings, to two
 /// digits.
 [[nodiscard]] double reference_drive(std::span<const PreparedRecording> recordings);
+
+/// A reference depth that every recording reaches: the least of their own.
+[[nodiscard]] double common_reference(std::span<const PreparedRecording> recordings);
 
 /// The configuration that fits one law to the recordings together: bounds and starts from the
 /// recordings, an offset (and contact) of its own for each, normal noise of unknown size (or the

@@ -75,6 +75,11 @@ std::string not_identified(const Candidate& candidate) {
       return fmt::format("{} ends at its {} bound", p.parameter.name,
                          p.at_lower_bound ? "lower" : "upper");
     }
+    for (const Condition& c : p.conditional_on) {
+      if (!c.at_estimate) continue;
+      return fmt::format("{} ends at its {} bound, and {} depends on it", c.parameter,
+                         c.upper ? "upper" : "lower", p.parameter.name);
+    }
     if (!p.standard_error) return fmt::format("{} is not determined", p.parameter.name);
     const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0 &&
                            !may_vanish(candidate.law, law->name);
@@ -221,12 +226,15 @@ HeldOut predict_second_half(const Candidate& candidate, const PreparedRecording&
 void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
               const SelectionOptions& options) {
   if (c.failed) return;
+  // Coefficients go from one recording to another only at one reference depth.
+  SetupOptions setup = options.setup;
+  setup.reference = c.law.reference;
   try {
     if (recordings.size() == 1) {
-      c.held_out.push_back(predict_second_half(c, recordings.front(), options.setup));
+      c.held_out.push_back(predict_second_half(c, recordings.front(), setup));
     } else {
       for (std::size_t i = 0; i < recordings.size(); ++i) {
-        c.held_out.push_back(predict_one(c, recordings, i, options.setup));
+        c.held_out.push_back(predict_one(c, recordings, i, setup));
       }
     }
   } catch (const Error& error) {

@@ -20,7 +20,7 @@ struct Tally {
   double bic = 0.0;
   int parameters = 0;
   int identified = 0;
-  bool failed = false;
+  int recordings = 0;  ///< that it was fitted to
 };
 
 std::vector<Tally> tally_laws(std::span<const PreparedRecording> recordings,
@@ -35,11 +35,12 @@ std::vector<Tally> tally_laws(std::span<const PreparedRecording> recordings,
         return law_name(t.law) == law_name(c.law);
       });
       Tally& tally =
-          found == tallies.end() ? tallies.emplace_back(Tally{c.law, 0, 0, 0, false}) : *found;
+          found == tallies.end() ? tallies.emplace_back(Tally{c.law, 0, 0, 0, 0}) : *found;
+      if (c.failed) continue;
       tally.bic += c.delta_bic;
       tally.parameters += c.parameters;
       tally.identified += c.identified ? 1 : 0;
-      tally.failed = tally.failed || c.failed;
+      ++tally.recordings;
     }
   }
   return tallies;
@@ -48,24 +49,31 @@ std::vector<Tally> tally_laws(std::span<const PreparedRecording> recordings,
 std::pair<LawSpec, std::string> common_law(std::span<const PreparedRecording> recordings,
                                            const SelectionOptions& options) {
   const std::vector<Tally> tallies = tally_laws(recordings, options);
-  double best = std::numeric_limits<double>::infinity();
-  for (const Tally& t : tallies) {
-    if (!t.failed) best = std::min(best, t.bic);
-  }
   const double margin = options.margin * static_cast<double>(recordings.size());
-  const Tally* chosen = nullptr;
-  for (const Tally& t : tallies) {
-    if (t.failed || t.bic - best > margin) continue;
-    if (chosen == nullptr || t.parameters < chosen->parameters) chosen = &t;
+  const auto count = static_cast<int>(recordings.size());
+  for (const bool only_identified : {true, false}) {
+    const auto eligible = [&](const Tally& t) {
+      return t.recordings == count && (!only_identified || 2 * t.identified > count);
+    };
+    double best = std::numeric_limits<double>::infinity();
+    for (const Tally& t : tallies) {
+      if (eligible(t)) best = std::min(best, t.bic);
+    }
+    const Tally* chosen = nullptr;
+    for (const Tally& t : tallies) {
+      if (!eligible(t) || t.bic - best > margin) continue;
+      if (chosen == nullptr || t.parameters < chosen->parameters) chosen = &t;
+    }
+    if (chosen == nullptr) continue;
+    return {chosen->law,
+            fmt::format("{} is the least law within {} of the least sum of BIC over {} recordings"
+                        "{}; its parameters are identified in {} of them",
+                        law_name(chosen->law), significant(margin, 3), recordings.size(),
+                        only_identified ? " among the laws that most of them identify"
+                                        : ", but no law is identified in most of them",
+                        chosen->identified)};
   }
-  if (chosen == nullptr) {
-    throw Error(ExitCode::numerical, "fit", "no law could be fitted to every recording");
-  }
-  return {chosen->law,
-          fmt::format("{} is the least law within {} of the least sum of BIC over {} recordings; "
-                      "all its parameters are identified in {} of them",
-                      law_name(chosen->law), significant(margin, 3), recordings.size(),
-                      chosen->identified)};
+  throw Error(ExitCode::numerical, "fit", "no law could be fitted to every recording");
 }
 
 std::optional<std::size_t> place_of(const FitResult& fit, const std::string& name) {
@@ -100,6 +108,7 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
                          const SetupOptions& setup) {
   SpecimenRow row;
   row.name = one.front().name;
+  row.specimen = one.front().specimen;
   try {
     row.fit = run_fit(recording_config(law, one, setup), data_sets(one));
     row.place = branches_by_time(law, *row.fit);
@@ -110,18 +119,32 @@ SpecimenRow fit_specimen(const LawSpec& law, std::span<const PreparedRecording> 
   return row;
 }
 
-bool is_nuisance(const std::string& name) {
-  return name.starts_with("offset") || name.starts_with("contact");
+/// The slack length of a stretched strip is its own, but tells about it; contact and offset do not.
+bool is_of_recording(const ParameterResult& p) {
+  return p.nuisance && p.parameter.name != "slack_length";
 }
 
-std::vector<PooledParameter> pool(const std::vector<SpecimenRow>& rows, double level) {
+void require_one_reference(const SpecimenRow& first, const SpecimenRow& row) {
+  if (!row.fit) return;
+  const LawSpec& a = first.fit->config.law.value();
+  const LawSpec& b = row.fit->config.law.value();
+  if (!depends_on_reference(a) || a.reference == b.reference) return;
+  throw bad_input(fmt::format("recording '{}'", row.name),
+                  fmt::format("its {}", reference_words(b)),
+                  fmt::format("those of '{}': {}", first.name, reference_words(a)));
+}
+
+}  // namespace
+
+std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows, double level) {
   std::vector<PooledParameter> pooled;
   const auto first = std::find_if(rows.begin(), rows.end(), [](const auto& r) { return !!r.fit; });
   if (first == rows.end()) return pooled;
+  for (const SpecimenRow& row : rows) require_one_reference(*first, row);
   for (std::size_t i = 0; i < first->fit->parameters.size(); ++i) {
     PooledParameter p;
     p.parameter = first->fit->parameters[i].parameter;
-    if (is_nuisance(p.parameter.name)) continue;
+    if (is_of_recording(first->fit->parameters[i])) continue;
     // A stiffness varies between specimens by factors, not by differences.
     p.parameter.scale = p.parameter.lower < 0.0 ? Scale::linear : Scale::log;
     std::vector<SpecimenEstimate> estimates;
@@ -129,26 +152,27 @@ std::vector<PooledParameter> pool(const std::vector<SpecimenRow>& rows, double l
       if (!row.fit) continue;
       const ParameterResult& r = row.parameter(i);
       const bool usable = r.standard_error && !r.at_lower_bound && !r.at_upper_bound &&
+                          r.conditional_on.empty() &&
                           (p.parameter.scale == Scale::linear || r.estimate > 0.0);
       if (!usable) {
         ++p.left_out;
         continue;
       }
       const double slope = p.parameter.scale == Scale::log ? r.estimate : 1.0;
-      estimates.push_back({row.name, p.parameter.theta(r.estimate), *r.standard_error / slope});
+      estimates.push_back(
+          {row.name, p.parameter.theta(r.estimate), *r.standard_error / slope, row.specimen});
     }
     if (estimates.empty()) continue;
-    p.effects = random_effects(estimates, level);
+    p.effects = random_effects_of_repeats(estimates, level);
     pooled.push_back(std::move(p));
   }
   return pooled;
 }
 
-}  // namespace
-
 SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
-                              const std::optional<LawSpec>& law, const SelectionOptions& options) {
+                              const std::optional<LawSpec>& law, SelectionOptions options) {
   SpecimenStudy study;
+  if (!options.setup.reference) options.setup.reference = common_reference(recordings);
   if (law) {
     study.law = *law;
     study.why = fmt::format("{} was asked for", law_name(*law));
@@ -158,15 +182,21 @@ SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     study.rows.push_back(fit_specimen(study.law, recordings.subspan(i, 1), options.setup));
   }
-  study.pooled = pool(study.rows, options.setup.level);
+  study.law.drive = recordings.front().recording.drive_quantity;
+  study.law.response = recordings.front().recording.response_quantity;
+  study.law.reference = *options.setup.reference;
+  study.pooled = pool_specimens(study.rows, options.setup.level);
   return study;
 }
 
 Json to_json(const SpecimenStudy& study) {
   Json j{{"law", law_name(study.law)}, {"why", study.why}};
+  j[si_key(study.law.drive, "reference")] = rounded(study.law.reference, 6);
+  j["coefficients_depend_on_reference"] = depends_on_reference(study.law);
   Json rows = Json::array();
   for (const SpecimenRow& row : study.rows) {
     Json entry{{"recording", row.name}, {"fitted", row.fit.has_value()}};
+    if (!row.specimen.empty()) entry["specimen"] = row.specimen;
     if (row.fit) {
       entry["fit"] = to_json(*row.fit);
       Json order = Json::array();
@@ -194,6 +224,11 @@ Json to_json(const SpecimenStudy& study) {
                {"words", e.words}};
     if (e.tau_squared) entry["between_specimens_sd_of_log"] = rounded(std::sqrt(*e.tau_squared), 6);
     if (e.i_squared) entry["i_squared"] = rounded(*e.i_squared, 6);
+    if (e.q_p_value) entry["spread_p_value"] = rounded(*e.q_p_value, 6);
+    if (e.repeat_variance) {
+      entry["between_repeats_sd_of_log"] = rounded(std::sqrt(*e.repeat_variance), 6);
+      entry["repeat_degrees_of_freedom"] = e.repeat_degrees;
+    }
     if (e.new_specimen) {
       entry["new_specimen_SI"] = {rounded(p.parameter.natural(e.new_specimen->lower), 6),
                                   rounded(p.parameter.natural(e.new_specimen->upper), 6)};
@@ -204,8 +239,18 @@ Json to_json(const SpecimenStudy& study) {
   return j;
 }
 
+namespace {
+
+std::string shown_name(const SpecimenRow& row) {
+  return row.specimen.empty() ? row.name : fmt::format("{} [{}]", row.name, row.specimen);
+}
+
+}  // namespace
+
 std::string to_terminal_text(const SpecimenStudy& study) {
-  std::string text = fmt::format("{}\n\n{:<32} {:>9}", study.why, "recording", "rms/peak");
+  std::string text = study.why + "\n";
+  if (depends_on_reference(study.law)) text += reference_words(study.law) + "\n";
+  text += fmt::format("\n{:<32} {:>9}", "recording", "rms/peak");
   const auto first = std::find_if(study.rows.begin(), study.rows.end(),
                                   [](const auto& r) { return r.fit.has_value(); });
   if (first == study.rows.end()) {
@@ -220,11 +265,11 @@ std::string to_terminal_text(const SpecimenStudy& study) {
   }
   for (const SpecimenRow& row : study.rows) {
     if (!row.fit) {
-      text += fmt::format("{:<32} {}\n", row.name, row.reason);
+      text += fmt::format("{:<32} {}\n", shown_name(row), row.reason);
       continue;
     }
     const RecordingFit& r = row.fit->recordings.front();
-    text += fmt::format("{:<32} {:>9}", row.name,
+    text += fmt::format("{:<32} {:>9}", shown_name(row),
                         significant(100.0 * r.rms_residual / r.peak, 3) + " %");
     for (std::size_t i = 0; i < row.place.size(); ++i) {
       const ParameterResult& p = row.parameter(i);

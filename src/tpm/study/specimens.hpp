@@ -12,6 +12,7 @@ namespace tpm {
 /// One recording's own fit of the common law.
 struct SpecimenRow {
   std::string name;
+  std::string specimen = {};     ///< whose repeat it is; empty: a specimen of its own
   std::optional<FitResult> fit;  ///< empty if it could not be fitted
   std::string reason;            ///< then why
   /// Which of the fit's parameters stands for each of the common law's: a fit may number its
@@ -28,24 +29,32 @@ struct SpecimenRow {
 struct PooledParameter {
   FitParameter parameter;
   RandomEffects effects;  ///< in theta
-  int left_out = 0;       ///< specimens that do not determine it (at a bound or of no full rank)
+  int left_out = 0;       ///< recordings that do not determine it: it is at a bound, depends on a
+                          ///< nuisance parameter at one, or the fit is of no full rank
 };
 
 struct SpecimenStudy {
-  LawSpec law;
+  LawSpec law;      ///< with the reference depth of all coefficients
   std::string why;  ///< how the law was chosen
   std::vector<SpecimenRow> rows;
   std::vector<PooledParameter> pooled;
 };
 
 /// Fits one law to each recording by itself and pools the material parameters with random effects:
-/// a typical specimen, its interval, and the spread between specimens.
-/// @param law empty: the least law that all recordings support, that is the one with the fewest
-///        parameters whose sum of BIC over the recordings is within the margin (for each recording)
-///        of the least sum
+/// a typical specimen, its interval, and the spread between specimens. All coefficients refer to
+/// one depth: options.setup.reference, or common_reference(). Recordings of one specimen
+/// (PreparedRecording::specimen) are its repeats.
+/// @param law empty: of the laws whose parameters are identified in most of the recordings, the one
+///        with the fewest parameters whose sum of BIC over the recordings is within the margin (for
+///        each recording) of the least sum; if there is no such law, of all laws
 [[nodiscard]] SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
                                             const std::optional<LawSpec>& law,
-                                            const SelectionOptions& options);
+                                            SelectionOptions options);
+
+/// Pools what fits of one law found. Throws Error(bad_input) naming a recording whose coefficients
+/// refer to another depth than the first one's.
+[[nodiscard]] std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows,
+                                                          double level);
 
 [[nodiscard]] Json to_json(const SpecimenStudy& study);
 [[nodiscard]] std::string to_terminal_text(const SpecimenStudy& study);

@@ -1,0 +1,209 @@
+#include "tpm/fit/conditional.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/law/law.hpp"
+
+namespace tpm {
+
+bool is_nuisance(const FitConfig& config, std::size_t parameter) {
+  const EstimatedParameter& p = config.parameters[parameter];
+  if (p.sets.empty()) return true;  // of the noise
+  if (!config.law) return false;
+  const std::vector<LawParameter> table = law_parameters(*config.law);
+  return std::all_of(p.sets.begin(), p.sets.end(),
+                     [&](const Target& target) { return table[target.parameter].nuisance; });
+}
+
+namespace {
+
+constexpr int kReadableDigits = 4;
+
+/// The next lower bound; the old one where there is no room.
+double further_down(const FitParameter& p, double widest) {
+  const double next =
+      p.scale == Scale::linear ? p.start - 2.0 * (p.start - p.lower) : p.lower / 10.0;
+  return std::min(p.lower, std::max(rounded(next, kReadableDigits), widest));
+}
+
+double further_up(const FitParameter& p, double widest) {
+  const double next =
+      p.scale == Scale::linear ? p.start + 2.0 * (p.upper - p.start) : p.upper * 10.0;
+  return std::max(p.upper, std::min(rounded(next, kReadableDigits), widest));
+}
+
+/// Whether the bound of a nuisance parameter cuts the interval of another parameter.
+bool cuts_an_interval(const FitResult& result, LimitingBound bound) {
+  return std::any_of(result.parameters.begin(), result.parameters.end(), [&](const auto& p) {
+    const auto& by = p.profile.limited_by;
+    return std::find(by.begin(), by.end(), bound) != by.end();
+  });
+}
+
+/// The root of the information just outside the bound of a parameter, which is where it would go: a
+/// law may have a kink at the bound itself. At the bound where the model ends there.
+bool root_beyond_bound(const FitResult& result, const ResidualFunction& function,
+                       LimitingBound bound, RowMatrix& root) {
+  constexpr double kBeyond = 1e-6;  // of the width between the bounds
+  const FitParameter& p = result.parameters[bound.parameter].parameter;
+  std::vector<double> natural = result.best.natural;
+  double& held = natural[bound.parameter];
+  const bool up = bound.upper != p.reversed();
+  const double step = kBeyond * (p.theta_upper() - p.theta_lower());
+  held = p.natural(p.theta(bound.upper ? p.upper : p.lower) + (up ? step : -step));
+  if (std::isfinite(held) && function.information_root(natural, root)) return true;
+  held = bound.upper ? p.upper : p.lower;
+  return function.information_root(natural, root);
+}
+
+/// Which parameters a held one decides for: d theta_i / d theta_held times the width of its bounds,
+/// against the standard error of theta_i.
+std::vector<bool> dependents(const FitResult& result, const ResidualFunction& function,
+                             LimitingBound bound) {
+  const std::size_t held = bound.parameter;
+  std::vector<bool> depend(result.parameters.size(), true);
+  depend[held] = false;
+  const Covariance& c = result.covariance;
+  RowMatrix jacobian;
+  if (!c.full_rank || !root_beyond_bound(result, function, bound, jacobian)) return depend;
+  const auto column = [&](std::size_t i) -> Eigen::VectorXd {
+    const FitParameter& p = result.parameters[i].parameter;
+    return jacobian.col(static_cast<Eigen::Index>(i)) *
+           p.natural_slope(p.theta(result.best.natural[i]));
+  };
+  std::vector<std::size_t> free;
+  std::vector<double> sd;
+  for (std::size_t k = 0; k < c.free.size(); ++k) {
+    if (c.free[k] == held) continue;
+    free.push_back(c.free[k]);
+    sd.push_back(c.theta_sd[static_cast<Eigen::Index>(k)]);
+  }
+  const auto n = std::ssize(free);
+  Eigen::MatrixXd j(jacobian.rows(), n);
+  Eigen::VectorXd length(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    j.col(k) = column(free[static_cast<std::size_t>(k)]);
+    length[k] = j.col(k).norm();
+    if (!(length[k] > 0.0)) return depend;
+    j.col(k) /= length[k];
+  }
+  const FitParameter& p = result.parameters[held].parameter;
+  const double width = p.theta_upper() - p.theta_lower();
+  const Eigen::VectorXd moved =
+      (j.colPivHouseholderQr().solve(column(held)).array() / length.array()).matrix() * width;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto place = static_cast<std::size_t>(k);
+    depend[free[place]] = !(std::abs(moved[k]) <= sd[place]);
+  }
+  return depend;
+}
+
+void add_condition(ParameterResult& p, const Condition& condition) {
+  const bool known =
+      std::any_of(p.conditional_on.begin(), p.conditional_on.end(), [&](const Condition& c) {
+        return c.parameter == condition.parameter && c.upper == condition.upper;
+      });
+  if (!known) p.conditional_on.push_back(condition);
+}
+
+Condition condition_of(const ParameterResult& nuisance, bool upper, bool at_estimate) {
+  const FitParameter& p = nuisance.parameter;
+  return {p.name, upper, upper ? p.upper : p.lower, at_estimate};
+}
+
+/// "contact is on its lower bound -0.93 mm: k1 and exponent hold only there".
+std::string bound_flag(const FitResult& result, const ParameterResult& nuisance) {
+  const FitParameter& p = nuisance.parameter;
+  const bool upper = nuisance.at_upper_bound;
+  std::vector<std::string> names;
+  for (const ParameterResult& other : result.parameters) {
+    for (const Condition& c : other.conditional_on) {
+      if (c.at_estimate && c.parameter == p.name) names.push_back(other.parameter.name);
+    }
+  }
+  const std::string where =
+      fmt::format("{} is on its {} bound {}", p.name, upper ? "upper" : "lower",
+                  in_unit(p, upper ? p.upper : p.lower));
+  if (names.empty()) return where + "; no other parameter depends on it";
+  return fmt::format("{}: what is said of {} holds only there", where, fmt::join(names, ", "));
+}
+
+std::string condition_words(const ParameterResult& p, const std::vector<ParameterResult>& all) {
+  std::string words;
+  for (const Condition& c : p.conditional_on) {
+    const auto of = std::find_if(all.begin(), all.end(), [&](const ParameterResult& other) {
+      return other.parameter.name == c.parameter;
+    });
+    words += fmt::format("; {} {} at its {} bound {}",
+                         c.at_estimate ? "this holds only with" : "its interval ends with",
+                         c.parameter, c.upper ? "upper" : "lower", in_unit(of->parameter, c.value));
+  }
+  return words;
+}
+
+}  // namespace
+
+bool widen_pressed_bounds(const FitResult& result, const FitConfig& config,
+                          std::vector<FitParameter>& parameters) {
+  bool moved = false;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const std::optional<WidestBounds>& widest = config.parameters[i].widest;
+    if (!widest) continue;
+    FitParameter& p = parameters[i];
+    const double value = result.best.natural[i];
+    const bool nuisance = is_nuisance(config, i);
+    const auto presses = [&](bool upper) {
+      return (upper ? p.at_upper(value) : p.at_lower(value)) ||
+             (nuisance && cuts_an_interval(result, {i, upper}));
+    };
+    const bool below = presses(false);
+    const bool above = presses(true);
+    const double lower = below ? further_down(p, widest->lower) : p.lower;
+    const double upper = above ? further_up(p, widest->upper) : p.upper;
+    moved = moved || lower < p.lower || upper > p.upper;
+    p.lower = lower;
+    p.upper = upper;
+  }
+  return moved;
+}
+
+void mark_conditions(FitResult& result, const ResidualFunction& function) {
+  std::vector<ParameterResult>& all = result.parameters;
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].nuisance = is_nuisance(result.config, i);
+  for (std::size_t held = 0; held < all.size(); ++held) {
+    const ParameterResult& nuisance = all[held];
+    if (!nuisance.nuisance || !(nuisance.at_lower_bound || nuisance.at_upper_bound)) continue;
+    const std::vector<bool> depend = dependents(result, function, {held, nuisance.at_upper_bound});
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (depend[i]) add_condition(all[i], condition_of(nuisance, nuisance.at_upper_bound, true));
+    }
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (const LimitingBound& bound : all[i].profile.limited_by) {
+      const ParameterResult& nuisance = all[bound.parameter];
+      if (!nuisance.nuisance || !dependents(result, function, bound)[i]) continue;
+      add_condition(all[i], condition_of(nuisance, bound.upper, false));
+    }
+  }
+  for (ParameterResult& p : all) p.words += condition_words(p, all);
+  for (const ParameterResult& p : all) {
+    if (p.first_bounds) {
+      result.flags.push_back(fmt::format(
+          "the automatic bounds of {} were widened from {} .. {} to {} .. {}: the fit pressed on "
+          "them",
+          p.parameter.name, in_unit(p.parameter, p.first_bounds->lower),
+          in_unit(p.parameter, p.first_bounds->upper), in_unit(p.parameter, p.parameter.lower),
+          in_unit(p.parameter, p.parameter.upper)));
+    }
+    if (p.nuisance && (p.at_lower_bound || p.at_upper_bound)) {
+      result.flags.push_back(bound_flag(result, p));
+    }
+  }
+}
+
+}  // namespace tpm

@@ -1,0 +1,25 @@
+#pragma once
+#include <vector>
+
+#include "tpm/fit/fit.hpp"
+
+namespace tpm {
+
+/// Whether an estimated parameter belongs to the recordings or their noise (contact point, zero
+/// error, size of the noise) and not to the material.
+[[nodiscard]] bool is_nuisance(const FitConfig& config, std::size_t parameter);
+
+/// Moves automatic bounds (EstimatedParameter::widest) out that the fit presses on: where the
+/// estimate stands on one, or where one of a nuisance parameter cuts another parameter's interval.
+/// Each time the distance from the start is doubled (on a log scale: ten times as far).
+/// @param parameters the bounds of the fit, changed here
+/// @return whether any bound was moved
+[[nodiscard]] bool widen_pressed_bounds(const FitResult& result, const FitConfig& config,
+                                        std::vector<FitParameter>& parameters);
+
+/// Fills ParameterResult::nuisance and conditional_on, and says so in words and flags. What stands
+/// on a bound decides for all parameters that would move by more than a standard error if it were
+/// moved by the width of its bounds (linearised).
+void mark_conditions(FitResult& result, const ResidualFunction& function);
+
+}  // namespace tpm

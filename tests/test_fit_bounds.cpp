@@ -1,0 +1,209 @@
+// Bounds that decide an answer, and profiles that fail.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "tpm/core/random.hpp"
+#include "tpm/law/law_model.hpp"
+#include "tpm/report/recording_report.hpp"
+#include "tpm/study/selection.hpp"
+
+using namespace tpm;
+using Catch::Matchers::Contains;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+/// Ramp of 3 mm at 2 mm/s and a hold; the specimen was touched `before` above where it begins.
+PreparedRecording pressed_from_the_start(double before, double exponent) {
+  LawSpec spec = parse_law_name("power-1", "test");
+  spec.reference = 5e-3;
+  const std::vector<double> values{100.0, 120.0, 2.0, exponent, -before, 0.0};
+  Recording r;
+  for (int i = 0; i < 200; ++i) {
+    r.time_s.push_back(0.05 * i);
+    r.drive.push_back(std::min(3e-3, 2e-3 * r.time_s.back()));
+  }
+  // The contact has rested at its first depth.
+  Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
+  history.set_relaxed_at_start(true);
+  const Eigen::VectorXd f = LawModel(spec).respond(history, r.time_s, values, Want::values).value;
+  Random random(11);
+  for (const double force : f) r.response.push_back(force + 2e-4 * f.maxCoeff() * random.normal());
+  return prepare_recording("pressed.csv", r);
+}
+
+const ParameterResult& named(const FitResult& fit, const std::string& name) {
+  for (const ParameterResult& p : fit.parameters) {
+    if (p.parameter.name == name) return p;
+  }
+  throw std::runtime_error(name);
+}
+
+FitResult fitted_power(const PreparedRecording& r, bool widen) {
+  const std::vector<PreparedRecording> one{r};
+  FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
+  for (EstimatedParameter& p : config.parameters) {
+    if (!widen) p.widest.reset();
+  }
+  return run_fit(config, data_sets(one));
+}
+
+}  // namespace
+
+TEST_CASE("An automatic bound of the contact point that presses is widened before anything is said",
+          "[bounds]") {
+  const PreparedRecording r = pressed_from_the_start(2e-3, 2.5);
+  const FitResult kept = fitted_power(r, false);
+  const ParameterResult& wrong = named(kept, "exponent");
+  REQUIRE(named(kept, "contact").at_lower_bound);
+  REQUIRE(wrong.verdict == Verdict::identified);
+  REQUIRE(wrong.upper.value() < 2.5);  // what the bound alone decides
+
+  const FitResult fit = fitted_power(r, true);
+  const ParameterResult& exponent = named(fit, "exponent");
+  const ParameterResult& contact = named(fit, "contact");
+  CHECK_FALSE(contact.at_lower_bound);
+  CHECK(contact.nuisance);
+  REQUIRE(contact.first_bounds);
+  CHECK(contact.first_bounds->lower > contact.parameter.lower);
+  CHECK_THAT(contact.first_bounds->lower, WithinRel(-0.75e-3, 1e-9));
+  CHECK(exponent.conditional_on.empty());
+  CHECK(exponent.lower.value() < 2.5);
+  CHECK(exponent.upper.value() > 2.5);
+  CHECK(contact.lower.value() < -2e-3);
+  CHECK(contact.upper.value() > -2e-3);
+  // The configuration that is written out has the bounds that were used.
+  const auto& bounds = fit.config.parameters.back().fit;
+  CHECK(bounds.name == "contact");
+  CHECK(bounds.lower == contact.parameter.lower);
+  CHECK_THAT(fmt::format("{}", fmt::join(fit.flags, "\n")),
+             Contains("the automatic bounds of contact were widened from -0.75 mm .. 0.3 mm"));
+}
+
+TEST_CASE("Verdicts that depend on a nuisance parameter on its bound are conditional", "[bounds]") {
+  // Touched further away than automatic bounds go.
+  const PreparedRecording r = pressed_from_the_start(12e-3, 3.0);
+  const FitResult fit = fitted_power(r, true);
+  const ParameterResult& contact = named(fit, "contact");
+  REQUIRE(contact.at_lower_bound);
+  CHECK_THAT(contact.parameter.lower, WithinRel(-6e-3, 1e-9));
+  const ParameterResult& exponent = named(fit, "exponent");
+  REQUIRE(exponent.conditional_on.size() == 1);
+  CHECK(exponent.conditional_on.front() == Condition{"contact", false, -6e-3, true});
+  CHECK_THAT(exponent.words, Contains("this holds only with contact at its lower bound -6 mm"));
+
+  const Json json = to_json(fit);
+  for (const Json& p : json.at("parameters")) {
+    if (p.at("name") != "exponent") continue;
+    CHECK(p.at("verdict") == "identified, conditional on contact at its lower bound");
+    CHECK(p.at("conditional_on").at(0).at("parameter") == "contact");
+    CHECK(p.at("conditional_on").at(0).at("bound_SI") == -6e-3);
+  }
+  CHECK_THAT(to_terminal_text(fit),
+             Contains("identified, conditional on contact at its lower bound") &&
+                 Contains("upper limit only; on its lower bound") &&
+                 Contains("note: contact is on its lower bound -6 mm: what is said of k_inf"));
+  CHECK_THAT(recording_figure(fit, 0).caption, Contains("presses on a bound of contact (-6 mm)"));
+
+  const std::vector<PreparedRecording> one{r};
+  SelectionOptions options;
+  options.laws = {parse_law_name("power-1", "test")};
+  options.only_listed = true;
+  options.held_out = false;
+  const Selection s = select_law(one, options);
+  CHECK_FALSE(s.candidates.front().identified);
+  CHECK_THAT(s.candidates.front().reason, Contains("contact ends at its lower bound, and k_inf"));
+}
+
+TEST_CASE("An interval that a bound of the contact point cuts says so", "[bounds]") {
+  const PreparedRecording r = pressed_from_the_start(2e-3, 2.5);
+  const std::vector<PreparedRecording> one{r};
+  FitConfig config = recording_config(parse_law_name("power-1", "test"), one, {});
+  const double estimate = named(fitted_power(r, true), "contact").estimate;
+  for (EstimatedParameter& p : config.parameters) {
+    p.widest.reset();
+    if (p.fit.name == "contact") p.fit.lower = estimate - 1e-6;  // within the interval
+  }
+  const FitResult fit = run_fit(config, data_sets(one));
+  CHECK_FALSE(named(fit, "contact").at_lower_bound);
+  const ParameterResult& exponent = named(fit, "exponent");
+  REQUIRE(exponent.conditional_on.size() == 1);
+  CHECK_FALSE(exponent.conditional_on.front().at_estimate);
+  CHECK_THAT(exponent.words, Contains("its interval ends with contact at its lower bound"));
+}
+
+TEST_CASE("A profile that fails is not a flat profile", "[bounds]") {
+  // The creep of a Maxwell element without noise: u = F/k (1 + t/tau).
+  PointSet creep;
+  creep.header.id = "maxwell";
+  creep.observable = Observable::indentation_depth;
+  creep.time_origin = TimeOrigin::load_applied;
+  for (int i = 1; i <= 20; ++i) {
+    Datum d;
+    d.load_N = 0.5;
+    d.time_s = 0.05 * i;
+    d.value = 0.5 / 100.0 * (1.0 + *d.time_s);
+    d.provenance = Provenance::derived;
+    creep.data.push_back(d);
+  }
+  const Json document = parse_json(R"({
+    "title": "exact", "law": {"name": "linear-1-fluid", "drive": "indentation_depth",
+                              "reference": "5 mm"},
+    "parameters": {
+      "k1": {"start": "80 N/m", "lower": "1 N/m", "upper": "10000 N/m", "scale": "log",
+             "sets": ["k1"]},
+      "tau1": {"start": "3 s", "lower": "0.001 s", "upper": "1000 s", "scale": "log",
+               "sets": ["tau1"]}},
+    "data": [{"dataset": "maxwell", "protocol": {"kind": "creep"},
+              "noise": {"kind": "absolute", "absolute": "0.01 mm", "scale": "estimated"}}],
+    "starts": {"count": 4, "seed": 0}})",
+                                   "test");
+  const FitResult fit = run_fit(parse_fit_config(document, "test"), {creep});
+  const ParameterResult& tau = named(fit, "tau1");
+  CHECK_THAT(tau.estimate, WithinRel(1.0, 1e-9));
+  CHECK(tau.standard_error.value() < 1e-9);
+  CHECK(tau.verdict == Verdict::failed);
+  CHECK(has_failed(tau.profile.below));
+  CHECK(has_failed(tau.profile.above));
+  CHECK_THAT(tau.words, Contains("its profile failed on both sides") &&
+                            Contains("does not mean that it is unknown") &&
+                            Contains("linearised standard error"));
+  CHECK_THAT(to_terminal_text(fit), Contains("profile failed") && !Contains("every value from"));
+  const Json p = to_json(fit).at("parameters").at(1);
+  CHECK(p.at("verdict") == "profile failed");
+  CHECK(p.at("profile_failed") == Json({"lower", "upper"}));
+  CHECK(p.at("interval_SI") == Json({nullptr, nullptr}));
+}
+
+TEST_CASE("A bound at which contact and offset begin to say the same is no condition", "[bounds]") {
+  // A straight kernel at rest in contact: less depth and more offset are one law.
+  LawSpec spec = parse_law_name("linear-1", "test");
+  Recording r;
+  for (int i = 0; i < 240; ++i) {
+    r.time_s.push_back(0.1 * i);
+    r.drive.push_back(std::min(5e-3, std::max(0.0, 2e-3 * (r.time_s.back() - 1.0))));
+  }
+  const Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
+  const Eigen::VectorXd f =
+      LawModel(spec)
+          .respond(history, r.time_s, std::vector<double>{100.0, 120.0, 3.0, 0.0, 0.0},
+                   Want::values)
+          .value;
+  int on_bound = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    Random random(seed);
+    r.response.clear();
+    for (const double force : f) {
+      r.response.push_back(force + 0.005 * f.maxCoeff() * random.normal());
+    }
+    const std::vector<PreparedRecording> one{prepare_recording("r.csv", r)};
+    const FitResult fit = run_fit(recording_config(spec, one, {}), data_sets(one));
+    on_bound += named(fit, "contact").at_lower_bound ? 1 : 0;
+    CHECK(named(fit, "k_inf").conditional_on.empty());
+    CHECK(named(fit, "tau1").conditional_on.empty());
+  }
+  CHECK(on_bound > 0);
+}
