@@ -5,10 +5,16 @@
 packages_run=(
   g++ cmake ninja-build
   libeigen3-dev libceres-dev libsundials-dev libboost-dev
-  libhdf5-dev nlohmann-json3-dev libvalijson-dev libcsv-dev libutfcpp-dev libssl-dev
+  libhdf5-dev nlohmann-json3-dev libcsv-dev libutfcpp-dev libssl-dev
   libmuparser-dev libcpp-httplib-dev pkg-config libcli11-dev libfmt-dev libassimp-dev libnanoflann-dev
   libtbb-dev zlib1g-dev
   python3 python3-numpy python3-matplotlib
+)
+
+# Header-only libraries whose packages ask for much that is not used: for its adapters to other JSON libraries
+# libvalijson-dev would bring Qt and Poco, 130 packages of 292 MiB. Unpacked into build/packages, not installed.
+packages_unpacked=(
+  libvalijson-dev
 )
 
 # What the tests need besides.
