@@ -51,14 +51,13 @@ double checkpoint_interval_s(const SimulateChoice& choice) {
 SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& network,
                           double checkpoint_every_s, const fs::path& checkpoint) {
   const InterruptWatch interrupts;
-  std::optional<Progress> progress;
+  // Shown from the beginning: the first point of a large organ may take long.
+  Progress progress(scene.formulation.mass_spring ? "mass-spring model" : "simulating",
+                    times_to_watch(scene).size());
   SimulationControls controls;
   std::size_t before = 0;
-  controls.progress = [&](std::size_t done, std::size_t total) {
-    if (!progress) {
-      progress.emplace(scene.formulation.mass_spring ? "mass-spring model" : "simulating", total);
-    }
-    progress->advance(done - before);
+  controls.progress = [&](std::size_t done, std::size_t /*total*/) {
+    progress.advance(done - before);
     before = done;
   };
   controls.interrupted = InterruptWatch::seen;
