@@ -39,12 +39,11 @@ int list_devices(const DeviceOptions& options, const Session& session) {
     omega7 = error.what();
   }
   if (session.json()) {
-    fmt::print("{}", to_text(Json{{"omega7", {{"available", count > 0}, {"reason", omega7}}},
-                                  {"virtual", {{"available", true}, {"simulated_device", true}}},
-                                  {"replay", {{"available", true}, {"simulated_device", true}}}}));
+    say("{}", to_text(Json{{"omega7", {{"available", count > 0}, {"reason", omega7}}},
+                           {"virtual", {{"available", true}, {"simulated_device", true}}},
+                           {"replay", {{"available", true}, {"simulated_device", true}}}}));
   } else {
-    fmt::print(
-        "omega7   {}\nvirtual  always there: a simulated Omega.7 and operator, no hardware\nreplay "
+    say("omega7   {}\nvirtual  always there: a simulated Omega.7 and operator, no hardware\nreplay "
         "  "
         "always there: the motion of a recording, no hardware\n",
         omega7);
@@ -144,9 +143,9 @@ int run_hil(const RunChoice& choice, const Session& session) {
   if (session.json()) {
     Json json = run_json(hil, run);
     json["recording"] = choice.output;
-    fmt::print("{}", to_text(json));
+    say("{}", to_text(json));
   } else {
-    fmt::print("{}wrote {}\n", run_text(hil, run), choice.output);
+    say("{}wrote {}\n", run_text(hil, run), choice.output);
   }
   for (const std::string& warning : run.rendering.warnings) {
     tell_user("tpm: warning: {}\n", warning);

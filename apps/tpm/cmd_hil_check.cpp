@@ -34,7 +34,7 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   const InterruptWatch interrupts;
   const JitterCheck check = check_jitter(chosen_device(choice.device), rate, duration,
                                          chosen_wish(choice.device), InterruptWatch::seen);
-  fmt::print("{}", session.json() ? to_text(check_json(check)) : check_text(check));
+  say("{}", session.json() ? to_text(check_json(check)) : check_text(check));
   return static_cast<int>(check.fit ? ExitCode::success : ExitCode::answer_is_no);
 }
 

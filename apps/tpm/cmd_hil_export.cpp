@@ -20,14 +20,14 @@ int export_hil(const ExportChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   export_recording(recording, sha256_hex(read_file(choice.recording)), choice.output);
   if (session.json()) {
-    fmt::print("{}", to_text(Json{{"file", choice.output},
-                                  {"rows", recording.rows.size()},
-                                  {"whole", recording.closed},
-                                  {"simulated_device", recording.simulated()}}));
+    say("{}", to_text(Json{{"file", choice.output},
+                           {"rows", recording.rows.size()},
+                           {"whole", recording.closed},
+                           {"simulated_device", recording.simulated()}}));
   } else {
-    fmt::print("{}\n{}wrote {}: {} rows\n", device_line(recording),
-               recording.closed ? "" : "the recording is cut off: no closing record\n",
-               choice.output, recording.rows.size());
+    say("{}\n{}wrote {}: {} rows\n", device_line(recording),
+        recording.closed ? "" : "the recording is cut off: no closing record\n", choice.output,
+        recording.rows.size());
   }
   return 0;
 }

@@ -35,21 +35,22 @@ VerifyOptions options_of(const VerifyChoice& choice) {
 int verify_hil(const VerifyChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
-  fmt::print("{}", session.json() ? to_text(verification_json(recording, v))
-                                  : verification_text(recording, v));
+  say("{}",
+      session.json() ? to_text(verification_json(recording, v)) : verification_text(recording, v));
   return 0;
 }
 
 int report_hil(const VerifyChoice& choice, const Session& session) {
+  will_write_into(choice.output, {"figures.json", "report.md", "report.html", "report.json"});
   const std::string python = find_drawing_python();
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
   write_hil_report(recording, v, choice.output, python);
   if (session.json()) {
-    fmt::print("{}", to_text(verification_json(recording, v)));
+    say("{}", to_text(verification_json(recording, v)));
   } else {
-    fmt::print("{}wrote {}/report.html, report.md and report.json\n",
-               verification_text(recording, v), choice.output);
+    say("{}wrote {}/report.html, report.md and report.json\n", verification_text(recording, v),
+        choice.output);
   }
   return 0;
 }

@@ -7,10 +7,12 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
+#include <optional>
 
 #include "tpm/core/error.hpp"
 #include "tpm/store/check_sum.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/replacement.hpp"
 
 namespace tpm {
 namespace {
@@ -64,7 +66,7 @@ class Cursor {
   std::size_t at_ = 0;
 };
 
-Error cannot_write(const std::filesystem::path& path, const char* what) {
+Error cannot_write_rows(const std::filesystem::path& path, const char* what) {
   return {ExitCode::environment, path.string(), fmt::format("{}: {}", what, std::strerror(errno))};
 }
 
@@ -73,25 +75,23 @@ Error cannot_write(const std::filesystem::path& path, const char* what) {
 RowLogWriter::RowLogWriter(std::filesystem::path path, std::string_view header,
                            std::size_t row_bytes)
     : path_(std::move(path)), row_bytes_(row_bytes) {
-  std::error_code ignored;
-  if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), ignored);
-  const bool in_place = is_device_or_pipe(path_);
-  const std::string begun =
-      in_place ? path_.string() : fmt::format("{}.part.{}", path_.string(), ::getpid());
-  file_ = ::open(begun.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file_ < 0) throw cannot_write(path_, "cannot be written");
+  std::optional<Replacement> begun;
+  if (is_device_or_pipe(path_)) {
+    file_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  } else {
+    begun.emplace(path_);
+    file_ = ::fcntl(begun->descriptor(), F_DUPFD_CLOEXEC, 0);
+  }
+  if (file_ < 0) throw cannot_write_rows(path_, "cannot be written");
   kept_.reserve(2 * kBlock);
   put(kept_, kMagic.data(), kMagic.size());
   put_number(kept_, static_cast<std::uint32_t>(row_bytes));
   put_text(kept_, header);
   try {
     flush();
-    if (!in_place && ::rename(begun.c_str(), path_.c_str()) != 0) {
-      throw cannot_write(path_, "cannot be written");
-    }
+    if (begun) begun->put_in_place();
   } catch (...) {
     (void)::close(file_);
-    if (!in_place) (void)::unlink(begun.c_str());
     throw;
   }
 }
@@ -113,7 +113,7 @@ void RowLogWriter::flush() {
   while (done < kept_.size()) {
     const ssize_t written = ::write(file_, kept_.data() + done, kept_.size() - done);
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw cannot_write(path_, "cannot be written on");
+    if (written < 0) throw cannot_write_rows(path_, "cannot be written on");
     done += static_cast<std::size_t>(written);
   }
   kept_.clear();
@@ -124,14 +124,15 @@ void RowLogWriter::close(std::string_view closing) {
   put_text(kept_, closing);
   flush();
   if (::fsync(file_) != 0 && errno != EINVAL) {  // EINVAL: a device or pipe, without a disk
-    throw cannot_write(path_, "cannot be brought to the disk");
+    throw cannot_write_rows(path_, "cannot be brought to the disk");
   }
   (void)::close(file_);
   file_ = -1;
 }
 
 RowLog read_row_log(const std::filesystem::path& path) {
-  const std::string bytes = read_file(path);
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 36U;  // a working day at 4 kHz
+  const std::string bytes = read_file(path, kMost);
   Cursor cursor(bytes);
   RowLog log;
   std::string magic(kMagic.size(), '\0');
