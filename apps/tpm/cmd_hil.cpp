@@ -99,9 +99,10 @@ void warn_if_beyond_model(const ServoOutcome& outcome) {
       outcome.counts.beyond_model, outcome.cycles);
 }
 
+constexpr int kStoppedBySignal = 128;
+
 int exit_code_of(const ServoOutcome& outcome) {
   if (outcome.cause == StopCause::finished) return 0;
-  constexpr int kStoppedBySignal = 128;
   if (outcome.cause == StopCause::signal) return kStoppedBySignal + InterruptWatch::signal();
   tell_user("tpm: session stopped: {}{}{}\n", word_of(outcome.cause),
             outcome.detail.empty() ? "" : ": ", outcome.detail);
@@ -120,7 +121,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   options.wish = chosen_wish(choice.device);
   options.recording = choice.output;
   options.accept_unstable = choice.accept_unstable;
-  const InterruptWatch interrupts;
+  const InterruptWatch interrupts(InterruptWatch::Of::motors);
   options.interrupted = InterruptWatch::seen;
   std::optional<HilPage> page;
   if (!choice.page.port.empty()) {
@@ -138,7 +139,14 @@ int run_hil(const RunChoice& choice, const Session& session) {
     guide->begin();
     if (opened) opened(identity, model);
   };
-  const SessionRun run = run_session(hil, device, options);
+  SessionRun run;
+  try {
+    run = run_session(hil, device, options);
+  } catch (const Error& error) {
+    if (!InterruptWatch::seen()) throw;
+    tell_user("tpm: {}\n", error.what());
+    return kStoppedBySignal + InterruptWatch::signal();
+  }
   guide.reset();
   if (session.json()) {
     Json json = run_json(hil, run);

@@ -22,14 +22,15 @@ int export_hil(const ExportChoice& choice, const Session& session) {
   if (session.json()) {
     say("{}", to_text(Json{{"file", choice.output},
                            {"rows", recording.rows.size()},
-                           {"whole", recording.closed},
+                           {"whole", recording.closed && recording.damaged == 0},
+                           {"damaged_rows", recording.damaged},
                            {"simulated_device", recording.simulated()}}));
   } else {
-    say("{}\n{}wrote {}: {} rows\n", device_line(recording),
-        recording.closed ? "" : "the recording is cut off: no closing record\n", choice.output,
-        recording.rows.size());
+    const std::string damage = damage_line(recording);
+    say("{}\n{}{}wrote {}: {} rows\n", device_line(recording), damage, damage.empty() ? "" : "\n",
+        choice.output, recording.rows.size());
   }
-  return 0;
+  return static_cast<int>(recording.damaged == 0 ? ExitCode::success : ExitCode::answer_is_no);
 }
 
 }  // namespace
