@@ -169,6 +169,10 @@ void require_valid(const LawSpec& spec, std::string_view where) {
         fmt::format("{} answered by {}", quantity_name(spec.drive), quantity_name(spec.response)),
         "indentation_depth with contact_force, or relative_length with stress");
   }
+  if (spec.kernel == Kernel::hertz && stretch) {
+    throw bad_input(where, "a Hertz kernel over a relative length",
+                    "a linear or power kernel: Hertz is the contact of a ball over its depth");
+  }
 }
 
 std::vector<LawParameter> law_parameters(const LawSpec& spec) {

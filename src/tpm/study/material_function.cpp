@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tpm/core/error.hpp"
@@ -151,7 +152,8 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
     return candidate;
   }
   candidate.rms_over_peak = largest_residual_share(candidate.fit);
-  candidate.reason = not_identified(candidate);
+  candidate.reason = not_identified(
+      candidate, {.hold_s = std::numeric_limits<double>::infinity()});
   candidate.identified = candidate.reason.empty();
   return candidate;
 }
