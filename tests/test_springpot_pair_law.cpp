@@ -218,8 +218,8 @@ TEST_CASE("the spring-pots may be named in either order", "[pair]") {
 TEST_CASE("in time the derivatives by all parameters of two spring-pots are exact", "[pair]") {
   const Protocol push(Drive::displacement, {{0.0, 0.0}, {0.7, 2e-3}, {2.0, 3e-3}, {6.0, 2.5e-3}});
   const std::vector<double> times{0.1, 0.5, 0.7, 1.3, 2.0, 2.5, 6.0};
-  for (const char* name : {"linear-fmaxwell2", "linear-fkelvin_voigt2", "linear-fzener2",
-                           "power-fzener2"}) {
+  for (const char* name :
+       {"linear-fmaxwell2", "linear-fkelvin_voigt2", "linear-fzener2", "power-fzener2"}) {
     const LawSpec spec = law_of(name);
     const LawModel law(spec);
     auto values = values_of(spec, 0.7, 0.15);
