@@ -224,9 +224,10 @@ TEST_CASE("in time the derivatives by all parameters of two spring-pots are exac
     const LawModel law(spec);
     auto values = values_of(spec, 0.7, 0.15);
     if (spec.kernel == Kernel::power) values[law.index("exponent")] = 1.6;
+    // At 0 the differences to both sides would not agree: one of them begins in contact.
+    values[law.index("contact")] = 1e-4;
     const auto r = law.respond(push, times, values, Want::values_and_sensitivity);
     for (std::size_t i = 0; i < times.size(); ++i) {
-      const std::vector<double> at{times[i]};
       INFO(name << " at " << times[i] << " s");
       const auto row = static_cast<Eigen::Index>(i);
       check_slopes(
@@ -365,7 +366,7 @@ TEST_CASE("a jump is refused by two spring-pots, and a load makes them creep", "
 
 TEST_CASE("infinite time relaxes two spring-pots fully, but not a spring", "[pair]") {
   const std::vector<double> ends{INFINITY};
-  const Protocol ramp = ramp_and_hold(2e-3, 1e-3, INFINITY);
+  const Protocol ramp(Drive::displacement, {{0.0, 0.0}, {2.0, 2e-3}}, "ramp", true);
   const auto end_of = [&](const char* name, const std::vector<double>& values) {
     return LawModel(law_of(name)).respond(ramp, ends, values, Want::values).value[0];
   };
@@ -388,7 +389,7 @@ TEST_CASE("laws of two spring-pots go through files and exports", "[pair]") {
     CHECK(back.spec == law.spec);
     CHECK(back.values == law.values);
     const PronyTable table = prony_table(law.spec, law.values, {});
-    CHECK(table.worst_relative_error < 0.02);
+    CHECK(table.worst_relative_error < 0.03);
     for (const double t : {0.01, 0.3, 5.0, 100.0}) {
       CHECK_THAT(table.at(t), WithinRel(law_relaxation(law.spec, law.values, t).value,
                                         1.001 * table.worst_relative_error));
