@@ -1,13 +1,18 @@
 #!/usr/bin/env python3
-"""Writes tests/fixtures/mittag_leffler.csv: E_{alpha,beta}(-z) to 25 digits.
+"""Writes tests/fixtures/mittag_leffler.csv: E_{alpha,beta}(-z) to 25 digits, and with the option
+--slopes tests/fixtures/mittag_leffler_slopes.csv: E_{a,b}(-z) of free orders and its derivatives.
 
     python3 scripts/reference_mittag_leffler.py > tests/fixtures/mittag_leffler.csv
+    python3 scripts/reference_mittag_leffler.py --slopes > tests/fixtures/mittag_leffler_slopes.csv
 
 Needs mpmath. Shares no formula with src/tpm/solve/mittag_leffler.cpp beyond the definition: up to
 t = z^(1/alpha) = 95 the power series in enough digits to survive its cancellation (terms reach
 exp(t)), above it the asymptotic series, whose smallest term is about exp(-t). Where both reach the
 digits (95 <= t <= 130) they are compared, and a disagreement stops the script. alpha = 1 is in
 closed form. z and alpha are the binary numbers that the table names, taken exactly.
+
+The derivatives are those of the same series term by term, 1/Gamma being differentiated as -psi/Gamma.
+At a = 1 the asymptotic series lacks an exponential, which is below 1e-40 there.
 """
 import sys
 
@@ -71,8 +76,74 @@ def mittag_leffler(alpha, beta, z):
     return far
 
 
+SLOPE_DIGITS = 20
+SLOPE_ORDERS_A = [0.02, 0.1, 0.3, 0.5, 0.65, 0.8, 0.9, 0.97, 0.999, 1.0]
+SLOPE_ORDERS_B = [0.03, 0.2, 0.5, 0.85, 1.0, 1.4, 2.0]
+SLOPE_Z = [1e-4, 0.02, 0.2, 0.7, 1.0, 1.3, 3.0, 12.0, 60.0, 1e3, 1e6]
+
+
+def inverse_gamma_slope(x):
+    """The derivative of 1/Gamma at x."""
+    if x <= 0 and x == mp.floor(x):
+        return (-1) ** int(-x) * mp.factorial(-x)
+    return -mp.psi(0, x) * mp.rgamma(x)
+
+
+def slopes_by_power_series(a, b, z):
+    """Value and derivatives by a, b and z from the power series."""
+    time = z ** (1 / a)
+    with mp.workdps(int(DIGITS + 30 + float(time))):
+        sums, power, n = [mp.mpf(0)] * 4, mp.mpf(1), 0
+        small = mp.mpf(10) ** (-DIGITS - 25 - int(float(time) / 2.3))
+        while True:
+            gamma, slope = mp.rgamma(a * n + b), inverse_gamma_slope(a * n + b)
+            terms = [power * gamma, power * n * slope, power * slope, power * n / z * gamma]
+            sums = [total + term for total, term in zip(sums, terms)]
+            if a * n > time and all(abs(term) < small for term in terms):
+                return sums
+            power *= -z
+            n += 1
+
+
+def slopes_by_asymptotic_series(a, b, z):
+    with mp.workdps(DIGITS + 50):
+        sums, power, k, quiet = [mp.mpf(0)] * 4, mp.mpf(1), 1, 0
+        while quiet < 10:
+            power /= -z
+            x = b - a * k
+            gamma, slope = mp.rgamma(x), inverse_gamma_slope(x)
+            terms = [-power * gamma, power * k * slope, -power * slope, power * k / z * gamma]
+            counts = any(abs(term) > abs(total) * mp.mpf(10) ** (-DIGITS - 5) for total, term in zip(sums, terms))
+            quiet = 0 if counts else quiet + 1
+            sums = [total + term for total, term in zip(sums, terms)]
+            k += 1
+            if a * k > z ** (1 / a):
+                sys.exit(f"asymptotic series does not reach the digits: a={a} b={b} z={z}")
+        return sums
+
+
+def print_slopes():
+    print("# E_{a,b}(-z) and its derivatives, written by scripts/reference_mittag_leffler.py --slopes")
+    print("a,b,z,value,d_a,d_b,d_z")
+    for a in SLOPE_ORDERS_A:
+        for b in SLOPE_ORDERS_B:
+            for z in SLOPE_Z:
+                exact = [mp.mpf(number) for number in (a, b, z)]
+                time = exact[2] ** (1 / exact[0])
+                near = slopes_by_power_series(*exact) if time <= 130 else None
+                far = slopes_by_asymptotic_series(*exact) if time >= 95 else None
+                for one, other in zip(near or [], far or []):
+                    if abs(one - other) > max(abs(one), mp.mpf(10) ** -20) * mp.mpf(10) ** (-SLOPE_DIGITS):
+                        sys.exit(f"series disagree: a={a} b={b} z={z}: {one} {other}")
+                texts = [mp.nstr(v, SLOPE_DIGITS, min_fixed=1, max_fixed=0) for v in near or far]
+                print(f"{a!r},{b!r},{z!r},{','.join(texts)}")
+
+
 def main():
     mp.mp.dps = DIGITS + 20
+    if sys.argv[1:] == ["--slopes"]:
+        print_slopes()
+        return
     print("# E_{alpha,beta}(-z), written by scripts/reference_mittag_leffler.py")
     print("alpha,beta,z,value")
     for alpha in ALPHAS:

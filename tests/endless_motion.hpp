@@ -75,6 +75,7 @@ Drift endless_run(EndlessMotion& device, ContactModel& model, ServoSettings sett
                   std::uint64_t cycles_a_round, std::uint64_t rounds, std::uint64_t settled,
                   std::uint64_t rest_cycles, Sink&& sink, RoundDone&& round_done) {
   settings.ramp_in_s = 0.0;  // or the first round would differ by it
+  settings.gate.reset();     // and wait for a hand at rest
   settings.phase_ends = {(rounds + 2) * cycles_a_round + rest_cycles};
   ServoStep step(device, model, settings);
   std::vector<double> first(cycles_a_round), steady(cycles_a_round);

@@ -447,6 +447,31 @@ std::vector<ErrorCase> design_cases() {
   };
 }
 
+std::vector<ErrorCase> recording_folder_cases() {
+  const std::string type = "folder of recordings";
+  std::string csv = "time [s],depth [mm],force [N],animal\n";
+  for (int i = 0; i < 30; ++i) {
+    const double depth_mm = std::min(0.2 * i, 3.0);
+    csv += std::to_string(0.1 * i) + "," + std::to_string(depth_mm) + "," +
+           std::to_string(0.1 * depth_mm) + "," + (i < 20 ? "a" : "b") + "\n";
+  }
+  const auto folder = files({{"a1.csv", csv}});
+  const auto fit = [](const std::string& options) {
+    return "fit {} --no-draw --law linear-1 " + options + " -o {}/out";
+  };
+  return {
+      {type, "no recording", "fit {} --no-draw -o {}/out", files({})},
+      {type, "name without a specimen", fit("--group-by '(cow[0-9])'"), folder},
+      {type, "two groups in a pattern", fit("--group-by '(a)(1)'"), folder},
+      {type, "no pattern", fit("--group-by '(['"), folder},
+      {type, "no such column", fit("--group-by cow"), folder},
+      {type, "column of two values", fit("--group-by animal"), folder},
+      {type, "reference depth 0", fit("--reference '0 mm'"), folder},
+      {type, "group of one recording", "fit {}/a1.csv --no-draw --group-by animal -o {}/out",
+       folder},
+  };
+}
+
 const std::string kLaw = R"({"law": "linear-1", "drive": "indentation_depth",
 "response": "contact_force", "reference_m": 0.001, "provenance": "assumed",
 "parameters": {"k_inf_N_per_m": 20.0, "k1_N_per_m": 30.0, "tau1_s": 1.5}})";
@@ -472,6 +497,11 @@ std::vector<ErrorCase> law_cases() {
       {type, "unknown parameter", spectrum, with("tau1_s", "tau1_ms")},
       {type, "negative time", spectrum, with("1.5", "-1.5")},
       {type, "strip in m", spectrum, with("contact_force", "stress")},
+      {type, "Hertz contact of a strip", spectrum,
+       law(replaced(replaced(replaced(replaced(kLaw, "linear-1", "hertz-1"), "indentation_depth",
+                                      "relative_length"),
+                             "contact_force", "stress"),
+                    "reference_m", "reference"))},
       {type, "frequency 0", "spectrum {}/l.json --from \"0 Hz\" -o {}/out", law(kLaw)},
       {type, "unknown program", "export {}/l.json --to nastran -o {}/out", law(kLaw)},
       {type, "tension in FEBio", to_febio,
@@ -558,8 +588,8 @@ std::vector<ErrorCase> all_cases() {
   for (const auto& cases :
        {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
         hdf5_cases(), fit_config_cases(), oscillation_cases(), fit_tables_cases(), design_cases(),
-        claims_cases(), law_cases(), scene_cases(), test::simulation_error_cases(),
-        test::sweep_error_cases()}) {
+        claims_cases(), recording_folder_cases(), law_cases(), scene_cases(),
+        test::simulation_error_cases(), test::sweep_error_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;
@@ -601,6 +631,7 @@ std::size_t count_files(const TempFolder& folder) {
 std::string table_row(const ErrorCase& error_case, const Answer& answer, const TempFolder& folder) {
   std::string message = answer.error.substr(0, answer.error.find('\n'));
   message = replace_all(message, folder.path().string() + "/", "");
+  message = replace_all(message, folder.path().string(), "FOLDER");
   message = replace_all(message, share_dir().string() + "/", "");
   message = replace_all(message, "|", "\\|");
   return "| " + error_case.file_type + " | " + error_case.what + " | " +

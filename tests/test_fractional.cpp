@@ -97,6 +97,53 @@ TEST_CASE("the Mittag-Leffler function agrees with the table of 25 digits") {
   CHECK(rows == 11 * 33 * 4);
 }
 
+TEST_CASE(
+    "the Mittag-Leffler function of free orders, and its slopes, agree with the table of 20 "
+    "digits") {
+  std::istringstream table(
+      read_file(std::string(TPM_TEST_SOURCE_DIR) + "/tests/fixtures/mittag_leffler_slopes.csv"));
+  int rows = 0;
+  double worst = 0.0;
+  double worst_slope = 0.0;
+  for (std::string line; std::getline(table, line);) {
+    if (line.starts_with("#") || line.starts_with("a,")) continue;
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream cells(line);
+    std::array<std::string, 7> text;
+    for (std::string& cell : text) cells >> cell;
+    std::array<double, 7> x{};
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = std::strtod(text[i].c_str(), nullptr);
+    const auto [a, b, z, value, d_a, d_b, d_z] = x;
+    const MittagLeffler got = mittag_leffler_with_slopes(a, b, z);
+    worst = std::max(worst, (1.0 + z) * std::abs(got.value - value));
+    worst_slope = std::max({worst_slope, (1.0 + z) * std::abs(got.d_a - d_a),
+                            (1.0 + z) * std::abs(got.d_b - d_b),
+                            (1.0 + z) * (1.0 + z) * std::abs(got.d_z - d_z)});
+    ++rows;
+  }
+  CHECK(rows == 10 * 7 * 11);
+  CHECK(worst < 1e-12);
+  CHECK(worst_slope < 1e-12);
+}
+
+TEST_CASE("the function of free orders has that of the usual ones as its special case") {
+  for (const double a : {0.05, 0.4, 0.9, 1.0}) {
+    for (const double z : {0.0, 1e-9, 0.3, 4.0, 1e5}) {
+      for (const double b : {1.0, 2.0, a, 1.0 + a}) {
+        CAPTURE(a, b, z);
+        CHECK_THAT(mittag_leffler_with_slopes(a, b, z).value,
+                   WithinAbs(mittag_leffler(a, b, z), 1e-12 / (1.0 + z)));
+      }
+    }
+  }
+  CHECK_THAT(mittag_leffler_with_slopes(0.0, 0.7, 3.0).value,  // a geometric series
+             WithinRel(0.25 / std::tgamma(0.7), 1e-12));
+  CHECK(mittag_leffler_with_slopes(0.5, 0.7, INFINITY).value == 0.0);
+  CHECK_THROWS_WITH(mittag_leffler_with_slopes(1.1, 1.0, 1.0), Catch::Contains("a = 1.1"));
+  CHECK_THROWS_WITH(mittag_leffler_with_slopes(0.5, -0.1, 1.0), Catch::Contains("b = -0.1"));
+  CHECK_THROWS_WITH(mittag_leffler_with_slopes(0.5, 1.0, NAN), Catch::Contains("z = nan"));
+}
+
 TEST_CASE("the Mittag-Leffler function outside the usual times") {
   for (const double alpha : {1e-3, 0.05, 0.5, 0.9, 0.9999, 1.0}) {
     CAPTURE(alpha);
@@ -438,5 +485,8 @@ TEST_CASE("bad windows and elements are named") {
   CHECK_THROWS_WITH(memory.mittag_leffler(0.0, 1.0, w), Catch::Contains("alpha = 0"));
   CHECK_THROWS_WITH(memory.mittag_leffler(0.5, 0.0, w), Catch::Contains("tau = 0"));
   CHECK_THROWS_WITH(memory.mittag_leffler(0.5, INFINITY, w), Catch::Contains("tau = inf"));
-  CHECK_THROWS_WITH(memory.springpot(1.5, w), Catch::Contains("0 < alpha <= 1"));
+  CHECK_THROWS_WITH(memory.springpot(1.5, w), Catch::Contains("alpha = 1.5"));
+  CHECK_THROWS_WITH(memory.springpots_in_series(1.5, 0.1, 1.0, w), Catch::Contains("alpha = 1.5"));
+  CHECK_THROWS_WITH(memory.springpots_in_series(0.5, -0.1, 1.0, w), Catch::Contains("beta = -0.1"));
+  CHECK_THROWS_WITH(memory.springpots_in_series(0.5, 0.1, 0.0, w), Catch::Contains("tau = 0"));
 }

@@ -66,9 +66,17 @@ TEST_CASE("names of laws go there and back", "[law]") {
   for (const std::string& name : kLaws) {
     CHECK(law_name(parse_law_name(name, "test")) == name);
   }
-  CHECK(law_name(parse_law_name("power-fkelvin_voigt", "test")) == "power-fkelvin_voigt");
+  for (const char* name : {"power-fkelvin_voigt", "linear-9", "hertz-12", "linear-40-fluid"}) {
+    CHECK(law_name(parse_law_name(name, "test")) == name);
+  }
+  CHECK(law_words(parse_law_name("linear-12", "test")) ==
+        "linear kernel, twelve relaxing branches, no tension");
+  CHECK(law_words(parse_law_name("linear-40", "test")) ==
+        "linear kernel, 40 relaxing branches, no tension");
+  CHECK_THROWS_WITH(parse_law_name("linear-41", "test"),
+                    "test: 41 branches; expected 0 to 40 branches");
   for (const char* bad :
-       {"", "cubic", "linear-9", "linear-1-elastic-elastic", "linear-elastic-1", "linear-relaxing",
+       {"", "cubic", "linear-41", "linear-1-elastic-elastic", "linear-elastic-1", "linear-relaxing",
         "linear-fluid", "linear-2-fluid-series", "linear-", "linear-1-fzener", "linear--1"}) {
     INFO(bad);
     CHECK_THROWS_AS(parse_law_name(bad, "test"), Error);
@@ -227,6 +235,80 @@ TEST_CASE("parallel and series form are one law", "[law]") {
     }
     CHECK(std::is_sorted(chain.T_s.begin(), chain.T_s.end()));
   }
+}
+
+TEST_CASE("forty branches answer a ramp in closed form, with exact derivatives", "[law]") {
+  const LawModel law(parse_law_name("linear-40", "test"));
+  REQUIRE(law.law_parameters().size() == 83);
+  std::vector<double> values{15.0};
+  for (int i = 0; i < 40; ++i) values.push_back(1.0 + 0.1 * i);
+  for (int i = 0; i < 40; ++i) values.push_back(std::pow(10.0, -2.0 + 0.1 * i));
+  values.insert(values.end(), {0.0, 0.0});
+  const double rate = 2e-3;
+  const Protocol ramp = ramp_and_hold(rate * 10.0, rate, 1.0);
+  const auto times = evenly(0.1, 10.0, 37);
+  const Response r = law.respond(ramp, times, values, Want::values_and_sensitivity);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const double t = times[i];
+    const auto row = static_cast<Eigen::Index>(i);
+    double force = values[0] * t;
+    for (Eigen::Index j = 0; j < 40; ++j) {
+      const double k = values[static_cast<std::size_t>(1 + j)];
+      const double tau = values[static_cast<std::size_t>(41 + j)];
+      const double relaxed = -std::expm1(-t / tau);
+      force += k * tau * relaxed;
+      CHECK_THAT(r.sensitivity(row, 1 + j), WithinRel(rate * tau * relaxed, 1e-11));
+      CHECK_THAT(r.sensitivity(row, 41 + j),
+                 WithinRel(rate * k * (relaxed - t / tau * std::exp(-t / tau)), 1e-9));
+    }
+    CHECK_THAT(r.value[row], WithinRel(rate * force, 1e-12));
+  }
+  // The general way, after a jump of the depth, carries as many parameters.
+  const Protocol step = step_and_hold(2e-3, 5.0);
+  const Response jumped =
+      law.respond(step, evenly(0.0, 5.0, 9), values, Want::values_and_sensitivity);
+  double instant = values[0];
+  for (std::size_t j = 1; j <= 40; ++j) instant += values[j];
+  CHECK_THAT(jumped.value[0], WithinRel(2e-3 * instant, 1e-13));
+  CHECK_THAT(jumped.sensitivity(8, 41), WithinAbs(2e-3 * values[1] * std::exp(-5.0 / values[41]) *
+                                                      5.0 / (values[41] * values[41]),
+                                                  1e-13));
+}
+
+TEST_CASE("forty units in series are forty branches, with exact derivatives", "[law]") {
+  for (const int units : {4, 5, 12, 13, 40}) {
+    const auto n = static_cast<std::size_t>(units);
+    KelvinChain chain;
+    chain.k0 = 200.0;
+    for (int i = 0; i < units; ++i) {
+      chain.k.push_back(30.0 + 7.0 * i);
+      chain.T_s.push_back(std::pow(10.0, -3.0 + 6.0 * i / units));
+    }
+    const ParallelWithSlopes parallel = to_parallel_with_slopes(chain);
+    REQUIRE(parallel.law.k.size() == n);
+    const KelvinChain back = to_series(parallel.law);
+    REQUIRE(back.k.size() == n);
+    for (std::size_t i = 0; i < n; ++i) {
+      CHECK_THAT(back.k[i], WithinRel(chain.k[i], 1e-9));
+      CHECK_THAT(back.T_s[i], WithinRel(chain.T_s[i], 1e-11));
+    }
+    // The slopes of both conversions are each other's inverse.
+    const SeriesWithSlopes series = to_series_with_slopes(parallel.law);
+    const Eigen::MatrixXd product = series.slopes * parallel.slopes;
+    const Eigen::Index size = 2 * units + 1;
+    REQUIRE(product.rows() == size);
+    Eigen::VectorXd scale(size);  // relative changes in, relative changes out
+    scale << chain.k0, Eigen::Map<const Eigen::VectorXd>(chain.k.data(), units),
+        Eigen::Map<const Eigen::VectorXd>(chain.T_s.data(), units);
+    const Eigen::MatrixXd relative =
+        scale.cwiseInverse().asDiagonal() * product * scale.asDiagonal();
+    INFO(units << " units");
+    CHECK((relative - Eigen::MatrixXd::Identity(size, size)).cwiseAbs().maxCoeff() < 1e-6);
+  }
+  KelvinChain long_chain{1.0, std::vector<double>(41, 1.0), {}, 0.0};
+  for (int i = 1; i <= 41; ++i) long_chain.T_s.push_back(i);
+  CHECK_THROWS_WITH(to_parallel_with_slopes(long_chain),
+                    "Kelvin chain: 41 branches; expected at most 40");
 }
 
 TEST_CASE("degenerate chains: equal times, branches without stiffness, one dashpot", "[law]") {

@@ -280,7 +280,27 @@ TEST_CASE("fractional laws are exported with their error; what cannot be said is
   CHECK_THROWS_WITH(export_law(some_law("linear-1-elastic"), options), Catch::Contains("tension"));
   options.relaxation_only = true;
   CHECK_THAT(export_law(some_law("linear-1-elastic"), options),
-             Catch::Contains("kernel and tension are left out"));
+             Catch::Contains("left out: the elastic tension, ") &&
+                 Catch::Contains("the contact is stiffer by it than what is exported"));
+  CHECK_THAT(export_law(some_law("linear-1-relaxing"), options),
+             Catch::Contains("left out: the shape of the tension, "));
+  CHECK_THAT(export_law(some_law("power-1"), options),
+             Catch::Contains("left out: the power kernel (exponent "));
   options.geometry.area_m2 = 1e-4;
   CHECK_THROWS_WITH(export_law(some_law("linear-1"), options), Catch::Contains("without a length"));
+}
+
+TEST_CASE("a modulus from a depth that is deep for the ball is exported with a warning",
+          "[export]") {
+  LawFile law = some_law("hertz-1");
+  ExportOptions options;
+  options.geometry.sphere_radius_m = 7.5e-3;
+  law.spec.reference = 8e-3;
+  for (const char* target : {"abaqus", "ansys", "febio", "json"}) {
+    options.target = parse_export_target(target, "test");
+    CHECK_THAT(export_law(law, options),
+               Catch::Contains("WARNING: the reference depth is 1.07 of the radius"));
+  }
+  law.spec.reference = 0.5e-3;
+  CHECK_THAT(export_law(law, options), !Catch::Contains("WARNING"));
 }

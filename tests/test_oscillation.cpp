@@ -370,3 +370,30 @@ TEST_CASE("the figure of a spectrum holds its readings and the law's answer to t
   CHECK_NOTHROW(to_json(std::vector<Figure>{figure}));
   CHECK_THROWS_WITH(spectrum_figure(fit, 0), Contains("no spectrum"));
 }
+
+TEST_CASE("error bars of a spectrum are those of its noise, on the readings' own scale") {
+  const std::vector<double> truth{40.0, 60.0, 0.5, 0.0, 0.0};
+  const Spectrum exact =
+      computed_spectrum(indentation_law("linear-1"), truth, log_spaced(0.05, 5.0, 8));
+  const auto bars = [&](const std::string& noise) {
+    const FitResult fit =
+        run_fit(config_of("linear-1", kOneBranch, entry("a", kOscillation, noise)), {exact});
+    std::vector<double> relative;
+    for (const FittedDatum& d : fit.data) relative.push_back(d.reading_sd / *d.datum.value);
+    const Figure figure = spectrum_figure(fit, 0);
+    const Series& storage = figure.panels.front().series.front();
+    REQUIRE(storage.sd.size() == 8);
+    for (std::size_t i = 0; i < 8; ++i) {
+      CHECK_THAT(storage.sd[i] / storage.y[i], WithinRel(relative[2 * i], 1e-9));
+    }
+    return relative;
+  };
+  // A standard deviation of 0.05 in the logarithm is 5 % of each reading.
+  for (const double sd : bars(R"({"kind": "log", "relative": 0.05, "scale": "known"})")) {
+    CHECK_THAT(sd, WithinRel(0.05, 1e-9));
+  }
+  for (const double sd : bars(R"({"kind": "relative_to_datum", "relative": 0.05,
+                                  "scale": "known"})")) {
+    CHECK_THAT(sd, WithinRel(0.05, 1e-9));
+  }
+}

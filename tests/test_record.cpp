@@ -60,11 +60,12 @@ TEST_CASE("A log cut at any byte gives all rows before the cut, and is not whole
     write_file(path, bytes.substr(0, size));
     const RowLog log = read_row_log(path);
     REQUIRE(log.rows == std::min<std::size_t>(20, (size - header) / stride));
+    REQUIRE(log.damaged == 0);
     REQUIRE_FALSE(log.closed);
   }
 }
 
-TEST_CASE("A damaged row ends what is read: no wrong number comes through") {
+TEST_CASE("A damaged row is left out and counted; all others and the closing come through") {
   const test::TempFolder folder;
   const std::string bytes = read_file(written(folder, 20, true));
   const std::size_t header = 8 + 4 + 4 + 13 + 4, stride = 4 + sizeof(Row) + 4;
@@ -74,10 +75,52 @@ TEST_CASE("A damaged row ends what is read: no wrong number comes through") {
     const std::string path = folder / "damaged";
     write_file(path, damaged);
     const RowLog log = read_row_log(path);
-    REQUIRE(log.rows == (at - header) / stride);
+    REQUIRE(log.rows == 19);
+    REQUIRE(log.damaged == 1);
+    REQUIRE(log.closed);
+    const std::size_t lost = (at - header) / stride;
     for (std::size_t i = 0; i < log.rows; ++i)
-      REQUIRE(row_of(log, i).a == 0.1 * static_cast<double>(i));
+      REQUIRE(row_of(log, i).a == 0.1 * static_cast<double>(i < lost ? i : i + 1));
   }
+}
+
+TEST_CASE("Four bytes lost between two rows damage both; a damaged closing is counted") {
+  const test::TempFolder folder;
+  const std::string bytes = read_file(written(folder, 20, true));
+  const std::size_t header = 8 + 4 + 4 + 13 + 4, stride = 4 + sizeof(Row) + 4;
+  std::string damaged = bytes;
+  damaged.replace(header + 5 * stride - 2, 4, "XXXX");
+  write_file(folder / "two", damaged);
+  CHECK(read_row_log(folder / "two").damaged == 2);
+  CHECK(read_row_log(folder / "two").rows == 18);
+  CHECK(read_row_log(folder / "two").closed);
+  damaged = bytes;
+  damaged[bytes.size() - 6] = 'X';
+  write_file(folder / "end", damaged);
+  CHECK(read_row_log(folder / "end").rows == 20);
+  CHECK(read_row_log(folder / "end").damaged == 1);
+  CHECK_FALSE(read_row_log(folder / "end").closed);
+}
+
+TEST_CASE("A log that is to appear later leaves nothing, and spares what has its name") {
+  const test::TempFolder folder;
+  write_file(folder / "rows", "before");
+  const auto files = [&] {
+    const std::filesystem::directory_iterator all(
+        std::filesystem::path(folder / "rows").parent_path());
+    return std::distance(begin(all), end(all));
+  };
+  {
+    const RowLogWriter log(folder / "rows", "{}", sizeof(Row), RowLogWriter::Name::later);
+    CHECK(files() == 2);
+  }
+  CHECK(read_file(folder / "rows") == "before");
+  CHECK(files() == 1);
+  RowLogWriter log(folder / "rows", "{}", sizeof(Row), RowLogWriter::Name::later);
+  log.appear();
+  log.close("{}");
+  CHECK(read_row_log(folder / "rows").closed);
+  CHECK(files() == 1);
 }
 
 TEST_CASE("What is no log is refused in one line") {

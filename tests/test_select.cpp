@@ -180,3 +180,115 @@ TEST_CASE("a depth of metres is taken for a slip of the unit", "[select]") {
   REQUIRE_FALSE(s.warnings.empty());
   CHECK_THAT(s.warnings.front(), Catch::Contains("changes by 5 m: is its unit right?"));
 }
+
+namespace {
+
+/// The law's answer with fine steps, sampled as often as asked.
+Recording sampled(const std::string& law, const std::vector<double>& values, double step_s,
+                  double end_s, double noise) {
+  Recording r;
+  for (int i = 0; i * step_s <= end_s; ++i) {
+    r.time_s.push_back(i * step_s);
+    r.drive.push_back(std::min(5e-3, std::max(0.0, 5e-3 * (r.time_s.back() - 1.0))));
+  }
+  const LawModel model(parse_law_name(law, "test"));
+  const Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
+  const Eigen::VectorXd f = model.respond(history, r.time_s, values, Want::values).value;
+  Random random(17);
+  for (const double force : f) r.response.push_back(force + noise * f.maxCoeff() * random.normal());
+  return r;
+}
+
+Selection selected(const Recording& r, std::initializer_list<const char*> laws) {
+  SelectionOptions options;
+  for (const char* name : laws) options.laws.push_back(parse_law_name(name, "test"));
+  options.only_listed = true;
+  options.setup.profiles = false;
+  const std::vector<PreparedRecording> one{prepare_recording("r.csv", r)};
+  return select_law(one, options);
+}
+
+const Candidate& candidate(const Selection& s, const std::string& law) {
+  for (const Candidate& c : s.candidates) {
+    if (law_name(c.law) == law) return c;
+  }
+  throw std::runtime_error(law);
+}
+
+}  // namespace
+
+TEST_CASE("a law with a relaxation time that the sampling cannot support is not recommended",
+          "[select]") {
+  // 0.15 s between samples that are 0.1 s apart.
+  const Selection s =
+      selected(sampled("linear-2", {100.0, 300.0, 80.0, 0.15, 6.0, 0.0, 0.0}, 0.1, 30.0, 1e-4),
+               {"linear-1", "linear-2"});
+  const Candidate& two = candidate(s, "linear-2");
+  REQUIRE(two.delta_bic == 0.0);
+  CHECK_FALSE(two.identified);
+  CHECK(two.reason == "tau1 is sampled by fewer than 3 points");
+  // Identified laws compete among themselves, however much better another one is.
+  CHECK(candidate(s, "linear-1").delta_bic > 10.0);
+  CHECK(law_name(s.candidates[s.recommended].law) == "linear-1");
+  CHECK_THAT(fmt::format("{}", fmt::join(s.words, "\n")),
+             Catch::Contains("linear-2 has the lowest BIC") &&
+                 Catch::Contains("but is not identified: tau1 is sampled by fewer than 3 points"));
+}
+
+TEST_CASE("a hold of three relaxation times is needed to say that nothing remains", "[select]") {
+  const std::vector<double> fluid{300.0, 6.0, 0.0, 0.0};
+  const Selection brief =
+      selected(sampled("linear-1-fluid", fluid, 0.1, 11.0, 2e-3), {"linear-1-fluid", "linear-1"});
+  CHECK_FALSE(candidate(brief, "linear-1-fluid").identified);
+  CHECK(candidate(brief, "linear-1-fluid").reason ==
+        "a hold of 9 s does not tell that nothing remains in the end");
+  CHECK(law_name(brief.candidates[brief.recommended].law) == "linear-1");
+  const Selection late =
+      selected(sampled("linear-1-fluid", fluid, 0.1, 40.0, 2e-3), {"linear-1-fluid", "linear-1"});
+  CHECK(candidate(late, "linear-1-fluid").identified);
+  CHECK(law_name(late.candidates[late.recommended].law) == "linear-1-fluid");
+}
+
+TEST_CASE("few samples are no prediction", "[select]") {
+  // Ramp of 1 s, and a hold of four samples.
+  const Selection s =
+      selected(sampled("linear-1", {100.0, 120.0, 1.0, 0.0, 0.0}, 0.1, 2.4, 1e-3), {"linear-1"});
+  CHECK(s.candidates.front().held_out.empty());
+  CHECK_THAT(s.warnings.front(), Catch::Contains("nothing was held out: the second half of the "
+                                                 "hold has fewer than 5 samples"));
+  CHECK(to_json(s).at("laws").at(0).at("held_out").empty());
+
+  // One sample after the fitted part, at which the surface is lost and the prediction 0.
+  Recording r = sampled("linear-1", {100.0, 120.0, 1.0, 0.0, 0.0}, 0.1, 12.0, 1e-3);
+  r.time_s.push_back(r.time_s.back() + 0.1);
+  r.drive.push_back(0.0);
+  r.response.push_back(0.3);
+  const std::vector<PreparedRecording> one{prepare_recording("r.csv", r)};
+  REQUIRE(one.front().to_s < r.time_s.back());
+  SetupOptions setup;
+  setup.profiles = false;
+  const FitResult fit =
+      run_fit(recording_config(parse_law_name("linear-1", "test"), one, setup), data_sets(one));
+  const std::vector<std::string> words = outside_words(fit);
+  REQUIRE(words.size() == 1);
+  CHECK_THAT(words.front(), Catch::Contains("1 sample after the fitted part") &&
+                                Catch::Contains("too few to say") && !Catch::Contains("%"));
+}
+
+TEST_CASE("a stretched strip is offered no Hertz contact", "[select]") {
+  Recording r = sampled("linear-1", {100.0, 120.0, 3.0, 0.0, 0.0}, 0.1, 12.0, 1e-3);
+  r.drive_quantity = Quantity::relative_length;
+  r.response_quantity = Quantity::stress;
+  for (double& drive : r.drive) drive = 1.0 + 40.0 * drive;
+  const std::vector<PreparedRecording> one{prepare_recording("strip.csv", r)};
+  SelectionOptions options;
+  options.held_out = false;
+  options.setup.profiles = false;
+  const Selection s = select_law(one, options);
+  for (const Candidate& c : s.candidates) CHECK(c.law.kernel != Kernel::hertz);
+  options.laws = {parse_law_name("hertz-1", "test")};
+  options.only_listed = true;
+  CHECK_THROWS_WITH(select_law(one, options),
+                    Catch::Contains("a Hertz kernel over a relative length; expected a linear or "
+                                    "power kernel"));
+}

@@ -13,6 +13,7 @@
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/jitter_check.hpp"
 #include "tpm/haptics/network_beside.hpp"
 #include "tpm/haptics/session_run.hpp"
@@ -195,6 +196,55 @@ TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as
     if (slow > 0) CHECK(1e-9 * static_cast<double>(off - slow) < 2.0);
   }
   CHECK(best_ms <= 10.0);
+}
+
+TEST_CASE("Whatever throws while a session runs, its threads end and the forces are off") {
+  class Free final : public ContactModel {
+   public:
+    void reset() noexcept override {}
+    ContactAnswer step(const Eigen::Vector3d&) noexcept override { return {}; }
+    [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
+    [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
+      return Eigen::Matrix3d::Identity();
+    }
+    [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+      return Eigen::Matrix3d::Identity();
+    }
+    [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
+    void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
+  };
+  HilSession session = patient_session();
+  session.servo.gate.reset();
+  session.plant.least_watchdog_s = 10.0;
+  const auto device = std::make_shared<VirtualOmega7>(session.plant, session.operator_script());
+  RealTimeOptions options;
+  options.hang_limit_s = 5.0;
+  const RecordSink quiet = [](const ServoRecord&) {};
+
+  device->prepare(session.preparation);
+  options.interrupted = []() -> bool { throw Error(ExitCode::environment, "asking", "failed"); };
+  CHECK_THROWS_WITH(
+      run_in_real_time(device, std::make_shared<Free>(), session.servo, quiet, options),
+      Catch::Contains("asking: failed"));
+  CHECK(device->status().forces_off == ForcesOff::software);
+
+  device->prepare(session.preparation);
+  options.interrupted = {};
+  const ServoOutcome no_error = run_in_real_time(
+      device, std::make_shared<Free>(), session.servo,
+      [](const ServoRecord& row) {
+        if (row.cycle == 50) throw 7;  // NOLINT: what is no error
+      },
+      options);
+  CHECK(no_error.cause == StopCause::exception);
+  CHECK_FALSE(no_error.detail.empty());
+  CHECK(device->status().forces_off == ForcesOff::software);
+
+  device->prepare(session.preparation);
+  CHECK(run_in_virtual_time(*device, *std::make_shared<Free>(), session.servo,
+                            [](const ServoRecord&) { throw 7; })
+            .cause == StopCause::exception);
+  CHECK(device->status().forces_off == ForcesOff::software);
 }
 
 TEST_CASE("What goes through a triple buffer arrives whole, in order, the last one at last") {

@@ -1,7 +1,10 @@
 // The vendor's library, stood in for by one with the same C interface and loaded in the same way.
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "hil_scenes.hpp"
 #include "refusal.hpp"
@@ -142,6 +145,65 @@ TEST_CASE("A device that is not initialised does not move unasked") {
   (void)device.open();
   device.prepare(preparation);
   CHECK(script.happened("moved"));
+}
+
+TEST_CASE("An initialisation that moves the device ends when it is interrupted, motors off") {
+  const Script script("initialised 0\ninit_ms 20000\n");
+  const auto start = std::chrono::steady_clock::now();
+  DevicePreparation preparation;
+  preparation.may_move = true;
+  preparation.interrupted = [&] { return script.happened("moved"); };
+  Omega7 device(TPM_STAND_IN_DHD);
+  (void)device.open();
+  CHECK_THAT(message_of([&] { device.prepare(preparation); }),
+             Contains("the initialisation was interrupted; the motors are off"));
+  CHECK(script.happened("drd_stop"));
+  CHECK(script.happened("stop"));
+  CHECK(script.happened("forces_off"));
+  CHECK(script.happened("init_over"));
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(15));
+}
+
+TEST_CASE("An initialisation that does not end when told so is left behind") {
+  const Script script("initialised 0\ninit_ms 4000\nstubborn 1\n");
+  DevicePreparation preparation;
+  preparation.may_move = true;
+  preparation.interrupted = [&] { return script.happened("moved"); };
+  {
+    Omega7 device(TPM_STAND_IN_DHD);
+    (void)device.open();
+    CHECK_THAT(message_of([&] { device.prepare(preparation); }), Contains("does not end"));
+    CHECK(script.happened("drd_stop"));
+    CHECK(script.happened("forces_off"));
+  }
+  CHECK_FALSE(script.happened("close"));  // a call is in the library still
+  for (int i = 0; i < 1000 && !script.happened("init_over"); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+}
+
+TEST_CASE("A session that cannot be prepared leaves no recording, and the next one runs") {
+  const HilSession session = test::parsed(test::short_session());
+  const test::TempFolder folder;
+  {
+    const Script script(operator_lines(session, folder) + "initialised 0\n");
+    SessionRunOptions options;
+    options.recording = folder / "r";
+    CHECK_THROWS_WITH(run_session(session, stand_in(), options), Contains("--may-move"));
+    CHECK_FALSE(std::filesystem::exists(folder / "r"));
+  }
+  const Script script(operator_lines(session, folder));
+  CHECK(ran(session, stand_in(), folder / "r").run.outcome.cause == StopCause::finished);
+}
+
+TEST_CASE("The device is told the session's limit of the force") {
+  const HilSession session =
+      test::parsed(test::with(test::short_session(), "/limits/force", "3 N"));
+  const test::TempFolder folder;
+  const Script script(operator_lines(session, folder));
+  (void)ran(session, stand_in(), folder / "r");
+  CHECK(script.happened("max_force_3000"));
 }
 
 TEST_CASE("Without libdrd nobody can tell whether a device is initialised") {

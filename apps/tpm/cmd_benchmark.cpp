@@ -13,6 +13,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/file_roles.hpp"
 #include "tpm/store/writable.hpp"
 
 namespace tpm::app {
@@ -33,10 +34,10 @@ int list_problems(const Session& session) {
     if (session.json()) {
       json.push_back({{"name", entry.name}, {"summary", entry.summary}});
     } else {
-      fmt::print("{:<18} {}\n", entry.name, entry.summary);
+      say("{:<18} {}\n", entry.name, entry.summary);
     }
   }
-  if (session.json()) fmt::print("{}", to_text(Json{{"problems", std::move(json)}}));
+  if (session.json()) say("{}", to_text(Json{{"problems", std::move(json)}}));
   return 0;
 }
 
@@ -52,15 +53,14 @@ void print_summary(const BenchmarkRecord& record) {
       if (point == nullptr || !point->times) continue;
       if (best == nullptr || point->times->median_s < best->times->median_s) best = point;
     }
-    fmt::print("{}: {} settings, {} failed; reference known to {}", result.name,
-               result.points.size(), failed, significant(result.reference.floor, 2));
+    say("{}: {} settings, {} failed; reference known to {}", result.name, result.points.size(),
+        failed, significant(result.reference.floor, 2));
     if (best != nullptr) {
       const std::string setting = setting_words(*best);
-      fmt::print("; cheapest within 1 %: {}{}, {} ms", best->curve(),
-                 setting.empty() ? "" : " (" + setting + ")",
-                 significant(1e3 * best->times->median_s, 3));
+      say("; cheapest within 1 %: {}{}, {} ms", best->curve(),
+          setting.empty() ? "" : " (" + setting + ")", significant(1e3 * best->times->median_s, 3));
     }
-    fmt::print("\n");
+    say("\n");
   }
 }
 
@@ -73,6 +73,7 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
   const std::string python = find_drawing_python();  // before minutes of work, not after
   require_writable_folder(choice.folder);
   const std::filesystem::path part = std::filesystem::path(choice.folder) / kBenchmarkPart;
+  will_update({part, std::filesystem::path(choice.folder) / "benchmark.json"});
   if (choice.keep) {
     KeptBenchmark kept = keep_benchmark(choice.folder, record.options, choice.problems);
     record = std::move(kept.record);
@@ -89,12 +90,11 @@ int benchmark(const BenchmarkChoice& choice, const Session& session) {
   }
   write_benchmark(record, choice.folder, python);
   if (session.json()) {
-    fmt::print("{}", to_text(to_json(record)));
+    say("{}", to_text(to_json(record)));
     return 0;
   }
   print_summary(record);
-  fmt::print(
-      "written to {}: report.html, report.md, benchmark.json, a CSV for each problem, "
+  say("written to {}: report.html, report.md, benchmark.json, a CSV for each problem, "
       "figures\n",
       choice.folder);
   return 0;

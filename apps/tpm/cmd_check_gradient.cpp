@@ -30,7 +30,7 @@ int check(const GradientOptions& options, const Session& session) {
   std::vector<FitParameter> parameters;
   for (const EstimatedParameter& p : function.config().parameters) parameters.push_back(p.fit);
   const GradientCheck result = check_gradient(function, parameters, wanted);
-  fmt::print("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
+  say("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
   return result.passed() ? 0 : static_cast<int>(ExitCode::answer_is_no);
 }
 

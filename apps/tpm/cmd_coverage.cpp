@@ -28,7 +28,7 @@ int coverage(const CoverageOptions& options, const Session& session) {
   const FitConfig config = read_fit_config(options.config);
   const auto sets = static_cast<int>(parse_whole_number(options.sets, "--sets", 1));
   const CoverageResult result = check_coverage(config, sets, seed_of(options.seed));
-  fmt::print("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
+  say("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
   constexpr double kSuspicious = 0.001;
   for (const ParameterCoverage& p : result.parameters) {
     if (p.p_value < kSuspicious) return static_cast<int>(ExitCode::answer_is_no);

@@ -34,14 +34,14 @@ int list(const Session& session) {
       json.push_back(
           {{"id", curve.id}, {"kind", curve.kind}, {"rows", curve.size}, {"title", curve.title}});
     }
-    fmt::print("{}", to_text(json));
+    say("{}", to_text(json));
     return 0;
   }
   std::vector<std::vector<std::string>> table{{"id", "kind", "rows", "title"}};
   for (const CurveSummary& curve : curves) {
     table.push_back({curve.id, curve.kind, std::to_string(curve.size), curve.title});
   }
-  fmt::print("{}", aligned(table));
+  say("{}", aligned(table));
   return 0;
 }
 
@@ -50,11 +50,11 @@ int show(const Session& session, const std::string& argument, bool all_rows) {
   if (session.json()) {
     Json json = Json::array();
     for (const Curve& curve : curves) json.push_back(curve_json(curve));
-    fmt::print("{}", to_text(is_packed(argument) ? json : json.front()));
+    say("{}", to_text(is_packed(argument) ? json : json.front()));
     return 0;
   }
   for (std::size_t i = 0; i < curves.size(); ++i) {
-    fmt::print("{}{}", i == 0 ? "" : "\n", curve_text(curves[i], all_rows));
+    say("{}{}", i == 0 ? "" : "\n", curve_text(curves[i], all_rows));
   }
   return 0;
 }
@@ -68,14 +68,14 @@ int check(const Session& session, const std::vector<std::string>& files) {
       std::size_t rows = 0;
       for (const Curve& curve : load_all(file)) rows += curve_size(curve);
       report.push_back({{"file", file}, {"ok", true}, {"rows", rows}});
-      if (!session.json()) fmt::print("{}: ok, {} rows\n", file, rows);
+      if (!session.json()) say("{}: ok, {} rows\n", file, rows);
     } catch (const Error& error) {
       sound = false;
       report.push_back({{"file", file}, {"ok", false}, {"error", error.what()}});
       if (!session.json()) tell_user("tpm: {}\n", error.what());
     }
   }
-  if (session.json()) fmt::print("{}", to_text(report));
+  if (session.json()) say("{}", to_text(report));
   return static_cast<int>(sound ? ExitCode::success : ExitCode::answer_is_no);
 }
 
@@ -90,9 +90,9 @@ int pack(const Session& session, const std::vector<std::string>& arguments,
   }
   pack_curves(output, curves);
   if (session.json()) {
-    fmt::print("{}", to_text(Json{{"file", output}, {"curves", curves.size()}}));
+    say("{}", to_text(Json{{"file", output}, {"curves", curves.size()}}));
   } else {
-    fmt::print("{}: {} curves\n", output, curves.size());
+    say("{}: {} curves\n", output, curves.size());
   }
   return 0;
 }

@@ -11,6 +11,7 @@
 #include "tpm/core/units.hpp"
 #include "tpm/curve/import.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/file_roles.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm::app {
@@ -202,12 +203,18 @@ void require_free(const std::vector<Target>& targets) {
   }
 }
 
+void announce(const std::vector<Target>& targets) {
+  for (const Target& target : targets) {
+    will_write({target.csv, fs::path(target.csv).replace_extension(".json")});
+  }
+}
+
 void print_text(const std::vector<Target>& targets, bool written) {
   for (const Target& target : targets) {
-    fmt::print("{} -> {}\n", target.source,
-               written ? target.csv.string() : "nothing written: no --output");
+    say("{} -> {}\n", target.source,
+        written ? target.csv.string() : "nothing written: no --output");
     for (const ImportFinding& finding : target.curve.findings) {
-      fmt::print("  {}: {}\n", finding.what, finding.value);
+      say("  {}: {}\n", finding.what, finding.value);
     }
   }
 }
@@ -223,7 +230,7 @@ void print_json(const std::vector<Target>& targets, bool written) {
                       {"id", target.curve.description.header.id},
                       {"understood", understood}});
   }
-  fmt::print("{}", to_text(report));
+  say("{}", to_text(report));
 }
 
 void write_curves(const std::vector<Target>& targets) {
@@ -239,6 +246,7 @@ void write_curves(const std::vector<Target>& targets) {
 int import_files(const Session& session, const ImportArguments& arguments) {
   const bool write = !arguments.output.empty();
   const std::vector<Target> targets = plan(arguments, options_of(arguments));
+  if (write) announce(targets);
   if (write && !arguments.force) require_free(targets);
   if (write) write_curves(targets);
   session.json() ? print_json(targets, write) : print_text(targets, write);

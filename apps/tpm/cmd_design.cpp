@@ -32,6 +32,7 @@ int design(const DesignOptions& options, const Session& session) {
   const auto sets = static_cast<int>(parse_whole_number(options.check, "--check", 0));
   const std::uint64_t seed = parse_whole_number(options.seed, "--seed", 0);
   const auto top = static_cast<std::size_t>(parse_whole_number(options.top, "--top", 1));
+  will_write_into(options.folder, {"figures.json"});
   const DesignResult result = plan(read_design(options.design));
   std::optional<DesignCheck> check;
   if (sets > 0) {

@@ -24,18 +24,19 @@ int experiments(const ExperimentsOptions& options, const Session& session) {
   const std::filesystem::path path = options.config.empty()
                                          ? share_dir() / "configs" / "organ_experiments.json"
                                          : std::filesystem::path(options.config);
+  will_write_into(options.folder, {"report.md", "report.html", "experiments.json", "readings.csv",
+                                   "fits.csv", "curves.csv", "figures.json", "report.run.json"});
   const OrganStudyConfig config = read_organ_study(path);
   const auto start = std::chrono::steady_clock::now();
   const OrganStudy study = run_organ_study(config);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_organ_study(study, options.folder, python, took.count());
   if (session.json()) {
-    fmt::print("{}", to_text(to_json(study)));
+    say("{}", to_text(to_json(study)));
     return 0;
   }
-  for (const std::string& sentence : cost_sentences(study)) fmt::print("- {}\n", sentence);
-  fmt::print(
-      "written to {}: report.html, report.md, experiments.json, readings.csv, fits.csv, "
+  for (const std::string& sentence : cost_sentences(study)) say("- {}\n", sentence);
+  say("written to {}: report.html, report.md, experiments.json, readings.csv, fits.csv, "
       "curves.csv, figures\n",
       options.folder);
   return 0;

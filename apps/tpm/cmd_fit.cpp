@@ -168,6 +168,7 @@ std::string figure_folder(const FitOptions& options, const std::string& input) {
 }
 
 int fit_configuration(const FitOptions& options, const Session& session) {
+  if (!options.no_draw) will_write_into(options.folder, {"figures.json"});
   const FitResult result = run_fit(configured(options));
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
   if (!options.folder.empty() && !options.no_draw) {
@@ -179,6 +180,10 @@ int fit_configuration(const FitOptions& options, const Session& session) {
 }
 
 int fit_folder(const FitOptions& options, const Session& session) {
+  if (!options.no_draw) {
+    will_write_into(figure_folder(options, options.recordings.files.front()),
+                    {"figures.json", "specimens.json"});
+  }
   RecordingOptions input = options.recordings;
   input.files = recordings_in(options.recordings.files.front());
   SelectionOptions selection = selection_options(options);
@@ -200,6 +205,10 @@ int fit_folder(const FitOptions& options, const Session& session) {
 
 int fit_recordings(const FitOptions& options, const Session& session) {
   const auto recordings = read_recordings(options.recordings);
+  if (!options.no_draw) {
+    will_write_into(figure_folder(options, recordings.front().name),
+                    {"figures.json", "config.json", "selection.json", "law.json"});
+  }
   SelectionOptions choices = selection_options(options);
   set_reference(options, recordings, choices);
   const Selection selection = select_law(recordings, choices);

@@ -39,12 +39,11 @@ int list_devices(const DeviceOptions& options, const Session& session) {
     omega7 = error.what();
   }
   if (session.json()) {
-    fmt::print("{}", to_text(Json{{"omega7", {{"available", count > 0}, {"reason", omega7}}},
-                                  {"virtual", {{"available", true}, {"simulated_device", true}}},
-                                  {"replay", {{"available", true}, {"simulated_device", true}}}}));
+    say("{}", to_text(Json{{"omega7", {{"available", count > 0}, {"reason", omega7}}},
+                           {"virtual", {{"available", true}, {"simulated_device", true}}},
+                           {"replay", {{"available", true}, {"simulated_device", true}}}}));
   } else {
-    fmt::print(
-        "omega7   {}\nvirtual  always there: a simulated Omega.7 and operator, no hardware\nreplay "
+    say("omega7   {}\nvirtual  always there: a simulated Omega.7 and operator, no hardware\nreplay "
         "  "
         "always there: the motion of a recording, no hardware\n",
         omega7);
@@ -100,9 +99,10 @@ void warn_if_beyond_model(const ServoOutcome& outcome) {
       outcome.counts.beyond_model, outcome.cycles);
 }
 
+constexpr int kStoppedBySignal = 128;
+
 int exit_code_of(const ServoOutcome& outcome) {
   if (outcome.cause == StopCause::finished) return 0;
-  constexpr int kStoppedBySignal = 128;
   if (outcome.cause == StopCause::signal) return kStoppedBySignal + InterruptWatch::signal();
   tell_user("tpm: session stopped: {}{}{}\n", word_of(outcome.cause),
             outcome.detail.empty() ? "" : ": ", outcome.detail);
@@ -121,7 +121,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   options.wish = chosen_wish(choice.device);
   options.recording = choice.output;
   options.accept_unstable = choice.accept_unstable;
-  const InterruptWatch interrupts;
+  const InterruptWatch interrupts(InterruptWatch::Of::motors);
   options.interrupted = InterruptWatch::seen;
   std::optional<HilPage> page;
   if (!choice.page.port.empty()) {
@@ -139,14 +139,21 @@ int run_hil(const RunChoice& choice, const Session& session) {
     guide->begin();
     if (opened) opened(identity, model);
   };
-  const SessionRun run = run_session(hil, device, options);
+  SessionRun run;
+  try {
+    run = run_session(hil, device, options);
+  } catch (const Error& error) {
+    if (!InterruptWatch::seen()) throw;
+    tell_user("tpm: {}\n", error.what());
+    return kStoppedBySignal + InterruptWatch::signal();
+  }
   guide.reset();
   if (session.json()) {
     Json json = run_json(hil, run);
     json["recording"] = choice.output;
-    fmt::print("{}", to_text(json));
+    say("{}", to_text(json));
   } else {
-    fmt::print("{}wrote {}\n", run_text(hil, run), choice.output);
+    say("{}wrote {}\n", run_text(hil, run), choice.output);
   }
   for (const std::string& warning : run.rendering.warnings) {
     tell_user("tpm: warning: {}\n", warning);

@@ -31,10 +31,10 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   constexpr double kLeast_Hz = 100.0, kMost_Hz = 4000.0, kLeast_s = 0.1, kMost_s = 86400.0;
   const double rate = within(choice.rate, Dimension::frequency, "--rate", kLeast_Hz, kMost_Hz);
   const double duration = within(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
-  const InterruptWatch interrupts;
+  const InterruptWatch interrupts(InterruptWatch::Of::motors);
   const JitterCheck check = check_jitter(chosen_device(choice.device), rate, duration,
                                          chosen_wish(choice.device), InterruptWatch::seen);
-  fmt::print("{}", session.json() ? to_text(check_json(check)) : check_text(check));
+  say("{}", session.json() ? to_text(check_json(check)) : check_text(check));
   return static_cast<int>(check.fit ? ExitCode::success : ExitCode::answer_is_no);
 }
 

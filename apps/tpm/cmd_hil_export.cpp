@@ -20,16 +20,17 @@ int export_hil(const ExportChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   export_recording(recording, sha256_hex(read_file(choice.recording)), choice.output);
   if (session.json()) {
-    fmt::print("{}", to_text(Json{{"file", choice.output},
-                                  {"rows", recording.rows.size()},
-                                  {"whole", recording.closed},
-                                  {"simulated_device", recording.simulated()}}));
+    say("{}", to_text(Json{{"file", choice.output},
+                           {"rows", recording.rows.size()},
+                           {"whole", recording.closed && recording.damaged == 0},
+                           {"damaged_rows", recording.damaged},
+                           {"simulated_device", recording.simulated()}}));
   } else {
-    fmt::print("{}\n{}wrote {}: {} rows\n", device_line(recording),
-               recording.closed ? "" : "the recording is cut off: no closing record\n",
-               choice.output, recording.rows.size());
+    const std::string damage = damage_line(recording);
+    say("{}\n{}{}wrote {}: {} rows\n", device_line(recording), damage, damage.empty() ? "" : "\n",
+        choice.output, recording.rows.size());
   }
-  return 0;
+  return static_cast<int>(recording.damaged == 0 ? ExitCode::success : ExitCode::answer_is_no);
 }
 
 }  // namespace

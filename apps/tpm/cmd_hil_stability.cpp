@@ -23,7 +23,7 @@ void add_hil_stability_command(CLI::App& hil, Session& session) {
       if (!figures->empty()) files = write_figures(*figures, border_figures(study));
       Json json = border_json(study);
       json["files"] = files;
-      fmt::print("{}", session.json() ? to_text(json) : border_text(study));
+      say("{}", session.json() ? to_text(json) : border_text(study));
       return 0;
     };
   });

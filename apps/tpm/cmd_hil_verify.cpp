@@ -32,26 +32,32 @@ VerifyOptions options_of(const VerifyChoice& choice) {
               "a tolerance and a spacing above 0, a window of 0 or more");
 }
 
+/// What is left of a damaged recording is verified; the answer is no all the same.
+int exit_code_of(const HilRecording& recording) {
+  return static_cast<int>(recording.damaged == 0 ? ExitCode::success : ExitCode::answer_is_no);
+}
+
 int verify_hil(const VerifyChoice& choice, const Session& session) {
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
-  fmt::print("{}", session.json() ? to_text(verification_json(recording, v))
-                                  : verification_text(recording, v));
-  return 0;
+  say("{}",
+      session.json() ? to_text(verification_json(recording, v)) : verification_text(recording, v));
+  return exit_code_of(recording);
 }
 
 int report_hil(const VerifyChoice& choice, const Session& session) {
+  will_write_into(choice.output, {"figures.json", "report.md", "report.html", "report.json"});
   const std::string python = find_drawing_python();
   const HilRecording recording = read_recording(choice.recording);
   const Verification v = verify(recording, options_of(choice));
   write_hil_report(recording, v, choice.output, python);
   if (session.json()) {
-    fmt::print("{}", to_text(verification_json(recording, v)));
+    say("{}", to_text(verification_json(recording, v)));
   } else {
-    fmt::print("{}wrote {}/report.html, report.md and report.json\n",
-               verification_text(recording, v), choice.output);
+    say("{}wrote {}/report.html, report.md and report.json\n", verification_text(recording, v),
+        choice.output);
   }
-  return 0;
+  return exit_code_of(recording);
 }
 
 std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {

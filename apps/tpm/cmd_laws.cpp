@@ -1,6 +1,7 @@
 // tpm laws: the family of laws, and the parameters of one.
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -13,7 +14,7 @@ namespace tpm::app {
 namespace {
 
 /// One of each kind; the rest are their combinations.
-constexpr std::array<const char*, 13> kExamples{"linear",
+constexpr std::array<const char*, 16> kExamples{"linear",
                                                 "linear-1",
                                                 "linear-2",
                                                 "linear-2-fluid",
@@ -25,12 +26,19 @@ constexpr std::array<const char*, 13> kExamples{"linear",
                                                 "linear-fspringpot",
                                                 "linear-fmaxwell",
                                                 "linear-fkelvin_voigt",
-                                                "linear-fzener"};
+                                                "linear-fzener",
+                                                "linear-fmaxwell2",
+                                                "linear-fkelvin_voigt2",
+                                                "linear-fzener2"};
 
-constexpr const char* kGrammar =
-    "KERNEL[-BRANCHES][-TENSION][-fluid][-series]: kernel linear, hertz or power; branches 1 to 8 "
-    "or "
-    "fspringpot, fmaxwell, fkelvin_voigt, fzener; tension elastic or relaxing";
+std::string grammar() {
+  return fmt::format(
+      "KERNEL[-BRANCHES][-TENSION][-fluid][-series]: kernel linear, hertz or power; branches 1 to "
+      "{} "
+      "or fspringpot, fmaxwell, fkelvin_voigt, fzener, with two spring-pots fmaxwell2, "
+      "fkelvin_voigt2, fzener2; tension elastic or relaxing",
+      kMostBranches);
+}
 
 Json limit(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -72,7 +80,7 @@ std::string one_law_text(const LawSpec& spec) {
 }
 
 std::string family_text() {
-  std::string text = fmt::format("{}\n\n", kGrammar);
+  std::string text = grammar() + "\n\n";
   for (const char* name : kExamples) {
     text += fmt::format("{:<22} {}\n", name, law_words(parse_law_name(name, "laws")));
   }
@@ -85,7 +93,7 @@ std::string answer(const std::string& name, const Session& session) {
     return session.json() ? to_text(law_json(spec, true)) : one_law_text(spec);
   }
   if (!session.json()) return family_text();
-  Json json{{"names", kGrammar}, {"laws", Json::array()}};
+  Json json{{"names", grammar()}, {"laws", Json::array()}};
   for (const char* example : kExamples) {
     json["laws"].push_back(law_json(parse_law_name(example, "laws"), false));
   }

@@ -13,6 +13,7 @@
 #include "tpm/report/network_report.hpp"
 #include "tpm/scene/network_file.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/file_roles.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;
@@ -54,16 +55,16 @@ std::string place_of(const NetworkChoice& choice) {
 }
 
 int build(const NetworkChoice& choice, const Session& session) {
+  will_write({fs::path(choice.output).replace_extension(".xdmf")});
   const Tissue tissue = tissue_of(choice);
   const fs::path xdmf = write_network(tissue, choice.output);
   const NetworkInspection inspection = inspect(tissue);
   if (session.json()) {
     Json json = network_json(tissue, inspection);
     json["files"] = {choice.output, xdmf.string()};
-    fmt::print("{}", to_text(json));
+    say("{}", to_text(json));
   } else {
-    fmt::print("{}wrote {} and {}\n", network_text(tissue, inspection), choice.output,
-               xdmf.string());
+    say("{}wrote {} and {}\n", network_text(tissue, inspection), choice.output, xdmf.string());
   }
   return 0;
 }
@@ -89,16 +90,15 @@ int check(const NetworkChoice& choice, const Session& session) {
     json["stands"] = fault.empty();
     json["fault"] = fault.empty() ? Json(nullptr) : Json(fault);
     json["modes_counted"] = tissue.network.organ.size() <= kMostSpheresForModes;
-    fmt::print("{}", to_text(json));
+    say("{}", to_text(json));
   } else {
-    fmt::print("{}least support: {} at sphere {} (loose below {})\n",
-               network_text(tissue, inspection), significant(*least, 3),
-               least - support.begin() + 1, shortest(kLooseSupport));
+    say("{}least support: {} at sphere {} (loose below {})\n", network_text(tissue, inspection),
+        significant(*least, 3), least - support.begin() + 1, shortest(kLooseSupport));
     if (fault.empty()) {
-      fmt::print("stands: no sphere is loose{}\n",
-                 tissue.network.organ.size() <= kMostSpheresForModes
-                     ? ", no motion is free of energy"
-                     : "; motions of the whole were not looked for, there are too many spheres");
+      say("stands: no sphere is loose{}\n",
+          tissue.network.organ.size() <= kMostSpheresForModes
+              ? ", no motion is free of energy"
+              : "; motions of the whole were not looked for, there are too many spheres");
     }
   }
   if (fault.empty()) return 0;
@@ -107,14 +107,15 @@ int check(const NetworkChoice& choice, const Session& session) {
 }
 
 int show(const NetworkChoice& choice) {
-  const Tissue tissue = tissue_of(choice);
-  const std::string python = find_drawing_python();
   fs::path stem = choice.output;
   if (stem.extension() == ".png" || stem.extension() == ".svg") stem.replace_extension();
   const fs::path picture = stem.string() + ".json";
+  will_write({picture, stem.string() + ".svg", stem.string() + ".png"});
+  const Tissue tissue = tissue_of(choice);
+  const std::string python = find_drawing_python();
   write_file(picture, to_text(network_picture(tissue)));
   draw_network(python, picture, stem);
-  fmt::print("wrote {0}.svg, {0}.png and {0}.json\n", stem.string());
+  say("wrote {0}.svg, {0}.png and {0}.json\n", stem.string());
   return 0;
 }
 

@@ -82,13 +82,13 @@ int calibrate(const PlanCommand& command, const Session& session) {
     seconds[std::string(entry.text)] = costs.seconds[static_cast<std::size_t>(entry.meaning)];
   }
   if (session.json()) {
-    fmt::print("{}", to_text(Json{{"seconds_per_operation", seconds}, {"file", file.string()}}));
+    say("{}", to_text(Json{{"seconds_per_operation", seconds}, {"file", file.string()}}));
     return 0;
   }
   for (const auto& [name, value] : seconds.items()) {
-    fmt::print("{:<16} {:>8} ns\n", name, significant(1e9 * value.get<double>(), 2));
+    say("{:<16} {:>8} ns\n", name, significant(1e9 * value.get<double>(), 2));
   }
-  fmt::print("wrote {}\n", file.string());
+  say("wrote {}\n", file.string());
   return 0;
 }
 
@@ -100,7 +100,7 @@ int run_plan(const PlanCommand& command, const Session& session) {
   PlanRequest request = plan_request(command.choice);
   request.relevance = request.changes = !command.brief;
   const Plan plan = planned(read_experiment(command.scene), std::move(request));
-  fmt::print("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
+  say("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
   return plan.choice ? 0 : static_cast<int>(ExitCode::answer_is_no);
 }
 

@@ -13,9 +13,8 @@ int report(const std::string& folder) {
   const std::string python = find_drawing_python();  // before minutes of work, not after
   const PaperReport paper = make_paper_report();
   write_paper_report(paper, folder, python);
-  for (const std::string& sentence : summary_sentences(paper)) fmt::print("- {}\n", sentence);
-  fmt::print("written to {}: report.html, report.md, tables.*, audit.json, fit_*.json, figures\n",
-             folder);
+  for (const std::string& sentence : summary_sentences(paper)) say("- {}\n", sentence);
+  say("written to {}: report.html, report.md, tables.*, audit.json, fit_*.json, figures\n", folder);
   return 0;
 }
 

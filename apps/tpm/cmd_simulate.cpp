@@ -16,6 +16,7 @@
 #include "tpm/simulate/recorder.hpp"
 #include "tpm/simulate/simulation_file.hpp"
 #include "tpm/simulate/vtkhdf.hpp"
+#include "tpm/store/file_roles.hpp"
 #include "tpm/store/hdf5.hpp"
 
 namespace tpm::app {
@@ -83,9 +84,30 @@ fs::path mass_spring_file(const fs::path& file) {
       fmt::format("{}-mass_spring{}", file.stem().string(), file.extension().string()));
 }
 
+/// All files that a run writes, before the first is read.
+void announce_files(const SimulateChoice& choice) {
+  std::vector<fs::path> results{choice.output};
+  if (choice.beside_mass_spring) results.push_back(mass_spring_file(choice.output));
+  for (std::size_t i = 0, results_alone = results.size(); i < results_alone; ++i) {
+    const fs::path file = results[i];
+    if (fs::path(file).replace_extension(".xdmf") == file ||
+        (choice.vtkhdf && fs::path(file).replace_extension(".vtkhdf") == file)) {
+      throw Error(ExitCode::usage, "-o " + choice.output, "its ending is that of a file beside it",
+                  "a name such as results.h5");
+    }
+    results.push_back(fs::path(file).replace_extension(".xdmf"));
+    if (choice.vtkhdf) results.push_back(fs::path(file).replace_extension(".vtkhdf"));
+  }
+  will_write(results);
+  will_write_into(choice.figures, {"pictures.json", "figures.json"});
+}
+
 std::vector<Simulated> simulate_all(const SimulateChoice& choice) {
   const double every_s = checkpoint_interval_s(choice);
+  announce_files(choice);
   ExperimentScene scene = read_experiment(choice.scene);
+  will_update(
+      {choice.output + ".checkpoint", mass_spring_file(choice.output).string() + ".checkpoint"});
   std::vector<Simulated> all;
   if (choice.beside_mass_spring) {
     if (scene.formulation.mass_spring) {
@@ -132,11 +154,11 @@ int simulate_and_report(const SimulateChoice& choice, const Session& session) {
     if (all.size() > 1)
       json["mass_spring"] = simulation_json(all[1].scene, all[1].network, all[1].run);
     json["files"] = files;
-    fmt::print("{}", to_text(json));
+    say("{}", to_text(json));
     return 0;
   }
-  for (const Simulated& s : all) fmt::print("{}", simulation_text(s.scene, s.network, s.run));
-  fmt::print("wrote {}\n", fmt::join(files, ", "));
+  for (const Simulated& s : all) say("{}", simulation_text(s.scene, s.network, s.run));
+  say("wrote {}\n", fmt::join(files, ", "));
   return 0;
 }
 
@@ -152,7 +174,7 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   request.relevance = request.changes = false;
   const Plan plan = planned(scene, std::move(request));
   if (!plan.choice) {
-    fmt::print("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
+    say("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
     return static_cast<int>(ExitCode::answer_is_no);
   }
   const std::vector<double> times = times_to_watch(scene);
@@ -161,10 +183,10 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
   if (session.json()) {
     Json json = planned_run_json(plan, scene, times, answer);
     json["files"] = {choice.output};
-    fmt::print("{}", to_text(json));
+    say("{}", to_text(json));
     return 0;
   }
-  fmt::print("{}wrote {}\n", planned_run_text(plan, times, answer), choice.output);
+  say("{}wrote {}\n", planned_run_text(plan, times, answer), choice.output);
   return 0;
 }
 

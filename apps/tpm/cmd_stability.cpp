@@ -20,12 +20,11 @@ int stability(const std::string& folder, const Session& session) {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_stability(study, folder, python, took.count());
   if (session.json()) {
-    fmt::print("{}", to_text(to_json(study)));
+    say("{}", to_text(to_json(study)));
     return 0;
   }
-  for (const std::string& sentence : stability_sentences(study)) fmt::print("- {}\n", sentence);
-  fmt::print(
-      "written to {}: report.html, report.md, stability.json, limits.csv, corners.csv, servo.csv, "
+  for (const std::string& sentence : stability_sentences(study)) say("- {}\n", sentence);
+  say("written to {}: report.html, report.md, stability.json, limits.csv, corners.csv, servo.csv, "
       "map_*.csv, figures\n",
       folder);
   return 0;

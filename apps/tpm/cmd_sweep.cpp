@@ -13,6 +13,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/file_roles.hpp"
 #include "tpm/sweep/sweep_ranks.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
@@ -122,19 +123,19 @@ int print_results(const Sweep& sweep, const CellTally& tally, const std::vector<
   if (session.json()) {
     Json json = tally_json(sweep, tally);
     json["files"] = files;
-    fmt::print("{}", to_text(json));
+    say("{}", to_text(json));
     return code;
   }
-  fmt::print("{} cells: {} done, {} skipped, {} failed\n", sweep.cells(), tally.done, tally.skipped,
-             tally.failed);
+  say("{} cells: {} done, {} skipped, {} failed\n", sweep.cells(), tally.done, tally.skipped,
+      tally.failed);
   constexpr std::size_t kShown = 5;
   for (std::size_t i = 0; i < std::min(kShown, tally.reasons.size()); ++i) {
-    fmt::print("- {}\n", printable(tally.reasons[i], 160));
+    say("- {}\n", printable(tally.reasons[i], 160));
   }
   if (tally.reasons.size() > kShown) {
-    fmt::print("- and {} more reasons: /reason_text\n", tally.reasons.size() - kShown);
+    say("- and {} more reasons: /reason_text\n", tally.reasons.size() - kShown);
   }
-  fmt::print("wrote {}\n", fmt::join(files, ", "));
+  say("wrote {}\n", fmt::join(files, ", "));
   return code;
 }
 
@@ -188,6 +189,7 @@ int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls
               const Session& session) {
   require_same_count(output, controls.shard);
   const fs::path file = shard_path(output, controls.shard);
+  will_write({file.string() + ".run.json"});
   const Shard shard = controls.shard;
   BlockLog log(file, sweep, say_note);
   const SweepRun run = run_watched(sweep, log, std::move(controls));
@@ -195,32 +197,32 @@ int run_shard(const Sweep& sweep, const fs::path& output, SweepControls controls
   log.sync();
   write_file(file.string() + ".run.json", to_text(sidecar(sweep, run, {})));
   if (session.json()) {
-    fmt::print("{}", to_text(Json{{"file", file.string()}, {"blocks", run.blocks}}));
+    say("{}", to_text(Json{{"file", file.string()}, {"blocks", run.blocks}}));
   } else {
-    fmt::print("shard {} of {}: {} of {} blocks in {}\n", shard.index + 1, shard.count, run.blocks,
-               sweep.blocks(), file.string());
+    say("shard {} of {}: {} of {} blocks in {}\n", shard.index + 1, shard.count, run.blocks,
+        sweep.blocks(), file.string());
   }
   return 0;
 }
 
-/// What goes beside the results is neither the results themselves nor the sweep.
-void require_apart(const fs::path& output, const fs::path& sweep) {
+/// All files that a sweep writes, before the first is read.
+void announce_files(const fs::path& output) {
   for (const char* ending : {".csv", ".run.json"}) {
     const fs::path other = beside(output, ending);
-    std::error_code ignored;
-    if (other == output || fs::equivalent(other, sweep, ignored)) {
+    if (other == output) {
       throw Error(ExitCode::usage, "-o " + output.string(),
                   fmt::format("{} goes beside it", other.string()),
                   "a name that leaves that one free, such as results.h5");
     }
+    will_write({other});
   }
 }
 
 /// Puts shards together.
 int merge(const SweepChoice& choice, const Session& session) {
-  const Sweep sweep = read_sweep(choice.sweep);
   const fs::path output = choice.output;
-  require_apart(output, choice.sweep);
+  announce_files(output);
+  const Sweep sweep = read_sweep(choice.sweep);
   const auto files = choice.shards.empty() ? shards_beside(output) : choice.shards;
   if (files.empty()) {
     throw bad_input(output.string(), "no shards beside it", "files of tpm sweep --shard I/N");
@@ -257,14 +259,15 @@ int run_command(const SweepChoice& choice, const Session& session) {
                 "tpm sweep SWEEP.json, or merge, show, plot, sensitivity, convergence, best");
   }
   const std::unique_ptr<SweepRanks> ranks = SweepRanks::of_this_run();
+  const fs::path output = choice.output, log_file = log_path(output);
+  announce_files(output);
   const Sweep sweep = read_sweep(choice.sweep);
   if (ranks && !ranks->first()) {
     const InterruptWatch until_sent_home;
     ranks->serve(sweep);
     return 0;
   }
-  const fs::path output = choice.output, log_file = log_path(output);
-  require_apart(output, choice.sweep);
+  will_update({output});  // a result that stands already is asked which sweep it holds
   if (choice.shard.empty() && fingerprint_of(output) == sweep.fingerprint) {
     std::error_code ignored;
     fs::remove(log_file, ignored);  // left where a run was killed after its last step

@@ -14,6 +14,7 @@
 #include "tpm/report/sweep_convergence_report.hpp"
 #include "tpm/report/sweep_report.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/file_roles.hpp"
 #include "tpm/sweep/best_cells.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
@@ -30,7 +31,7 @@ struct SweepViewChoice {
 
 int show(const SweepViewChoice& choice, const Session& session) {
   const SweepReader sweep(choice.file);
-  fmt::print("{}", session.json() ? to_text(sweep_json(sweep)) : sweep_text(sweep));
+  say("{}", session.json() ? to_text(sweep_json(sweep)) : sweep_text(sweep));
   return 0;
 }
 
@@ -67,6 +68,7 @@ void draw_into(const std::string& folder, const std::vector<Figure>& figures) {
 }
 
 int sensitivity(const SweepViewChoice& choice, const Session& session) {
+  will_write_into(choice.figure_folder, {"figures.json"});
   const SweepReader sweep(choice.file);
   HeldPlaces held;
   for (const std::string& text : choice.at) held.push_back(parse_held(text, sweep));
@@ -79,12 +81,13 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
     if (wished) all.push_back(sensitivity_of(sweep, v.name, held));
   }
   for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
-  fmt::print("{}", session.json() ? to_text(sensitivity_json(all)) : sensitivity_text(all));
+  say("{}", session.json() ? to_text(sensitivity_json(all)) : sensitivity_text(all));
   draw_into(choice.figure_folder, sensitivity_figures(all, sweep.title()));
   return 0;
 }
 
 int convergence(const SweepViewChoice& choice, const Session& session) {
+  will_write_into(choice.figure_folder, {"figures.json"});
   const SweepReader sweep(choice.file);
   HeldPlaces held;
   for (const std::string& text : choice.at) held.push_back(parse_held(text, sweep));
@@ -101,9 +104,9 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
     all.push_back(convergence_of(sweep, name, axis, choice.size, held));
   }
   if (session.json()) {
-    fmt::print("{}", to_text(convergence_json(all)));
+    say("{}", to_text(convergence_json(all)));
   } else {
-    fmt::print("{}", convergence_text(all));
+    say("{}", convergence_text(all));
   }
   draw_into(choice.figure_folder, convergence_figures(all, sweep.title()));
   const bool none = std::none_of(all.begin(), all.end(), [](auto& c) { return c.monotone(); });
@@ -119,6 +122,7 @@ void move_scene(Json& fit, const fs::path& from, const fs::path& to) {
 }
 
 int best(const SweepViewChoice& choice, const Session& session) {
+  will_write({choice.start});
   const SweepReader sweep(choice.file);
   std::optional<std::string> over;
   if (!choice.over.empty()) over = choice.over;
@@ -145,24 +149,25 @@ int best(const SweepViewChoice& choice, const Session& session) {
                       {choice.best_output, cell.value},
                       {"parameters", std::move(parameters)}});
     }
-    fmt::print("{}", to_text(Json{{"best", std::move(list)}}));
+    say("{}", to_text(Json{{"best", std::move(list)}}));
     return 0;
   }
   for (const BestCell& cell : cells) {
-    fmt::print("{} = {}:", choice.best_output, significant(cell.value, 6));
+    say("{} = {}:", choice.best_output, significant(cell.value, 6));
     for (const CellParameter& p : cell.parameters) {
       const Unit unit = p.unit.empty() ? Unit{"", Dimension::dimensionless, 1.0}
                                        : shown_unit(parse_unit(p.unit, p.name).dimension);
-      fmt::print(" {} = {}{}{}", p.name, significant(p.value / unit.to_si, 6),
-                 unit.symbol.empty() ? "" : " ", unit.symbol);
+      say(" {} = {}{}{}", p.name, significant(p.value / unit.to_si, 6),
+          unit.symbol.empty() ? "" : " ", unit.symbol);
     }
-    fmt::print("\n");
+    say("\n");
   }
-  if (!choice.start.empty()) fmt::print("wrote {}: tpm fit goes on from there\n", choice.start);
+  if (!choice.start.empty()) say("wrote {}: tpm fit goes on from there\n", choice.start);
   return 0;
 }
 
 int plot(const SweepViewChoice& choice) {
+  will_write_into(choice.folder, {"figures.json"});
   const SweepReader sweep(choice.file);
   SweepFigures wished;
   wished.variables = choice.variables;
@@ -178,7 +183,7 @@ int plot(const SweepViewChoice& choice) {
     wished.pareto = {choice.pareto.substr(0, comma), choice.pareto.substr(comma + 1)};
   }
   const auto files = write_figures(choice.folder, sweep_figures(sweep, wished));
-  fmt::print("wrote {} into {}\n", fmt::join(files, ", "), choice.folder);
+  say("wrote {} into {}\n", fmt::join(files, ", "), choice.folder);
   return 0;
 }
 

@@ -12,9 +12,9 @@ void add_version_command(CLI::App& app, Session& session) {
   command->callback([&session] {
     session.run = [&session] {
       if (session.json()) {
-        fmt::print("{}", to_text(Json{{"version", version()}}));
+        say("{}", to_text(Json{{"version", version()}}));
       } else {
-        fmt::print("tpm {}\n", version());
+        say("tpm {}\n", version());
       }
       return 0;
     };

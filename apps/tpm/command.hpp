@@ -4,8 +4,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace tpm::app {
@@ -26,16 +29,32 @@ void add_format_option(CLI::App& command, Session& session);
 /// Prints the text, or writes it to `file` if that is not empty.
 void deliver(const std::string& text, const std::string& file);
 
+/// Announces the files of these names in a folder, before they are computed (will_write()); none if
+/// the folder is empty.
+void will_write_into(const std::filesystem::path& folder, std::initializer_list<const char*> names);
+
 /// Reads a whole number from `smallest` to 1e9. Throws Error(usage) naming the option.
 [[nodiscard]] std::uint64_t parse_whole_number(const std::string& text, const char* option,
                                                std::uint64_t smallest);
 
-/// Writes a warning or an error to standard error. A full disk behind it, or nobody who reads it,
-/// changes nothing else.
+/// Writes to standard output, control characters from names and titles escaped (for_terminal()).
+/// Throws Error(environment) if it takes nothing more.
+void write_output(std::string_view text);
+
+/// Formats and writes an answer to standard output.
+template <class... Arguments>
+void say(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
+  write_output(fmt::format(text, std::forward<Arguments>(arguments)...));
+}
+
+/// Writes one line to standard error, control characters escaped, those that end lines too. A full
+/// disk behind it, or nobody who reads it, changes nothing else.
+void write_message(std::string_view line);
+
+/// Formats and writes a warning or an error: one line that ends in a line feed.
 template <class... Arguments>
 void tell_user(fmt::format_string<Arguments...> text, Arguments&&... arguments) {
-  const std::string line = fmt::format(text, std::forward<Arguments>(arguments)...);
-  (void)std::fputs(line.c_str(), stderr);
+  write_message(fmt::format(text, std::forward<Arguments>(arguments)...));
 }
 
 // One function per file cmd_*.cpp.

@@ -3,10 +3,13 @@
 
 namespace tpm::app {
 
-/// While this lives, the first SIGINT or SIGTERM is remembered and a second one kills.
+/// While this lives, the first SIGINT or SIGTERM is remembered and a second one kills. With
+/// `motors`, only one that comes two seconds after the first: until then the program is stopping
+/// them, and must not be killed in the middle of it.
 class InterruptWatch {
  public:
-  InterruptWatch();
+  enum class Of { work, motors };
+  explicit InterruptWatch(Of of = Of::work);
   ~InterruptWatch();
   InterruptWatch(const InterruptWatch&) = delete;
   InterruptWatch& operator=(const InterruptWatch&) = delete;

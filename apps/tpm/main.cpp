@@ -8,12 +8,15 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <system_error>
 #include <vector>
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/core/text.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/file_roles.hpp"
 
 namespace tpm::app {
 
@@ -23,12 +26,33 @@ void add_format_option(CLI::App& command, Session& session) {
       ->capture_default_str();
 }
 
+void write_output(std::string_view text) {
+  const std::string safe = for_terminal(text, LineEnds::kept);
+  if (std::fwrite(safe.data(), 1, safe.size(), stdout) == safe.size()) return;
+  throw Error(ExitCode::environment, "standard output",
+              fmt::format("cannot be written: {}", std::strerror(errno)), "room for the answer");
+}
+
+void write_message(std::string_view line) {
+  if (line.ends_with('\n')) line.remove_suffix(1);
+  const std::string safe = for_terminal(line, LineEnds::escaped) + "\n";
+  (void)std::fputs(safe.c_str(), stderr);
+}
+
 void deliver(const std::string& text, const std::string& file) {
   if (file.empty()) {
-    fmt::print("{}", text);
+    write_output(text);
   } else {
     write_file(file, text);
   }
+}
+
+void will_write_into(const std::filesystem::path& folder,
+                     std::initializer_list<const char*> names) {
+  if (folder.empty()) return;
+  std::vector<std::filesystem::path> files;
+  for (const char* name : names) files.push_back(folder / name);
+  will_write(files);
 }
 
 std::uint64_t parse_whole_number(const std::string& text, const char* option,
@@ -44,26 +68,14 @@ std::uint64_t parse_whole_number(const std::string& text, const char* option,
 
 namespace {
 
-/// No command writes over a file that it was given to read.
-void require_output_apart(const CLI::App& app) {
+/// No command writes over a file that it reads: what --output names is announced before anything is
+/// read. Commands that write further files announce them themselves.
+void announce_output(const CLI::App& app) {
   for (const CLI::App* command : app.get_subcommands()) {
-    require_output_apart(*command);
+    announce_output(*command);
     const CLI::Option* output = command->get_option_no_throw("--output");
     if (output == nullptr) continue;
-    const std::string file =
-        output->count() > 0 ? output->results().front() : output->get_default_str();
-    for (const CLI::Option* option : command->get_options()) {
-      if (option == output) continue;
-      for (const std::string& given : option->results()) {
-        std::error_code ignored;
-        if (!std::filesystem::is_regular_file(given, ignored) ||
-            !std::filesystem::equivalent(given, file, ignored)) {
-          continue;
-        }
-        throw Error(ExitCode::usage, fmt::format("-o {}", printable(file)),
-                    fmt::format("is {} itself", option->get_name()), "another file");
-      }
-    }
+    will_write({output->count() > 0 ? output->results().front() : output->get_default_str()});
   }
 }
 
@@ -103,6 +115,7 @@ int run(int argc, char** argv) {
       "Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35\n"
       "Each command explains itself: tpm COMMAND --help");
   Session session;
+  const FileRoles roles;
   add_commands(app, session);
 
   try {
@@ -113,7 +126,7 @@ int run(int argc, char** argv) {
     tell_user("tpm: {}; see tpm --help\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
-  require_output_apart(app);
+  announce_output(app);
   return session.run();
 }
 
@@ -147,12 +160,12 @@ int main(int argc, char** argv) {
   } catch (const tpm::Error& error) {
     tpm::app::tell_user("tpm: {}\n", error.what());
     return static_cast<int>(error.code());
-  } catch (const std::system_error& error) {
-    // fmt::print throws these where standard output takes nothing more.
-    const bool output = std::ferror(stdout) != 0;
-    tpm::app::tell_user("tpm: {}: {}\n", output ? "standard output" : "internal error",
-                        error.what());
-    return static_cast<int>(output ? tpm::ExitCode::environment : tpm::ExitCode::numerical);
+  } catch (const std::filesystem::filesystem_error& error) {
+    tpm::app::tell_user("tpm: {}: {}\n", error.path1().string(), error.code().message());
+    return static_cast<int>(tpm::ExitCode::environment);
+  } catch (const std::bad_alloc&) {
+    tpm::app::tell_user("tpm: not enough memory for this input\n");
+    return static_cast<int>(tpm::ExitCode::environment);
   } catch (const std::exception& error) {
     // Nothing in the library throws anything else on purpose: this is a defect of tpm.
     tpm::app::tell_user("tpm: internal error: {}; please report it\n", error.what());

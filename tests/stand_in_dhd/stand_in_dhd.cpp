@@ -4,6 +4,8 @@
 // read when devices are counted; its lines are
 //   version|com_mode|entries|devices|type|initialised|period|delay_periods|encoder_step NUMBER
 //   wait NUMBER       forces set before the operator begins
+//   init_ms NUMBER    that drdAutoInit takes; drdStop ends it, unless stubborn NUMBER is not 0
+//   max_force         is an event with the limit in mN behind its name
 //   operator FILE     pieces as written by to_lines(OperatorScript)
 //   events FILE       what happened, with the time of the clock: "NAME NANOSECONDS"
 //   fault NAME FIRST COUNT   at the calls of dhdGetPosition (dhdSetForce for saturated) numbered
@@ -42,7 +44,9 @@ struct StandIn {
   bool initialised = true, read_once = false, opened_by_drd = false;
   long reads = 0, writes = 0, wait = 0;
   int watchdog_ticks = 0;
-  std::atomic<bool> expert{false}, unplugged{false};
+  std::atomic<bool> expert{false}, unplugged{false}, init_stopped{false};
+  int init_ms = 0;
+  bool stubborn = false;
   std::atomic<int> cause{0};
 };
 
@@ -102,6 +106,8 @@ void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
     if (key == "devices") s.devices = whole;
     if (key == "type") s.type = whole;
     if (key == "initialised") s.initialised = whole != 0;
+    if (key == "init_ms") s.init_ms = whole;
+    if (key == "stubborn") s.stubborn = whole != 0;
     if (key == "wait") s.wait = whole;
     if (key == "period") s.plant_settings.period_s = value;
     if (key == "delay_periods") s.plant_settings.delay_periods = whole;
@@ -213,7 +219,8 @@ int dhdGetComMode(char) {
 int dhdSetGravityCompensation(int, char) {
   return 0;
 }
-int dhdSetMaxForce(double, char) {
+int dhdSetMaxForce(double newton, char) {
+  event(("max_force_" + std::to_string(std::lround(1e3 * newton))).c_str());
   return 0;
 }
 int dhdSetBrakes(int, char) {
@@ -330,13 +337,23 @@ bool drdIsInitialized(char) {
 
 int drdAutoInit(char) {
   if (!here().opened_by_drd) return failed(5);
+  StandIn& s = here();
   event("moved");
-  here().initialised = true;
+  for (int ms = 0; ms < s.init_ms && (s.stubborn || !s.init_stopped); ++ms) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  event("init_over");
+  if (s.init_stopped) return failed(7);
+  s.initialised = true;
   return 0;
 }
 
 #ifndef STAND_IN_WITHOUT_A_SYMBOL
-int drdStop(bool, char) {
+int drdStop(bool keep_force, char) {
+  if (!keep_force) {
+    here().init_stopped = true;
+    event("drd_stop");
+  }
   return 0;
 }
 #endif

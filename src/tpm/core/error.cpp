@@ -4,6 +4,8 @@
 
 #include <iterator>
 
+#include "tpm/core/text.hpp"
+
 namespace tpm {
 namespace {
 
@@ -12,7 +14,7 @@ std::string one_line(std::string_view where, std::string_view what, std::string_
   if (!where.empty()) line.append(where).append(": ");
   line.append(what);
   if (!expected.empty()) line.append("; expected ").append(expected);
-  return line;
+  return for_terminal(line, LineEnds::escaped);
 }
 
 }  // namespace

@@ -17,7 +17,8 @@ enum class ExitCode : int {
 };
 
 /// An error with the three things a person needs, printed as one line:
-/// "WHERE: WHAT; expected EXPECTED".
+/// "WHERE: WHAT; expected EXPECTED". Control characters in it, line ends too, are escaped
+/// (for_terminal()): it may repeat names and titles from outside.
 class Error : public std::runtime_error {
  public:
   /// @param where file, file:line, key or option; may be empty

@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <string_view>
 
 namespace tpm {
 
@@ -17,5 +18,12 @@ namespace tpm {
 
 /// `decimals` digits after the point.
 [[nodiscard]] std::string fixed(double value, int decimals);
+
+enum class LineEnds { kept, escaped };
+
+/// Text as a terminal may show it: what would move its cursor, change its colours or turn the
+/// direction of writing is written as \uXXXX, which JSON reads as the same character; bytes that
+/// are not UTF-8 become '?'. Tabs stay.
+[[nodiscard]] std::string for_terminal(std::string_view text, LineEnds line_ends);
 
 }  // namespace tpm

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -64,6 +65,8 @@ struct DevicePreparation {
   double watchdog_s = 0.008;   ///< forces are cut without a command for so long; 0.004 to 0.016
   bool may_move = false;       ///< the device may move by itself to initialise
   bool take_as_ready = false;  ///< it is initialised, where nobody can tell
+  /// Asked while the device initialises itself; true stops it there.
+  std::function<bool()> interrupted;
 };
 
 /// What a device reports beside its position. Plain data.

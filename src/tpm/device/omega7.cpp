@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <thread>
 
 #include "tpm/core/error.hpp"
 
@@ -19,6 +21,13 @@ constexpr double kWatchdogTick_s = 125e-6;
 
 Error device_error(std::string_view what, std::string_view expected) {
   return {ExitCode::environment, "omega7", what, expected};
+}
+
+/// Of the last call in this thread.
+std::string words_of(const DhdCalls& call) {
+  const int number = call.error_get_last();
+  const char* words = call.error_get_last_text();
+  return fmt::format("error {} ({})", number, printable(words == nullptr ? "no words" : words));
 }
 
 DeviceLink link_of(int mode) {
@@ -39,16 +48,14 @@ DeviceLink link_of(int mode) {
 }  // namespace
 
 Omega7::Omega7(const std::filesystem::path& library)
-    : library_(std::make_unique<DhdLibrary>(library)), call_(library_->calls()) {}
+    : library_(std::make_shared<DhdLibrary>(library)), call_(library_->calls()) {}
 
 Omega7::~Omega7() {
   stop();
 }
 
 std::string Omega7::last_words() const {
-  const int number = call_.error_get_last();
-  const char* words = call_.error_get_last_text();
-  return fmt::format("error {} ({})", number, printable(words == nullptr ? "no words" : words));
+  return words_of(call_);
 }
 
 void Omega7::require(int answer, const char* call) const {
@@ -103,8 +110,64 @@ void Omega7::require_initialised(const DevicePreparation& preparation) {
     throw device_error("is not initialised, for which it moves by itself",
                        "--may-move with free space around the device");
   }
-  require(call_.drd_auto_init(id_), "drdAutoInit");
+  initialise(preparation.interrupted);
   require(call_.drd_stop(true, id_), "drdStop");
+}
+
+/// drdAutoInit moves the device and blocks until it has done so: it runs in a thread of its own,
+/// and whoever waits for it can stop the motors.
+void Omega7::initialise(const std::function<bool()>& interrupted) {
+  struct Moving {
+    std::atomic<bool> over{false};
+    int answer = 0;
+    std::string words;  // of the library, which keeps them for each thread
+  };
+  const auto moving = std::make_shared<Moving>();
+  std::thread mover([moving, library = library_, id = id_] {
+    moving->answer = library->calls().drd_auto_init(id);
+    if (moving->answer < 0) moving->words = words_of(library->calls());
+    moving->over = true;
+  });
+  bool stopped = false;
+  const auto wait = [&](std::chrono::milliseconds limit) {
+    const auto until = std::chrono::steady_clock::now() + limit;
+    while (!moving->over && std::chrono::steady_clock::now() < until) {
+      if (!stopped && interrupted && interrupted()) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  };
+  try {
+    while (!moving->over && !(interrupted && interrupted())) wait(std::chrono::hours(1));
+  } catch (...) {
+    stop_moving();
+    mover.detach();
+    throw;
+  }
+  if (!moving->over) {
+    stopped = true;
+    stop_moving();
+    constexpr std::chrono::milliseconds kPatience{2000};
+    wait(kPatience);
+    if (moving->over) {
+      mover.join();
+      throw device_error("the initialisation was interrupted; the motors are off", "");
+    }
+    mover.detach();
+    cut_ = true;  // the library is not asked again while a call is stuck in it
+    throw device_error(
+        "the initialisation was interrupted and does not end; the motors were "
+        "switched off",
+        "the device to be switched off and on");
+  }
+  mover.join();
+  if (moving->answer >= 0) return;
+  throw device_error("drdAutoInit failed: " + moving->words, "");
+}
+
+void Omega7::stop_moving() noexcept {
+  (void)call_.drd_stop(false, id_);
+  (void)call_.stop(id_);
+  (void)call_.enable_force(0, id_);
 }
 
 void Omega7::set_watchdog(double seconds) {

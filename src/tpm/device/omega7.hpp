@@ -28,11 +28,13 @@ class Omega7 final : public HapticDevice {
   void require(int answer, const char* call) const;
   [[nodiscard]] std::string last_words() const;
   void require_initialised(const DevicePreparation& preparation);
+  void initialise(const std::function<bool()>& interrupted);
+  void stop_moving() noexcept;
   void set_watchdog(double seconds);
   DeviceAnswer judged(int answer) noexcept;
   void note_error() noexcept;
 
-  std::unique_ptr<DhdLibrary> library_;
+  std::shared_ptr<DhdLibrary> library_;  ///< shared with a call that is stuck in it
   const DhdCalls& call_;
   DeviceIdentity identity_;
   DeviceStatus status_;

@@ -36,10 +36,16 @@ void ExperimentResiduals::find_linear() {
         return d.noise.kind != NoiseKind::log && d.noise.kind != NoiseKind::relative_to_model &&
                d.noise.shape == ErrorShape::normal && !d.estimates_sigma();
       });
+  // What answers a load with a depth is linear in a compliance, not in a stiffness.
+  const bool by_load =
+      std::any_of(experiments_.begin(), experiments_.end(), [](const Experiment& e) {
+        const auto* course = std::get_if<TimeCourse>(&e.imposed);
+        return course != nullptr && course->protocol.drive() == Drive::force;
+      });
   linear_.clear();
   linear_.reserve(config_.parameters.size());
   for (const EstimatedParameter& p : config_.parameters) {
-    linear_.push_back(noise_stays && p.fit.scale == Scale::linear && !p.sets.empty() &&
+    linear_.push_back(noise_stays && !by_load && p.fit.scale == Scale::linear && !p.sets.empty() &&
                       std::all_of(p.sets.begin(), p.sets.end(), [&](const Target& target) {
                         return model_->linear_in(target.parameter);
                       }));

@@ -81,9 +81,10 @@ struct FittedDatum {
   FitDatum datum;
   double predicted = 0.0;              ///< SI
   std::optional<double> predicted_sd;  ///< from the parameters' covariance
-  double standardised = 0.0;           ///< (predicted - value) / sigma after the noise model
-  std::optional<Limits> confidence;    ///< pointwise band of the curve, at the fit's level
-  std::optional<Limits> prediction;    ///< where one new reading falls
+  double reading_sd = 0.0;    ///< of the reading itself, on its own scale whatever the noise's, SI
+  double standardised = 0.0;  ///< (predicted - value) / sigma after the noise model
+  std::optional<Limits> confidence;  ///< pointwise band of the curve, at the fit's level
+  std::optional<Limits> prediction;  ///< where one new reading falls
 };
 
 /// One recording with the fitted model's answer.

@@ -18,6 +18,12 @@ double reading_sd(const ExperimentResiduals& function, std::size_t datum, double
   return sd / transformed_slope(law.scale, answer);
 }
 
+/// Standard deviation of a reading, from the scale of the noise to the reading's own.
+double sd_of_reading(const Noise& noise, const FitDatum& d) {
+  const ErrorLaw law = error_law(noise);
+  return standard_deviation(law, d.sigma) / transformed_slope(law.scale, *d.value);
+}
+
 /// Bands about the answers to all data; empty if the data do not determine them.
 std::optional<PredictionBands> bands_of(const FitResult& result,
                                         const ExperimentResiduals& function,
@@ -162,7 +168,11 @@ void fill_data(FitResult& result, const ExperimentResiduals& function,
       if (result.config.data[datum.choice].estimates_sigma()) {
         datum.sigma = function.noise_scale(i, predicted[row], result.best.natural);
       }
-      FittedDatum d{std::move(datum), predicted[row], std::nullopt, z, {}, {}};
+      FittedDatum d{std::move(datum), predicted[row], std::nullopt, 0.0, z, {}, {}};
+      if (d.datum.value) {
+        d.reading_sd = sd_of_reading(result.config.data[d.datum.choice].noise, d.datum) *
+                       std::sqrt(result.variance_factor);
+      }
       if (sd.size() > 0) d.predicted_sd = sd[row];
       if (bands) {
         d.confidence = {bands->lower[row], bands->upper[row]};

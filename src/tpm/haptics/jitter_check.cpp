@@ -76,6 +76,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, double rate_Hz, double dura
   DevicePreparation preparation = session.preparation;
   preparation.may_move = choice.may_move;
   preparation.take_as_ready = choice.take_as_ready;
+  preparation.interrupted = interrupted;
   RealTimeOptions options;
   options.wish = wish;
   constexpr double kGiveUp_s = 0.5;  // long stalls are what is looked for

@@ -127,8 +127,20 @@ HilRecording read_recording(const std::filesystem::path& file) {
         hand_m + *recording.session.servo.surface_before_hand_m * recording.session.servo.push;
   }
   recording.closed = log.closed;
+  recording.damaged = log.damaged;
   if (log.closed) recording.closing = parse_json(log.closing, file.string());
   return recording;
+}
+
+std::string damage_line(const HilRecording& recording) {
+  if (recording.damaged > 0) {
+    return fmt::format(
+        "the recording is damaged: {} of {} rows are not as they were written, and "
+        "left out{}",
+        recording.damaged, recording.rows.size() + recording.damaged,
+        recording.closed ? "" : "; it has no closing record");
+  }
+  return recording.closed ? "" : "the recording is cut off: no closing record";
 }
 
 std::string device_line(const HilRecording& recording) {

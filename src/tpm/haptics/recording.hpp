@@ -26,8 +26,9 @@ struct HilRecording {
   Json header;
   HilSession session;
   std::vector<ServoRecord> rows;
-  bool closed = false;  ///< the session came to an end, of whatever cause
-  Json closing;         ///< null unless closed
+  bool closed = false;      ///< the session came to an end, of whatever cause
+  Json closing;             ///< null unless closed
+  std::size_t damaged = 0;  ///< rows that were written and are not whole; left out
 
   /// The device was simulated, replayed, or may be: no motor is known to have moved.
   [[nodiscard]] bool simulated() const;
@@ -38,6 +39,9 @@ struct HilRecording {
 
 /// Reads a recording, also of a session that was cut off. Throws Error(bad_input).
 [[nodiscard]] HilRecording read_recording(const std::filesystem::path& file);
+
+/// What of a recording is missing, one line for a person; empty if nothing is.
+[[nodiscard]] std::string damage_line(const HilRecording& recording);
 
 /// "SIMULATED DEVICE" in words that suit the recording, or what the hardware is.
 [[nodiscard]] std::string device_line(const HilRecording& recording);

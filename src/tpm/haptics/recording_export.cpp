@@ -169,7 +169,8 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
   }
   attribute("time", recording.header.value("time", ""));
   attribute("model", recording.header.at("model").value("name", ""));
-  attribute("whole", yes_or_no(recording.closed));
+  attribute("whole", yes_or_no(recording.closed && recording.damaged == 0));
+  attribute("damaged_rows", std::to_string(recording.damaged));
   attribute("cause", recording.closed ? recording.closing.value("cause", "") : "cut off");
   write_rows(writer, recording);
   write_phases(writer, recording.session);

@@ -100,14 +100,16 @@ SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
   DevicePreparation preparation = session.preparation;
   preparation.may_move = choice.may_move;
   preparation.take_as_ready = choice.take_as_ready;
+  preparation.interrupted = options.interrupted;
   try {
     run.device = device->open();
     if (options.opened) options.opened(run.device, run.model);
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
                                               to_json(run.rendering))),
-                     sizeof(ServoRecord));
+                     sizeof(ServoRecord), RowLogWriter::Name::later);
     device->prepare(preparation);
+    log.appear();
     run.outcome = run_loop(session, device, run.model, stepped, run.rendering,
                            choice.kind != "replay", options, log);
     log.close(to_text(recording_closing(run.outcome)));

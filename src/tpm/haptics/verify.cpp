@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <span>
 
 #include "tpm/core/error.hpp"
@@ -20,6 +22,8 @@
 namespace tpm {
 namespace {
 
+constexpr double kNoReference = std::numeric_limits<double>::quiet_NaN();
+
 /// Adds up errors of instants.
 class FidelitySum {
  public:
@@ -27,6 +31,7 @@ class FidelitySum {
     add_error(commanded_N - reference_N, reference_N);
   }
   void add_error(double error, double reference_N) {
+    if (std::isnan(reference_N)) return;
     squares_ += error * error;
     result_.max_N = std::max(result_.max_N, std::abs(error));
     result_.peak_N = std::max(result_.peak_N, std::abs(reference_N));
@@ -103,6 +108,7 @@ void judge_phases(Verification& v, const HilRecording& recording,
     sums[p].add_error(v.error_N[k], reference_size_N[k]);
     all.add_error(v.error_N[k], reference_size_N[k]);
     const OperatorAim aim = script.at(v.time_s[k]);
+    if (std::isnan(reference_size_N[k])) continue;
     const bool place = aim.aim == OperatorPiece::Aim::place;  // phases that ask for a push: none
     const double asked = place ? aim.value : row.tool_depth_m;
     depth_squares[p] += (row.tool_depth_m - asked) * (row.tool_depth_m - asked);
@@ -123,6 +129,7 @@ double apart_from_reference(const Verification& v, const std::vector<double>& ti
   std::size_t i = 0;
   for (std::size_t k = 0; k < v.time_s.size() && v.time_s[k] <= time_s.back(); ++k) {
     while (time_s[i] < v.time_s[k]) ++i;  // the instants of the reference are among them
+    if (std::isnan(v.reference_N[k])) continue;
     most = std::max(most, std::abs(answer_N[i] - v.reference_N[k]));
   }
   return most;
@@ -224,7 +231,7 @@ void put_beside_experiment(Verification& v, const HilRecording& recording,
 Verification begun(const HilRecording& recording, const std::vector<const ServoRecord*>& rows,
                    const std::vector<std::size_t>& compared) {
   Verification v;
-  v.whole = recording.closed;
+  v.whole = recording.closed && recording.damaged == 0;
   v.end_s = recording.time_s(*rows.back());
   for (const std::size_t i : compared) {
     v.time_s.push_back(recording.time_s(*rows[i]));
@@ -278,17 +285,22 @@ double off_the_lines_m(const SurfaceScene& surface, const HilRecording& recordin
 }
 
 /// Forces of the full network on a ball at the places after the first; only every `stride`-th of
-/// them is a step.
-std::vector<Eigen::Vector3d> forces_on_ball(const SurfaceScene& surface,
-                                            const std::vector<BallPlace>& places,
-                                            std::size_t stride) {
+/// them is a step. None where there is no equilibrium.
+std::vector<std::optional<Eigen::Vector3d>> forces_on_ball(const SurfaceScene& surface,
+                                                           const std::vector<BallPlace>& places,
+                                                           std::size_t stride) {
   BallOnNetwork network(surface.scene.tissue.bonds(), surface.scene.rest(),
                         surface.scene.tissue.freedom(), surface.ball);
-  std::vector<Eigen::Vector3d> forces;
+  std::vector<std::optional<Eigen::Vector3d>> forces;
   double before_s = places.front().time_s;
   for (std::size_t k = 1; k < places.size(); k += stride) {
-    forces.push_back(network.step(places[k].at_m, places[k].time_s - before_s));
-    before_s = places[k].time_s;
+    try {
+      forces.emplace_back(network.step(places[k].at_m, places[k].time_s - before_s));
+      before_s = places[k].time_s;
+    } catch (const Error& error) {  // the network is where it was
+      if (error.code() != ExitCode::numerical) throw;
+      forces.emplace_back();
+    }
   }
   return forces;
 }
@@ -298,12 +310,12 @@ std::vector<Eigen::Vector3d> forces_on_ball(const SurfaceScene& surface,
 /// @param reference forces at the places after the first
 void ask_cvode_in_space(Verification& v, const SurfaceScene& surface,
                         const std::vector<BallPlace>& places,
-                        const std::vector<Eigen::Vector3d>& reference,
+                        const std::vector<std::optional<Eigen::Vector3d>>& reference,
                         const std::vector<const ServoRecord*>& rows,
                         const std::vector<std::size_t>& compared, const VerifyOptions& options) {
   const auto touched = static_cast<std::size_t>(
       std::find_if(reference.begin(), reference.end(),
-                   [](const Eigen::Vector3d& force) { return !force.isZero(0.0); }) -
+                   [](const auto& force) { return !force || !force->isZero(0.0); }) -
       reference.begin());
   if (!(options.window_s > 0.0) || touched == reference.size()) return;
   const double end_s = places[touched].time_s + options.window_s;
@@ -320,14 +332,114 @@ void ask_cvode_in_space(Verification& v, const SurfaceScene& surface,
   OtherOpinion& opinion = v.others.emplace_back();
   for (std::size_t i = 1; i < answer.size(); ++i) {
     const std::size_t k = touched + i - 1;
+    if (!reference[k]) continue;
     const Eigen::Map<const Eigen::Vector3d> commanded_N(rows[compared[k]]->commanded_N);
     sum.add_error((surface.to_model * commanded_N - answer[i]).norm(), answer[i].norm());
-    opinion.apart_N = std::max(opinion.apart_N, (answer[i] - reference[k]).norm());
+    opinion.apart_N = std::max(opinion.apart_N, (answer[i] - *reference[k]).norm());
   }
   opinion.name = "CVODE (Adams) on what the bonds remember, in balance at each evaluation";
   opinion.start_s = window.front().time_s;
   opinion.end_s = window.back().time_s;
   opinion.commanded = sum.take();
+}
+
+/// The motion with a straight line from an instant to a later one.
+Protocol cut_across(const Protocol& motion, double from_s, double from, double to_s, double to) {
+  std::vector<double> time, depth;
+  const auto add = [&](double t, double d) {
+    if (!time.empty() && t <= time.back()) return;
+    time.push_back(t);
+    depth.push_back(d);
+  };
+  for (const Knot& knot : motion.knots()) {
+    if (knot.time_s < from_s) add(knot.time_s, knot.value);
+  }
+  add(from_s, from);
+  add(to_s, to);
+  for (const Knot& knot : motion.knots()) {
+    if (knot.time_s > to_s) add(knot.time_s, knot.value);
+  }
+  return measured_history(Drive::displacement, time, depth);
+}
+
+/// The reference at the instants compared. Where it has no equilibrium it goes on from the last
+/// instant that has one, straight to the next at which the tissue is no deeper than there.
+void run_reference(Verification& v, const QuasiStatic& network, const Protocol& motion) {
+  try {
+    const QuasiStaticRun run = network.run(motion, v.time_s);
+    v.reference_N.assign(run.response.begin(), run.response.end());
+    v.reference_error_N = run.error_estimate;
+    return;
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::numerical) throw;
+  }
+  constexpr int kMostGaps = 100;
+  v.reference_N.assign(v.time_s.size(), kNoReference);
+  Protocol left = motion;
+  std::optional<QuasiStaticState> last;
+  std::size_t next = 0;
+  for (int gap = 0; gap < kMostGaps && next < v.time_s.size(); ++gap) {
+    const std::vector<double> times(v.time_s.begin() + static_cast<std::ptrdiff_t>(next),
+                                    v.time_s.end());
+    std::optional<QuasiStaticState> reached;
+    const auto see = [&](const QuasiStaticState& state) {
+      v.reference_N[next++] = state.response;
+      reached = state;
+    };
+    try {
+      const QuasiStaticRun run = network.run(left, times, see, last ? &*last : nullptr);
+      v.reference_error_N += run.error_estimate;
+      return;
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::numerical) throw;
+    }
+    if (reached) last = reached;
+    if (!last) return;  // not even at rest
+    const auto deeper = [&](std::size_t k) {
+      return value_at(motion, v.time_s[k]) > last->imposed;
+    };
+    ++next;
+    while (next < v.time_s.size() && deeper(next)) ++next;
+    if (next == v.time_s.size()) return;
+    left = cut_across(motion, last->time_s, last->imposed, v.time_s[next],
+                      value_at(motion, v.time_s[next]));
+  }
+}
+
+/// Another opinion that fails costs nothing but itself.
+void ask(Verification& v, const std::string& what, const std::function<void()>& opinion) {
+  const std::size_t others = v.others.size();
+  try {
+    opinion();
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::numerical) throw;
+    v.others.resize(others);
+    v.notes.push_back(what + " is missing: " + error.what());
+  }
+}
+
+void leave_out_what_has_no_reference(Verification& v) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < v.reference_N.size(); ++k) {
+    if (std::isnan(v.reference_N[k])) continue;
+    for (auto* column : {&v.time_s, &v.reference_N, &v.commanded_N, &v.depth_m, &v.error_N}) {
+      (*column)[kept] = (*column)[k];
+    }
+    ++kept;
+  }
+  v.without_equilibrium = v.reference_N.size() - kept;
+  if (v.without_equilibrium == 0) return;
+  v.notes.push_back(
+      fmt::format("no equilibrium of the reference at {} of {} instants, which are left "
+                  "out; what follows them rests on a motion straight across",
+                  v.without_equilibrium, v.reference_N.size()));
+  if (2 * kept < v.reference_N.size()) {
+    throw Error(ExitCode::numerical, v.reference, v.notes.back(),
+                "a motion that the tissue can bear");
+  }
+  for (auto* column : {&v.time_s, &v.reference_N, &v.commanded_N, &v.depth_m, &v.error_N}) {
+    column->resize(kept);
+  }
 }
 
 Verification verify_in_space(const HilRecording& recording, const VerifyOptions& options) {
@@ -347,22 +459,30 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
   v.knots = compared.size();
   const std::vector<BallPlace> places = places_of_ball(surface, recording, rows, compared);
   v.motion_tolerance_m = off_the_lines_m(surface, recording, rows, places);
-  const std::vector<Eigen::Vector3d> fine = forces_on_ball(surface, places, 1);
-  const std::vector<Eigen::Vector3d> coarse = forces_on_ball(surface, places, 2);
+  const auto fine = forces_on_ball(surface, places, 1);
+  const auto coarse = forces_on_ball(surface, places, 2);
   std::vector<double> size_N;
   for (std::size_t k = 0; k < compared.size(); ++k) {
     const Eigen::Map<const Eigen::Vector3d> commanded_N(rows[compared[k]]->commanded_N);
-    const Eigen::Vector3d felt_N = surface.to_model.transpose() * fine[k];
+    if (!fine[k]) {
+      v.reference_N.push_back(kNoReference);
+      v.error_N.push_back(kNoReference);
+      size_N.push_back(kNoReference);
+      continue;
+    }
+    const Eigen::Vector3d felt_N = surface.to_model.transpose() * *fine[k];
     v.reference_N.push_back(-recording.session.servo.push.dot(felt_N));
     v.error_N.push_back((commanded_N - felt_N).norm());
-    size_N.push_back(fine[k].norm());
+    size_N.push_back(fine[k]->norm());
     // The error falls with the square of the step.
-    if (k % 2 == 0) {
-      v.reference_error_N = std::max(v.reference_error_N, (coarse[k / 2] - fine[k]).norm() / 3.0);
+    if (k % 2 == 0 && coarse[k / 2]) {
+      v.reference_error_N = std::max(v.reference_error_N, (*coarse[k / 2] - *fine[k]).norm() / 3.0);
     }
   }
   judge_phases(v, recording, rows, compared, size_N);
-  ask_cvode_in_space(v, surface, places, fine, rows, compared, options);
+  ask(v, "the second opinion by CVODE",
+      [&] { ask_cvode_in_space(v, surface, places, fine, rows, compared, options); });
+  leave_out_what_has_no_reference(v);
   return v;
 }
 
@@ -396,20 +516,20 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
       decimated(motion.time_s, motion.surface_m, options.motion_tolerance_m);
   v.knots = kept.size();
   const Protocol protocol = protocol_of(motion, kept);
-  const QuasiStaticRun run = network.run(protocol, v.time_s);
-  v.reference_N.assign(run.response.begin(), run.response.end());
-  v.reference_error_N = run.error_estimate;
+  run_reference(v, network, protocol);
   for (std::size_t k = 0; k < compared.size(); ++k) {
     v.error_N.push_back(v.commanded_N[k] - v.reference_N[k]);
   }
   judge_phases(v, recording, rows, compared, v.reference_N);
-  ask_cvode(v, recording, driven, protocol, options);
+  ask(v, "the second opinion by CVODE",
+      [&] { ask_cvode(v, recording, driven, protocol, options); });
   if (recording.session.model == LoopModelKind::element) {
     ask_others(v, recording, motion, protocol, rows, tissue.material, options);
   }
   v.motion_error_N = options.motion_tolerance_m *
                      recording.header.at("model").at("stiffness_at_once_N_per_m").get<double>();
   put_beside_experiment(v, recording, rows);
+  leave_out_what_has_no_reference(v);
   return v;
 }
 

@@ -61,6 +61,9 @@ struct Verification {
   std::optional<double> motion_error_N;
   double reference_error_N = 0.0;  ///< as the reference run estimates
   double model_error_N = 0.0;      ///< largest estimate of the model itself, in any period
+  /// Instants at which the reference finds no equilibrium: left out of everything, and counted.
+  std::size_t without_equilibrium = 0;
+  std::vector<std::string> notes;  ///< what could not be compared, one line each
   /// At the instants compared; forces against the push.
   std::vector<double> time_s, reference_N, commanded_N, depth_m;
   /// Commanded less reference; of a tool that moves in space the length of the difference, all
@@ -83,8 +86,12 @@ struct Verification {
 /// A tool that moves in space is compared with the full network under the same ball
 /// (BallOnNetwork), in all three components, its motion taken as linear between the instants
 /// compared; the reference's error is estimated with every second of them. CVODE is asked there as
-/// well (ball_forces_by_cvode). Throws Error(bad_input) for an empty recording, or fewer than four
-/// instants to compare in space, Error(numerical) if the reference run fails.
+/// well (ball_forces_by_cvode).
+///
+/// Where the reference has no equilibrium the instant is left out, and it goes on with the next one
+/// that it has one for, on a straight line. Throws Error(bad_input) for an empty recording, or
+/// fewer than four instants to compare in space, Error(numerical) if less than half of the instants
+/// can be compared.
 [[nodiscard]] Verification verify(const HilRecording& recording, const VerifyOptions& options = {});
 
 }  // namespace tpm

@@ -7,6 +7,7 @@
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <numeric>
+#include <type_traits>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -226,21 +227,26 @@ std::vector<std::size_t> order_of_times(std::span<const double> times) {
   return order;
 }
 
-constexpr int kMostSlopes = 2 * kMostBranches + 2;
-using SlopeJet = ceres::Jet<double, kMostSlopes>;
+/// Derivatives by the coefficients of at most `Units` units. Their number is fixed when compiled,
+/// and every operation costs as much: small chains have Jets of their own.
+template <int Units>
+using SlopeJet = ceres::Jet<double, 2 * Units + 2>;
+constexpr std::size_t kFewUnits = 4;
+constexpr std::size_t kSomeUnits = 12;
 
 /// Row of derivatives of a Jet, first n.
-void put_row(Eigen::MatrixXd& slopes, Eigen::Index row, const SlopeJet& value) {
+template <class Jet>
+void put_row(Eigen::MatrixXd& slopes, Eigen::Index row, const Jet& value) {
   slopes.row(row) = value.v.head(slopes.cols()).transpose();
 }
 
 /// Sorted coefficients as Jets whose derivatives refer to the unsorted order
 /// (first, k_1.., time_1..).
-Coefficients<SlopeJet> as_jets(double first, std::span<const double> k,
-                               std::span<const double> times) {
+template <class Jet>
+Coefficients<Jet> as_jets(double first, std::span<const double> k, std::span<const double> times) {
   constexpr double kNudge = 1e-9;
-  Coefficients<SlopeJet> jets;
-  jets.first = SlopeJet(first, 0);
+  Coefficients<Jet> jets;
+  jets.first = Jet(first, 0);
   const auto n = static_cast<int>(k.size());
   double last = 0.0;
   for (const std::size_t i : order_of_times(times)) {
@@ -303,12 +309,13 @@ Prony to_parallel(const KelvinChain& chain) {
 namespace {
 
 /// The values of converted coefficients and, from row 1 on, the slopes of the k's, then the times'.
-void take_units(const Coefficients<SlopeJet>& c, std::vector<double>& k,
-                std::vector<double>& time_s, Eigen::MatrixXd& slopes) {
+template <class Jet>
+void take_units(const Coefficients<Jet>& c, std::vector<double>& k, std::vector<double>& time_s,
+                Eigen::MatrixXd& slopes) {
   const auto n = static_cast<Eigen::Index>(c.k.size());
   for (Eigen::Index i = 0; i < n; ++i) {
-    const SlopeJet& stiffness = c.k[static_cast<std::size_t>(i)];
-    const SlopeJet& time = c.time[static_cast<std::size_t>(i)];
+    const Jet& stiffness = c.k[static_cast<std::size_t>(i)];
+    const Jet& time = c.time[static_cast<std::size_t>(i)];
     k.push_back(stiffness.a);
     time_s.push_back(time.a);
     put_row(slopes, 1 + i, stiffness);
@@ -316,11 +323,9 @@ void take_units(const Coefficients<SlopeJet>& c, std::vector<double>& k,
   }
 }
 
-}  // namespace
-
-ParallelWithSlopes to_parallel_with_slopes(const KelvinChain& chain) {
-  require_coefficients(chain.k0, chain.k, chain.T_s, "Kelvin chain");
-  const Coefficients<SlopeJet> c = parallel_of(as_jets(chain.k0, chain.k, chain.T_s));
+template <int Units>
+ParallelWithSlopes parallel_with_slopes(const KelvinChain& chain) {
+  const auto c = parallel_of(as_jets<SlopeJet<Units>>(chain.k0, chain.k, chain.T_s));
   const auto n = static_cast<Eigen::Index>(chain.k.size());
   ParallelWithSlopes result;
   result.slopes.resize(2 * n + 1, 2 * n + 1);
@@ -330,9 +335,9 @@ ParallelWithSlopes to_parallel_with_slopes(const KelvinChain& chain) {
   return result;
 }
 
-SeriesWithSlopes to_series_with_slopes(const Prony& law) {
-  require_coefficients(law.k_inf, law.k, law.tau_s, "Prony law");
-  const Coefficients<SlopeJet> c = series_of(as_jets(law.k_inf, law.k, law.tau_s));
+template <int Units>
+SeriesWithSlopes series_with_slopes(const Prony& law) {
+  const auto c = series_of(as_jets<SlopeJet<Units>>(law.k_inf, law.k, law.tau_s));
   SeriesWithSlopes result;
   const auto units = static_cast<Eigen::Index>(c.k.size());
   result.slopes.resize(2 * units + 1 + (c.fluid ? 1 : 0),
@@ -345,6 +350,36 @@ SeriesWithSlopes to_series_with_slopes(const Prony& law) {
     put_row(result.slopes, 2 * units + 1, c.eta);
   }
   return result;
+}
+
+/// Calls f with a number of units, known when compiled, that is at least `units`.
+template <class Function>
+auto with_enough_units(std::size_t units, const Function& f) {
+  if (units <= kFewUnits) return f(std::integral_constant<int, kFewUnits>());
+  if (units <= kSomeUnits) return f(std::integral_constant<int, kSomeUnits>());
+  return f(std::integral_constant<int, kMostBranches>());
+}
+
+void require_units(std::size_t units, const char* what) {
+  if (units <= kMostBranches) return;
+  throw bad_input(what, fmt::format("{} branches", units),
+                  fmt::format("at most {}", kMostBranches));
+}
+
+}  // namespace
+
+ParallelWithSlopes to_parallel_with_slopes(const KelvinChain& chain) {
+  require_coefficients(chain.k0, chain.k, chain.T_s, "Kelvin chain");
+  require_units(chain.k.size(), "Kelvin chain");
+  return with_enough_units(chain.k.size(),
+                           [&](auto units) { return parallel_with_slopes<units>(chain); });
+}
+
+SeriesWithSlopes to_series_with_slopes(const Prony& law) {
+  require_coefficients(law.k_inf, law.k, law.tau_s, "Prony law");
+  require_units(law.k.size(), "Prony law");
+  return with_enough_units(law.k.size(),
+                           [&](auto units) { return series_with_slopes<units>(law); });
 }
 
 }  // namespace tpm

@@ -23,7 +23,15 @@ constexpr auto kFractionalWords =
     std::to_array<Word<Fractional>>({{Fractional::springpot, "fspringpot"},
                                      {Fractional::maxwell, "fmaxwell"},
                                      {Fractional::kelvin_voigt, "fkelvin_voigt"},
-                                     {Fractional::zener, "fzener"}});
+                                     {Fractional::zener, "fzener"},
+                                     {Fractional::maxwell_pair, "fmaxwell2"},
+                                     {Fractional::kelvin_voigt_pair, "fkelvin_voigt2"},
+                                     {Fractional::zener_pair, "fzener2"}});
+
+/// Numbers up to twelve are written as words.
+constexpr auto kNumbers =
+    std::to_array<std::string_view>({"no", "one", "two", "three", "four", "five", "six", "seven",
+                                     "eight", "nine", "ten", "eleven", "twelve"});
 
 Error unknown_law(std::string_view text, std::string_view where) {
   return bad_input(
@@ -89,16 +97,16 @@ LawSpec parse_law_name(std::string_view text, std::string_view where) {
 }
 
 std::string law_words(const LawSpec& spec) {
-  constexpr std::array<std::string_view, kMostBranches + 1> kNumbers{
-      "no", "one", "two", "three", "four", "five", "six", "seven", "eight"};
+  const auto count = static_cast<std::size_t>(spec.branches);
   std::string words = spec.kernel == Kernel::linear  ? "linear kernel"
                       : spec.kernel == Kernel::hertz ? "Hertz kernel"
                                                      : "power-law kernel";
   switch (spec.fractional) {
     case Fractional::none:
-      words += fmt::format(", {} relaxing branch{}",
-                           kNumbers.at(static_cast<std::size_t>(spec.branches)),
-                           spec.branches == 1 ? "" : "es");
+      words += fmt::format(
+          ", {} relaxing branch{}",
+          count < kNumbers.size() ? std::string(kNumbers[count]) : std::to_string(spec.branches),
+          spec.branches == 1 ? "" : "es");
       break;
     case Fractional::springpot:
       words += ", spring-pot";
@@ -111,6 +119,15 @@ std::string law_words(const LawSpec& spec) {
       break;
     case Fractional::zener:
       words += ", fractional Zener";
+      break;
+    case Fractional::maxwell_pair:
+      words += ", fractional Maxwell of two spring-pots";
+      break;
+    case Fractional::kelvin_voigt_pair:
+      words += ", fractional Kelvin-Voigt of two spring-pots";
+      break;
+    case Fractional::zener_pair:
+      words += ", fractional Zener of two spring-pots";
       break;
   }
   if (spec.form == BranchForm::series) words += " as a Kelvin chain";
@@ -169,6 +186,10 @@ void require_valid(const LawSpec& spec, std::string_view where) {
         fmt::format("{} answered by {}", quantity_name(spec.drive), quantity_name(spec.response)),
         "indentation_depth with contact_force, or relative_length with stress");
   }
+  if (spec.kernel == Kernel::hertz && stretch) {
+    throw bad_input(where, "a Hertz kernel over a relative length",
+                    "a linear or power kernel: Hertz is the contact of a ball over its depth");
+  }
 }
 
 std::vector<LawParameter> law_parameters(const LawSpec& spec) {
@@ -185,6 +206,26 @@ std::vector<LawParameter> law_parameters(const LawSpec& spec) {
     p.push_back({std::move(name), Dimension::time, std::move(meaning), false, false, std::nullopt,
                  0.0, kInfinity});
   };
+  const auto add_order = [&](std::string name, std::string meaning, double lower) {
+    p.push_back({std::move(name), Dimension::dimensionless, std::move(meaning), false, false,
+                 std::nullopt, lower, 1.0});
+  };
+  const auto add_fractional = [&](Fractional law) {
+    const bool has_tau = has_relaxation_time(law);
+    const bool pair = has_two_springpots(law);
+    if (has_lasting_spring(law)) add_stiffness("k_inf", "stiffness in the end", true);
+    add_stiffness("k1",
+                  !has_tau ? "spring-pot: stiffness at 1 s, times Gamma(1-alpha)"
+                  : pair   ? "stiffness of each spring-pot at the rate 1/tau1"
+                           : "stiffness that relaxes",
+                  true);
+    if (law == Fractional::kelvin_voigt_pair) {
+      add_stiffness("k2", "second spring-pot: stiffness at 1 s, times Gamma(1-beta)", true);
+    }
+    if (has_tau) add_time("tau1", "relaxation time");
+    add_order("alpha", "order of the spring-pot", 0.01);
+    if (pair) add_order("beta", "order of the second spring-pot, the smaller one", 0.0);
+  };
   if (spec.form == BranchForm::series) {
     add_stiffness("k0", "stiffness at once", false);
     for (int i = 1; i <= spec.branches; ++i) {
@@ -194,18 +235,7 @@ std::vector<LawParameter> law_parameters(const LawSpec& spec) {
       add_time(fmt::format("T{}", i), "retardation time of that unit");
     }
   } else if (spec.fractional != Fractional::none) {
-    const bool has_k_inf =
-        spec.fractional == Fractional::kelvin_voigt || spec.fractional == Fractional::zener;
-    const bool has_tau =
-        spec.fractional == Fractional::maxwell || spec.fractional == Fractional::zener;
-    if (has_k_inf) add_stiffness("k_inf", "stiffness in the end", true);
-    add_stiffness(
-        "k1",
-        has_tau ? "stiffness that relaxes" : "spring-pot: stiffness at 1 s, times Gamma(1-alpha)",
-        true);
-    if (has_tau) add_time("tau1", "relaxation time");
-    p.push_back({"alpha", Dimension::dimensionless, "order of the spring-pot", false, false,
-                 std::nullopt, 0.01, 1.0});
+    add_fractional(spec.fractional);
   } else {
     if (spec.solid) add_stiffness("k_inf", "stiffness in the end", true);
     for (int i = 1; i <= spec.branches; ++i) {

@@ -33,17 +33,42 @@ enum class Tension {
   relaxing,  ///< the kernel is (1 - tension_share) W + tension_share T, and relaxes as one
 };
 
-/// Relaxation by a spring-pot instead of by branches.
+/// Relaxation by spring-pots instead of by branches. A spring-pot of the order alpha has the
+/// operational stiffness k (s tau)^alpha: a spring at 0, a dashpot at 1.
 enum class Fractional {
   none,
   springpot,     ///< G = k1 (t/1s)^-alpha / Gamma(1-alpha)
   maxwell,       ///< spring k1 in series with a spring-pot: G = k1 E_alpha(-(t/tau1)^alpha)
   kelvin_voigt,  ///< spring k_inf beside a spring-pot: G = k_inf + k1 (t/1s)^-alpha/Gamma(1-alpha)
   zener,         ///< G = k_inf + k1 E_alpha(-(t/tau1)^alpha)
+  /// Two spring-pots in series, with d = alpha - beta:
+  /// G = k1 (t/tau1)^-beta E_{d,1-beta}(-(t/tau1)^d)
+  maxwell_pair,
+  /// Two spring-pots side by side:
+  /// G = k1 (t/1s)^-alpha/Gamma(1-alpha) + k2 (t/1s)^-beta/Gamma(1-beta)
+  kelvin_voigt_pair,
+  zener_pair,  ///< spring k_inf beside maxwell_pair
 };
 
+/// Whether a law has two spring-pots. They may change places without changing the law: alpha is
+/// the larger order by convention only.
+[[nodiscard]] constexpr bool has_two_springpots(Fractional law) {
+  return law == Fractional::maxwell_pair || law == Fractional::kelvin_voigt_pair ||
+         law == Fractional::zener_pair;
+}
+/// Whether a spring k_inf stands beside what relaxes.
+[[nodiscard]] constexpr bool has_lasting_spring(Fractional law) {
+  return law == Fractional::kelvin_voigt || law == Fractional::zener ||
+         law == Fractional::zener_pair;
+}
+/// Whether the law has a relaxation time: something stands in series.
+[[nodiscard]] constexpr bool has_relaxation_time(Fractional law) {
+  return law == Fractional::maxwell || law == Fractional::zener ||
+         law == Fractional::maxwell_pair || law == Fractional::zener_pair;
+}
+
 /// The most branches of a law.
-inline constexpr int kMostBranches = 8;
+inline constexpr int kMostBranches = 40;
 
 /// One member of the family of laws (docs/notation.md):
 ///
@@ -68,8 +93,9 @@ struct LawSpec {
 };
 
 /// "linear", "linear-1", "linear-1-elastic", "power-2", "hertz-fzener", "linear-2-fluid",
-/// "linear-1-series": kernel, then branches or fspringpot/fmaxwell/fkelvin_voigt/fzener, then
-/// elastic/relaxing, then fluid, then series. Units and reference are not part of it.
+/// "linear-1-series": kernel, then branches or fspringpot/fmaxwell/fkelvin_voigt/fzener, with
+/// two spring-pots fmaxwell2/fkelvin_voigt2/fzener2, then elastic/relaxing, then fluid, then
+/// series. Units and reference are not part of it.
 [[nodiscard]] std::string law_name(const LawSpec& spec);
 
 /// The inverse of law_name; drive, response and reference keep their defaults. Throws
@@ -101,8 +127,9 @@ struct LawParameter {
   double upper = 0.0;
 };
 
-/// In the order of the parameter vector: k_inf (or k0), k_i (kc_i), tau_i (T_i), alpha, exponent,
-/// k_tension or tension_share, spacing, then the nuisance parameters contact and offset, always.
+/// In the order of the parameter vector: k_inf (or k0), k_i (kc_i), tau_i (T_i), alpha, beta,
+/// exponent, k_tension or tension_share, spacing, then the nuisance parameters contact and offset,
+/// always.
 [[nodiscard]] std::vector<LawParameter> law_parameters(const LawSpec& spec);
 
 /// Stiffness at once, in the end and between: the law's relaxation function in parallel form.

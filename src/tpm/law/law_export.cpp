@@ -63,6 +63,40 @@ void require_terms(const PronyTable& table, ExportTarget target) {
   }
 }
 
+/// Depth over radius up to which Hertz's parabola stands for a sphere.
+constexpr double kShallow = 0.1;
+
+/// What --relaxation-only drops, and how much of the force that is.
+void add_left_out(const LawFile& law, std::vector<std::string>& lines) {
+  const LawSpec& spec = law.spec;
+  const auto parameters = law_parameters(spec);
+  const auto value_of = [&](std::string_view name) {
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      if (parameters[i].name == name) return law.values[i];
+    }
+    return 0.0;
+  };
+  lines.push_back("relaxation only: what the material model cannot say is left out");
+  if (spec.kernel == Kernel::power) {
+    lines.push_back(
+        fmt::format("left out: the power kernel (exponent {}); the stiffnesses are "
+                    "secants at the reference {}",
+                    digits(value_of("exponent")), shortest(spec.reference)));
+  }
+  const std::string_view unit = spec.response == Quantity::stress ? "Pa" : "N/m";
+  if (spec.tension == Tension::elastic) {
+    lines.push_back(fmt::format(
+        "left out: the elastic tension, {} {} at the reference {}, in addition to the stiffnesses "
+        "above: the contact is stiffer by it than what is exported",
+        digits(value_of("k_tension")), unit, shortest(spec.reference)));
+  }
+  if (spec.tension == Tension::relaxing) {
+    lines.push_back(fmt::format(
+        "left out: the shape of the tension, {} % of the stiffnesses above at the reference {}",
+        digits(100.0 * value_of("tension_share")), shortest(spec.reference)));
+  }
+}
+
 std::vector<std::string> remarks_of(const LawFile& law, const PronyTable& table,
                                     const ExportOptions& options, bool has_modulus) {
   std::vector<std::string> lines{fmt::format("law {}: {}; parameters {}", law_name(law.spec),
@@ -76,7 +110,7 @@ std::vector<std::string> remarks_of(const LawFile& law, const PronyTable& table,
         "error {}; nothing is said outside",
         shortest(table.from_s), shortest(table.to_s), significant(table.worst_relative_error, 2)));
   }
-  if (options.relaxation_only) lines.push_back("relaxation only: kernel and tension are left out");
+  if (options.relaxation_only) add_left_out(law, lines);
   const ContactGeometry& geometry = options.geometry;
   if (!has_modulus) {
     lines.push_back("relative moduli only: a modulus in Pa needs --radius, or --area and --length");
@@ -84,6 +118,15 @@ std::vector<std::string> remarks_of(const LawFile& law, const PronyTable& table,
     lines.push_back(fmt::format(
         "modulus from the stiffness at the reference depth {} m under a sphere of {} m (Hertz)",
         shortest(law.spec.reference), shortest(*geometry.sphere_radius_m)));
+    const double depth = law.spec.reference / *geometry.sphere_radius_m;
+    if (depth > kShallow) {
+      lines.push_back(fmt::format(
+          "WARNING: the reference depth is {} of the radius; Hertz's formula is that of "
+          "depths well below it (contact radius {} m): the modulus is that of a deeper "
+          "contact than it is good for",
+          significant(depth, 3),
+          significant(std::sqrt(law.spec.reference * *geometry.sphere_radius_m), 3)));
+    }
   } else if (geometry.area_m2) {
     lines.push_back(fmt::format("modulus from the stiffness of a bar of {} m^2 and {} m",
                                 shortest(*geometry.area_m2), shortest(*geometry.length_m)));

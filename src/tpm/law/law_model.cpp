@@ -11,6 +11,7 @@
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/contact_retreat.hpp"
 #include "tpm/law/imposed_depth.hpp"
+#include "tpm/law/imposed_load.hpp"
 #include "tpm/law/kelvin_chain.hpp"
 #include "tpm/solve/exponential_sum.hpp"
 
@@ -58,28 +59,44 @@ FractionalMemory rates_for(const LawSpec& spec, const Protocol& protocol,
   return {earlier * window.shortest_s, window.longest_s, kTolerance};
 }
 
-/// Walks a contact through a protocol, stopping at each asked time.
+/// Steps a contact by what is imposed on it, a depth or a load.
+class Stepper {
+ public:
+  Stepper(ContactHistory& contact, const Protocol& protocol)
+      : contact_(contact), displacement_(protocol.drive() == Drive::displacement) {
+    for (const Knot& k : protocol.knots()) time_scale_ = std::max(time_scale_, std::abs(k.time_s));
+  }
+  void rest_at(double value) {
+    displacement_ ? contact_.rest_at_drive(value) : contact_.rest_at_load(value);
+  }
+  void jump_to(double value) {
+    displacement_ ? contact_.jump_to_drive(value) : contact_.jump_to_load(value);
+  }
+  void move(double from, double to, double h) {
+    displacement_ ? contact_.move_drive(from, to, h, time_scale_)
+                  : contact_.move_load(from, to, h, time_scale_);
+  }
+
+ private:
+  ContactHistory& contact_;
+  bool displacement_;
+  double time_scale_ = 0.0;
+};
+
+/// Walks a contact (Stepper or LoadedSurface) through a protocol, stopping at each asked time.
 /// @param report called once for each asked time with its index
 /// @param passed called after each knot
-template <class Report, class Passed>
-void walk(const Protocol& protocol, std::span<const double> times_s, ContactHistory& contact,
+template <class Contact, class Report, class Passed>
+void walk(const Protocol& protocol, std::span<const double> times_s, Contact& contact,
           const Report& report, const Passed& passed) {
   const auto order = rising_order(times_s);
   const auto knots = protocol.knots();
-  const bool displacement = protocol.drive() == Drive::displacement;
-  double time_scale = 0.0;
-  for (const Knot& k : knots) time_scale = std::max(time_scale, std::abs(k.time_s));
-  const auto jump = [&](double value) {
-    displacement ? contact.jump_to_drive(value) : contact.jump_to_load(value);
-  };
+  const auto jump = [&](double value) { contact.jump_to(value); };
   const auto move = [&](double from, double to, double h) {
-    if (!(h > 0.0)) return;
-    displacement ? contact.move_drive(from, to, h, time_scale)
-                 : contact.move_load(from, to, h, time_scale);
+    if (h > 0.0) contact.move(from, to, h);
   };
   if (protocol.relaxed_at_start()) {
-    displacement ? contact.rest_at_drive(knots.front().value)
-                 : contact.rest_at_load(knots.front().value);
+    contact.rest_at(knots.front().value);
   } else {
     jump(knots.front().value);
   }
@@ -207,7 +224,42 @@ Response respond_by_steps(const LawSpec& spec, const LawAtParameters& law, const
     response.value[row] = a.value;
     if (want_slopes) response.sensitivity.row(row) = a.slopes.matrix().transpose();
   };
-  walk(protocol, stops.time_s, contact, answer, watch_depth);
+  Stepper stepper(contact, protocol);
+  walk(protocol, stops.time_s, stepper, answer, watch_depth);
+  return response;
+}
+
+/// A load that the kernel alone carries; nothing where the probe leaves the surface, or where an
+/// infinite time is asked for.
+std::optional<Response> respond_to_load(const LawSpec& spec, const LawAtParameters& law,
+                                        const Protocol& protocol, std::span<const double> times_s,
+                                        Want want) {
+  if (protocol.drive() != Drive::force || !LoadedSurface::answers(law)) return std::nullopt;
+  if (!std::all_of(times_s.begin(), times_s.end(), [](double t) { return std::isfinite(t); })) {
+    return std::nullopt;
+  }
+  const bool want_slopes = want == Want::values_and_sensitivity;
+  Response response;
+  response.value.resize(std::ssize(times_s));
+  if (want_slopes) response.sensitivity.resize(response.value.size(), law.parameter_count);
+  LoadedSurface surface(law, want);
+  ShrinkWatch watch(depends_on_growth(spec));
+  bool in_contact = true;
+  const auto look = [&] {
+    in_contact = in_contact && surface.in_contact();
+    watch.see(surface.drive() - law.contact);
+  };
+  const auto answer = [&](std::size_t i) {
+    look();
+    const auto row = static_cast<Eigen::Index>(i);
+    const Answer a = watch.shrunk()
+                         ? not_predicted(law.parameter_count)
+                         : Answer{surface.drive(), want_slopes ? surface.drive_slopes() : Slopes()};
+    response.value[row] = a.value;
+    if (want_slopes) response.sensitivity.row(row) = a.slopes.matrix().transpose();
+  };
+  walk(protocol, times_s, surface, answer, look);
+  if (!in_contact) return std::nullopt;
   return response;
 }
 
@@ -362,13 +414,15 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
   const Prepared prepared = prepare(parameters, rates ? &*rates : nullptr);
   const LawAtParameters& law = prepared.law;
   const bool displacement = protocol.drive() == Drive::displacement;
-  if (displacement && law.memory.dashpot > 0.0) require_no_jump(protocol, law.contact);
+  if (displacement && law.memory.infinite_at_once) require_no_jump(protocol, law.contact);
   const bool want_slopes = want == Want::values_and_sensitivity;
   Response response;
   const Stops stops = stops_for(spec_, law, protocol, times_s, want);
-  const auto in_contact = stops.edges.empty() ? respond_quickly(law, protocol, times_s, want)
-                                              : std::optional<Response>();
-  response = in_contact ? *in_contact : respond_by_steps(spec_, law, protocol, stops, want);
+  std::optional<Response> in_contact;
+  if (stops.edges.empty()) in_contact = respond_quickly(law, protocol, times_s, want);
+  if (!in_contact) in_contact = respond_to_load(spec_, law, protocol, times_s, want);
+  response =
+      in_contact ? *std::move(in_contact) : respond_by_steps(spec_, law, protocol, stops, want);
   if (want_slopes && prepared.chain_slopes.size() > 0) {
     const Eigen::Index n = prepared.chain_slopes.rows();
     response.sensitivity.leftCols(n) =

@@ -15,8 +15,10 @@ class FractionalMemory;
 /// Displacement-driven: exact in time for a drive that is linear between knots (exponential
 /// quadrature of V(u(s)), refined until a polynomial of fourth degree holds to 1e-10 of the peak),
 /// in O(n) for each branch. After detachment (the force would become tensile) the surface recovers
-/// freely and the response is the offset until the probe meets it again. Force-driven: adaptive
-/// implicit steps. Times at infinity are answered by full relaxation.
+/// freely and the response is the offset until the probe meets it again. Force-driven: in
+/// closed form where the kernel alone carries the load and the probe stays on the surface
+/// (law/imposed_load.hpp), else adaptive implicit steps. Times at infinity are answered by full
+/// relaxation.
 ///
 /// A hertz kernel that relaxes follows Lee and Radok while the contact grows and Ting (1966) when
 /// it shrinks, without branches any history. Not predicted (NaN) from then on: where the contact

@@ -1,6 +1,7 @@
 #include "tpm/law/memory.hpp"
 
 #include <cmath>
+#include <initializer_list>
 #include <numeric>
 
 #include "tpm/core/error.hpp"
@@ -61,61 +62,117 @@ Memory branch_memory(bool solid, int branches, std::span<const double> parallel)
   return m;
 }
 
+namespace {
+
+/// What a parameter changes in the coefficients on the grid.
+struct GridColumn {
+  int parameter;
+  double scale;
+  const Eigen::VectorXd& weight;
+  double constant;
+  double dashpot_s;
+};
+
+/// Adds one fractional element to a memory: `unit` times its stiffness, and the derivatives.
+void add_element(Memory& m, const GridColumn& unit, std::initializer_list<GridColumn> slopes,
+                 const FastPair* fast) {
+  /// `total` is what the coefficients add up to at time 0
+  const auto column = [&](const GridColumn& c, double total) -> Eigen::VectorXd {
+    if (fast == nullptr) return with_ends(c.constant, c.weight, nullptr);
+    const auto ends = fast->sharing(total - c.constant - c.weight.sum(), c.dashpot_s);
+    return with_ends(c.constant, c.weight, &ends);
+  };
+  const Eigen::VectorXd whole = column(unit, 1.0);
+  m.stiffness += unit.scale * whole;
+  m.d_stiffness.col(unit.parameter) = whole;
+  if (fast == nullptr) {
+    m.dashpot += unit.scale * unit.dashpot_s;
+    m.d_dashpot[unit.parameter] = unit.dashpot_s;
+  }
+  for (const GridColumn& slope : slopes) {
+    m.d_stiffness.col(slope.parameter) = slope.scale * column(slope, 0.0);
+    if (fast == nullptr) m.d_dashpot[slope.parameter] = slope.scale * slope.dashpot_s;
+  }
+}
+
+}  // namespace
+
 Memory fractional_memory(Fractional law, std::span<const double> values,
                          const FractionalMemory& rates) {
   if (law == Fractional::none) throw bad_input("law", "not fractional", "a fractional law");
-  const bool solid = law == Fractional::kelvin_voigt || law == Fractional::zener;
-  const bool relaxes = law == Fractional::maxwell || law == Fractional::zener;
-  const std::size_t at_k1 = solid ? 1 : 0;
-  const std::size_t at_alpha = at_k1 + (relaxes ? 2 : 1);
-  const double k1 = values[at_k1];
-  const double alpha = values[at_alpha];
-  FractionalWeights w;
-  if (relaxes) {
-    rates.mittag_leffler(alpha, values[at_k1 + 1], w);
-  } else {
-    rates.springpot(alpha, w);
-  }
+  const bool pair = has_two_springpots(law);
+  const bool side_by_side = law == Fractional::kelvin_voigt_pair;
+  const bool has_tau = has_relaxation_time(law);
+  const int at_k1 = has_lasting_spring(law) ? 1 : 0;
+  const int at_tau = at_k1 + 1;
+  const int at_alpha = at_k1 + (has_tau || side_by_side ? 2 : 1);
+  const int count = at_alpha + (pair ? 2 : 1);
+  const auto value = [&](int i) { return values[static_cast<std::size_t>(i)]; };
+  const double k1 = value(at_k1);
+  const double alpha = value(at_alpha);
+
   const auto grid = rates.rates_per_s();
   const double beyond = grid.back() * std::exp(rates.log_step());
-  const FastPair pair{beyond, 1e2 * beyond};
-  /// `total` is what the coefficients add up to at time 0
-  const auto column = [&](double slow, const Eigen::VectorXd& weight, double total,
-                          double viscosity) {
-    const auto fast = pair.sharing(total - slow - weight.sum(), viscosity);
-    return with_ends(slow, weight, relaxes ? &fast : nullptr);
-  };
-  const Eigen::VectorXd unit = column(w.constant, w.weight, 1.0, w.dashpot_s);
+  const FastPair ends{beyond, 1e2 * beyond};
+  const FastPair::Stiffness end_rates{ends.first_rate, ends.second_rate};
+  const FastPair* fast = has_tau && !pair ? &ends : nullptr;
 
   Memory m;
-  const FastPair::Stiffness pair_rates{pair.first_rate, pair.second_rate};
+  m.infinite_at_once = fast == nullptr;
   m.rate_per_s =
       with_ends(kNever_per_s, Eigen::Map<const Eigen::VectorXd>(grid.data(), std::ssize(grid)),
-                relaxes ? &pair_rates : nullptr);
-  m.stiffness = k1 * unit;
-  m.rate_parameter.assign(static_cast<std::size_t>(unit.size()), -1);
-  m.by.resize(at_alpha + 1);
+                fast != nullptr ? &end_rates : nullptr);
+  m.rate_parameter.assign(static_cast<std::size_t>(m.rate_per_s.size()), -1);
+  m.by.resize(static_cast<std::size_t>(count));
   std::iota(m.by.begin(), m.by.end(), 0);
-  m.d_stiffness.setZero(unit.size(), std::ssize(m.by));
-  m.d_constant.setZero(std::ssize(m.by));
-  m.d_dashpot.setZero(std::ssize(m.by));
-  const auto place = [](std::size_t i) { return static_cast<Eigen::Index>(i); };
-  m.d_stiffness.col(place(at_k1)) = unit;
-  m.d_stiffness.col(place(at_alpha)) =
-      k1 * column(w.d_constant_d_alpha, w.d_weight_d_alpha, 0.0, w.d_dashpot_d_alpha_s);
-  if (relaxes) {
-    m.d_stiffness.col(place(at_k1 + 1)) =
-        k1 / values[at_k1 + 1] *
-        column(w.d_constant_d_log_tau, w.d_weight_d_log_tau, 0.0, w.d_dashpot_d_log_tau_s);
-  } else {
-    m.dashpot = k1 * w.dashpot_s;
-    m.d_dashpot[place(at_k1)] = w.dashpot_s;
-    m.d_dashpot[place(at_alpha)] = k1 * w.d_dashpot_d_alpha_s;
-  }
-  if (solid) {
+  m.stiffness.setZero(m.rate_per_s.size());
+  m.d_stiffness.setZero(m.rate_per_s.size(), count);
+  m.d_constant.setZero(count);
+  m.d_dashpot.setZero(count);
+  if (has_lasting_spring(law)) {
     m.constant = values[0];
     m.d_constant[0] = 1.0;
   }
+
+  FractionalWeights w;
+  const auto unit = [&](int parameter) {
+    return GridColumn{parameter, value(parameter), w.weight, w.constant, w.dashpot_s};
+  };
+  const auto by_alpha = [&](int parameter, double scale) {
+    return GridColumn{parameter, scale, w.d_weight_d_alpha, w.d_constant_d_alpha,
+                      w.d_dashpot_d_alpha_s};
+  };
+  if (!has_tau) {
+    rates.springpot(alpha, w);
+    add_element(m, unit(at_k1), {by_alpha(at_alpha, k1)}, fast);
+    if (!side_by_side) return m;
+    const int at_k2 = at_k1 + 1;
+    rates.springpot(value(at_alpha + 1), w);
+    add_element(m, unit(at_k2), {by_alpha(at_alpha + 1, value(at_k2))}, fast);
+    if (value(at_alpha + 1) == 0.0) {  // a spring: it stays for ever
+      m.constant = value(at_k2);
+      m.d_constant[at_k2] = 1.0;
+      m.stiffness[0] -= m.constant;
+      m.d_stiffness(0, at_k2) -= 1.0;
+    }
+    return m;
+  }
+  const double tau = value(at_tau);
+  const auto by_tau = [&] {
+    return GridColumn{at_tau, k1 / tau, w.d_weight_d_log_tau, w.d_constant_d_log_tau,
+                      w.d_dashpot_d_log_tau_s};
+  };
+  if (!pair) {
+    rates.mittag_leffler(alpha, tau, w);
+    add_element(m, unit(at_k1), {by_tau(), by_alpha(at_alpha, k1)}, fast);
+    return m;
+  }
+  rates.springpots_in_series(alpha, value(at_alpha + 1), tau, w);
+  add_element(
+      m, unit(at_k1),
+      {by_tau(), by_alpha(at_alpha, k1),
+       GridColumn{at_alpha + 1, k1, w.d_weight_d_beta, w.d_constant_d_beta, w.d_dashpot_d_beta_s}},
+      fast);
   return m;
 }
 

@@ -15,7 +15,8 @@ namespace tpm {
 /// with the derivatives of the coefficients by the few parameters that they depend on.
 struct Memory {
   double constant = 0.0;
-  double dashpot = 0.0;  ///< N s/m
+  double dashpot = 0.0;           ///< N s/m
+  bool infinite_at_once = false;  ///< a spring-pot answers a jump with an infinite force
   Eigen::VectorXd rate_per_s;
   Eigen::VectorXd stiffness;
   std::vector<int> rate_parameter;  ///< parameter that is 1/rate_j, or -1 if the rate is fixed
@@ -35,8 +36,8 @@ struct Memory {
 /// Memory of a fractional law on the fixed rates of a window. What the window does not see is kept
 /// too: slow rates as a branch that relaxes only under infinite time, so that `constant` is what
 /// remains in the end; for E_alpha the fast rates as two branches with their stiffness and
-/// viscosity, so that G(0) is exact; for the spring-pot, infinitely stiff at once, as the dashpot.
-/// @param values those of law_parameters: [k_inf], k1, [tau1], alpha
+/// viscosity, so that G(0) is exact; for spring-pots, infinitely stiff at once, as the dashpot.
+/// @param values those of law_parameters: [k_inf], k1, [k2], [tau1], alpha, [beta]
 /// Throws Error(bad_input) for a law that is not fractional, or as FractionalMemory.
 [[nodiscard]] Memory fractional_memory(Fractional law, std::span<const double> values,
                                        const FractionalMemory& rates);

@@ -31,18 +31,33 @@ double relaxation_of(const Prony& law, double t_s) {
   return g;
 }
 
+/// (t/1 s)^-order / Gamma(1 - order). 1/Gamma(0) is 0: a dashpot has relaxed at every t > 0.
+double springpot_relaxation(double order, double t_s) {
+  return order < 1.0 ? std::pow(t_s, -order) / std::tgamma(1.0 - order) : 0.0;
+}
+
+/// Two spring-pots in series, of the stiffness 1 at 1/tau; t in units of tau.
+double series_relaxation(double alpha, double beta, double t) {
+  const auto [low, high] = std::minmax(alpha, beta);
+  if (low == high) return 0.5 * springpot_relaxation(low, t);
+  return std::pow(t, -low) *
+         mittag_leffler_with_slopes(high - low, 1.0 - low, std::pow(t, high - low)).value;
+}
+
 double fractional_relaxation(Fractional law, std::span<const double> values, double t_s) {
-  const bool solid = law == Fractional::kelvin_voigt || law == Fractional::zener;
-  const std::size_t at = solid ? 1 : 0;
-  const double end = solid ? values[0] : 0.0;
-  if (law == Fractional::maxwell || law == Fractional::zener) {
-    const double alpha = values[at + 2];
-    return end + values[at] * mittag_leffler(alpha, 1.0, std::pow(t_s / values[at + 1], alpha));
+  const std::size_t at = has_lasting_spring(law) ? 1 : 0;
+  const double end = at == 1 ? values[0] : 0.0;
+  if (law == Fractional::kelvin_voigt_pair) {
+    return values[0] * springpot_relaxation(values[2], t_s) +
+           values[1] * springpot_relaxation(values[3], t_s);
   }
-  const double alpha = values[at + 1];
-  // 1/Gamma(1 - alpha) is 0 at alpha = 1: a dashpot, which has relaxed at every t > 0
-  const double spring = alpha < 1.0 ? std::pow(t_s, -alpha) / std::tgamma(1.0 - alpha) : 0.0;
-  return end + values[at] * spring;
+  if (!has_relaxation_time(law))
+    return end + values[at] * springpot_relaxation(values[at + 1], t_s);
+  const double alpha = values[at + 2];
+  const double t = t_s / values[at + 1];
+  return end + values[at] * (has_two_springpots(law)
+                                 ? series_relaxation(alpha, values[at + 3], t)
+                                 : mittag_leffler(alpha, 1.0, std::pow(t, alpha)));
 }
 
 std::vector<double> evenly_in_log(double from, double to, int count) {

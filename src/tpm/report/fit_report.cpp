@@ -42,7 +42,7 @@ Series measured_part(const std::vector<const FittedDatum*>& readings, bool stora
     s.x.push_back(*datum.frequency_Hz);
     s.y.push_back(*datum.value / unit);
     // A bar below 0 would leave the axis.
-    s.sd.push_back(std::min(datum.sigma, 0.99 * *datum.value) / unit);
+    s.sd.push_back(std::min(d->reading_sd, 0.99 * *datum.value) / unit);
   }
   return s;
 }

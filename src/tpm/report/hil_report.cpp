@@ -164,6 +164,7 @@ void add_fidelity(Document& d, const Verification& v) {
                      o.name, significant(o.start_s, 4), significant(o.end_s, 4),
                      mN(o.commanded.rms_N), mN(o.commanded.max_N), mN(o.apart_N))});
   }
+  for (const std::string& note : v.notes) others.push_back({note, Tone::bad});
   if (!others.empty()) d.bullets(std::move(others));
   d.picture({"session", "The session", ""});
   Table table{"Force error by phase; depth: how well the operator followed, rms",
@@ -218,6 +219,7 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
   std::vector<Cell> lines;
   lines.push_back(
       {fmt::format("end: {}", s.cause), s.cause == "finished" ? Tone::good : Tone::bad});
+  if (r.damaged > 0) lines.push_back({damage_line(r), Tone::bad});
   if (!r.closed) {
     lines.push_back(
         {"the recording has no closing record: the process was killed; all rows up to "

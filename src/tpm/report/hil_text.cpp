@@ -180,6 +180,9 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
       {"model", recording.header.at("model")},
       {"reference", v.reference},
       {"whole", v.whole},
+      {"damaged_rows", recording.damaged},
+      {"without_equilibrium", v.without_equilibrium},
+      {"notes", v.notes},
       {"end_s", rounded(v.end_s, kHilDigits)},
       {"knots", v.knots},
       {"motion_tolerance_m", v.motion_tolerance_m},
@@ -202,7 +205,7 @@ std::string verification_text(const HilRecording& recording, const Verification&
       "{}\n{}\nverified {} s{} against: {}\nmotion through {} knots within {} um, {}; the "
       "reference's own error estimate {} N\n",
       recording.session.title, device_line(recording), significant(v.end_s, 6),
-      v.whole ? "" : " (the recording is cut off there)", v.reference, v.knots,
+      v.whole ? "" : " (" + damage_line(recording) + ")", v.reference, v.knots,
       significant(1e6 * v.motion_tolerance_m, 3), motion_cost(v, 1.0, "N"),
       significant(v.reference_error_N, 3));
   text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}\n", "phase", "count", "rms mN", "max mN",
@@ -229,6 +232,7 @@ std::string verification_text(const HilRecording& recording, const Verification&
   text += fmt::format("{:<10} {:>7} {:>10} {:>10} {:>10}   peak {} N\n", "all", v.phases.size(),
                       significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
                       share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
+  for (const std::string& note : v.notes) text += "note: " + note + "\n";
   for (const OtherOpinion& o : v.others) {
     text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
                         o.name, significant(o.start_s, 4), significant(o.end_s, 4),

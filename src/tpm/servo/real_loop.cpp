@@ -80,6 +80,12 @@ class RecordThread {
   RecordThread(std::shared_ptr<Shared> shared, const RecordSink& sink,
                const std::function<void()>& idle)
       : shared_(std::move(shared)), thread_([this, sink, idle] { drain(sink, idle); }) {}
+  ~RecordThread() {
+    ending_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  RecordThread(const RecordThread&) = delete;
+  RecordThread& operator=(const RecordThread&) = delete;
 
   /// The last rows are written when this returns.
   void finish() {
@@ -121,6 +127,48 @@ void cut_forces_from_outside(const std::shared_ptr<Shared>& shared) {
   for (int i = 0; i < 20 && !*cut; ++i) std::this_thread::sleep_for(100us);
 }
 
+/// The loop in its thread. However this ends, the forces are off then and no thread is left to
+/// end the program; one that is stuck stays behind.
+class LoopThread {
+ public:
+  LoopThread(std::shared_ptr<Shared> shared, RealTimeWish wish)
+      : shared_(std::move(shared)), thread_([s = shared_, wish] {
+          try {
+            s->scheduling = become_real_time(wish);
+          } catch (...) {
+            s->refused = std::current_exception();
+          }
+          s->scheduled.store(true, std::memory_order_release);
+          while (!s->begin.load(std::memory_order_acquire)) std::this_thread::sleep_for(100us);
+          if (!s->refused) serve(*s);
+          s->over.store(true, std::memory_order_release);
+        }) {}
+  ~LoopThread() {
+    if (!thread_.joinable()) return;
+    shared_->wanted.store(StopCause::exception, std::memory_order_release);
+    shared_->begin.store(true, std::memory_order_release);
+    constexpr int kPatience = 1000;  // ms
+    for (int i = 0; i < kPatience && !over(); ++i) std::this_thread::sleep_for(1ms);
+    if (over()) {
+      thread_.join();
+    } else {
+      cut_forces_from_outside(shared_);
+      thread_.detach();
+    }
+  }
+  LoopThread(const LoopThread&) = delete;
+  LoopThread& operator=(const LoopThread&) = delete;
+
+  void join() { thread_.join(); }
+  void leave_behind() { thread_.detach(); }
+
+ private:
+  [[nodiscard]] bool over() const { return shared_->over.load(std::memory_order_acquire); }
+
+  std::shared_ptr<Shared> shared_;
+  std::thread thread_;
+};
+
 /// Waits for the loop; true if a cycle did not end in time.
 bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
            std::int64_t& stop_took_ns) {
@@ -159,28 +207,18 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
                               const ServoSettings& settings, const RecordSink& sink,
                               const RealTimeOptions& options) {
   auto shared = std::make_shared<Shared>(device, model, settings);
-  std::thread loop([shared, wish = options.wish] {
-    try {
-      shared->scheduling = become_real_time(wish);
-    } catch (...) {
-      shared->refused = std::current_exception();
-    }
-    shared->scheduled.store(true, std::memory_order_release);
-    while (!shared->begin.load(std::memory_order_acquire)) std::this_thread::sleep_for(100us);
-    if (!shared->refused) serve(*shared);
-    shared->over.store(true, std::memory_order_release);
-  });
+  RecordThread records(shared, sink, options.idle);
+  LoopThread loop(shared, options.wish);
   while (!shared->scheduled.load(std::memory_order_acquire)) std::this_thread::sleep_for(100us);
 
   ServoOutcome outcome;
   outcome.real_time = true;
   outcome.scheduling = shared->scheduling;
-  RecordThread records(shared, sink, options.idle);
   shared->begin.store(true, std::memory_order_release);
   std::int64_t stop_took_ns = 0;
   const bool hang = watch(shared, options, stop_took_ns);
   if (hang) {
-    loop.detach();
+    loop.leave_behind();
     outcome.cause = StopCause::hang;
     outcome.cycles = shared->cycle.load(std::memory_order_acquire) + 1;
     outcome.stop_took_s = static_cast<double>(stop_took_ns) * 1e-9;
@@ -192,6 +230,8 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
     records.finish();
   } catch (const std::exception& error) {
     outcome.detail = error.what();
+  } catch (...) {
+    outcome.detail = "something that is no error was thrown by whoever records";
   }
   outcome.dropped_records = shared->dropped;
   if (hang) return outcome;

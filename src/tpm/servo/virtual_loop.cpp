@@ -29,6 +29,9 @@ ServoOutcome run_in_virtual_time(HapticDevice& device, ContactModel& model,
   } catch (const std::exception& error) {
     step.stop(StopCause::exception);
     outcome.detail = error.what();
+  } catch (...) {
+    step.stop(StopCause::exception);
+    outcome.detail = "something that is no error was thrown by whoever records";
   }
   outcome.cause = step.cause();
   outcome.cycles = step.cycles();

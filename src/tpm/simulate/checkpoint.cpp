@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "tpm/core/error.hpp"
 #include "tpm/core/version.hpp"
 #include "tpm/store/file.hpp"
@@ -42,9 +45,22 @@ class ListReader {
 
   [[nodiscard]] std::vector<double> list(const std::string& name, std::size_t multiple) const {
     std::vector<double> values = file_.numbers(name);
+    if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); })) {
+      throw bad_input(path_.string(), fmt::format("{} holds a number that is not finite", name),
+                      kExpected);
+    }
     if (multiple == 0 ? !values.empty() : values.size() % multiple == 0) return values;
     throw bad_input(path_.string(), fmt::format("{} has {} numbers", name, values.size()),
                     kExpected);
+  }
+
+  /// A count or a number of a sphere, which is stored as the others are.
+  [[nodiscard]] std::size_t whole(double value, const char* what) const {
+    constexpr double kMost = 1e9;
+    if (value >= 0.0 && value <= kMost && value == std::floor(value)) {
+      return static_cast<std::size_t>(value);
+    }
+    throw bad_input(path_.string(), fmt::format("says {} for {}", value, what), kExpected);
   }
 
   [[nodiscard]] std::vector<QuasiStaticState> states(const std::string& group, std::size_t spheres,
@@ -99,7 +115,7 @@ Validity read_validity(const ListReader& file) {
     if (values.empty()) continue;
     validity.breach[k].first_time_s = values.front();
     for (std::size_t i = 1; i < values.size(); ++i) {
-      validity.breach[k].spheres.push_back(static_cast<std::size_t>(values[i]));
+      validity.breach[k].spheres.push_back(file.whole(values[i], "a sphere"));
     }
   }
   return validity;
@@ -173,16 +189,23 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
     }
     return std::nullopt;
   }
+  if (!file.sealed()) {
+    throw bad_input(path.string(), "is damaged: it has no check sum", kExpected);
+  }
   const ListReader lists(file, path);
-  const auto spheres = static_cast<std::size_t>(lists.list("/spheres", 0).front());
-  const auto bonds = static_cast<std::size_t>(lists.list("/bonds", 0).front());
+  const std::size_t spheres = lists.whole(lists.list("/spheres", 0).front(), "the spheres");
+  const std::size_t bonds = lists.whole(lists.list("/bonds", 0).front(), "the bonds");
   Checkpoint checkpoint;
   constexpr std::size_t kColumns = 8;
   const std::vector<double> curve = lists.list("/curve", kColumns);
   for (std::size_t i = 0; i + kColumns <= curve.size(); i += kColumns) {
     const double* p = &curve[i];
-    checkpoint.record.curve.push_back(
-        {p[0], p[1], p[2], {p[3], p[4], p[5]}, static_cast<int>(p[6]), p[7]});
+    checkpoint.record.curve.push_back({p[0],
+                                       p[1],
+                                       p[2],
+                                       {p[3], p[4], p[5]},
+                                       static_cast<int>(lists.whole(p[6], "the tools that touch")),
+                                       p[7]});
   }
   checkpoint.record.outputs = lists.states("/outputs", spheres, bonds);
   checkpoint.record.validity = read_validity(lists);

@@ -1,9 +1,10 @@
 #include "tpm/solve/cardinal_weight.hpp"
 
-#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>
+
+#include "tpm/solve/analytic.hpp"
 
 namespace tpm {
 
@@ -16,40 +17,6 @@ using Complex = std::complex<double>;
 constexpr double kNegligible = 1e-17;
 /// |alpha y|^2 below which the two terms of W are taken together. Apart they lose a digit here.
 constexpr double kNearPole = 0.01;
-
-/// A function of one complex number with its derivative.
-struct Analytic {
-  Complex value;
-  Complex slope;
-};
-
-/// (exp(z) - 1)/z.
-Analytic mean_exponential(Complex z) {
-  if (std::norm(z) > 0.25) {
-    const Complex growth = std::exp(z);
-    const Complex mean = (growth - 1.0) / z;
-    return {mean, (growth - mean) / z};
-  }
-  Analytic sum{1.0, 0.0};
-  for (int n = 16; n >= 2; --n) {  // 1 + z/2 (1 + z/3 (1 + ...))
-    sum.slope = (sum.value + z * sum.slope) / static_cast<double>(n);
-    sum.value = 1.0 + z * sum.value / static_cast<double>(n);
-  }
-  return sum;
-}
-
-/// v/sinh(v) for |v| < 0.15.
-Analytic inverse_sinhc(Complex v) {
-  constexpr std::array<double, 6> kSeries{
-      1.0, -1.0 / 6.0, 7.0 / 360.0, -31.0 / 15120.0, 127.0 / 604800.0, -73.0 / 3421440.0};
-  const Complex square = v * v;
-  Analytic sum{0.0, 0.0};
-  for (std::size_t n = kSeries.size(); n-- > 0;) {
-    sum.slope = sum.slope * square + sum.value;
-    sum.value = sum.value * square + kSeries[n];
-  }
-  return {sum.value, 2.0 * v * sum.slope};
-}
 
 }  // namespace
 

@@ -10,6 +10,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/solve/cardinal_weight.hpp"
+#include "tpm/solve/springpot_pair.hpp"
 
 namespace tpm {
 
@@ -29,6 +30,14 @@ struct Sloped {
 
 void check_alpha(double alpha) {
   if (!(alpha > 0.0 && alpha <= 1.0)) refuse("alpha", alpha, "0 < alpha <= 1");
+}
+
+void check_order(const char* name, double order) {
+  if (!(order >= 0.0 && order <= 1.0)) refuse(name, order, "0 to 1");
+}
+
+void check_tau(double tau_s) {
+  if (!(tau_s > 0.0 && std::isfinite(tau_s))) refuse("tau", tau_s, "a time > 0 s");
 }
 
 void check_window(double t_min_s, double t_max_s, double tolerance) {
@@ -83,9 +92,9 @@ Sloped springpot_beyond(double e, double edge, double h) {
 
 /// The sum of exp(-j h) W(m + (j - 1) direction), j = 1, 2, ...: rates beyond an edge of the grid
 /// by their rate (or time) relative to that of the edge.
-SpectralValue damped_sum(const CardinalWeight& weight, long m, int direction,
-                         std::span<const double> damping) {
-  SpectralValue sum;
+template <class Weight>
+auto damped_sum(const Weight& weight, long m, int direction, std::span<const double> damping) {
+  decltype(weight.at(m)) sum;
   for (const double factor : damping) {
     sum += weight.at(m).times(factor);
     m += direction;
@@ -121,7 +130,8 @@ SpectralValue sum_below(const CardinalWeight& weight, long first, long last,
 
 // The tolerance is spent by halves: one on the step (error exp(-pi^2/(2h)), reached at alpha = 1),
 // a quarter on each end of the grid.
-FractionalMemory::FractionalMemory(double t_min_s, double t_max_s, double tolerance) {
+FractionalMemory::FractionalMemory(double t_min_s, double t_max_s, double tolerance)
+    : t_min_s_(t_min_s), t_max_s_(t_max_s) {
   check_window(t_min_s, t_max_s, tolerance);
   step_ = pi * pi / (2.0 * std::log(2.0 / tolerance));
   // Slower rates as a constant and the first rate: (r t)^2/8 at most.
@@ -144,12 +154,15 @@ void FractionalMemory::prepare(FractionalWeights& out) const {
   const auto n = static_cast<Eigen::Index>(rates_.size());
   out.weight.resize(n);
   out.d_weight_d_alpha.resize(n);
-  out.d_weight_d_log_tau.resize(n);
+  out.d_weight_d_beta.setZero(n);
+  out.d_weight_d_log_tau.setZero(n);
+  out.d_constant_d_beta = out.d_constant_d_log_tau = 0.0;
+  out.d_dashpot_d_beta_s = out.d_dashpot_d_log_tau_s = 0.0;
 }
 
 void FractionalMemory::mittag_leffler(double alpha, double tau_s, FractionalWeights& out) const {
   check_alpha(alpha);
-  if (!(tau_s > 0.0 && std::isfinite(tau_s))) refuse("tau", tau_s, "a time > 0 s");
+  check_tau(tau_s);
   prepare(out);
   const double steps = std::log(tau_s) / step_;
   const double whole = std::nearbyint(steps);
@@ -174,11 +187,8 @@ void FractionalMemory::mittag_leffler(double alpha, double tau_s, FractionalWeig
 }
 
 void FractionalMemory::springpot(double alpha, FractionalWeights& out) const {
-  check_alpha(alpha);
+  check_order("alpha", alpha);
   prepare(out);
-  out.d_weight_d_log_tau.setZero();
-  out.d_constant_d_log_tau = 0.0;
-  out.d_dashpot_d_log_tau_s = 0.0;
   const double rest = 1.0 - alpha;
   const double sine = std::sin(pi * std::min(alpha, rest));  // exactly 0 at alpha = 1
   const double cosine = std::cos(pi * alpha);
@@ -203,6 +213,41 @@ void FractionalMemory::springpot(double alpha, FractionalWeights& out) const {
   const Sloped fast = springpot_beyond(rest, last_x, step_);
   out.dashpot_s = fast.value;
   out.d_dashpot_d_alpha_s = -fast.slope;
+}
+
+void FractionalMemory::springpots_in_series(double alpha, double beta, double tau_s,
+                                            FractionalWeights& out) const {
+  check_order("alpha", alpha);
+  check_order("beta", beta);
+  check_tau(tau_s);
+  prepare(out);
+  const double steps = std::log(tau_s) / step_;
+  const double whole = std::nearbyint(steps);
+  const PairWeight weight(alpha, beta, steps - whole, step_);
+  const long first = first_ + std::lround(whole);
+  // What the sum of the rates lacks of G(t_max), and of the integral over [0, t_min].
+  PairValue constant = pair_relaxation(alpha, beta, t_max_s_ / tau_s);
+  PairValue dashpot = pair_relaxation_mean(alpha, beta, t_min_s_ / tau_s).times(t_min_s_);
+  for (std::size_t j = 0; j < rates_.size(); ++j) {
+    PairValue w = weight.at(first + static_cast<long>(j));
+    if (j == 0) w += damped_sum(weight, first - 1, -1, damping_);
+    const auto i = static_cast<Eigen::Index>(j);
+    out.weight[i] = w.value;
+    out.d_weight_d_alpha[i] = w.d_alpha;
+    out.d_weight_d_beta[i] = w.d_beta;
+    out.d_weight_d_log_tau[i] = w.d_x;
+    constant += w.times(-std::exp(-rates_[j] * t_max_s_));
+    dashpot += w.times(std::expm1(-rates_[j] * t_min_s_) / rates_[j]);
+  }
+  dashpot += constant.times(-t_min_s_);
+  out.constant = constant.value;
+  out.d_constant_d_alpha = constant.d_alpha;
+  out.d_constant_d_beta = constant.d_beta;
+  out.d_constant_d_log_tau = constant.d_x;
+  out.dashpot_s = dashpot.value;
+  out.d_dashpot_d_alpha_s = dashpot.d_alpha;
+  out.d_dashpot_d_beta_s = dashpot.d_beta;
+  out.d_dashpot_d_log_tau_s = dashpot.d_x;
 }
 
 double FractionalMemory::at(const FractionalWeights& weights, double t_s) const {

@@ -9,17 +9,21 @@ namespace tpm {
 ///
 ///     G(t) ~ constant + sum_j weight_j exp(-r_j t) + dashpot_s delta(t)
 ///
-/// with its derivatives by the order alpha and by ln tau. Weights may be negative by up to about a
+/// with its derivatives by the order alpha (of two spring-pots: alpha and beta) and by ln tau.
+/// Weights may be negative by up to about a
 /// fifth of the total: no sum of positive weights on fixed rates can follow E_alpha as alpha -> 1.
 struct FractionalWeights {
   Eigen::VectorXd weight;  ///< one for each rate, dimensionless
   Eigen::VectorXd d_weight_d_alpha;
+  Eigen::VectorXd d_weight_d_beta;
   Eigen::VectorXd d_weight_d_log_tau;
   double constant = 0.0;  ///< what relaxes so slowly that the window does not see it
   double d_constant_d_alpha = 0.0;
+  double d_constant_d_beta = 0.0;
   double d_constant_d_log_tau = 0.0;
   double dashpot_s = 0.0;  ///< what relaxes within a step: acts on du/dt
   double d_dashpot_d_alpha_s = 0.0;
+  double d_dashpot_d_beta_s = 0.0;
   double d_dashpot_d_log_tau_s = 0.0;
 };
 
@@ -37,10 +41,11 @@ struct FractionalWeights {
 ///
 ///     |sum - G|(t) <= e g,   |integral over [0, t] of (sum - G)| <= e g t
 ///
-/// with e = stated_error(), g = 1 for E_alpha and g = G(t_min) for the spring-pot. So a history
-/// whose knots are at least t_min apart is answered at its knots to e g times its total variation.
-/// Not for t < t_min: just after a jump G is 1 (E_alpha) or infinite (spring-pot), and the sum is
-/// less. If u is curved between the knots, dashpot_s du/dt is off by dashpot_s u''/r_max.
+/// with e = stated_error(), g = 1 for E_alpha, g = G(t_min) for the spring-pot and the mean of G
+/// over [0, t_min] for two spring-pots. So a history whose knots are at least t_min apart is
+/// answered at its knots to e g times its total variation. Not for t < t_min: just after a jump G
+/// is 1 (E_alpha) or infinite (spring-pot), and the sum is less. If u is curved between the knots,
+/// dashpot_s du/dt is off by dashpot_s u''/r_max.
 ///
 /// Method: the trapezoidal rule on the spectrum in ln(rate); where the poles of the spectrum come
 /// near (alpha -> 1) their residue, an exponential of a complex rate, is interpolated on the same
@@ -67,9 +72,15 @@ class FractionalMemory {
   /// tau_s > 0 and finite.
   void mittag_leffler(double alpha, double tau_s, FractionalWeights& out) const;
 
-  /// G(t) = (t / 1 s)^(-alpha) / Gamma(1 - alpha), a dashpot of 1 s at alpha = 1. The derivatives
-  /// by ln tau are 0. Throws Error(bad_input) unless 0 < alpha <= 1.
+  /// G(t) = (t / 1 s)^(-alpha) / Gamma(1 - alpha), a dashpot of 1 s at alpha = 1, a constant at
+  /// alpha = 0. The derivatives by ln tau are 0. Throws Error(bad_input) unless 0 <= alpha <= 1.
   void springpot(double alpha, FractionalWeights& out) const;
+
+  /// Two spring-pots in series, G(t) = (t/tau)^-beta E_{d,1-beta}(-(t/tau)^d), d = alpha - beta,
+  /// which is the same with alpha and beta exchanged (springpot_pair.hpp). At beta = 0 it is
+  /// mittag_leffler up to the stated error; at alpha = 1 a dashpot in series with a spring-pot.
+  /// Throws Error(bad_input) unless alpha and beta are from 0 to 1 and tau_s > 0 and finite.
+  void springpots_in_series(double alpha, double beta, double tau_s, FractionalWeights& out) const;
 
   /// The sum at a time > 0, and its integral from 0 on (with the dashpot).
   [[nodiscard]] double at(const FractionalWeights& weights, double t_s) const;
@@ -78,6 +89,8 @@ class FractionalMemory {
  private:
   void prepare(FractionalWeights& out) const;
 
+  double t_min_s_;
+  double t_max_s_;
   double step_;  ///< h, spacing in ln(rate)
   long first_;   ///< the rates are exp(k h) per second, k = first_ ...
   double stated_error_;

@@ -9,6 +9,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/solve/laplace_contour.hpp"
 #include "tpm/solve/relaxation_spectrum.hpp"
 
 namespace tpm {
@@ -25,15 +26,16 @@ constexpr double kStep = 0.25;
 constexpr double kSlowest = -38.0;
 constexpr double kFastest = 6.7;
 
+[[noreturn]] void refuse_argument(const char* what, double value, const char* expected) {
+  throw bad_input("Mittag-Leffler function", fmt::format("{} = {}", what, shortest(value)),
+                  expected);
+}
+
 void check(double alpha, double beta, double z) {
-  const auto refuse = [](const char* what, double value, const char* expected) {
-    throw bad_input("Mittag-Leffler function", fmt::format("{} = {}", what, shortest(value)),
-                    expected);
-  };
-  if (!(alpha > 0.0 && alpha <= 1.0)) refuse("alpha", alpha, "0 < alpha <= 1");
-  if (!(z >= 0.0)) refuse("z", z, "z >= 0, for the argument -z");
+  if (!(alpha > 0.0 && alpha <= 1.0)) refuse_argument("alpha", alpha, "0 < alpha <= 1");
+  if (!(z >= 0.0)) refuse_argument("z", z, "z >= 0, for the argument -z");
   if (beta != 1.0 && beta != 2.0 && beta != alpha && beta != 1.0 + alpha) {
-    refuse("beta", beta, "1, 2, alpha or 1 + alpha");
+    refuse_argument("beta", beta, "1, 2, alpha or 1 + alpha");
   }
 }
 
@@ -122,6 +124,23 @@ double mittag_leffler(double alpha, double beta, double z) {
   if (beta == 2.0) return spectral_sum(Response::ramp, alpha, z);
   if (beta == alpha) return spectral_sum(Response::slope, alpha, z) / z;
   return (1.0 - spectral_sum(Response::step, alpha, z)) / z;
+}
+
+MittagLeffler mittag_leffler_with_slopes(double a, double b, double z) {
+  if (!(a >= 0.0 && a <= 1.0)) refuse_argument("a", a, "0 to 1");
+  if (!(b >= 0.0 && b <= 3.0)) refuse_argument("b", b, "0 to 3");
+  if (!(z >= 0.0)) refuse_argument("z", z, "z >= 0, for the argument -z");
+  MittagLeffler sum;
+  if (std::isinf(z)) return sum;
+  for (const ContourNode& node : contour_nodes()) {
+    const std::complex<double> inverse = 1.0 / (std::exp(a * node.log_s) + z);
+    const std::complex<double> term = node.weight * std::exp((a - b) * node.log_s) * inverse;
+    sum.value += term.real();
+    sum.d_a += (term * node.log_s * z * inverse).real();
+    sum.d_b -= (term * node.log_s).real();
+    sum.d_z -= (term * inverse).real();
+  }
+  return sum;
 }
 
 }  // namespace tpm

@@ -5,14 +5,15 @@
 #include <openssl/sha.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 
 #include "tpm/core/error.hpp"
+#include "tpm/store/file_roles.hpp"
+#include "tpm/store/replacement.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;
@@ -38,15 +39,47 @@ class Descriptor {
   int fd_;
 };
 
-Error cannot_write(const fs::path& path, int error_number) {
-  return {ExitCode::environment, path.string(),
-          fmt::format("cannot write: {}", std::strerror(error_number)),
-          "a folder that can be written and has room"};
+/// /dev/stdout, /dev/fd/3: links into /proc, which stand for a stream whatever it is connected to.
+bool is_open_stream(const fs::path& path) {
+  constexpr int kMostLinks = 40;
+  fs::path target = path;
+  std::error_code ec;
+  for (int links = 0; links < kMostLinks && fs::is_symlink(target, ec); ++links) {
+    if (target.string().starts_with("/proc/")) return true;
+    const fs::path next = fs::read_symlink(target, ec);
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  return false;
 }
 
-bool write_all(int fd, std::string_view bytes) {
+/// False with errno if reading fails; stops one byte above the limit.
+bool read_all(int fd, std::uint64_t most, std::string& bytes) {
+  // A pipe has no size, and a file may change: whatever comes is read in blocks.
+  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  while (bytes.size() <= most) {
+    const std::size_t have = bytes.size();
+    bytes.resize(have + std::min<std::uint64_t>(kBlock, most + 1 - have));
+    const ssize_t n = ::read(fd, bytes.data() + have, bytes.size() - have);
+    bytes.resize(have + static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return n == 0;
+  }
+  return true;
+}
+
+}  // namespace
+
+Error cannot_write(const fs::path& path, int error_number) {
+  const char* expected = "a folder that can be written and has room";
+  if (error_number == ENAMETOOLONG) expected = "a name of at most 255 bytes";
+  if (error_number == ELOOP) expected = "links that lead to a file";
+  return {ExitCode::environment, path.string(),
+          fmt::format("cannot write: {}", std::strerror(error_number)), expected};
+}
+
+bool write_all(int descriptor, std::string_view bytes) {
   while (!bytes.empty()) {
-    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+    const ssize_t n = ::write(descriptor, bytes.data(), bytes.size());
     if (n < 0) {
       if (errno == EINTR) continue;
       return false;
@@ -56,31 +89,36 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
-}  // namespace
-
-std::string read_file(const fs::path& path) {
+std::string read_file(const fs::path& path, std::uint64_t most) {
   std::error_code ec;
   const auto status = fs::status(path, ec);
   if (!fs::exists(status)) throw bad_input(path.string(), "no such file", "a readable file");
   if (fs::is_directory(status)) throw bad_input(path.string(), "is a folder", "a readable file");
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
-  std::string bytes;
-  // A pipe has no size, and a file may change: whatever comes is read in blocks.
-  constexpr std::size_t kBlock = std::size_t{1} << 20;
-  bytes.reserve(fs::is_regular_file(status) ? fs::file_size(path, ec) + 1 : kBlock);
-  while (in) {
-    const std::size_t have = bytes.size();
-    bytes.resize(have + kBlock);
-    in.read(bytes.data() + have, static_cast<std::streamsize>(kBlock));
-    bytes.resize(have + static_cast<std::size_t>(in.gcount()));
+  const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (in.get() < 0) {
+    throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
   }
-  if (in.bad()) throw bad_input(path.string(), "reading stopped half-way", "a readable file");
+  note_reading(path, in.get());
+  const auto too_large = [&] {
+    return bad_input(path.string(), fmt::format("holds more than {} MB", most >> 20U),
+                     "a smaller file");
+  };
+  std::string bytes;
+  if (fs::is_regular_file(status)) {
+    const std::uint64_t size = fs::file_size(path, ec);
+    if (!ec && size > most) throw too_large();
+    if (!ec) bytes.reserve(size + 1);
+  }
+  if (!read_all(in.get(), most, bytes)) {
+    throw bad_input(path.string(), "reading stopped half-way", "a readable file");
+  }
+  if (bytes.size() > most) throw too_large();
   if (bytes.empty()) throw bad_input(path.string(), "the file is empty", "some content");
   return bytes;
 }
 
 bool is_device_or_pipe(const fs::path& path) {
+  if (is_open_stream(path)) return true;
   std::error_code ec;
   const auto status = fs::status(path, ec);
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
@@ -96,27 +134,16 @@ void require_replaceable(const fs::path& path) {
 
 void write_file(const fs::path& path, std::string_view bytes) {
   if (is_device_or_pipe(path)) {
-    Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+    Descriptor device(::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
     if (device.get() < 0 || !write_all(device.get(), bytes) || device.close() != 0) {
       throw cannot_write(path, errno);
     }
     return;
   }
-  std::error_code ec;
-  if (path.has_parent_path()) {
-    fs::create_directories(path.parent_path(), ec);
-    if (ec) throw cannot_write(path.parent_path(), ec.value());
-  }
-  const std::string temporary = fmt::format("{}.part.{}", path.string(), ::getpid());
-  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-  if (file.get() < 0) throw cannot_write(path, errno);
-  const bool ok = write_all(file.get(), bytes) && ::fsync(file.get()) == 0 && file.close() == 0 &&
-                  ::rename(temporary.c_str(), path.c_str()) == 0;
-  if (!ok) {
-    const int error_number = errno;
-    ::unlink(temporary.c_str());
-    throw cannot_write(path, error_number);
-  }
+  Replacement file(path);
+  if (!write_all(file.descriptor(), bytes)) throw cannot_write(path, errno);
+  file.to_disk();
+  file.put_in_place();
 }
 
 fs::path share_dir() {

@@ -1,23 +1,38 @@
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
 
+#include "tpm/core/error.hpp"
+
 namespace tpm {
 
-/// Whole file as bytes. Throws Error(bad_input) if it is missing, a directory, unreadable or empty.
-[[nodiscard]] std::string read_file(const std::filesystem::path& path);
+/// No text or mesh that a person hands over is larger; what has no end (/dev/zero) is.
+inline constexpr std::uint64_t kLargestInput = std::uint64_t{1} << 30U;
 
-/// A device, a pipe or a socket: it is written into, and never replaced by a file of its name.
+/// Whole file as bytes. Throws Error(bad_input) if it is missing, a directory, unreadable, empty or
+/// larger than `most` bytes.
+[[nodiscard]] std::string read_file(const std::filesystem::path& path,
+                                    std::uint64_t most = kLargestInput);
+
+/// A device, a pipe, a socket, or a name of an open stream such as /dev/stdout: it is written into,
+/// and never replaced by a file of its name.
 [[nodiscard]] bool is_device_or_pipe(const std::filesystem::path& path);
 
 /// Throws Error(environment) if what has the name is no file that a result could replace: a folder,
 /// a device or a pipe.
 void require_replaceable(const std::filesystem::path& path);
 
-/// Writes under a temporary name in the same folder, flushes to the disk and renames, so that a
-/// reader sees the old file or the new one and a full disk leaves the old one alone; into a device
-/// or pipe as it stands. Creates the parent folders. Throws Error(environment).
+/// "PATH: cannot write: REASON", of an errno.
+[[nodiscard]] Error cannot_write(const std::filesystem::path& path, int error_number);
+
+/// Writes all bytes; false with errno if that is not possible.
+[[nodiscard]] bool write_all(int descriptor, std::string_view bytes);
+
+/// Writes through a Replacement (replacement.hpp) and flushes to the disk, so that a reader sees
+/// the old file or the new one and a full disk leaves the old one alone; into a device or pipe as
+/// it stands. Creates the parent folders. Throws Error(environment).
 void write_file(const std::filesystem::path& path, std::string_view bytes);
 
 /// The folder that holds data/, configs/, schemas/ and scripts/: $TPMKIT_SHARE if set, else beside

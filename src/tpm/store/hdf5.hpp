@@ -2,10 +2,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "tpm/store/replacement.hpp"
 
 namespace tpm {
 
@@ -32,16 +35,21 @@ class Hdf5Handle {
   Closer closer_ = nullptr;
 };
 
-/// Writes an HDF5 file under a temporary name in the same folder; commit() gives it its name. A
-/// writer that is destroyed without commit() leaves nothing behind. Paths inside the file are
-/// absolute ("/curves/a/time"); groups on the way are created. No time stamps are stored, so that
-/// the same content gives the same bytes. Errors are Error(environment).
+struct Hdf5Storage;  // hdf5_driver.hpp
+
+/// Writes an HDF5 file through a Replacement; commit() seals it (seal.hpp), passes it to the disk
+/// and gives it its name. A writer that is destroyed without commit() leaves nothing behind. Paths
+/// inside the file are absolute ("/curves/a/time"); groups on the way are created. No time stamps
+/// are stored, so that the same content gives the same bytes. Errors are Error(environment).
 class Hdf5Writer {
  public:
   explicit Hdf5Writer(std::filesystem::path path);
   ~Hdf5Writer();
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
+
+  /// Asks the disk for so many bytes beforehand.
+  void reserve(std::uint64_t bytes);
 
   void group(const std::string& name);
   void numbers(const std::string& name, const std::vector<double>& values);
@@ -91,21 +99,34 @@ class Hdf5Writer {
                                    const Hdf5Handle& creation);
   void attach(const std::string& object, const std::string& name, Hdf5Handle::Id type,
               const Hdf5Handle& space, const void* values);
+  void require_written(bool done, const std::string& what) const;
   [[noreturn]] void fail(const std::string& what) const;
 
   std::filesystem::path path_;
-  std::filesystem::path temporary_;
+  std::unique_ptr<Hdf5Storage> storage_;
+  Replacement place_;
   Hdf5Handle file_;
-  int raw_ = -1;                                 ///< the same file, for parts
   std::map<std::string, std::uint64_t> places_;  ///< of arrays, in bytes from the file's beginning
-  bool committed_ = false;
 };
 
-/// Reads an HDF5 file. Every error is Error(bad_input) with file and object name; HDF5's own error
-/// stack is never printed.
+class Contained;
+enum class SealState;
+
+/// Reads an HDF5 file, of which nothing is trusted: a child process reads it with limits of memory
+/// and processor time (contained.hpp), and content that lies outside the file is refused. A file
+/// whose check sum is wrong is not opened. Every error is one line, Error(bad_input) with file and
+/// object name.
 class Hdf5Reader {
  public:
   explicit Hdf5Reader(std::filesystem::path path);
+  ~Hdf5Reader();
+  Hdf5Reader(Hdf5Reader&&) noexcept;
+  Hdf5Reader& operator=(Hdf5Reader&&) noexcept;
+  Hdf5Reader(const Hdf5Reader&) = delete;
+  Hdf5Reader& operator=(const Hdf5Reader&) = delete;
+
+  /// True if the file has a check sum, which then is right.
+  [[nodiscard]] bool sealed() const noexcept;
 
   [[nodiscard]] bool has(const std::string& name) const;
   /// Names of the members of a group, in alphabetical order.
@@ -124,14 +145,12 @@ class Hdf5Reader {
   [[nodiscard]] std::string attribute(const std::string& object, const std::string& name) const;
 
  private:
-  [[nodiscard]] Hdf5Handle open_dataset(const std::string& name, bool as_text, int dimensions,
-                                        std::size_t& size) const;
-  [[nodiscard]] std::vector<double> real_numbers(const std::string& name, int dimensions) const;
-  [[noreturn]] void fail(const std::string& object, const std::string& what,
-                         std::string_view expected) const;
+  template <class Result>
+  [[nodiscard]] Result ask(std::string request) const;
 
   std::filesystem::path path_;
-  Hdf5Handle file_;
+  SealState seal_{};
+  std::unique_ptr<Contained> child_;
 };
 
 }  // namespace tpm

@@ -1,213 +1,274 @@
-#include <fmt/format.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <fstream>
+#include <cstring>
+#include <type_traits>
 #include <utility>
 
 #include "tpm/core/error.hpp"
+#include "tpm/store/contained.hpp"
 #include "tpm/store/file.hpp"
-#include "tpm/store/hdf5_parts.hpp"
+#include "tpm/store/file_roles.hpp"
+#include "tpm/store/hdf5.hpp"
+#include "tpm/store/hdf5_contents.hpp"
+#include "tpm/store/seal.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;
 namespace {
 
-/// HDF5 reads texts of any length into memory of its own, which has to be given back to it.
-class BorrowedTexts {
- public:
-  BorrowedTexts(const Hdf5Handle& type, const Hdf5Handle& space, std::size_t size)
-      : type_(type), space_(space), pointers_(size, nullptr) {}
-  ~BorrowedTexts() {
-    H5Dvlen_reclaim(type_.get(), space_.get(), H5P_DEFAULT, static_cast<void*>(pointers_.data()));
-  }
-  BorrowedTexts(const BorrowedTexts&) = delete;
-  BorrowedTexts& operator=(const BorrowedTexts&) = delete;
+enum class Wish : std::uint8_t {
+  nothing,  ///< only to open the file
+  has,
+  members,
+  numbers,
+  table,
+  extents,
+  part,
+  texts,
+  has_attribute,
+  attribute
+};
 
-  [[nodiscard]] void* buffer() { return static_cast<void*>(pointers_.data()); }
-  [[nodiscard]] std::vector<std::string> copy() const {
-    std::vector<std::string> texts;
-    texts.reserve(pointers_.size());
-    for (const char* text : pointers_) texts.emplace_back(text == nullptr ? "" : text);
-    return texts;
+/// Packs what goes between the processes, both on one machine and of one program.
+class Packer {
+ public:
+  template <class T>
+  requires std::is_trivially_copyable_v<T> Packer& put(const T& value) {
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+    return *this;
+  }
+  Packer& put(std::string_view text) {
+    put(std::uint64_t{text.size()});
+    bytes_.append(text);
+    return *this;
+  }
+  template <class T>
+  Packer& put(const std::vector<T>& list) {
+    put(std::uint64_t{list.size()});
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      bytes_.append(reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T));
+    } else {
+      for (const T& value : list) put(std::string_view(value));
+    }
+    return *this;
+  }
+  [[nodiscard]] std::string take() { return std::move(bytes_); }
+
+ private:
+  std::string bytes_;
+};
+
+/// Takes apart what a Packer packed. The child may have been led astray by the file: nothing that
+/// it says is believed, and sizes are checked against what is there.
+class Unpacker {
+ public:
+  Unpacker(std::string_view bytes, std::string_view where) : bytes_(bytes), where_(where) {}
+
+  template <class T>
+  requires std::is_trivially_copyable_v<T>
+  void take(T& value) { std::memcpy(&value, next(sizeof value), sizeof value); }
+  void take(std::string& text) {
+    std::uint64_t size = 0;
+    take(size);
+    const char* begin = next(size);
+    text.assign(begin, size);
+  }
+  template <class T>
+  void take(std::vector<T>& list) {
+    std::uint64_t size = 0;
+    take(size);
+    if constexpr (std::is_trivially_copyable_v<T>) {
+      if (size > bytes_.size() / sizeof(T)) next(bytes_.size() + 1);
+      const char* begin = next(size * sizeof(T));
+      list.resize(size);
+      if (size > 0) std::memcpy(list.data(), begin, size * sizeof(T));
+    } else {
+      for (std::uint64_t i = 0; i < size; ++i) take(list.emplace_back());
+    }
   }
 
  private:
-  const Hdf5Handle& type_;
-  const Hdf5Handle& space_;
-  std::vector<char*> pointers_;
+  const char* next(std::uint64_t size) {
+    if (size > bytes_.size()) {
+      throw bad_input(where_, "its content crashes the reader", "a whole file");
+    }
+    const char* begin = bytes_.data();
+    bytes_.remove_prefix(size);
+    return begin;
+  }
+  std::string_view bytes_;
+  std::string_view where_;
 };
+
+/// In the child.
+std::string answer(const Hdf5Contents& file, std::string_view request) {
+  Unpacker in(request, "");
+  Wish wish{};
+  std::string name, second;
+  in.take(wish);
+  in.take(name);
+  Packer out;
+  switch (wish) {
+    case Wish::nothing:
+      break;
+    case Wish::has:
+      return out.put(static_cast<std::uint8_t>(file.has(name))).take();
+    case Wish::members:
+      return out.put(file.members(name)).take();
+    case Wish::numbers:
+      return out.put(file.real_numbers(name, 1)).take();
+    case Wish::table:
+      return out.put(file.real_numbers(name, 2)).take();
+    case Wish::extents:
+      return out.put(file.extents(name)).take();
+    case Wish::part: {
+      std::vector<std::uint64_t> first, counts;
+      in.take(first);
+      in.take(counts);
+      return out.put(file.part(name, first, counts)).take();
+    }
+    case Wish::texts:
+      return out.put(file.texts(name)).take();
+    case Wish::has_attribute:
+      in.take(second);
+      return out.put(static_cast<std::uint8_t>(file.has_attribute(name, second))).take();
+    case Wish::attribute:
+      in.take(second);
+      return out.put(std::string_view(file.attribute(name, second))).take();
+  }
+  return {};
+}
+
+constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+
+/// The open file. HDF5 says the same of a missing file and of garbage: here they are told apart.
+int opened(const fs::path& path) {
+  std::error_code ec;
+  // Not a file, not readable or empty: the reason is read_file's to tell.
+  if (!fs::is_regular_file(path, ec) || fs::is_empty(path, ec)) {
+    static_cast<void>(read_file(path, 1));
+    throw bad_input(path.string(), "is a device or a pipe", "a file");
+  }
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (file < 0) {
+    throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
+  }
+  return file;
+}
+
+void require_hdf5(const fs::path& path, int file) {
+  std::array<char, kSignature.size()> begin{};
+  const ssize_t n = ::pread(file, begin.data(), begin.size(), 0);
+  if (n != static_cast<ssize_t>(begin.size()) ||
+      !std::equal(begin.begin(), begin.end(), kSignature.begin())) {
+    throw bad_input(path.string(), "is not an HDF5 file", "an HDF5 file that tpm wrote");
+  }
+}
+
+ContainedLimits limits_for(int file) {
+  struct stat found {};
+  const std::uint64_t size =
+      ::fstat(file, &found) == 0 ? static_cast<std::uint64_t>(found.st_size) : 0;
+  // A list may have as many numbers as the file has bytes (compressed ones do), and is packed once.
+  constexpr std::uint64_t kBytesForByte = 32;
+  ContainedLimits limits;
+  limits.memory_bytes += kBytesForByte * size;
+  limits.answer_bytes += kBytesForByte * size;
+  return limits;
+}
 
 }  // namespace
 
 Hdf5Reader::Hdf5Reader(fs::path path) : path_(std::move(path)) {
-  const QuietErrors quiet;
-  // HDF5 says the same of a missing file and of garbage: tell them apart first.
-  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  std::array<char, kSignature.size()> begin{};
-  std::ifstream in(path_, std::ios::binary);
-  // Not a file, not readable or empty: the reason is read_file's to tell.
-  std::error_code ec;
-  if (!in || !fs::is_regular_file(path_, ec) || fs::is_empty(path_, ec)) {
-    static_cast<void>(read_file(path_));
+  const int file = opened(path_);
+  try {
+    note_reading(path_, file);
+    require_hdf5(path_, file);
+    seal_ = seal_of(file);
+    if (seal_ == SealState::broken) {
+      throw bad_input(path_.string(), "is damaged: its check sum is another",
+                      "the file as it was written");
+    }
+    child_ = std::make_unique<Contained>(
+        path_.string(), file, limits_for(file), [where = path_.string()](int descriptor) {
+          auto contents = std::make_shared<Hdf5Contents>(descriptor, where);
+          return [contents](std::string_view request) { return answer(*contents, request); };
+        });
+    static_cast<void>(child_->ask(Packer().put(Wish::nothing).put(std::string_view()).take()));
+  } catch (...) {
+    ::close(file);
+    throw;
   }
-  in.read(begin.data(), begin.size());
-  if (!std::equal(begin.begin(), begin.end(), kSignature.begin())) {
-    throw bad_input(path_.string(), "is not an HDF5 file", "an HDF5 file that tpm wrote");
-  }
-  file_ = {H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose};
-  if (!file_.valid()) {
-    throw bad_input(path_.string(), "begins like HDF5 but is damaged or cut short",
-                    "a whole HDF5 file");
-  }
+  ::close(file);
 }
 
-void Hdf5Reader::fail(const std::string& object, const std::string& what,
-                      std::string_view expected) const {
-  throw bad_input(path_.string(), fmt::format("{}: {}", object, what), expected);
+Hdf5Reader::~Hdf5Reader() = default;
+Hdf5Reader::Hdf5Reader(Hdf5Reader&&) noexcept = default;
+Hdf5Reader& Hdf5Reader::operator=(Hdf5Reader&&) noexcept = default;
+
+bool Hdf5Reader::sealed() const noexcept {
+  return seal_ == SealState::whole;
+}
+
+template <class Result>
+Result Hdf5Reader::ask(std::string request) const {
+  const std::string reply = child_->ask(request);
+  Result result{};
+  Unpacker(reply, path_.native()).take(result);
+  return result;
 }
 
 bool Hdf5Reader::has(const std::string& name) const {
-  const QuietErrors quiet;
-  return H5Lexists(file_.get(), name.c_str(), H5P_DEFAULT) > 0;
+  return ask<std::uint8_t>(Packer().put(Wish::has).put(std::string_view(name)).take()) != 0;
 }
 
 std::vector<std::string> Hdf5Reader::members(const std::string& group) const {
-  const QuietErrors quiet;
-  const Hdf5Handle opened(H5Gopen2(file_.get(), group.c_str(), H5P_DEFAULT), H5Gclose);
-  if (!opened.valid()) fail(group, "no such group", "an HDF5 file that tpm wrote");
-  std::vector<std::string> names;
-  const auto collect = [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
-    static_cast<std::vector<std::string>*>(list)->emplace_back(name);
-    return 0;
-  };
-  if (H5Literate(opened.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect, &names) < 0) {
-    fail(group, "cannot be listed", "a whole HDF5 file");
-  }
-  return names;
-}
-
-Hdf5Handle Hdf5Reader::open_dataset(const std::string& name, bool as_text, int dimensions,
-                                    std::size_t& size) const {
-  Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
-  if (!set.valid()) fail(name, "no such dataset", "an HDF5 file that tpm wrote");
-  const Hdf5Handle type(H5Dget_type(set.get()), H5Tclose);
-  const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
-  const bool right = H5Tget_class(type.get()) == (as_text ? H5T_STRING : H5T_FLOAT) &&
-                     H5Sget_simple_extent_ndims(space.get()) == dimensions &&
-                     (!as_text || H5Tis_variable_str(type.get()) > 0);
-  if (!right) {
-    fail(name, "is of another type",
-         as_text           ? "a list of texts"
-         : dimensions == 1 ? "a list of floating-point numbers"
-                           : "a table of floating-point numbers");
-  }
-  size = static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.get()));
-  // A damaged extent must not become an allocation of that size.
-  if (size > fs::file_size(path_))
-    fail(name, "says it is larger than the file", "a whole HDF5 file");
-  return set;
+  return ask<std::vector<std::string>>(
+      Packer().put(Wish::members).put(std::string_view(group)).take());
 }
 
 std::vector<double> Hdf5Reader::numbers(const std::string& name) const {
-  return real_numbers(name, 1);
+  return ask<std::vector<double>>(Packer().put(Wish::numbers).put(std::string_view(name)).take());
 }
 
 std::vector<double> Hdf5Reader::table(const std::string& name) const {
-  return real_numbers(name, 2);
-}
-
-std::vector<double> Hdf5Reader::real_numbers(const std::string& name, int dimensions) const {
-  const QuietErrors quiet;
-  std::size_t size = 0;
-  const Hdf5Handle set = open_dataset(name, false, dimensions, size);
-  std::vector<double> values(size);
-  if (H5Dread(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
-    fail(name, "cannot be read", "a whole HDF5 file");
-  }
-  return values;
+  return ask<std::vector<double>>(Packer().put(Wish::table).put(std::string_view(name)).take());
 }
 
 std::vector<std::uint64_t> Hdf5Reader::extents(const std::string& name) const {
-  const QuietErrors quiet;
-  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
-  if (!set.valid()) fail(name, "no such dataset", "an HDF5 file that tpm wrote");
-  const Hdf5Handle type(H5Dget_type(set.get()), H5Tclose);
-  const H5T_class_t kind = H5Tget_class(type.get());
-  if (kind != H5T_FLOAT && kind != H5T_INTEGER) fail(name, "is of another type", "numbers");
-  const auto shape = shape_of({H5Dget_space(set.get()), H5Sclose});
-  return {shape.begin(), shape.end()};
+  return ask<std::vector<std::uint64_t>>(
+      Packer().put(Wish::extents).put(std::string_view(name)).take());
 }
 
 std::vector<double> Hdf5Reader::part(const std::string& name,
                                      const std::vector<std::uint64_t>& first,
                                      const std::vector<std::uint64_t>& counts) const {
-  const auto extents_now = extents(name);
-  bool inside = first.size() == extents_now.size() && counts.size() == extents_now.size();
-  std::uint64_t size = 1;
-  for (std::size_t d = 0; inside && d < counts.size(); ++d) {
-    inside = first[d] <= extents_now[d] && counts[d] <= extents_now[d] - first[d];
-    size *= counts[d];
-  }
-  if (!inside) fail(name, "is smaller than was asked for", "a whole HDF5 file");
-  if (size > fs::file_size(path_))
-    fail(name, "says it is larger than the file", "a whole HDF5 file");
-  const QuietErrors quiet;
-  const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
-  const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
-  const std::vector<hsize_t> start(first.begin(), first.end()), box(counts.begin(), counts.end());
-  H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, box.data(), nullptr);
-  const hsize_t count = size;
-  const Hdf5Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
-  std::vector<double> values(size);
-  if (H5Dread(set.get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, values.data()) <
-      0) {
-    fail(name, "cannot be read", "a whole HDF5 file");
-  }
-  return values;
+  return ask<std::vector<double>>(
+      Packer().put(Wish::part).put(std::string_view(name)).put(first).put(counts).take());
 }
 
 std::vector<std::string> Hdf5Reader::texts(const std::string& name) const {
-  const QuietErrors quiet;
-  std::size_t size = 0;
-  const Hdf5Handle set = open_dataset(name, true, 1, size);
-  const Hdf5Handle type = text_type();
-  const Hdf5Handle space(H5Dget_space(set.get()), H5Sclose);
-  BorrowedTexts borrowed(type, space, size);
-  if (H5Dread(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, borrowed.buffer()) < 0) {
-    fail(name, "cannot be read", "a whole HDF5 file");
-  }
-  return borrowed.copy();
+  return ask<std::vector<std::string>>(
+      Packer().put(Wish::texts).put(std::string_view(name)).take());
 }
 
 bool Hdf5Reader::has_attribute(const std::string& object, const std::string& name) const {
-  const QuietErrors quiet;
-  return H5Aexists_by_name(file_.get(), object.c_str(), name.c_str(), H5P_DEFAULT) > 0;
+  return ask<std::uint8_t>(Packer()
+                               .put(Wish::has_attribute)
+                               .put(std::string_view(object))
+                               .put(std::string_view(name))
+                               .take()) != 0;
 }
 
 std::string Hdf5Reader::attribute(const std::string& object, const std::string& name) const {
-  const QuietErrors quiet;
-  const Hdf5Handle opened(
-      H5Aopen_by_name(file_.get(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT),
-      H5Aclose);
-  if (!opened.valid()) {
-    fail(object, fmt::format("no attribute '{}'", name), "an HDF5 file that tpm wrote");
-  }
-  const Hdf5Handle stored(H5Aget_type(opened.get()), H5Tclose);
-  if (H5Tis_variable_str(stored.get()) <= 0) {
-    fail(object, fmt::format("attribute '{}' is of another type", name), "a text");
-  }
-  const Hdf5Handle type = text_type();
-  const Hdf5Handle space(H5Aget_space(opened.get()), H5Sclose);
-  // HDF5 writes as many texts as the file says into the room for one.
-  if (H5Sget_simple_extent_npoints(space.get()) != 1) {
-    fail(object, fmt::format("attribute '{}' is not a single text", name), "one text");
-  }
-  BorrowedTexts borrowed(type, space, 1);
-  if (H5Aread(opened.get(), type.get(), borrowed.buffer()) < 0) {
-    fail(object, fmt::format("attribute '{}' cannot be read", name), "a whole HDF5 file");
-  }
-  return borrowed.copy().front();
+  return ask<std::string>(Packer()
+                              .put(Wish::attribute)
+                              .put(std::string_view(object))
+                              .put(std::string_view(name))
+                              .take());
 }
 
 }  // namespace tpm

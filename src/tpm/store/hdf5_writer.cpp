@@ -10,7 +10,9 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/hdf5_driver.hpp"
 #include "tpm/store/hdf5_parts.hpp"
+#include "tpm/store/seal.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;
@@ -52,23 +54,30 @@ void Hdf5Handle::reset() noexcept {
 }
 
 Hdf5Writer::Hdf5Writer(fs::path path)
-    : path_(std::move(path)), temporary_(fmt::format("{}.part.{}", path_.string(), ::getpid())) {
-  require_replaceable(path_);
+    : path_(std::move(path)), storage_(std::make_unique<Hdf5Storage>()), place_(path_) {
   const QuietErrors quiet;
-  std::error_code ec;
-  if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), ec);
-  file_ = {H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose};
-  raw_ = ::open(temporary_.c_str(), O_WRONLY | O_CLOEXEC);
-  if (!file_.valid() || raw_ < 0) fail("cannot write");
+  storage_->descriptor = place_.descriptor();
+  file_ = create_hdf5(*storage_);
+  require_written(file_.valid(), "cannot write");
 }
 
 Hdf5Writer::~Hdf5Writer() {
-  if (raw_ >= 0) ::close(raw_);
-  if (committed_) return;
   const QuietErrors quiet;
   file_.reset();
-  std::error_code ec;
-  fs::remove(temporary_, ec);
+}
+
+void Hdf5Writer::reserve(std::uint64_t bytes) {
+  const int refused = ::posix_fallocate(place_.descriptor(), 0, static_cast<off_t>(bytes));
+  if (refused == 0) return;
+  throw Error(ExitCode::environment, path_.string(),
+              fmt::format("cannot write {} MB: {}", (bytes >> 20U) + 1, std::strerror(refused)),
+              "a folder that can be written and has room; what was computed is kept");
+}
+
+/// HDF5 was not told of what went wrong on the disk (hdf5_driver.hpp).
+void Hdf5Writer::require_written(bool done, const std::string& what) const {
+  if (storage_->error_number != 0) throw cannot_write(path_, storage_->error_number);
+  if (!done) fail(what);
 }
 
 void Hdf5Writer::fail(const std::string& what) const {
@@ -82,7 +91,7 @@ void Hdf5Writer::group(const std::string& name) {
   H5Pset_create_intermediate_group(links.get(), 1);
   const Hdf5Handle made(
       H5Gcreate2(file_.get(), name.c_str(), links.get(), H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-  if (!made.valid()) fail(fmt::format("cannot write group {}", name));
+  require_written(made.valid(), fmt::format("cannot write group {}", name));
 }
 
 Hdf5Handle Hdf5Writer::dataset(const std::string& name, hid_t type,
@@ -97,7 +106,7 @@ Hdf5Handle Hdf5Writer::dataset(const std::string& name, hid_t type,
   Hdf5Handle made(H5Dcreate2(file_.get(), name.c_str(), type, space.get(), links.get(),
                              creation.get(), H5P_DEFAULT),
                   H5Dclose);
-  if (!made.valid()) fail(fmt::format("cannot write dataset {}", name));
+  require_written(made.valid(), fmt::format("cannot write dataset {}", name));
   return made;
 }
 
@@ -107,9 +116,8 @@ void Hdf5Writer::write_whole(const std::string& name, Hdf5Handle::Id stored,
   const QuietErrors quiet;
   const Hdf5Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   const Hdf5Handle set = dataset(name, stored, extents, creation);
-  if (H5Dwrite(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
-    fail(fmt::format("cannot write dataset {}", name));
-  }
+  require_written(H5Dwrite(set.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0,
+                  fmt::format("cannot write dataset {}", name));
 }
 
 void Hdf5Writer::numbers(const std::string& name, const std::vector<double>& values) {
@@ -151,9 +159,8 @@ void Hdf5Writer::attach(const std::string& object, const std::string& name, hid_
   const Hdf5Handle made(H5Acreate_by_name(file_.get(), object.c_str(), name.c_str(), type,
                                           space.get(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
                         H5Aclose);
-  if (!made.valid() || H5Awrite(made.get(), type, values) < 0) {
-    fail(fmt::format("cannot write attribute {} of {}", name, object));
-  }
+  require_written(made.valid() && H5Awrite(made.get(), type, values) >= 0,
+                  fmt::format("cannot write attribute {} of {}", name, object));
 }
 
 void Hdf5Writer::attribute(const std::string& object, const std::string& name,
@@ -190,7 +197,7 @@ void Hdf5Writer::array(const std::string& name, Number kind,
   H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
   const Hdf5Handle made = dataset(name, stored_type(kind), extents, creation);
   const haddr_t place = H5Dget_offset(made.get());
-  if (place == HADDR_UNDEF) fail(fmt::format("cannot write dataset {}", name));
+  require_written(place != HADDR_UNDEF, fmt::format("cannot write dataset {}", name));
   places_[name] = place;
 }
 
@@ -199,9 +206,9 @@ void Hdf5Writer::write_part(const std::string& name, std::uint64_t place, std::s
   const char* bytes = static_cast<const char*>(values);
   place += places_.at(name);
   while (size > 0) {
-    const ssize_t n = ::pwrite(raw_, bytes, size, static_cast<off_t>(place));
+    const ssize_t n = ::pwrite(place_.descriptor(), bytes, size, static_cast<off_t>(place));
     if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) fail(fmt::format("cannot write dataset {}: {}", name, std::strerror(errno)));
+    if (n <= 0) throw cannot_write(path_, n < 0 ? errno : ENOSPC);
     bytes += n;
     place += static_cast<std::uint64_t>(n);
     size -= static_cast<std::size_t>(n);
@@ -231,9 +238,8 @@ void Hdf5Writer::part(const std::string& name, std::uint64_t first,
 void Hdf5Writer::dimension_scale(const std::string& name) {
   const QuietErrors quiet;
   const Hdf5Handle set(H5Dopen2(file_.get(), name.c_str(), H5P_DEFAULT), H5Dclose);
-  if (H5DSset_scale(set.get(), name.substr(name.rfind('/') + 1).c_str()) < 0) {
-    fail(fmt::format("cannot write the scale {}", name));
-  }
+  require_written(H5DSset_scale(set.get(), name.substr(name.rfind('/') + 1).c_str()) >= 0,
+                  fmt::format("cannot write the scale {}", name));
 }
 
 void Hdf5Writer::attach_scale(const std::string& array, unsigned dimension,
@@ -241,19 +247,21 @@ void Hdf5Writer::attach_scale(const std::string& array, unsigned dimension,
   const QuietErrors quiet;
   const Hdf5Handle set(H5Dopen2(file_.get(), array.c_str(), H5P_DEFAULT), H5Dclose);
   const Hdf5Handle along(H5Dopen2(file_.get(), scale.c_str(), H5P_DEFAULT), H5Dclose);
-  if (H5DSattach_scale(set.get(), along.get(), dimension) < 0) {
-    fail(fmt::format("cannot write the scales of {}", array));
-  }
+  require_written(H5DSattach_scale(set.get(), along.get(), dimension) >= 0,
+                  fmt::format("cannot write the scales of {}", array));
 }
 
 void Hdf5Writer::commit() {
   const QuietErrors quiet;
-  if (H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) < 0) fail("cannot write");
+  const bool flushed = H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0;
   file_.reset();
-  std::error_code ec;
-  fs::rename(temporary_, path_, ec);
-  if (ec) fail(fmt::format("cannot write: {}", ec.message()));
-  committed_ = true;
+  require_written(flushed, "cannot write");
+  const std::uint64_t size = storage_->begin_of_free;
+  if (::ftruncate(place_.descriptor(), static_cast<off_t>(size)) != 0 ||
+      !seal(place_.descriptor(), size)) {
+    throw cannot_write(path_, errno);
+  }
+  place_.put_in_place();
 }
 
 }  // namespace tpm

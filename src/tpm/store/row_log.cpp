@@ -11,6 +11,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/store/check_sum.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/replacement.hpp"
 
 namespace tpm {
 namespace {
@@ -51,6 +52,13 @@ class Cursor {
     at_ += size;
     return true;
   }
+  /// What is left is enough for the text that begins here.
+  [[nodiscard]] bool holds_text() const {
+    Cursor ahead = *this;
+    std::uint32_t size = 0;
+    return ahead.take(&size, sizeof size) &&
+           bytes_.size() - ahead.at_ >= std::size_t{size} + sizeof(std::uint32_t);
+  }
   bool take_text(std::string& text) {
     std::uint32_t size = 0, crc = 0;
     if (!take(&size, sizeof size) || bytes_.size() - at_ < size) return false;
@@ -64,40 +72,49 @@ class Cursor {
   std::size_t at_ = 0;
 };
 
-Error cannot_write(const std::filesystem::path& path, const char* what) {
+Error cannot_write_rows(const std::filesystem::path& path, const char* what) {
   return {ExitCode::environment, path.string(), fmt::format("{}: {}", what, std::strerror(errno))};
 }
 
 }  // namespace
 
 RowLogWriter::RowLogWriter(std::filesystem::path path, std::string_view header,
-                           std::size_t row_bytes)
+                           std::size_t row_bytes, Name name)
     : path_(std::move(path)), row_bytes_(row_bytes) {
-  std::error_code ignored;
-  if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), ignored);
-  const bool in_place = is_device_or_pipe(path_);
-  const std::string begun =
-      in_place ? path_.string() : fmt::format("{}.part.{}", path_.string(), ::getpid());
-  file_ = ::open(begun.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file_ < 0) throw cannot_write(path_, "cannot be written");
+  if (is_device_or_pipe(path_)) {
+    file_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  } else {
+    begun_ = std::make_unique<Replacement>(path_);
+    file_ = ::fcntl(begun_->descriptor(), F_DUPFD_CLOEXEC, 0);
+  }
+  if (file_ < 0) throw cannot_write_rows(path_, "cannot be written");
   kept_.reserve(2 * kBlock);
   put(kept_, kMagic.data(), kMagic.size());
   put_number(kept_, static_cast<std::uint32_t>(row_bytes));
   put_text(kept_, header);
   try {
     flush();
-    if (!in_place && ::rename(begun.c_str(), path_.c_str()) != 0) {
-      throw cannot_write(path_, "cannot be written");
-    }
+    if (name == Name::at_once) appear();
   } catch (...) {
-    (void)::close(file_);
-    if (!in_place) (void)::unlink(begun.c_str());
+    give_up();
     throw;
   }
 }
 
-RowLogWriter::~RowLogWriter() {
+void RowLogWriter::appear() {
+  if (begun_ == nullptr) return;
+  begun_->put_in_place();
+  begun_.reset();
+}
+
+void RowLogWriter::give_up() noexcept {
   if (file_ >= 0) (void)::close(file_);
+  file_ = -1;
+  begun_.reset();  // removes what never appeared
+}
+
+RowLogWriter::~RowLogWriter() {
+  give_up();
 }
 
 void RowLogWriter::append(const void* row) {
@@ -113,7 +130,7 @@ void RowLogWriter::flush() {
   while (done < kept_.size()) {
     const ssize_t written = ::write(file_, kept_.data() + done, kept_.size() - done);
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw cannot_write(path_, "cannot be written on");
+    if (written < 0) throw cannot_write_rows(path_, "cannot be written on");
     done += static_cast<std::size_t>(written);
   }
   kept_.clear();
@@ -124,14 +141,50 @@ void RowLogWriter::close(std::string_view closing) {
   put_text(kept_, closing);
   flush();
   if (::fsync(file_) != 0 && errno != EINVAL) {  // EINVAL: a device or pipe, without a disk
-    throw cannot_write(path_, "cannot be brought to the disk");
+    throw cannot_write_rows(path_, "cannot be brought to the disk");
   }
   (void)::close(file_);
   file_ = -1;
 }
 
+namespace {
+
+/// A row, or what stands in its place.
+enum class Found { row, closing, damage, end };
+
+Found read_slot(Cursor& cursor, RowLog& log, std::uint32_t expected, std::vector<std::byte>& row) {
+  std::uint32_t number = 0, crc = 0;
+  if (!cursor.take(&number, sizeof number)) return Found::end;
+  if (number == kClosing) {
+    const bool cut = !cursor.holds_text();
+    if (cursor.take_text(log.closing)) return Found::closing;
+    log.closing.clear();
+    if (!cut) ++log.damaged;
+    return Found::end;
+  }
+  if (!cursor.take(row.data(), row.size()) || !cursor.take(&crc, sizeof crc)) return Found::end;
+  const bool whole = number == expected && crc == crc_of(row.data(), row.size(), number);
+  return whole ? Found::row : Found::damage;
+}
+
+void read_rows(Cursor& cursor, RowLog& log) {
+  std::vector<std::byte> row(log.row_bytes);
+  for (std::uint32_t expected = 0;; ++expected) {
+    const Found found = read_slot(cursor, log, expected, row);
+    if (found == Found::damage) ++log.damaged;
+    if (found == Found::closing) log.closed = true;
+    if (found == Found::closing || found == Found::end) return;
+    if (found != Found::row) continue;
+    log.bytes.insert(log.bytes.end(), row.begin(), row.end());
+    ++log.rows;
+  }
+}
+
+}  // namespace
+
 RowLog read_row_log(const std::filesystem::path& path) {
-  const std::string bytes = read_file(path);
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 36U;  // a working day at 4 kHz
+  const std::string bytes = read_file(path, kMost);
   Cursor cursor(bytes);
   RowLog log;
   std::string magic(kMagic.size(), '\0');
@@ -144,21 +197,7 @@ RowLog read_row_log(const std::filesystem::path& path) {
   }
   log.row_bytes = row_bytes;
   log.bytes.reserve(bytes.size());
-  std::vector<std::byte> row(row_bytes);
-  std::uint32_t number = 0, crc = 0;
-  while (cursor.take(&number, sizeof number)) {
-    if (number == kClosing) {
-      log.closed = cursor.take_text(log.closing);
-      if (!log.closed) log.closing.clear();
-      break;
-    }
-    if (number != log.rows || !cursor.take(row.data(), row_bytes) ||
-        !cursor.take(&crc, sizeof crc) || crc != crc_of(row.data(), row_bytes, number)) {
-      break;
-    }
-    log.bytes.insert(log.bytes.end(), row.begin(), row.end());
-    ++log.rows;
-  }
+  read_rows(cursor, log);
   return log;
 }
 

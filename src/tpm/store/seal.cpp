@@ -1,6 +1,7 @@
 #include "tpm/store/seal.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
@@ -12,13 +13,10 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/check_sum.hpp"
 
 namespace tpm {
 namespace {
-
-namespace fs = std::filesystem;
 
 static_assert(std::endian::native == std::endian::little, "seals hold little-endian numbers");
 
@@ -31,46 +29,30 @@ struct Seal {
   std::uint32_t nothing;
 };
 
-/// A file that is open, for as long as this lives.
-class OpenFile {
- public:
-  OpenFile(const fs::path& file, int flags) : file_(::open(file.c_str(), flags | O_CLOEXEC)) {}
-  ~OpenFile() {
-    if (file_ >= 0) ::close(file_);
+/// False if there are fewer bytes.
+bool read_sealed(int file, void* to, std::uint64_t size, std::uint64_t from) {
+  auto* bytes = static_cast<char*>(to);
+  while (size > 0) {
+    const ssize_t n = ::pread(file, bytes, size, static_cast<off_t>(from));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    bytes += n;
+    from += static_cast<std::uint64_t>(n);
+    size -= static_cast<std::uint64_t>(n);
   }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  [[nodiscard]] int get() const { return file_; }
-
-  /// False if there are fewer bytes.
-  bool read(void* to, std::uint64_t size, std::uint64_t from) const {
-    auto* bytes = static_cast<char*>(to);
-    while (size > 0) {
-      const ssize_t n = ::pread(file_, bytes, size, static_cast<off_t>(from));
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) return false;
-      bytes += n;
-      from += static_cast<std::uint64_t>(n);
-      size -= static_cast<std::uint64_t>(n);
-    }
-    return true;
-  }
-
- private:
-  int file_;
-};
+  return true;
+}
 
 constexpr std::uint64_t kStretch = std::uint64_t{1} << 22U;
 
 /// Of a stretch of a file.
-std::optional<std::uint32_t> crc_of_stretch(const OpenFile& file, std::uint64_t from,
-                                            std::uint64_t to) {
+std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::uint64_t to) {
   constexpr std::uint64_t kAtOnce = std::uint64_t{1} << 17U;
   std::vector<char> bytes(static_cast<std::size_t>(std::min(to - from, kAtOnce)));
   std::uint32_t crc = 0;
   while (from < to) {
     const std::uint64_t part = std::min(to - from, kAtOnce);
-    if (!file.read(bytes.data(), part, from)) return std::nullopt;
+    if (!read_sealed(file, bytes.data(), part, from)) return std::nullopt;
     crc = check_sum(bytes.data(), static_cast<std::size_t>(part), crc);
     from += part;
   }
@@ -78,7 +60,7 @@ std::optional<std::uint32_t> crc_of_stretch(const OpenFile& file, std::uint64_t 
 }
 
 /// Of the first bytes of a file, by all threads; nothing if they cannot be read.
-std::optional<std::uint32_t> crc_of(const OpenFile& file, std::uint64_t size) {
+std::optional<std::uint32_t> crc_of(int file, std::uint64_t size) {
   std::vector<std::optional<std::uint32_t>> parts((size + kStretch - 1) / kStretch);
   const auto end_of = [&](std::size_t i) { return std::min(size, (i + 1) * kStretch); };
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
@@ -94,35 +76,32 @@ std::optional<std::uint32_t> crc_of(const OpenFile& file, std::uint64_t size) {
 
 }  // namespace
 
-void seal_file(const fs::path& file) {
-  std::error_code ec;
-  Seal seal{{}, fs::file_size(file, ec), 0, 0};
+bool seal(int descriptor, std::uint64_t size) {
+  Seal seal{{}, size, 0, 0};
   std::copy(kSealMagic.begin(), kSealMagic.end(), seal.magic);
-  const OpenFile opened(file, O_RDWR);
-  const auto crc = crc_of(opened, seal.size);
-  if (!ec && crc) {
-    seal.crc = *crc;
-    const auto end = static_cast<off_t>(seal.size);
-    if (::pwrite(opened.get(), &seal, sizeof seal, end) == sizeof seal &&
-        ::fsync(opened.get()) == 0) {
-      return;
-    }
+  const auto crc = crc_of(descriptor, size);
+  if (!crc) {
+    if (errno == 0) errno = EIO;
+    return false;
   }
-  throw Error(ExitCode::environment, file.string(), "cannot write its check sum",
-              "a folder that can be written and has room");
+  seal.crc = *crc;
+  const ssize_t n = ::pwrite(descriptor, &seal, sizeof seal, static_cast<off_t>(size));
+  if (n >= 0 && n != sizeof seal) errno = ENOSPC;
+  return n == sizeof seal && ::fsync(descriptor) == 0;
 }
 
-void require_whole(const fs::path& file) {
-  std::error_code ec;
-  const std::uint64_t size = fs::file_size(file, ec);
-  if (ec || size < sizeof(Seal)) return;
-  const OpenFile opened(file, O_RDONLY);
+SealState seal_of(int descriptor) {
+  struct stat found {};
+  if (::fstat(descriptor, &found) != 0) return SealState::none;
+  const auto size = static_cast<std::uint64_t>(found.st_size);
   Seal seal{};
-  if (!opened.read(&seal, sizeof seal, size - sizeof seal)) return;
-  if (!std::equal(kSealMagic.begin(), kSealMagic.end(), seal.magic)) return;
-  if (seal.size + sizeof seal == size && crc_of(opened, seal.size) == seal.crc) return;
-  throw bad_input(file.string(), "is damaged: its check sum is another",
-                  "the file as it was written");
+  if (size < sizeof seal || !read_sealed(descriptor, &seal, sizeof seal, size - sizeof seal) ||
+      !std::equal(kSealMagic.begin(), kSealMagic.end(), seal.magic)) {
+    return SealState::none;
+  }
+  const bool whole = seal.size + sizeof seal == size && seal.nothing == 0 &&
+                     crc_of(descriptor, seal.size) == seal.crc;
+  return whole ? SealState::whole : SealState::broken;
 }
 
 }  // namespace tpm

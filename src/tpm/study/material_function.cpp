@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tpm/core/error.hpp"
@@ -151,7 +152,7 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
     return candidate;
   }
   candidate.rms_over_peak = largest_residual_share(candidate.fit);
-  candidate.reason = not_identified(candidate);
+  candidate.reason = not_identified(candidate, {.hold_s = std::numeric_limits<double>::infinity()});
   candidate.identified = candidate.reason.empty();
   return candidate;
 }
@@ -218,7 +219,7 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
     const LawParameter& p = model.law_parameters()[i];
     config.fixed.push_back(p.preset.value_or(0.0));
     if (p.nuisance || p.preset) continue;
-    config.parameters.push_back({function_bounds(p, sizes, times, law.branches), {{i, {}}}});
+    config.parameters.push_back({function_bounds(p, sizes, times, law.branches), {{i, {}}}, {}});
     if (p.dimension == Dimension::time) ++times;
   }
   DataChoice data;

@@ -96,6 +96,11 @@ AutomaticBounds law_parameter_bounds(const LawParameter& p, const Sizes& sizes, 
     fit.lower = p.lower;
     fit.upper = p.upper;
     fit.start = 0.3;
+  } else if (p.name == "beta") {
+    fit.scale = Scale::linear;
+    fit.lower = p.lower;
+    fit.upper = p.upper;
+    fit.start = 0.1;
   } else if (p.name == "tension_share") {
     fit.scale = Scale::linear;
     fit.lower = 0.0;

@@ -32,11 +32,13 @@ double visible_value(const LawParameter& p, int branches, double order) {
   static const std::vector<std::vector<double>> times_s = {{}, {2.0}, {0.5, 5.0}, {0.3, 2.0, 12.0}};
   if (p.preset) return *p.preset;
   if (p.name == "alpha") return order;
+  if (p.name == "beta") return 0.25 * order;
   if (p.name == "exponent") return 2.2;
   if (p.name == "tension_share") return 0.5;
   if (p.dimension != Dimension::time) return kStiffness;
   if (branches == 0) return 2.0;
-  const auto place = static_cast<std::size_t>(p.name.back() - '1');
+  const auto place =
+      static_cast<std::size_t>(std::stoi(p.name.substr(p.name.find_first_of("0123456789"))) - 1);
   const auto count = static_cast<std::size_t>(branches);
   if (count < times_s.size()) return times_s[count][place];
   return 0.2 * std::pow(60.0, static_cast<double>(place) / (branches - 1));

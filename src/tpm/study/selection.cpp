@@ -42,6 +42,9 @@ Correlation correlation_of(const FitResult& fit) {
   return residual_correlation(views);
 }
 
+/// Fewer samples than these say nothing about a prediction.
+constexpr int kFewestPredicted = 5;
+
 double rms_over_peak(const FitResult& fit) {
   double worst = 0.0;
   for (const RecordingFit& r : fit.recordings) worst = std::max(worst, r.rms_residual / r.peak);
@@ -64,8 +67,9 @@ bool may_vanish(const LawSpec& law, const std::string& parameter) {
 
 }  // namespace
 
-std::string not_identified(const Candidate& candidate) {
+std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans) {
   constexpr double kLeastStandardErrors = 2.0;
+  double longest_s = 0.0;
   const auto table = law_parameters(candidate.fit.config.law.value());
   for (const ParameterResult& p : candidate.fit.parameters) {
     const LawParameter* law = material_parameter(table, p.parameter.name);
@@ -86,9 +90,18 @@ std::string not_identified(const Candidate& candidate) {
     if (from_zero && p.estimate < kLeastStandardErrors * *p.standard_error) {
       return fmt::format("{} is not told from 0", p.parameter.name);
     }
-    if (law->dimension == Dimension::time && *p.standard_error > p.estimate) {
+    if (law->dimension != Dimension::time) continue;
+    if (*p.standard_error > p.estimate) {
       return fmt::format("{} is known only to its order of magnitude", p.parameter.name);
     }
+    if (spans.samples_too_far_for(p.estimate)) {
+      return fmt::format("{} is sampled by fewer than {} points", p.parameter.name, kLeastSamples);
+    }
+    longest_s = std::max(longest_s, p.estimate);
+  }
+  if (!candidate.law.solid && spans.too_short_to_end(longest_s)) {
+    return fmt::format("a hold of {} s does not tell that nothing remains in the end",
+                       significant(spans.hold_s, 3));
   }
   return {};
 }
@@ -112,7 +125,7 @@ Candidate fit_candidate(const LawSpec& law, std::span<const PreparedRecording> r
     return candidate;
   }
   candidate.rms_over_peak = rms_over_peak(candidate.fit);
-  candidate.reason = not_identified(candidate);
+  candidate.reason = not_identified(candidate, protocol_spans(recordings));
   candidate.identified = candidate.reason.empty();
   return candidate;
 }
@@ -192,8 +205,9 @@ HeldOut predict_one(const Candidate& candidate, std::span<const PreparedRecordin
 }
 
 /// The second half of the hold, predicted from everything before.
-HeldOut predict_second_half(const Candidate& candidate, const PreparedRecording& recording,
-                            SetupOptions setup) {
+/// Nothing if it has too few samples to tell a prediction from another.
+std::optional<HeldOut> predict_second_half(const Candidate& candidate,
+                                           const PreparedRecording& recording, SetupOptions setup) {
   PreparedRecording early = recording;
   double hold_begin = recording.from_s;
   for (const Phase& phase : recording.phases.phases) {
@@ -217,9 +231,10 @@ HeldOut predict_second_half(const Candidate& candidate, const PreparedRecording&
     sum_fitted += std::pow(whole.predicted[i] - whole.observed[i], 2);
     ++count;
   }
-  held.rms = std::sqrt(sum / std::max(count, 1));
+  if (count < kFewestPredicted) return std::nullopt;
+  held.rms = std::sqrt(sum / count);
   held.rms_over_peak = held.rms / whole.peak;
-  held.rms_if_fitted = std::sqrt(sum_fitted / std::max(count, 1));
+  held.rms_if_fitted = std::sqrt(sum_fitted / count);
   return held;
 }
 
@@ -231,7 +246,8 @@ void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
   setup.reference = c.law.reference;
   try {
     if (recordings.size() == 1) {
-      c.held_out.push_back(predict_second_half(c, recordings.front(), setup));
+      const auto held = predict_second_half(c, recordings.front(), setup);
+      if (held) c.held_out.push_back(*held);
     } else {
       for (std::size_t i = 0; i < recordings.size(); ++i) {
         c.held_out.push_back(predict_one(c, recordings, i, setup));
@@ -294,7 +310,7 @@ void describe(Selection& s) {
     s.words.push_back(fmt::format(
         "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
         best.identified ? fmt::format("less than the margin of {}", significant(s.margin, 3))
-                        : best.reason));
+                        : "but is not identified: " + best.reason));
   }
   for (std::size_t i = 0; i < best.held_out.size() && best.held_out.size() > 1; ++i) {
     describe_prediction(s, i);
@@ -338,9 +354,16 @@ std::vector<LawSpec> fractional_family() {
 std::size_t least_within(const std::vector<Candidate>& candidates, double margin) {
   std::optional<std::size_t> chosen;
   for (const bool only_identified : {true, false}) {
+    const auto eligible = [&](const Candidate& c) {
+      return !c.failed && (c.identified || !only_identified);
+    };
+    double best = std::numeric_limits<double>::infinity();
+    for (const Candidate& c : candidates) {
+      if (eligible(c)) best = std::min(best, c.delta_bic);
+    }
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       const Candidate& c = candidates[i];
-      if (c.failed || c.delta_bic > margin || (only_identified && !c.identified)) continue;
+      if (!eligible(c) || c.delta_bic - best > margin) continue;
       if (!chosen || c.parameters < candidates[*chosen].parameters) chosen = i;
     }
     if (chosen) return *chosen;
@@ -371,7 +394,11 @@ void rank_candidates(Selection& s) {
 
 Selection select_law(std::span<const PreparedRecording> recordings,
                      const SelectionOptions& options) {
-  const std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
+  std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
+  if (!options.only_listed && !recordings.empty() &&
+      recordings.front().recording.drive_quantity == Quantity::relative_length) {
+    std::erase_if(laws, [](const LawSpec& law) { return law.kernel == Kernel::hertz; });
+  }
   const std::vector<DataSet> data = data_sets(recordings);
   Selection s;
   s.margin = options.margin;
@@ -403,12 +430,19 @@ Selection select_law(std::span<const PreparedRecording> recordings,
       predicting.advance();
     }
     judge_predictions(s, options.prediction_factor);
+    if (s.candidates.front().held_out.empty()) {
+      s.warnings.push_back(
+          fmt::format("nothing was held out: the second half of the hold has fewer than {} samples",
+                      kFewestPredicted));
+    }
   }
   Candidate& chosen = s.candidates[s.recommended];
   if (options.setup.profiles) {
     chosen.fit = run_fit(recording_config(chosen.law, recordings, options.setup), data);
   }
-  s.warnings = protocol_warnings(chosen.fit, recordings);
+  for (std::string& warning : protocol_warnings(chosen.fit, recordings)) {
+    s.warnings.push_back(std::move(warning));
+  }
   describe(s);
   return s;
 }

@@ -30,9 +30,10 @@ struct Candidate {
   double rms_over_peak = 0.0;
   double aicc = 0.0, bic = 0.0;              ///< with the effective number of readings
   double delta_aicc = 0.0, delta_bic = 0.0;  ///< above the best
-  bool identified =
-      true;  ///< no parameter at a bound, covariance of full rank, each stiffness
-             ///< more than two standard errors above 0 (k_inf beside branches may be 0)
+  /// No material parameter at a bound or dependent on a nuisance parameter at one, covariance of
+  /// full rank, each stiffness more than two standard errors above 0 (k_inf beside branches may be
+  /// 0), each relaxation time sampled by kLeastSamples; of a fluid, a hold that shows its end.
+  bool identified = true;
   std::vector<HeldOut> held_out;
 };
 
@@ -68,9 +69,9 @@ struct Selection {
 /// Where the lasting stiffness of a law of the family is not told from 0, the law without it
 /// (NAME-fluid) is fitted, too.
 ///
-/// Fits every law to the recordings together and recommends the least: of the laws whose BIC is
-/// within the margin of the best and whose parameters are identified (or, if none of them is, of
-/// all within the margin), the one with the fewest parameters. AICc and BIC count the effective
+/// Fits every law to the recordings together and recommends the least: of the laws whose parameters
+/// are identified (or, if none is, of all), the one with the fewest parameters whose BIC is within
+/// the margin of the best of these. AICc and BIC count the effective
 /// number of readings, because neighbouring residuals repeat each other; with n samples of n_eff
 /// effective ones, -2 ln L = n_eff ln(RSS/n).
 ///
@@ -88,9 +89,6 @@ struct Selection {
 /// @return place in candidates. Throws Error(numerical) if no law could be fitted.
 [[nodiscard]] std::size_t least_within(const std::vector<Candidate>& candidates, double margin);
 
-/// The first reason why a material parameter of a fit is not known; empty if all are.
-[[nodiscard]] std::string not_identified(const Candidate& candidate);
-
 /// True if the lasting stiffness k_inf is not told from 0.
 [[nodiscard]] bool plateau_is_not_told(const FitResult& fit);
 
@@ -102,6 +100,28 @@ void rank_candidates(Selection& s);
 /// the peak; the law does not describe it", and which of them it does not predict. Empty if there
 /// are none.
 [[nodiscard]] std::vector<std::string> outside_words(const FitResult& fit);
+
+/// Fewer samples over a relaxation time than these cannot support it.
+inline constexpr int kLeastSamples = 3;
+
+/// What the protocols of recordings can tell, at best.
+struct ProtocolSpans {
+  double ramp_s = 0.0;  ///< shortest; infinite without a ramp
+  double hold_s = 0.0;  ///< longest; 0 without a hold, infinite without a protocol
+  double step_s = 0.0;  ///< shortest mean distance of samples in a phase
+
+  [[nodiscard]] bool samples_too_far_for(double time_s) const {
+    return time_s < kLeastSamples * step_s;
+  }
+  /// The hold is shorter than three relaxation times: no plateau is seen, nor that there is none.
+  [[nodiscard]] bool too_short_to_end(double time_s) const { return time_s > hold_s / 3.0; }
+};
+
+/// Of the fitted parts.
+[[nodiscard]] ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings);
+
+/// The first reason why a material parameter of a fit is not known; empty if all are.
+[[nodiscard]] std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans);
 
 /// What the protocol of a recording cannot tell about a fitted law: relaxation times shorter than
 /// the ramp or the sampling, or longer than the hold.

@@ -59,11 +59,17 @@ std::vector<std::string> unit_warnings(std::span<const PreparedRecording> record
 
 std::vector<std::string> outside_words(const FitResult& fit) {
   constexpr double kDescribes = 3.0;  // times the residual inside the window
+  constexpr std::size_t kFewestOutside = 5;
   std::vector<std::string> words;
   for (const RecordingFit& r : fit.recordings) {
     const Outside o = outside_of(r);
     const std::string& name = fit.config.data[r.choice].dataset;
-    if (o.predicted > 0) {
+    if (o.predicted > 0 && o.predicted < kFewestOutside) {
+      words.push_back(fmt::format(
+          "{}: {} sample{} after the fitted part (from {} s): too few to say "
+          "how the law describes what follows",
+          name, o.predicted, o.predicted == 1 ? "" : "s", significant(o.last_fitted_s, 4)));
+    } else if (o.predicted > 0) {
       const double rms = std::sqrt(o.sum_of_squares / static_cast<double>(o.predicted));
       const bool describes = rms <= kDescribes * r.rms_residual;
       words.push_back(fmt::format(
@@ -84,24 +90,29 @@ std::vector<std::string> outside_words(const FitResult& fit) {
   return words;
 }
 
-std::vector<std::string> protocol_warnings(const FitResult& fit,
-                                           std::span<const PreparedRecording> recordings) {
-  std::vector<std::string> warnings = unit_warnings(recordings);
-  double ramp_s = std::numeric_limits<double>::infinity();
-  double hold_s = 0.0;
-  double step_s = std::numeric_limits<double>::infinity();
+ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  ProtocolSpans spans{kInfinity, 0.0, kInfinity};
   for (const PreparedRecording& r : recordings) {
     const std::vector<double>& time = r.recording.time_s;
     for (const Phase& phase : r.phases.phases) {
       const double length = time[phase.last] - time[phase.first];
       if (time[phase.first] >= r.to_s) break;
-      if (phase.kind == PhaseKind::loading) ramp_s = std::min(ramp_s, length);
-      if (phase.kind == PhaseKind::hold) hold_s = std::max(hold_s, length);
+      if (phase.kind == PhaseKind::loading) spans.ramp_s = std::min(spans.ramp_s, length);
+      if (phase.kind == PhaseKind::hold) spans.hold_s = std::max(spans.hold_s, length);
       if (phase.last > phase.first) {
-        step_s = std::min(step_s, length / static_cast<double>(phase.last - phase.first));
+        spans.step_s =
+            std::min(spans.step_s, length / static_cast<double>(phase.last - phase.first));
       }
     }
   }
+  return spans;
+}
+
+std::vector<std::string> protocol_warnings(const FitResult& fit,
+                                           std::span<const PreparedRecording> recordings) {
+  std::vector<std::string> warnings = unit_warnings(recordings);
+  const auto [ramp_s, hold_s, step_s] = protocol_spans(recordings);
   if (hold_s == 0.0) {
     warnings.emplace_back("there is no hold: relaxation is seen only through the ramp");
   }
@@ -120,10 +131,11 @@ std::vector<std::string> protocol_warnings(const FitResult& fit,
           p.parameter.name, in_unit(p.parameter, p.estimate), significant(hold_s, 3),
           significant(3.0 * p.estimate, 2)));
     }
-    if (p.estimate < 3.0 * step_s) {
+    if (p.estimate < kLeastSamples * step_s) {
       warnings.push_back(fmt::format(
-          "{} = {} is sampled by fewer than 3 points ({} s apart): sampling cannot support it",
-          p.parameter.name, in_unit(p.parameter, p.estimate), significant(step_s, 3)));
+          "{} = {} is sampled by fewer than {} points ({} s apart): sampling cannot support it",
+          p.parameter.name, in_unit(p.parameter, p.estimate), kLeastSamples,
+          significant(step_s, 3)));
     }
   }
   return warnings;

@@ -14,6 +14,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/store/check_sum.hpp"
+#include "tpm/store/file_roles.hpp"
 
 namespace tpm {
 namespace {
@@ -150,7 +151,9 @@ BlockLog::BlockLog(BlockLog&& other) noexcept
       place_(std::move(other.place_)) {}
 
 void BlockLog::open(int flags) {
-  file_ = ::open(path_.c_str(), flags | O_CLOEXEC, 0666);
+  if ((flags & O_CREAT) != 0) require_not_read(path_);
+  file_ = ::open(path_.c_str(), flags | O_CLOEXEC | O_NONBLOCK, 0666);
+  if (file_ >= 0 && (flags & O_CREAT) == 0) note_reading(path_, file_);
   struct stat found {};
   if (file_ < 0 || ::fstat(file_, &found) != 0) {
     if ((flags & O_CREAT) != 0) throw cannot_write_log(path_);

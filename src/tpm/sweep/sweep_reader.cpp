@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "tpm/core/error.hpp"
-#include "tpm/store/seal.hpp"
 
 namespace tpm {
 namespace {
@@ -24,15 +23,9 @@ std::string names_in(const List& list) {
   return names;
 }
 
-/// A damaged file is found before HDF5 reads it.
-Hdf5Reader opened_whole(const std::filesystem::path& file) {
-  require_whole(file);
-  return Hdf5Reader(file);
-}
-
 }  // namespace
 
-SweepReader::SweepReader(const std::filesystem::path& file) : file_(opened_whole(file)) {
+SweepReader::SweepReader(const std::filesystem::path& file) : file_(file) {
   if (!file_.has_attribute("/", "sweep_fingerprint")) {
     throw bad_input(file.string(), "holds no sweep", "a file that tpm sweep has written");
   }

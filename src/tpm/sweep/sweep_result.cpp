@@ -1,15 +1,11 @@
 #include "tpm/sweep/sweep_result.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <tbb/parallel_pipeline.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <map>
 
@@ -18,7 +14,6 @@
 #include "tpm/store/delimited.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
-#include "tpm/store/seal.hpp"
 #include "tpm/sweep/workers.hpp"
 
 namespace tpm {
@@ -75,14 +70,21 @@ std::vector<std::string> names_of(const List& list) {
   return names;
 }
 
+/// Bytes of a result, with some to spare for names.
+std::uint64_t room_for(const Sweep& sweep) {
+  constexpr std::uint64_t kForNames = std::uint64_t{1} << 20U;
+  const std::uint64_t cell = 1 + 1 + 4 + 8 + 8 * (sweep.model->counted().size() + sweep.width());
+  std::uint64_t bytes = cell * sweep.cells() + kForNames;
+  for (const SweepAxis& axis : sweep.axes) bytes += 8 * axis.size;
+  for (const SweptParameter& p : sweep.parameters) bytes += 8 * sweep.axes[p.axis].size;
+  return bytes;
+}
+
 /// Writes the datasets of a sweep.
 class ResultWriter {
  public:
-  ResultWriter(const Sweep& sweep, fs::path file)
-      : sweep_(sweep),
-        file_(std::move(file)),
-        unsealed_(file_.string() + ".unsealed"),
-        out_(unsealed_) {
+  ResultWriter(const Sweep& sweep, const fs::path& file) : sweep_(sweep), out_(file) {
+    out_.reserve(room_for(sweep));
     for (const SweepAxis& axis : sweep.axes) shape_.push_back(axis.size);
     out_.attribute("/", "title", sweep.title);
     out_.attribute("/", "description", sweep.description);
@@ -148,7 +150,6 @@ class ResultWriter {
     out_.texts("/reason_text", reasons_.texts());
     out_.dimension_scale("/reason_text");
     out_.commit();
-    put_in_place();
     tally_.reasons.assign(reasons_.texts().begin() + 1, reasons_.texts().end());
     return tally_;
   }
@@ -220,49 +221,12 @@ class ResultWriter {
     }
   }
 
-  /// The result has its name when it is whole.
-  void put_in_place() const {
-    std::error_code ec;
-    try {
-      seal_file(unsealed_);
-    } catch (const Error&) {
-      fs::remove(unsealed_, ec);
-      throw;
-    }
-    fs::rename(unsealed_, file_, ec);
-    if (!ec) return;
-    throw Error(ExitCode::environment, file_.string(),
-                fmt::format("cannot write: {}", ec.message()), "a folder that can be written");
-  }
-
   const Sweep& sweep_;
-  fs::path file_, unsealed_;
   Hdf5Writer out_;
   std::vector<std::uint64_t> shape_;
   ReasonTable reasons_;
   CellTally tally_;
 };
-
-/// HDF5 does not survive a disk that gets full under it: the room is asked for before.
-void require_room(const Sweep& sweep, const fs::path& file) {
-  require_replaceable(file);
-  constexpr std::uint64_t kForNames = std::uint64_t{1} << 20U;
-  const std::uint64_t cell = 1 + 1 + 4 + 8 + 8 * (sweep.model->counted().size() + sweep.width());
-  std::uint64_t bytes = cell * sweep.cells() + kForNames;
-  for (const SweepAxis& axis : sweep.axes) bytes += 8 * axis.size;
-  for (const SweptParameter& p : sweep.parameters) bytes += 8 * sweep.axes[p.axis].size;
-  const std::string trial = fmt::format("{}.part.{}", file.string(), ::getpid());
-  const int opened = ::open(trial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  const int refused = opened < 0 ? errno : ::posix_fallocate(opened, 0, static_cast<off_t>(bytes));
-  if (opened >= 0) {
-    ::close(opened);
-    ::unlink(trial.c_str());
-  }
-  if (refused == 0) return;
-  throw Error(ExitCode::environment, file.string(),
-              fmt::format("cannot write {} MB: {}", (bytes >> 20U) + 1, std::strerror(refused)),
-              "a folder that can be written and has room; what was computed is kept");
-}
 
 void write_csv_head(const Sweep& sweep, std::string& text) {
   for (const SweptParameter& p : sweep.parameters) {
@@ -315,7 +279,6 @@ void write_csv_row(const Sweep& sweep, const CellBlock& block, std::size_t cell,
 
 CellTally write_sweep(const Sweep& sweep, const std::vector<const BlockLog*>& logs,
                       const fs::path& file, int workers) {
-  require_room(sweep, file);
   ResultWriter writer(sweep, file);
   FirstFault fault;
   std::uint64_t next = 0;
@@ -371,7 +334,6 @@ std::string fingerprint_of(const fs::path& file) {
   std::error_code ec;
   if (!fs::is_regular_file(file, ec)) return {};
   try {
-    require_whole(file);
     const Hdf5Reader reader(file);
     if (!reader.has_attribute("/", "sweep_fingerprint")) return {};
     return reader.attribute("/", "sweep_fingerprint");

@@ -1,0 +1,29 @@
+#pragma once
+#include <Eigen/Core>
+#include <span>
+
+#include "tpm/law/law.hpp"
+
+namespace tpm {
+
+/// A number and its derivatives by all parameters of a law.
+struct SlopedNumber {
+  double value = 0.0;
+  Eigen::VectorXd by;
+};
+
+/// G(t) of a law, N/m (or Pa): the response at t > 0 to a unit step of V(u), without tension.
+/// The contour sum of laplace_contour.hpp over the law's operational stiffness; the error is some
+/// 1e-13 of |s L[G](s)| at s = 1/t. (relaxation_stiffness has the closed forms, without slopes.)
+/// @param values all of law_parameters(spec)
+/// Throws Error(bad_input) for values out of range, or a time that is not above 0 and finite.
+[[nodiscard]] SlopedNumber law_relaxation(const LawSpec& spec, std::span<const double> values,
+                                          double t_s);
+
+/// The creep compliance J(t), m/N (or 1/Pa): V(u) at t > 0 under a unit load from t = 0 on, without
+/// tension. The integral of J(t - s) dG(s) from 0 to t is 1. Computed as law_relaxation.
+/// Throws Error(bad_input) also for a law without any stiffness.
+[[nodiscard]] SlopedNumber law_creep(const LawSpec& spec, std::span<const double> values,
+                                     double t_s);
+
+}  // namespace tpm

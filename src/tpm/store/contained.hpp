@@ -1,0 +1,55 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+
+/// What a contained process may use.
+struct ContainedLimits {
+  std::uint64_t memory_bytes = std::uint64_t{256} << 20U;  ///< beyond that of the parent
+  std::uint64_t answer_bytes = std::uint64_t{1} << 20U;    ///< of one answer
+  double cpu_s = 5.0;                                      ///< at the first answer
+  double cpu_s_per_megabyte = 0.1;                         ///< more for what it answers
+};
+
+/// A child process that answers requests about one open file, for code that cannot be trusted with
+/// the file (HDF5 crashes, loops and takes gigabytes on crafted bytes). What the child does wrong
+/// ends the child and becomes an Error in the parent.
+///
+/// The child is a copy of this process that keeps nothing open but the file and the way to its
+/// parent. It cannot open or write files, and it has its limits of memory and processor time. It
+/// ends with its parent.
+class Contained {
+ public:
+  /// Answers a request with bytes; runs in the child. An Error that it throws is thrown in the
+  /// parent by ask(). Must not use threads.
+  using Answer = std::function<std::string(std::string_view request)>;
+  /// Makes the Answer, in the child. `descriptor` is the file.
+  using Start = std::function<Answer(int descriptor)>;
+
+  /// @param where of the errors
+  /// Throws Error(environment) if no process can be started.
+  Contained(std::string where, int descriptor, const ContainedLimits& limits, const Start& start);
+  ~Contained();
+  Contained(const Contained&) = delete;
+  Contained& operator=(const Contained&) = delete;
+
+  /// Throws the Error of the Answer, or Error(bad_input) that says how the child ended, also on
+  /// every later call.
+  [[nodiscard]] std::string ask(std::string_view request);
+
+ private:
+  [[noreturn]] void report_end();
+
+  std::string where_;
+  std::uint64_t most_bytes_;
+  int socket_ = -1;
+  int child_ = -1;
+  std::string end_;  ///< how the child ended; empty: it lives
+};
+
+}  // namespace tpm
