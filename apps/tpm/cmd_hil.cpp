@@ -23,6 +23,7 @@ struct RunChoice {
   DeviceOptions device;
   std::string time;
   std::string output = "session.tpmrec";
+  SessionChanges changes;
   bool force = false, accept_unstable = false;
   PageOptions page;
 };
@@ -114,8 +115,9 @@ int run_hil(const RunChoice& choice, const Session& session) {
     throw Error(ExitCode::usage, "-o " + choice.output, "the file exists",
                 "another --output, or --force");
   }
-  const HilSession hil = read_session(choice.session);
-  const DeviceChoice device = chosen_device(choice.device);
+  const HilSession hil = read_session(choice.session, choice.changes);
+  DeviceChoice device = chosen_device(choice.device);
+  if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";
   SessionRunOptions options;
   options.real_time = choice.time.empty() ? device.kind == "omega7" : choice.time == "real";
   options.wish = chosen_wish(choice.device);
@@ -217,6 +219,11 @@ void add_hil_command(CLI::App& app, Session& session) {
                   "default: real with omega7, else virtual")
       ->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
+  run->add_option("--law", choice->changes.law,
+                  "Feel this law instead of the session's tissue (tpm fit writes law.json)");
+  run->add_option("--replay-motion", choice->changes.motion,
+                  "Go through the motion of this recording of a depth instead of the session's "
+                  "phases; with --device omega7 the operator is asked to");
   run->add_flag("--force", choice->force, "Replace a recording that exists");
   run->add_flag("--accept-unstable", choice->accept_unstable,
                 "Run what would be unstable, on the virtual device only");
@@ -229,7 +236,10 @@ void add_hil_command(CLI::App& app, Session& session) {
                   "Keep a page that is open for so long after the end")
       ->capture_default_str();
   add_format_option(*run, session);
-  run->footer("Example:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec");
+  run->footer(
+      "Examples:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec\n"
+      "  tpm fit recording.csv -o fitted && tpm hil run configs/hil_omega7.json --law "
+      "fitted/law.json");
   run->callback([choice, &session] {
     session.run = [choice, &session] { return run_hil(*choice, session); };
   });

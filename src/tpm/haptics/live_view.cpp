@@ -85,6 +85,8 @@ std::string instruction_of(const SessionPhase& phase) {
       return "Stay clear of the tissue and let it recover";
     case SessionPhaseKind::load:
       return fmt::format("Raise your push to {} N", significant(phase.to, 4));
+    case SessionPhaseKind::motion:
+      return "Follow the depth that is shown: the motion of a recording";
     case SessionPhaseKind::creep:
       break;
   }

@@ -58,7 +58,11 @@ Json to_json(const DeviceIdentity& device) {
 Json recording_header(const HilSession& session, const DeviceIdentity& device,
                       const LoopModel& model, bool real_time, const Json& rendering) {
   Json said = parse_json(session.text, "session");
-  said["model"]["scene"] = session.scene;
+  if (session.law) {
+    said["model"]["law"] = to_json(*session.law);
+  } else {
+    said["model"]["scene"] = session.scene;
+  }
   Json surface = Json::array();
   for (const SessionPhase& phase : session.phases) surface.push_back(phase.surface_m);
   return {{"format", kFormat},

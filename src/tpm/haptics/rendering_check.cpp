@@ -7,22 +7,12 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/device/device_limits.hpp"
-#include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/haptics/rendering_border.hpp"
 
 namespace tpm {
 namespace {
 
 constexpr double kAtLoads_m = 0.010;
-
-double deepest_asked_m(const HilSession& session) {
-  double deepest = 0.0;
-  for (const SessionPhase& phase : session.phases) {
-    deepest = std::max(deepest, phase.depth_m);
-    if (phase.kind == SessionPhaseKind::load) deepest = std::max(deepest, kAtLoads_m);
-  }
-  return deepest;
-}
 
 /// Stiffness along the push within one period at a depth, 0 where the model does not trust itself.
 double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth_m) {
@@ -46,7 +36,7 @@ void find_stiffness(RenderingCheck& check, const HilSession& session, ContactMod
   const double relaxed = push.dot(model.relaxed_stiffness() * push);
   check.stiffness_N_per_m = at_rest;
   check.relaxed_share = at_rest > 0.0 ? std::clamp(relaxed / at_rest, 0.0, 1.0) : 1.0;
-  const double deepest = deepest_asked_m(session);
+  const double deepest = deepest_asked_m(session, kAtLoads_m);
   for (int i = 1; i <= kDepths; ++i) {
     const double depth = deepest * i / kDepths;
     const double tangent = tangent_at(model, push, depth);
@@ -132,14 +122,17 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
   check.passive_friction_N_s_per_m = check.stiffness_N_per_m * late_s;
   check.passive_N_per_m = check.friction_N_s_per_m / late_s;
 
-  const double tau_s = parse_tissue(session.scene, kScenePlace, {}).material.relaxation_time_s();
-  check.recovery_s = tau_s / std::max(check.relaxed_share, 1e-3);
+  check.recovery_s = loop.relaxation_times_s.empty()
+                         ? 0.0
+                         : loop.relaxation_times_s.back() / std::max(check.relaxed_share, 1e-3);
   PlantSettings plant = session.plant;
   plant.damping_N_s_per_m = check.friction_N_s_per_m;
   // A spring that never relaxes may be worse than one that does.
   constexpr double kNever_s = 1e6;
   check.stable_N_per_m = 1e300;
-  for (const double relaxation_s : {tau_s, kNever_s}) {
+  std::vector<double> times_s = loop.relaxation_times_s;
+  times_s.push_back(kNever_s);
+  for (const double relaxation_s : times_s) {
     const RenderedContact contact = contact_of(check, relaxation_s);
     check.spectral_radius = std::max(check.spectral_radius, loop_spectral_radius(contact, plant));
     check.stable_N_per_m = std::min(check.stable_N_per_m,

@@ -126,8 +126,9 @@ double furthest_of(const HilSession& session, const Eigen::Vector3d& surface_m) 
   for (const SessionPhase& phase : session.phases) {
     const bool pushes =
         phase.kind == SessionPhaseKind::load || phase.kind == SessionPhaseKind::creep;
-    const std::pair<double, double> depths =
-        pushes ? std::pair(0.0, kUnderLoads_m) : std::pair(phase.from, phase.to);
+    std::pair<double, double> depths(phase.from, phase.to);
+    if (pushes) depths = {0.0, kUnderLoads_m};
+    if (phase.kind == SessionPhaseKind::motion) depths = {0.0, phase.depth_m};
     for (const double depth : {depths.first, depths.second}) {
       for (const double across : {phase.across_from_m, phase.across_to_m}) {
         const Eigen::Vector3d at = surface_m + depth * session.servo.push + across * session.slide;
@@ -184,7 +185,37 @@ LoopModelKind parse_model(const std::string& kind) {
   if (kind == "network_beside") return LoopModelKind::network_beside;
   if (kind == "surface") return LoopModelKind::surface;
   if (kind == "condensed") return LoopModelKind::condensed;
+  if (kind == "law") return LoopModelKind::law;
   return LoopModelKind::planned;
+}
+
+/// The scene, or the law, from the block or from a file that it names.
+void parse_tissue_of(HilSession& session, const Json& model, const DocumentPlace& place,
+                     const std::filesystem::path& folder) {
+  const bool by_law = session.model == LoopModelKind::law;
+  const char* key = by_law ? "law" : "scene";
+  const char* other = by_law ? "scene" : "law";
+  const DocumentPlace at = place.key(key);
+  if (model.contains(other)) {
+    throw bad_input(place.key(other).where,
+                    fmt::format("is not for the kind '{}'", model.value("kind", "planned")),
+                    fmt::format("'{}'", key));
+  }
+  if (!model.contains(key)) {
+    throw bad_input(place.where, fmt::format("no key '{}'", key),
+                    by_law ? "a law, or a file with one (tpm fit writes law.json)"
+                           : "a scene, or a file with one");
+  }
+  const Json& tissue = model.at(key);
+  const std::filesystem::path file =
+      tissue.is_string() ? folder / tissue.get<std::string>() : std::filesystem::path();
+  const std::string where = tissue.is_string() ? file.string() : at.where;
+  if (by_law) {
+    session.law = law_from_json(tissue.is_string() ? read_json(file) : tissue, where);
+  } else {
+    session.scene = with_mesh_listed(tissue.is_string() ? read_json(file) : tissue, where,
+                                     tissue.is_string() ? file.parent_path() : folder);
+  }
 }
 
 std::string parse_tolerance(const Json& model, LoopModelKind kind, const DocumentPlace& place) {
@@ -231,9 +262,20 @@ std::string_view word_of(SessionPhaseKind kind) {
     case SessionPhaseKind::load:
       return "load";
     case SessionPhaseKind::creep:
+      return "creep";
+    case SessionPhaseKind::motion:
       break;
   }
-  return "creep";
+  return "motion";
+}
+
+double deepest_asked_m(const HilSession& session, double under_loads_m) {
+  double deepest = 0.0;
+  for (const SessionPhase& phase : session.phases) {
+    deepest = std::max(deepest, phase.depth_m);
+    if (phase.kind == SessionPhaseKind::load) deepest = std::max(deepest, under_loads_m);
+  }
+  return deepest;
 }
 
 OperatorScript HilSession::operator_script() const {
@@ -271,17 +313,18 @@ HilSession parse_session(const Json& json, std::string_view where,
   session.model = parse_model(json.at("model").value("kind", std::string("planned")));
   session.tolerance = parse_tolerance(json.at("model"), session.model, place.key("model"));
   parse_tool(session, json.at("model"), place.key("model"));
-  session.text = to_text(json);
-  const Json& scene = json.at("model").at("scene");
-  if (scene.is_string()) {
-    const std::filesystem::path file = folder / scene.get<std::string>();
-    session.scene = with_mesh_listed(read_json(file), file.string(), file.parent_path());
-  } else {
-    session.scene = with_mesh_listed(scene, place.key("model").key("scene").where, folder);
-  }
+  parse_tissue_of(session, json.at("model"), place.key("model"), folder);
   constexpr double kSlowest_Hz = 500.0, kUsual_Hz = 1000.0, kFastest_Hz = 4000.0;
   session.servo.period_s = 1.0 / in_range(json, "rate", Dimension::frequency, kUsual_Hz,
                                           kSlowest_Hz, kFastest_Hz, place);
+  Json with_motion = json;
+  if (session.law) {
+    embed_motion(with_motion, *session.law, session.servo.period_s, folder, place);
+  } else if (json.contains("motion")) {
+    throw bad_input(place.key("motion").where, "is for the model 'law' only",
+                    "\"model\": {\"kind\": \"law\", ...}: the law knows where contact began");
+  }
+  session.text = to_text(with_motion);
   session.servo.push = push_of(json, place);
   if (json.contains("slides")) {
     const DocumentPlace slides = place.key("slides");
@@ -301,7 +344,10 @@ HilSession parse_session(const Json& json, std::string_view where,
   }
   parse_limits(session, json.value("limits", Json::object()), device, place.key("limits"));
   parse_start(session.servo, json, device, place);
-  session.phases = parse_phases(json, place);
+  session.phases = parse_phases(with_motion, place);
+  if (with_motion.contains("motion")) {
+    session.measured_N = with_motion.at("motion").value("measured_N", std::vector<double>());
+  }
   if (session.servo.surface_before_hand_m) {
     session.phases.front().from = -*session.servo.surface_before_hand_m;
   }
@@ -316,8 +362,21 @@ HilSession parse_session(const Json& json, std::string_view where,
   return session;
 }
 
-HilSession read_session(const std::filesystem::path& file) {
-  HilSession session = parse_session(read_json(file), file.string(), file.parent_path());
+HilSession read_session(const std::filesystem::path& file, const SessionChanges& changes) {
+  Json json = read_json(file);
+  check_schema(json, "hil", file.string());
+  if (!changes.law.empty()) {
+    json["model"] = {{"kind", "law"}, {"law", to_json(read_law(changes.law))}};
+  }
+  if (!changes.motion.empty()) {
+    if (json.at("model").value("kind", "") != "law") {
+      throw Error(ExitCode::usage, "--replay-motion", "the session feels no law",
+                  "--law FILE beside it: the law knows the depth at which contact began");
+    }
+    for (const char* key : {"indentations", "slides", "creep"}) json.erase(key);
+    json["motion"] = {{"recording", changes.motion.string()}};
+  }
+  HilSession session = parse_session(json, file.string(), file.parent_path());
   follow_surface(session);
   return session;
 }

@@ -11,6 +11,7 @@
 
 #include "tpm/device/haptic_device.hpp"
 #include "tpm/device/virtual_plant.hpp"
+#include "tpm/law/law_file.hpp"
 #include "tpm/reduce/contact_model.hpp"
 #include "tpm/servo/servo_step.hpp"
 #include "tpm/store/json.hpp"
@@ -18,7 +19,17 @@
 namespace tpm {
 
 /// A stretch of a session.
-enum class SessionPhaseKind { approach, indent, hold, slide, release, rest, load, creep };
+enum class SessionPhaseKind {
+  approach,
+  indent,
+  hold,
+  slide,
+  release,
+  rest,
+  load,
+  creep,
+  motion  ///< that of a recording, repeated
+};
 
 [[nodiscard]] std::string_view word_of(SessionPhaseKind kind);
 
@@ -43,6 +54,7 @@ enum class LoopModelKind {
   network,         ///< the whole network, every period
   network_beside,  ///< the whole network at a lower rate beside the loop
   surface,         ///< the whole network under a ball that moves over it, every period
+  law,             ///< one contact that answers by a law of the family, no organ
   planned,         ///< the cheapest of those that a plan finds accurate enough
 };
 
@@ -54,8 +66,11 @@ struct HilSession {
   double contact_stiffness_N_per_m = 1e4;            ///< the same, of ball and sphere
   Eigen::Vector3d slide = Eigen::Vector3d::UnitX();  ///< unit vector, square to the push, device
   std::string tolerance = "1%";  ///< of a planned model, as set_tolerance() takes it
-  Json scene;                    ///< of the tissue; needs no file
+  Json scene;                    ///< of the tissue; needs no file. Null with a law
+  std::optional<LawFile> law;    ///< of the model `law`
   std::vector<SessionPhase> phases;
+  /// Forces of the recording whose motion the last phase is, evenly spaced over it; may be empty.
+  std::vector<double> measured_N;
   ServoSettings servo;
   DevicePreparation preparation;
   PlantSettings plant;
@@ -66,12 +81,22 @@ struct HilSession {
   [[nodiscard]] double duration_s() const { return phases.back().end_s; }
 };
 
+/// The deepest place that the phases ask for, m; under a load the depth that is taken for it.
+[[nodiscard]] double deepest_asked_m(const HilSession& session, double under_loads_m);
+
 /// Reads a session (schemas/hil.schema.json). Throws Error(bad_input) with the key.
 /// @param folder that paths in the session are relative to
 [[nodiscard]] HilSession parse_session(const Json& json, std::string_view where,
                                        const std::filesystem::path& folder);
+/// What a run puts in place of parts of its session.
+struct SessionChanges {
+  std::filesystem::path law;     ///< the model is this law, whatever the file says
+  std::filesystem::path motion;  ///< the phases are the motion of this recording of a depth
+};
 /// The same of a file, slides following the surface (follow_surface).
-[[nodiscard]] HilSession read_session(const std::filesystem::path& file);
+/// Throws Error(bad_input) for a motion without a law: the depth that it counts from is the law's.
+[[nodiscard]] HilSession read_session(const std::filesystem::path& file,
+                                      const SessionChanges& changes = {});
 
 /// The tissue of a session as it is drawn, in the coordinates of its scene.
 struct TissueShape {
@@ -100,7 +125,8 @@ struct LoopModel {
   std::string name;                                 ///< for people
   std::string error_bound;         ///< what is known of its distance from the reference, in words
   Json plan;                       ///< null, or what a plan was asked for, considered and picked
-  double stiffness_N_per_m = 0.0;  ///< at once, at rest, along the push
+  double stiffness_N_per_m = 0.0;  ///< at once, at rest, along the push; of a law at its deepest
+  std::vector<double> relaxation_times_s;  ///< shortest and longest; empty: nothing relaxes
   TissueShape shape;
 };
 

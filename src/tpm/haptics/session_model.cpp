@@ -3,6 +3,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/element_contact.hpp"
+#include "tpm/haptics/law_contact.hpp"
 #include "tpm/haptics/network_beside.hpp"
 #include "tpm/haptics/planned_model.hpp"
 #include "tpm/haptics/pushed_scene.hpp"
@@ -77,6 +78,34 @@ LoopModel network_beside_model(const HilSession& session, bool threads) {
   return loop;
 }
 
+/// A contact by itself: there is no organ to draw but the place that is pushed.
+LoopModel law_model(const HilSession& session) {
+  constexpr double kDrawnRadius_m = 5e-3;
+  const LawFile& law = session.law.value();
+  const double trusted = trusted_depth_m(law, deepest_asked_m(session, law.spec.reference));
+  const double deepest = deepest_asked_m(session, trusted);
+  if (deepest > trusted) {
+    throw bad_input("session",
+                    fmt::format("goes to a depth of {} mm, the law was fitted to {} mm",
+                                significant(1e3 * deepest, 4),
+                                significant(1e3 * law.fitted_to.value_or(0.0), 4)),
+                    fmt::format("{} mm at most", significant(1e3 * trusted, 4)));
+  }
+  auto contact =
+      std::make_unique<LawContact>(law, LawContactSettings{.period_s = session.servo.period_s,
+                                                           .longest_s = session.duration_s(),
+                                                           .deepest_m = deepest,
+                                                           .trusted_m = trusted});
+  LoopModel loop;
+  loop.name = fmt::format("law {}: {}", law_name(law.spec), law_words(law.spec));
+  loop.error_bound = "each branch exact for a kernel that is linear within a period";
+  loop.relaxation_times_s = contact->relaxation_times_s();
+  loop.model = std::move(contact);
+  loop.shape.rest_m = Eigen::Matrix3Xd::Zero(3, 1);
+  loop.shape.radius_m = kDrawnRadius_m;
+  return loop;
+}
+
 LoopModel model_of(const HilSession& session, bool threads, const PlanningTold& told) {
   switch (session.model) {
     case LoopModelKind::element:
@@ -89,6 +118,8 @@ LoopModel model_of(const HilSession& session, bool threads, const PlanningTold& 
       return surface_model(session);
     case LoopModelKind::planned:
       return planned_model(session, told);
+    case LoopModelKind::law:
+      return law_model(session);
     case LoopModelKind::condensed:
       break;
   }
@@ -99,6 +130,10 @@ LoopModel model_of(const HilSession& session, bool threads, const PlanningTold& 
 
 LoopModel make_loop_model(const HilSession& session, bool threads, const PlanningTold& told) {
   LoopModel loop = model_of(session, threads, told);
+  if (!session.law) {
+    loop.relaxation_times_s = {
+        parse_tissue(session.scene, kScenePlace, {}).material.relaxation_time_s()};
+  }
   loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
   return loop;
 }

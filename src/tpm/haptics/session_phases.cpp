@@ -2,8 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/curve/recording_file.hpp"
+#include "tpm/protocol/protocol.hpp"
 
 namespace tpm {
 namespace {
@@ -26,6 +31,8 @@ class PhaseList {
     phases_.push_back({kind, std::move(name), time_s_, from, to, depth_m, rate_m_per_s,
                        across_from_m, across_to_m});
   }
+  /// The last phase goes through these depths, evenly spaced in time.
+  void follow(std::vector<double> depths_m) { phases_.back().surface_m = std::move(depths_m); }
   double depth_m = 0.0, rate_m_per_s = 0.0;
   [[nodiscard]] std::vector<SessionPhase> take() { return std::move(phases_); }
   [[nodiscard]] double time_s() const { return time_s_; }
@@ -118,7 +125,82 @@ void add_creep(PhaseList& list, const Json& block, const DocumentPlace& place) {
   }
 }
 
+/// The block as embed_motion() leaves it.
+void add_motion(PhaseList& list, const Json& block, const DocumentPlace& place) {
+  if (!block.contains("depths_m")) {
+    throw bad_input(place.where, "no key 'depths_m'", "a motion, or a recording of one");
+  }
+  const auto depths = block.at("depths_m").get<std::vector<double>>();
+  const double length_s =
+      block.at("spacing_s").get<double>() * static_cast<double>(depths.size() - 1);
+  constexpr double kUsualRate_m_per_s = 1e-3;
+  const double first = depths.front();
+  list.add(SessionPhaseKind::approach, "approach", kApproach_s, -kClearance_m,
+           std::min(first, 0.0));
+  list.depth_m = std::max(0.0, *std::max_element(depths.begin(), depths.end()));
+  list.rate_m_per_s = kUsualRate_m_per_s;
+  if (first > 0.0) {  // the recording begins in contact, and the fit took that as relaxed
+    const std::string mm = significant(1e3 * first, 4);
+    list.add(SessionPhaseKind::indent, fmt::format("indent to {} mm, where the motion begins", mm),
+             first / kUsualRate_m_per_s, 0.0, first);
+    list.add(SessionPhaseKind::hold, fmt::format("hold {} mm until relaxed", mm),
+             block.value("relax_s", 0.0), first, first);
+  }
+  list.add(SessionPhaseKind::motion, block.at("name").get<std::string>(), length_s, 0.0, 0.0);
+  list.follow(depths);
+  list.depth_m = list.rate_m_per_s = 0.0;
+}
+
+/// The longest relaxation time among the parameters of a law, s; 0 if it has none.
+double longest_time_s(const LawFile& law) {
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  double longest = 0.0;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].dimension == Dimension::time) longest = std::max(longest, law.values[i]);
+  }
+  return longest;
+}
+
+/// 0 if the law has no such parameter.
+double parameter_of(const LawFile& law, std::string_view name) {
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].name == name) return law.values[i];
+  }
+  return 0.0;
+}
+
 }  // namespace
+
+void embed_motion(Json& session, const LawFile& law, double period_s,
+                  const std::filesystem::path& folder, const DocumentPlace& place) {
+  if (!session.contains("motion") || !session.at("motion").contains("recording")) return;
+  constexpr double kMostSamples = 20000.0, kRelaxed = 10.0, kLongestWait_s = 600.0;
+  const double contact_m = parameter_of(law, "contact"), offset_N = parameter_of(law, "offset");
+  const std::filesystem::path file =
+      folder / session.at("motion").at("recording").get<std::string>();
+  const Recording recording = read_recording_file(file, {}).recording;
+  if (recording.drive_quantity != Quantity::indentation_depth) {
+    throw bad_input(place.key("motion").where,
+                    fmt::format("a recording of a {}", quantity_name(recording.drive_quantity)),
+                    "one of an indentation depth");
+  }
+  const Protocol path = measured_history(Drive::displacement, recording.time_s, recording.drive);
+  const double length_s = path.end_s() - path.start_s();
+  const double parts = std::max(1.0, std::ceil(std::min(length_s / period_s, kMostSamples)));
+  const Protocol forces = measured_history(Drive::force, recording.time_s, recording.response);
+  Json depths = Json::array(), measured = Json::array();
+  for (double i = 0.0; i <= parts; ++i) {
+    const double time_s = path.start_s() + i / parts * length_s;
+    depths.push_back(value_at(path, time_s) - contact_m);
+    measured.push_back(value_at(forces, time_s) - offset_N);
+  }
+  session["motion"] = {{"name", file.filename().string()},
+                       {"relax_s", std::min(kRelaxed * longest_time_s(law), kLongestWait_s)},
+                       {"spacing_s", length_s / parts},
+                       {"depths_m", std::move(depths)},
+                       {"measured_N", std::move(measured)}};
+}
 
 std::vector<SessionPhase> parse_phases(const Json& session, const DocumentPlace& place) {
   PhaseList list;
@@ -127,8 +209,9 @@ std::vector<SessionPhase> parse_phases(const Json& session, const DocumentPlace&
   }
   if (session.contains("slides")) add_slides(list, session.at("slides"), place.key("slides"));
   if (session.contains("creep")) add_creep(list, session.at("creep"), place.key("creep"));
+  if (session.contains("motion")) add_motion(list, session.at("motion"), place.key("motion"));
   if (list.time_s() == 0.0) {
-    throw bad_input(place.where, "nothing is done in it", "indentations, slides or creep");
+    throw bad_input(place.where, "nothing is done in it", "indentations, slides, creep or motion");
   }
   if (list.time_s() > kLongest_s) {
     throw bad_input(place.where, fmt::format("takes {} s", significant(list.time_s(), 4)),

@@ -4,7 +4,14 @@
 
 namespace tpm {
 
-/// The phases that the blocks `indentations`, `slides` and `creep` lead to. Throws
+/// Puts the motion itself in place of the name of a recording in the block `motion`: depths from
+/// the law's contact point on, evenly spaced in time, linear between the samples of the recording;
+/// and for how long the first depth has to be held until the law has relaxed under it.
+/// @param folder that the name is relative to
+void embed_motion(Json& session, const LawFile& law, double period_s,
+                  const std::filesystem::path& folder, const DocumentPlace& place);
+
+/// The phases that the blocks `indentations`, `slides`, `creep` and `motion` lead to. Throws
 /// Error(bad_input).
 [[nodiscard]] std::vector<SessionPhase> parse_phases(const Json& session,
                                                      const DocumentPlace& place);

@@ -23,6 +23,17 @@ Eigen::Matrix3Xd motion_of(const HilRecording& recording) {
   return motion;
 }
 
+/// Where a session with the motion of a recording asks the tool to be, every period.
+Eigen::Matrix3Xd asked_motion(const HilSession& session) {
+  OperatorScript script = session.operator_script();
+  Eigen::Matrix3Xd motion(3, static_cast<Eigen::Index>(session.servo.phase_ends.back()));
+  for (Eigen::Index i = 0; i < motion.cols(); ++i) {
+    const double depth_m = script.at(static_cast<double>(i) * session.servo.period_s).value;
+    motion.col(i) = session.servo.surface_m + depth_m * session.servo.push;
+  }
+  return motion;
+}
+
 ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
                       const LoopModel& model, const std::shared_ptr<ContactModel>& stepped,
                       const RenderingCheck& rendering, bool guided,
@@ -80,6 +91,9 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
   if (choice.kind != "replay") {
     throw Error(ExitCode::usage, "--device", "'" + printable(choice.kind) + "'",
                 "virtual, omega7 or replay");
+  }
+  if (choice.replay.empty() && session.phases.back().kind == SessionPhaseKind::motion) {
+    return std::make_shared<ReplayDevice>(asked_motion(session), session.phases.back().name);
   }
   if (choice.replay.empty()) {
     throw Error(ExitCode::usage, "--device replay", "has nothing to replay",

@@ -88,6 +88,9 @@ struct Verification {
 /// compared; the reference's error is estimated with every second of them. CVODE is asked there as
 /// well (ball_forces_by_cvode).
 ///
+/// One contact that answers by a law is compared with the law itself, asked along every sample of
+/// the motion (LawModel), and with another quadrature of it (law_forces_by_gauss).
+///
 /// Where the reference has no equilibrium the instant is left out, and it goes on with the next one
 /// that it has one for, on a straight line. Throws Error(bad_input) for an empty recording, or
 /// fewer than four instants to compare in space, Error(numerical) if less than half of the instants

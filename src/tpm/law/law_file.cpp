@@ -16,6 +16,10 @@ const char* reference_key(const LawSpec& spec) {
   return spec.drive == Quantity::relative_length ? "reference" : "reference_m";
 }
 
+const char* fitted_to_key(const LawSpec& spec) {
+  return spec.drive == Quantity::relative_length ? "fitted_to" : "fitted_to_m";
+}
+
 LawSpec spec_of(const Json& json, std::string_view where) {
   LawSpec spec = parse_law_name(json.at("law").get<std::string>(), where);
   spec.drive = parse_quantity_name(json.at("drive").get<std::string>(), where);
@@ -80,6 +84,9 @@ LawFile law_from_json(const Json& json, std::string_view where) {
   }
   law.provenance = parse_provenance(json.at("provenance").get<std::string>(), where);
   law.note = json.value("note", "");
+  if (const char* key = fitted_to_key(law.spec); json.contains(key)) {
+    law.fitted_to = json.at(key).get<double>();
+  }
   return law;
 }
 
@@ -95,6 +102,7 @@ Json to_json(const LawFile& law) {
   }
   json["parameters"] = std::move(values);
   json["provenance"] = provenance_name(law.provenance);
+  if (law.fitted_to) json[fitted_to_key(law.spec)] = *law.fitted_to;
   if (!law.note.empty()) json["note"] = law.note;
   return json;
 }

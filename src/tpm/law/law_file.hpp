@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,8 @@ struct LawFile {
   std::vector<double> values;  ///< in the order of law_parameters(spec), SI
   Provenance provenance = Provenance::assumed;
   std::string note;
+  /// Largest depth (or relative length less the slack) of the data that it was fitted to, > 0.
+  std::optional<double> fitted_to = std::nullopt;
 };
 
 /// The key of a parameter in files: name and SI unit, "k_inf_N_per_m", "tau1_s", "alpha".

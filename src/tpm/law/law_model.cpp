@@ -405,6 +405,10 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values,
   return prepared;
 }
 
+LawAtParameters LawModel::at(std::span<const double> values, const FractionalMemory* rates) const {
+  return prepare(values, rates).law;
+}
+
 Response LawModel::respond(const Protocol& protocol, std::span<const double> times_s,
                            std::span<const double> parameters, Want want) const {
   require_times_within(protocol, times_s);

@@ -9,6 +9,7 @@
 namespace tpm {
 
 class FractionalMemory;
+struct LawAtParameters;
 
 /// A law of the family, behind the interface that tables, fits and plans ask.
 ///
@@ -49,6 +50,10 @@ class LawModel final : public Model {
   /// Throws Error(bad_input) naming the first parameter out of its range, or if their number is
   /// wrong.
   void require_in_range(std::span<const double> values) const;
+  /// The law at given parameters, branches in parallel form, as time steppers use it.
+  /// @param rates of a fractional law, else unused
+  [[nodiscard]] LawAtParameters at(std::span<const double> values,
+                                   const FractionalMemory* rates) const;
   [[nodiscard]] bool linear_in(std::size_t parameter) const override;
   [[nodiscard]] std::pair<double, double> range(std::size_t parameter) const override;
 

@@ -20,7 +20,8 @@ namespace tpm {
 /// Deviances in which the starts ended, sorted.
 [[nodiscard]] Figure waterfall_figure(const FitResult& fit);
 
-/// The fitted law without what belongs to the recording, for law files (tpm spectrum, tpm export).
+/// The fitted law for law files, with contact point and offset if it was fitted to one recording;
+/// of several each has its own, and they are left out.
 [[nodiscard]] LawFile fitted_law(const FitResult& fit);
 
 /// The configuration with its data sets as a file in the folder finds them.

@@ -219,7 +219,8 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
     const LawParameter& p = model.law_parameters()[i];
     config.fixed.push_back(p.preset.value_or(0.0));
     if (p.nuisance || p.preset) continue;
-    config.parameters.push_back({function_bounds(p, sizes, times, law.branches), {{i, {}}}, {}});
+    config.parameters.push_back(
+        {function_bounds(p, sizes, times, law.branches), {{i, {}}}, false, {}});
     if (p.dimension == Dimension::time) ++times;
   }
   DataChoice data;

@@ -1,0 +1,66 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "tpm/law/contact_history.hpp"
+#include "tpm/law/law_file.hpp"
+#include "tpm/reduce/contact_model.hpp"
+
+namespace tpm {
+
+/// How a law is stepped in a loop.
+struct LawContactSettings {
+  double period_s = 1e-3;
+  double longest_s = 60.0;  ///< of a session: the window of a fractional law
+  double deepest_m = 4e-3;  ///< of a session, > 0: where the stiffness is told
+  double trusted_m = 5e-3;  ///< beyond this depth forces are not trusted
+};
+
+/// One contact that answers by a law of the family (docs/laws.md),
+///
+///     F = constant V + sum_j k_j y_j + dashpot dV/dt + k_tension T(u),  dy_j/dt = dV/dt - r_j y_j,
+///
+/// the exact update of each branch for V linear within a period. Contact depth and offset of the
+/// recording are not rendered: the tissue begins at the surface, and a sensor's zero error is no
+/// force. Fractional laws are sums of exponentials with a stated error, taken over the session.
+///
+/// Where a Hertz contact shrinks this is the integral over the whole history, not Ting's solution,
+/// which leaves out what the edge of the contact has left behind.
+///
+/// Passive in continuous time for stiffnesses >= 0 whatever the kernel (Fenchel-Young: with P the
+/// integral of W and P* its Legendre transform, S = k_inf P(u) + sum k_i [P(u) + P*(W_i) - u W_i]
+/// rises by no more than the work). Coordinates: the push is along +z; across it there is no force.
+class LawContact final : public ContactModel {
+ public:
+  /// Throws Error(bad_input) for a law that is not of a force over a depth, or settings out of
+  /// range.
+  LawContact(const LawFile& law, const LawContactSettings& settings);
+
+  void reset() noexcept override;
+  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  [[nodiscard]] double period_s() const noexcept override { return settings_.period_s; }
+  /// Of the session's deepest place, what relaxes within a period included: kernels that stiffen
+  /// have less above it.
+  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
+  /// At the same depth.
+  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override;
+  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
+  void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
+
+  /// Shortest and longest relaxation time of what relaxes, s; empty if nothing does.
+  [[nodiscard]] std::vector<double> relaxation_times_s() const;
+
+ private:
+  [[nodiscard]] Eigen::Matrix3d along_push(double stiffness_N_per_m) const noexcept;
+
+  LawContactSettings settings_;
+  LawAtParameters law_;
+  Eigen::VectorXd decay_, gain_;  ///< of y_j over a period: exp(-z), (1 - exp(-z))/z
+  Eigen::VectorXd y_;
+  double depth_m_ = 0.0, kernel_m_ = 0.0;  ///< u and V(u) a period ago
+};
+
+/// The depth up to which a law is trusted: somewhat beyond what it was fitted to; without that,
+/// beyond the deepest place asked for.
+[[nodiscard]] double trusted_depth_m(const LawFile& law, double deepest_m);
+
+}  // namespace tpm
