@@ -324,6 +324,8 @@ bool ServoStep::storm(int missed) noexcept {
   const char late = missed > 0 ? 1 : 0;
   late_now_ += late - slot;
   slot = late;
+  counts_.most_late = std::max(counts_.most_late, late_now_);
+  counts_.most_missed_at_once = std::max(counts_.most_missed_at_once, missed);
   return late_now_ > settings_.most_late || missed > settings_.most_missed;
 }
 
