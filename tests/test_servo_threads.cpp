@@ -339,6 +339,10 @@ TEST_CASE("The jitter check says no where a session with the same limits would h
   judge(check);
   CHECK_THAT(check.verdict,
              Catch::Contains("101 cycles of 1000 were late, a session stops after 100"));
+  o.counts.most_late = 100;
+  o.counts.missed = 900;
+  judge(check);
+  CHECK_THAT(check.verdict, Catch::Contains("2.25 % of the periods were missed"));
   check.outcome = ServoOutcome{};
   o.cause = StopCause::finished;
   o.cycles = 1000;
