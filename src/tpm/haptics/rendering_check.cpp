@@ -132,7 +132,8 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
   check.passive_friction_N_s_per_m = check.stiffness_N_per_m * late_s;
   check.passive_N_per_m = check.friction_N_s_per_m / late_s;
 
-  const double tau_s = parse_tissue(session.scene, kScenePlace, {}).material.relaxation_time_s();
+  const double tau_s =
+      parse_tissue(session.scene, session.scene_place, {}).material.relaxation_time_s();
   check.recovery_s = tau_s / std::max(check.relaxed_share, 1e-3);
   PlantSettings plant = session.plant;
   plant.damping_N_s_per_m = check.friction_N_s_per_m;

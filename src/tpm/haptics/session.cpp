@@ -275,9 +275,11 @@ HilSession parse_session(const Json& json, std::string_view where,
   const Json& scene = json.at("model").at("scene");
   if (scene.is_string()) {
     const std::filesystem::path file = folder / scene.get<std::string>();
-    session.scene = with_mesh_listed(read_json(file), file.string(), file.parent_path());
+    session.scene_place = file.string();
+    session.scene = with_mesh_listed(read_json(file), session.scene_place, file.parent_path());
   } else {
-    session.scene = with_mesh_listed(scene, place.key("model").key("scene").where, folder);
+    session.scene_place = place.key("model").key("scene").where;
+    session.scene = with_mesh_listed(scene, session.scene_place, folder);
   }
   constexpr double kSlowest_Hz = 500.0, kUsual_Hz = 1000.0, kFastest_Hz = 4000.0;
   session.servo.period_s = 1.0 / in_range(json, "rate", Dimension::frequency, kUsual_Hz,

@@ -55,6 +55,7 @@ struct HilSession {
   Eigen::Vector3d slide = Eigen::Vector3d::UnitX();  ///< unit vector, square to the push, device
   std::string tolerance = "1%";  ///< of a planned model, as set_tolerance() takes it
   Json scene;                    ///< of the tissue; needs no file
+  std::string scene_place;       ///< where the scene stands, for messages: "FILE: key /model/scene"
   std::vector<SessionPhase> phases;
   ServoSettings servo;
   DevicePreparation preparation;
