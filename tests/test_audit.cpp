@@ -104,6 +104,22 @@ TEST_CASE("formulas: names, definitions, the dynamic scope and the model library
   CHECK_THROWS_WITH(e.evaluate("1, 2", {}, "here"), Contains("more than one value"));
 }
 
+TEST_CASE(
+    "formulas: a chain of definitions that name two earlier ones each is computed link by link") {
+  constexpr int kLinks = 40;  // one by one; without the values of earlier ones 2^40
+  Evaluator e;
+  e.define_expression("a0", "1", "here");
+  e.define_expression("b0", "1", "here");
+  for (int i = 1; i <= kLinks; ++i) {
+    const std::string before = std::to_string(i - 1), number = std::to_string(i);
+    e.define_expression("a" + number, "(a" + before + " + b" + before + ") / 2", "here");
+    e.define_expression("b" + number, "(b" + before + " + 3 * a" + before + ") / 4", "here");
+  }
+  const std::string last = "a" + std::to_string(kLinks);
+  CHECK(e.evaluate(last, {}, "here") == 1.0);
+  CHECK(e.inputs(last, {}, "here").empty());
+}
+
 TEST_CASE("item 1: the stated viscosity relaxes in 0.2 ms") {
   CHECK(finding(paper(), "relaxation-after-1s").verdict == AuditVerdict::contradicted);
   CHECK_THAT(finding(paper(), "relaxation-after-1s").consequence, Contains("0.2083 ms"));

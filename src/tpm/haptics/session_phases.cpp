@@ -216,7 +216,8 @@ std::vector<SessionPhase> parse_phases(const Json& session, const DocumentPlace&
     throw bad_input(place.where, "nothing is done in it", "indentations, slides, creep or motion");
   }
   if (list.time_s() > kLongest_s) {
-    throw bad_input(place.where, fmt::format("takes {} s", significant(list.time_s(), 4)),
+    throw bad_input(place.where + ": keys /indentations, /slides and /creep",
+                    fmt::format("the session takes {} s", significant(list.time_s(), 4)),
                     "12 hours at most");
   }
   return list.take();
