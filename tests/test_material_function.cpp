@@ -107,6 +107,25 @@ TEST_CASE("A creep compliance is fitted from its file alone") {
   CHECK_THAT(estimate(fit, "tau1"), WithinRel(T * k / (k0 + k), 1e-5));
 }
 
+TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spring-pot") {
+  constexpr double kSize = 500.0, kOrder = 0.3;
+  const test::TempFolder folder;
+  std::string text = "time [s],G(t) [Pa]\n";
+  for (const double t : decades_of(0.01, 100.0, 41)) {
+    text += fmt::format("{:.17g},{:.17g}\n", t,
+                        kSize * std::pow(t, -kOrder) / std::tgamma(1.0 - kOrder));
+  }
+  write_file(folder / "g.csv", text);
+  const Selection s = select_law(read(folder / "g.csv"), quick());
+  CHECK(law_name(chosen(s).config.law.value()) == "linear-fspringpot");
+  CHECK_THAT(estimate(chosen(s), "k1"), WithinRel(kSize, 1e-6));
+  CHECK_THAT(estimate(chosen(s), "alpha"), WithinRel(kOrder, 1e-6));
+  for (const Candidate& c : s.candidates) {
+    INFO(law_name(c.law) << ": " << c.reason);
+    CHECK_FALSE(c.failed);
+  }
+}
+
 TEST_CASE("A spectrum is fitted from magnitude and phase over an angular frequency") {
   const test::TempFolder folder;
   std::string text = "omega [1/s],|G*| [Pa],delta [deg]\n";

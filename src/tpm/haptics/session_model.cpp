@@ -133,7 +133,7 @@ LoopModel make_loop_model(const HilSession& session, bool threads, const Plannin
   LoopModel loop = model_of(session, threads, told);
   if (!session.law) {
     loop.relaxation_times_s = {
-        parse_tissue(session.scene, kScenePlace, {}).material.relaxation_time_s()};
+        parse_tissue(session.scene, session.scene_place, {}).material.relaxation_time_s()};
   }
   loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
   return loop;
