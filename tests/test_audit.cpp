@@ -1,4 +1,6 @@
 // The audit: what it finds in the paper, and that findings follow from the printed strings.
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 
 #include "tpm/core/error.hpp"
@@ -111,9 +113,8 @@ TEST_CASE(
   e.define_expression("a0", "1", "here");
   e.define_expression("b0", "1", "here");
   for (int i = 1; i <= kLinks; ++i) {
-    const std::string before = std::to_string(i - 1), number = std::to_string(i);
-    e.define_expression("a" + number, "(a" + before + " + b" + before + ") / 2", "here");
-    e.define_expression("b" + number, "(b" + before + " + 3 * a" + before + ") / 4", "here");
+    e.define_expression(fmt::format("a{}", i), fmt::format("(a{0} + b{0}) / 2", i - 1), "here");
+    e.define_expression(fmt::format("b{}", i), fmt::format("(b{0} + 3 * a{0}) / 4", i - 1), "here");
   }
   const std::string last = "a" + std::to_string(kLinks);
   CHECK(e.evaluate(last, {}, "here") == 1.0);

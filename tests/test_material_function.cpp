@@ -27,6 +27,7 @@ double modulus(double t) {
 
 std::vector<double> decades_of(double from, double to, int points) {
   std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(points));
   for (int i = 0; i < points; ++i) {
     values.push_back(from * std::pow(to / from, static_cast<double>(i) / (points - 1)));
   }

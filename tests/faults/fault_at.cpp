@@ -6,11 +6,13 @@
 //                      any call that changes a file; a write counts twice there, before it and
 //                      half-way
 //   TPM_FAULT_AT       which call fails, from 1; 0 only counts
-//   TPM_FAULT_HOW      ENOSPC, EIO, EMFILE, EINTR, ENOMEM, EAGAIN; short: half of a write; kill:
-//   SIGKILL TPM_FAULT_ONWARD   set: all later calls fail too TPM_FAULT_UNDER    only files in this
-//   folder count TPM_FAULT_PROGRAM  only a program whose file name begins so is touched
-//   TPM_FAULT_MARK     file for what became of it: "fired ..." when a call failed, "calls N" at the
-//   end
+//   TPM_FAULT_HOW      ENOSPC, EIO, EMFILE, EINTR, ENOMEM, EAGAIN; short: half of a write;
+//                      kill: SIGKILL
+//   TPM_FAULT_ONWARD   set: all later calls fail too
+//   TPM_FAULT_UNDER    only files in this folder count
+//   TPM_FAULT_PROGRAM  only a program whose file name begins so is touched
+//   TPM_FAULT_MARK     file for what became of it: "fired ..." when a call failed, "calls N" at
+//                      the end
 //
 // Calls are counted from main() on, in all threads together. Files are reached by system calls, so
 // that nothing here needs memory or another library to be ready.
@@ -35,12 +37,14 @@
 #include <cstdint>
 #include <utility>
 
+// NOLINTBEGIN(bugprone-reserved-identifier): the C library's own
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
 void* __libc_realloc(void* block, std::size_t size);
 void* __libc_memalign(std::size_t alignment, std::size_t size);
 }
+// NOLINTEND(bugprone-reserved-identifier)
 
 namespace {
 
@@ -75,7 +79,7 @@ std::atomic<long> calls{0};
 
 void keep_text(char* to, const char* name) {
   const char* text = getenv(name);
-  if (text != nullptr && strlen(text) < PATH_MAX) strcpy(to, text);
+  if (text != nullptr && strlen(text) < PATH_MAX) memcpy(to, text, strlen(text) + 1);
 }
 
 void write_mark(const char* text) {
@@ -160,8 +164,11 @@ bool fails(const char* name, const char* path) {
   if (number == fault.at) {
     char line[PATH_MAX + 80] = "";
     // No formatting of stdio: it may want memory.
-    strcat(strcat(strcat(strcat(line, "fired "), name), " "), path);
-    write_mark(strcat(line, "\n"));
+    std::size_t size = 0;
+    for (const char* part : {"fired ", name, " ", path, "\n"}) {
+      for (; *part != '\0' && size + 2 < sizeof line; ++part) line[size++] = *part;
+    }
+    write_mark(line);
   }
   if (fault.kill) {
     (void)syscall(SYS_kill, getpid(), SIGKILL);
@@ -277,6 +284,7 @@ __attribute__((destructor)) void end_counting() {
 
 }  // namespace
 
+// NOLINTBEGIN(bugprone-reserved-identifier): names of the C library, taken over
 extern "C" {
 
 int __libc_start_main(Main main, int count, char** arguments, void (*init)(), void (*fini)(),
@@ -495,3 +503,4 @@ int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*
 }
 
 }  // extern "C"
+// NOLINTEND(bugprone-reserved-identifier)
