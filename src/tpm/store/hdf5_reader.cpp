@@ -214,7 +214,7 @@ bool Hdf5Reader::sealed() const noexcept {
 }
 
 template <class Result>
-Result Hdf5Reader::ask(std::string request) const {
+Result Hdf5Reader::ask(const std::string& request) const {
   const std::string reply = child_->ask(request);
   Result result{};
   Unpacker(reply, path_.native()).take(result);
