@@ -1,4 +1,6 @@
 // The audit: what it finds in the paper, and that findings follow from the printed strings.
+#include <fmt/format.h>
+
 #include <catch2/catch.hpp>
 
 #include "tpm/core/error.hpp"
@@ -102,6 +104,21 @@ TEST_CASE("formulas: names, definitions, the dynamic scope and the model library
   CHECK_THROWS_WITH(e.define_symbol("exp", 1.0, "here"), Contains("'exp' is taken"));
   CHECK_THROWS_WITH(e.evaluate("k = 4", {}, "here"), Contains("'=' assigns"));
   CHECK_THROWS_WITH(e.evaluate("1, 2", {}, "here"), Contains("more than one value"));
+}
+
+TEST_CASE(
+    "formulas: a chain of definitions that name two earlier ones each is computed link by link") {
+  constexpr int kLinks = 40;  // one by one; without the values of earlier ones 2^40
+  Evaluator e;
+  e.define_expression("a0", "1", "here");
+  e.define_expression("b0", "1", "here");
+  for (int i = 1; i <= kLinks; ++i) {
+    e.define_expression(fmt::format("a{}", i), fmt::format("(a{0} + b{0}) / 2", i - 1), "here");
+    e.define_expression(fmt::format("b{}", i), fmt::format("(b{0} + 3 * a{0}) / 4", i - 1), "here");
+  }
+  const std::string last = "a" + std::to_string(kLinks);
+  CHECK(e.evaluate(last, {}, "here") == 1.0);
+  CHECK(e.inputs(last, {}, "here").empty());
 }
 
 TEST_CASE("item 1: the stated viscosity relaxes in 0.2 ms") {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -503,6 +504,10 @@ std::vector<ErrorCase> law_cases() {
                              "contact_force", "stress"),
                     "reference_m", "reference"))},
       {type, "frequency 0", "spectrum {}/l.json --from \"0 Hz\" -o {}/out", law(kLaw)},
+      {type, "frequency that overflows", "spectrum {}/l.json --to \"1e308 Hz\" -o {}/out",
+       law(kLaw)},
+      {type, "frequency the law does not reach",
+       "spectrum {}/l.json --from \"1 Hz\" --to \"1e308 Hz\" -o {}/out", law(kLaw)},
       {type, "unknown program", "export {}/l.json --to nastran -o {}/out", law(kLaw)},
       {type, "tension in FEBio", to_febio,
        law(replaced(replaced(kLaw, "linear-1", "linear-1-elastic"), bar,
@@ -513,6 +518,16 @@ std::vector<ErrorCase> law_cases() {
       {type, "area without length", "export {}/l.json --to ansys --area \"3 mm^2\" -o {}/out",
        law(kLaw)},
   };
+}
+
+std::string polygon(int corners) {
+  std::string obj, face = "f";
+  for (int i = 0; i < corners; ++i) {
+    const double angle = 6.283185307179586 * i / corners;
+    obj += "v " + std::to_string(std::cos(angle)) + " " + std::to_string(std::sin(angle)) + " 0\n";
+    face += " " + std::to_string(i + 1);
+  }
+  return obj + face + "\n";
 }
 
 std::vector<ErrorCase> scene_cases() {
@@ -552,7 +567,13 @@ std::vector<ErrorCase> scene_cases() {
        organ(listed + R"([{"at": [0, 0, 0]}, {"at": [20, 0, 0]}, {"at": [20, 0, 0]}])")},
       {type, "normal without length", check,
        organ(listed + R"([{"at": [0, 0, 0], "normal": [0, 0, 0]}, {"at": [20, 0, 0]}])")},
+      {type, "cells that 32 bits cut", check,
+       scene(R"({"organ": {"kind": "block", "cells": [4294967299, 3, 3]}})")},
+      {type, "seed above 2^63", check, organ(R"("kind": "liver", "seed": 9223372036854775809)")},
+      {type, "seed above 2^53", check, organ(R"("kind": "liver", "seed": 9007199254740993)")},
       {type, "open mesh", check, mesh(open)},
+      {type, "face of too many corners", check, mesh(polygon(5000))},
+      {type, "mesh that names an endless file", check, mesh("mtllib /dev/zero\n" + open)},
       {type, "landing far off", check,
        files({{"m.obj", corners + "f 1 3 2\nf 1 2 4\nf 2 3 5\nf 3 4 5\nf 4 2 5\nf 1 4 3\n"},
               {"s.json", R"({"organ": {"kind": "mesh", "mesh": "m.obj", "unit": "cm", "count": 90,
@@ -583,13 +604,71 @@ std::vector<ErrorCase> scene_cases() {
   };
 }
 
+std::vector<ErrorCase> table_option_cases() {
+  const std::string type = "options of tpm tables";
+  return {
+      {type, "depth that overflows", "tables --depths 1e300 -o {}/out", files({})},
+      {type, "infinite depth", "tables --depths 1e400 -o {}/out", files({})},
+      {type, "depth without unit", "tables --depths inf -o {}/out", files({})},
+  };
+}
+
+const std::string kSession = R"({"model": {"kind": "condensed", "scene": {
+  "organ": {"kind": "liver", "count": 60}, "material": {"eta1": "2.4e5 Pa s"},
+  "anchors": [{"kind": "far_side", "fraction": 0.3}]}},
+"indentations": {"depths": ["2 mm"], "rates": ["4 mm/s"], "hold": "1 s"}})";
+
+std::vector<ErrorCase> session_cases() {
+  const std::string type = "session";
+  const std::string run_session = "hil run {}/h.json -o {}/out";
+  const auto session = [](std::string text) { return files({{"h.json", std::move(text)}}); };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return session(replaced(kSession, from, to));
+  };
+  return {
+      {type, "missing", run_session, files({})},
+      {type, "empty", run_session, session("")},
+      {type, "truncated", run_session, session(kSession.substr(0, 90))},
+      {type, "binary garbage", run_session, session(kGarbage)},
+      {type, "missing scene", run_session,
+       session(R"({"model": {"kind": "condensed"}, "creep": {"loads": ["1 N"], "hold": "1 s"}})")},
+      {type, "scene is missing", run_session,
+       session(R"({"model": {"scene": "none.json"}, "creep": {"loads": ["1 N"], "hold": "1 s"}})")},
+      {type, "nothing to do", run_session,
+       session(R"({"model": {"scene": {"organ": {"kind": "liver"}}}})")},
+      {type, "unit of a rate", run_session, with("4 mm/s", "4 mm")},
+      {type, "rate of 0", run_session, with("4 mm/s", "0 mm/s")},
+      {type, "longer than a day", run_session, with("\"1 s\"", "\"1e12 s\"")},
+      {type, "unit in its scene", run_session, with("2.4e5 Pa s", "5 mm")},
+      {type, "one sphere", run_session, with("60", "1")},
+  };
+}
+
+std::vector<ErrorCase> session_recording_cases() {
+  const std::string type = "recording of a session";
+  const std::string to_hdf5 = "hil export {}/r.tpmrec -o {}/out.h5";
+  const auto recording = [](std::string bytes) { return files({{"r.tpmrec", std::move(bytes)}}); };
+  return {
+      {type, "missing", to_hdf5, files({})},
+      {type, "empty", to_hdf5, recording("")},
+      {type, "binary garbage", to_hdf5, recording(kGarbage)},
+      {type, "100 MB line", to_hdf5, recording(long_line())},
+      {type, "report of garbage", "hil report {}/r.tpmrec -o {}/out", recording(kGarbage)},
+      {type, "verification of garbage", "hil verify {}/r.tpmrec", recording(kGarbage)},
+      {type, "replay of garbage",
+       "hil run {}/h.json --device replay --recording {}/r.tpmrec -o {}/out",
+       files({{"h.json", kSession}, {"r.tpmrec", kGarbage}})},
+  };
+}
+
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
   for (const auto& cases :
        {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
         hdf5_cases(), fit_config_cases(), oscillation_cases(), fit_tables_cases(), design_cases(),
-        claims_cases(), recording_folder_cases(), law_cases(), scene_cases(),
-        test::simulation_error_cases(), test::sweep_error_cases()}) {
+        claims_cases(), recording_folder_cases(), law_cases(), scene_cases(), table_option_cases(),
+        session_cases(), session_recording_cases(), test::simulation_error_cases(),
+        test::sweep_error_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -1,8 +1,9 @@
 // A law felt at one contact: against the law's own answer, without a heap, passive, in sessions.
+#include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include "counted_allocations.hpp"
 
+#include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"

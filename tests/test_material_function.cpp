@@ -27,6 +27,7 @@ double modulus(double t) {
 
 std::vector<double> decades_of(double from, double to, int points) {
   std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(points));
   for (int i = 0; i < points; ++i) {
     values.push_back(from * std::pow(to / from, static_cast<double>(i) / (points - 1)));
   }
@@ -105,6 +106,25 @@ TEST_CASE("A creep compliance is fitted from its file alone") {
   CHECK_THAT(estimate(fit, "k_inf"), WithinRel(lasting, 1e-5));
   CHECK_THAT(estimate(fit, "k1"), WithinRel(k0 - lasting, 1e-5));
   CHECK_THAT(estimate(fit, "tau1"), WithinRel(T * k / (k0 + k), 1e-5));
+}
+
+TEST_CASE("A relaxation modulus that falls by a power of time is fitted by a spring-pot") {
+  constexpr double kSize = 500.0, kOrder = 0.3;
+  const test::TempFolder folder;
+  std::string text = "time [s],G(t) [Pa]\n";
+  for (const double t : decades_of(0.01, 100.0, 41)) {
+    text += fmt::format("{:.17g},{:.17g}\n", t,
+                        kSize * std::pow(t, -kOrder) / std::tgamma(1.0 - kOrder));
+  }
+  write_file(folder / "g.csv", text);
+  const Selection s = select_law(read(folder / "g.csv"), quick());
+  CHECK(law_name(chosen(s).config.law.value()) == "linear-fspringpot");
+  CHECK_THAT(estimate(chosen(s), "k1"), WithinRel(kSize, 1e-6));
+  CHECK_THAT(estimate(chosen(s), "alpha"), WithinRel(kOrder, 1e-6));
+  for (const Candidate& c : s.candidates) {
+    INFO(law_name(c.law) << ": " << c.reason);
+    CHECK_FALSE(c.failed);
+  }
 }
 
 TEST_CASE("A spectrum is fitted from magnitude and phase over an angular frequency") {

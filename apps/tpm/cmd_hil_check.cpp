@@ -16,7 +16,7 @@ namespace {
 
 struct CheckChoice {
   DeviceOptions device;
-  std::string rate = "1 kHz", duration = "5 s";
+  std::string session, rate, duration = "5 s";
 };
 
 double within(const std::string& text, Dimension dimension, const char* option, double least,
@@ -29,10 +29,15 @@ double within(const std::string& text, Dimension dimension, const char* option, 
 
 int check_hil(const CheckChoice& choice, const Session& session) {
   constexpr double kLeast_Hz = 100.0, kMost_Hz = 4000.0, kLeast_s = 0.1, kMost_s = 86400.0;
-  const double rate = within(choice.rate, Dimension::frequency, "--rate", kLeast_Hz, kMost_Hz);
+  HilSession hil;
+  if (!choice.session.empty()) hil = read_session(choice.session);
+  if (!choice.rate.empty()) {
+    hil.servo.period_s =
+        1.0 / within(choice.rate, Dimension::frequency, "--rate", kLeast_Hz, kMost_Hz);
+  }
   const double duration = within(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
-  const JitterCheck check = check_jitter(chosen_device(choice.device), rate, duration,
+  const JitterCheck check = check_jitter(chosen_device(choice.device), hil, duration,
                                          chosen_wish(choice.device), InterruptWatch::seen);
   say("{}", session.json() ? to_text(check_json(check)) : check_text(check));
   return static_cast<int>(check.fit ? ExitCode::success : ExitCode::answer_is_no);
@@ -44,13 +49,17 @@ void add_hil_check_command(CLI::App& hil, Session& session) {
   CLI::App* command = hil.add_subcommand(
       "check", "Is this machine, with this device, up to a session? Jitter, verdict");
   auto choice = std::make_shared<CheckChoice>();
+  command->add_option("SESSION", choice->session,
+                      "With the rate and the limits of this session (default: those of one that "
+                      "says nothing)");
   add_device_options(*command, choice->device);
-  command->add_option("--rate", choice->rate, "Of the loop, 100 Hz to 4 kHz")
-      ->capture_default_str();
+  command->add_option("--rate", choice->rate,
+                      "Of the loop, 100 Hz to 4 kHz (default: the session's, 1 kHz)");
   command->add_option("--duration", choice->duration, "Of the test")->capture_default_str();
   add_format_option(*command, session);
   command->footer(
-      "Example:\n  tpm hil check --device virtual --rate \"4 kHz\" --duration \"10 s\"");
+      "Examples:\n  tpm hil check configs/hil_liver.json --device omega7\n"
+      "  tpm hil check --device virtual --rate \"4 kHz\" --duration \"10 s\"");
   command->callback([choice, &session] {
     session.run = [choice, &session] { return check_hil(*choice, session); };
   });

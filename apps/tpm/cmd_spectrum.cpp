@@ -26,7 +26,7 @@ std::vector<double> frequencies(const SpectrumTexts& texts) {
   const double from = parse_quantity(texts.from, Dimension::frequency, "--from");
   const double to = parse_quantity(texts.to, Dimension::frequency, "--to");
   const auto points = parse_whole_number(texts.points, "--points", 2);
-  if (!(from > 0.0 && to > from) || points > 100000) {
+  if (!(from > 0.0 && to > from && std::isfinite(to / from)) || points > 100000) {
     throw Error(ExitCode::usage, "spectrum", "no range of frequencies",
                 "--from above 0 Hz and below --to, and at most 100000 points");
   }
@@ -81,11 +81,23 @@ Json json_of(const LawFile& law, const std::vector<double>& frequency_Hz,
   return json;
 }
 
+void require_finite(const std::vector<double>& frequency_Hz, const SpectrumResponse& r) {
+  for (std::size_t i = 0; i < frequency_Hz.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    if (std::isfinite(r.storage[row]) && std::isfinite(r.loss[row])) continue;
+    throw Error(
+        ExitCode::numerical, "spectrum",
+        fmt::format("storage and loss at {} Hz are not finite numbers", shortest(frequency_Hz[i])),
+        "frequencies within the range of the law");
+  }
+}
+
 int spectrum(const SpectrumTexts& texts, const Session& session) {
   const LawFile law = read_law(texts.law);
   const std::vector<double> frequency_Hz = frequencies(texts);
   const SpectrumResponse r = respond_spectrum(law.spec, law.values, frequency_Hz,
                                               operating_depth(texts, law.spec), Want::values);
+  require_finite(frequency_Hz, r);
   deliver(session.json() ? to_text(json_of(law, frequency_Hz, r)) : text_of(law, frequency_Hz, r),
           texts.output);
   return 0;

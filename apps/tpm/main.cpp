@@ -1,14 +1,17 @@
 // The program `tpm`: reads the command line, runs one command, turns errors into one line.
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -151,7 +154,31 @@ void require_output_written() {
 }  // namespace
 }  // namespace tpm::app
 
-int main(int argc, char** argv) {
+namespace {
+
+/// Says so without asking for memory.
+int out_of_memory() noexcept {
+  static constexpr std::string_view kWords =
+      "tpm: out of memory; expected more, or a smaller input\n";
+  (void)!::write(STDERR_FILENO, kWords.data(), kWords.size());
+  return static_cast<int>(tpm::ExitCode::environment);
+}
+
+/// Libraries that ask for memory where they must not throw (nlohmann-json does in its destructor)
+/// end here: then nothing is unwound, and the next run removes the temporary file (Replacement).
+[[noreturn]] void end_without_memory() noexcept {
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {
+    ::_exit(out_of_memory());
+  } catch (...) {
+    std::abort();
+  }
+  std::abort();
+}
+
+/// The exit code; what goes wrong is one line. Throws std::bad_alloc.
+int answer(int argc, char** argv) {
   try {
     tpm::app::occupy_closed_streams();
     const int code = tpm::app::run(argc, argv);
@@ -164,11 +191,21 @@ int main(int argc, char** argv) {
     tpm::app::tell_user("tpm: {}: {}\n", error.path1().string(), error.code().message());
     return static_cast<int>(tpm::ExitCode::environment);
   } catch (const std::bad_alloc&) {
-    tpm::app::tell_user("tpm: not enough memory for this input\n");
-    return static_cast<int>(tpm::ExitCode::environment);
+    throw;
   } catch (const std::exception& error) {
     // Nothing in the library throws anything else on purpose: this is a defect of tpm.
     tpm::app::tell_user("tpm: internal error: {}; please report it\n", error.what());
     return static_cast<int>(tpm::ExitCode::numerical);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::set_terminate(end_without_memory);
+  try {
+    return answer(argc, argv);
+  } catch (const std::bad_alloc&) {  // telling what went wrong takes memory, too
+    return out_of_memory();
   }
 }

@@ -96,6 +96,7 @@ void add_family_option(CLI::App& command, std::string& family) {
 
 std::vector<LawSpec> chosen_laws(const std::vector<std::string>& names, const std::string& family) {
   std::vector<LawSpec> laws;
+  laws.reserve(names.size());
   for (const std::string& name : names) laws.push_back(parse_law_name(name, "--laws"));
   if (!laws.empty()) return laws;
   if (family != "fractional") laws = classical_family();

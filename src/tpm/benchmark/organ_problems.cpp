@@ -72,8 +72,8 @@ std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guid
   times_s.pop_back();
   // At a kink the force jumps: it is asked for between them.
   for (double& time : times_s) time += 0.5 * kSpacing_s;
-  const auto posed = posed_liver(tissue, tissue.material.eta1_Pa_s,
-                                 ramp_and_hold(8e-3, 0.1, kMovingPoke_s - 0.08), times_s);
+  auto posed = posed_liver(tissue, tissue.material.eta1_Pa_s,
+                           ramp_and_hold(8e-3, 0.1, kMovingPoke_s - 0.08), times_s);
   if (guided) {
     const Probe& probe = posed->network.probes.front();
     posed->network.freedom.guide(probe.sphere, probe.direction);

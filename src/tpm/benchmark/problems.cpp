@@ -33,6 +33,7 @@ std::span<const BenchmarkEntry> benchmark_entries() {
 
 std::vector<BenchmarkEntry> chosen_benchmarks(std::span<const std::string> names) {
   std::vector<std::string_view> known;
+  known.reserve(std::size(kEntries));
   for (const BenchmarkEntry& entry : kEntries) known.push_back(entry.name);
   for (const std::string& name : names) {
     if (std::find(known.begin(), known.end(), name) == known.end()) {

@@ -432,12 +432,11 @@ BenchmarkProblem servo_normal_problem() {
                             full_model(kServoPeriod_s)});
   problem.name = "servo_normal";
   problem.title = "Contact models along the normal";
-  problem.text =
-      std::string(
-          "The liver of 424 spheres (configs/liver_scene.json) at sphere 71: 8 mm at 4 "
-          "mm/s and held for 1 s; 2 mm at 10 mm/s and held; in and out at 100 mm/s; random "
-          "probing for 1 s at 1 to 100 mm/s.") +
-      kServoText;
+  problem.text = fmt::format(
+      "The liver of 424 spheres (configs/liver_scene.json) at sphere 71: 8 mm at 4 "
+      "mm/s and held for 1 s; 2 mm at 10 mm/s and held; in and out at 100 mm/s; random "
+      "probing for 1 s at 1 to 100 mm/s.{}",
+      kServoText);
   return problem;
 }
 

@@ -4,7 +4,7 @@
 
 namespace tpm {
 
-ReplayDevice::ReplayDevice(Eigen::Matrix3Xd position_m, std::string source)
+ReplayDevice::ReplayDevice(Eigen::Matrix3Xd position_m, const std::string& source)
     : position_m_(std::move(position_m)) {
   if (position_m_.cols() == 0) throw bad_input(source, "holds no motion", "a recorded session");
   identity_.kind = "replay";

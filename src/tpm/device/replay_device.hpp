@@ -8,7 +8,7 @@ class ReplayDevice final : public HapticDevice {
  public:
   /// @param position_m 3 x samples, as a device read them
   /// @param source for the identity: where they come from
-  ReplayDevice(Eigen::Matrix3Xd position_m, std::string source);
+  ReplayDevice(Eigen::Matrix3Xd position_m, const std::string& source);
 
   const DeviceIdentity& open() override;
   void prepare(const DevicePreparation&) override { next_ = 0; }

@@ -81,7 +81,7 @@ double VirtualPlant::time_s() const noexcept {
 }
 
 Eigen::Vector3d VirtualPlant::measured_m() const noexcept {
-  const Eigen::Vector3d at = position_m();
+  Eigen::Vector3d at = position_m();
   if (!(settings_.encoder_step_m > 0.0)) return at;
   const double step = settings_.encoder_step_m;
   return {std::round(at.x() / step) * step, std::round(at.y() / step) * step,

@@ -1,5 +1,6 @@
 #include "tpm/haptics/law_contact.hpp"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 

@@ -32,9 +32,10 @@ TissueShape shape_of(const Network& network, std::size_t contact, const Eigen::V
 }
 
 PushedScene::PushedScene(const HilSession& session)
-    : tissue(parse_tissue(session.scene, kScenePlace, {})), deepest_m(deepest_of(session)) {
-  require_standing(tissue, kScenePlace);
-  probe = parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{kScenePlace})
+    : tissue(parse_tissue(session.scene, session.scene_place, {})), deepest_m(deepest_of(session)) {
+  require_standing(tissue, session.scene_place);
+  probe = parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue,
+                         DocumentPlace{session.scene_place})
               .front()
               .probe;
 }

@@ -5,9 +5,6 @@
 
 namespace tpm {
 
-/// Where the scene of a session's model stands, for messages.
-inline constexpr const char* kScenePlace = "model: scene";
-
 [[nodiscard]] TissueShape shape_of(const Network& network, std::size_t contact,
                                    const Eigen::Vector3d& push);
 

@@ -40,7 +40,9 @@ Json to_json(const ServoCounts& counts) {
           {"damped", counts.damped},
           {"beyond_model", counts.beyond_model},
           {"late", counts.late},
-          {"missed", counts.missed}};
+          {"missed", counts.missed},
+          {"most_missed_at_once", counts.most_missed_at_once},
+          {"most_late_of_1000", counts.most_late}};
 }
 
 Json to_json(const DeviceIdentity& device) {

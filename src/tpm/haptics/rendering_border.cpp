@@ -18,8 +18,9 @@ constexpr int kSamples = 1024;  // of a measurement; frequencies are whole numbe
 /// Cycles in kSamples: closer and closer to zero, where a delay is worst, up to Nyquist.
 std::vector<int> measured_cycles() {
   std::vector<int> cycles;
-  for (double m = 1.0; m < 0.5 * kSamples; m *= 1.25) {
-    const int whole = static_cast<int>(std::lround(m));
+  for (int step = 0;; ++step) {
+    const int whole = static_cast<int>(std::lround(std::pow(1.25, step)));
+    if (2 * whole >= kSamples) break;
     if (cycles.empty() || whole > cycles.back()) cycles.push_back(whole);
   }
   cycles.push_back(kSamples / 2);

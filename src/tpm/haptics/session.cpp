@@ -213,6 +213,7 @@ void parse_tissue_of(HilSession& session, const Json& model, const DocumentPlace
   if (by_law) {
     session.law = law_from_json(tissue.is_string() ? read_json(file) : tissue, where);
   } else {
+    session.scene_place = where;
     session.scene = with_mesh_listed(tissue.is_string() ? read_json(file) : tissue, where,
                                      tissue.is_string() ? file.parent_path() : folder);
   }

@@ -67,6 +67,7 @@ struct HilSession {
   Eigen::Vector3d slide = Eigen::Vector3d::UnitX();  ///< unit vector, square to the push, device
   std::string tolerance = "1%";  ///< of a planned model, as set_tolerance() takes it
   Json scene;                    ///< of the tissue; needs no file. Null with a law
+  std::string scene_place;       ///< where the scene stands, for messages: "FILE: key /model/scene"
   std::optional<LawFile> law;    ///< of the model `law`
   std::vector<SessionPhase> phases;
   /// Forces of the recording whose motion the last phase is, evenly spaced over it; may be empty.

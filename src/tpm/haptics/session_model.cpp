@@ -15,9 +15,10 @@ namespace tpm {
 namespace {
 
 LoopModel element_model(const HilSession& session) {
-  const Tissue tissue = parse_tissue(session.scene, kScenePlace, {});
+  const Tissue tissue = parse_tissue(session.scene, session.scene_place, {});
   if (session.scene.at("organ").value("kind", "") != "star") {
-    throw bad_input(kScenePlace, "is no star", "an organ of the kind star for the model 'element'");
+    throw bad_input(session.scene_place, "is no star",
+                    "an organ of the kind star for the model 'element'");
   }
   LoopModel loop;
   loop.model = std::make_unique<ElementContact>(tissue.material, session.servo.period_s);
@@ -59,7 +60,7 @@ LoopModel network_beside_model(const HilSession& session, bool threads) {
   const PushedScene scene(session);
   const double tau_s = scene.tissue.material.relaxation_time_s();
   if (tau_s < kShortest_s) {
-    throw bad_input(kScenePlace,
+    throw bad_input(session.scene_place,
                     fmt::format("has a relaxation time of {} s, too short for the model "
                                 "'network_beside'",
                                 significant(tau_s, 4)),
@@ -132,7 +133,7 @@ LoopModel make_loop_model(const HilSession& session, bool threads, const Plannin
   LoopModel loop = model_of(session, threads, told);
   if (!session.law) {
     loop.relaxation_times_s = {
-        parse_tissue(session.scene, kScenePlace, {}).material.relaxation_time_s()};
+        parse_tissue(session.scene, session.scene_place, {}).material.relaxation_time_s()};
   }
   loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
   return loop;

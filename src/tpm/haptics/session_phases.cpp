@@ -187,17 +187,19 @@ void embed_motion(Json& session, const LawFile& law, double period_s,
   }
   const Protocol path = measured_history(Drive::displacement, recording.time_s, recording.drive);
   const double length_s = path.end_s() - path.start_s();
-  const double parts = std::max(1.0, std::ceil(std::min(length_s / period_s, kMostSamples)));
+  const auto parts = static_cast<std::size_t>(
+      std::max(1.0, std::ceil(std::min(length_s / period_s, kMostSamples))));
+  const double spacing_s = length_s / static_cast<double>(parts);
   const Protocol forces = measured_history(Drive::force, recording.time_s, recording.response);
   Json depths = Json::array(), measured = Json::array();
-  for (double i = 0.0; i <= parts; ++i) {
-    const double time_s = path.start_s() + i / parts * length_s;
+  for (std::size_t i = 0; i <= parts; ++i) {
+    const double time_s = path.start_s() + static_cast<double>(i) * spacing_s;
     depths.push_back(value_at(path, time_s) - contact_m);
     measured.push_back(value_at(forces, time_s) - offset_N);
   }
   session["motion"] = {{"name", file.filename().string()},
                        {"relax_s", std::min(kRelaxed * longest_time_s(law), kLongestWait_s)},
-                       {"spacing_s", length_s / parts},
+                       {"spacing_s", spacing_s},
                        {"depths_m", std::move(depths)},
                        {"measured_N", std::move(measured)}};
 }
@@ -214,7 +216,8 @@ std::vector<SessionPhase> parse_phases(const Json& session, const DocumentPlace&
     throw bad_input(place.where, "nothing is done in it", "indentations, slides, creep or motion");
   }
   if (list.time_s() > kLongest_s) {
-    throw bad_input(place.where, fmt::format("takes {} s", significant(list.time_s(), 4)),
+    throw bad_input(place.where + ": keys /indentations, /slides and /creep",
+                    fmt::format("the session takes {} s", significant(list.time_s(), 4)),
                     "12 hours at most");
   }
   return list.take();

@@ -200,31 +200,45 @@ std::vector<const ServoRecord*>::const_iterator after_phase(
                               [phase](const ServoRecord* row) { return row->phase <= phase; });
 }
 
+/// Whether the phases from a ramp or hold on repeat the experiment of the readings: held for the 30
+/// s after which they were taken.
+bool repeats_experiment(const std::vector<SessionPhase>& phases, std::size_t p) {
+  constexpr double kHeld_s = 30.0, kAbout_s = 1.0;
+  const std::size_t hold = phases[p].kind == SessionPhaseKind::hold ? p : p + 1;
+  if (hold >= phases.size() || phases[hold].kind != SessionPhaseKind::hold) return false;
+  const double begin_s = hold == 0 ? 0.0 : phases[hold - 1].end_s;
+  return std::abs(phases[hold].end_s - begin_s - kHeld_s) <= kAbout_s;
+}
+
 /// Puts the largest commanded force of a ramp, and the one at the end of a hold, beside the
-/// readings of the same depth.
+/// readings of the same depth: of sessions on the paper's star or liver that repeat that
+/// experiment.
 void put_beside_experiment(Verification& v, const HilRecording& recording,
                            const std::vector<const ServoRecord*>& rows) {
+  const std::string organ = recording.session.scene.at("organ").value("kind", "");
+  if (organ != "star" && organ != "liver") return;
   const PointSet readings = load_points("evren_relaxation");
   const std::vector<SessionPhase>& phases = recording.session.phases;
   for (std::size_t p = 0; p < phases.size(); ++p) {
     const bool ramp = phases[p].kind == SessionPhaseKind::indent;
     if (!ramp && phases[p].kind != SessionPhaseKind::hold) continue;
+    if (!repeats_experiment(phases, p)) continue;
     const auto first = after_phase(rows, static_cast<std::int32_t>(p) - 1);
     // The operator lags behind what is shown: the peak may come when the hold has begun.
     const bool held = ramp && p + 1 < phases.size() && phases[p + 1].kind == SessionPhaseKind::hold;
     const auto past = after_phase(rows, static_cast<std::int32_t>(held ? p + 1 : p));
     if (past == first || past == rows.end()) continue;  // cut off before its end
-    double felt_N = recording.commanded_N(**(past - 1));
+    double commanded_N = recording.commanded_N(**(past - 1));
     if (ramp) {
       for (auto row = first; row != past; ++row) {
-        felt_N = std::max(felt_N, recording.commanded_N(**row));
+        commanded_N = std::max(commanded_N, recording.commanded_N(**row));
       }
     }
     for (const Datum& datum : readings.data) {
       if (datum.label != (ramp ? "peak" : "end") || !datum.value || !datum.depth_m) continue;
       if (std::abs(*datum.depth_m - phases[p].depth_m) > 1e-9) continue;
       v.experiment.push_back(
-          {phases[p].depth_m, phases[p].rate_m_per_s, datum.label, *datum.value, felt_N});
+          {phases[p].depth_m, phases[p].rate_m_per_s, datum.label, *datum.value, commanded_N});
     }
   }
 }
@@ -489,7 +503,7 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
 }
 
 /// Depth of the model's tool: of a tool that touches that of the surface, slip included.
-std::vector<double> felt_depth_m(const std::vector<const ServoRecord*>& rows) {
+std::vector<double> touched_depth_m(const std::vector<const ServoRecord*>& rows) {
   std::vector<double> depth;
   depth.reserve(rows.size());
   for (const ServoRecord* row : rows) {
@@ -558,8 +572,9 @@ Verification verify_law(const HilRecording& recording, const VerifyOptions& opti
   const LawFile& law = recording.session.law.value();
   Verification v = begun(recording, rows, compared);
   v.knots = rows.size();
-  const std::vector<double> depth_m = felt_depth_m(rows);
+  const std::vector<double> depth_m = touched_depth_m(rows);
   std::vector<double> time_s;
+  time_s.reserve(rows.size());
   for (const ServoRecord* row : rows) time_s.push_back(recording.time_s(*row));
   const LawModel model(law.spec);
   std::vector<double> values = law.values;

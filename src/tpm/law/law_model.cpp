@@ -13,6 +13,7 @@
 #include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/imposed_load.hpp"
 #include "tpm/law/kelvin_chain.hpp"
+#include "tpm/law/relaxation.hpp"
 #include "tpm/solve/exponential_sum.hpp"
 
 namespace tpm {
@@ -263,6 +264,53 @@ std::optional<Response> respond_to_load(const LawSpec& spec, const LawAtParamete
   return response;
 }
 
+/// The value of a step that is imposed at the first knot and kept; nothing for other histories.
+std::optional<double> kept_step(const Protocol& protocol) {
+  const auto knots = protocol.knots();
+  const double value = knots.front().value;
+  const bool kept =
+      !protocol.relaxed_at_start() &&
+      std::all_of(knots.begin(), knots.end(), [value](const Knot& k) { return k.value == value; });
+  return kept ? std::optional(value) : std::nullopt;
+}
+
+/// A step of the depth or of the load on a linear law with spring-pots: G(t) and J(t), exact at any
+/// time after the step. Nothing for other laws and histories, at the step itself, or where the step
+/// leaves the probe out of contact.
+std::optional<Response> respond_to_step(const LawSpec& spec, std::span<const double> parameters,
+                                        const Protocol& protocol, std::span<const double> times_s,
+                                        Want want) {
+  const bool curved = spec.kernel != Kernel::linear || spec.tension != Tension::none;
+  const auto value = kept_step(protocol);
+  if (spec.fractional == Fractional::none || curved || !value) return std::nullopt;
+  const double start = protocol.start_s();
+  if (!std::all_of(times_s.begin(), times_s.end(),
+                   [start](double t) { return t > start && std::isfinite(t); })) {
+    return std::nullopt;
+  }
+  const std::size_t n = parameters.size();  // contact and offset are the last two
+  const double contact = parameters[n - 2], offset = parameters[n - 1];
+  const bool depth = protocol.drive() == Drive::displacement;
+  const double step = *value - (depth ? contact : offset);
+  if (!(step > 0.0)) return std::nullopt;
+  Response response;
+  response.value.resize(std::ssize(times_s));
+  const bool want_slopes = want == Want::values_and_sensitivity;
+  if (want_slopes) response.sensitivity.resize(std::ssize(times_s), static_cast<Eigen::Index>(n));
+  for (Eigen::Index i = 0; i < response.value.size(); ++i) {
+    const double since = times_s[static_cast<std::size_t>(i)] - start;
+    const SlopedNumber f =
+        depth ? law_relaxation(spec, parameters, since) : law_creep(spec, parameters, since);
+    response.value[i] = (depth ? offset : contact) + step * f.value;
+    if (!want_slopes) continue;
+    response.sensitivity.row(i) = step * f.by.transpose();
+    const auto last = static_cast<Eigen::Index>(n) - 1;
+    response.sensitivity(i, depth ? last : last - 1) += 1.0;
+    response.sensitivity(i, depth ? last - 1 : last) -= f.value;
+  }
+  return response;
+}
+
 /// A depth without jumps that the surface follows all the way, which is what recordings are fitted
 /// with; nothing where it is otherwise.
 std::optional<Response> respond_quickly(const LawAtParameters& law, const Protocol& protocol,
@@ -413,6 +461,9 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
                            std::span<const double> parameters, Want want) const {
   require_times_within(protocol, times_s);
   require_in_range(parameters);
+  if (auto stepped = respond_to_step(spec_, parameters, protocol, times_s, want)) {
+    return *std::move(stepped);
+  }
   std::optional<FractionalMemory> rates;
   if (spec_.fractional != Fractional::none) rates = rates_for(spec_, protocol, times_s);
   const Prepared prepared = prepare(parameters, rates ? &*rates : nullptr);

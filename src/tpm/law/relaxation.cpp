@@ -49,7 +49,7 @@ SlopedNumber law_relaxation(const LawSpec& spec, std::span<const double> values,
 }
 
 SlopedNumber law_creep(const LawSpec& spec, std::span<const double> values, double t_s) {
-  const SlopedNumber j = inverse_over_s(spec, values, t_s, [](std::complex<double> g) {
+  SlopedNumber j = inverse_over_s(spec, values, t_s, [](std::complex<double> g) {
     return WithSlope{1.0 / g, -1.0 / (g * g)};
   });
   if (std::isfinite(j.value)) return j;

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
 #include <string>
 
@@ -14,6 +15,18 @@
 namespace tpm {
 
 namespace {
+
+/// Cutting a polygon into triangles costs the square of its corners.
+constexpr unsigned kMostCorners = 1000;
+
+/// Opens nothing: a mesh may name other files (`mtllib` in OBJ), and none of them is needed.
+class NoOtherFiles : public Assimp::IOSystem {
+ public:
+  bool Exists(const char* /*name*/) const override { return false; }
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* /*name*/, const char* /*mode*/) override { return nullptr; }
+  void Close(Assimp::IOStream* /*file*/) override {}
+};
 
 /// "stl" or "obj". Others are refused even where Assimp reads them: nobody has tried them here.
 std::string format_of(const std::filesystem::path& path) {
@@ -53,14 +66,29 @@ void append(const aiMesh& from, double scale, TriangleMesh& to) {
   }
 }
 
+void require_small_faces(const aiScene& scene, std::string_view file) {
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
+    const aiMesh& mesh = *scene.mMeshes[m];
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      if (mesh.mFaces[f].mNumIndices <= kMostCorners) continue;
+      throw bad_input(file, fmt::format("a face has {} corners", mesh.mFaces[f].mNumIndices),
+                      fmt::format("at most {}; triangles are best", kMostCorners));
+    }
+  }
+}
+
 }  // namespace
 
 ClosedMesh read_closed_mesh(const std::filesystem::path& path, const Unit& unit) {
   const std::string format = format_of(path);
   const std::string bytes = read_file(path);
   Assimp::Importer importer;
-  const aiScene* scene = importer.ReadFileFromMemory(bytes.data(), bytes.size(),
-                                                     aiProcess_Triangulate, format.c_str());
+  importer.SetIOHandler(new NoOtherFiles);  // the importer owns it
+  const aiScene* scene = importer.ReadFileFromMemory(bytes.data(), bytes.size(), 0, format.c_str());
+  if (scene != nullptr) {
+    require_small_faces(*scene, path.string());
+    scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  }
   if (scene == nullptr) {
     throw bad_input(path.string(),
                     fmt::format("cannot be read: {}", printable(importer.GetErrorString(), 200)),

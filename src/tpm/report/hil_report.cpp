@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
@@ -31,6 +32,53 @@ std::vector<double> thinned(const std::vector<double>& values, double scale = 1.
   return result;
 }
 
+/// Where the phases ask the tool to be, mm; nothing while they ask for a push.
+Series asked_depth(const HilRecording& recording, const std::vector<double>& time_s) {
+  OperatorScript script = recording.session.operator_script();
+  Series asked;
+  asked.label = "asked for";
+  asked.provenance = "model";
+  for (const double time : time_s) {
+    const OperatorAim aim = script.at(time);
+    const bool place = aim.aim == OperatorPiece::Aim::place;
+    asked.x.push_back(time);
+    asked.y.push_back(place ? 1e3 * aim.value : std::numeric_limits<double>::quiet_NaN());
+  }
+  return asked;
+}
+
+/// Some of the values, so that they can be told from the curve that they lie on.
+Series some_points(std::string label, const std::vector<double>& x, const std::vector<double>& y,
+                   std::string provenance) {
+  constexpr std::size_t kPoints = 120;
+  Series series;
+  series.kind = Series::Kind::points;
+  series.label = std::move(label);
+  series.provenance = std::move(provenance);
+  const std::size_t stride = std::max<std::size_t>(1, x.size() / kPoints);
+  for (std::size_t i = 0; i < x.size(); i += stride) {
+    series.x.push_back(x[i]);
+    series.y.push_back(y[i]);
+  }
+  return series;
+}
+
+/// The recording whose motion was repeated, if there is one.
+void add_measured(std::vector<Series>& series, const HilRecording& recording) {
+  const HilSession& session = recording.session;
+  if (session.measured_N.size() < 2) return;
+  const double start_s =
+      session.phases.size() < 2 ? 0.0 : session.phases[session.phases.size() - 2].end_s;
+  const double spacing_s =
+      (session.duration_s() - start_s) / static_cast<double>(session.measured_N.size() - 1);
+  std::vector<double> time_s;
+  for (std::size_t i = 0; i < session.measured_N.size(); ++i) {
+    time_s.push_back(start_s + spacing_s * static_cast<double>(i));
+  }
+  series.push_back(some_points(session.phases.back().name, time_s, session.measured_N,
+                               std::string(provenance_name(Provenance::measured))));
+}
+
 Figure session_figure(const HilRecording& recording, const Verification& v) {
   const std::vector<double> time = thinned(v.time_s);
   const Axis seconds{"time", "s", false, std::nullopt, std::nullopt};
@@ -38,17 +86,20 @@ Figure session_figure(const HilRecording& recording, const Verification& v) {
   figure.id = "session";
   figure.title = recording.simulated() ? "The session, on a simulated device" : "The session";
   figure.caption =
-      "Depth of the tool below the surface at rest, force sent to the device, and its "
-      "difference from the reference under the recorded motion.";
+      "Depth of the tool below the surface at rest and where the phases ask it to be, force sent "
+      "to "
+      "the device on the curve of the reference under the recorded motion, and their difference.";
+  std::vector<Series> forces{line("reference", time, thinned(v.reference_N)),
+                             some_points("commanded", v.time_s, v.commanded_N, "model")};
+  add_measured(forces, recording);
   figure.panels = {{"motion",
                     seconds,
                     {"depth", "mm", false, std::nullopt, std::nullopt},
-                    {line("tool", time, thinned(v.depth_m, 1e3))}},
+                    {asked_depth(recording, time), line("tool", time, thinned(v.depth_m, 1e3))}},
                    {"force",
                     seconds,
                     {"contact force", "N", false, std::nullopt, std::nullopt},
-                    {line("reference", time, thinned(v.reference_N)),
-                     line("commanded", time, thinned(v.commanded_N))}},
+                    std::move(forces)},
                    {"commanded less reference",
                     seconds,
                     {"force error", "mN", false, std::nullopt, std::nullopt},
@@ -77,9 +128,26 @@ Figure energy_figure(const HilRecording& recording) {
   return figure;
 }
 
-/// First of all: how it ended, and whether it could be rendered safely.
-void add_rendering(Document& d, const HilRecording& r, const RecordingSummary& s) {
-  d.heading(2, "Stability");
+/// Largest and smallest difference from the readings, in words.
+std::string experiment_line(const Verification& v) {
+  if (v.experiment.empty()) return "no experiment is repeated: nothing is compared with readings";
+  double least = 1e300, most = -1e300;
+  for (const BesideExperiment& e : v.experiment) {
+    const double part = 100.0 * (e.commanded_N / e.measured_N - 1.0);
+    least = std::min(least, part);
+    most = std::max(most, part);
+  }
+  return fmt::format(
+      "beside the pig-liver readings of the same indentations: {:+.0f} % to {:+.0f} %, which "
+      "judges the material, not the rendering",
+      least, most);
+}
+
+/// To be read in a minute: how it ended and whether it could be rendered safely, whether what was
+/// commanded is the model, and how that lies beside the experiment.
+void add_glance(Document& d, const HilRecording& r, const Verification& v,
+                const RecordingSummary& s) {
+  d.heading(2, "Safe, faithful, like the experiment?");
   std::vector<Cell> lines{{fmt::format("the session ended: {}", s.cause),
                            s.cause == "finished" ? Tone::good : Tone::bad}};
   const Json rendering = r.header.value("rendering", Json());
@@ -92,17 +160,29 @@ void add_rendering(Document& d, const HilRecording& r, const RecordingSummary& s
       lines.push_back({warning.get<std::string>(), Tone::bad});
     }
   }
+  lines.push_back({fmt::format("the force commanded is within {} of the reference, in parts of the "
+                               "session's peak of {} N",
+                               percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)),
+                   v.all.max_N <= kMostError * v.all.peak_N ? Tone::good : Tone::bad});
+  if (r.session.measured_N.empty()) lines.push_back({experiment_line(v)});
+  for (const OtherOpinion& o : v.others) {
+    if (o.name.starts_with("MEASURED")) {
+      lines.push_back({fmt::format("{}: {} mN rms, {} mN at most", o.name, mN(o.commanded.rms_N),
+                                   mN(o.commanded.max_N))});
+    }
+  }
+  if (r.simulated()) {
+    lines.push_back(
+        {"SIMULATED DEVICE: no motor moved and no hand felt these forces. What is "
+         "verified is the path from motion to command, not the hardware.",
+         Tone::bad});
+  }
   d.bullets(std::move(lines));
+  d.picture({"session", "The session", ""});
 }
 
 void add_identity(Document& d, const HilRecording& r) {
   const Json& device = r.header.at("device");
-  if (r.simulated()) {
-    d.bullets(
-        {{"SIMULATED DEVICE: no motor moved and no hand felt these forces. What is verified "
-          "is the path from motion to command, not the hardware.",
-          Tone::bad}});
-  }
   Table table{"", {{"what"}, {"value"}}, {}};
   const auto row = [&](const char* what, std::string value) {
     table.rows.push_back({{what}, {value.empty() ? "not known" : std::move(value)}});
@@ -166,7 +246,6 @@ void add_fidelity(Document& d, const Verification& v) {
   }
   for (const std::string& note : v.notes) others.push_back({note, Tone::bad});
   if (!others.empty()) d.bullets(std::move(others));
-  d.picture({"session", "The session", ""});
   Table table{"Force error by phase; depth: how well the operator followed, rms",
               {{"phase"},
                {"start s", true},
@@ -199,7 +278,7 @@ void add_experiment(Document& d, const Verification& v) {
                {"rate mm/s", true},
                {"reading"},
                {"measured N", true},
-               {"felt N", true},
+               {"commanded N", true},
                {"difference", true}},
               {}};
   for (const BesideExperiment& e : v.experiment) {
@@ -261,6 +340,9 @@ void add_timing(Document& d, const HilRecording& r, const RecordingSummary& s) {
          Tone::bad});
   }
   d.bullets(std::move(lines));
+}
+
+void add_energy(Document& d, const RecordingSummary& s) {
   d.heading(2, "Energy");
   d.paragraph(fmt::format(
       "Work of the hand on what was rendered: {} mJ at the end, {} mJ at the least. Holding the "
@@ -307,12 +389,13 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   Document d;
   d.title = recording.session.title;
   d.subtitle = device_line(recording);
-  add_rendering(d, recording, summary);
+  add_glance(d, recording, v, summary);
+  add_experiment(d, v);
+  add_energy(d, summary);
+  add_timing(d, recording, summary);
   add_identity(d, recording);
   add_plan(d, recording.header.at("model").value("plan", Json()));
   add_fidelity(d, v);
-  add_experiment(d, v);
-  add_timing(d, recording, summary);
   typeset(d);
   write_file(folder / "report.md", to_markdown(d));
   write_file(folder / "report.html", to_html(d, drawings));

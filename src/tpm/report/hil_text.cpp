@@ -86,8 +86,13 @@ Json check_json(const JitterCheck& check) {
           {"busy", times_json(o.busy)},
           {"woke_late_histogram", bins},
           {"cause", word_of(o.cause)},
+          {"most_missed_at_once", o.counts.most_missed_at_once},
+          {"most_late_of_1000", o.counts.most_late},
+          {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
+          {"hang_limit_s", rounded(check.hang_limit_s, kHilDigits)},
           {"fit", check.fit},
-          {"verdict", check.verdict}};
+          {"verdict", check.verdict},
+          {"advice", check.advice}};
 }
 
 std::string check_text(const JitterCheck& check) {
@@ -103,7 +108,10 @@ std::string check_text(const JitterCheck& check) {
   for (const auto& [edge, count] : octaves(o.woke_late)) {
     text += fmt::format("  {:>8} us {:>10}\n", us(edge), count);
   }
-  return text + "verdict: " + check.verdict + "\n";
+  text += fmt::format("at most {} periods missed at once, {} of 1000 cycles late; watchdog {} ms\n",
+                      o.counts.most_missed_at_once, o.counts.most_late,
+                      significant(1e3 * check.watchdog_s, 3));
+  return text + "verdict: " + check.verdict + "\n" + check.advice + "\n";
 }
 
 Json run_json(const HilSession& session, const SessionRun& run) {
@@ -240,10 +248,11 @@ std::string verification_text(const HilRecording& recording, const Verification&
                         significant(1e3 * o.commanded.max_N, 3), significant(1e3 * o.apart_N, 3));
   }
   for (const BesideExperiment& e : v.experiment) {
-    text += fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, felt {} N ({:+.1f} %)\n",
-                        significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3),
-                        e.label, significant(e.measured_N, 3), significant(e.commanded_N, 3),
-                        100.0 * (e.commanded_N / e.measured_N - 1.0));
+    text +=
+        fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, commanded {} N ({:+.1f} %)\n",
+                    significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3), e.label,
+                    significant(e.measured_N, 3), significant(e.commanded_N, 3),
+                    100.0 * (e.commanded_N / e.measured_N - 1.0));
   }
   return text;
 }

@@ -283,11 +283,12 @@ Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
       passivity_.damping_N(moved_m_, energy_.given_J() - kTolerated * settings_.energy_allowance_J);
   if (damping.isZero(0.0)) return tissue_N_;
   row.flags |= kDamped;
-  const Eigen::Vector3d force_N = tissue_N_ + damping;
+  Eigen::Vector3d force_N = tissue_N_ + damping;
   const double size_N = force_N.norm();
   if (size_N <= settings_.force_limit_N) return force_N;
   row.flags |= kForceLimited;
-  return force_N * (settings_.force_limit_N / size_N);
+  force_N *= settings_.force_limit_N / size_N;
+  return force_N;
 }
 
 StopCause ServoStep::judge_rendering(int periods) noexcept {
@@ -324,6 +325,8 @@ bool ServoStep::storm(int missed) noexcept {
   const char late = missed > 0 ? 1 : 0;
   late_now_ += late - slot;
   slot = late;
+  counts_.most_late = std::max(counts_.most_late, late_now_);
+  counts_.most_missed_at_once = std::max(counts_.most_missed_at_once, missed);
   return late_now_ > settings_.most_late || missed > settings_.most_missed;
 }
 

@@ -48,6 +48,8 @@ struct ServoSettings {
 struct ServoCounts {
   std::uint64_t time_guards = 0, saturations = 0, force_limited = 0, slipped = 0, ramping_in = 0,
                 damped = 0, beyond_model = 0, late = 0, missed = 0;
+  int most_missed_at_once = 0;  ///< periods between two cycles
+  int most_late = 0;            ///< of any 1000 cycles behind each other
 };
 
 /// One cycle of the loop: read, model, limits, passivity, write. Neither allocates nor locks nor

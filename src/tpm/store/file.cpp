@@ -69,6 +69,17 @@ bool read_all(int fd, std::uint64_t most, std::string& bytes) {
 
 }  // namespace
 
+Error cannot_read(const fs::path& path, int error_number) {
+  const bool of_the_file = error_number == EACCES || error_number == EPERM ||
+                           error_number == ENOENT || error_number == ENXIO;
+  if (of_the_file) {
+    return bad_input(path.string(), "cannot be opened for reading", "a readable file");
+  }
+  return {ExitCode::environment, path.string(),
+          fmt::format("cannot be opened for reading: {}", std::strerror(error_number)),
+          "a system that can open one more file"};
+}
+
 Error cannot_write(const fs::path& path, int error_number) {
   const char* expected = "a folder that can be written and has room";
   if (error_number == ENAMETOOLONG) expected = "a name of at most 255 bytes";
@@ -96,7 +107,7 @@ std::string read_file(const fs::path& path, std::uint64_t most) {
   if (fs::is_directory(status)) throw bad_input(path.string(), "is a folder", "a readable file");
   const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (in.get() < 0) {
-    throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
+    throw cannot_read(path, errno);
   }
   note_reading(path, in.get());
   const auto too_large = [&] {

@@ -24,6 +24,10 @@ inline constexpr std::uint64_t kLargestInput = std::uint64_t{1} << 30U;
 /// a device or a pipe.
 void require_replaceable(const std::filesystem::path& path);
 
+/// Why a file could not be opened for reading: bad_input if it lies in the file (rights), else
+/// environment (no descriptors left, a disk that fails).
+[[nodiscard]] Error cannot_read(const std::filesystem::path& path, int error_number);
+
 /// "PATH: cannot write: REASON", of an errno.
 [[nodiscard]] Error cannot_write(const std::filesystem::path& path, int error_number);
 

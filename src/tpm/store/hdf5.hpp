@@ -146,7 +146,7 @@ class Hdf5Reader {
 
  private:
   template <class Result>
-  [[nodiscard]] Result ask(std::string request) const;
+  [[nodiscard]] Result ask(const std::string& request) const;
 
   std::filesystem::path path_;
   SealState seal_{};

@@ -154,7 +154,7 @@ int opened(const fs::path& path) {
   }
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0) {
-    throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
+    throw cannot_read(path, errno);
   }
   return file;
 }
@@ -214,7 +214,7 @@ bool Hdf5Reader::sealed() const noexcept {
 }
 
 template <class Result>
-Result Hdf5Reader::ask(std::string request) const {
+Result Hdf5Reader::ask(const std::string& request) const {
   const std::string reply = child_->ask(request);
   Result result{};
   Unpacker(reply, path_.native()).take(result);

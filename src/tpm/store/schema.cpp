@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <limits>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
 #include <valijson/schema_parser.hpp>
@@ -144,9 +146,24 @@ Error in_plain_words(const Violation& violation, const Json& root, std::string_v
   return bad_input(at(path), plain(said), expected);
 }
 
+/// valijson keeps whole numbers in 64 bits with a sign and would take larger ones for negative.
+void require_signed_range(const Json& value, const std::string& key, std::string_view where) {
+  constexpr auto kLargest = std::numeric_limits<std::int64_t>::max();
+  if (value.is_number_unsigned() && value.get<std::uint64_t>() > std::uint64_t{kLargest}) {
+    throw bad_input(fmt::format("{}: key {}", where, key),
+                    fmt::format("{} is too large", value.dump()),
+                    fmt::format("at most {}", kLargest));
+  }
+  if (!value.is_structured()) return;
+  for (const auto& [name, member] : value.items()) {
+    require_signed_range(member, fmt::format("{}/{}", key, printable(name)), where);
+  }
+}
+
 }  // namespace
 
 void check_schema(const Json& value, std::string_view schema_name, std::string_view where) {
+  require_signed_range(value, "", where);
   const auto path = share_dir() / "schemas" / fmt::format("{}.schema.json", schema_name);
   const Json root = read_json(path);
   const nlohmann::json schema_document = root;

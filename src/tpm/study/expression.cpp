@@ -106,7 +106,12 @@ struct Evaluator::Impl {
     return names.empty() ? "a formula of numbers" : fmt::format("{}", fmt::join(names, ", "));
   }
 
-  double lookup(const std::string& name, const Scope& scope, std::string_view where, int depth) {
+  /// What the definitions of one evaluation came to: each is computed once, or a chain of
+  /// definitions that name two earlier ones each would cost a power of two.
+  using Known = std::map<std::string, double, std::less<>>;
+
+  double lookup(const std::string& name, const Scope& scope, std::string_view where, int depth,
+                Known& known_values) {
     if (const auto value = scope.values.find(name); value != scope.values.end()) {
       return value->second;
     }
@@ -119,15 +124,23 @@ struct Evaluator::Impl {
       throw bad_input(where, fmt::format("'{}' refers to itself", printable(name)),
                       "definitions without circles");
     }
-    return run(*formula, scope, where, depth + 1);
+    if (const auto value = known_values.find(name); value != known_values.end()) {
+      return value->second;
+    }
+    const double value = run(*formula, scope, where, depth + 1, known_values);
+    known_values.emplace(name, value);
+    return value;
   }
 
-  double run(const std::string& text, const Scope& scope, std::string_view where, int depth) {
+  double run(const std::string& text, const Scope& scope, std::string_view where, int depth,
+             Known& known_values) {
     CompiledFormula& formula = compiled(text, where);
     // Looked up first: a definition may use the same formula and so the same storage.
     std::vector<double> values;
     values.reserve(formula.names.size());
-    for (const auto& name : formula.names) values.push_back(lookup(name, scope, where, depth));
+    for (const auto& name : formula.names) {
+      values.push_back(lookup(name, scope, where, depth, known_values));
+    }
     std::copy(values.begin(), values.end(), formula.values.begin());
     double result = 0.0;
     try {
@@ -146,13 +159,13 @@ struct Evaluator::Impl {
   }
 
   void collect(const std::string& text, const Scope& scope, std::string_view where, int depth,
-               std::set<std::string>& found) {
+               std::set<std::string>& found, std::set<std::string>& followed) {
     for (const auto& name : compiled(text, where).names) {
       const std::string* formula = scope.values.contains(name) ? nullptr : formula_of(name, scope);
       if (formula == nullptr || depth >= kDeepestDefinition) {
         found.insert(name);
-      } else {
-        collect(*formula, scope, where, depth + 1, found);
+      } else if (followed.insert(name).second) {
+        collect(*formula, scope, where, depth + 1, found, followed);
       }
     }
   }
@@ -185,13 +198,14 @@ void Evaluator::define_expression(const std::string& name, std::string text,
 
 double Evaluator::evaluate(const std::string& text, const Scope& scope,
                            std::string_view where) const {
-  return impl_->run(text, scope, where, 0);
+  Impl::Known known_values;
+  return impl_->run(text, scope, where, 0, known_values);
 }
 
 std::vector<std::string> Evaluator::inputs(const std::string& text, const Scope& scope,
                                            std::string_view where) const {
-  std::set<std::string> found;
-  impl_->collect(text, scope, where, 0, found);
+  std::set<std::string> found, followed;
+  impl_->collect(text, scope, where, 0, found, followed);
   return {found.begin(), found.end()};
 }
 

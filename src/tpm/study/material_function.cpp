@@ -143,7 +143,8 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
   try {
     candidate.fit = run_fit(config, data);
   } catch (const Error& error) {
-    // A spring-pot cannot follow the step; that is a reason of the law, not of the file.
+    // The stiffness of a spring-pot has no value at the step itself: a reading there is a reason
+    // against the law, not an error of the file.
     const bool of_law = law.fractional != Fractional::none && error.code() == ExitCode::bad_input;
     if (error.code() != ExitCode::numerical && !of_law) throw;
     candidate.failed = true;
@@ -242,7 +243,8 @@ std::vector<LawSpec> linear_family() {
     laws.push_back(law);
   }
   for (const Fractional fractional :
-       {Fractional::springpot, Fractional::maxwell, Fractional::kelvin_voigt, Fractional::zener}) {
+       {Fractional::springpot, Fractional::maxwell, Fractional::kelvin_voigt, Fractional::zener,
+        Fractional::maxwell_pair, Fractional::kelvin_voigt_pair, Fractional::zener_pair}) {
     LawSpec law;
     law.branches = 0;
     law.fractional = fractional;

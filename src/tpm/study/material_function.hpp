@@ -29,7 +29,7 @@ struct MaterialFunction {
 [[nodiscard]] FitConfig function_config(LawSpec law, const MaterialFunction& function,
                                         const SetupOptions& options);
 
-/// Linear kernels with 0 to 4 branches, and the four fractional elements.
+/// Linear kernels with 0 to 4 branches, and the laws with one or two spring-pots.
 [[nodiscard]] std::vector<LawSpec> linear_family();
 
 /// Fits every law and recommends the least, as select_law does for recordings; without held-out

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -214,6 +215,23 @@ void CellCounts::add(const DigitCheck& check) {
   }
 }
 
+namespace {
+
+void require_finite(const TableRow& row) {
+  const std::pair<const char*, double> cells[] = {{"lambda1", row.lambda1.value},
+                                                  {"peak force", row.peak_force.value},
+                                                  {"end force", row.end_force.value}};
+  for (const auto& [name, value] : cells) {
+    if (std::isfinite(value)) continue;
+    throw Error(ExitCode::numerical, "tables",
+                fmt::format("the {} at depth {} m and spacing {} m is not a finite number", name,
+                            shortest(row.depth_m), shortest(row.spacing_m)),
+                "depths, spacings and parameters of a tissue");
+  }
+}
+
+}  // namespace
+
 TablesResult make_tables(const TableRequest& request, const std::vector<PrintedTable>& printed) {
   require_valid(request);
   TablesResult result;
@@ -221,6 +239,7 @@ TablesResult make_tables(const TableRequest& request, const std::vector<PrintedT
   for (const double depth : request.depths_m) {
     for (const double spacing : request.spacings_m) {
       result.rows.push_back(make_row(request, printed, depth, spacing));
+      require_finite(result.rows.back());
     }
     if (auto band = make_band(request, printed, depth)) result.bands.push_back(std::move(*band));
   }
