@@ -95,7 +95,7 @@ COMMANDS = [
     Command("recovery", "recovery --laws linear-1 --trials 1 -o recovery.txt", ["recovery.txt"], weight=50, code=1),
     Command("plan", "plan in/indented.json --costs nominal --brief", [], weight=20),
     Command("benchmark", "benchmark bond_paper --no-timing -o bench", [], weight=50),
-    Command("hil run", "hil run in/session.json -o s.tpmrec --force", ["s.tpmrec"], varies=["s.tpmrec"], weight=4),
+    Command("hil run", "hil run in/session.json -o s.tpmrec --force", ["s.tpmrec"], weight=4),
     Command("hil export", "hil export in/s.tpmrec -o s.h5", ["s.h5"]),
     Command("report", "report -o paper", [], weight=100),
     Command("stability", "stability -o stability", [], weight=100),

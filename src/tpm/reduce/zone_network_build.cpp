@@ -98,7 +98,7 @@ void ZoneNetwork::build(PushedContact& tissue) {
       throw Error(ExitCode::numerical, "zone", "its surroundings are not stiff by themselves");
     }
   }
-  const auto follow = [&](Eigen::Matrix3Xd displacement) {
+  const auto follow = [&](const Eigen::Matrix3Xd& displacement) {
     Eigen::Matrix3Xd left = Eigen::Matrix3Xd::Zero(3, displacement.cols());
     around.add_resistance(displacement, relaxed, left);
     left *= -1.0;
