@@ -28,10 +28,10 @@ COMMANDS = [
     Command("sweep", "sweep in/sweep.json -o sweep.h5 --workers 2", ["sweep.h5", "sweep.csv", "sweep.run.json"],
             varies=["sweep.run.json"]),
     Command("simulate", "simulate in/indented.json -o sim.h5 --checkpoint-every '50 ms'",
-            ["sim.h5", "sim.xdmf", "sim.run.json"], varies=["sim.run.json"], weight=4),
+            ["sim.h5", "sim.xdmf"], weight=4),
     Command("fit FOLDER", "fit in/folder --law linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
     Command("hil run", "hil run in/session.json -o s.tpmrec", ["s.tpmrec"], old=False),
-    Command("report", "report -o paper", [], weight=100),
+    Command("report", "report -o paper", [], varies=["paper/report.run.json"], weight=100),
 ]
 RECORDING = ".tpmrec"
 
