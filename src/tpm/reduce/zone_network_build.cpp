@@ -113,7 +113,7 @@ void ZoneNetwork::build(PushedContact& tissue) {
     for (Eigen::Index c = 0; c < 3; ++c) {
       Eigen::Matrix3Xd unit = nothing();
       unit(c, static_cast<Eigen::Index>(zone_[i])) = 1.0;
-      basis.push_back(follow(std::move(unit)));
+      basis.push_back(follow(unit));
     }
   }
   const ContactFields at_once = tissue.fields(pressed, tissue.memory(pressed, relaxed, 0.0));
