@@ -268,9 +268,9 @@ int run_command(const SweepChoice& choice, const Session& session) {
     return 0;
   }
   will_update({output});  // a result that stands already is asked which sweep it holds
-  if (choice.shard.empty() && fingerprint_of(output) == sweep.fingerprint) {
-    std::error_code ignored;
-    fs::remove(log_file, ignored);  // left where a run was killed after its last step
+  // A log beside the result: a run was killed before all files were written.
+  if (choice.shard.empty() && !fs::exists(log_file) &&
+      fingerprint_of(output) == sweep.fingerprint) {
     tell_user("tpm: {} holds this sweep already\n", output.string());
     return 0;
   }

@@ -188,10 +188,13 @@ class FixedDriver final : public MethodDriver {
     const double least = (last_asked_s() - from.time_s) / settings_.step_s;
     if (!(least <= static_cast<double>(settings_.most_rates))) return MethodEnd::too_much_work;
     const double h = length / count;
-    for (double i = 0.0; i < count; ++i) {
-      time_s_ = from.time_s + length * (i / count);
-      const bool last = i + 1.0 == count;
-      const double until = last ? to.time_s : from.time_s + length * ((i + 1.0) / count);
+    const auto at_step = [&](std::uint64_t i) {
+      return from.time_s + length * (static_cast<double>(i) / count);
+    };
+    const auto steps = static_cast<std::uint64_t>(count);
+    for (std::uint64_t i = 0; i < steps; ++i) {
+      time_s_ = at_step(i);
+      const double until = i + 1 == steps ? to.time_s : at_step(i + 1);
       if (const auto end = answer_before(until, h); end != MethodEnd::completed) return end;
       if (all_answered()) return MethodEnd::completed;
       if (const auto end = rule_->step(system_, time_s_, h, state_); end != MethodEnd::completed) {

@@ -38,7 +38,7 @@ class Survival {
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
     try {
       const PlanScout changed(scene, request_.measure, scout_.inertial());
-      if (const auto reason = model_.why_not(changed, request_.budget)) return reason;
+      if (auto reason = model_.why_not(changed, request_.budget)) return reason;
       if (valid_) {
         const auto passed = passed_limits(scene);
         if (!passed.empty()) return "validity: " + passed.front();

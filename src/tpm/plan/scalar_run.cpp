@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace tpm {
 namespace {
@@ -80,8 +81,9 @@ void ScalarRun::cross(double time_s, double value) {
   const double count = rests ? 1.0 : std::max(1.0, std::ceil(length / longest_s_ * (1.0 - 1e-9)));
   model_.set_period(length / count);
   const double begin = value_;
-  for (double i = 1.0; i <= count; i += 1.0) {
-    const double now = begin + (value - begin) * i / count;
+  const auto steps = static_cast<std::uint64_t>(count);
+  for (std::uint64_t i = 1; i <= steps; ++i) {
+    const double now = begin + (value - begin) * static_cast<double>(i) / count;
     response_ = by_depth_ ? model_.step_to(now) : model_.step_under(now);
   }
   steps_ += count;

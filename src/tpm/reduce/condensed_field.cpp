@@ -87,7 +87,7 @@ CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3
   const Eigen::LLT<Eigen::MatrixXd> factor_of_w(of_w.transpose() * of_w);
   const Eigen::MatrixXd second = factor_of_w.matrixL().solve(of_w.transpose() * answers);
 
-  Eigen::MatrixXd coefficients(count + 3 * kOfW, rest.size());
+  Eigen::MatrixXd coefficients(count + Eigen::Index{3} * kOfW, rest.size());
   coefficients.topRows(count) = factor.matrixL().solve(Eigen::MatrixXd(terms.transpose() * fields));
   for (Eigen::Index k = 0; k < 3; ++k) {
     coefficients.middleRows(count + k * kOfW, kOfW) =

@@ -98,7 +98,7 @@ void ZoneNetwork::build(PushedContact& tissue) {
       throw Error(ExitCode::numerical, "zone", "its surroundings are not stiff by themselves");
     }
   }
-  const auto follow = [&](Eigen::Matrix3Xd displacement) {
+  const auto follow = [&](const Eigen::Matrix3Xd& displacement) {
     Eigen::Matrix3Xd left = Eigen::Matrix3Xd::Zero(3, displacement.cols());
     around.add_resistance(displacement, relaxed, left);
     left *= -1.0;
@@ -113,7 +113,7 @@ void ZoneNetwork::build(PushedContact& tissue) {
     for (Eigen::Index c = 0; c < 3; ++c) {
       Eigen::Matrix3Xd unit = nothing();
       unit(c, static_cast<Eigen::Index>(zone_[i])) = 1.0;
-      basis.push_back(follow(std::move(unit)));
+      basis.push_back(follow(unit));
     }
   }
   const ContactFields at_once = tissue.fields(pressed, tissue.memory(pressed, relaxed, 0.0));

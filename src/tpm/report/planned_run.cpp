@@ -115,6 +115,7 @@ void write_planned_run(const Plan& plan, const ExperimentScene& scene,
   file.attribute("/", "provenance", "model");
   write_claim(plan, file);
   std::vector<double> imposed;
+  imposed.reserve(times_s.size());
   for (const double time : times_s) imposed.push_back(value_at(scene.protocol, time));
   const std::vector<double> response(answer.response.begin(), answer.response.end());
   file.numbers("/curve/time_s", times_s);

@@ -26,7 +26,7 @@ std::string percent(double share) {
 
 /// "holds, 0.012 %", "diverged".
 std::string verdict_words(const StabilityVerdict& v) {
-  const std::string name(stability_class_name(v.found));
+  std::string name(stability_class_name(v.found));
   // What is left of rounding is no error to speak of.
   constexpr double kRounding = 1e-12;
   if (!std::isfinite(v.error)) return name;

@@ -185,6 +185,7 @@ Json convergence_json(const std::vector<SweepConvergence>& all) {
 std::vector<Figure> convergence_figures(const std::vector<SweepConvergence>& all,
                                         const std::string& title) {
   std::vector<Figure> figures;
+  figures.reserve(all.size());
   for (const SweepConvergence& c : all) figures.push_back(convergence_figure(c, title));
   return figures;
 }

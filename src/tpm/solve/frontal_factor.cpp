@@ -42,7 +42,7 @@ class Elimination {
   /// False if the front's pivot is not positive definite.
   [[nodiscard]] bool eliminate(std::size_t number) {
     const FrontalPattern::Front& front = pattern_.fronts()[number];
-    const auto own = static_cast<Index>(3 * front.own);
+    const auto own = Index{3} * front.own;
     const auto reached = static_cast<Index>(3 * front.rows.size());
     dense_.setZero(own + reached, own + reached);
     add_matrix(front);
@@ -60,9 +60,9 @@ class Elimination {
 
  private:
   [[nodiscard]] static Index place_in(const FrontalPattern::Front& front, std::uint32_t place) {
-    if (place < front.first + front.own) return static_cast<Index>(3 * (place - front.first));
+    if (place < front.first + front.own) return Index{3} * (place - front.first);
     const auto at = std::lower_bound(front.rows.begin(), front.rows.end(), place);
-    return static_cast<Index>(3 * front.own) + 3 * (at - front.rows.begin());
+    return Index{3} * front.own + 3 * (at - front.rows.begin());
   }
 
   [[nodiscard]] std::vector<std::size_t> children_of(std::size_t number) const {
@@ -206,7 +206,7 @@ void FrontalFactor::solve(float* x) noexcept {
       for (std::size_t i = 0; i < front.count; ++i) {
         copy_node(x + std::size_t{4} * row[i], reached_.data() + 3 * i);
       }
-      std::fill(reached_.begin() + 3 * front.count,
+      std::fill(reached_.begin() + std::ptrdiff_t{3} * front.count,
                 reached_.begin() + static_cast<std::ptrdiff_t>(down.stride), 0.0F);
       kernels_.subtract_transposed(down, reached_.data(), sum_.data());
     }

@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+"""Kills each command at the calls that change a file, runs it again and makes one table.
+
+    python3 scripts/kill_table.py build/release/tpm build/release/tests/libfault_at.so -o reports/faults/kills.md
+
+SIGKILL comes at the n-th call that opens a file for writing, writes (before it and half-way), syncs, renames, cuts
+or removes: every n to --first, then --spread more. Before the second run, a file of a wanted name is either as it
+was before the command or whole; a recording of a session may also end early, and then `tpm hil export` has to read
+every whole row of it. The second run (with --force where an early recording stands) has to end as an undisturbed
+one does, write the same bytes and leave nothing else behind. Exit code 1 if any
+did otherwise.
+"""
+import argparse
+import concurrent.futures
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from fault_table import OLD, Command, files_in, numbers, write_inputs
+
+COMMANDS = [
+    Command("sweep", "sweep in/sweep.json -o sweep.h5 --workers 2", ["sweep.h5", "sweep.csv", "sweep.run.json"],
+            varies=["sweep.run.json"]),
+    Command("simulate", "simulate in/indented.json -o sim.h5 --checkpoint-every '50 ms'",
+            ["sim.h5", "sim.xdmf"], weight=4),
+    Command("fit FOLDER", "fit in/folder --law linear-1 --starts 2 --no-draw -o fit.txt", ["fit.txt"], weight=4),
+    Command("hil run", "hil run in/session.json -o s.tpmrec", ["s.tpmrec"], old=False),
+    Command("report", "report -o paper", [], varies=["paper/report.run.json"], weight=100),
+]
+RECORDING = ".tpmrec"
+
+
+def tpm_in(folder: Path, tpm: Path, arguments: list, **environment) -> subprocess.CompletedProcess:
+    return subprocess.run([tpm, *arguments], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, timeout=300,
+                          env={**os.environ, "XDG_CACHE_HOME": str(folder.parent / "cache"), **environment})
+
+
+def rows_in(tpm: Path, content: bytes) -> int:
+    """Rows that tpm reads from a recording; -1 if it refuses it."""
+    with tempfile.TemporaryDirectory(prefix="tpm-rows-") as name:
+        folder = Path(name) / "work"
+        folder.mkdir()
+        (folder / "r.tpmrec").write_bytes(content)
+        done = tpm_in(folder, tpm, ["hil", "export", "r.tpmrec", "-o", "r.h5", "--format", "json"])
+        return json.loads(done.stdout)["rows"] if done.returncode == 0 else -1
+
+
+def end_of_row(tpm: Path, recording: bytes, row: int) -> int:
+    """How much of a recording has to be there for tpm to read so many rows."""
+    none, enough = 0, len(recording)
+    while enough - none > 1:
+        middle = (none + enough) // 2
+        if rows_in(tpm, recording[:middle]) >= row:
+            enough = middle
+        else:
+            none = middle
+    return enough
+
+
+@dataclass
+class RowPlaces:
+    """Where the rows of a recording stand in its file."""
+    first: int
+    length: int
+    count: int
+
+    def whole(self, size: int) -> int:
+        return max(0, min(self.count, (size - self.first) // self.length))
+
+
+def places_in(tpm: Path, recording: bytes) -> RowPlaces:
+    one, two = (end_of_row(tpm, recording, row) for row in (1, 2))
+    return RowPlaces(2 * one - two, two - one, rows_in(tpm, recording))
+
+
+def killed(tpm: Path, preload: Path, inputs: Path, command: Command, at: int, plain: dict,
+           places: "RowPlaces | None") -> tuple:
+    """Whether the signal came, and what went wrong."""
+    with tempfile.TemporaryDirectory(prefix="tpm-kill-") as name:
+        folder = Path(name) / "work"
+        folder.mkdir()
+        (folder / "in").symlink_to(inputs)
+        for output in command.outputs if command.old else []:
+            (folder / output).write_bytes(OLD)
+        first = tpm_in(folder, tpm, shlex.split(command.arguments), LD_PRELOAD=str(preload), TPM_FAULT_CALL="change",
+                       TPM_FAULT_HOW="kill", TPM_FAULT_AT=str(at), TPM_FAULT_PROGRAM=tpm.name)
+        if first.returncode != -signal.SIGKILL:
+            return False, []
+        found, again = [], shlex.split(command.arguments)
+        for output, content in files_in(folder).items():
+            if output not in plain or content == OLD:
+                continue
+            if output.endswith(RECORDING):
+                read = rows_in(tpm, content)
+                if not plain[output].startswith(content):
+                    found.append(f"{output}: its bytes are not those of an undisturbed run's beginning")
+                if read != places.whole(len(content)):
+                    found.append(f"{output}: {read} rows are read of {places.whole(len(content))} whole ones")
+                again.append("--force")
+            elif output not in command.varies and content != plain[output]:
+                found.append(f"{output} is not whole after the signal")
+        second = tpm_in(folder, tpm, again)
+        if second.returncode != command.code:
+            found.append(f"second run: exit code {second.returncode}: {second.stderr.decode(errors='replace')[-160:]}")
+        files = files_in(folder)
+        for output, content in plain.items():
+            if output not in command.varies and files.get(output) != content:
+                found.append(f"{output} differs from an undisturbed run's")
+        found += [f"left over: {output}" for output in files if output not in plain]
+        return True, found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tpm", type=Path)
+    parser.add_argument("preload", type=Path)
+    parser.add_argument("--first", type=int, default=300)
+    parser.add_argument("--spread", type=int, default=100)
+    parser.add_argument("--only", help="commands whose name begins so, separated by commas")
+    parser.add_argument("--heaviest", type=int, default=1000, help="leave out commands of a larger weight")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("-o", "--output", type=Path)
+    options = parser.parse_args()
+    tpm, preload = options.tpm.resolve(), options.preload.resolve()
+    only = tuple(options.only.split(",")) if options.only else ("",)
+    rows, failures = [], []
+    with tempfile.TemporaryDirectory(prefix="tpm-kills-") as work, \
+            concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        inputs = Path(work) / "in"
+        write_inputs(tpm, inputs)
+        for command in COMMANDS:
+            if not command.name.startswith(only) or command.weight > options.heaviest:
+                continue
+            folder, mark = Path(work) / command.name.replace(" ", "_") / "work", Path(work) / "mark"
+            folder.mkdir(parents=True)
+            (folder / "in").symlink_to(inputs)
+            mark.unlink(missing_ok=True)
+            done = tpm_in(folder, tpm, shlex.split(command.arguments), LD_PRELOAD=str(preload), TPM_FAULT_CALL="change",
+                          TPM_FAULT_HOW="kill", TPM_FAULT_AT="0", TPM_FAULT_PROGRAM=tpm.name, TPM_FAULT_MARK=str(mark))
+            if done.returncode != command.code:
+                raise SystemExit(f"kill_table.py: {command.name}: exit code {done.returncode} undisturbed: "
+                                 f"{done.stderr.decode(errors='replace').strip()}")
+            calls = max(int(line.split()[1]) for line in mark.read_text().splitlines() if line.startswith("calls "))
+            plain = files_in(folder)
+            recording = next((content for output, content in plain.items() if output.endswith(RECORDING)), None)
+            places = places_in(tpm, recording) if recording else None
+            tried = numbers(calls, options.first, options.spread, command.weight)
+            results = list(pool.map(lambda n: killed(tpm, preload, inputs, command, n, plain, places), tried))
+            wrong = [(n, found) for n, (came, found) in zip(tried, results) if found]
+            rows.append((command.name, calls, sum(came for came, _ in results), len(wrong)))
+            for n, found in wrong:
+                failures.append(f"{command.name}: killed at {n}: {'; '.join(found)}")
+                print(failures[-1], file=sys.stderr)
+            print(*rows[-1], sep="\t", flush=True)
+    text = (f"`python3 scripts/kill_table.py {' '.join(sys.argv[1:])}`\n\n# Killed at every call that changes a file\n\n"
+            "Every row: a command, the calls that change a file in an undisturbed run, how many runs were killed at one of\n"
+            "them, and after how many of these the second run did not end with the files of an undisturbed run.\n\n"
+            "| command | calls | killed | otherwise |\n| --- | --- | --- | --- |\n")
+    text += "".join("| " + " | ".join(str(cell) for cell in row) + " |\n" for row in rows)
+    text += "".join(f"\n- {line}" for line in failures)
+    if options.output:
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        options.output.write_text(text)
+    print(f"{sum(row[2] for row in rows)} runs, {len(failures)} otherwise")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
