@@ -43,7 +43,7 @@ template <class T>
 bool take_all(std::string_view& from, std::vector<T>& values) {
   const std::size_t bytes = values.size() * sizeof(T);
   if (from.size() < bytes) return false;
-  std::memcpy(values.data(), from.data(), bytes);
+  if (bytes > 0) std::memcpy(values.data(), from.data(), bytes);  // no vector, no address
   from.remove_prefix(bytes);
   return true;
 }

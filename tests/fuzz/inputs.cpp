@@ -1,0 +1,145 @@
+#include "fuzz/inputs.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <string>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/curve/description.hpp"
+#include "tpm/curve/import.hpp"
+#include "tpm/curve/recording_file.hpp"
+#include "tpm/fit/config.hpp"
+#include "tpm/fit/tables.hpp"
+#include "tpm/haptics/recording.hpp"
+#include "tpm/haptics/session.hpp"
+#include "tpm/law/law_file.hpp"
+#include "tpm/network/mesh_file.hpp"
+#include "tpm/plan/operations.hpp"
+#include "tpm/scene/experiment_scene.hpp"
+#include "tpm/scene/scene.hpp"
+#include "tpm/simulate/checkpoint.hpp"
+#include "tpm/store/delimited.hpp"
+#include "tpm/store/hdf5.hpp"
+#include "tpm/store/json.hpp"
+#include "tpm/store/row_log.hpp"
+#include "tpm/study/claims.hpp"
+#include "tpm/study/design.hpp"
+#include "tpm/study/organ_study.hpp"
+#include "tpm/sweep/block_log.hpp"
+#include "tpm/sweep/sweep.hpp"
+
+namespace tpm::fuzz {
+namespace {
+
+using Path = std::filesystem::path;
+
+void quiet(const std::string& /*note*/) {}
+
+void read_delimited_text(const Path& path) {
+  (void)read_measured_file(path);
+}
+
+void read_digitizer_project(const Path& path) {
+  (void)import_series(path, ImportOptions{});
+}
+
+void read_mesh(const Path& path) {
+  (void)read_closed_mesh(path, parse_unit("mm", Dimension::length, "fuzz"));
+}
+
+void read_claim_file(const Path& path) {
+  const Json document = read_json(path);
+  (void)read_claims(document, path.native());
+  (void)read_printed_tables(document, path.native());
+}
+
+void read_scene(const Path& path) {
+  (void)read_experiment(path);
+}
+
+void read_block_log(const Path& path) {
+  static const Sweep sweep = parse_sweep(
+      parse_json(R"({"model": "single_contact", "indentation": {"kind": "step_hold"}, "block": 2,
+                     "axes": [{"parameter": "depth", "values": ["2 mm", "4 mm", "6 mm"]},
+                              {"parameter": "spacing", "values": ["20 mm", "30 mm"]}],
+                     "outputs": ["peak_force", "end_force"]})",
+                 "fuzz"),
+      "fuzz", {});
+  (void)BlockLog::to_read(path, sweep, quiet);
+}
+
+void read_checkpoint_file(const Path& path) {
+  (void)read_checkpoint(path, "fuzz", quiet);
+}
+
+/// Every member of the root and of its groups, as numbers.
+void read_hdf5(const Path& path) {
+  const Hdf5Reader file(path);
+  for (const std::string& name : file.members("/")) {
+    try {
+      (void)file.extents("/" + name);
+      (void)file.numbers("/" + name);
+    } catch (const Error&) {  // a group, or no numbers
+      continue;
+    }
+  }
+}
+
+constexpr Input kInputs[] = {
+    {"delimited_text", ".csv", read_delimited_text},
+    {"curve_description", ".json", [](const Path& p) { (void)read_description(p); }},
+    {"digitizer_project", ".json", read_digitizer_project},
+    {"scene", ".json", read_scene},
+    {"fit", ".json", [](const Path& p) { (void)read_fit_config(p); }},
+    {"fit_tables", ".json", [](const Path& p) { (void)read_fit_problem(p); }},
+    {"session", ".json", [](const Path& p) { (void)read_session(p, {}); }},
+    {"sweep", ".json", [](const Path& p) { (void)read_sweep(p); }},
+    {"design", ".json", [](const Path& p) { (void)read_design(p); }},
+    {"organ_study", ".json", [](const Path& p) { (void)read_organ_study(p); }},
+    {"costs", ".json", [](const Path& p) { (void)read_costs(p); }},
+    {"law", ".json", [](const Path& p) { (void)read_law(p); }},
+    {"claims", ".json", read_claim_file},
+    {"stl", ".stl", read_mesh},
+    {"obj", ".obj", read_mesh},
+    {"recording", ".tpmrec", [](const Path& p) { (void)read_recording(p); }},
+    {"row_log", ".rows", [](const Path& p) { (void)read_row_log(p); }},
+    {"sweep_log", ".blocks", read_block_log},
+    {"checkpoint", ".h5", read_checkpoint_file},
+    {"hdf5", ".h5", read_hdf5},
+};
+
+}  // namespace
+
+std::span<const Input> inputs() {
+  return kInputs;
+}
+
+const Input& input_named(std::string_view name) {
+  const auto* const found =
+      std::ranges::find_if(kInputs, [name](const Input& input) { return input.name == name; });
+  if (found == std::end(kInputs)) {
+    std::string known;
+    for (const Input& input : kInputs) known.append(known.empty() ? "" : ", ").append(input.name);
+    throw Error(ExitCode::usage, "TPM_FUZZ", "no input '" + std::string(name) + "'", known);
+  }
+  return *found;
+}
+
+bool reads(const Input& input, const std::filesystem::path& folder, std::string_view bytes) {
+  const Path path = folder / ("case" + std::string(input.ending));
+  {
+    std::ofstream out(path, std::ios::binary | std::ios::trunc);
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    if (!out.flush())
+      throw Error(ExitCode::environment, path.native(), "cannot be written", "room");
+  }
+  try {
+    input.read(path);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace tpm::fuzz
