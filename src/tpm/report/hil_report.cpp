@@ -32,19 +32,26 @@ std::vector<double> thinned(const std::vector<double>& values, double scale = 1.
   return result;
 }
 
-/// Where the phases ask the tool to be, mm; nothing while they ask for a push.
-Series asked_depth(const HilRecording& recording, const std::vector<double>& time_s) {
+/// Where the phases ask the tool to be, mm: a curve for each stretch of time; none while they ask
+/// for a push.
+std::vector<Series> asked_depths(const HilRecording& recording, const std::vector<double>& time_s) {
   OperatorScript script = recording.session.operator_script();
-  Series asked;
-  asked.label = "asked for";
-  asked.provenance = "model";
+  std::vector<Series> stretches;
+  bool before = false;
   for (const double time : time_s) {
     const OperatorAim aim = script.at(time);
     const bool place = aim.aim == OperatorPiece::Aim::place;
-    asked.x.push_back(time);
-    asked.y.push_back(place ? 1e3 * aim.value : std::numeric_limits<double>::quiet_NaN());
+    if (place && !before) {
+      stretches.emplace_back();
+      stretches.back().label = "asked for";
+      stretches.back().provenance = "model";
+    }
+    before = place;
+    if (!place) continue;
+    stretches.back().x.push_back(time);
+    stretches.back().y.push_back(1e3 * aim.value);
   }
-  return asked;
+  return stretches;
 }
 
 /// Some of the values, so that they can be told from the curve that they lie on.
@@ -92,18 +99,18 @@ Figure session_figure(const HilRecording& recording, const Verification& v) {
   std::vector<Series> forces{line("reference", time, thinned(v.reference_N)),
                              some_points("commanded", v.time_s, v.commanded_N, "model")};
   add_measured(forces, recording);
-  figure.panels = {{"motion",
-                    seconds,
-                    {"depth", "mm", false, std::nullopt, std::nullopt},
-                    {asked_depth(recording, time), line("tool", time, thinned(v.depth_m, 1e3))}},
-                   {"force",
-                    seconds,
-                    {"contact force", "N", false, std::nullopt, std::nullopt},
-                    std::move(forces)},
-                   {"commanded less reference",
-                    seconds,
-                    {"force error", "mN", false, std::nullopt, std::nullopt},
-                    {line("error", time, thinned(v.error_N, 1e3))}}};
+  std::vector<Series> depths = asked_depths(recording, time);
+  depths.push_back(line("tool", time, thinned(v.depth_m, 1e3)));
+  figure.panels = {
+      {"motion", seconds, {"depth", "mm", false, std::nullopt, std::nullopt}, std::move(depths)},
+      {"force",
+       seconds,
+       {"contact force", "N", false, std::nullopt, std::nullopt},
+       std::move(forces)},
+      {"commanded less reference",
+       seconds,
+       {"force error", "mN", false, std::nullopt, std::nullopt},
+       {line("error", time, thinned(v.error_N, 1e3))}}};
   return figure;
 }
 
