@@ -191,20 +191,30 @@ def numbers(calls: int, first: int, spread: int, weight: int) -> list:
     return sorted(chosen)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments_of(description: str) -> argparse.ArgumentParser:
+    """What both tables are asked for with."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("tpm", type=Path)
     parser.add_argument("preload", type=Path)
     parser.add_argument("--first", type=int, default=300)
     parser.add_argument("--spread", type=int, default=100)
     parser.add_argument("--only", help="commands whose name begins so, separated by commas")
-    parser.add_argument("--calls", help="kinds of calls, separated by commas")
     parser.add_argument("--heaviest", type=int, default=1000, help="leave out commands of a larger weight")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("-o", "--output", type=Path)
+    return parser
+
+
+def is_wanted(command: Command, options: argparse.Namespace) -> bool:
+    only = tuple(options.only.split(",")) if options.only else ("",)
+    return command.name.startswith(only) and command.weight <= options.heaviest
+
+
+def main() -> int:
+    parser = arguments_of(__doc__)
+    parser.add_argument("--calls", help="kinds of calls, separated by commas")
     options = parser.parse_args()
     tpm, preload = options.tpm.resolve(), options.preload.resolve()
-    only = tuple(options.only.split(",")) if options.only else ("",)
     calls = options.calls.split(",") if options.calls else None
     rows, failures = [], []
     with tempfile.TemporaryDirectory(prefix="tpm-faults-") as work, \
@@ -212,7 +222,7 @@ def main() -> int:
         inputs = Path(work) / "in"
         write_inputs(tpm, inputs)
         for command in COMMANDS:
-            if not command.name.startswith(only) or command.weight > options.heaviest:
+            if not is_wanted(command, options):
                 continue
             for call, how in FAULTS:
                 if calls and call not in calls:

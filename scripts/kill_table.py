@@ -10,7 +10,6 @@ every whole row of it. The second run (with --force where an early recording sta
 one does, write the same bytes and leave nothing else behind. Exit code 1 if any
 did otherwise.
 """
-import argparse
 import concurrent.futures
 import json
 import os
@@ -22,7 +21,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from fault_table import OLD, Command, files_in, numbers, write_inputs
+from fault_table import OLD, Command, arguments_of, files_in, is_wanted, numbers, write_inputs
 
 COMMANDS = [
     Command("sweep", "sweep in/sweep.json -o sweep.h5 --workers 2", ["sweep.h5", "sweep.csv", "sweep.run.json"],
@@ -117,25 +116,15 @@ def killed(tpm: Path, preload: Path, inputs: Path, command: Command, at: int, pl
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tpm", type=Path)
-    parser.add_argument("preload", type=Path)
-    parser.add_argument("--first", type=int, default=300)
-    parser.add_argument("--spread", type=int, default=100)
-    parser.add_argument("--only", help="commands whose name begins so, separated by commas")
-    parser.add_argument("--heaviest", type=int, default=1000, help="leave out commands of a larger weight")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("-o", "--output", type=Path)
-    options = parser.parse_args()
+    options = arguments_of(__doc__).parse_args()
     tpm, preload = options.tpm.resolve(), options.preload.resolve()
-    only = tuple(options.only.split(",")) if options.only else ("",)
     rows, failures = [], []
     with tempfile.TemporaryDirectory(prefix="tpm-kills-") as work, \
             concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         inputs = Path(work) / "in"
         write_inputs(tpm, inputs)
         for command in COMMANDS:
-            if not command.name.startswith(only) or command.weight > options.heaviest:
+            if not is_wanted(command, options):
                 continue
             folder, mark = Path(work) / command.name.replace(" ", "_") / "work", Path(work) / "mark"
             folder.mkdir(parents=True)
