@@ -267,6 +267,18 @@ TEST_CASE("Control characters of names and titles are escaped on every way to th
   CHECK(std::count(option.said.begin(), option.said.end(), '\n') == 1);
 }
 
+TEST_CASE("A sweep for which the disk has no room is refused before its first cell") {
+  const test::TempFolder folder;
+  write_file(folder / "s.json",
+             R"({"model": "single_contact", "indentation": {"kind": "step_hold"},
+                 "axes": [{"parameter": "depth", "from": "1 mm", "to": "8 mm", "count": 1000000},
+                          {"parameter": "spacing", "from": "10 mm", "to": "40 mm", "count": 1000000}],
+                 "outputs": ["peak_force"]})");
+  const Ran ran = run_in(folder, "timeout -s INT 60 $TPM sweep s.json -o o.h5");
+  CHECK(ran.code == 5);
+  CHECK_THAT(ran.said, Contains("o.h5.blocks: 1e+12 cells need") && Contains("GB are free"));
+}
+
 TEST_CASE("Inputs without an end are refused") {
   const test::TempFolder folder;
   const Ran zero = run_in(folder, "$TPM simulate /dev/zero -o o.h5");

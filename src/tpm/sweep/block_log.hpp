@@ -41,6 +41,8 @@ class BlockLog {
   /// Throws Error(environment); the log is then as it was before.
   /// @param record of this block, from log_record()
   void append(std::uint64_t block, std::string_view record);
+  /// Throws Error(environment) if the disk has no room for so many blocks more.
+  void require_room(std::uint64_t blocks) const;
   /// Throws Error(bad_input) if the block was damaged since the log was opened.
   [[nodiscard]] CellBlock read(std::uint64_t block) const;
   /// Passes everything to the disk: from here on it survives the machine.
