@@ -4,7 +4,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/device/device_limits.hpp"
-#include "tpm/device/omega7.hpp"
+#include "tpm/device/force_dimension.hpp"
 #include "tpm/device/replay_device.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/store/row_log.hpp"
@@ -87,10 +87,8 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
   if (choice.kind == "virtual") {
     return std::make_shared<VirtualOmega7>(session.plant, session.operator_script());
   }
-  if (choice.kind == "omega7") return std::make_shared<Omega7>(choice.library);
-  if (choice.kind != "replay") {
-    throw Error(ExitCode::usage, "--device", "'" + printable(choice.kind) + "'",
-                "virtual, omega7 or replay");
+  if (limits_of(choice.kind).hardware()) {
+    return std::make_shared<ForceDimension>(choice.library, choice.kind, choice.which);
   }
   if (choice.replay.empty() && session.phases.back().kind == SessionPhaseKind::motion) {
     return std::make_shared<ReplayDevice>(asked_motion(session), session.phases.back().name);
@@ -105,6 +103,7 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
 
 SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                        const SessionRunOptions& options) {
+  require_within(session, limits_of(choice.kind));
   SessionRun run;
   run.model = make_loop_model(session, options.real_time, options.planning);
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
@@ -120,7 +119,7 @@ SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
     if (options.opened) options.opened(run.device, run.model);
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
-                                              to_json(run.rendering))),
+                                              options.notes, to_json(run.rendering))),
                      sizeof(ServoRecord), RowLogWriter::Name::later);
     device->prepare(preparation);
     log.appear();

@@ -38,9 +38,10 @@ double stiffness_of(const ContactModel& model, const ServoSettings& settings) {
   return std::max(kLeast_N_per_m, settings.to_model ? k.norm() : push.dot(k * push));
 }
 
-/// The vendor's numbers for "no device" and "not available".
+/// The vendor's number for "no device". 6, "not available", is said of calls that a device does not
+/// have.
 bool is_gone(int error) {
-  return error == 5 || error == 6;
+  return error == 5;
 }
 
 }  // namespace
@@ -317,6 +318,7 @@ StopCause ServoStep::write(const Eigen::Vector3d& force_N, ServoRecord& row) noe
 
 StopCause ServoStep::look_at_status() noexcept {
   status_ = device_.status();
+  hand_ = device_.hand();
   return cause_of(status_.forces_off);
 }
 
@@ -359,7 +361,11 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   count_limits(row.flags);
   if (cause != StopCause::none) return cause;
   const auto every = static_cast<std::uint64_t>(settings_.status_every);
-  return cycle_ % every == 0 ? look_at_status() : StopCause::none;
+  if (cycle_ % every != 0) return StopCause::none;
+  cause = look_at_status();
+  row.gripper_m = hand_.gripper_m;
+  row.buttons = hand_.buttons;
+  return cause;
 }
 
 /// A tool that moves in space may touch the tissue above the plane of its surface.
@@ -379,7 +385,8 @@ StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   if (cause != StopCause::none) return cause;
   row.tool_depth_m = settings_.push.dot(position_m_ - settings_.surface_m);
   const bool with_surface = !settings_.surface_before_hand_m;
-  const std::uint32_t missing = gate_->see(position_m_, row.tool_depth_m, with_surface);
+  const std::uint32_t missing =
+      gate_->see(position_m_, row.tool_depth_m, with_surface, hand_.buttons != 0);
   row.flags |= missing;
   cause = write(Eigen::Vector3d::Zero(), row);
   if (cause != StopCause::none) return cause;

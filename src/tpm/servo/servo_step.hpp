@@ -131,6 +131,7 @@ class ServoStep {
   std::optional<StartGate> gate_;
   ServoCounts counts_;
   DeviceStatus status_;
+  HandState hand_;
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d moved_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d sent_N_ = Eigen::Vector3d::Zero();
