@@ -55,7 +55,7 @@ reader_of() {
     fit) echo fit/config.cpp ;;
     fit_tables) echo fit/tables.cpp ;;
     session) echo haptics/session.cpp ;;
-    sweep) echo sweep/sweep_reader.cpp ;;
+    sweep) echo sweep/sweep_file.cpp ;;
     design) echo study/design_file.cpp ;;
     organ_study) echo study/organ_study_file.cpp ;;
     costs) echo plan/operations.cpp ;;
