@@ -279,6 +279,7 @@ TEST_CASE("Each fault ends in a safe stop within 10 ms of session, with its caus
                               Case{"watchdog", StopCause::watchdog, "watchdog"},
                               Case{"velocity", StopCause::velocity, "velocity"},
                               Case{"communication", StopCause::communication, "communication"},
+                              Case{"status", StopCause::communication, "stop"},
                               Case{"not_available", StopCause::communication, "stop"},
                               Case{"nan", StopCause::position_not_finite, "nan"});
   CAPTURE(fault.fault);

@@ -12,7 +12,7 @@
 //   events FILE       what happened, with the time of the clock: "NAME NANOSECONDS"
 //   fault NAME FIRST COUNT   at the calls of dhdGetPosition (dhdSetForce for saturated) numbered
 //                            FIRST to FIRST + COUNT - 1, from 0
-// Faults: time_guard, saturated, communication, not_available, nan, and those that stay: watchdog,
+// Faults: status, time_guard, saturated, communication, not_available, nan, and those that stay: watchdog,
 // velocity, unplugged; hang sleeps COUNT milliseconds; each slow call takes 3 ms.
 #include <algorithm>
 #include <atomic>
@@ -334,6 +334,7 @@ int dhdSetForce(double x, double y, double z, char) {
 int dhdGetStatus(int* status, char) {
   StandIn& s = here();
   if (s.unplugged) return failed(5);
+  if (due("status", s.reads - 1) || due("status", s.reads - 2)) return failed(2);  // every second
   std::fill(status, status + s.entries, 0);
   if (s.entries > 14) status[14] = s.cause;
   return 0;

@@ -355,7 +355,8 @@ DeviceAnswer ForceDimension::write(const Eigen::Vector3d& force_N) noexcept {
 DeviceStatus ForceDimension::status() noexcept {
   if (cut_) return status_;
   int entries[kStatusRoom] = {};
-  if (judged(call_.get_status(entries, id_)) != DeviceAnswer::failed) {
+  status_.failed = judged(call_.get_status(entries, id_)) == DeviceAnswer::failed;
+  if (!status_.failed) {
     const int cause = entries[kForcesOffEntry];
     status_.forces_off =
         cause >= 0 && cause <= 6 ? static_cast<ForcesOff>(cause) : ForcesOff::unknown;

@@ -184,7 +184,7 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
   write_rows(writer, recording);
   write_phases(writer, recording.session);
   std::vector<std::string> causes;
-  for (auto i = 0; i <= static_cast<std::int32_t>(StopCause::oscillation); ++i) {
+  for (auto i = 0; i <= static_cast<std::int32_t>(StopCause::position_jump); ++i) {
     causes.emplace_back(word_of(static_cast<StopCause>(i)));
   }
   writer.texts("/causes", causes);

@@ -35,19 +35,8 @@ Eigen::Matrix3Xd asked_motion(const HilSession& session) {
 }
 
 ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
-                      const LoopModel& model, const std::shared_ptr<ContactModel>& stepped,
-                      const RenderingCheck& rendering, bool guided,
+                      const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
                       const SessionRunOptions& options, RowLogWriter& log) {
-  ServoSettings servo = session.servo;
-  servo.friction_N_s_per_m = rendering.friction_N_s_per_m;
-  servo.delay_periods = guided ? rendering.delay_periods : 0;
-  if (!guided) {  // a recorded motion begins where it began, and nobody feels it
-    servo.gate.reset();
-    servo.energy_allowance_J = std::numeric_limits<double>::infinity();
-    servo.watch_oscillation = false;
-  }
-  servo.model_push = model.push;
-  servo.to_model = model.to_model;
   const RecordSink sink = [&](const ServoRecord& row) {
     const bool waits = row.phase < 0 && row.stop == StopCause::none;
     if (!waits) log.append(&row);
@@ -101,6 +90,22 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
   return std::make_shared<ReplayDevice>(motion_of(recording), recording.name);
 }
 
+ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
+                            const RenderingCheck& rendering, bool guided) {
+  ServoSettings servo = session.servo;
+  servo.friction_N_s_per_m = rendering.friction_N_s_per_m;
+  servo.delay_periods = guided ? rendering.delay_periods : 0;
+  if (!guided) {
+    servo.gate.reset();
+    servo.energy_allowance_J = std::numeric_limits<double>::infinity();
+    servo.watch_oscillation = false;
+    servo.most_speed_m_per_s = std::numeric_limits<double>::infinity();
+  }
+  servo.model_push = model.push;
+  servo.to_model = model.to_model;
+  return servo;
+}
+
 SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                        const SessionRunOptions& options) {
   require_within(session, limits_of(choice.kind));
@@ -123,8 +128,9 @@ SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                      sizeof(ServoRecord), RowLogWriter::Name::later);
     device->prepare(preparation);
     log.appear();
-    run.outcome = run_loop(session, device, run.model, stepped, run.rendering,
-                           choice.kind != "replay", options, log);
+    const ServoSettings servo =
+        loop_settings(session, run.model, run.rendering, choice.kind != "replay");
+    run.outcome = run_loop(session, device, stepped, servo, options, log);
     log.close(to_text(recording_closing(run.outcome)));
   } catch (...) {
     device->stop();

@@ -43,6 +43,12 @@ struct SessionRun {
   ServoOutcome outcome;
 };
 
+/// What the loop of a session is set to, with what is known of its model and device.
+/// @param guided a hand holds the device; else a recorded motion begins where it began, and nobody
+///        feels it
+[[nodiscard]] ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
+                                          const RenderingCheck& rendering, bool guided);
+
 /// Runs a session and records it. A rendering that would be unstable is refused, forces and phases
 /// begin when the tool is in place (StartGate; rows until then are shown and not recorded).
 /// In real time the rows written by now are passed to the system

@@ -28,6 +28,7 @@ enum class StopCause : std::int32_t {
   untrusted,      ///< the model did not trust its forces for too long
   energy,         ///< what was rendered gave the hand energy that the tissue did not have
   oscillation,    ///< the force went up and down by itself
+  position_jump,  ///< the device read a place that no hand reaches so soon
 };
 
 [[nodiscard]] std::string_view word_of(StopCause cause);

@@ -88,6 +88,8 @@ std::string_view word_of(StopCause cause) {
       return "energy given to the hand";
     case StopCause::oscillation:
       return "oscillation";
+    case StopCause::position_jump:
+      return "position jumped";
   }
   return "unknown";
 }
@@ -112,7 +114,7 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
   device_.await();
 }
 
-StopCause ServoStep::read(ServoRecord& row) noexcept {
+StopCause ServoStep::read(int missed, ServoRecord& row) noexcept {
   const Eigen::Vector3d before = position_m_;
   const DeviceAnswer answer = device_.read(position_m_);
   if (answer == DeviceAnswer::finished) return StopCause::finished;
@@ -128,6 +130,10 @@ StopCause ServoStep::read(ServoRecord& row) noexcept {
   std::copy_n(position_m_.data(), 3, row.position_m);
   if (!position_m_.allFinite()) return StopCause::position_not_finite;
   moved_m_ = begun_ ? Eigen::Vector3d(position_m_ - before) : Eigen::Vector3d::Zero();
+  stale_ += 1 + missed;
+  const double reach_m = settings_.most_speed_m_per_s * stale_ * settings_.period_s;
+  if (moved_m_.norm() > reach_m) return StopCause::position_jump;
+  if (answer != DeviceAnswer::time_guard) stale_ = 0;
   return StopCause::none;
 }
 
@@ -319,7 +325,9 @@ StopCause ServoStep::write(const Eigen::Vector3d& force_N, ServoRecord& row) noe
 StopCause ServoStep::look_at_status() noexcept {
   status_ = device_.status();
   hand_ = device_.hand();
-  return cause_of(status_.forces_off);
+  const StopCause cause = cause_of(status_.forces_off);
+  if (cause != StopCause::none || !status_.failed) return cause;
+  return is_gone(status_.error) ? StopCause::unplugged : StopCause::communication;
 }
 
 bool ServoStep::storm(int missed) noexcept {
@@ -345,7 +353,7 @@ void ServoStep::count_limits(std::uint32_t flags) noexcept {
 
 StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   if (storm(missed)) return StopCause::overrun_storm;
-  StopCause cause = read(row);
+  StopCause cause = read(missed, row);
   if (cause != StopCause::none) return cause;
   if (!begun_ && settings_.surface_before_hand_m) {
     settings_.surface_m = position_m_ + *settings_.surface_before_hand_m * settings_.push;
@@ -381,7 +389,7 @@ StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   row.phase = -1;
   row.flags |= kWaiting;
   gate_->count(static_cast<std::uint64_t>(missed) + 1);
-  StopCause cause = read(row);
+  StopCause cause = read(missed, row);
   if (cause != StopCause::none) return cause;
   row.tool_depth_m = settings_.push.dot(position_m_ - settings_.surface_m);
   const bool with_surface = !settings_.surface_before_hand_m;

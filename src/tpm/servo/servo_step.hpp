@@ -42,7 +42,8 @@ struct ServoSettings {
   /// Stop if so many of the last 1000 cycles were late, or so many periods were missed at once.
   int most_late = 100;
   int most_missed = 50;
-  int status_every = 2;  ///< cycles
+  int status_every = 2;             ///< cycles
+  double most_speed_m_per_s = 5.0;  ///< of a hand; a position that needs more is not believed
 };
 
 struct ServoCounts {
@@ -105,7 +106,7 @@ class ServoStep {
   [[nodiscard]] StopCause wait(int missed, ServoRecord& row) noexcept;
   [[nodiscard]] ServoRecord begun_row() const noexcept;
   [[nodiscard]] bool free_in_space() noexcept;
-  [[nodiscard]] StopCause read(ServoRecord& row) noexcept;
+  [[nodiscard]] StopCause read(int missed, ServoRecord& row) noexcept;
   void touch(int missed, ServoRecord& row) noexcept;
   void touch_along_push(int steps, ServoRecord& row) noexcept;
   void touch_in_space(int steps, ServoRecord& row) noexcept;
@@ -147,7 +148,8 @@ class ServoStep {
   double tissue_work_J_ = 0.0;                               ///< on the surface in this cycle
   double doubted_ = 0.0;  ///< periods without trust, forgotten ten times as slowly
   bool doubted_before_ = false;
-  int owed_ = 0;  ///< periods that the model has not lived through yet
+  int owed_ = 0;   ///< periods that the model has not lived through yet
+  int stale_ = 0;  ///< periods for which the position is that of an earlier call
   ServoRecord last_;
   std::uint64_t cycle_ = 0;
   std::size_t phase_ = 0;
