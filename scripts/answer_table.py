@@ -1,8 +1,11 @@
 #!/usr/bin/env python3
 """Gives the same hostile inputs to two versions of the program and makes one table of both answers.
 
-    python3 scripts/answer_table.py OLD/tpm build/release/tpm build/release/tests/libfault_at.so \
-        -o reports/faults/inputs.md
+    python3 scripts/answer_table.py inputs OLD/build/release/tpm build/release/tpm -o reports/faults/inputs.md
+    python3 scripts/answer_table.py sessions OLD/build/release/tpm build/release/tpm -o reports/safety/sessions.md
+
+`inputs`: files, names and disks; `sessions`: the haptic loop, on the simulated device and through the stand-in for
+the vendor's library: each version's own, but where a case is about the library's strictness the new one's.
 
 Each program is build/PRESET/tpm of its own source tree, whose data it uses. Every case runs in a folder of its own, with 30 s and 4 GB. An answer is the exit code (or the signal, or that
 time was up), how many lines the message has and its first, and what the case looks at afterwards. Needs numpy
@@ -23,6 +26,7 @@ from typing import Callable, Optional
 
 SOURCE = Path(__file__).resolve().parent.parent
 SECONDS, BYTES = 30, 4_000_000
+STAND_IN = "tests/stand_in_dhd/libstand_in_dhd_whole.so"
 SHOWN = 150  # characters of a message that are shown
 
 LIVER = {"organ": {"kind": "liver", "count": 60}, "material": {"eta1": "16800 Pa s"}}
@@ -259,6 +263,159 @@ CASES = [
     Case("9", "a polygon of 600,000 corners", polygon, "$TPM network check s.json", "test_mesh"),
 ]
 
+STAR = {"model": {"kind": "element", "scene": {
+            "organ": {"kind": "star", "spacing": "30 mm"},
+            "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"}}},
+        "indentations": {"depths": ["4 mm"], "rates": ["4 mm/s"], "hold": "1 s", "rest": "1 s"}}
+
+
+def star(limits=None, modulus=None, **more) -> dict:
+    session = json.loads(json.dumps({**STAR, **more}))
+    if limits:
+        session["limits"] = limits
+    if modulus:
+        session["model"]["scene"]["material"].update(E1=modulus, E2=modulus, Eprime=modulus)
+    return session
+
+
+# 2 mm above the surface, to 4 mm within 1.5 s, held, back.
+HAND = "".join(f"place {end} {begin} {to} 0 0 0 0 0 0\n" for end, begin, to in [
+    (0.5, -0.002, -0.002), (2.0, -0.002, 0.004), (3.0, 0.004, 0.004), (4.5, 0.004, -0.002), (1e9, -0.002, -0.002)])
+
+
+def scripted(session: dict, *lines: str) -> Callable:
+    """A session, and what the stand-in for the vendor's library is told."""
+    def make(folder: Path) -> None:
+        files(s__json=session)(folder)
+        said = "\n".join(["operator FOLDER/hand", *lines])
+        (folder / "script").write_text(said.replace("FOLDER", str(folder)) + "\n")
+        (folder / "hand").write_text(HAND)
+    return make
+
+
+def recorded(folder: Path):
+    """Columns of the recording, as the program that made it exports them; None if there is none."""
+    import h5py
+    if not (folder / "r.tpmrec").exists():
+        return None
+    done = subprocess.run([os.environ["TPM_LOOKED"], "hil", "export", "r.tpmrec", "-o", "looked.h5"], cwd=folder,
+                          capture_output=True)
+    if done.returncode not in (0, 1) or not (folder / "looked.h5").exists():
+        return None
+    with h5py.File(folder / "looked.h5") as file:
+        return {name: file["rows"][name][()] for name in file["rows"]}
+
+
+def force_and_motion(folder: Path) -> str:
+    import numpy
+    rows = recorded(folder)
+    if rows is None or len(rows["time_s"]) < 3:
+        return "nothing recorded"
+    size = numpy.sqrt(sum(rows[f"commanded_{axis}_N"] ** 2 for axis in "xyz"))
+    end = rows["tool_depth_m"][-1000:]
+    return (f"largest force {size.max():.3g} N, largest jump {numpy.abs(numpy.diff(size[:-1])).max():.3g} N, "
+            f"in its last second {1e3 * (end.max() - end.min()):.3g} mm from peak to peak, observer at worst "
+            f"{1e3 * rows['observed_J'].min():.3g} mJ")
+
+
+def lateness(folder: Path) -> str:
+    rows = recorded(folder)
+    return "nothing recorded" if rows is None or not len(rows["time_s"]) else f"latest {1e3 * rows['woke_late_s'].max():.3g} ms in the recording"
+
+
+def last_row(folder: Path) -> str:
+    rows = recorded(folder)
+    if rows is None:
+        return "nothing recorded"
+    zero = all(float(values[-1]) == 0.0 for name, values in rows.items() if name not in ("stop", "time_s", "gripper_m"))
+    return ("**the last row is all zeros**" if zero else "the last row holds what was known last") + (
+        "" if "stop" in rows else ", no column of the stop")
+
+
+def calls_of_library(folder: Path) -> str:
+    events = (folder / "events").read_text().split() if (folder / "events").exists() else []
+    return "stop calls: " + (", ".join(e for e in events[::2] if e in ("drd_stop", "stop", "forces_off")) or "**none**")
+
+
+def rows_kept(folder: Path) -> str:
+    rows = recorded(folder)
+    return "no row is read back" if rows is None else f"{len(rows['time_s'])} rows are read back"
+
+
+RUN = "$TPM hil run s.json -o r.tpmrec"
+STRICT = "TPM_STAND_IN_SCRIPT=script $TPM hil run s.json -o r.tpmrec --device omega7 --dhd-library $STRICT_STAND_IN "
+LIBRARY = "TPM_STAND_IN_SCRIPT=script $TPM hil run s.json -o r.tpmrec --device omega7 --dhd-library $STAND_IN "
+VIRTUAL = "--time virtual"
+DEEP_SLIDE = {"model": {"kind": "surface", "tool_radius": "10 mm", "scene": {
+                  "organ": {"kind": "liver", "count": 424, "layers": 2, "spacing": "20 mm", "seed": 1},
+                  "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e5 Pa s"},
+                  "anchors": [{"kind": "far_side", "fraction": 0.3}]}},
+              "slides": {"depths": ["30 mm"], "press": "20 mm/s", "direction": [1, 0, 0], "distance": "10 mm",
+                         "rate": "10 mm/s", "rest": "0.5 s"}}
+
+SESSIONS = [
+    Case("1", "an Omega.7 that is initialised, through the vendor's library",
+         scripted(star(), "wait 250", "initialised 1"), STRICT + VIRTUAL, "test_vendor"),
+    Case("1", "one that is not, with `--may-move`", scripted(star(), "wait 250", "initialised 0"),
+         STRICT + VIRTUAL + " --may-move", "test_vendor: A device that is not initialised"),
+    Case("2", "the hand hangs 8 mm below the surface", scripted(star()),
+         "echo 'place 1e9 0.008 0.008 0 0 0 0 0 0' > hand; " + LIBRARY + VIRTUAL,
+         "test_safety: A hand that hangs in the tissue", force_and_motion),
+    Case("3", "E1 = E2 = 1e6 kPa", files(s__json=star(modulus="1e6 kPa")), RUN, "test_safety: What would be unstable"),
+    Case("3", "the same, accepted (earlier: no such option)", files(s__json=star(modulus="1e6 kPa")),
+         RUN + " $ACCEPT", "test_safety: What is unstable and accepted", force_and_motion),
+    Case("3", "5 periods of delay at 300 kPa, accepted",
+         files(s__json=star(modulus="300 kPa", virtual_device={"delay_periods": 5})), RUN + " $ACCEPT",
+         "test_safety: What is unstable and accepted", force_and_motion),
+    Case("3", "50 periods of delay", files(s__json=star(virtual_device={"delay_periods": 50})), RUN,
+         "test_safety: What would be unstable", force_and_motion),
+    *[Case("4", f"1.4 MPa, two periods of delay, pressed at 0.3 m/s, rise limited to {slew} N/s, accepted",
+           files(s__json=star(limits={"slew_N_per_s": slew}, modulus="1.4 MPa", virtual_device={"delay_periods": 2},
+                              indentations={"depths": ["8 mm"], "rates": ["300 mm/s"], "hold": "1 s", "rest": "1 s"})),
+           RUN + " $ACCEPT", "test_safety: A slip takes energy", force_and_motion) for slew in (2000, 400)],
+    Case("5", "a ball 30 mm deep in the organ", files(s__json=DEEP_SLIDE), RUN, "test_safety: A force in doubt",
+         force_and_motion),
+    Case("6", "damping 1e4 N s/m", files(s__json=star(limits={"damping_N_s_per_m": 1e4})), RUN,
+         "test_safety: Limits have ceilings"),
+    Case("6", "rise 1e9 N/s", files(s__json=star(limits={"slew_N_per_s": 1e9})), RUN,
+         "test_safety: Limits have ceilings"),
+    Case("6", "ramp-in 0 s at 3 MPa", files(s__json=star(limits={"ramp_in": "0 s"}, modulus="3 MPa")), RUN,
+         "test_safety: Limits have ceilings"),
+    Case("6", "a depth of 10 m", files(s__json=star(indentations={"depths": ["10 m"], "rates": ["4 m/s"], "hold": "1 s"})),
+         RUN, "test_safety: Limits have ceilings"),
+    Case("6", "a surface 0.5 m away", files(s__json=star(surface=["0 m", "0 m", "-0.5 m"])), RUN,
+         "test_safety: Limits have ceilings"),
+    Case("6", "a session's limit of 3 N, as the device is told",
+         scripted(star(limits={"force": "3 N"}), "wait 250", "events FOLDER/events"), LIBRARY + VIRTUAL,
+         "test_vendor: The device is told",
+         lambda folder: "told " + ", ".join(e[10:] + " mN" for e in ((folder / "events").read_text() if (folder / "events").exists() else "").split()
+                                            if e.startswith("max_force")) or "told nothing"),
+    Case("7", "Ctrl-C while the device initialises itself",
+         scripted(star(), "initialised 0", "init_ms 20000", "events FOLDER/events"),
+         "export TPM_STAND_IN_SCRIPT=script; timeout -s INT 2 $TPM hil run s.json -o r.tpmrec --device omega7 --dhd-library $STAND_IN "
+         "--may-move; code=$?; test $code = 124 || exit $code; echo 'timeout: it was ended by the signal' >&2", "test_vendor: An initialisation that moves", calls_of_library),
+    Case("8", "a stall of 29 ms at 1 kHz",
+         scripted(star(limits={"hang": "0.5 s"}), "wait 250", "period 0.001", "fault hang 1500 29"), LIBRARY + "--time real",
+         "test_servo_threads", lateness),
+    Case("10", "a session that cannot be prepared, then one that can",
+         scripted(star(), "wait 250", "initialised 0"),
+         LIBRARY + VIRTUAL + " 2> first; sed -i 's/initialised 0/initialised 1/' script; " + LIBRARY + VIRTUAL,
+         "test_vendor: A session that cannot be prepared"),
+    Case("10", "the last row of a session that a fault stopped",
+         scripted(star(), "wait 250", "fault unplugged 1500 1"), LIBRARY + VIRTUAL, "test_record", last_row),
+    Case("10", "four corrupted bytes in the middle of a recording", files(s__json=star()),
+         RUN + " >/dev/null 2>&1; printf 'XXXX' | dd of=r.tpmrec bs=1 seek=200000 conv=notrunc 2>/dev/null; "
+         "$TPM hil export r.tpmrec -o e.h5", "test_record", rows_kept),
+    Case("10", "a recording cut in the middle", files(s__json=star()),
+         RUN + " >/dev/null 2>&1; truncate -s 200000 r.tpmrec; $TPM hil export r.tpmrec -o e.h5", "test_record", rows_kept),
+    Case("11", "5 s of rest, relaxation time 10 s",
+         files(s__json={**STAR, "model": {"kind": "element", "scene": {
+             "organ": {"kind": "star", "spacing": "30 mm"},
+             "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e5 Pa s"}}},
+             "indentations": {"depths": ["4 mm"], "rates": ["1 mm/s", "4 mm/s"], "hold": "5 s", "rest": "5 s"}}),
+         RUN, "test_hil: rests"),
+]
+
 
 def limits() -> None:
     import resource
@@ -267,15 +424,16 @@ def limits() -> None:
     os.setsid()
 
 
-def answer(case: Case, tpm: Path, fault: Path) -> str:
+def answer(case: Case, tpm: Path) -> str:
     with tempfile.TemporaryDirectory(prefix="tpm-answer-") as name:
         folder = Path(name)
         case.make(folder)
         begun = time.monotonic()
         process = subprocess.Popen(["sh", "-c", case.line], cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, preexec_fn=limits,
-                                   env={**os.environ, "TPM": str(tpm), "FAULT": str(fault), "PYTHON": sys.executable,
-                                        "TPMKIT_SHARE": str(tpm.parents[2])})
+                                   env={**os.environ, "TPM": str(tpm), "PYTHON": sys.executable, "STAND_IN": str(tpm.parent / STAND_IN),
+                                        "TPMKIT_SHARE": str(tpm.parents[2]),
+                                        "ACCEPT": "--accept-unstable" if tpm == TPM_FOR_INPUTS_PATH else ""})
         try:
             _, said = process.communicate(timeout=SECONDS if "<<" not in case.line else 40 * SECONDS)
             code = process.returncode
@@ -300,32 +458,36 @@ def answer(case: Case, tpm: Path, fault: Path) -> str:
         if "600,000" in case.what:
             parts.append(f"{took:.0f} s" if took >= 1.5 else "under 2 s")
         if case.look is not None:
+            os.environ["TPM_LOOKED"] = str(tpm)
             parts.append(case.look(folder))
         return "; ".join(parts)
 
 
 def main() -> int:
-    global TPM_FOR_INPUTS
+    global TPM_FOR_INPUTS, TPM_FOR_INPUTS_PATH
     description = __doc__.split("\n\n")
     parser = argparse.ArgumentParser(description=description[0], formatter_class=argparse.RawDescriptionHelpFormatter,
                                      epilog="\n\n".join(description[1:]))
+    parser.add_argument("cases", choices=["inputs", "sessions"])
     parser.add_argument("old", type=Path)
     parser.add_argument("new", type=Path)
-    parser.add_argument("fault", type=Path, help="libfault_at.so")
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--only", help="cases whose text contains this")
     options = parser.parse_args()
-    old, new, fault = options.old.resolve(), options.new.resolve(), options.fault.resolve()
+    old, new = options.old.resolve(), options.new.resolve()
+    os.environ["STRICT_STAND_IN"] = str(new.parent / STAND_IN)
     TPM_FOR_INPUTS = str(new)
+    TPM_FOR_INPUTS_PATH = new
     os.environ["TPMKIT_SHARE"] = str(new.parents[2])
-    lines = ["# Hostile inputs", "",
+    title = "Hostile inputs" if options.cases == "inputs" else "Sessions that go wrong"
+    lines = [f"# {title}", "",
              "Every row: an input, what version dfed67b answered, what this version answers, and the test that holds it.",
-             "Made by `python3 scripts/answer_table.py OLD NEW libfault_at.so -o reports/faults/inputs.md`.", "",
+             f"Made by `python3 scripts/answer_table.py {options.cases} OLD NEW -o {options.output}`.", "",
              "| item | input | earlier answer | answer | test |", "| --- | --- | --- | --- | --- |"]
-    for case in CASES:
+    for case in CASES if options.cases == "inputs" else SESSIONS:
         if options.only and options.only not in case.what:
             continue
-        row = f"| {case.item} | {case.what} | {answer(case, old, fault)} | {answer(case, new, fault)} | {case.test} |"
+        row = f"| {case.item} | {case.what} | {answer(case, old)} | {answer(case, new)} | {case.test} |"
         print(row, file=sys.stderr, flush=True)
         lines.append(row)
     options.output.write_text("\n".join(lines) + "\n")
