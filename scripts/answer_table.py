@@ -95,6 +95,13 @@ def many_texts(folder: Path) -> None:
             file.attrs[name] = [f"text number {i} of many" * 4 for i in range(2000)]
 
 
+def wrong_depth(folder: Path) -> None:
+    import h5py
+    packed(folder)
+    with h5py.File(folder / "c.h5", "r+") as file:
+        file["curves/evren_static/depth"][1] = -1.0
+
+
 def linked_outside(folder: Path) -> None:
     import h5py
     subprocess.run([TPM_FOR_INPUTS, "data", "pack", "evren_static", "-o", "other.h5"], cwd=folder, check=True,
@@ -237,6 +244,8 @@ CASES = [
          "$TPM network check s.json", "test_errors"),
     Case("8", "HDF5 cut in the middle, for `data check`", lambda folder: (packed(folder), os.truncate(folder / "c.h5", 4096)) and None,
          "$TPM data check c.h5", "test_errors"),
+    Case("8", "HDF5 with a depth of -1 m, for `data check`", wrong_depth, "$TPM data check c.h5",
+         "test_curve: packed curves are checked"),
     Case("8", "4294967299 cells of a block", files(s__json={"organ": {"kind": "block", "cells": [4294967299, 3, 3]}}),
          "$TPM network check s.json", "test_errors: cells"),
     Case("8", "`tables --depths 1e300`", files(), "$TPM tables --depths 1e300", "test_errors: depth that overflows"),
