@@ -38,9 +38,7 @@ seeds_of() {
     design) echo configs/design_*.json ;;
     claims) echo data/paper_claims.json ;;
     organ_study) echo configs/organ_*.json ;;
-    costs) echo configs/plan/*.json ;;
     fit_tables) echo configs/liver_tables/problem.json ;;
-    checkpoint) echo tests/fuzz/corpus/hdf5/packed.h5 ;;
     row_log) echo tests/fuzz/corpus/{recording/cut.tpmrec,sweep_log/begun.blocks} ;;
   esac
 }
@@ -60,7 +58,7 @@ reader_of() {
     organ_study) echo study/organ_study_file.cpp ;;
     costs) echo plan/operations.cpp ;;
     law) echo law/law_file.cpp ;;
-    claims) echo study/claim_reader.cpp ;;
+    claims) echo study/claims.cpp ;;
     stl | obj) echo network/mesh_file.cpp ;;
     recording) echo haptics/recording.cpp ;;
     row_log) echo store/row_log.cpp ;;

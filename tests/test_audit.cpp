@@ -49,9 +49,9 @@ Json small_file(Json claim) {
   claim["quote"] = "so it says";
   file["claims"].push_back(std::move(claim));
   for (int i = 0; i < 60; ++i) {
-    const std::string below = i == 0 ? "1" : "a" + std::to_string(i - 1);
-    file["definitions"].push_back({{"name", "a" + std::to_string(i)},
-                                   {"expression", below + " + " + below},
+    const std::string below = i == 0 ? "1" : fmt::format("a{}", i - 1);
+    file["definitions"].push_back({{"name", fmt::format("a{}", i)},
+                                   {"expression", fmt::format("{0} + {0}", below)},
                                    {"where", "p. 1"}});
   }
   return file;

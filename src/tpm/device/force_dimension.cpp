@@ -106,6 +106,7 @@ std::vector<SeenDevice> look_around(const DhdLibrary& library, int count) {
 
 std::string in_a_row(const std::vector<SeenDevice>& devices) {
   std::vector<std::string> words;
+  words.reserve(devices.size());
   for (const SeenDevice& d : devices) {
     words.push_back(d.problem.empty()
                         ? fmt::format("{}: {}, serial {}", d.index, type_words(d), d.serial)

@@ -132,7 +132,7 @@ StopCause ServoStep::read(int missed, ServoRecord& row) noexcept {
   moved_m_ = begun_ ? Eigen::Vector3d(position_m_ - before) : Eigen::Vector3d::Zero();
   stale_ += 1 + missed;
   const double reach_m = settings_.most_speed_m_per_s * stale_ * settings_.period_s;
-  if (moved_m_.norm() > reach_m) return StopCause::position_jump;
+  if (moved_m_.squaredNorm() > reach_m * reach_m) return StopCause::position_jump;
   if (answer != DeviceAnswer::time_guard) stale_ = 0;
   return StopCause::none;
 }
@@ -154,9 +154,9 @@ void ServoStep::touch(int missed, ServoRecord& row) noexcept {
 
 /// The largest force that may be sent now, and the flag that says what it is limited by.
 ServoStep::Cap ServoStep::cap() const noexcept {
-  const double before_N = tissue_N_.norm();
+  const double before_N = tissue_size_N_;
   const double time = static_cast<double>(cycle_) * settings_.period_s;
-  const double ramp = settings_.ramp_in_s > 0.0 ? std::min(1.0, time / settings_.ramp_in_s) : 1.0;
+  const double ramp = time < settings_.ramp_in_s ? time / settings_.ramp_in_s : 1.0;
   const double limit = ramp * settings_.force_limit_N;
   // The model comes back from a time of doubt at the force that is being sent.
   const double rising =
@@ -191,7 +191,7 @@ double ServoStep::felt_N(const Felt& felt, const Cap& cap, ServoRecord& row) noe
   doubted_ += static_cast<double>(felt.steps);
   row.flags |= kBeyondModel;
   if (!felt.touching) return 0.0;
-  const double before_N = tissue_N_.norm();
+  const double before_N = tissue_size_N_;
   const double fallen = before_N - stiffness_N_per_m_ * std::max(0.0, felt.withdrawn_m);
   const double faded =
       before_N * std::exp(-static_cast<double>(felt.steps) * settings_.period_s / settings_.fade_s);
@@ -212,14 +212,15 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
   const double to_m = tool_m_ - slip_m_;
   OneSidedContact::Answer answer;
   const bool touched = model_N_ > 0.0;
-  for (int i = 1; i <= steps; ++i) {
+  for (int i = 1; i < steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
     answer = contact_.step(begun_ ? from_m + part * (to_m - from_m) : to_m);
   }
+  answer = contact_.step(to_m);
   if (touched && answer.touching && answer.trusted && !doubted_before_) {
     learn_stiffness(answer.force_N - model_N_, to_m - from_m);
   }
-  const double before_N = tissue_N_.norm();
+  const double before_N = tissue_size_N_;
   const double moved = answer.surface_m - surface_m_;
   const double now_N =
       felt_N({answer.force_N, from_m - to_m, steps, answer.touching, answer.trusted}, most, row);
@@ -228,6 +229,7 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
   surface_m_ = answer.surface_m;
   model_N_ = answer.force_N;
   tissue_N_ = -settings_.push * now_N;
+  tissue_size_N_ = now_N;
   row.model_force_N = answer.force_N;
   row.model_error_N = answer.error_N;
   if (answer.touching) row.flags |= kTouching;
@@ -272,6 +274,7 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
   tissue_N_ = !answer.trusted ? Eigen::Vector3d(now_N * along)
               : size_N > 0.0  ? Eigen::Vector3d(force_N * (now_N / size_N))
                               : force_N;
+  tissue_size_N_ = tissue_N_.norm();
   tissue_work_J_ = -0.5 * (before_N + tissue_N_).dot(to_m - from_m);
   leak_J_ += 0.5 * (before_N - tissue_N_).dot(moved_m_);
   model_tool_m_ = to_m;
@@ -300,7 +303,7 @@ Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
 
 StopCause ServoStep::judge_rendering(int periods) noexcept {
   energy_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
-  oscillation_.observe(sent_N_.norm(), periods);
+  if (settings_.watch_oscillation) oscillation_.observe(sent_N_.norm(), periods);
   if (energy_.too_much()) return StopCause::energy;
   if (settings_.watch_oscillation && oscillation_.found()) return StopCause::oscillation;
   const double limit = settings_.untrusted_limit_s / settings_.period_s;
@@ -368,8 +371,8 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   cause = write(with_damping(row), row);
   count_limits(row.flags);
   if (cause != StopCause::none) return cause;
-  const auto every = static_cast<std::uint64_t>(settings_.status_every);
-  if (cycle_ % every != 0) return StopCause::none;
+  if (--to_status_ > 0) return StopCause::none;
+  to_status_ = settings_.status_every;
   cause = look_at_status();
   row.gripper_m = hand_.gripper_m;
   row.buttons = hand_.buttons;

@@ -136,6 +136,8 @@ class ServoStep {
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d moved_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d sent_N_ = Eigen::Vector3d::Zero();
+  double tissue_size_N_ = 0.0;  ///< of tissue_N_
+  int to_status_ = 0;           ///< cycles until the device is asked for its status
   Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, after slip and trust
   double tool_m_ = 0.0, surface_m_ = 0.0, leak_J_ = 0.0;
   double stiffness_N_per_m_;        ///< that a slip is foretold with
