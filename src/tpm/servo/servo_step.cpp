@@ -415,15 +415,14 @@ StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   return gate_->given_up() ? StopCause::not_in_place : StopCause::none;
 }
 
-/// A row that holds what was known last, and no command.
-ServoRecord ServoStep::begun_row() const noexcept {
-  ServoRecord row = last_;
-  std::fill_n(row.commanded_N, 3, 0.0);
-  row.woke_late_s = row.busy_s = 0.0F;
-  row.flags = 0;
-  row.cycle = cycle_;
-  row.phase = static_cast<std::int32_t>(phase_);
-  return row;
+/// The row goes on from what was known last, without a command.
+void ServoStep::begin_row(int missed) noexcept {
+  std::fill_n(row_.commanded_N, 3, 0.0);
+  row_.woke_late_s = row_.busy_s = 0.0F;
+  row_.flags = 0;
+  row_.cycle = cycle_;
+  row_.phase = static_cast<std::int32_t>(phase_);
+  row_.missed = missed;
 }
 
 StopCause ServoStep::cycle(int missed, ServoRecord& row) noexcept {
@@ -432,25 +431,24 @@ StopCause ServoStep::cycle(int missed, ServoRecord& row) noexcept {
     cycle_ += static_cast<std::uint64_t>(missed);
     while (phase_ < settings_.phase_ends.size() && cycle_ >= settings_.phase_ends[phase_]) ++phase_;
   }
-  row = begun_row();
-  row.missed = missed;
+  begin_row(missed);
   if (missed > 0 && !waiting) {
-    row.flags |= kLate;
+    row_.flags |= kLate;
     ++counts_.late;
     counts_.missed += static_cast<std::uint64_t>(missed);
   }
   const bool over = phase_ >= settings_.phase_ends.size();
   const StopCause cause = over      ? StopCause::finished
-                          : waiting ? wait(missed, row)
-                                    : work(missed, row);
+                          : waiting ? wait(missed, row_)
+                                    : work(missed, row_);
   if (cause == StopCause::none) {
     if (!waiting) ++cycle_;
-    last_ = row;
-    return cause;
+  } else {
+    row_.stop = cause;
+    std::fill_n(row_.commanded_N, 3, 0.0);
+    stop(cause);
   }
-  row.stop = cause;
-  std::fill_n(row.commanded_N, 3, 0.0);
-  stop(cause);
+  row = row_;
   return cause;
 }
 

@@ -104,7 +104,7 @@ class ServoStep {
     std::uint32_t flag = 0;
   };
   [[nodiscard]] StopCause wait(int missed, ServoRecord& row) noexcept;
-  [[nodiscard]] ServoRecord begun_row() const noexcept;
+  void begin_row(int missed) noexcept;
   [[nodiscard]] bool free_in_space() noexcept;
   [[nodiscard]] StopCause read(int missed, ServoRecord& row) noexcept;
   void touch(int missed, ServoRecord& row) noexcept;
@@ -152,7 +152,7 @@ class ServoStep {
   bool doubted_before_ = false;
   int owed_ = 0;   ///< periods that the model has not lived through yet
   int stale_ = 0;  ///< periods for which the position is that of an earlier call
-  ServoRecord last_;
+  ServoRecord row_;  ///< of this cycle; what it does not know anew is from the one before
   std::uint64_t cycle_ = 0;
   std::size_t phase_ = 0;
   std::vector<char> late_;  ///< of the last cycles served, a ring
