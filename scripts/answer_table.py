@@ -7,9 +7,10 @@
 `inputs`: files, names and disks; `sessions`: the haptic loop, on the simulated device and through the stand-in for
 the vendor's library: each version's own, but where a case is about the library's strictness the new one's.
 
-Each program is build/PRESET/tpm of its own source tree, whose data it uses. Every case runs in a folder of its own, with 30 s and 4 GB. An answer is the exit code (or the signal, or that
-time was up), how many lines the message has and its first, and what the case looks at afterwards. Needs numpy
-and h5py. The last column names the test that holds the answer.
+Each program is build/PRESET/tpm of its own source tree, whose data it uses. Every case runs in a folder of its own,
+with 30 s and 4 GB (cases of many runs: 20 minutes). An answer is the exit code (or the signal, or that time was up),
+how many lines the message has and its first, and what the case looks at afterwards. Needs numpy and h5py. The last
+column names the test that holds the answer.
 """
 import argparse
 import json
@@ -443,17 +444,18 @@ def answer(case: Case, tpm: Path) -> str:
                                    env={**os.environ, "TPM": str(tpm), "PYTHON": sys.executable, "STAND_IN": str(tpm.parent / STAND_IN),
                                         "TPMKIT_SHARE": str(tpm.parents[2]),
                                         "ACCEPT": "--accept-unstable" if tpm == TPM_FOR_INPUTS_PATH else ""})
+        patience = SECONDS if "<<" not in case.line else 40 * SECONDS
         try:
-            _, said = process.communicate(timeout=SECONDS if "<<" not in case.line else 40 * SECONDS)
+            _, said = process.communicate(timeout=patience)
             code = process.returncode
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
             said, code = b"", None
         took = time.monotonic() - begun
-        lines = [line for line in said.decode(errors="replace").replace(name, "").splitlines() if line.strip()]
+        lines = [line for line in said.decode(errors="replace").replace(name, "").replace(str(tpm.parents[2]) + "/", "").splitlines() if line.strip()]
         if code is None:
-            parts = [f"**still running after {SECONDS} s**"]
+            parts = [f"**still running after {patience} s**"]
         elif code < 0 or code > 128:
             number = -code if code < 0 else code - 128
             parts = [f"**ended by {signal.Signals(number).name}**"]

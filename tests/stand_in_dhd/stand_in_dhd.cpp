@@ -12,8 +12,8 @@
 //   events FILE       what happened, with the time of the clock: "NAME NANOSECONDS"
 //   fault NAME FIRST COUNT   at the calls of dhdGetPosition (dhdSetForce for saturated) numbered
 //                            FIRST to FIRST + COUNT - 1, from 0
-// Faults: status, time_guard, saturated, communication, not_available, nan, and those that stay: watchdog,
-// velocity, unplugged; hang sleeps COUNT milliseconds; each slow call takes 3 ms.
+// Faults: status, time_guard, saturated, communication, not_available, nan; those that stay:
+// watchdog, velocity, unplugged; hang sleeps COUNT milliseconds; each slow call takes 3 ms.
 #include <algorithm>
 #include <atomic>
 #include <chrono>

@@ -83,7 +83,7 @@ struct DevicePreparation {
 struct DeviceStatus {
   ForcesOff forces_off = ForcesOff::none;
   bool failed = false;  ///< it could not be asked
-  int error = 0;  ///< of the vendor's library, 0: none
+  int error = 0;        ///< of the vendor's library, 0: none
   char error_text[64] = {};
   std::uint64_t time_guards = 0;  ///< since prepare()
   std::uint64_t saturations = 0;  ///< since prepare()

@@ -26,12 +26,12 @@ struct HazardRow {
 
 /// What the rows are held against.
 struct HazardBounds {
-  double force_N = 8.0;            ///< the session's limit
-  double rise_N = 0.4;             ///< the same of a period, 400 N/s at 1 kHz
-  double given_J = 2e-3;           ///< of a session that comes to its end
+  double force_N = 8.0;           ///< the session's limit
+  double rise_N = 0.4;            ///< the same of a period, 400 N/s at 1 kHz
+  double given_J = 2e-3;          ///< of a session that comes to its end
   double given_stopped_J = 5e-3;  ///< of one that is stopped
-  double travel_m = 0.010;         ///< of one that is stopped
-  double to_zero_s = 1.2;          ///< the same; of an injected fault `fault_to_zero_s`
+  double travel_m = 0.010;        ///< of one that is stopped
+  double to_zero_s = 1.2;         ///< the same; of an injected fault `fault_to_zero_s`
   double fault_to_zero_s = 0.01;
 };
 

@@ -150,8 +150,8 @@ class ServoStep {
   double tissue_work_J_ = 0.0;                               ///< on the surface in this cycle
   double doubted_ = 0.0;  ///< periods without trust, forgotten ten times as slowly
   bool doubted_before_ = false;
-  int owed_ = 0;   ///< periods that the model has not lived through yet
-  int stale_ = 0;  ///< periods for which the position is that of an earlier call
+  int owed_ = 0;     ///< periods that the model has not lived through yet
+  int stale_ = 0;    ///< periods for which the position is that of an earlier call
   ServoRecord row_;  ///< of this cycle; what it does not know anew is from the one before
   std::uint64_t cycle_ = 0;
   std::size_t phase_ = 0;

@@ -292,11 +292,11 @@ void BlockLog::require_room(std::uint64_t blocks) const {
   std::error_code ec;
   const auto folder = path_.has_parent_path() ? path_.parent_path() : std::filesystem::path(".");
   const auto space = std::filesystem::space(folder, ec);
-  if (ec || cells * per_cell <= static_cast<double>(space.available)) return;
+  if (ec || cells * per_cell <= static_cast<double>(space.capacity)) return;
   throw Error(ExitCode::environment, path_.string(),
-              fmt::format("{:.3g} cells need {:.3g} GB, {:.3g} GB are free", cells,
-                          1e-9 * cells * per_cell, 1e-9 * static_cast<double>(space.available)),
-              "a folder with room, a coarser axis, or --shard over several machines");
+              fmt::format("{:.3g} cells need {:.3g} GB, the disk has {:.3g}", cells,
+                          1e-9 * cells * per_cell, 1e-9 * static_cast<double>(space.capacity)),
+              "a larger disk, a coarser axis, or --shard over several machines");
 }
 
 CellBlock BlockLog::read(std::uint64_t number) const {
