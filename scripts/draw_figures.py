@@ -48,6 +48,7 @@ PROVENANCE = {
     "assumed": "chosen, not measured: open, hatched or dashed",
     "digitized": "read off a figure",
     "measured": "raw recording",
+    "simulated": "run on a simulated device",
 }
 
 STYLE = {

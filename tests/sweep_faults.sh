@@ -18,7 +18,8 @@ work=$3
 mount -t tmpfs -o size=32m tmpfs "$work" || exit 77
 cd "$work"
 mkdir disk
-mount -t tmpfs -o size=300k tmpfs disk || exit 77
+mount -t tmpfs -o size=8m tmpfs disk || exit 77
+head -c 8081408 /dev/zero >disk/filler  # 300 kB are left
 
 fail() {
   echo "sweep_faults.sh: $1" >&2
@@ -45,13 +46,13 @@ cat >sweep.json <<'END'
 END
 "$tpm" sweep sweep.json -o whole.h5 >out
 
-echo "a disk of 300 kB"
+echo "a disk with 300 kB left"
 refused 5 "$tpm" sweep sweep.json -o disk/a.h5
 [ ! -e disk/a.h5 ] || fail "a result without room"
 kept=$(wc -c <disk/a.h5.blocks)
 [ "$kept" -gt 200000 ] || fail "only $kept bytes kept"
 echo "there is room again"
-mount -o remount,size=8m disk
+rm disk/filler
 "$tpm" sweep sweep.json -o disk/a.h5 >out
 cmp disk/a.h5 whole.h5 || fail "another result after the full disk"
 grep -q '"blocks_found_in_the_log": [1-9]' disk/a.run.json || fail "what was kept was not used"

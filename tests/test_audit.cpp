@@ -48,6 +48,12 @@ Json small_file(Json claim) {
   claim["where"] = "p. 1";
   claim["quote"] = "so it says";
   file["claims"].push_back(std::move(claim));
+  for (int i = 0; i < 60; ++i) {
+    const std::string below = i == 0 ? "1" : fmt::format("a{}", i - 1);
+    file["definitions"].push_back({{"name", fmt::format("a{}", i)},
+                                   {"expression", fmt::format("{0} + {0}", below)},
+                                   {"where", "p. 1"}});
+  }
   return file;
 }
 
@@ -243,6 +249,7 @@ TEST_CASE("bad claims give one line that names file and claim") {
   CHECK_THAT(value("a +"), Contains("f.json: claim 'c1': expression 'a +': Unexpected end"));
   CHECK_THAT(value("nosuch(a)"), Contains("claim 'c1'"));
   CHECK_THAT(value("0 / 0"), Contains("claim 'c1': expression '0 / 0' is not a finite number"));
+  CHECK_THAT(value("a59"), Contains("'a9' stands below 50 definitions that name each other"));
   CHECK_THAT(value("circle"), Contains("claim 'c1'") && Contains("refers to itself"));
   CHECK_THAT(value("step_force(a, 1, 1, -1, 1, 1, 1, 1)"),
              Contains("claim 'c1': expression 'step_force") && Contains("E1 = -1 Pa"));

@@ -1,4 +1,5 @@
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
@@ -259,6 +260,48 @@ TEST_CASE("packing the same curves twice gives the same bytes, and a failure lea
     files += entry.is_regular_file() ? 1 : 0;
   }
   CHECK(files == 2);
+}
+
+TEST_CASE("packed curves are checked like files of text") {
+  const TempFolder folder;
+  const auto answer = [&](const Curve& curve) -> std::string {
+    pack_curves(folder / "c.h5", {curve});
+    try {
+      (void)unpack_curves(folder / "c.h5");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "taken";
+  };
+  Recording recording;
+  recording.header.id = "r";
+  recording.time_s = {0, 0.1, 0.2};
+  recording.drive = {0, 1e-3, 2e-3};
+  recording.response = {0, 0.1, 0.2};
+  CHECK(answer(recording) == "taken");
+  Recording wrong = recording;
+  wrong.response[1] = std::nan("");
+  CHECK_THAT(answer(wrong), Catch::Contains("/curves/r: response 1: not a number"));
+  wrong = recording;
+  wrong.time_s[2] = 0.1;
+  CHECK_THAT(answer(wrong), Catch::Contains("time 2: time 0.1 s does not follow 0.1 s"));
+  wrong = recording;
+  wrong.response_sd = {0.1, -0.1, 0.1};
+  CHECK_THAT(answer(wrong), Catch::Contains("response_sd 1: -0.1 is negative"));
+  PointSet points = std::get<PointSet>(load_curve("evren_static"));
+  CHECK(answer(points) == "taken");
+  points.data[1].depth_m = -1e-3;
+  CHECK_THAT(answer(points), Catch::Contains("indentation_depth 1: -0.001 is negative"));
+  points.data[1].depth_m.reset();
+  CHECK_THAT(answer(points), Catch::Contains("no imposed indentation_depth"));
+  Spectrum spectrum;
+  spectrum.header.id = "s";
+  spectrum.frequency_Hz = {1, 1};
+  spectrum.storage = spectrum.loss = {1, 1};
+  CHECK_THAT(answer(spectrum), Catch::Contains("row 1: frequency 1 stands twice"));
+  ValueSet values = load_values("amy_abstract");
+  values.values[0].value = std::numeric_limits<double>::infinity();
+  CHECK_THAT(answer(values), Catch::Contains("value 0: not a number"));
 }
 
 TEST_CASE("an HDF5 file cut at any place gives an error and never a crash") {

@@ -71,16 +71,18 @@ TEST_CASE("No command writes over a file that it reads, whatever the file is cal
   fs::create_directory(folder / "way");
   REQUIRE(run_in(folder, "$TPM data pack evren_static -o c.h5").code == 0);
   const std::string packed = read_file(folder / "c.h5"), organ = read_file(folder / "organ.json");
+  const char* const linked =
+      "$TPM fit $S/configs/liver_relaxation.json -o out.json; ln out.json in.json; $TPM fit "
+      "in.json "
+      "-o out.json";
   for (const char* line :
-       {"$TPM network show organ.json -o organ", "$TPM network show link.json -o organ",
+       {linked, "$TPM network show organ.json -o organ", "$TPM network show link.json -o organ",
         "$TPM network show twin.json -o organ", "$TPM network show organ.json -o link",
         "$TPM network show organ.json -o ./way/../organ", "$TPM network build x.xdmf -o x.h5",
         "$TPM simulate x.xdmf -o x.h5", "$TPM simulate x.xdmf -o x.xdmf",
         "$TPM simulate organ.json -o organ.json", "$TPM data import d.csv -o d --force",
         "$TPM data pack c.h5 -o c.h5 --force", "$TPM sweep s.json -o s.json",
-        "$TPM sweep t.csv -o t.h5", "$TPM design figures.json --check 0 --draw .",
-        "$TPM fit $S/configs/liver_relaxation.json -o out.json; ln out.json in.json; "
-        "$TPM fit in.json -o out.json"}) {
+        "$TPM sweep t.csv -o t.h5", "$TPM design figures.json --check 0 --draw ."}) {
     INFO(line);
     const Ran ran = run_in(folder, line);
     CHECK(ran.code == 2);
@@ -265,6 +267,18 @@ TEST_CASE("Control characters of names and titles are escaped on every way to th
   CHECK(option.code == 2);
   CHECK(option.said.find('\x1b') == std::string::npos);
   CHECK(std::count(option.said.begin(), option.said.end(), '\n') == 1);
+}
+
+TEST_CASE("A sweep for which the disk has no room is refused before its first cell") {
+  const test::TempFolder folder;
+  write_file(folder / "s.json",
+             R"({"model": "single_contact", "indentation": {"kind": "step_hold"},
+                 "axes": [{"parameter": "depth", "from": "1 mm", "to": "8 mm", "count": 1000000},
+                          {"parameter": "spacing", "from": "10 mm", "to": "40 mm", "count": 1000000}],
+                 "outputs": ["peak_force"]})");
+  const Ran ran = run_in(folder, "timeout -s INT 60 $TPM sweep s.json -o o.h5");
+  CHECK(ran.code == 5);
+  CHECK_THAT(ran.said, Contains("o.h5.blocks: 1e+12 cells need") && Contains("the disk has"));
 }
 
 TEST_CASE("Inputs without an end are refused") {

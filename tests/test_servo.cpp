@@ -61,6 +61,7 @@ ServoSettings plain(std::uint64_t cycles = 1'000'000) {
   s.most_damping_N_s_per_m = 0.0;
   s.energy_allowance_J = std::numeric_limits<double>::infinity();
   s.watch_oscillation = false;
+  s.most_speed_m_per_s = std::numeric_limits<double>::infinity();
   return s;
 }
 

@@ -1,10 +1,16 @@
 // tpm hil devices, tpm hil run: a session through a haptic device.
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <ctime>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "command.hpp"
 #include "hil_options.hpp"
@@ -12,7 +18,7 @@
 #include "interrupt_watch.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
-#include "tpm/device/omega7.hpp"
+#include "tpm/device/force_dimension.hpp"
 #include "tpm/report/hil_report.hpp"
 
 namespace tpm::app {
@@ -24,32 +30,98 @@ struct RunChoice {
   std::string time;
   std::string output = "session.tpmrec";
   SessionChanges changes;
+  SessionNotes notes;
   bool force = false, accept_unstable = false;
   PageOptions page;
 };
 
+Json seen_json(const SeenDevice& device) {
+  const bool known = !device.kind.empty();
+  return {{"index", device.index},
+          {"type", device.type},
+          {"device", known ? Json(device.kind) : Json()},
+          {"name", device.name},
+          {"serial", device.serial < 0 ? Json() : Json(device.serial)},
+          {"tried", known && limits_of(device.kind).tried},
+          {"problem", device.problem}};
+}
+
+std::string seen_text(const SeenDevice& device) {
+  if (!device.problem.empty()) {
+    return fmt::format("{:<8} cannot be opened: {}\n", device.index, device.problem);
+  }
+  if (device.kind.empty()) {
+    return fmt::format("{:<8} {}, type {}, serial {}: no --device of tpm\n", device.index,
+                       device.name, device.type, device.serial);
+  }
+  return fmt::format("{:<8} {}, serial {}: --device {} --serial {}{}\n", device.index, device.name,
+                     device.serial, device.kind, device.serial,
+                     limits_of(device.kind).tried ? "" : " (never tried with this device)");
+}
+
 int list_devices(const DeviceOptions& options, const Session& session) {
-  std::string omega7;
-  int count = 0;
+  std::vector<SeenDevice> devices;
+  std::string reason;
   try {
-    count = count_omega7(options.library);
-    omega7 = count > 0 ? fmt::format("{} found", count)
-                       : std::string("the library is there, and sees no device");
+    devices = seen_devices(options.library);
+    if (devices.empty()) reason = "the library is there, and sees no device";
   } catch (const Error& error) {
     if (error.code() != ExitCode::environment) throw;
-    omega7 = error.what();
+    reason = error.what();
+  }
+  Json list = Json::array();
+  std::string text;
+  for (const SeenDevice& device : devices) {
+    list.push_back(seen_json(device));
+    text += seen_text(device);
   }
   if (session.json()) {
-    say("{}", to_text(Json{{"omega7", {{"available", count > 0}, {"reason", omega7}}},
+    say("{}", to_text(Json{{"force_dimension", {{"devices", list}, {"reason", reason}}},
                            {"virtual", {{"available", true}, {"simulated_device", true}}},
                            {"replay", {{"available", true}, {"simulated_device", true}}}}));
-  } else {
-    say("omega7   {}\nvirtual  always there: a simulated Omega.7 and operator, no hardware\nreplay "
-        "  "
-        "always there: the motion of a recording, no hardware\n",
-        omega7);
+    return 0;
   }
+  if (devices.empty()) text = fmt::format("none     of Force Dimension: {}\n", reason);
+  say("{}virtual  always there: a simulated Omega.7 and operator, no hardware\n"
+      "replay   always there: the motion of a recording, no hardware\n",
+      text);
   return 0;
+}
+
+/// Whether Enter was pressed where tpm runs in a terminal.
+bool enter_was_pressed() {
+  pollfd keys{STDIN_FILENO, POLLIN, 0};
+  char line[256];
+  return ::poll(&keys, 1, 0) > 0 && ::read(STDIN_FILENO, line, sizeof line) > 0;
+}
+
+/// Sees a signal, and Enter where a session waits for it.
+std::function<bool()> watched_keys(HilSession& session) {
+  if (!session.servo.gate || !session.servo.gate->confirm || ::isatty(STDIN_FILENO) == 0) {
+    return InterruptWatch::seen;
+  }
+  const auto confirmed = std::make_shared<std::atomic<bool>>(false);
+  session.servo.gate->confirmed = confirmed;
+  return [confirmed] {
+    if (!*confirmed && enter_was_pressed()) *confirmed = true;
+    return InterruptWatch::seen();
+  };
+}
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  char text[32];
+  return std::string(text, std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc));
+}
+
+/// Throws Error(usage) for a text that does not fit into a line of a report.
+void require_short(const std::string& text, const char* option) {
+  constexpr std::size_t kMost = 64;
+  if (text.size() <= kMost && printable(text) == text) return;
+  throw Error(ExitCode::usage, option, "'" + printable(text, kMost) + "'",
+              fmt::format("at most {} printable characters", kMost));
 }
 
 /// Tells how far the planning of a model is, and then the operator what to do or how far a
@@ -79,7 +151,7 @@ class Guide {
  private:
   /// Says what is missing before the session can begin, once for each thing.
   void wait(const ServoRecord& row) {
-    const std::uint32_t missing = row.flags & (kOutOfReach | kInTissue | kMoving);
+    const std::uint32_t missing = row.flags & (kOutOfReach | kInTissue | kMoving | kUnconfirmed);
     if (missing == missing_ || row.stop != StopCause::none) return;
     missing_ = missing;
     if (real_time_ || (missing & ~kMoving) != 0) tell_user("tpm: {}\n", instruction_of(row));
@@ -115,16 +187,23 @@ int run_hil(const RunChoice& choice, const Session& session) {
     throw Error(ExitCode::usage, "-o " + choice.output, "the file exists",
                 "another --output, or --force");
   }
-  const HilSession hil = read_session(choice.session, choice.changes);
+  HilSession hil = read_session(choice.session, choice.changes);
   DeviceChoice device = chosen_device(choice.device);
   if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";
   SessionRunOptions options;
-  options.real_time = choice.time.empty() ? device.kind == "omega7" : choice.time == "real";
+  const bool hardware = limits_of(device.kind).hardware();
+  options.real_time = choice.time.empty() ? hardware : choice.time == "real";
+  options.notes = choice.notes;
+  require_short(choice.notes.date, "--date");
+  require_short(choice.notes.operator_code, "--operator");
+  require_short(choice.notes.subject_code, "--subject");
+  // What is simulated is the same bytes each time.
+  if (hardware && options.notes.date.empty()) options.notes.date = today();
   options.wish = chosen_wish(choice.device);
   options.recording = choice.output;
   options.accept_unstable = choice.accept_unstable;
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
-  options.interrupted = InterruptWatch::seen;
+  options.interrupted = watched_keys(hil);
   std::optional<HilPage> page;
   if (!choice.page.port.empty()) {
     page.emplace(hil, options.real_time, choice.page);
@@ -168,9 +247,15 @@ int run_hil(const RunChoice& choice, const Session& session) {
 }  // namespace
 
 void add_device_options(CLI::App& command, DeviceOptions& options) {
-  command.add_option("--device", options.choice.kind, "virtual, omega7 or replay")
-      ->check(CLI::IsMember({"virtual", "omega7", "replay"}))
+  command
+      .add_option("--device", options.choice.kind,
+                  "virtual, replay, omega7 or another device of Force Dimension")
+      ->check(CLI::IsMember(device_kinds()))
       ->capture_default_str();
+  command.add_option("--serial", options.serial, "Of the device, where there are several")
+      ->check(CLI::Range(0, 65535));
+  command.add_option("--index", options.index, "Its place in the list of tpm hil devices")
+      ->check(CLI::Range(0, 127));
   command.add_option("--dhd-library", options.library,
                      "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
   command.add_option("--recording", options.replay, "What --device replay plays");
@@ -188,6 +273,8 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
 DeviceChoice chosen_device(const DeviceOptions& options) {
   DeviceChoice choice = options.choice;
   choice.library = options.library;
+  if (options.serial >= 0) choice.which.serial = options.serial;
+  if (options.index >= 0) choice.which.index = options.index;
   choice.replay = options.replay;
   return choice;
 }
@@ -216,7 +303,7 @@ void add_hil_command(CLI::App& app, Session& session) {
   add_device_options(*run, choice->device);
   run->add_option("--time", choice->time,
                   "real: on the clock; virtual: as fast as it goes, the same bits each time; "
-                  "default: real with omega7, else virtual")
+                  "default: real with a real device, else virtual")
       ->check(CLI::IsMember({"real", "virtual"}));
   run->add_option("-o,--output", choice->output, "Recording")->capture_default_str();
   run->add_option("--law", choice->changes.law,
@@ -224,6 +311,12 @@ void add_hil_command(CLI::App& app, Session& session) {
   run->add_option("--replay-motion", choice->changes.motion,
                   "Go through the motion of this recording of a depth instead of the session's "
                   "phases; with --device omega7 the operator is asked to");
+  run->add_option("--date", choice->notes.date,
+                  "Stands in the recording; default with a real device: now");
+  run->add_option("--operator", choice->notes.operator_code,
+                  "Code of who runs the session; stands in the recording");
+  run->add_option("--subject", choice->notes.subject_code,
+                  "Code of who holds the device; stands in the recording");
   run->add_flag("--force", choice->force, "Replace a recording that exists");
   run->add_flag("--accept-unstable", choice->accept_unstable,
                 "Run what would be unstable, on the virtual device only");
@@ -248,6 +341,7 @@ void add_hil_command(CLI::App& app, Session& session) {
   add_hil_verify_commands(*hil, session);
   add_hil_export_command(*hil, session);
   add_hil_stability_command(*hil, session);
+  add_hil_hazards_command(*hil, session);
 }
 
 }  // namespace tpm::app

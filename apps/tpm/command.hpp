@@ -84,6 +84,7 @@ void add_hil_check_command(CLI::App& hil, Session& session);      // below `tpm 
 void add_hil_export_command(CLI::App& hil, Session& session);     // below `tpm hil`
 void add_hil_verify_commands(CLI::App& hil, Session& session);    // below `tpm hil`
 void add_hil_stability_command(CLI::App& hil, Session& session);  // below `tpm hil`
+void add_hil_hazards_command(CLI::App& hil, Session& session);    // below `tpm hil`
 void add_data_import_command(CLI::App& data, Session& session);   // below `tpm data`
 void add_sweep_views(CLI::App& sweep, Session& session);          // below `tpm sweep`
 

@@ -8,10 +8,11 @@ namespace tpm::app {
 struct DeviceOptions {
   DeviceChoice choice;
   std::string library, replay;
+  int serial = -1, index = -1;  ///< -1: not given
   std::string real_time = "ignore";
 };
 
-/// Adds --device, --dhd-library, --recording, --may-move and --take-as-ready.
+/// Adds --device, --serial, --index, --dhd-library, --recording, --may-move and --take-as-ready.
 void add_device_options(CLI::App& command, DeviceOptions& options);
 
 /// What was chosen; call when the command runs.

@@ -3,6 +3,8 @@
 // opened, and drdAutoInit of another answers error 5. The file named in $TPM_STAND_IN_SCRIPT is
 // read when devices are counted; its lines are
 //   version|com_mode|entries|devices|type|initialised|period|delay_periods|encoder_step NUMBER
+//   types NUMBER...   of the devices, where there are several; their serials count from 4711
+//   gripper|buttons NUMBER   what the hand does; without `gripper` the device has none
 //   wait NUMBER       forces set before the operator begins
 //   init_ms NUMBER    that drdAutoInit takes; drdStop ends it, unless stubborn NUMBER is not 0
 //   max_force         is an event with the limit in mN behind its name
@@ -10,8 +12,8 @@
 //   events FILE       what happened, with the time of the clock: "NAME NANOSECONDS"
 //   fault NAME FIRST COUNT   at the calls of dhdGetPosition (dhdSetForce for saturated) numbered
 //                            FIRST to FIRST + COUNT - 1, from 0
-// Faults: time_guard, saturated, communication, nan, and those that stay: watchdog, velocity,
-// unplugged; hang sleeps COUNT milliseconds; each slow call takes 3 ms.
+// Faults: status, time_guard, saturated, communication, not_available, nan; those that stay:
+// watchdog, velocity, unplugged; hang sleeps COUNT milliseconds; each slow call takes 3 ms.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -41,6 +43,10 @@ struct StandIn {
   std::string operator_file, events_file;
   std::vector<Fault> faults;
   int version = 3, com_mode = 0, entries = 17, devices = 1, type = 35;
+  std::vector<int> types;
+  int index = -1;  // of the device that is open; -1: none
+  double gripper_m = -1.0;
+  unsigned buttons = 0;
   bool initialised = true, read_once = false, opened_by_drd = false;
   long reads = 0, writes = 0, wait = 0;
   int watchdog_ticks = 0;
@@ -96,6 +102,9 @@ void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
     Fault fault;
     words >> fault.name >> fault.first >> fault.count;
     s.faults.push_back(fault);
+  } else if (key == "types") {
+    for (int type = 0; words >> type;) s.types.push_back(type);
+    s.devices = static_cast<int>(s.types.size());
   } else {
     double value = 0.0;
     words >> value;
@@ -108,6 +117,8 @@ void read_line(StandIn& s, std::istringstream& words, const std::string& key) {
     if (key == "initialised") s.initialised = whole != 0;
     if (key == "init_ms") s.init_ms = whole;
     if (key == "stubborn") s.stubborn = whole != 0;
+    if (key == "gripper") s.gripper_m = value;
+    if (key == "buttons") s.buttons = static_cast<unsigned>(whole);
     if (key == "wait") s.wait = whole;
     if (key == "period") s.plant_settings.period_s = value;
     if (key == "delay_periods") s.plant_settings.delay_periods = whole;
@@ -171,30 +182,62 @@ int dhdGetDeviceCount() {
   return here().devices;
 }
 
-int dhdOpenID(char /*index*/) {
+int dhdOpenID(char index) {
   StandIn& s = here();
+  if (index >= s.devices) return failed(15);
+  if (s.index >= 0) return failed(20);
+  s.index = std::max<int>(index, 0);
   tpm::OperatorScript script;
   if (!s.operator_file.empty()) script = tpm::read_operator_script(s.operator_file);
   s.plant = std::make_unique<tpm::VirtualPlant>(s.plant_settings, std::move(script));
   if (s.wait > 0) s.plant->await();
   event("open");
-  return 0;
+  return s.index;
 }
 
 int dhdClose(char) {
   event("close");
+  if (here().index < 0) return failed(5);
+  here().index = -1;
   return here().unplugged ? failed(5) : 0;
 }
 
-int dhdGetSystemType(char) {
-  return here().type;
+int dhdGetSystemType(char id) {
+  const StandIn& s = here();
+  if (s.index != id) return failed(5);
+  return s.types.empty() ? s.type : s.types[static_cast<std::size_t>(id)];
 }
 const char* dhdGetSystemName(char) {
   return "omega.7";
 }
 
-int dhdGetSerialNumber(unsigned short* number, char) {
-  *number = 4711;
+int dhdGetSerialNumber(unsigned short* number, char id) {
+  if (here().index != id) return failed(5);
+  *number = static_cast<unsigned short>(4711 + id);
+  return 0;
+}
+
+bool dhdHasGripper(char) {
+  return here().gripper_m >= 0.0;
+}
+
+int dhdGetGripperGap(double* gap_m, char) {
+  if (here().gripper_m < 0.0) return failed(6);
+  *gap_m = here().gripper_m;
+  return 0;
+}
+
+unsigned int dhdGetButtonMask(char) {
+  return here().buttons;
+}
+
+int dhdSetEffectorMass(double kg, char) {
+  event(("effector_mass_" + std::to_string(std::lround(1e3 * kg))).c_str());
+  return 0;
+}
+
+int dhdSetBaseAngleXRad(double rad, char) {
+  event(("base_angle_x_" + std::to_string(std::lround(1e3 * rad))).c_str());
   return 0;
 }
 
@@ -261,6 +304,7 @@ int dhdGetPosition(double* x, double* y, double* z, char) {
     fall(5, "unplugged");
   }
   if (s.unplugged) return failed(5);
+  if (due("not_available", call)) return failed(6);
   if (due("communication", call)) {
     event("communication");
     return failed(2);
@@ -290,6 +334,7 @@ int dhdSetForce(double x, double y, double z, char) {
 int dhdGetStatus(int* status, char) {
   StandIn& s = here();
   if (s.unplugged) return failed(5);
+  if (due("status", s.reads - 1) || due("status", s.reads - 2)) return failed(2);  // every second
   std::fill(status, status + s.entries, 0);
   if (s.entries > 14) status[14] = s.cause;
   return 0;
@@ -312,6 +357,8 @@ const char* dhdErrorGetLastStr() {
       return "communication error";
     case 5:
       return "no device";
+    case 6:
+      return "not available";
     case 9:
       return "expert mode disabled";
     default:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -132,6 +133,66 @@ const std::vector<double>& Recording::force_sd_N() const {
 SpectrumQuantities spectrum_quantities(Dimension dimension) noexcept {
   if (dimension == Dimension::stress) return {Quantity::storage_modulus, Quantity::loss_modulus};
   return {Quantity::storage_stiffness, Quantity::loss_stiffness};
+}
+
+std::optional<RowFault> find_datum_fault(const Datum& datum, Observable observable) {
+  struct Number {
+    const char* column;
+    const std::optional<double>& value;
+    bool any_sign;
+  };
+  const bool force = observable == Observable::contact_force;
+  for (const Number& number :
+       {Number{"indentation_depth", datum.depth_m, false}, Number{"load", datum.load_N, false},
+        Number{"time", datum.time_s, false}, Number{"value", datum.value, true},
+        Number{"lower", datum.lower, true}, Number{"upper", datum.upper, true},
+        Number{"sd", datum.sd, false}}) {
+    if (!number.value) continue;
+    if (!std::isfinite(*number.value)) return RowFault{number.column, "not a number", "a number"};
+    if (!number.any_sign && *number.value < 0.0) {
+      return RowFault{number.column, fmt::format("{} is negative", *number.value), "at least 0"};
+    }
+  }
+  if (datum.lower.has_value() != datum.upper.has_value()) {
+    return RowFault{"lower", "only one end of the band is given", "both ends"};
+  }
+  if (datum.value.has_value() == datum.is_band()) {
+    return RowFault{"value", "neither or both of a value and a band", "one of the two"};
+  }
+  if (datum.is_band() && *datum.lower > *datum.upper) {
+    return RowFault{"lower", "the lower end of the band lies above the upper one",
+                    "lower <= upper"};
+  }
+  if (datum.sd && datum.is_band()) {
+    return RowFault{"sd", "a band has no standard deviation", "an empty field"};
+  }
+  // A model can answer only if it knows what was imposed.
+  if (!(force ? datum.depth_m : datum.load_N)) {
+    return RowFault{force ? "indentation_depth" : "load",
+                    force ? "no imposed indentation_depth" : "no imposed load",
+                    "the imposed quantity in each row"};
+  }
+  return std::nullopt;
+}
+
+std::optional<RowFault> find_value_fault(const NamedValue& value) {
+  if (value.name.empty()) return RowFault{"name", "empty", "a name"};
+  for (const auto& number : {value.value, value.lower, value.upper, value.plus_minus}) {
+    if (number && !std::isfinite(*number)) return RowFault{"value", "not a number", "a number"};
+  }
+  if (value.value.has_value() == (value.lower || value.upper)) {
+    return RowFault{"value", "neither or both of a value and a range", "one of the two"};
+  }
+  if (value.lower && value.upper && *value.lower > *value.upper) {
+    return RowFault{"lower", "lies above the upper end of the range", "lower <= upper"};
+  }
+  if ((value.provenance == Provenance::derived) == value.formula.empty()) {
+    return RowFault{"formula",
+                    value.formula.empty() ? "empty for a derived value"
+                                          : "stands beside a value that is not derived",
+                    "a formula for derived values and only for them"};
+  }
+  return std::nullopt;
 }
 
 std::optional<SpectrumFault> find_spectrum_fault(const std::vector<double>& frequency,

@@ -100,6 +100,15 @@ struct Datum {
   [[nodiscard]] bool is_band() const noexcept { return lower.has_value(); }
 };
 
+/// What of a row cannot be, and what was expected.
+struct RowFault {
+  std::string column, what, expected;
+};
+
+/// The first thing of a reading that cannot be: neither or both of a value and a band, nothing
+/// imposed, a negative depth, load, time or standard deviation, a number that is not finite.
+[[nodiscard]] std::optional<RowFault> find_datum_fault(const Datum& datum, Observable observable);
+
 /// What the times of a point set count from.
 enum class TimeOrigin { none, end_of_ramp, load_applied };
 
@@ -187,6 +196,9 @@ struct NamedValue {
   std::string note;
   int line = 0;
 };
+
+/// The first thing of a named value that cannot be, apart from its name being taken.
+[[nodiscard]] std::optional<RowFault> find_value_fault(const NamedValue& value);
 
 /// Single values, in the order of the file.
 struct ValueSet {

@@ -59,36 +59,6 @@ std::optional<Provenance> time_provenance(const CurveDescription& description) {
   return std::nullopt;
 }
 
-Error in_row(const CurveRows& rows, const Datum& datum, std::string_view what,
-             std::string_view expected) {
-  return bad_input(fmt::format("{}:{}", rows.file(), datum.line), what, expected);
-}
-
-void require_reading(const CurveRows& rows, const Datum& datum) {
-  if (datum.lower.has_value() != datum.upper.has_value()) {
-    throw in_row(rows, datum, "only one end of the band is given", "both ends");
-  }
-  if (datum.value.has_value() == datum.is_band()) {
-    throw in_row(rows, datum, "neither or both of a value and a band", "one of the two");
-  }
-  if (datum.is_band() && *datum.lower > *datum.upper) {
-    throw in_row(rows, datum, "the lower end of the band lies above the upper one",
-                 "lower <= upper");
-  }
-  if (datum.sd && datum.is_band()) {
-    throw in_row(rows, datum, "a band has no standard deviation", "an empty field");
-  }
-}
-
-/// A model can answer only if it knows what was imposed.
-void require_imposed(const CurveRows& rows, const Datum& datum, Observable observable) {
-  const bool force = observable == Observable::contact_force;
-  if (!(force ? datum.depth_m : datum.load_N)) {
-    throw in_row(rows, datum, force ? "no imposed indentation_depth" : "no imposed load",
-                 "the imposed quantity in each row");
-  }
-}
-
 Observable parse_observable(const CurveDescription& description, const std::string& file) {
   for (const Observable o : {Observable::contact_force, Observable::indentation_depth}) {
     if (observable_quantity(o) == description.observable) return o;
@@ -134,8 +104,9 @@ PointSet read_points(const CurveDescription& description, const CurveRows& rows,
     datum.provenance = rows.provenance(i);
     datum.where = rows.text(i, "where");
     datum.note = rows.text(i, "note");
-    require_reading(rows, datum);
-    require_imposed(rows, datum, points.observable);
+    if (const auto fault = find_datum_fault(datum, points.observable)) {
+      throw bad_input(fmt::format("{}:{}", rows.file(), datum.line), fault->what, fault->expected);
+    }
     points.data.push_back(std::move(datum));
   }
   return points;

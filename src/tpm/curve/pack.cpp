@@ -237,6 +237,21 @@ CurveHeader read_header(const GroupReader& group, const std::string& id) {
   return header;
 }
 
+Error bad_row(const GroupReader& group, std::size_t row, const RowFault& fault) {
+  return bad_input(fmt::format("{}: {} {}", group.where(), fault.column, row), fault.what,
+                   fault.expected);
+}
+
+/// Throws Error(bad_input) for the first number that is none.
+void require_finite(const GroupReader& group, const char* column, const std::vector<double>& values,
+                    bool any_sign = true) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) throw bad_row(group, i, {column, "not a number", "a number"});
+    if (any_sign || values[i] >= 0.0) continue;
+    throw bad_row(group, i, {column, fmt::format("{} is negative", values[i]), "at least 0"});
+  }
+}
+
 PointSet read_points(GroupReader& group, CurveHeader header) {
   PointSet points;
   points.header = std::move(header);
@@ -256,6 +271,11 @@ PointSet read_points(GroupReader& group, CurveHeader header) {
   group.provenances(points.data);
   group.texts("where", points.data, &Datum::where);
   group.texts("note", points.data, &Datum::note);
+  for (std::size_t i = 0; i < points.data.size(); ++i) {
+    if (const auto fault = find_datum_fault(points.data[i], points.observable)) {
+      throw bad_row(group, i, *fault);
+    }
+  }
   return points;
 }
 
@@ -271,6 +291,19 @@ Recording read_recording(GroupReader& group, CurveHeader header) {
     recording.drive_quantity = group.quantity("drive");
   }
   if (group.has("response_sd")) recording.response_sd = group.numbers("response_sd");
+  require_finite(group, "response", recording.response);
+  require_finite(group, "time", recording.time_s);
+  require_finite(group, "drive", recording.drive);
+  require_finite(group, "response_sd", recording.response_sd, false);
+  if (recording.response.empty()) throw bad_input(group.where(), "has no rows", "one at least");
+  for (std::size_t i = 1; i < recording.time_s.size(); ++i) {
+    if (recording.time_s[i] > recording.time_s[i - 1]) continue;
+    throw bad_row(group, i,
+                  {"time",
+                   fmt::format("time {} s does not follow {} s", recording.time_s[i],
+                               recording.time_s[i - 1]),
+                   "strictly increasing times"});
+  }
   return recording;
 }
 
@@ -284,6 +317,15 @@ Spectrum read_spectrum(GroupReader& group, CurveHeader header) {
   spectrum.loss = group.numbers("loss");
   if (group.has("storage_sd")) spectrum.storage_sd = group.numbers("storage_sd");
   if (group.has("loss_sd")) spectrum.loss_sd = group.numbers("loss_sd");
+  require_finite(group, "frequency", spectrum.frequency_Hz);
+  require_finite(group, "storage", spectrum.storage);
+  require_finite(group, "loss", spectrum.loss);
+  require_finite(group, "storage_sd", spectrum.storage_sd, false);
+  require_finite(group, "loss_sd", spectrum.loss_sd, false);
+  if (const auto fault =
+          find_spectrum_fault(spectrum.frequency_Hz, spectrum.storage, spectrum.loss)) {
+    throw bad_row(group, fault->row, {"row", fault->what, fault->expected});
+  }
   return spectrum;
 }
 
@@ -305,6 +347,9 @@ ValueSet read_values(GroupReader& group, CurveHeader header) {
   group.texts("where", set.values, &NamedValue::where);
   group.texts("formula", set.values, &NamedValue::formula);
   group.texts("note", set.values, &NamedValue::note);
+  for (std::size_t i = 0; i < set.values.size(); ++i) {
+    if (const auto fault = find_value_fault(set.values[i])) throw bad_row(group, i, *fault);
+  }
   return set;
 }
 

@@ -181,22 +181,6 @@ NamedValue read_value(const ValueRow& row) {
   return value;
 }
 
-void require_sound(const NamedValue& value, const ValueRow& row) {
-  if (value.name.empty()) throw bad_input(row.place("name"), "empty", "a name");
-  if (value.value.has_value() == (value.lower || value.upper)) {
-    throw bad_input(row.place("value"), "neither or both of a value and a range", "one of the two");
-  }
-  if (value.lower && value.upper && *value.lower > *value.upper) {
-    throw bad_input(row.place("lower"), "lies above the upper end of the range", "lower <= upper");
-  }
-  if ((value.provenance == Provenance::derived) == value.formula.empty()) {
-    throw bad_input(row.place("formula"),
-                    value.formula.empty() ? "empty for a derived value"
-                                          : "stands beside a value that is not derived",
-                    "a formula for derived values and only for them");
-  }
-}
-
 }  // namespace
 
 ValueSet read_values(const CurveHeader& header, std::string_view bytes, const std::string& file) {
@@ -212,7 +196,9 @@ ValueSet read_values(const CurveHeader& header, std::string_view bytes, const st
   for (std::size_t i = 1; i < table.rows.size(); ++i) {
     const ValueRow row(table.rows[i], file);
     set.values.push_back(read_value(row));
-    require_sound(set.values.back(), row);
+    if (const auto fault = find_value_fault(set.values.back())) {
+      throw bad_input(row.place(fault->column.c_str()), fault->what, fault->expected);
+    }
     if (!names.insert(set.values.back().name).second) {
       throw bad_input(row.place("name"),
                       fmt::format("'{}' stands twice", printable(set.values.back().name)),

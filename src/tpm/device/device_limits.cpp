@@ -1,14 +1,28 @@
 #include "tpm/device/device_limits.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "tpm/core/error.hpp"
 
 namespace tpm {
 namespace {
 
+// Force and reach of the Omega.7: its data sheet. Stiffness and damping of omega, lambda and
+// Falcon: CHAI3D 3.3. All else of the others is assumed, and no higher than that of the Omega.7.
 constexpr DeviceLimits kDeviceLimits[] = {
-    {"omega7", 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
-    {"virtual", 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
-    {"replay", 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
+    {"virtual", "simulated Omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
+    {"replay", "replay", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
+    {"omega7", "omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"omega3", "omega.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"omega6", "omega.6", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"delta3", "delta.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"sigma3", "sigma.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"sigma7", "sigma.7", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"lambda3", "lambda.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"lambda6", "lambda.6", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"lambda7", "lambda.7", false, 12.0, 0.075, 8000.0, 30.0, 2000.0, 0.1, 0.1, 1},
+    {"falcon", "Falcon", false, 8.0, 0.05, 3000.0, 20.0, 1000.0, 0.1, 0.1, 1},
 };
 
 }  // namespace
@@ -18,7 +32,13 @@ const DeviceLimits& limits_of(std::string_view kind) {
     if (limits.kind == kind) return limits;
   }
   throw Error(ExitCode::usage, "--device", "'" + printable(kind) + "'",
-              "virtual, omega7 or replay");
+              fmt::format("one of {}", fmt::join(device_kinds(), ", ")));
+}
+
+std::vector<std::string> device_kinds() {
+  std::vector<std::string> kinds;
+  for (const DeviceLimits& limits : kDeviceLimits) kinds.emplace_back(limits.kind);
+  return kinds;
 }
 
 }  // namespace tpm

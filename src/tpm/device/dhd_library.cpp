@@ -77,7 +77,7 @@ void DhdLibrary::load(const std::vector<fs::path>& candidates) {
 }
 
 void DhdLibrary::find_symbols() {
-  std::vector<std::string> missing, without_drd;
+  std::vector<std::string> missing, without_drd, not_needed;
   DhdCalls& c = calls_;
   find(handle_, "dhdGetDeviceCount", c.get_device_count, missing);
   find(handle_, "dhdOpenID", c.open_id, missing);
@@ -102,6 +102,14 @@ void DhdLibrary::find_symbols() {
   find(handle_, "dhdStop", c.stop, missing);
   find(handle_, "dhdErrorGetLast", c.error_get_last, missing);
   find(handle_, "dhdErrorGetLastStr", c.error_get_last_text, missing);
+  find(handle_, "dhdHasGripper", c.has_gripper, not_needed);
+  find(handle_, "dhdGetGripperGap", c.get_gripper_gap, not_needed);
+  find(handle_, "dhdGetButtonMask", c.get_button_mask, not_needed);
+  find(handle_, "dhdSetEffectorMass", c.set_effector_mass, not_needed);
+  find(handle_, "dhdSetDeviceAngleRad", c.set_device_angle, not_needed);
+  find(handle_, "dhdSetBaseAngleXRad", c.set_base_angle_x, not_needed);
+  find(handle_, "dhdSetBaseAngleZRad", c.set_base_angle_z, not_needed);
+  if (c.get_gripper_gap == nullptr) c.has_gripper = nullptr;
   find(handle_, "drdOpenID", c.drd_open_id, without_drd);
   find(handle_, "drdClose", c.drd_close, without_drd);
   find(handle_, "drdIsInitialized", c.drd_is_initialized, without_drd);

@@ -32,6 +32,14 @@ struct DhdCalls {
   int (*stop)(char id);
   int (*error_get_last)();
   const char* (*error_get_last_text)();
+  // Not in every library; null then.
+  bool (*has_gripper)(char id);
+  int (*get_gripper_gap)(double* gap_m, char id);
+  unsigned int (*get_button_mask)(char id);
+  int (*set_effector_mass)(double kg, char id);
+  int (*set_device_angle)(double rad, char id);
+  int (*set_base_angle_x)(double rad, char id);
+  int (*set_base_angle_z)(double rad, char id);
   // Of libdrd; null if the library is libdhd alone. drd_is_initialized and drd_auto_init know only
   // a device that drd_open_id opened; after open_id they answer as if no device were there.
   int (*drd_open_id)(char index);

@@ -2,6 +2,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,7 +47,7 @@ enum class DeviceLink {
 
 /// What a device says it is.
 struct DeviceIdentity {
-  std::string kind;  ///< "omega7", "virtual", "replay"
+  std::string kind;  ///< as limits_of() takes it
   std::string name;
   std::string serial;           ///< empty if not known
   std::string firmware;         ///< empty if not known
@@ -59,8 +61,16 @@ struct DeviceIdentity {
   std::vector<std::string> assumptions;  ///< numbers that nobody has measured, one line each
 };
 
+/// How a device stands, where it differs from what it expects; its maker's library takes it into
+/// account for gravity and coordinates.
+struct DeviceMounting {
+  std::optional<double> effector_mass_kg;  ///< of a tool mounted on the handle
+  std::optional<double> angle_rad, base_angle_x_rad, base_angle_z_rad;
+};
+
 /// How a device is set up before a session.
 struct DevicePreparation {
+  DeviceMounting mounting;
   double max_force_N = 12.0;   ///< > 0
   double watchdog_s = 0.008;   ///< forces are cut without a command for so long; 0.004 to 0.016
   bool may_move = false;       ///< the device may move by itself to initialise
@@ -72,15 +82,22 @@ struct DevicePreparation {
 /// What a device reports beside its position. Plain data.
 struct DeviceStatus {
   ForcesOff forces_off = ForcesOff::none;
-  int error = 0;  ///< of the vendor's library, 0: none
+  bool failed = false;  ///< it could not be asked
+  int error = 0;        ///< of the vendor's library, 0: none
   char error_text[64] = {};
   std::uint64_t time_guards = 0;  ///< since prepare()
   std::uint64_t saturations = 0;  ///< since prepare()
 };
 
+/// What a hand does beside moving the tool.
+struct HandState {
+  float gripper_m = std::numeric_limits<float>::quiet_NaN();  ///< opening; NaN: there is none
+  std::uint32_t buttons = 0;                                  ///< a bit for each that is pressed
+};
+
 /// A device with three translations that renders forces. One thread uses it; cut_forces() alone may
-/// be called from another. read, write, status, advance and stop neither allocate nor throw, and
-/// each makes a bounded number of calls.
+/// be called from another. read, write, status, hand, advance and stop neither allocate nor throw,
+/// and each makes a bounded number of calls.
 class HapticDevice {
  public:
   HapticDevice() = default;
@@ -97,6 +114,7 @@ class HapticDevice {
   /// @param force_N on the hand, in the coordinates of the device
   virtual DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept = 0;
   virtual DeviceStatus status() noexcept = 0;
+  virtual HandState hand() noexcept { return {}; }
   /// The session waits until the tool is in place: a simulated operator holds still meanwhile.
   virtual void await() noexcept {}
   /// The first phase begins.

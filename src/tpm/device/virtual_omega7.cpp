@@ -47,6 +47,12 @@ DeviceStatus VirtualOmega7::status() noexcept {
   return status;
 }
 
+HandState VirtualOmega7::hand() noexcept {
+  HandState hand;
+  hand.buttons = plant_.waiting() ? 1U : 0U;
+  return hand;
+}
+
 void VirtualOmega7::advance(double seconds) noexcept {
   owed_s_ += seconds;
   plant_.forces(forces_on_);

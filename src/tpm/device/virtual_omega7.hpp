@@ -16,6 +16,8 @@ class VirtualOmega7 final : public HapticDevice {
   DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override;
   DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override;
   DeviceStatus status() noexcept override;
+  /// The simulated operator presses a button while the session waits.
+  HandState hand() noexcept override;
   void await() noexcept override { plant_.await(); }
   void begin() noexcept override { plant_.begin(); }
   void advance(double seconds) noexcept override;

@@ -68,6 +68,7 @@ class VirtualPlant {
   void forces(bool on) noexcept { forces_on_ = on; }
   /// The hand holds still where its script begins, until begin().
   void await() noexcept { waiting_ = true; }
+  [[nodiscard]] bool waiting() const noexcept { return waiting_; }
   /// The script begins now.
   void begin() noexcept;
   /// Puts the place that the hand means somewhere; the device stays.

@@ -105,6 +105,7 @@ std::string instruction_of(const ServoRecord& waiting) {
                        waiting.tool_depth_m < 0.0 ? "above" : "below");
   }
   if ((waiting.flags & kMoving) != 0) return "Hold the tool still";
+  if ((waiting.flags & kUnconfirmed) != 0) return "Press a button of the device, or Enter";
   return "The session begins";
 }
 

@@ -11,7 +11,8 @@
 namespace tpm {
 namespace {
 
-constexpr const char* kFormat = "tpm hil recording 1";
+constexpr const char* kFormat = "tpm hil recording 2";
+constexpr const char* kFirstFormat = "tpm hil recording 1";
 
 Json times_json(const TimeHistogram& times) {
   return {{"p50_s", times.quantile_s(0.5)},
@@ -58,7 +59,8 @@ Json to_json(const DeviceIdentity& device) {
 }
 
 Json recording_header(const HilSession& session, const DeviceIdentity& device,
-                      const LoopModel& model, bool real_time, const Json& rendering) {
+                      const LoopModel& model, bool real_time, const SessionNotes& notes,
+                      const Json& rendering) {
   Json said = parse_json(session.text, "session");
   if (session.law) {
     said["model"]["law"] = to_json(*session.law);
@@ -77,6 +79,10 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
             {"error_bound", model.error_bound},
             {"stiffness_at_once_N_per_m", model.stiffness_N_per_m},
             {"plan", model.plan}}},
+          {"notes",
+           {{"date", notes.date},
+            {"operator_code", notes.operator_code},
+            {"subject_code", notes.subject_code}}},
           {"rendering", rendering},
           {"surface_by_phase_m", std::move(surface)},
           {"session", std::move(said)}};
@@ -118,7 +124,9 @@ HilRecording read_recording(const std::filesystem::path& file) {
   HilRecording recording;
   recording.name = file.filename().string();
   recording.header = parse_json(log.header, file.string());
-  if (recording.header.value("format", "") != kFormat || log.row_bytes != sizeof(ServoRecord)) {
+  const std::string format = recording.header.value("format", "");
+  const std::size_t row_bytes = format == kFirstFormat ? kFirstRowBytes : sizeof(ServoRecord);
+  if ((format != kFormat && format != kFirstFormat) || log.row_bytes != row_bytes) {
     throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
   }
   recording.session = parse_session(recording.header.at("session"), file.string(), {});
@@ -126,7 +134,9 @@ HilRecording read_recording(const std::filesystem::path& file) {
     set_surface(recording.session, recording.header.at("surface_by_phase_m"), file.string());
   }
   recording.rows.resize(log.rows);
-  if (log.rows > 0) std::memcpy(recording.rows.data(), log.bytes.data(), log.bytes.size());
+  for (std::size_t i = 0; i < log.rows; ++i) {
+    std::memcpy(&recording.rows[i], log.bytes.data() + i * row_bytes, row_bytes);
+  }
   if (recording.session.servo.surface_before_hand_m && log.rows > 0) {
     const Eigen::Map<const Eigen::Vector3d> hand_m(recording.rows.front().position_m);
     recording.session.servo.surface_m =

@@ -8,11 +8,17 @@
 
 namespace tpm {
 
+/// What a person adds to a recording. Codes, not names: the recording may be passed on. Nothing is
+/// required.
+struct SessionNotes {
+  std::string date, operator_code, subject_code;
+};
+
 /// What stands before the rows of a recording: format, session with its scene, device, model, what
 /// was known of its rendering before (RenderingCheck).
 [[nodiscard]] Json recording_header(const HilSession& session, const DeviceIdentity& device,
                                     const LoopModel& model, bool real_time,
-                                    const Json& rendering = {});
+                                    const SessionNotes& notes = {}, const Json& rendering = {});
 
 /// What stands behind them: how the session ended.
 [[nodiscard]] Json recording_closing(const ServoOutcome& outcome);

@@ -108,6 +108,11 @@ void write_rows(Hdf5Writer& file, const HilRecording& recording) {
   columns.whole<std::int32_t>(
       "stop", "0, or in the last row the number of the cause: see /causes",
       [](const ServoRecord& row) { return static_cast<std::int32_t>(row.stop); });
+  columns.numbers("gripper_m", "m", "opening of the gripper; not a number: the device has none",
+                  [](const ServoRecord& row) { return static_cast<double>(row.gripper_m); });
+  columns.whole<std::int64_t>(
+      "buttons", "of the device, a bit for each that is pressed",
+      [](const ServoRecord& row) { return static_cast<std::int64_t>(row.buttons); });
   for (const FlagWord& flag : kFlagWords) {
     columns.whole<std::int32_t>(flag.word, "1: so in this cycle", [&flag](const ServoRecord& row) {
       return (row.flags & flag.flag) != 0 ? 1 : 0;
@@ -168,6 +173,10 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
     attribute(fmt::format("device_{}", key).c_str(), device.value(key, ""));
   }
   attribute("time", recording.header.value("time", ""));
+  const Json notes = recording.header.value("notes", Json::object());
+  for (const char* key : {"date", "operator_code", "subject_code"}) {
+    attribute(key, notes.value(key, ""));
+  }
   attribute("model", recording.header.at("model").value("name", ""));
   attribute("whole", yes_or_no(recording.closed && recording.damaged == 0));
   attribute("damaged_rows", std::to_string(recording.damaged));
@@ -175,7 +184,7 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
   write_rows(writer, recording);
   write_phases(writer, recording.session);
   std::vector<std::string> causes;
-  for (auto i = 0; i <= static_cast<std::int32_t>(StopCause::oscillation); ++i) {
+  for (auto i = 0; i <= static_cast<std::int32_t>(StopCause::position_jump); ++i) {
     causes.emplace_back(word_of(static_cast<StopCause>(i)));
   }
   writer.texts("/causes", causes);

@@ -109,7 +109,7 @@ std::string RenderingCheck::verdict() const {
 RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                                const LoopModel& loop, std::string_view kind) {
   const DeviceLimits& limits = limits_of(kind);
-  const bool hardware = kind == "omega7";
+  const bool hardware = limits.hardware();
   RenderingCheck check;
   check.rate_Hz = 1.0 / session.servo.period_s;
   check.delay_periods = hardware ? limits.delay_periods : session.plant.delay_periods;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -108,6 +109,7 @@ void parse_start(ServoSettings& servo, const Json& json, const DeviceLimits& dev
       in_range(start, "still", Dimension::time, gate.still_s, kLeastStill_s, kMostStill_s, at);
   gate.limit_s =
       in_range(start, "limit", Dimension::time, gate.limit_s, kLeastLimit_s, kMostLimit_s, at);
+  gate.confirm = start.value("confirm", false);
   servo.gate = gate;
   if (!json.contains("surface_before_hand")) return;
   if (json.contains("surface")) {
@@ -117,6 +119,21 @@ void parse_start(ServoSettings& servo, const Json& json, const DeviceLimits& dev
   constexpr double kNearest_m = 1e-3, kFurthest_m = 0.05;
   servo.surface_before_hand_m =
       in_range(json, "surface_before_hand", Dimension::length, 0.0, kNearest_m, kFurthest_m, place);
+}
+
+DeviceMounting parse_mounting(const Json& json, const DocumentPlace& place) {
+  DeviceMounting mounting;
+  if (json.contains("effector_mass_kg")) {
+    mounting.effector_mass_kg = json.at("effector_mass_kg").get<double>();
+  }
+  const auto angle = [&](const char* key, double most_rad) -> std::optional<double> {
+    if (!json.contains(key)) return std::nullopt;
+    return in_range(json, key, Dimension::angle, 0.0, -most_rad, most_rad, place);
+  };
+  mounting.angle_rad = angle("angle", 2.0 * std::numbers::pi);
+  mounting.base_angle_x_rad = angle("base_angle_x", std::numbers::pi);
+  mounting.base_angle_z_rad = angle("base_angle_z", std::numbers::pi);
+  return mounting;
 }
 
 /// How far the tool goes beyond the place where the tissue begins, m: along the push and across.
@@ -345,6 +362,8 @@ HilSession parse_session(const Json& json, std::string_view where,
   }
   parse_limits(session, json.value("limits", Json::object()), device, place.key("limits"));
   parse_start(session.servo, json, device, place);
+  session.preparation.mounting =
+      parse_mounting(json.value("mounting", Json::object()), place.key("mounting"));
   session.phases = parse_phases(with_motion, place);
   if (with_motion.contains("motion")) {
     session.measured_N = with_motion.at("motion").value("measured_N", std::vector<double>());
@@ -361,6 +380,30 @@ HilSession parse_session(const Json& json, std::string_view where,
   parse_plant(session.plant, json.value("virtual_device", Json::object()),
               place.key("virtual_device"));
   return session;
+}
+
+void require_within(const HilSession& session, const DeviceLimits& limits) {
+  const auto refuse = [&](const char* key, std::string_view what, const std::string& most) {
+    throw Error(ExitCode::answer_is_no, fmt::format("device '{}'", limits.kind),
+                fmt::format("the session's {} is {}", key, what), "at most " + most);
+  };
+  const ServoSettings& servo = session.servo;
+  if (servo.force_limit_N > limits.force_N) {
+    refuse("limits/force", shortest(servo.force_limit_N) + " N", shortest(limits.force_N) + " N");
+  }
+  if (servo.slew_limit_N_per_s > limits.slew_N_per_s) {
+    refuse("limits/slew_N_per_s", shortest(servo.slew_limit_N_per_s),
+           shortest(limits.slew_N_per_s));
+  }
+  if (servo.most_damping_N_s_per_m > limits.damping_N_s_per_m) {
+    refuse("limits/damping_N_s_per_m", shortest(servo.most_damping_N_s_per_m),
+           shortest(limits.damping_N_s_per_m));
+  }
+  const double furthest_m = furthest_of(session, session.servo.surface_m);
+  if (!servo.surface_before_hand_m && furthest_m > limits.reach_m) {
+    refuse("furthest place", fmt::format("{:.3g} m from the centre", furthest_m),
+           shortest(limits.reach_m) + " m");
+  }
 }
 
 HilSession read_session(const std::filesystem::path& file, const SessionChanges& changes) {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/device/device_limits.hpp"
 #include "tpm/device/haptic_device.hpp"
 #include "tpm/device/virtual_plant.hpp"
 #include "tpm/law/law_file.hpp"
@@ -89,6 +90,9 @@ struct HilSession {
 /// @param folder that paths in the session are relative to
 [[nodiscard]] HilSession parse_session(const Json& json, std::string_view where,
                                        const std::filesystem::path& folder);
+/// Throws Error(answer_is_no) if the session asks for more than a device can take.
+void require_within(const HilSession& session, const DeviceLimits& limits);
+
 /// What a run puts in place of parts of its session.
 struct SessionChanges {
   std::filesystem::path law;     ///< the model is this law, whatever the file says

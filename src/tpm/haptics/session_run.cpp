@@ -4,7 +4,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/device/device_limits.hpp"
-#include "tpm/device/omega7.hpp"
+#include "tpm/device/force_dimension.hpp"
 #include "tpm/device/replay_device.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/store/row_log.hpp"
@@ -35,19 +35,8 @@ Eigen::Matrix3Xd asked_motion(const HilSession& session) {
 }
 
 ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
-                      const LoopModel& model, const std::shared_ptr<ContactModel>& stepped,
-                      const RenderingCheck& rendering, bool guided,
+                      const std::shared_ptr<ContactModel>& stepped, const ServoSettings& servo,
                       const SessionRunOptions& options, RowLogWriter& log) {
-  ServoSettings servo = session.servo;
-  servo.friction_N_s_per_m = rendering.friction_N_s_per_m;
-  servo.delay_periods = guided ? rendering.delay_periods : 0;
-  if (!guided) {  // a recorded motion begins where it began, and nobody feels it
-    servo.gate.reset();
-    servo.energy_allowance_J = std::numeric_limits<double>::infinity();
-    servo.watch_oscillation = false;
-  }
-  servo.model_push = model.push;
-  servo.to_model = model.to_model;
   const RecordSink sink = [&](const ServoRecord& row) {
     const bool waits = row.phase < 0 && row.stop == StopCause::none;
     if (!waits) log.append(&row);
@@ -87,10 +76,8 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
   if (choice.kind == "virtual") {
     return std::make_shared<VirtualOmega7>(session.plant, session.operator_script());
   }
-  if (choice.kind == "omega7") return std::make_shared<Omega7>(choice.library);
-  if (choice.kind != "replay") {
-    throw Error(ExitCode::usage, "--device", "'" + printable(choice.kind) + "'",
-                "virtual, omega7 or replay");
+  if (limits_of(choice.kind).hardware()) {
+    return std::make_shared<ForceDimension>(choice.library, choice.kind, choice.which);
   }
   if (choice.replay.empty() && session.phases.back().kind == SessionPhaseKind::motion) {
     return std::make_shared<ReplayDevice>(asked_motion(session), session.phases.back().name);
@@ -103,8 +90,25 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
   return std::make_shared<ReplayDevice>(motion_of(recording), recording.name);
 }
 
+ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
+                            const RenderingCheck& rendering, bool guided) {
+  ServoSettings servo = session.servo;
+  servo.friction_N_s_per_m = rendering.friction_N_s_per_m;
+  servo.delay_periods = guided ? rendering.delay_periods : 0;
+  if (!guided) {
+    servo.gate.reset();
+    servo.energy_allowance_J = std::numeric_limits<double>::infinity();
+    servo.watch_oscillation = false;
+    servo.most_speed_m_per_s = std::numeric_limits<double>::infinity();
+  }
+  servo.model_push = model.push;
+  servo.to_model = model.to_model;
+  return servo;
+}
+
 SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                        const SessionRunOptions& options) {
+  require_within(session, limits_of(choice.kind));
   SessionRun run;
   run.model = make_loop_model(session, options.real_time, options.planning);
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
@@ -120,12 +124,13 @@ SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
     if (options.opened) options.opened(run.device, run.model);
     RowLogWriter log(options.recording,
                      to_text(recording_header(session, run.device, run.model, options.real_time,
-                                              to_json(run.rendering))),
+                                              options.notes, to_json(run.rendering))),
                      sizeof(ServoRecord), RowLogWriter::Name::later);
     device->prepare(preparation);
     log.appear();
-    run.outcome = run_loop(session, device, run.model, stepped, run.rendering,
-                           choice.kind != "replay", options, log);
+    const ServoSettings servo =
+        loop_settings(session, run.model, run.rendering, choice.kind != "replay");
+    run.outcome = run_loop(session, device, stepped, servo, options, log);
     log.close(to_text(recording_closing(run.outcome)));
   } catch (...) {
     device->stop();

@@ -2,6 +2,7 @@
 #include <functional>
 #include <memory>
 
+#include "tpm/device/force_dimension.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/rendering_check.hpp"
 
@@ -9,9 +10,10 @@ namespace tpm {
 
 /// Which device, and what it may do.
 struct DeviceChoice {
-  std::string kind = "virtual";   ///< virtual, omega7, replay
+  std::string kind = "virtual";   ///< as limits_of() takes it
   std::filesystem::path library;  ///< of the vendor; empty: looked for
   std::filesystem::path replay;   ///< recording to be replayed
+  DeviceSelection which;
   bool may_move = false;
   bool take_as_ready = false;
 };
@@ -25,6 +27,7 @@ struct SessionRunOptions {
   RealTimeWish wish = RealTimeWish::ignore;
   std::filesystem::path recording;
   bool accept_unstable = false;  ///< of a simulated device only
+  SessionNotes notes;
   std::function<bool()> interrupted;
   /// Sees every record, on the thread that writes them.
   std::function<void(const ServoRecord&)> watcher;
@@ -39,6 +42,12 @@ struct SessionRun {
   RenderingCheck rendering;
   ServoOutcome outcome;
 };
+
+/// What the loop of a session is set to, with what is known of its model and device.
+/// @param guided a hand holds the device; else a recorded motion begins where it began, and nobody
+///        feels it
+[[nodiscard]] ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
+                                          const RenderingCheck& rendering, bool guided);
 
 /// Runs a session and records it. A rendering that would be unstable is refused, forces and phases
 /// begin when the tool is in place (StartGate; rows until then are shown and not recorded).

@@ -59,9 +59,9 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
   Series predicted, measured;
   measured.kind = Series::Kind::points;
   predicted.provenance = "model";
-  measured.provenance = "measured";
+  measured.provenance = "simulated";
   predicted.label = delay == 0 ? "no delay" : fmt::format("delay {} periods", delay);
-  measured.label = predicted.label + ", measured";
+  measured.label = predicted.label + ", on the simulated device";
   for (const BorderPoint& p : points) {
     if (p.delay_periods != delay || p.damping_N_s_per_m != damping) continue;
     predicted.x.push_back(p.rate_Hz);
@@ -121,9 +121,9 @@ Figure rule_figure(const BorderStudy& study) {
     Series predicted, measured;
     measured.kind = Series::Kind::points;
     predicted.provenance = "model";
-    measured.provenance = "measured";
+    measured.provenance = "simulated";
     predicted.label = std::string(word_of_rule(rule));
-    measured.label = predicted.label + ", measured";
+    measured.label = predicted.label + ", on the simulated device";
     for (const RulePoint& p : study.rules) {
       if (p.rule != rule || !std::isfinite(p.measured_N_s_per_m)) continue;
       predicted.x.push_back(p.relaxation_time_s / kPeriod_s);
@@ -152,6 +152,145 @@ Figure rule_figure(const BorderStudy& study) {
 
 }  // namespace
 
+namespace {
+
+Json impacts_json(const BorderStudy& study) {
+  Json list = Json::array();
+  for (const ImpactPoint& p : study.impacts) {
+    Json json{{"delay_periods", p.delay_periods},
+              {"speed_m_per_s", p.speed_m_per_s},
+              {"share_of_linear_border", p.share},
+              {"stiffness_N_per_m", rounded(p.stiffness_N_per_m, kBorderDigits)}};
+    Json by_limit = Json::object();
+    for (const RiseLimit limit : kRiseLimits) {
+      const auto which = static_cast<std::size_t>(limit);
+      by_limit[std::string(word_of(limit))] = {
+          {"comes_to_rest", p.rests[which]}, {"given_to_hand_J", number_or_null(p.given_J[which])}};
+    }
+    json["by_limit_of_rise"] = std::move(by_limit);
+    list.push_back(std::move(json));
+  }
+  return list;
+}
+
+Json corners_json(const BorderStudy& study) {
+  Json list = Json::array();
+  for (const DeviceCorner& c : study.corners) {
+    Json json{{"device", c.device},
+              {"stiffness_N_per_m", c.stiffness_N_per_m},
+              {"damping_N_s_per_m", c.damping_N_s_per_m},
+              {"friction_needed_N_s_per_m", c.needed_N_s_per_m},
+              {"friction_needed_with_a_period_of_delay_N_s_per_m", c.needed_delayed_N_s_per_m},
+              {"assumed_friction_N_s_per_m", nullptr},
+              {"passive", nullptr}};
+    if (c.assumed_friction_N_s_per_m) {
+      json["assumed_friction_N_s_per_m"] = {c.assumed_friction_N_s_per_m->first,
+                                            c.assumed_friction_N_s_per_m->second};
+      json["passive"] = c.assumed_friction_N_s_per_m->first > c.needed_N_s_per_m;
+    }
+    list.push_back(std::move(json));
+  }
+  return list;
+}
+
+/// A letter for each limit of the rise: the tool comes to rest, or it does not.
+std::string impact_text(const BorderStudy& study) {
+  std::string text =
+      "\na hand runs into the contact and stays 4 mm deep, at 1 kHz: r comes to rest (0.1 mm "
+      "within 5 s), O goes on to "
+      "oscillate;\nfirst letter without a limit of the rise, second with the slip of a session "
+      "(400 "
+      "N/s, 8 N), third with ramp-in besides;\nstiffness over that of the border of the linear, "
+      "two-sided loop\n";
+  int delay = -1;
+  double share = -1.0;
+  for (const ImpactPoint& p : study.impacts) {
+    if (p.delay_periods != delay) {
+      delay = p.delay_periods;
+      share = -1.0;
+      text += fmt::format("delay {} periods, border {} N/m\n{:>9}", delay,
+                          significant(p.stiffness_N_per_m / p.share, 4), "m/s");
+      double last = 0.0;
+      for (const ImpactPoint& other : study.impacts) {
+        if (other.speed_m_per_s <= last) break;
+        last = other.speed_m_per_s;
+        text += fmt::format("{:>6}", significant(last, 3));
+      }
+      text += "\n";
+    }
+    if (p.share != share) {
+      share = p.share;
+      text += fmt::format("{:>9}", significant(share, 3));
+    }
+    std::string cell;
+    for (const bool rests : p.rests) cell += rests ? 'r' : 'O';
+    text += fmt::format("{:>6}", cell);
+    if (&p == &study.impacts.back() || (&p)[1].share != share || (&p)[1].delay_periods != delay) {
+      text += "\n";
+    }
+  }
+  return text;
+}
+
+std::string corner_text(const BorderStudy& study) {
+  std::string text = fmt::format(
+      "\nfriction that a device needs to be passive at 1 kHz with all of its maker's stiffness and "
+      "damping (software limits of CHAI3D), N s/m\n{:<10}{:>8}{:>8}{:>10}{:>16}  verdict\n",
+      "device", "N/m", "N s/m", "needed", "needed, 1 late");
+  for (const DeviceCorner& c : study.corners) {
+    std::string verdict = "none: its friction is not known";
+    if (c.assumed_friction_N_s_per_m) {
+      const auto& [least, most] = *c.assumed_friction_N_s_per_m;
+      verdict = fmt::format("{} (friction assumed to be {} to {})",
+                            least > c.needed_N_s_per_m ? "passive" : "not passive",
+                            significant(least, 3), significant(most, 3));
+    }
+    text += fmt::format("{:<10}{:>8}{:>8}{:>10}{:>16}  {}\n", c.device,
+                        significant(c.stiffness_N_per_m, 4), significant(c.damping_N_s_per_m, 4),
+                        significant(c.needed_N_s_per_m, 4),
+                        significant(c.needed_delayed_N_s_per_m, 4), verdict);
+  }
+  return text;
+}
+
+/// Where impacts come to rest with the slip of a session, a panel for each delay.
+Figure impact_figure(const BorderStudy& study) {
+  Figure figure;
+  figure.id = "impacts";
+  figure.title = "Impacts with the slip of a session (simulated device)";
+  figure.caption =
+      "A hand runs into the one-sided contact and stays 4 mm deep; stiffness over that at which "
+      "the "
+      "linear, two-sided loop becomes unstable. The rise of the force is limited to 400 N/s by a "
+      "slip of the model's tool, its size to 8 N.";
+  for (const ImpactPoint& p : study.impacts) {
+    const std::string title = fmt::format("delay {} periods", p.delay_periods);
+    if (figure.panels.empty() || figure.panels.back().title != title) {
+      Panel panel{title,
+                  {"speed of the hand", "m/s", true, std::nullopt, std::nullopt},
+                  {"stiffness over the linear border", "", true, std::nullopt, std::nullopt},
+                  {}};
+      for (const char* label : {"comes to rest", "oscillates"}) {
+        Series series;
+        series.kind = Series::Kind::points;
+        series.provenance = "simulated";
+        series.label = label;
+        panel.series.push_back(std::move(series));
+      }
+      figure.panels.push_back(std::move(panel));
+    }
+    Series& series = figure.panels.back().series[p.rests[1] ? 0 : 1];
+    series.x.push_back(p.speed_m_per_s);
+    series.y.push_back(p.share);
+  }
+  for (Panel& panel : figure.panels) {
+    std::erase_if(panel.series, [](const Series& series) { return series.x.empty(); });
+  }
+  return figure;
+}
+
+}  // namespace
+
 Json border_json(const BorderStudy& study) {
   Json rules = Json::array();
   for (const RulePoint& p : study.rules) {
@@ -169,6 +308,8 @@ Json border_json(const BorderStudy& study) {
           {"rules", rules},
           {"shortest_forward_euler", points_json(study.shortest, "measured_s", "predicted_s")},
           {"shortest_exact", points_json(study.shortest_exact, "measured_s", "predicted_s")},
+          {"impacts", impacts_json(study)},
+          {"device_corners", corners_json(study)},
           {"worst_passive", rounded(worst_difference(study.passive), kBorderDigits)},
           {"worst_stable", rounded(worst_difference(study.stable), kBorderDigits)}};
 }
@@ -210,11 +351,11 @@ std::string border_text(const BorderStudy& study) {
         significant(euler.rate_Hz, 4), value(1e3 * euler.measured), value(1e3 * euler.predicted),
         study.shortest_exact[i].measured == 0.0 ? "any" : value(study.shortest_exact[i].measured));
   }
-  return text;
+  return text + impact_text(study) + corner_text(study);
 }
 
 std::vector<Figure> border_figures(const BorderStudy& study) {
-  return {border_figure(study), rule_figure(study)};
+  return {border_figure(study), rule_figure(study), impact_figure(study)};
 }
 
 }  // namespace tpm

@@ -23,7 +23,7 @@ struct Series {
   };
   Kind kind = Kind::line;
   std::string label;       ///< for the legend; same label, same colour in all panels of a figure
-  std::string provenance;  ///< "model", or a word of provenance_name()
+  std::string provenance;  ///< "model", "simulated", or a word of provenance_name()
   std::string assumed;     ///< what of its place is assumed ("time"); empty if nothing
   std::vector<double> x;
   std::vector<double> y;

@@ -205,6 +205,10 @@ void add_identity(Document& d, const HilRecording& r) {
   row("rate", significant(1.0 / r.session.servo.period_s, 4) + " Hz");
   row("time", r.header.at("time").get<std::string>());
   row("tpm", r.header.at("version").get<std::string>());
+  const Json notes = r.header.value("notes", Json::object());
+  row("date", notes.value("date", ""));
+  row("operator", notes.value("operator_code", ""));
+  row("subject", notes.value("subject_code", ""));
   d.heading(2, "Device and model");
   d.table(std::move(table));
   std::vector<Cell> assumed;

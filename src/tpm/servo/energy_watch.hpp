@@ -58,8 +58,10 @@ class EnergyWatch {
   std::vector<Eigen::Vector3d> pending_N_;  ///< commands on their way, a ring
   std::size_t oldest_ = 0;
   std::uint64_t block_periods_, in_block_ = 0;
+  double friction_N_per_m_;  ///< of a motion within one period
   std::array<double, kBlocks> largest_J_{};
   std::size_t block_ = 0;
+  double largest_of_all_J_ = 0.0;
   double q_J_ = 0.0, tissue_J_ = 0.0, given_J_ = 0.0, most_given_J_ = 0.0;
 };
 

@@ -1,5 +1,7 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string_view>
 
 namespace tpm {
@@ -26,6 +28,7 @@ enum class StopCause : std::int32_t {
   untrusted,      ///< the model did not trust its forces for too long
   energy,         ///< what was rendered gave the hand energy that the tissue did not have
   oscillation,    ///< the force went up and down by itself
+  position_jump,  ///< the device read a place that no hand reaches so soon
 };
 
 [[nodiscard]] std::string_view word_of(StopCause cause);
@@ -42,10 +45,11 @@ enum ServoFlag : std::uint32_t {
   kBeyondModel = 1U << 7U,  ///< the model does not trust its answer
   kLate = 1U << 8U,         ///< woke after the next deadline
   // Before the session begins (StartGate); the rows have phase -1.
-  kWaiting = 1U << 9U,      ///< for the operator; forces are zero
-  kOutOfReach = 1U << 10U,  ///< the tool is outside the workspace
-  kInTissue = 1U << 11U,    ///< or too close to it
-  kMoving = 1U << 12U,      ///< the tool is not at rest
+  kWaiting = 1U << 9U,       ///< for the operator; forces are zero
+  kOutOfReach = 1U << 10U,   ///< the tool is outside the workspace
+  kInTissue = 1U << 11U,     ///< or too close to it
+  kMoving = 1U << 12U,       ///< the tool is not at rest
+  kUnconfirmed = 1U << 13U,  ///< all is in place, and the operator has not said so
 };
 
 /// One cycle of the servo loop. Plain data, written as it stands. Depths are along the push, from
@@ -68,8 +72,14 @@ struct ServoRecord {
   std::int32_t phase = 0;        ///< -1 before the session begins
   std::int32_t missed = 0;       ///< periods before this one that went by without a command
   StopCause stop = StopCause::none;
+  float gripper_m = std::numeric_limits<float>::quiet_NaN();  ///< opening; NaN: there is none
+  std::uint32_t buttons = 0;  ///< of the device, a bit for each that is pressed
 };
 
-static_assert(sizeof(ServoRecord) == 128);
+static_assert(sizeof(ServoRecord) == 136);
+
+/// Of a row in recordings of the first format, which know neither gripper nor buttons.
+inline constexpr std::size_t kFirstRowBytes = 128;
+static_assert(offsetof(ServoRecord, gripper_m) == kFirstRowBytes);
 
 }  // namespace tpm

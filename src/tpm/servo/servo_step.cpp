@@ -38,9 +38,10 @@ double stiffness_of(const ContactModel& model, const ServoSettings& settings) {
   return std::max(kLeast_N_per_m, settings.to_model ? k.norm() : push.dot(k * push));
 }
 
-/// The vendor's numbers for "no device" and "not available".
+/// The vendor's number for "no device". 6, "not available", is said of calls that a device does not
+/// have.
 bool is_gone(int error) {
-  return error == 5 || error == 6;
+  return error == 5;
 }
 
 }  // namespace
@@ -87,6 +88,8 @@ std::string_view word_of(StopCause cause) {
       return "energy given to the hand";
     case StopCause::oscillation:
       return "oscillation";
+    case StopCause::position_jump:
+      return "position jumped";
   }
   return "unknown";
 }
@@ -111,7 +114,7 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
   device_.await();
 }
 
-StopCause ServoStep::read(ServoRecord& row) noexcept {
+StopCause ServoStep::read(int missed, ServoRecord& row) noexcept {
   const Eigen::Vector3d before = position_m_;
   const DeviceAnswer answer = device_.read(position_m_);
   if (answer == DeviceAnswer::finished) return StopCause::finished;
@@ -127,6 +130,10 @@ StopCause ServoStep::read(ServoRecord& row) noexcept {
   std::copy_n(position_m_.data(), 3, row.position_m);
   if (!position_m_.allFinite()) return StopCause::position_not_finite;
   moved_m_ = begun_ ? Eigen::Vector3d(position_m_ - before) : Eigen::Vector3d::Zero();
+  stale_ += 1 + missed;
+  const double reach_m = settings_.most_speed_m_per_s * stale_ * settings_.period_s;
+  if (moved_m_.squaredNorm() > reach_m * reach_m) return StopCause::position_jump;
+  if (answer != DeviceAnswer::time_guard) stale_ = 0;
   return StopCause::none;
 }
 
@@ -147,9 +154,9 @@ void ServoStep::touch(int missed, ServoRecord& row) noexcept {
 
 /// The largest force that may be sent now, and the flag that says what it is limited by.
 ServoStep::Cap ServoStep::cap() const noexcept {
-  const double before_N = tissue_N_.norm();
+  const double before_N = tissue_size_N_;
   const double time = static_cast<double>(cycle_) * settings_.period_s;
-  const double ramp = settings_.ramp_in_s > 0.0 ? std::min(1.0, time / settings_.ramp_in_s) : 1.0;
+  const double ramp = time < settings_.ramp_in_s ? time / settings_.ramp_in_s : 1.0;
   const double limit = ramp * settings_.force_limit_N;
   // The model comes back from a time of doubt at the force that is being sent.
   const double rising =
@@ -184,7 +191,7 @@ double ServoStep::felt_N(const Felt& felt, const Cap& cap, ServoRecord& row) noe
   doubted_ += static_cast<double>(felt.steps);
   row.flags |= kBeyondModel;
   if (!felt.touching) return 0.0;
-  const double before_N = tissue_N_.norm();
+  const double before_N = tissue_size_N_;
   const double fallen = before_N - stiffness_N_per_m_ * std::max(0.0, felt.withdrawn_m);
   const double faded =
       before_N * std::exp(-static_cast<double>(felt.steps) * settings_.period_s / settings_.fade_s);
@@ -205,14 +212,15 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
   const double to_m = tool_m_ - slip_m_;
   OneSidedContact::Answer answer;
   const bool touched = model_N_ > 0.0;
-  for (int i = 1; i <= steps; ++i) {
+  for (int i = 1; i < steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
     answer = contact_.step(begun_ ? from_m + part * (to_m - from_m) : to_m);
   }
+  answer = contact_.step(to_m);
   if (touched && answer.touching && answer.trusted && !doubted_before_) {
     learn_stiffness(answer.force_N - model_N_, to_m - from_m);
   }
-  const double before_N = tissue_N_.norm();
+  const double before_N = tissue_size_N_;
   const double moved = answer.surface_m - surface_m_;
   const double now_N =
       felt_N({answer.force_N, from_m - to_m, steps, answer.touching, answer.trusted}, most, row);
@@ -221,6 +229,7 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
   surface_m_ = answer.surface_m;
   model_N_ = answer.force_N;
   tissue_N_ = -settings_.push * now_N;
+  tissue_size_N_ = now_N;
   row.model_force_N = answer.force_N;
   row.model_error_N = answer.error_N;
   if (answer.touching) row.flags |= kTouching;
@@ -265,6 +274,7 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
   tissue_N_ = !answer.trusted ? Eigen::Vector3d(now_N * along)
               : size_N > 0.0  ? Eigen::Vector3d(force_N * (now_N / size_N))
                               : force_N;
+  tissue_size_N_ = tissue_N_.norm();
   tissue_work_J_ = -0.5 * (before_N + tissue_N_).dot(to_m - from_m);
   leak_J_ += 0.5 * (before_N - tissue_N_).dot(moved_m_);
   model_tool_m_ = to_m;
@@ -293,7 +303,7 @@ Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
 
 StopCause ServoStep::judge_rendering(int periods) noexcept {
   energy_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
-  oscillation_.observe(sent_N_.norm(), periods);
+  if (settings_.watch_oscillation) oscillation_.observe(sent_N_.norm(), periods);
   if (energy_.too_much()) return StopCause::energy;
   if (settings_.watch_oscillation && oscillation_.found()) return StopCause::oscillation;
   const double limit = settings_.untrusted_limit_s / settings_.period_s;
@@ -317,7 +327,10 @@ StopCause ServoStep::write(const Eigen::Vector3d& force_N, ServoRecord& row) noe
 
 StopCause ServoStep::look_at_status() noexcept {
   status_ = device_.status();
-  return cause_of(status_.forces_off);
+  hand_ = device_.hand();
+  const StopCause cause = cause_of(status_.forces_off);
+  if (cause != StopCause::none || !status_.failed) return cause;
+  return is_gone(status_.error) ? StopCause::unplugged : StopCause::communication;
 }
 
 bool ServoStep::storm(int missed) noexcept {
@@ -343,7 +356,7 @@ void ServoStep::count_limits(std::uint32_t flags) noexcept {
 
 StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   if (storm(missed)) return StopCause::overrun_storm;
-  StopCause cause = read(row);
+  StopCause cause = read(missed, row);
   if (cause != StopCause::none) return cause;
   if (!begun_ && settings_.surface_before_hand_m) {
     settings_.surface_m = position_m_ + *settings_.surface_before_hand_m * settings_.push;
@@ -358,8 +371,12 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   cause = write(with_damping(row), row);
   count_limits(row.flags);
   if (cause != StopCause::none) return cause;
-  const auto every = static_cast<std::uint64_t>(settings_.status_every);
-  return cycle_ % every == 0 ? look_at_status() : StopCause::none;
+  if (--to_status_ > 0) return StopCause::none;
+  to_status_ = settings_.status_every;
+  cause = look_at_status();
+  row.gripper_m = hand_.gripper_m;
+  row.buttons = hand_.buttons;
+  return cause;
 }
 
 /// A tool that moves in space may touch the tissue above the plane of its surface.
@@ -375,11 +392,12 @@ StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   row.phase = -1;
   row.flags |= kWaiting;
   gate_->count(static_cast<std::uint64_t>(missed) + 1);
-  StopCause cause = read(row);
+  StopCause cause = read(missed, row);
   if (cause != StopCause::none) return cause;
   row.tool_depth_m = settings_.push.dot(position_m_ - settings_.surface_m);
   const bool with_surface = !settings_.surface_before_hand_m;
-  const std::uint32_t missing = gate_->see(position_m_, row.tool_depth_m, with_surface);
+  const std::uint32_t missing =
+      gate_->see(position_m_, row.tool_depth_m, with_surface, hand_.buttons != 0);
   row.flags |= missing;
   cause = write(Eigen::Vector3d::Zero(), row);
   if (cause != StopCause::none) return cause;
@@ -397,15 +415,14 @@ StopCause ServoStep::wait(int missed, ServoRecord& row) noexcept {
   return gate_->given_up() ? StopCause::not_in_place : StopCause::none;
 }
 
-/// A row that holds what was known last, and no command.
-ServoRecord ServoStep::begun_row() const noexcept {
-  ServoRecord row = last_;
-  std::fill_n(row.commanded_N, 3, 0.0);
-  row.woke_late_s = row.busy_s = 0.0F;
-  row.flags = 0;
-  row.cycle = cycle_;
-  row.phase = static_cast<std::int32_t>(phase_);
-  return row;
+/// The row goes on from what was known last, without a command.
+void ServoStep::begin_row(int missed) noexcept {
+  std::fill_n(row_.commanded_N, 3, 0.0);
+  row_.woke_late_s = row_.busy_s = 0.0F;
+  row_.flags = 0;
+  row_.cycle = cycle_;
+  row_.phase = static_cast<std::int32_t>(phase_);
+  row_.missed = missed;
 }
 
 StopCause ServoStep::cycle(int missed, ServoRecord& row) noexcept {
@@ -414,25 +431,24 @@ StopCause ServoStep::cycle(int missed, ServoRecord& row) noexcept {
     cycle_ += static_cast<std::uint64_t>(missed);
     while (phase_ < settings_.phase_ends.size() && cycle_ >= settings_.phase_ends[phase_]) ++phase_;
   }
-  row = begun_row();
-  row.missed = missed;
+  begin_row(missed);
   if (missed > 0 && !waiting) {
-    row.flags |= kLate;
+    row_.flags |= kLate;
     ++counts_.late;
     counts_.missed += static_cast<std::uint64_t>(missed);
   }
   const bool over = phase_ >= settings_.phase_ends.size();
   const StopCause cause = over      ? StopCause::finished
-                          : waiting ? wait(missed, row)
-                                    : work(missed, row);
+                          : waiting ? wait(missed, row_)
+                                    : work(missed, row_);
   if (cause == StopCause::none) {
     if (!waiting) ++cycle_;
-    last_ = row;
-    return cause;
+  } else {
+    row_.stop = cause;
+    std::fill_n(row_.commanded_N, 3, 0.0);
+    stop(cause);
   }
-  row.stop = cause;
-  std::fill_n(row.commanded_N, 3, 0.0);
-  stop(cause);
+  row = row_;
   return cause;
 }
 

@@ -42,7 +42,8 @@ struct ServoSettings {
   /// Stop if so many of the last 1000 cycles were late, or so many periods were missed at once.
   int most_late = 100;
   int most_missed = 50;
-  int status_every = 2;  ///< cycles
+  int status_every = 2;             ///< cycles
+  double most_speed_m_per_s = 5.0;  ///< of a hand; a position that needs more is not believed
 };
 
 struct ServoCounts {
@@ -103,9 +104,9 @@ class ServoStep {
     std::uint32_t flag = 0;
   };
   [[nodiscard]] StopCause wait(int missed, ServoRecord& row) noexcept;
-  [[nodiscard]] ServoRecord begun_row() const noexcept;
+  void begin_row(int missed) noexcept;
   [[nodiscard]] bool free_in_space() noexcept;
-  [[nodiscard]] StopCause read(ServoRecord& row) noexcept;
+  [[nodiscard]] StopCause read(int missed, ServoRecord& row) noexcept;
   void touch(int missed, ServoRecord& row) noexcept;
   void touch_along_push(int steps, ServoRecord& row) noexcept;
   void touch_in_space(int steps, ServoRecord& row) noexcept;
@@ -131,9 +132,12 @@ class ServoStep {
   std::optional<StartGate> gate_;
   ServoCounts counts_;
   DeviceStatus status_;
+  HandState hand_;
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d moved_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d sent_N_ = Eigen::Vector3d::Zero();
+  double tissue_size_N_ = 0.0;  ///< of tissue_N_
+  int to_status_ = 0;           ///< cycles until the device is asked for its status
   Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, after slip and trust
   double tool_m_ = 0.0, surface_m_ = 0.0, leak_J_ = 0.0;
   double stiffness_N_per_m_;        ///< that a slip is foretold with
@@ -146,8 +150,9 @@ class ServoStep {
   double tissue_work_J_ = 0.0;                               ///< on the surface in this cycle
   double doubted_ = 0.0;  ///< periods without trust, forgotten ten times as slowly
   bool doubted_before_ = false;
-  int owed_ = 0;  ///< periods that the model has not lived through yet
-  ServoRecord last_;
+  int owed_ = 0;     ///< periods that the model has not lived through yet
+  int stale_ = 0;    ///< periods for which the position is that of an earlier call
+  ServoRecord row_;  ///< of this cycle; what it does not know anew is from the one before
   std::uint64_t cycle_ = 0;
   std::size_t phase_ = 0;
   std::vector<char> late_;  ///< of the last cycles served, a ring

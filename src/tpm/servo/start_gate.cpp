@@ -18,8 +18,8 @@ StartGate::StartGate(const StartGateSettings& settings, double period_s) noexcep
       needed_(gate_periods(settings.still_s, period_s)),
       limit_(gate_periods(settings.limit_s, period_s)) {}
 
-std::uint32_t StartGate::see(const Eigen::Vector3d& position_m, double depth_m,
-                             bool with_surface) noexcept {
+std::uint32_t StartGate::see(const Eigen::Vector3d& position_m, double depth_m, bool with_surface,
+                             bool pressed) noexcept {
   std::uint32_t missing = 0;
   // Written so that a position that is no number is never in place.
   if (!((position_m - settings_.centre_m).norm() <= settings_.reach_m)) missing |= kOutOfReach;
@@ -30,7 +30,9 @@ std::uint32_t StartGate::see(const Eigen::Vector3d& position_m, double depth_m,
   }
   ++still_;
   if (still_ < needed_) missing |= kMoving;
-  return missing;
+  if (!settings_.confirm || missing != 0) return missing;
+  const bool said = settings_.confirmed && settings_.confirmed->load(std::memory_order_acquire);
+  return pressed || said ? 0 : static_cast<std::uint32_t>(kUnconfirmed);
 }
 
 }  // namespace tpm

@@ -1,6 +1,8 @@
 #pragma once
 #include <Eigen/Core>
+#include <atomic>
 #include <cstdint>
+#include <memory>
 
 namespace tpm {
 
@@ -12,6 +14,9 @@ struct StartGateSettings {
   double still_m = 0.5e-3;                             ///< how far a tool at rest may move
   double still_s = 0.25;                               ///< for how long it has to be at rest
   double limit_s = 60.0;                               ///< after which the session is given up
+  /// The operator has to say when: by a button of the device, or where `confirmed` becomes true.
+  bool confirm = false;
+  std::shared_ptr<const std::atomic<bool>> confirmed = nullptr;  ///< a key, say; may be null
 };
 
 /// Watches the tool before a session: forces stay at zero until it is in free air, inside the
@@ -21,10 +26,11 @@ class StartGate {
   /// @param period_s between two calls of see(), > 0
   StartGate(const StartGateSettings& settings, double period_s) noexcept;
 
+  /// @param pressed a button of the device; counts from when all else is in place
   /// @param depth_m of the tool, negative in the air; ignored unless `with_surface`
   /// @returns what is missing, ServoFlag bits; 0: the session can begin
   [[nodiscard]] std::uint32_t see(const Eigen::Vector3d& position_m, double depth_m,
-                                  bool with_surface) noexcept;
+                                  bool with_surface, bool pressed) noexcept;
   /// The time to get into place is over.
   [[nodiscard]] bool given_up() const noexcept { return waited_ >= limit_; }
   void count(std::uint64_t periods) noexcept { waited_ += periods; }

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/sha.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -100,15 +101,45 @@ bool write_all(int descriptor, std::string_view bytes) {
   return true;
 }
 
+namespace {
+
+/// One that has a name, so that perhaps nobody writes into it; a shell's `<(...)` has none.
+bool is_named_pipe(const fs::path& path, const fs::file_status& status) {
+  std::error_code ec;
+  (void)fs::canonical(path, ec);
+  return fs::is_fifo(status) && !ec;
+}
+
+/// Opening a pipe that nobody writes into would wait for ever. The descriptor blocks afterwards.
+void wait_for_writer(const fs::path& path, int descriptor) {
+  constexpr int kLongest_ms = 10000;
+  pollfd waited{descriptor, POLLIN, 0};
+  int ready = 0;
+  do {
+    ready = ::poll(&waited, 1, kLongest_ms);
+  } while (ready < 0 && errno == EINTR);
+  if (ready <= 0) {
+    throw bad_input(
+        path.string(),
+        fmt::format("is a pipe into which nothing was written for {} s", kLongest_ms / 1000),
+        "a file, or a pipe that something is written into");
+  }
+  (void)::fcntl(descriptor, F_SETFL, 0);
+}
+
+}  // namespace
+
 std::string read_file(const fs::path& path, std::uint64_t most) {
   std::error_code ec;
   const auto status = fs::status(path, ec);
   if (!fs::exists(status)) throw bad_input(path.string(), "no such file", "a readable file");
   if (fs::is_directory(status)) throw bad_input(path.string(), "is a folder", "a readable file");
-  const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  const bool pipe = is_named_pipe(path, status);
+  const Descriptor in(::open(path.c_str(), O_RDONLY | O_CLOEXEC | (pipe ? O_NONBLOCK : 0)));
   if (in.get() < 0) {
     throw cannot_read(path, errno);
   }
+  if (pipe) wait_for_writer(path, in.get());
   note_reading(path, in.get());
   const auto too_large = [&] {
     return bad_input(path.string(), fmt::format("holds more than {} MB", most >> 20U),

@@ -2,6 +2,9 @@
 
 #include <cstdint>
 #include <limits>
+#include <new>
+#include <stdexcept>
+#include <string_view>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
 #include <valijson/schema_parser.hpp>
@@ -160,6 +163,19 @@ void require_signed_range(const Json& value, const std::string& key, std::string
   }
 }
 
+/// valijson asks for memory without an exception and then throws one of its own.
+void populate(const nlohmann::json& document, valijson::Schema& schema) {
+  valijson::SchemaParser parser;
+  try {
+    parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(document), schema);
+  } catch (const std::runtime_error& error) {
+    if (std::string_view(error.what()).starts_with("Failed to allocate memory")) {
+      throw std::bad_alloc();
+    }
+    throw;
+  }
+}
+
 }  // namespace
 
 void check_schema(const Json& value, std::string_view schema_name, std::string_view where) {
@@ -170,8 +186,7 @@ void check_schema(const Json& value, std::string_view schema_name, std::string_v
   const nlohmann::json document = value;
 
   valijson::Schema schema;
-  valijson::SchemaParser parser;
-  parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(schema_document), schema);
+  populate(schema_document, schema);
   valijson::Validator validator;
   valijson::ValidationResults results;
   if (validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), &results)) {

@@ -108,7 +108,10 @@ struct Evaluator::Impl {
 
   /// What the definitions of one evaluation came to: each is computed once, or a chain of
   /// definitions that name two earlier ones each would cost a power of two.
-  using Known = std::map<std::string, double, std::less<>>;
+  struct Known {
+    std::map<std::string, double, std::less<>> values;
+    std::set<std::string, std::less<>> under_way;
+  };
 
   double lookup(const std::string& name, const Scope& scope, std::string_view where, int depth,
                 Known& known_values) {
@@ -120,15 +123,23 @@ struct Evaluator::Impl {
       if (const auto symbol = symbols.find(name); symbol != symbols.end()) return symbol->second;
       throw bad_input(where, fmt::format("unknown symbol '{}'", printable(name)), known(scope));
     }
-    if (depth >= kDeepestDefinition) {
+    if (known_values.under_way.contains(name)) {
       throw bad_input(where, fmt::format("'{}' refers to itself", printable(name)),
                       "definitions without circles");
     }
-    if (const auto value = known_values.find(name); value != known_values.end()) {
+    if (const auto value = known_values.values.find(name); value != known_values.values.end()) {
       return value->second;
     }
+    if (depth >= kDeepestDefinition) {
+      throw bad_input(where,
+                      fmt::format("'{}' stands below {} definitions that name each other",
+                                  printable(name), kDeepestDefinition),
+                      fmt::format("at most {}", kDeepestDefinition));
+    }
+    known_values.under_way.insert(name);
     const double value = run(*formula, scope, where, depth + 1, known_values);
-    known_values.emplace(name, value);
+    known_values.under_way.erase(name);
+    known_values.values.emplace(name, value);
     return value;
   }
 

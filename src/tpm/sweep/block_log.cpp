@@ -279,6 +279,26 @@ void BlockLog::append(std::uint64_t number, std::string_view record) {
   ++size_;
 }
 
+void BlockLog::require_room(std::uint64_t blocks) const {
+  double per_cell = sizeof(CellStatus) + sizeof(std::uint16_t) + sizeof(double);
+  if (!sweep_->model->models().empty()) per_cell += 1.0;
+  per_cell += 8.0 * static_cast<double>(sweep_->model->counted().size());
+  for (const SweepVariable& variable : sweep_->variables) {
+    per_cell += 8.0 * static_cast<double>(variable.width());
+  }
+  const double cells =
+      std::min(static_cast<double>(blocks) * static_cast<double>(sweep_->block_cells),
+               static_cast<double>(sweep_->cells()));
+  std::error_code ec;
+  const auto folder = path_.has_parent_path() ? path_.parent_path() : std::filesystem::path(".");
+  const auto space = std::filesystem::space(folder, ec);
+  if (ec || cells * per_cell <= static_cast<double>(space.capacity)) return;
+  throw Error(ExitCode::environment, path_.string(),
+              fmt::format("{:.3g} cells need {:.3g} GB, the disk has {:.3g}", cells,
+                          1e-9 * cells * per_cell, 1e-9 * static_cast<double>(space.capacity)),
+              "a larger disk, a coarser axis, or --shard over several machines");
+}
+
 CellBlock BlockLog::read(std::uint64_t number) const {
   CellBlock block;
   std::string payload;

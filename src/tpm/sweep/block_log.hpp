@@ -41,6 +41,9 @@ class BlockLog {
   /// Throws Error(environment); the log is then as it was before.
   /// @param record of this block, from log_record()
   void append(std::uint64_t block, std::string_view record);
+  /// Throws Error(environment) if so many blocks can never fit on the disk; room that is only
+  /// missing now may be made while the sweep runs.
+  void require_room(std::uint64_t blocks) const;
   /// Throws Error(bad_input) if the block was damaged since the log was opened.
   [[nodiscard]] CellBlock read(std::uint64_t block) const;
   /// Passes everything to the disk: from here on it survives the machine.

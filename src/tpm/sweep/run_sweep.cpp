@@ -3,6 +3,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_pipeline.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <ctime>
@@ -91,6 +92,7 @@ SweepRun run_sweep(const Sweep& sweep, BlockLog& log, const SweepControls& contr
   run.workers = worker_count(controls.workers);
   run.blocks = controls.shard.size(sweep.blocks());
   run.resumed_blocks = log.size();
+  log.require_room(run.blocks - std::min(run.blocks, log.size()));
   if (controls.progress) controls.progress(log.size(), run.blocks);
   const auto start = std::chrono::steady_clock::now();
   const double cpu_start = processor_seconds();

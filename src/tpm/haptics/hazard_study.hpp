@@ -1,0 +1,51 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tpm/servo/servo_record.hpp"
+
+namespace tpm {
+
+/// What became of one hazard, on the simulated device in virtual time.
+struct HazardRow {
+  std::string hazard, setting;
+  bool accepted = false;  ///< run with --accept-unstable after a refusal, in the row before
+  bool passive = false;   ///< by the check before the session
+  std::string refused;    ///< in words; empty: it ran
+  StopCause cause = StopCause::none;
+  double largest_force_N = 0.0;  ///< sent
+  double largest_rise_N = 0.0;   ///< of the size of the force, from a period to the next
+  double given_J = 0.0;          ///< most that the rendering gave to the hand, see EnergyWatch
+  /// From the fault, or else from the first touch, to zero force, s; and how far the tool went
+  /// meanwhile, m. Of sessions that were stopped.
+  double to_zero_s = 0.0, travel_m = 0.0;
+  bool damped = false;  ///< by the passivity controller, which no limit of rise holds for
+  bool within = false;  ///< what HazardBounds state
+};
+
+/// What the rows are held against.
+struct HazardBounds {
+  double force_N = 8.0;           ///< the session's limit
+  double rise_N = 0.4;            ///< the same of a period, 400 N/s at 1 kHz
+  double given_J = 2e-3;          ///< of a session that comes to its end
+  double given_stopped_J = 5e-3;  ///< of one that is stopped
+  double travel_m = 0.010;        ///< of one that is stopped
+  double to_zero_s = 1.2;         ///< the same; of an injected fault `fault_to_zero_s`
+  double fault_to_zero_s = 0.01;
+};
+
+struct HazardStudy {
+  HazardBounds bounds;
+  std::vector<HazardRow> rows;
+  /// All are within the bounds, and nothing passive was refused.
+  [[nodiscard]] bool safe() const;
+};
+
+/// Runs all hazards, deterministic. What is refused as unstable is run once more, accepted.
+/// @param told before each row
+[[nodiscard]] HazardStudy study_hazards(const std::function<void()>& told = {});
+/// How often `told` is called.
+[[nodiscard]] std::size_t hazard_count();
+
+}  // namespace tpm

@@ -1,0 +1,93 @@
+#include "tpm/report/hazard_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/text.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr int kHazardDigits = 4;
+
+bool ran(const HazardRow& row) {
+  return row.refused.empty();
+}
+
+bool stopped(const HazardRow& row) {
+  return ran(row) && row.cause != StopCause::finished;
+}
+
+std::string outcome_of(const HazardRow& row) {
+  if (!ran(row)) return "refused: " + row.refused;
+  return std::string(word_of(row.cause));
+}
+
+std::string in(double value, double scale, bool shown) {
+  return shown ? significant(scale * value, 3) : std::string("-");
+}
+
+}  // namespace
+
+Json hazard_json(const HazardStudy& study) {
+  const HazardBounds& b = study.bounds;
+  Json rows = Json::array();
+  for (const HazardRow& row : study.rows) {
+    const auto number = [&](double value, bool shown) {
+      return shown ? Json(rounded(value, kHazardDigits)) : Json();
+    };
+    rows.push_back({{"hazard", row.hazard},
+                    {"setting", row.setting},
+                    {"accepted_unstable", row.accepted},
+                    {"refused", ran(row) ? Json() : Json(row.refused)},
+                    {"cause", ran(row) ? Json(word_of(row.cause)) : Json()},
+                    {"largest_force_N", number(row.largest_force_N, ran(row))},
+                    {"largest_rise_N", number(row.largest_rise_N, ran(row))},
+                    {"given_to_hand_J", number(row.given_J, ran(row))},
+                    {"to_zero_force_s", number(row.to_zero_s, stopped(row))},
+                    {"travel_m", number(row.travel_m, stopped(row))},
+                    {"passive", row.passive},
+                    {"within_bounds", row.within}});
+  }
+  return {{"simulated_device", true},
+          {"safe", study.safe()},
+          {"bounds",
+           {{"force_N", b.force_N},
+            {"rise_in_a_period_N", b.rise_N},
+            {"given_to_hand_J", b.given_J},
+            {"given_to_hand_stopped_J", b.given_stopped_J},
+            {"travel_m", b.travel_m},
+            {"to_zero_force_s", b.to_zero_s},
+            {"fault_to_zero_force_s", b.fault_to_zero_s}}},
+          {"rows", std::move(rows)}};
+}
+
+std::string hazard_text(const HazardStudy& study) {
+  const HazardBounds& b = study.bounds;
+  std::string text =
+      "Hazards on the simulated Omega.7 and operator, in virtual time: no hardware\n\n"
+      "| hazard | setting | outcome | largest force, N | largest rise in a period, N | given to "
+      "the hand, mJ | to zero force, ms | travel, mm | within bounds |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+  for (const HazardRow& row : study.rows) {
+    text += fmt::format("| {} | {}{} | {} | {} | {} | {} | {} | {} | {} |\n", row.hazard,
+                        row.setting, row.accepted ? ", accepted as unstable" : "", outcome_of(row),
+                        in(row.largest_force_N, 1.0, ran(row)),
+                        in(row.largest_rise_N, 1.0, ran(row)) + (row.damped ? " (damped)" : ""),
+                        in(row.given_J, 1e3, ran(row)), in(row.to_zero_s, 1e3, stopped(row)),
+                        in(row.travel_m, 1e3, stopped(row)), row.within ? "yes" : "NO");
+  }
+  const auto within = std::count_if(study.rows.begin(), study.rows.end(),
+                                    [](const HazardRow& row) { return row.within; });
+  text += fmt::format(
+      "\n{} of {} rows are within bounds: force {} N, rise {} N in a period unless the passivity "
+      "controller damps; energy given to the hand {} mJ, of a session that is stopped {} mJ, which "
+      "ends within {} ms and {} mm of the first touch, or within {} ms of the fault (after a "
+      "stall); nothing passive is refused\n",
+      within, study.rows.size(), b.force_N, b.rise_N, 1e3 * b.given_J, 1e3 * b.given_stopped_J,
+      1e3 * b.to_zero_s, 1e3 * b.travel_m, 1e3 * b.fault_to_zero_s);
+  return text;
+}
+
+}  // namespace tpm

@@ -1,0 +1,14 @@
+#pragma once
+#include <string>
+
+#include "tpm/haptics/hazard_study.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// What `tpm hil hazards` shows; keys are described in docs/haptics.md. The text is a table in
+/// Markdown.
+[[nodiscard]] Json hazard_json(const HazardStudy& study);
+[[nodiscard]] std::string hazard_text(const HazardStudy& study);
+
+}  // namespace tpm
