@@ -156,7 +156,7 @@ def run(tpm: Path, preload: Path, inputs: Path, command: Command, call: str, how
             code, said = done.returncode, done.stderr.decode(errors="replace")
         except subprocess.TimeoutExpired:
             code, said = 1000, "no end within 120 s"
-        lines = mark.read_text().splitlines() if mark.exists() else []
+        lines = mark.read_text().rstrip("\0").splitlines() if mark.exists() else []
         fired = next((line for line in lines if line.startswith("fired ")), "")
         calls = max((int(line.split()[1]) for line in lines if line.startswith("calls ")), default=0)
         return Run(code, said, files_in(folder), fired, calls)
