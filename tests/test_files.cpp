@@ -337,6 +337,18 @@ TEST_CASE("Inputs without an end are refused") {
   const Ran zero = run_in(folder, "$TPM simulate /dev/zero -o o.h5");
   CHECK(zero.code == 3);
   CHECK(zero.said == "tpm: /dev/zero: holds more than 1024 MB; expected a smaller file\n");
+  // A recording may be larger than other inputs, if it is a file.
+  for (const char* command : {"hil verify /dev/zero", "hil export /dev/zero -o o.h5",
+                              "hil run $S/configs/hil_omega7.json --device replay --recording "
+                              "/dev/zero -o o.tpmrec"}) {
+    INFO(command);
+    const Ran ran = run_in(folder, std::string("$TPM ") + command);
+    CHECK(ran.code == 3);
+    CHECK(ran.said == "tpm: /dev/zero: holds more than 1024 MB; expected a smaller file\n");
+  }
+  const Ran sweep = run_in(folder, "$TPM sweep show /dev/zero");
+  CHECK(sweep.code == 3);
+  CHECK(sweep.said == "tpm: /dev/zero: is a device or a pipe; expected a file\n");
   write_file(folder / "ten", "0123456789");
   CHECK(read_file(folder / "ten", 10) == "0123456789");
   CHECK_THAT(test::refusal_of([&] { (void)read_file(folder / "ten", 9); }), Contains("holds more"));

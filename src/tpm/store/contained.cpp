@@ -153,7 +153,7 @@ void confine(int descriptor, int parent, bool writes, std::uint64_t memory_bytes
   char kind = 0;
   while (receive_message(kParent, kind, request)) {
     char what = kAnswer;
-    if (!limits.writes) allow_cpu_until(cpu_s);
+    allow_cpu_until(limits.writes ? cpu_used_s() + limits.cpu_s : cpu_s);
     try {
       if (!answer) answer = start(kFile);
       reply = answer(request);

@@ -10,12 +10,12 @@ namespace tpm {
 
 /// What a contained process may do and use.
 struct ContainedLimits {
-  /// True: the child writes the file with data of ours, without a limit. Its end is then a fault of
-  /// the system (Error(environment)) and not of the file.
+  /// True: the child writes the file with data of ours, without limits but `cpu_s`, which is then
+  /// that of each request. Its end is a fault of the system (Error(environment)), not of the file.
   bool writes = false;
   std::uint64_t memory_bytes = std::uint64_t{256} << 20U;  ///< beyond that of the parent
   std::uint64_t answer_bytes = std::uint64_t{1} << 20U;    ///< of one answer
-  double cpu_s = 5.0;                                      ///< at the first answer
+  double cpu_s = 5.0;                                      ///< until the first answer
   double cpu_s_per_megabyte = 0.1;                         ///< more for what it answers
 };
 

@@ -74,11 +74,12 @@ constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
 
 /// The open file. HDF5 says the same of a missing file and of garbage: here they are told apart.
 int opened(const fs::path& path) {
+  if (is_device_or_pipe(path)) throw bad_input(path.string(), "is a device or a pipe", "a file");
   std::error_code ec;
   // Not a file, not readable or empty: the reason is read_file's to tell.
   if (!fs::is_regular_file(path, ec) || fs::is_empty(path, ec)) {
     static_cast<void>(read_file(path, 1));
-    throw bad_input(path.string(), "is a device or a pipe", "a file");
+    throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
   }
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0) {

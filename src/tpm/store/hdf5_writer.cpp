@@ -114,6 +114,7 @@ std::uint64_t number_in(std::string_view reply) {
 Hdf5Writer::Hdf5Writer(fs::path path) : path_(std::move(path)), place_(path_) {
   ContainedLimits limits;
   limits.writes = true;
+  limits.cpu_s = 60.0;  // milliseconds are usual; a library without memory may loop
   child_ = std::make_unique<Contained>(
       path_.string(), place_.descriptor(), limits, [where = path_.string()](int descriptor) {
         auto file = std::make_shared<Hdf5Assembly>(descriptor, where);
