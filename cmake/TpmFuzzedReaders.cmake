@@ -22,6 +22,7 @@ foreach(floor core store curve law network scene simulate fit plan haptics study
   tpm_compile_together(fuzzed_${floor})
   target_link_libraries(fuzz_inputs PRIVATE fuzzed_${floor})
 endforeach()
+target_include_directories(fuzz_inputs PRIVATE ${PROJECT_SOURCE_DIR}/src)
 target_link_libraries(fuzz_inputs PRIVATE ${TPM_FUZZ_ARCHIVE} Eigen3::Eigen nlohmann_json::nlohmann_json fmt::fmt
                                           ${TPM_PRIVATE_LIBRARIES} tpm_options)
 target_link_options(fuzz_inputs PRIVATE -Wl,-z,muldefs)
