@@ -1,5 +1,6 @@
 #include "tpm/network/bond_system.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tpm {
@@ -71,6 +72,23 @@ BondSystem BondSystem::with_tools(std::size_t tools, std::span<const ToolContact
     other.rest_length_[row] = contact.reach_m;
     other.stiffness_[row] = contact.stiffness_N_per_m;
   }
+  return other;
+}
+
+BondSystem BondSystem::without_tools() const {
+  BondSystem other = *this;
+  const std::size_t bonds = first_contact();
+  for (const ToolContact& contact : contacts_) {
+    other.spheres_ = std::min<std::size_t>(other.spheres_, contact.tool);
+  }
+  other.contacts_.clear();
+  other.end_a_.resize(bonds);
+  other.end_b_.resize(bonds);
+  other.rope_.resize(bonds);
+  for (Eigen::VectorXd* numbers : {&other.rest_length_, &other.stiffness_, &other.relaxing_}) {
+    numbers->conservativeResize(static_cast<Eigen::Index>(bonds));
+  }
+  other.graph_ = std::make_shared<LazyGraph>();
   return other;
 }
 
