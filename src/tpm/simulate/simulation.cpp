@@ -10,8 +10,6 @@
 namespace tpm {
 namespace {
 
-constexpr std::size_t kParts = 16;  // of a run; a checkpoint can be written after each
-
 /// A network with the contacts of a scene; tools in their order.
 DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bonds) {
   const Organ& organ = scene.tissue.network.organ;
@@ -42,7 +40,7 @@ DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bond
 template <class RunPart>
 SimulationRun run_in_parts(const ExperimentScene& scene, const RunNetwork& network,
                            const SimulationControls& controls, RunPart&& run_part) {
-  Recorder recorder(scene, network, controls, kParts);
+  Recorder recorder(scene, network, controls, kRunParts);
   SimulationRun result;
   if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
   for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {

@@ -38,6 +38,9 @@ struct CurvePoint {
   double force_on_tissue_N = 0.0;  ///< force_on_tissue_N()
 };
 
+/// Parts of a run; each begins afresh, and a checkpoint can be written after it.
+inline constexpr std::size_t kRunParts = 16;
+
 /// What a run has found so far, rising in time.
 struct SimulationRecord {
   std::vector<CurvePoint> curve;
