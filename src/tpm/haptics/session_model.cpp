@@ -21,7 +21,7 @@ LoopModel element_model(const HilSession& session) {
                     "an organ of the kind star for the model 'element'");
   }
   LoopModel loop;
-  loop.model = std::make_unique<ElementContact>(tissue.material, session.servo.period_s);
+  loop.model = std::make_unique<ElementContact>(tissue.element("the element"), session.servo.period_s);
   loop.name = "element: the paper's star, exact exponential update";
   loop.error_bound = "exact for linear motion within a period, to rounding";
   const std::size_t contact = tissue.network.organ.contact.value();
@@ -58,7 +58,7 @@ LoopModel network_model(const HilSession& session) {
 LoopModel network_beside_model(const HilSession& session, bool threads) {
   constexpr double kShortest_s = 0.1;
   const PushedScene scene(session);
-  const double tau_s = scene.tissue.material.relaxation_time_s();
+  const double tau_s = scene.tissue.bonds().relaxation_time_s();
   if (tau_s < kShortest_s) {
     throw bad_input(session.scene_place,
                     fmt::format("has a relaxation time of {} s, too short for the model "
@@ -133,7 +133,7 @@ LoopModel make_loop_model(const HilSession& session, bool threads, const Plannin
   LoopModel loop = model_of(session, threads, told);
   if (!session.law) {
     loop.relaxation_times_s = {
-        parse_tissue(session.scene, session.scene_place, {}).material.relaxation_time_s()};
+        parse_tissue(session.scene, session.scene_place, {}).bonds().relaxation_time_s()};
   }
   loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
   return loop;

@@ -54,8 +54,9 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest, const F
       kernels_(panel_kernels(options.portable)),
       contact_(contact) {
   require(options, into_tissue);
+  require_servo_material(bonds, "the zone");
   PushedContact tissue(bonds, rest, freedom, contact);
-  weights_ = servo_weights(options.period_s / bonds.relaxation_time_s());
+  weights_ = servo_weights(bonds, options.period_s);
   at_once_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
   relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
   choose_zone(tissue);
@@ -126,6 +127,7 @@ void ZoneNetwork::reset() noexcept {
                                    &pull_, &offset_pull_, &next_pull_}) {
     std::fill(all->begin(), all->end(), 0.0F);
   }
+  for (AlignedFloats& offset : branch_offset_) std::fill(offset.begin(), offset.end(), 0.0F);
   largest_N_ = 0.0;
 }
 
@@ -141,9 +143,22 @@ void ZoneNetwork::gather(std::size_t first) noexcept {
 
 void ZoneNetwork::add_surroundings() noexcept {
   kernels_.times(stiff_.panel(), moved_.data(), pull_.data());
-  for (std::size_t i = 0; i < stiff_.columns; ++i) {
-    const float remembered = offset_[i] + weights_.of_end * moved_[i];
-    next_offset_[i] = weights_.keep * remembered + weights_.of_start * moved_[i];
+  if (branch_offset_.empty()) {
+    for (std::size_t i = 0; i < stiff_.columns; ++i) {
+      const float viscous = offset_[i] + weights_.of_end * moved_[i];
+      next_offset_[i] = weights_.keep * viscous + weights_.of_start * moved_[i];
+    }
+  } else {
+    std::fill(next_offset_.begin(), next_offset_.end(), 0.0F);
+    for (std::size_t j = 0; j < branch_offset_.size(); ++j) {
+      const ServoBranch& branch = weights_.branches[j];
+      float* const offset = branch_offset_[j].data();
+      for (std::size_t i = 0; i < stiff_.columns; ++i) {
+        const float viscous = offset[i] + branch.of_end * moved_[i];
+        offset[i] = branch.keep * viscous + branch.of_start * moved_[i];
+        next_offset_[i] += branch.share * offset[i];
+      }
+    }
   }
   kernels_.times(relaxing_.panel(), next_offset_.data(), next_pull_.data());
   for (std::size_t i = 0; i < stiff_.columns; ++i) {

@@ -21,7 +21,8 @@ StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
   if (scene.outputs.force) {
     const std::vector<char> open(network.driven.bonds.contact_count(), 0);
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, state.position.cols());
-    network.driven.bonds.add_forces(state.position, {state.remembered, 0.0, open}, force);
+    network.driven.bonds.add_forces(
+        state.position, {network.driven.bonds.mean_viscous(state.viscous), 0.0, open}, force);
     fields.of_spheres.push_back({"force_N", 3, list_of(network.spheres(force))});
     fields.of_spheres.push_back(
         {"largest_bond_force_N", 1, largest_bond_forces_N(network.network, bond_force)});
@@ -31,14 +32,17 @@ StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
   }
   if (scene.outputs.remembered) {
     const auto bonds = static_cast<Eigen::Index>(network.network.bonds.size());
-    fields.of_bonds.push_back({"remembered_m", 1, list_of(state.remembered.head(bonds))});
+    // One row per bond, one column per branch.
+    const Eigen::MatrixXd rows = state.viscous.topRows(bonds).transpose();
+    fields.of_bonds.push_back(
+        {"remembered_m", static_cast<std::size_t>(rows.rows()), list_of(rows)});
   }
   return fields;
 }
 
 Eigen::VectorXd bond_forces_N(const BondSystem& bonds, const QuasiStaticState& state) {
   Eigen::VectorXd tension;
-  bonds.tensions(state.position, {state.remembered, 0.0}, tension);
+  bonds.tensions(state.position, {bonds.mean_viscous(state.viscous), 0.0}, tension);
   return tension.head(static_cast<Eigen::Index>(bonds.first_contact()));
 }
 
