@@ -10,6 +10,7 @@
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/lowest_mode.hpp"
+#include "tpm/network/material_directions.hpp"
 #include "tpm/scene/organ_model.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpm/solve/fractional_branches.hpp"
@@ -528,7 +529,7 @@ TEST_CASE("an organ is differentiated by every parameter of its material's table
       "kernel": {"shape": "sinh", "stiffening": "3 mm"},
       "regions": [{"kind": "ball", "below_contact": "0 mm", "radius": "30 mm", "factor": 2},
                   {"kind": "layer", "layer": 2, "material": {"Einf": "3 kPa",
-                   "potential": {"shape": "cubic", "stiffening": "4 mm"}}}]}})"),
+                   "potential": {"shape": "cubic", "stiffening": "6 mm"}}}]}})"),
                                                                   "s.json", {}));
   const OrganModel organ(tissue);
   CHECK_FALSE(organ.has_element());
@@ -564,4 +565,20 @@ TEST_CASE("an organ is differentiated by every parameter of its material's table
   CHECK_THROWS_WITH(
       organ.respond(protocol, std::vector<double>{1.0}, none, Want::values_and_sensitivity),
       Catch::Contains("g1 = 0"));
+}
+
+TEST_CASE("a derivative across two materials that are one by chance is refused") {
+  const OrganScene& scene = small_scene();
+  const auto with = [&](double stiffening_m) {
+    MaterialField field(material_of({0.3}, 0.5));
+    field.materials.push_back(field.materials.front());
+    field.materials[0].potential = {ElongationShape::cubic, stiffening_m};
+    field.materials[1].potential = {ElongationShape::cubic, 4e-3};
+    field.of_sphere.assign(scene.network.organ.size(), 0);
+    field.of_sphere[3] = 1;
+    return BondSystem(scene.network, field);
+  };
+  CHECK_THROWS_WITH(direction_between(with(3.9e-3), with(4e-3), with(4.1e-3), 2e-4),
+                    Catch::Contains("laws change their form"));
+  CHECK_NOTHROW(direction_between(with(4.9e-3), with(5e-3), with(5.1e-3), 2e-4));
 }

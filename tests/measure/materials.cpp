@@ -163,8 +163,11 @@ void print_servo() {
              "claim/peak", "over claim");
   for (const Named& named : materials(scene.network)) {
     const BondSystem bonds(scene.network, named.field);
+    // The models move the contact in space: it does not yield to the side.
+    Freedom guided = scene.freedom;
+    guided.guide(scene.probe.sphere, scene.probe.direction);
     const QuasiStaticRun run =
-        QuasiStatic(bonds, rest, scene.freedom, scene.probe, {.tolerance = 1e-7})
+        QuasiStatic(bonds, rest, guided, scene.probe, {.tolerance = 1e-7})
             .run(ramp_and_hold(kDepth_m, kRamp * kPeriod_s, kSteps * kPeriod_s), times);
     const double peak = run.response.maxCoeff();
     const auto judge = [&](const char* name,

@@ -66,8 +66,9 @@ bool correspond(const BondSystem& minus, const BondSystem& plus) {
 
 }  // namespace
 
-TangentDirection direction_between(const BondSystem& minus, const BondSystem& plus, double step) {
-  if (!correspond(minus, plus)) {
+TangentDirection direction_between(const BondSystem& minus, const BondSystem& bonds,
+                                   const BondSystem& plus, double step) {
+  if (!correspond(minus, bonds) || !correspond(bonds, plus)) {
     throw bad_input("material", "its laws change their form where a derivative is taken",
                     "moduli above 0, relaxation times that differ, and regions of one law varied "
                     "together");

@@ -10,12 +10,11 @@ namespace tpm {
 [[nodiscard]] std::array<TangentDirection, 3> material_directions(const Network& network,
                                                                   const TpmParameters& material);
 
-/// The change of everything about the bonds from one system to another of the same graph, over a
-/// step: a central difference where the two lie on either side. To first order in the step, exact
-/// to about the square of its size.
-/// Throws Error(bad_input) if their laws do not correspond: a branch has vanished, or two materials
-/// that were one law part.
-[[nodiscard]] TangentDirection direction_between(const BondSystem& minus, const BondSystem& plus,
-                                                 double step);
+/// The change of everything about the bonds of a system: a central difference between two systems
+/// of the same graph on either side of it, over the step from one to the other. Throws
+/// Error(bad_input) if their laws do not correspond: a branch has vanished, or materials that were
+/// one part.
+[[nodiscard]] TangentDirection direction_between(const BondSystem& minus, const BondSystem& bonds,
+                                                 const BondSystem& plus, double step);
 
 }  // namespace tpm

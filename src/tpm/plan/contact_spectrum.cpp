@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "tpm/core/error.hpp"
+#include "tpm/network/material_refusal.hpp"
 #include "tpm/network/driven_tissue.hpp"
 
 namespace tpm {
@@ -80,6 +81,7 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
                       scene.protocol().drive());
   const TissueState rest = tissue.at_rest(0.0);
   ContactSpectrum spectrum;
+  require_one_relaxation(driven.bonds, "a contact of a few exponentials");
   spectrum.tau_s = driven.bonds.relaxation_time_s();
   // A bond under a constant force creeps in k/(k - g) tau; one without equilibrium modulus creeps
   // for ever.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tpm/core/error.hpp"
@@ -230,7 +231,13 @@ PlanScene PlanScene::stiffer(double factor) const {
 PlanScene PlanScene::nothing_relaxing() const {
   constexpr double kNever = 1e9;  // durations
   const double lasts_s = duration_s() > 0.0 ? duration_s() : 1.0;
-  const double longer = kNever * lasts_s / driven().bonds.shortest_relaxation_time_s();
+  double shortest_s = std::numeric_limits<double>::infinity();
+  for (const BondMaterial& material : scene_.tissue.materials.materials) {
+    for (const BondMaterial::Branch& branch : material.branches) {
+      shortest_s = std::min(shortest_s, branch.relaxation_time_s);
+    }
+  }
+  const double longer = kNever * lasts_s / shortest_s;
   return with_materials([longer](BondMaterial& material) {
     for (BondMaterial::Branch& branch : material.branches) branch.relaxation_time_s *= longer;
   });

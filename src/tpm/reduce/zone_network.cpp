@@ -15,7 +15,8 @@ constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
 /// What the surroundings miss in motion over what they miss in equilibrium: what they remember of
 /// deeper places is missed too.
 constexpr double kMissedInMotion = 1.5;
-constexpr double kUnbalanced = 0.1;  // what is left of the correction for what is unbalanced
+constexpr double kMissedStiffening = 3.0;  // times that where bonds of the surroundings stiffen
+constexpr double kUnbalanced = 0.1;        // what is left of the correction for what is unbalanced
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
 
 void require(const ZoneNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
@@ -55,6 +56,7 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest, const F
       contact_(contact) {
   require(options, into_tissue);
   require_servo_material(bonds, "the zone");
+  missed_in_motion_ = kMissedInMotion * (bonds.is_linear() ? 1.0 : kMissedStiffening);
   PushedContact tissue(bonds, rest, freedom, contact);
   weights_ = servo_weights(bonds, options.period_s);
   at_once_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
@@ -217,7 +219,7 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
   const double share = at - static_cast<double>(low);
   const double missed_N =
       (1.0 - share) * missed_N_[low] + share * missed_N_[low + 1] + aside_m * missed_aside_N_per_m_;
-  answer.error_N = kMissedInMotion * missed_N + kUnbalanced * correction.norm() +
+  answer.error_N = missed_in_motion_ * missed_N + kUnbalanced * correction.norm() +
                    step_error_->advance(displacement_m).norm();
   const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * relaxed_.norm());
   answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&

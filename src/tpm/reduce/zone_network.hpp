@@ -101,6 +101,7 @@ class ZoneNetwork final : public ContactModel {
   std::unique_ptr<StepError> step_error_;
   /// Force missed at even depths from rest on, and per metre across the normal, N and N/m.
   std::vector<double> missed_N_;
+  double missed_in_motion_ = 0.0;  ///< factor on it
   double missed_stride_m_ = 0.0, missed_aside_N_per_m_ = 0.0;
 
   AlignedFloats displacement_, force_;

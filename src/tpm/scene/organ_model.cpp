@@ -173,7 +173,8 @@ Response OrganModel::respond_by_table(const Protocol& protocol, std::span<const 
       return bonds_.with_materials(
           network, materials_with({values.data(), static_cast<std::size_t>(values.size())}));
     };
-    options.directions.push_back(direction_between(beside(-1.0), beside(1.0), 2.0 * kDifference));
+    options.directions.push_back(
+        direction_between(beside(-1.0), bonds, beside(1.0), 2.0 * kDifference));
   }
   const QuasiStaticRun run =
       QuasiStatic(bonds, network.organ.position, freedom_, probe_, options).run(protocol, times_s);
