@@ -172,6 +172,23 @@ BondSystem BondSystem::with_tools(std::size_t tools, std::span<const ToolContact
   return other;
 }
 
+BondSystem BondSystem::without_tools() const {
+  BondSystem other = *this;
+  const std::size_t bonds = first_contact();
+  for (const ToolContact& contact : contacts_) {
+    other.spheres_ = std::min<std::size_t>(other.spheres_, contact.tool);
+  }
+  other.contacts_.clear();
+  other.end_a_.resize(bonds);
+  other.end_b_.resize(bonds);
+  other.rope_.resize(bonds);
+  for (Eigen::VectorXd* numbers : {&other.rest_length_, &other.stiffness_, &other.relaxing_}) {
+    numbers->conservativeResize(static_cast<Eigen::Index>(bonds));
+  }
+  other.graph_ = std::make_shared<LazyGraph>();
+  return other;
+}
+
 BondSystem::Line BondSystem::line(std::size_t bond, const Positions& position) const {
   const Eigen::Vector3d along = position.col(end_b_[bond]) - position.col(end_a_[bond]);
   const double rest = rest_length_[static_cast<Eigen::Index>(bond)];

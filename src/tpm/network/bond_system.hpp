@@ -76,6 +76,9 @@ class BondSystem {
   [[nodiscard]] BondSystem with_tools(std::size_t tools,
                                       std::span<const ToolContact> contacts) const;
 
+  /// The bonds between spheres alone: no contacts, and no columns of tools.
+  [[nodiscard]] BondSystem without_tools() const;
+
   /// Bonds and contacts.
   [[nodiscard]] std::size_t size() const { return end_a_.size(); }
   [[nodiscard]] std::size_t contact_count() const { return contacts_.size(); }

@@ -178,6 +178,14 @@ double DrivenTissue::linear_response(const TissueState& rest, double peak) {
   return along(force) * peak;
 }
 
+double DrivenTissue::push_on_tissue(const Eigen::Matrix3Xd& on_driven) const {
+  double sum = 0.0;
+  for (const Driven& d : driven_) {
+    sum -= (depth_driven() ? d.weight : 1.0) * on_driven.col(d.column).dot(d.direction);
+  }
+  return sum;
+}
+
 void DrivenTissue::add_imposed_velocity(double rate, Eigen::Matrix3Xd& velocity) const {
   if (!depth_driven()) return;
   for (const Driven& d : driven_) velocity.col(d.column) += d.weight * rate * d.direction;

@@ -82,6 +82,9 @@ class DrivenTissue {
   /// Size of the response to a peak of what is imposed, with the relaxed stiffness at rest.
   [[nodiscard]] double linear_response(const TissueState& rest, double peak);
 
+  /// Force on the tissue, N (or impulse, N s), given what the tissue does to what is driven: summed
+  /// with the shares under an imposed depth, as the response is, and plainly under a load.
+  [[nodiscard]] double push_on_tissue(const Eigen::Matrix3Xd& on_driven) const;
   /// Speeds of what is driven where the imposed depth changes at a rate, added to velocities.
   void add_imposed_velocity(double rate, Eigen::Matrix3Xd& velocity) const;
   /// What the masses driven weigh in the force of a probe that moves them, kg.

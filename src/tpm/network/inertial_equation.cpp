@@ -1,5 +1,10 @@
 #include "tpm/network/inertial_equation.hpp"
 
+#include <cmath>
+#include <limits>
+
+#include "tpm/network/tool_impact.hpp"
+
 namespace tpm {
 namespace {
 
@@ -18,6 +23,25 @@ Following following_over(const BondSystem& bonds, double gamma) {
     of_law.push_back(share);
   }
   return Following(std::move(of_law));
+}
+
+constexpr double kTouching_m = 1e-14;  // a gap that is none: above the rounding of positions
+
+/// c of each contact.
+Eigen::VectorXd contact_dashpots(const DrivenTissue& tissue, const Inertia& inertia) {
+  const auto& contacts = tissue.bonds().contacts();
+  Eigen::VectorXd c(std::ssize(contacts));
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const auto moves = [&](std::uint32_t column) {
+      return tissue.freedom().projector(column).isZero(0.0) ? 0.0 : 1.0 / inertia.mass_kg[column];
+    };
+    const double per_mass = moves(contacts[i].sphere) + moves(contacts[i].tool);
+    c[static_cast<Eigen::Index>(i)] = per_mass > 0.0
+                                          ? 2.0 * inertia.contact_damping_ratio *
+                                                std::sqrt(contacts[i].stiffness_N_per_m / per_mass)
+                                          : 0.0;
+  }
+  return c;
 }
 
 }  // namespace
@@ -40,6 +64,12 @@ InertialEquation::InertialEquation(const DrivenTissue& tissue, const Positions& 
   }
   motion_.viscous.setZero(static_cast<Eigen::Index>(bonds.size()), bonds.most_branches());
   motion_.mean.setZero(static_cast<Eigen::Index>(bonds.size()));
+  drag_per_s_ = Vector::Constant(rest_.cols(), inertia_.drag_per_s);
+  tissue_mass_kg_ = inertia_.mass_kg;
+  for (const ToolContact& contact : bonds.contacts()) {
+    drag_per_s_[contact.tool] = tissue_mass_kg_[contact.tool] = 0.0;
+  }
+  contact_dashpot_N_s_m_ = contact_dashpots(tissue, inertia_);
 }
 
 Eigen::Index InertialEquation::size() const {
@@ -48,6 +78,10 @@ Eigen::Index InertialEquation::size() const {
 
 double InertialEquation::driven_mass_kg() const {
   return tissue_.driven_mass_kg(inertia_.mass_kg);
+}
+
+double InertialEquation::driven_sphere_mass_kg() const {
+  return tissue_.driven_mass_kg(tissue_mass_kg_);
 }
 
 void InertialEquation::set_piece(const Knot& from, const Knot& to) {
@@ -96,12 +130,71 @@ const TissueMotion& InertialEquation::unpack(double time_s, const ConstVector& s
   return motion_;
 }
 
-Eigen::Vector3d InertialEquation::along(std::size_t bond, double& length) const {
+Eigen::Vector3d InertialEquation::along(std::size_t bond, const Positions& position,
+                                        double& length) const {
   const BondSystem& bonds = tissue_.bonds();
+  if (bond >= bonds.first_contact()) {
+    if (const auto& normal = bonds.contacts()[bond - bonds.first_contact()].normal) {
+      length = std::numeric_limits<double>::infinity();
+      return *normal;
+    }
+  }
   const Eigen::Vector3d apart =
-      motion_.position.col(bonds.end_b()[bond]) - motion_.position.col(bonds.end_a()[bond]);
+      position.col(bonds.end_b()[bond]) - position.col(bonds.end_a()[bond]);
   length = apart.norm();
   return apart / length;
+}
+
+InertialEquation::Gap InertialEquation::gap(std::size_t contact) const {
+  const BondSystem& bonds = tissue_.bonds();
+  const ToolContact& pair = bonds.contacts()[contact];
+  double length = 0.0;
+  Gap gap;
+  gap.normal = along(bonds.first_contact() + contact, motion_.position, length);
+  gap.now_m =
+      contact_gap_m(pair, motion_.position.col(pair.sphere), motion_.position.col(pair.tool));
+  gap.rate_m_s =
+      gap.normal.dot(motion_.velocity.col(pair.tool) - motion_.velocity.col(pair.sphere));
+  return gap;
+}
+
+void InertialEquation::find_pressing() {
+  const auto& contacts = tissue_.bonds().contacts();
+  pressing_.assign(contacts.size(), 0);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Gap lies = gap(i);
+    const double pull = contacts[i].stiffness_N_per_m * lies.now_m +
+                        contact_dashpot_N_s_m_[static_cast<Eigen::Index>(i)] * lies.rate_m_s;
+    pressing_[i] = lies.now_m <= kTouching_m && pull <= 0.0 ? 1 : 0;
+  }
+}
+
+double InertialEquation::dashpot_N_s_m(std::size_t bond) const {
+  const std::size_t first = tissue_.bonds().first_contact();
+  if (bond >= first) {
+    return pressing_[bond - first] != 0
+               ? contact_dashpot_N_s_m_[static_cast<Eigen::Index>(bond - first)]
+               : 0.0;
+  }
+  return inertia_.dashpot_N_s_m.size() > 0 ? inertia_.dashpot_N_s_m[static_cast<Eigen::Index>(bond)]
+                                           : 0.0;
+}
+
+void InertialEquation::add_contact_dashpot_forces(const Positions& position,
+                                                  const Eigen::Matrix3Xd& velocity,
+                                                  std::span<const char> pressing,
+                                                  Eigen::Matrix3Xd& force) const {
+  const BondSystem& bonds = tissue_.bonds();
+  for (std::size_t i = 0; i < pressing.size(); ++i) {
+    if (pressing[i] == 0) continue;
+    const ToolContact& pair = bonds.contacts()[i];
+    double length = 0.0;
+    const Eigen::Vector3d n = along(bonds.first_contact() + i, position, length);
+    const Eigen::Vector3d f = contact_dashpot_N_s_m_[static_cast<Eigen::Index>(i)] *
+                              n.dot(velocity.col(pair.tool) - velocity.col(pair.sphere)) * n;
+    force.col(pair.sphere) += f;
+    force.col(pair.tool) -= f;
+  }
 }
 
 void InertialEquation::add_dashpot_forces(const Positions& position,
@@ -119,10 +212,12 @@ void InertialEquation::add_dashpot_forces(const Positions& position,
   }
 }
 
-void InertialEquation::forces(double time_s, Eigen::Matrix3Xd& force) const {
+void InertialEquation::forces(double time_s, Eigen::Matrix3Xd& force) {
+  find_pressing();
   tissue_.load(imposed(time_s), force);
-  tissue_.bonds().add_forces(motion_.position, {motion_.mean, 0.0}, force);
+  tissue_.bonds().add_forces(motion_.position, {motion_.mean, 0.0, pressing_}, force);
   add_dashpot_forces(motion_.position, motion_.velocity, force);
+  add_contact_dashpot_forces(motion_.position, motion_.velocity, pressing_, force);
 }
 
 void InertialEquation::rate(double time_s, const ConstVector& state, Eigen::Ref<Vector> rate) {
@@ -131,7 +226,7 @@ void InertialEquation::rate(double time_s, const ConstVector& state, Eigen::Ref<
   forces(time_s, force_);
   Spheres acceleration(rate.data() + coordinates(), 3, n);
   acceleration = force_ * inertia_.mass_kg.cwiseInverse().asDiagonal();
-  acceleration -= inertia_.drag_per_s * now.velocity;
+  acceleration -= now.velocity * drag_per_s_.asDiagonal();
   tissue_.freedom().project(acceleration);
   rate.head(coordinates()) = state.segment(coordinates(), coordinates());
   tissue_.bonds().followed(now.position, followed_);
@@ -145,7 +240,7 @@ void InertialEquation::rate(double time_s, const ConstVector& state, Eigen::Ref<
 }
 
 double InertialEquation::drag_on_driven_sphere_N() const {
-  return inertia_.drag_per_s * driven_mass_kg() * imposed_speed();
+  return inertia_.drag_per_s * driven_sphere_mass_kg() * imposed_speed();
 }
 
 double InertialEquation::response(double time_s, const ConstVector& state) {
@@ -154,7 +249,66 @@ double InertialEquation::response(double time_s, const ConstVector& state) {
   return tissue_.response(now.position, force_) + drag_on_driven_sphere_N();
 }
 
-Eigen::Vector3d InertialEquation::powers_W(double time_s, const ConstVector& state) {
+void InertialEquation::gaps(double time_s, const ConstVector& state, Eigen::Ref<Vector> gap) {
+  const TissueMotion& now = unpack(time_s, state);
+  const auto& contacts = tissue_.bonds().contacts();
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    gap[static_cast<Eigen::Index>(i)] = contact_gap_m(
+        contacts[i], now.position.col(contacts[i].sphere), now.position.col(contacts[i].tool));
+  }
+}
+
+bool InertialEquation::meets(double time_s, const ConstVector& state) {
+  (void)unpack(time_s, state);
+  for (std::size_t i = 0; i < tissue_.bonds().contact_count(); ++i) {
+    const Gap lies = gap(i);
+    if (std::abs(lies.now_m) <= kTouching_m && lies.rate_m_s < 0.0) return true;
+  }
+  return false;
+}
+
+InertialEquation::Vector InertialEquation::contact_pushes_N(double time_s,
+                                                            const ConstVector& state) {
+  (void)unpack(time_s, state);
+  find_pressing();
+  const auto& contacts = tissue_.bonds().contacts();
+  Vector push = Vector::Zero(std::ssize(contacts));
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (pressing_[i] == 0) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    const Gap lies = gap(i);
+    push[row] =
+        -contacts[i].stiffness_N_per_m * lies.now_m - contact_dashpot_N_s_m_[row] * lies.rate_m_s;
+  }
+  return push;
+}
+
+ToolImpact InertialEquation::strike(double time_s, Eigen::Ref<Vector> state) {
+  const double before_J = kinetic_J(time_s, state);  // unpacks
+  const auto& contacts = tissue_.bonds().contacts();
+  std::vector<TouchingPair> pairs;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const Gap lies = gap(i);
+    if (lies.now_m <= kTouching_m)
+      pairs.push_back({contacts[i].sphere, contacts[i].tool, lies.normal});
+  }
+  Eigen::Matrix3Xd velocity = motion_.velocity;
+  const Vector impulse = inelastic_impact(pairs, tissue_.freedom(), inertia_.mass_kg, velocity);
+  Eigen::Matrix3Xd on_tools = Eigen::Matrix3Xd::Zero(3, rest_.cols());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    on_tools.col(pairs[i].tool) += impulse[static_cast<Eigen::Index>(i)] * pairs[i].normal;
+  }
+  Spheres free_velocity(state.data() + coordinates(), 3, rest_.cols());
+  free_velocity = velocity;
+  tissue_.freedom().project(free_velocity);
+  ToolImpact impact;
+  impact.on_tissue_N_s = tissue_.push_on_tissue(on_tools);
+  impact.work_J = tissue_.depth_driven() ? impact.on_tissue_N_s * imposed_speed() : 0.0;
+  impact.lost_J = impact.work_J + before_J - kinetic_J(time_s, state);
+  return impact;
+}
+
+Eigen::Vector4d InertialEquation::powers_W(double time_s, const ConstVector& state) {
   const double answer = response(time_s, state);  // unpacks
   const TissueMotion& now = motion_;
   const double speed = tissue_.depth_of(now.velocity);
@@ -162,9 +316,20 @@ Eigen::Vector3d InertialEquation::powers_W(double time_s, const ConstVector& sta
   force_.setZero();
   add_dashpot_forces(now.position, now.velocity, force_);
   const double dashpots = -force_.cwiseProduct(now.velocity).sum();
-  const double drag =
-      inertia_.drag_per_s * now.velocity.colwise().squaredNorm().dot(inertia_.mass_kg.transpose());
-  return {push * speed, tissue_.bonds().dissipation_W(now.position, now.viscous), dashpots + drag};
+  const double drag = now.velocity.colwise().squaredNorm().dot(
+      inertia_.mass_kg.cwiseProduct(drag_per_s_).transpose());
+  // A contact takes N dl/dt and keeps k l dl/dt of it, l < 0 its gap; N is 0 where it would pull.
+  double contacts = 0.0;
+  for (std::size_t i = 0; i < pressing_.size(); ++i) {
+    const Gap lies = gap(i);
+    if (lies.now_m > kTouching_m) continue;
+    contacts +=
+        pressing_[i] != 0
+            ? contact_dashpot_N_s_m_[static_cast<Eigen::Index>(i)] * lies.rate_m_s * lies.rate_m_s
+            : -tissue_.bonds().contacts()[i].stiffness_N_per_m * lies.now_m * lies.rate_m_s;
+  }
+  return {push * speed, tissue_.bonds().dissipation_W(now.position, now.viscous), dashpots + drag,
+          contacts};
 }
 
 double InertialEquation::kinetic_J(double time_s, const ConstVector& state) {
@@ -184,23 +349,30 @@ bool InertialEquation::factorise(double time_s, const ConstVector& state, double
   factorised_at_ = now.position;
   bonds.kernel_slopes(now.position, kernel_slope_);
   bonds.followed(now.position, followed_);
+  find_pressing();
+  factorised_pressing_ = pressing_;
   matrix_.set_zero();
-  bonds.add_stiffness(now.position,
-                      bonds.memory_at(now.mean, followed_, following_over(bonds, gamma)), matrix_);
+  bonds.add_stiffness(
+      now.position,
+      bonds.memory_at(now.mean, followed_, following_over(bonds, gamma), factorised_pressing_),
+      matrix_);
   for (Eigen::Matrix3d& block : matrix_.diagonal) block *= gamma * gamma;
   for (Eigen::Matrix3d& block : matrix_.below) block *= gamma * gamma;
-  for (Eigen::Index i = 0; i < inertia_.dashpot_N_s_m.size(); ++i) {
-    const auto bond = static_cast<std::size_t>(i);
+  const bool bonds_damped = inertia_.dashpot_N_s_m.size() > 0;
+  for (std::size_t bond = bonds_damped ? 0 : bonds.first_contact(); bond < bonds.size(); ++bond) {
+    const double dashpot = dashpot_N_s_m(bond);
+    if (dashpot == 0.0) continue;
     double length = 0.0;
-    const Eigen::Vector3d n = along(bond, length);
-    const Eigen::Matrix3d block = gamma * inertia_.dashpot_N_s_m[i] * n * n.transpose();
+    const Eigen::Vector3d n = along(bond, now.position, length);
+    const Eigen::Matrix3d block = gamma * dashpot * n * n.transpose();
     matrix_.diagonal[bonds.end_a()[bond]] += block;
     matrix_.diagonal[bonds.end_b()[bond]] += block;
     matrix_.below[bonds.place(bond).index] -= block;
   }
   for (std::size_t i = 0; i < matrix_.diagonal.size(); ++i) {
     matrix_.diagonal[i].diagonal().array() +=
-        inertia_.mass_kg[static_cast<Eigen::Index>(i)] * (1.0 + gamma * inertia_.drag_per_s);
+        inertia_.mass_kg[static_cast<Eigen::Index>(i)] *
+        (1.0 + gamma * drag_per_s_[static_cast<Eigen::Index>(i)]);
   }
   tissue_.freedom().constrain(bonds, matrix_);
   return factor_.factorise(matrix_);
@@ -218,8 +390,9 @@ void InertialEquation::solve(Eigen::Ref<Vector> x) {
   Spheres v(x.data() + coordinates(), 3, n);
   force_.setZero(3, n);
   add_dashpot_forces(factorised_at_, u, force_);  // -C ru
+  add_contact_dashpot_forces(factorised_at_, u, factorised_pressing_, force_);
   Eigen::Matrix3Xd right = -gamma_ * force_;
-  right += ((1.0 + gamma_ * inertia_.drag_per_s) * u + gamma_ * v) * inertia_.mass_kg.asDiagonal();
+  right += (u + gamma_ * (u * drag_per_s_.asDiagonal() + v)) * inertia_.mass_kg.asDiagonal();
   for (const std::size_t bond : relaxing_) {
     const std::uint32_t a = bonds.end_a()[bond];
     const std::uint32_t b = bonds.end_b()[bond];

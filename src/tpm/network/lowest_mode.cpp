@@ -109,6 +109,15 @@ Eigen::VectorXd sphere_masses_kg(const Organ& organ, double density_kg_per_m3) {
 
 LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
                        const Eigen::VectorXd& mass_kg) {
+  if (bonds.contact_count() > 0) {
+    const BondSystem tissue = bonds.without_tools();
+    const auto spheres = static_cast<Eigen::Index>(tissue.spheres());
+    LowestMode mode = lowest_mode(tissue, rest.leftCols(spheres), freedom.first(tissue.spheres()),
+                                  mass_kg.head(spheres));
+    mode.shape.conservativeResize(Eigen::NoChange, rest.cols());
+    mode.shape.rightCols(rest.cols() - spheres).setZero();
+    return mode;
+  }
   require_rigid(bonds, rest, freedom, "lowest mode");
   if (freedom.count() == 0) throw bad_input("lowest mode", "nothing is free", "a free coordinate");
   InverseIteration iteration(bonds, rest, freedom, mass_kg);

@@ -182,12 +182,12 @@ PlanTrajectory PlanScene::inertial(const InertialOptions& options,
                            masses_kg(), options);
   PlanTrajectory result;
   const Eigen::Index spheres = network().organ.position.cols();
-  const auto see = [&](const QuasiStaticState& state) {
+  const auto see = [&](const QuasiStaticState& state, const Eigen::VectorXd& /*pushes*/) {
     result.displacement.emplace_back(state.position.leftCols(spheres) -
                                      driven().rest.leftCols(spheres));
   };
   const InertialRun run =
-      equations.run(protocol(), times_s, with_field ? QuasiStaticObserver(see) : nullptr);
+      equations.run(protocol(), times_s, with_field ? InertialObserver(see) : nullptr);
   result.response = run.response;
   const auto& pattern = driven().bonds.pattern();
   const auto bonds = static_cast<double>(driven().bonds.size());

@@ -126,22 +126,55 @@ Validity read_validity(const ListReader& file) {
 
 void write_motion(Hdf5Writer& file, const InertialState& s, const InertialEnergy& e) {
   file.numbers("/motion/state", {s.motion.begin(), s.motion.end()});
-  file.numbers("/motion/scalars", {s.time_s, s.spent_J[0], s.spent_J[1], s.spent_J[2],
+  file.numbers("/motion/scalars", {s.time_s, s.spent_J[0], s.spent_J[1], s.spent_J[2], s.spent_J[3],
                                    s.blow_work_J, s.stored_at_start_J});
-  file.numbers("/motion/energy", {e.work, e.stored, e.kinetic, e.bond_heat, e.damping_heat});
+  file.numbers("/motion/energy",
+               {e.work, e.stored, e.kinetic, e.bond_heat, e.damping_heat, e.contact_heat});
+}
+
+void write_blows(Hdf5Writer& file, const std::vector<ProbeBlow>& blows) {
+  std::vector<double> numbers;
+  for (const ProbeBlow& b : blows) {
+    numbers.insert(numbers.end(), {b.time_s, b.impulse_N_s, b.impulse_on_tissue_N_s});
+  }
+  file.numbers("/motion/blows", numbers);
+}
+
+void write_pushes(Hdf5Writer& file, const std::vector<Eigen::VectorXd>& pushes) {
+  std::vector<double> numbers;
+  for (const Eigen::VectorXd& push : pushes) append(numbers, push.data(), push.size());
+  file.numbers("/motion/contact_pushes_N", numbers);
+}
+
+/// Those of each output.
+std::vector<Eigen::VectorXd> read_pushes(const ListReader& file, std::size_t outputs) {
+  if (outputs == 0) return {};
+  const std::vector<double> numbers = file.list("/motion/contact_pushes_N", outputs);
+  const std::size_t contacts = numbers.size() / outputs;
+  std::vector<Eigen::VectorXd> pushes;
+  for (std::size_t i = 0; i < outputs; ++i) {
+    pushes.emplace_back(Eigen::Map<const Eigen::VectorXd>(numbers.data() + contacts * i,
+                                                          static_cast<Eigen::Index>(contacts)));
+  }
+  return pushes;
 }
 
 void read_motion(const ListReader& file, Checkpoint& checkpoint) {
   const std::vector<double> state = file.list("/motion/state", 0);
-  const std::vector<double> s = file.list("/motion/scalars", 6);
-  const std::vector<double> e = file.list("/motion/energy", 5);
+  const std::vector<double> s = file.list("/motion/scalars", 7);
+  const std::vector<double> e = file.list("/motion/energy", 6);
   checkpoint.motion = InertialState{
       s.at(0),
       Eigen::Map<const Eigen::VectorXd>(state.data(), static_cast<Eigen::Index>(state.size())),
-      {s.at(1), s.at(2), s.at(3)},
-      s.at(4),
-      s.at(5)};
-  checkpoint.record.inertial_energy = InertialEnergy{e.at(0), e.at(1), e.at(2), e.at(3), e.at(4)};
+      {s.at(1), s.at(2), s.at(3), s.at(4)},
+      s.at(5),
+      s.at(6)};
+  checkpoint.record.inertial_energy =
+      InertialEnergy{e.at(0), e.at(1), e.at(2), e.at(3), e.at(4), e.at(5)};
+  const std::vector<double> blows = file.list("/motion/blows", 3);
+  for (std::size_t i = 0; i + 3 <= blows.size(); i += 3) {
+    checkpoint.record.blows.push_back({blows[i], blows[i + 1], blows[i + 2]});
+  }
 }
 
 }  // namespace
@@ -166,16 +199,20 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
   file.numbers("/branches", {static_cast<double>(latest.viscous.cols())});
   std::vector<double> curve;
   for (const CurvePoint& p : record.curve) {
-    curve.insert(curve.end(),
-                 {p.time_s, p.imposed, p.response, p.energy.work_J, p.energy.dissipated_J,
-                  p.energy.stored_J, static_cast<double>(p.touching), p.overlap_m});
+    curve.insert(curve.end(), {p.time_s, p.imposed, p.response, p.energy.work_J,
+                               p.energy.dissipated_J, p.energy.stored_J,
+                               static_cast<double>(p.touching), p.overlap_m, p.force_on_tissue_N});
   }
   file.numbers("/curve", curve);
   file.numbers("/error_estimate", {record.error_estimate});
   write_states(file, "/outputs", record.outputs);
   write_states(file, "/latest", {&latest, 1});
   write_validity(file, record.validity);
-  if (checkpoint.motion) write_motion(file, *checkpoint.motion, record.inertial_energy.value());
+  if (checkpoint.motion) {
+    write_motion(file, *checkpoint.motion, record.inertial_energy.value());
+    write_blows(file, record.blows);
+    write_pushes(file, record.contact_pushes_N);
+  }
   file.commit();
 }
 
@@ -201,7 +238,7 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   const std::size_t bonds = lists.whole(lists.list("/bonds", 0).front(), "the bonds");
   const std::size_t branches = lists.whole(lists.list("/branches", 0).front(), "the branches");
   Checkpoint checkpoint;
-  constexpr std::size_t kColumns = 8;
+  constexpr std::size_t kColumns = 9;
   const std::vector<double> curve = lists.list("/curve", kColumns);
   for (std::size_t i = 0; i + kColumns <= curve.size(); i += kColumns) {
     const double* p = &curve[i];
@@ -210,7 +247,8 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
                                        p[2],
                                        {p[3], p[4], p[5]},
                                        static_cast<int>(lists.whole(p[6], "the tools that touch")),
-                                       p[7]});
+                                       p[7],
+                                       p[8]});
   }
   checkpoint.record.outputs = lists.states("/outputs", spheres, bonds, branches);
   checkpoint.record.validity = read_validity(lists);
@@ -218,7 +256,11 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   std::vector<QuasiStaticState> latest = lists.states("/latest", spheres, bonds, branches);
   if (latest.size() != 1) throw bad_input(path.string(), "holds no state", kExpected);
   checkpoint.latest = std::move(latest.front());
-  if (file.has("/motion")) read_motion(lists, checkpoint);
+  checkpoint.record.contact_pushes_N.resize(checkpoint.record.outputs.size());
+  if (file.has("/motion")) {
+    read_motion(lists, checkpoint);
+    checkpoint.record.contact_pushes_N = read_pushes(lists, checkpoint.record.outputs.size());
+  }
   return checkpoint;
 }
 

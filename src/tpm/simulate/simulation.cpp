@@ -1,6 +1,7 @@
 #include "tpm/simulate/simulation.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "tpm/network/lowest_mode.hpp"
 #include "tpm/simulate/recorder.hpp"
@@ -14,7 +15,10 @@ constexpr std::size_t kParts = 16;  // of a run; a checkpoint can be written aft
 /// A network with the contacts of a scene; tools in their order.
 DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bonds) {
   const Organ& organ = scene.tissue.network.organ;
-  const double usual = usual_contact_stiffness_N_per_m(bonds);
+  // With mass, contacts ring unless they are much stiffer; a stiffer one costs no more steps there.
+  constexpr double kStifferWithMass = 100.0;
+  const double usual = usual_contact_stiffness_N_per_m(bonds) *
+                       (scene.formulation.inertial() ? kStifferWithMass : 1.0);
   std::vector<Probe> driven;
   std::vector<PressedTool> tools;
   for (const SceneContact& contact : scene.contacts) {
@@ -101,8 +105,8 @@ Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& networ
   return mass;
 }
 
-SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& network,
-                           const SimulationControls& controls) {
+SimulationRun run_with_mass(const ExperimentScene& scene, const RunNetwork& network,
+                            const SimulationControls& controls) {
   const DrivenNetwork& driven = network.driven;
   const Eigen::VectorXd mass_kg = masses_kg(scene, network);
   InertialOptions options;
@@ -115,13 +119,59 @@ SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& netwo
     options.tolerance = part.tolerance;
     const Inertial equations(driven.bonds, driven.rest, driven.freedom, driven.probes, mass_kg,
                              options);
-    const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
+    const auto see = [&](const QuasiStaticState& state, const Eigen::VectorXd& pushes) {
+      recorder.see(state, pushes);
+    };
     const InertialRun run = equations.run(part.protocol, times, see, recorder.motion());
-    recorder.close_part(run.end, run.energy.value());
+    recorder.close_part(run.end, run.energy.value(), run.blows);
   };
   SimulationRun result = run_in_parts(scene, network, controls, run_part);
   result.lowest_frequency_Hz =
       lowest_mode(driven.bonds, driven.rest, driven.freedom, mass_kg).frequency_Hz;
+  return result;
+}
+
+/// Runs the scene with softer contacts and compares.
+ContactCheck checked_contacts(const ExperimentScene& scene, const RunNetwork& network,
+                              const std::vector<CurvePoint>& curve,
+                              const SimulationControls& controls) {
+  ExperimentScene softer = scene;
+  auto tool = network.driven.tools.begin();
+  for (SceneContact& contact : softer.contacts) {
+    if (!contact.is_tool()) continue;
+    contact.stiffness_N_per_m = (tool++)->stiffness_N_per_m / ContactCheck::kSofter;
+  }
+  SimulationControls quiet;
+  quiet.interrupted = controls.interrupted;
+  const std::vector<CurvePoint> other =
+      run_with_mass(softer, network_to_run(softer), quiet).record.curve;
+  ContactCheck check;
+  double over_time = 0.0, before = 0.0;  // trapezoidal rule
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    check.largest = std::max(check.largest, std::abs(curve[i].response));
+    check.largest_softer = std::max(check.largest_softer, std::abs(other[i].response));
+    const double apart = std::abs(curve[i].response - other[i].response);
+    check.at_one_time = std::max(check.at_one_time, apart);
+    if (i > 0) over_time += 0.5 * (apart + before) * (curve[i].time_s - curve[i - 1].time_s);
+    before = apart;
+  }
+  check.end = curve.back().response;
+  check.end_softer = other.back().response;
+  if (!(check.largest > 0.0)) return check;
+  check.difference = std::max({std::abs(check.largest - check.largest_softer),
+                               std::abs(check.end - check.end_softer),
+                               over_time / (curve.back().time_s - curve.front().time_s)}) /
+                     check.largest;
+  check.at_one_time /= check.largest;
+  return check;
+}
+
+SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& network,
+                           const SimulationControls& controls) {
+  SimulationRun result = run_with_mass(scene, network, controls);
+  if (!network.driven.tools.empty()) {
+    result.contact_check = checked_contacts(scene, network, result.record.curve, controls);
+  }
   return result;
 }
 

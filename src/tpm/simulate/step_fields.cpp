@@ -1,11 +1,17 @@
 #include "tpm/simulate/step_fields.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 namespace tpm {
 std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
   return {numbers.data(), numbers.data() + numbers.size()};
+}
+
+std::string viscous_name(Eigen::Index branch, Eigen::Index branches) {
+  return branches == 1 ? "remembered_m" : fmt::format("remembered_{}_m", branch + 1);
 }
 
 StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
@@ -32,10 +38,10 @@ StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
   }
   if (scene.outputs.remembered) {
     const auto bonds = static_cast<Eigen::Index>(network.network.bonds.size());
-    // One row per bond, one column per branch.
-    const Eigen::MatrixXd rows = state.viscous.topRows(bonds).transpose();
-    fields.of_bonds.push_back(
-        {"remembered_m", static_cast<std::size_t>(rows.rows()), list_of(rows)});
+    for (Eigen::Index j = 0; j < state.viscous.cols(); ++j) {
+      fields.of_bonds.push_back(
+          {viscous_name(j, state.viscous.cols()), 1, list_of(state.viscous.col(j).head(bonds))});
+    }
   }
   return fields;
 }
