@@ -178,16 +178,15 @@ SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& netwo
 RunNetwork network_to_run(const ExperimentScene& scene) {
   const Tissue& tissue = scene.tissue;
   if (!scene.formulation.mass_spring) {
-    return {tissue.network, tissue.material, with_contacts(scene, tissue.bonds())};
+    return {tissue.network, with_contacts(scene, tissue.bonds())};
   }
   const Freedom freedom = tissue.freedom();
   const double stiffness = contact_stiffness_N_per_m(tissue.bonds(), tissue.network.organ.position,
                                                      freedom, scene.probe(), 1.0);
   Network msm = msm_network(tissue.network, scene.formulation.springs);
-  const TpmParameters material =
-      msm_material(msm, tissue.material, freedom, scene.probe(), stiffness);
-  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, material));
-  return {std::move(msm), material, std::move(driven)};
+  const BondMaterial springs = msm_material(msm, freedom, scene.probe(), stiffness);
+  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, springs));
+  return {std::move(msm), std::move(driven)};
 }
 
 SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,

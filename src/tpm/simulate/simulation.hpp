@@ -13,7 +13,6 @@ namespace tpm {
 /// touches it.
 struct RunNetwork {
   Network network;  ///< without tools
-  TpmParameters material;
   DrivenNetwork driven;
 
   /// The spheres of positions that tools follow.
