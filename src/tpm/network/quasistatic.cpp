@@ -59,7 +59,7 @@ class Run {
         options_(options),
         times_s_(times_s),
         observer_(observer),
-        tissue_(bonds, rest, freedom, probes, protocol.drive()),
+        tissue_(bonds, rest, freedom, probes, protocol.drive(), options.equilibrium),
         stages_(tissue_, options.stages, !options.step_s) {
     order_ = rising_order(times_s);
     const auto asked = static_cast<Eigen::Index>(times_s.size());
@@ -88,6 +88,7 @@ class Run {
     const int rejected = result_.work.rejected;
     result_.work = stages_.work();
     result_.work.rejected = rejected;
+    result_.solver = tissue_.equilibrium().choice();
     if (options_.energies) result_.energy = energy_of(state_, energy_);
     result_.position = state_.position;
     result_.remembered = state_.remembered;

@@ -53,7 +53,7 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
       bonds_(tissue.bonds()),
       full_(with_start(radau_nodes(stages))),
       inner_(radau_nodes(stages)),
-      factor_(tissue.bonds().pattern()),
+      factor_(tissue.equilibrium()),
       anderson_(coordinates_ * kLanes, kMemoryDepth),
       x_(kLanes, coordinates_),
       d_(kLanes, coordinates_),
@@ -143,7 +143,7 @@ bool StageBalance::refactorise(const TissueState& state, double following) {
   Equilibrium& equilibrium = tissue_.equilibrium();
   factorised_ = equilibrium.factorise(state.position, memory) && equilibrium.is_stable();
   if (!factorised_) return false;
-  factor_.copy(equilibrium.factor());
+  factor_.take();
   const DrivenTissue::UnitField field = tissue_.unit_field(state, memory);
   path_stiffness_ = field.stiffness;
   lane_field_ = by_coordinate(field.displacement);

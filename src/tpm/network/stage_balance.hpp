@@ -6,9 +6,9 @@
 
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/lane_bonds.hpp"
+#include "tpm/network/lane_stiffness.hpp"
 #include "tpm/solve/anderson.hpp"
 #include "tpm/solve/exponential_collocation.hpp"
-#include "tpm/solve/lane_factor.hpp"
 
 namespace tpm {
 
@@ -126,7 +126,7 @@ class StageBalance {
   LaneBonds bonds_;
   ExponentialCollocation full_;   ///< through the start and the stages
   ExponentialCollocation inner_;  ///< through the stages alone
-  LaneFactor factor_;
+  LaneStiffness factor_;
   Anderson anderson_;
   QuasiStaticWork work_;
   double scale_ = 0.0;

@@ -59,6 +59,7 @@ struct SimulationRun {
   SimulationRecord record;
   std::optional<double> resumed_at_s;  ///< time of the checkpoint it went on from
   double lowest_frequency_Hz = 0.0;    ///< of an inertial run
+  std::optional<SolverChoice> solver;  ///< of a run without mass; none if a checkpoint held it all
 };
 
 /// A run that was asked to stop; says where it stands.
