@@ -174,24 +174,27 @@ TEST_CASE("an indentation refuses what it cannot do") {
 
 TEST_CASE("a solver is chosen by what the factor takes, counted before it is made") {
   const IndentedScene scene(solid_liver(700), 0.02, 0.03);
-  const SolverChoice usual = choose_solver(scene.bonds, {.solver = StiffnessSolver::automatic});
+  const SolverChoice usual =
+      choose_solver(scene.bonds, scene.freedom, {.solver = StiffnessSolver::automatic});
   CHECK(usual.direct);
   CHECK(usual.operations > 1e6);
   CHECK(usual.bytes > 1e6);
   const auto chosen = [&](double operations, double bytes) {
-    return choose_solver(scene.bonds, {.solver = StiffnessSolver::automatic,
-                                       .most_operations = operations,
-                                       .most_bytes = bytes})
+    return choose_solver(scene.bonds, scene.freedom,
+                         {.solver = StiffnessSolver::automatic,
+                          .most_operations = operations,
+                          .most_bytes = bytes})
         .direct;
   };
   CHECK(chosen(usual.operations, usual.bytes));
   CHECK_FALSE(chosen(0.99 * usual.operations, usual.bytes));
   CHECK_FALSE(chosen(usual.operations, 0.99 * usual.bytes));
   CHECK(
-      choose_solver(scene.bonds,
+      choose_solver(scene.bonds, scene.freedom,
                     {.solver = StiffnessSolver::direct, .most_operations = 0.0, .most_bytes = 0.0})
           .direct);
-  CHECK_FALSE(choose_solver(scene.bonds, {.solver = StiffnessSolver::iterative}).direct);
+  CHECK_FALSE(
+      choose_solver(scene.bonds, scene.freedom, {.solver = StiffnessSolver::iterative}).direct);
 }
 
 TEST_CASE("a quasi-static run is the same with either solver, within its tolerance", "[heavy]") {

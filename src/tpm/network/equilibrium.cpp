@@ -12,11 +12,13 @@ constexpr double kOperationsPerProduct = 54.0;  // of 3x3 blocks
 
 }  // namespace
 
-SolverChoice choose_solver(const BondSystem& bonds, const EquilibriumOptions& options) {
+SolverChoice choose_solver(const BondSystem& bonds, const Freedom& freedom,
+                           const EquilibriumOptions& options) {
   SolverChoice choice;
   choice.direct = options.solver != StiffnessSolver::iterative;
   if (!choice.direct) return choice;
-  const BlockPattern& pattern = bonds.pattern();
+  const auto graph = moving_graph(bonds, freedom);
+  const BlockPattern& pattern = graph->pattern;
   choice.operations = kOperationsPerProduct * static_cast<double>(pattern.factor_products());
   choice.bytes = static_cast<double>(pattern.factor_bytes());
   if (options.solver == StiffnessSolver::direct) return choice;
@@ -27,8 +29,8 @@ SolverChoice choose_solver(const BondSystem& bonds, const EquilibriumOptions& op
 
 Equilibrium::Equilibrium(const BondSystem& bonds, const Freedom& freedom,
                          EquilibriumOptions options)
-    : bonds_(bonds), freedom_(freedom), choice_(choose_solver(bonds, options)) {
-  if (choice_.direct) direct_.emplace(bonds.pattern());
+    : bonds_(bonds), freedom_(freedom), choice_(choose_solver(bonds, freedom, options)) {
+  if (choice_.direct) direct_.emplace(bonds, freedom);
 }
 
 Equilibrium::~Equilibrium() = default;
@@ -52,10 +54,7 @@ bool Equilibrium::factorise(const Positions& position, const BondMemory& memory)
     stable_ = answer == TangentAnswer::solved;
     return answer != TangentAnswer::failed;
   }
-  direct_->matrix.set_zero();
-  bonds_.add_stiffness(position, memory, direct_->matrix);
-  freedom_.constrain(bonds_, direct_->matrix);
-  const bool done = direct_->factor.factorise(direct_->matrix);
+  const bool done = direct_->factor.factorise(direct_->blocks.assemble(position, memory));
   stable_ = direct_->factor.negative_count() == 0;
   return done;
 }

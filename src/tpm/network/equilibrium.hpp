@@ -5,6 +5,7 @@
 
 #include "tpm/core/word_table.hpp"
 #include "tpm/network/newton_balance.hpp"
+#include "tpm/network/stiffness_blocks.hpp"
 
 namespace tpm {
 
@@ -39,9 +40,9 @@ struct SolverChoice {
   double bytes = 0.0;       ///< of the factor
 };
 
-/// The solver that options choose for the bonds of a network. Finds their pattern unless the
-/// options say `iterative`.
-[[nodiscard]] SolverChoice choose_solver(const BondSystem& bonds,
+/// The solver that options choose for a network. Finds the pattern of what moves unless the options
+/// say `iterative`.
+[[nodiscard]] SolverChoice choose_solver(const BondSystem& bonds, const Freedom& freedom,
                                          const EquilibriumOptions& options);
 
 /// Balances the forces on the free spheres of a network by Newton's method with solutions of the
@@ -83,6 +84,8 @@ class Equilibrium {
   [[nodiscard]] const SolverChoice& choice() const { return choice_; }
   /// The factorisation of a direct solver, null otherwise.
   [[nodiscard]] const BlockLdlt* factor() const { return direct_ ? &direct_->factor : nullptr; }
+  /// Of that. There is none where solutions iterate.
+  [[nodiscard]] const BlockPattern& pattern() const { return direct_->blocks.pattern(); }
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Freedom& freedom() const { return freedom_; }
 
@@ -93,8 +96,9 @@ class Equilibrium {
   [[nodiscard]] LargeEquilibrium& iterative(const Positions& position);
 
   struct Direct {
-    explicit Direct(const BlockPattern& pattern) : matrix(pattern), factor(pattern) {}
-    BlockMatrix matrix;
+    Direct(const BondSystem& bonds, const Freedom& freedom)
+        : blocks(bonds, freedom), factor(blocks.pattern()) {}
+    StiffnessBlocks blocks;
     BlockLdlt factor;
   };
 

@@ -8,7 +8,7 @@ constexpr double kLaneTolerance = 1e-4;
 }  // namespace
 
 LaneStiffness::LaneStiffness(const Equilibrium& equilibrium) : equilibrium_(equilibrium) {
-  if (equilibrium.factor() != nullptr) factor_.emplace(equilibrium.bonds().pattern());
+  if (equilibrium.factor() != nullptr) factor_.emplace(equilibrium.pattern());
 }
 
 void LaneStiffness::take() {

@@ -71,8 +71,8 @@ std::size_t parts_of(const ExperimentScene& scene, const RunNetwork& network) {
   constexpr double kAllRestarts = 2.5e9;   // operations
   constexpr std::size_t kPiecesAPart = 8;  // of the protocol
   const std::size_t least = std::min(scene.protocol.knots().size() / kPiecesAPart + 1, kParts);
-  const SolverChoice factor =
-      choose_solver(network.driven.bonds, {.solver = scene.formulation.solver});
+  const SolverChoice factor = choose_solver(network.driven.bonds, network.driven.freedom,
+                                            {.solver = scene.formulation.solver});
   if (!factor.direct) return kParts;
   const double cheap = kAllRestarts / (kRestart * factor.operations + 1.0);
   return std::clamp(cheap < kParts ? static_cast<std::size_t>(cheap) : kParts, least, kParts);

@@ -18,10 +18,10 @@ std::size_t up_to_four(std::size_t size) {
 /// v[begin..end) -= the three columns of a node times the values of the node.
 [[gnu::always_inline]] inline void subtract_node(const double* column, std::size_t stride,
                                                  std::size_t begin, std::size_t end,
-                                                 const double* value, double* v) {
-  const double* const c0 = column;
-  const double* const c1 = column + stride;
-  const double* const c2 = column + 2 * stride;
+                                                 const double* value, double* __restrict v) {
+  const double* const __restrict c0 = column;
+  const double* const __restrict c1 = column + stride;
+  const double* const __restrict c2 = column + 2 * stride;
   const double v0 = value[0], v1 = value[1], v2 = value[2];
   for (std::size_t i = begin; i < end; ++i) v[i] -= c0[i] * v0 + c1[i] * v1 + c2[i] * v2;
 }
@@ -150,8 +150,8 @@ BlockLdlt::BlockLdlt(const BlockPattern& pattern, bool portable)
     : pattern_(pattern),
       update_(dense_update(portable)),
       panels_(pattern.panel_numbers_ + kSlack),
-      stacks_{std::vector<double>(pattern.stack_numbers_[0] + kSlack),
-              std::vector<double>(pattern.stack_numbers_[1] + kSlack)},
+      stacks_{ZeroedNumbers(pattern.stack_numbers_[0] + kSlack),
+              ZeroedNumbers(pattern.stack_numbers_[1] + kSlack)},
       pivot_(pattern.nodes()),
       inverse_(pattern.nodes()),
       scaled_(pattern.longest_front_ * kTogether + kSlack),

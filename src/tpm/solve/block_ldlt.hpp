@@ -9,6 +9,7 @@
 
 #include "tpm/solve/dense_update.hpp"
 #include "tpm/solve/elimination_fronts.hpp"
+#include "tpm/solve/zeroed_numbers.hpp"
 
 namespace tpm {
 
@@ -119,8 +120,8 @@ class BlockLdlt {
 
   const BlockPattern& pattern_;
   const DenseUpdate& update_;
-  std::vector<double> panels_;                    ///< L of each front, its own coordinates first
-  std::array<std::vector<double>, 2> stacks_;     ///< what fronts leave to their parents
+  ZeroedNumbers panels_;                          ///< L of each front, its own coordinates first
+  std::array<ZeroedNumbers, 2> stacks_;           ///< what fronts leave to their parents
   std::vector<Eigen::Matrix3d> pivot_, inverse_;  ///< by place
   std::vector<double> scaled_;                    ///< L D of the columns being eliminated
   std::vector<double> lower_inverse_;             ///< minus the inverse of L on the diagonal
