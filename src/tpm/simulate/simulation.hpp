@@ -83,6 +83,7 @@ struct SimulationRun {
   std::optional<double> resumed_at_s;         ///< time of the checkpoint it went on from
   double lowest_frequency_Hz = 0.0;           ///< of an inertial run, of the tissue without tools
   std::optional<ContactCheck> contact_check;  ///< of an inertial run with tools
+  std::optional<SolverChoice> solver;  ///< of a run without mass; none if a checkpoint held it all
 };
 
 /// A run that was asked to stop; says where it stands.
