@@ -1,7 +1,7 @@
 #pragma once
 #include <functional>
-#include <stdexcept>
 
+#include "tpm/core/interrupted.hpp"
 #include "tpm/network/driven_network.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/scene/experiment_scene.hpp"
@@ -59,12 +59,6 @@ struct SimulationRun {
   SimulationRecord record;
   std::optional<double> resumed_at_s;  ///< time of the checkpoint it went on from
   double lowest_frequency_Hz = 0.0;    ///< of an inertial run
-};
-
-/// A run that was asked to stop; says where it stands.
-class Interrupted : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
 };
 
 /// Runs a scene. In a static run everything has relaxed under what is imposed at each time. A run

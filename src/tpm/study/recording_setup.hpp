@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,6 +43,7 @@ struct SetupOptions {
   /// Depth (or change of relative length) that the coefficients refer to; reference_drive() if
   /// nobody says.
   std::optional<double> reference;
+  std::function<bool()> interrupted;  ///< see FitConfig
 };
 
 /// A reference depth for the kernels: the largest drive above contact among the recordings, to two
