@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "tpm/core/error.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/oscillation.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/recording_report.hpp"
@@ -229,7 +230,14 @@ std::vector<std::string> write_fit_report(const std::filesystem::path& folder,
     if (oscillation) figures.push_back(spectrum_figure(fit, i));
   }
   figures.push_back(waterfall_figure(fit));
-  return write_figures(folder, figures);
+  std::vector<std::string> files;
+  if (!no_law_because(fit.config)) {
+    files.push_back("law.json");
+    write_law(folder / files.back(), fitted_law(fit));
+  }
+  const std::vector<std::string> drawn = write_figures(folder, figures);
+  files.insert(files.end(), drawn.begin(), drawn.end());
+  return files;
 }
 
 std::vector<std::string> write_specimen_report(const std::filesystem::path& folder,
