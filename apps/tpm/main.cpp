@@ -92,11 +92,12 @@ void add_commands(CLI::App& app, Session& session) {
   };
   const std::vector<Group> groups = {
       {"Data: recordings, laws and fits",
-       {add_data_command, add_fit_command, add_select_command, add_laws_command,
-        add_spectrum_command, add_export_command, add_design_command}},
+       {add_data_command, add_fit_command, add_select_command, add_predict_command,
+        add_identify_command, add_laws_command, add_spectrum_command, add_export_command,
+        add_design_command}},
       {"Tissue: organs of spheres",
        {add_network_command, add_simulate_command, add_plan_command, add_sweep_command}},
-      {"Hand: haptic devices", {add_hil_command}},
+      {"Hand: haptic devices", {add_hil_command, add_budget_command}},
       {"Evidence: the paper, and tpm itself",
        {add_report_command, add_tables_command, add_audit_command, add_experiments_command,
         add_benchmark_command, add_stability_command, add_recovery_command, add_coverage_command,
