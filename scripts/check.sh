@@ -2,7 +2,7 @@
 # What a maintainer checks beyond scripts/test.sh: formatting, the slow tests (with Chromium, ParaView, the
 # Python package, notebooks and full disks), every source compiled with warnings as errors, the fast tests with the floors of
 # TPM_SANITIZED_FLOORS (cmake/TpmFloors.cmake) under AddressSanitizer and UndefinedBehaviorSanitizer, those
-# with threads under ThreadSanitizer, clang-tidy on what changed. Stops at the first failure; ends with the
+# with threads under ThreadSanitizer, a minute of fuzzing, clang-tidy on what changed. Stops at the first failure; ends with the
 # closing lines of the slow tests. Everything under sanitizers: presets asan-ubsan and tsan.
 #
 #   TPM_TIDY_BASE=COMMIT  clang-tidy checks the sources changed since COMMIT; `all` checks all.
@@ -50,6 +50,9 @@ configure check
 build check
 step "fast tests with sanitized floors, tests with threads under ThreadSanitizer"
 ctest --preset sanitized --parallel "$(nproc)" --no-tests=error | tail -n 4
+
+# 20 kinds of input, 6 s of processor time each, on two cores: a minute. scripts/fuzz.sh 310 is the whole of it.
+scripts/fuzz.sh --readers 6
 
 step "all checks passed; the slow tests ended with:"
 sed -n '/% tests passed/,$p' "$slow_log"

@@ -16,6 +16,7 @@
 #include "hil_options.hpp"
 #include "hil_page.hpp"
 #include "interrupt_watch.hpp"
+#include "out_of_memory.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/device/force_dimension.hpp"
@@ -258,8 +259,10 @@ int run_hil(const RunChoice& choice, const Session& session) {
     if (page) page->see(row);
   };
   options.planning = [&guide](const std::string&) { guide->plan(); };
-  options.opened = [&guide, opened = options.opened](const DeviceIdentity& identity,
-                                                     const LoopModel& model) {
+  std::optional<OutOfMemoryIsThrown> while_the_device_is_open;
+  options.opened = [&, opened = options.opened](const DeviceIdentity& identity,
+                                                const LoopModel& model) {
+    while_the_device_is_open.emplace();
     guide->begin();
     if (opened) opened(identity, model);
   };

@@ -8,17 +8,18 @@ namespace tpm {
 /// What may be asked of a kind of device. Numbers that nobody has measured here are marked.
 struct DeviceLimits {
   std::string_view kind;
-  std::string_view name;      ///< as its maker writes it
-  bool tried;                 ///< against the maker's library; none has been tried on hardware
-  double force_N;             ///< data sheet
-  double reach_m;             ///< radius of the workspace, as commonly used
-  double stiffness_N_per_m;   ///< recommended maximum, CHAI3D 3.3's software limit
-  double damping_N_s_per_m;   ///< CHAI3D 3.3's software limit
-  double slew_N_per_s;        ///< assumed: full force within 6 ms
-  double least_ramp_in_s;     ///< assumed: longer than a hand takes to stiffen
-  double friction_N_s_per_m;  ///< assumed: the least of what is usual, 0.1 to 1
-  int delay_periods;          ///< assumed, from a command to its force
-  bool simulated = false;     ///< of a plugin: it says that it has no motors
+  std::string_view name;         ///< as its maker writes it
+  bool tried;                    ///< against the maker's library; none has been tried on hardware
+  double force_N;                ///< data sheet
+  double reach_m;                ///< radius of the workspace, as commonly used
+  double stiffness_N_per_m;      ///< recommended maximum, CHAI3D 3.3's software limit
+  double damping_N_s_per_m;      ///< CHAI3D 3.3's software limit
+  double slew_N_per_s;           ///< assumed: full force within 6 ms
+  double least_ramp_in_s;        ///< assumed: longer than a hand takes to stiffen
+  double friction_N_s_per_m;     ///< assumed: the least of what is usual, 0.1 to 1
+  int delay_periods;             ///< assumed, from a command to its force
+  double encoder_step_m = 1e-5;  ///< assumed: the data sheet of the Omega.7 says less
+  bool simulated = false;        ///< of a plugin: it says that it has no motors
 
   /// Its motors may move: it is neither simulated nor a replay.
   [[nodiscard]] bool hardware() const {

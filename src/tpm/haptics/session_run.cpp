@@ -67,7 +67,8 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
   }
   if (rendering.acceptable() || options.accept_unstable || choice.kind == "replay") return;
   throw Error(ExitCode::answer_is_no, "stability", rendering.verdict(),
-              "a softer tissue, a higher rate or a shorter delay; --accept-unstable with --device "
+              "a softer tissue, a higher rate, a shorter delay or a faster rise; --accept-unstable "
+              "with --device "
               "virtual");
 }
 
