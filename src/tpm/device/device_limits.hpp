@@ -19,16 +19,20 @@ struct DeviceLimits {
   double friction_N_s_per_m;     ///< assumed: the least of what is usual, 0.1 to 1
   int delay_periods;             ///< assumed, from a command to its force
   double encoder_step_m = 1e-5;  ///< assumed: the data sheet of the Omega.7 says less
+  bool simulated = false;        ///< of a plugin: it says that it has no motors
 
   /// Its motors may move: it is neither simulated nor a replay.
-  [[nodiscard]] bool hardware() const { return kind != "virtual" && kind != "replay"; }
+  [[nodiscard]] bool hardware() const {
+    return kind != "virtual" && kind != "replay" && !simulated;
+  }
 };
 
 /// Of the kind that a session is run on, "omega7" or what simulates or replays one; the simulated
 /// device has the limits of the real one. Throws Error(usage) for another.
 [[nodiscard]] const DeviceLimits& limits_of(std::string_view kind);
 
-/// The kinds that there are, as --device takes them.
+/// The kinds that this library knows by itself, as --device takes them; plugins bring their own
+/// limits (plugin_device.hpp).
 [[nodiscard]] std::vector<std::string> device_kinds();
 
 }  // namespace tpm

@@ -116,7 +116,11 @@ std::string RenderingCheck::verdict() const {
 
 RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                                const LoopModel& loop, std::string_view kind) {
-  const DeviceLimits& limits = limits_of(kind);
+  return check_rendering(session, model, loop, limits_of(kind));
+}
+
+RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
+                               const LoopModel& loop, const DeviceLimits& limits) {
   const bool hardware = limits.hardware();
   RenderingCheck check;
   check.rate_Hz = 1.0 / session.servo.period_s;

@@ -46,6 +46,9 @@ struct RenderingCheck {
 /// deepest, then a little further within one period. Stability is that of the linear, two-sided
 /// loop with the arm of the session's simulated operator; the slip element only ever takes energy
 /// and is left out. The model is at rest afterwards.
+/// @param limits of the device
+[[nodiscard]] RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
+                                             const LoopModel& loop, const DeviceLimits& limits);
 /// @param kind of device, see limits_of()
 [[nodiscard]] RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                                              const LoopModel& loop, std::string_view kind);
