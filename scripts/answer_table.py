@@ -432,7 +432,7 @@ SESSIONS = [
     Case("9", "`hil check --rate '4 kHz'` on a machine that stands still for 17 ms (68 periods)", files(),
          stalled("hil check --rate '4 kHz' --duration '2 s'"), "test_servo_threads: The jitter check says no", verdict),
     Case("9", "the same stall in a session at 4 kHz, `hil run`", files(s__json=star(rate="4 kHz")),
-         stalled("hil run s.json -o r.tpmrec --force"), "test_servo_threads: The jitter check says no", said_first),
+         stalled("hil run s.json -o r.tpmrec --time real"), "test_servo_threads: The jitter check says no", said_first),
     Case("10", "a session that cannot be prepared, then one that can",
          scripted(star(), "wait 250", "initialised 0"),
          LIBRARY + VIRTUAL + " 2> first; sed -i 's/initialised 0/initialised 1/' script; " + LIBRARY + VIRTUAL,
