@@ -96,7 +96,7 @@ COMMANDS = [
     Command("recovery", "recovery --laws linear-1 --trials 1 -o recovery.txt", ["recovery.txt"]),
     Command("plan", "plan in/indented.json --costs nominal --brief", [], weight=20),
     Command("benchmark", "benchmark bond_paper --no-timing -o bench", [], varies=["bench/report.run.json"],
-            weight=50),
+            kept=["bench/benchmark.part.json"], weight=50),
     Command("hil run", "hil run in/session.json -o s.tpmrec --force", ["s.tpmrec"], varies=["s.tpmrec"],  # ends early where the disk is full
             weight=4),
     Command("hil export", "hil export in/s.tpmrec -o s.h5", ["s.h5"]),
