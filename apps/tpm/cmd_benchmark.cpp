@@ -12,6 +12,7 @@
 #include "tpm/report/benchmark_report.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
+#include "tpm/report/trajectory_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/writable.hpp"
@@ -37,7 +38,11 @@ int list_problems(const Session& session) {
       say("{:<18} {}\n", entry.name, entry.summary);
     }
   }
-  if (session.json()) say("{}", to_text(Json{{"problems", std::move(json)}}));
+  if (session.json()) {
+    say("{}", to_text(Json{{"problems", std::move(json)}, {"formulations", formulations_json()}}));
+  } else {
+    say("\nFormulations:\n{}", formulations_text());
+  }
   return 0;
 }
 
@@ -115,7 +120,8 @@ void add_benchmark_command(CLI::App& app, Session& session) {
   command->add_flag("--keep", choice->keep,
                     "Keep what the folder holds: run the problems that are missing there, or those "
                     "named; goes on from a run that was interrupted");
-  command->add_flag("--list", choice->list, "Name the problems and do nothing");
+  command->add_flag("--list", choice->list,
+                    "Name the problems and all formulations, and do nothing");
   add_format_option(*command, session);
   command->footer(
       "Run it on an otherwise idle machine. Example:\n"

@@ -609,8 +609,8 @@ Verification verify_law(const HilRecording& recording, const VerifyOptions& opti
 }  // namespace
 
 Verification verify(const HilRecording& recording, const VerifyOptions& options) {
-  if (recording.session.model == LoopModelKind::law) return verify_law(recording, options);
-  if (recording.session.model == LoopModelKind::surface) return verify_in_space(recording, options);
+  if (recording.session.model == "law") return verify_law(recording, options);
+  if (recording.session.model == "surface") return verify_in_space(recording, options);
   const std::vector<const ServoRecord*> rows = moved_rows(recording);
   const Motion motion = motion_of(recording, rows);
   const Tissue tissue = parse_tissue(recording.session.scene, recording.name, {});
@@ -644,7 +644,7 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
   judge_phases(v, recording, rows, compared, v.reference_N);
   ask(v, "the second opinion by CVODE",
       [&] { ask_cvode(v, recording, driven, protocol, options); });
-  if (recording.session.model == LoopModelKind::element) {
+  if (recording.session.model == "element") {
     ask_others(v, recording, motion, protocol, rows, tissue.material, options);
   }
   v.motion_error_N = options.motion_tolerance_m *

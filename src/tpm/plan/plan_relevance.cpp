@@ -16,7 +16,7 @@ constexpr double kAffordable = 1.2e6;  // steps times spheres of a run with mass
 constexpr double kInertiaTolerance = 1e-4;
 
 /// The tissue as the truth has it, changed in one part.
-PlanTrajectory answer_of(const PlanScene& scene, const PlanScout& like) {
+Trajectory answer_of(const PlanScene& scene, const PlanScout& like) {
   const PlanScout changed(scene, like.measure(), false);
   QuasiStaticOptions options;
   options.tolerance = PlanScout::kTolerance;
@@ -77,7 +77,7 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
   result.part = "inertia";
   try {
     if (scout.inertial()) {
-      const PlanTrajectory& massless = scout.coarse();
+      const Trajectory& massless = scout.coarse();
       result.error =
           trajectory_error(massless, scout.with_masses(kInertiaTolerance), scout.measure());
       return result;
@@ -100,7 +100,7 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
     if (steps * static_cast<double>(scout.scene().network().organ.size()) > kAffordable)
       return result;
     const PlanScout moving(scout.scene(), scout.measure(), true);
-    const PlanTrajectory& truth = moving.with_masses(kInertiaTolerance);
+    const Trajectory& truth = moving.with_masses(kInertiaTolerance);
     result.error = trajectory_error(moving.coarse(), truth, scout.measure());
     result.estimated = false;
     result.note.clear();

@@ -199,14 +199,13 @@ std::string validity_text(const Validity& validity, bool depth_limits) {
 }
 
 std::string equations_text(const ExperimentScene& scene, const SimulationRun& run) {
-  const Formulation& f = scene.formulation;
+  const FormulationChoice& f = scene.formulation;
   const char* network = f.mass_spring ? "mass-spring model" : "tissue";
-  if (!f.inertial()) {
-    return fmt::format("{}, {}, tolerance {}\n", network,
-                       f.kind == FormulationKind::relaxed
-                           ? "static: everything has relaxed at each time"
-                           : "quasi-static",
-                       shortest(f.tolerance));
+  if (!f.masses) {
+    return fmt::format(
+        "{}, {}, tolerance {}\n", network,
+        !f.entry().can().course ? "static: everything has relaxed at each time" : "quasi-static",
+        shortest(f.tolerance));
   }
   return fmt::format("{} with mass, damping ratio {} of its lowest mode ({} Hz), tolerance {}\n",
                      network, shortest(f.damping_ratio), significant(run.lowest_frequency_Hz, 4),
@@ -217,14 +216,14 @@ std::string equations_text(const ExperimentScene& scene, const SimulationRun& ru
 
 Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                      const SimulationRun& run) {
-  const Formulation& f = scene.formulation;
+  const FormulationChoice& f = scene.formulation;
   const SimulationRecord& record = run.record;
   const bool depth = by_depth(scene);
   Json json{{"title", scene.tissue.title},
             {"version", version()},
             {"scene_sha256", sha256_hex(scene.text)},
             {"network", f.mass_spring ? "mass_spring" : "tissue"},
-            {"formulation", word_of(f.kind)},
+            {"formulation", f.kind},
             {"tolerance", f.tolerance},
             {"spheres", scene.tissue.network.organ.size()},
             {"bonds", scene.tissue.network.bonds.size()},
@@ -241,9 +240,8 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
   json["outputs"] = record.outputs.size();
   json["energy"] = energy_json(run);
   json["roughness"] = smoothness_json(smoothness_of(scene, record.outputs.back().position));
-  json["error_estimate"] = f.kind == FormulationKind::quasi_static
-                               ? Json(rounded(record.error_estimate, 3))
-                               : Json(nullptr);
+  json["error_estimate"] =
+      f.kind == "quasi_static" ? Json(rounded(record.error_estimate, 3)) : Json(nullptr);
   json["resumed_at_s"] = run.resumed_at_s ? Json(*run.resumed_at_s) : Json(nullptr);
   json["validity"] = validity_json(record.validity, depth_limits_apply(scene.tissue));
   return json;

@@ -28,14 +28,14 @@ std::string step_group(std::size_t step) {
 }
 
 void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hdf5Writer& file) {
-  const Formulation& f = scene.formulation;
+  const FormulationChoice& f = scene.formulation;
   file.attribute("/", "scene", scene.text);
   file.attribute("/", "scene_sha256", sha256_hex(scene.text));
-  file.attribute("/", "formulation", std::string(word_of(f.kind)));
+  file.attribute("/", "formulation", f.kind);
   file.attribute("/", "network", f.mass_spring ? "mass_spring" : "tissue");
   file.attribute("/", "tolerance", shortest(f.tolerance));
   file.attribute("/", "provenance", "model");
-  if (f.inertial()) {
+  if (f.masses) {
     file.attribute("/", "damping_ratio", shortest(f.damping_ratio));
     file.attribute("/", "lowest_frequency_Hz", significant(run.lowest_frequency_Hz, 6));
   }
@@ -102,7 +102,7 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
     file.integers("/curve/touching", touching, 1);
     file.numbers("/curve/overlap_m", overlap);
   }
-  if (scene.formulation.inertial()) return;
+  if (scene.formulation.masses) return;
   file.numbers("/curve/work_J", work);
   file.numbers("/curve/dissipated_J", heat);
   file.numbers("/curve/stored_J", stored);
