@@ -29,8 +29,9 @@ const std::string kCreep = R"("protocol": {"kind": "creep", "load": "0.2 N", "du
 const std::string kStep = R"("protocol": {"kind": "step_hold", "depth": "2 mm", "hold": "1 s"})";
 const std::string kCycle = R"("protocol": {"kind": "knots", "knots": [
   {"time": "0 s", "depth": "0 mm"}, {"time": "1 s", "depth": "4 mm"}, {"time": "2 s", "depth": "0 mm"}]})";
-const std::string kStill = R"("protocol": {"kind": "knots", "knots": [
-  {"time": "0 s", "depth": "0 mm"}, {"time": "1 s", "depth": "0 mm"}]})";
+const std::string kLate =
+    R"("protocol": {"kind": "knots", "knots": [{"time": "0 s", "depth": "0 mm"},
+  {"time": "1 s", "depth": "0 mm"}, {"time": "2 s", "depth": "1 mm"}]})";
 
 ExperimentScene parsed(const std::string& organ, const std::string& blocks, const Formulation& f) {
   const std::string text = R"({"organ": )" + organ + ", " + kMaterial + blocks + "}";
@@ -45,8 +46,18 @@ ExperimentScene star(const std::string& blocks, const Formulation& f) {
   return parsed(R"({"kind": "star", "spacing": "30 mm"})", blocks, f);
 }
 
+/// A small liver, its contact guided along the push as a tool does it: else it goes so far aside
+/// that reduced contacts do not trust themselves.
 ExperimentScene liver(const std::string& blocks, const Formulation& f) {
-  return parsed(R"({"kind": "liver", "count": 40})", blocks, f);
+  ExperimentScene scene = parsed(R"({"kind": "liver", "count": 40})", blocks, f);
+  scene.tissue.guides.push_back({scene.probe().sphere, scene.probe().direction});
+  return scene;
+}
+
+/// The simplest organ that it runs on and that all of its kind do: reduced contacts need spheres
+/// that follow.
+ExperimentScene usual(const std::string& blocks, const Formulation& f) {
+  return f.can().network ? liver(blocks, f) : star(blocks, f);
 }
 
 /// A formulation that is driven by a depth has one, else a load.
@@ -100,13 +111,16 @@ Eigen::VectorXd exact(const ExperimentScene& scene, const std::vector<double>& t
 /// their order. Spheres with mass: against the oscillator, below.
 void closed_forms(const Formulation& f, Broken& broken) {
   constexpr double kTimesTolerance = 30.0;  // errors gather over a run
-  if (f.can().planned) return;
+  constexpr int kSweeps = 50;               // XPBD has its order once the bonds agree
+  const bool follows_tolerance = f.as<StateRunner>() != nullptr && !f.can().masses;
+  if (f.can().planned && !follows_tolerance) return;
   for (const std::string* push : {&kRamp, &kCreep}) {
     const bool by_depth = push == &kRamp;
     if (!(by_depth ? f.can().depth : f.can().load && f.can().jumps)) continue;
     ExperimentScene scene = star(*push, f);
     const std::vector<double> times = even_times(scene.protocol, 12);
     const Eigen::VectorXd truth = exact(scene, times);
+    scene.formulation.sweeps = kSweeps;
     const auto error = [&](double step_s) {
       scene.formulation.step_s = step_s;
       return apart(run_scene(scene, times, false).response, truth);
@@ -151,7 +165,7 @@ void oscillator(const Formulation& f, Broken& broken) {
   };
   if (order_of(f) == 0) {
     const double found = error(1e-3);
-    check(broken, found <= 1e-5, "oscillator", fmt::format("{} of the peak from it", found));
+    check(broken, found <= 1e-4, "oscillator", fmt::format("{} of the peak from it", found));
     return;
   }
   constexpr double kStep_s = 2.5e-4, kShort = 0.35;
@@ -160,21 +174,16 @@ void oscillator(const Formulation& f, Broken& broken) {
         fmt::format("{} where {} is stated", std::log2(coarse / fine), order_of(f)));
 }
 
-/// Nothing imposed, nothing answered.
+/// Before anything is imposed nothing answers.
 void equality_at_rest(const Formulation& f, Broken& broken) {
   if (!f.can().depth) return;
-  ExperimentScene scene = star(kStill, f);
-  if (f.can().planned) {  // they refuse what has no peak: rest before a push instead
-    scene.protocol = Protocol(Drive::displacement, {{0.0, 0.0}, {1.0, 0.0}, {2.0, 1e-3}}, "late");
-  }
-  scene.outputs.times_s = {0.0};
-  const std::vector<double> times{0.0, 0.5, 1.0};
-  const double most = run_scene(scene, times, false).response.cwiseAbs().maxCoeff();
+  const ExperimentScene scene = usual(kLate, f);
+  const double most = run_scene(scene, {0.0, 0.5, 0.99}, false).response.cwiseAbs().maxCoeff();
   check(broken, most <= 1e-12, "rest", fmt::format("{} N without a depth", most));
 }
 
 void determinism(const Formulation& f, Broken& broken) {
-  const ExperimentScene scene = star(usual_push(f), f);
+  const ExperimentScene scene = usual(usual_push(f), f);
   const std::vector<double> times = even_times(scene.protocol, 20);
   const Eigen::VectorXd first = run_scene(scene, times, false).response;
   check(broken, first == run_scene(scene, times, false).response, "determinism",
@@ -184,7 +193,7 @@ void determinism(const Formulation& f, Broken& broken) {
 /// A closed cycle of depth takes no energy out of the tissue.
 void passivity(const Formulation& f, Broken& broken) {
   if (!f.can().depth) return;
-  const ExperimentScene scene = star(kCycle, f);
+  const ExperimentScene scene = usual(kCycle, f);
   constexpr int kParts = 400;
   const std::vector<double> times = even_times(scene.protocol, kParts);
   const Eigen::VectorXd force = run_scene(scene, times, false).response;
@@ -218,7 +227,7 @@ void energy_account(const Formulation& f, Broken& broken) {
 /// Displacements of the driven sphere are what is imposed on it.
 void field(const Formulation& f, Broken& broken) {
   if (!f.can().field || !f.can().depth) return;
-  const ExperimentScene scene = star(kRamp, f);
+  const ExperimentScene scene = usual(kRamp, f);
   const std::vector<double> times = even_times(scene.protocol, 4);
   const Trajectory answer = run_scene(scene, times, true);
   check(broken, answer.displacement.size() == times.size(), "field",
@@ -360,22 +369,25 @@ Broken broken_in_loop(const Formulation& f, HeapCalls heap_calls) {
                                   "session");
   const LoopModel loop = make_loop_model(parse_session(session, "session", {}));
   ContactModel& model = *loop.model;
-  const auto moved = [&](std::vector<double>& forces) {
+  constexpr std::size_t kPeriods = 300;
+  std::vector<double> first(kPeriods), second(kPeriods);
+  // At rest, then 2 mm in within 200 periods, and held.
+  const auto moved = [&](std::vector<double>& forces_N) {
     model.reset();
     const double rest_N = model.step(Eigen::Vector3d::Zero()).force_N.norm();
-    check(broken, rest_N <= 1e-6, "rest", fmt::format("{} N without a displacement", rest_N));
-    constexpr int kPeriods = 300;
-    for (int i = 0; i < kPeriods; ++i) {
-      const double depth_m = 2e-3 * std::min(1.0, i / 200.0);
-      forces[static_cast<std::size_t>(i)] = loop.push.dot(model.step(depth_m * loop.push).force_N);
+    for (std::size_t i = 0; i < kPeriods; ++i) {
+      const double depth_m = 2e-3 * std::min(1.0, static_cast<double>(i) / 200.0);
+      forces_N[i] = loop.push.dot(model.step(depth_m * loop.push).force_N);
     }
+    return rest_N;
   };
-  std::vector<double> first(300), second(300);
   const long before = heap_calls();
-  moved(first);
+  const double rest_N = moved(first);
   const long calls = heap_calls() - before;
-  check(broken, calls == 0, "heap", fmt::format("{} calls of the heap in 301 steps", calls));
-  moved(second);
+  check(broken, calls == 0, "heap",
+        fmt::format("{} calls of the heap in {} steps", calls, kPeriods + 1));
+  check(broken, rest_N <= 1e-6, "rest", fmt::format("{} N without a displacement", rest_N));
+  (void)moved(second);
   check(broken, first == second, "determinism", "after reset() it answers other bits");
   check(broken, first.back() < 0.0, "push", fmt::format("{} N along the push", first.back()));
   return broken;

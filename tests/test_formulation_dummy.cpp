@@ -54,8 +54,8 @@ TEST_CASE("a formulation in one file is in the lists") {
 TEST_CASE("a formulation in one file runs a scene and a sweep") {
   const TempFolder folder;
   write_file(folder / "s.json", scene_of("dummy"));
-  const std::string path = (folder / "s.json").string();
-  const Json run = answer_of("simulate " + path + " -o " + (folder / "s.h5").string());
+  const std::string path = folder / "s.json";
+  const Json run = answer_of("simulate " + path + " -o " + (folder / "s.h5"));
   CHECK(run.at("formulation") == "dummy");
   const double force_N = run.at("last").at("response").get<double>();
   CHECK(force_N > 0.0);
@@ -64,8 +64,7 @@ TEST_CASE("a formulation in one file runs a scene and a sweep") {
              R"({"title": "t", "model": "organ", "scene": )" + scene_of("dummy") + R"(,
     "axes": [{"parameter": "/protocol/depth", "values": ["1 mm", "2 mm"]}],
     "outputs": ["end_force"]})");
-  const Json sweep =
-      answer_of("sweep " + (folder / "sweep.json").string() + " -o " + (folder / "sweep").string());
+  const Json sweep = answer_of("sweep " + (folder / "sweep.json") + " -o " + (folder / "sweep"));
   INFO(sweep.dump());
   CHECK(sweep.at("done") == 2);
 }
@@ -73,7 +72,7 @@ TEST_CASE("a formulation in one file runs a scene and a sweep") {
 TEST_CASE("a formulation in one file is a candidate of plans") {
   const TempFolder folder;
   write_file(folder / "s.json", scene_of("quasi_static"));
-  const Json plan = answer_of("plan " + (folder / "s.json").string() + " --tolerance 1%");
+  const Json plan = answer_of("plan " + (folder / "s.json") + " --tolerance 1%");
   for (const Json& candidate : plan.at("frontier")) {
     if (candidate.at("name") != "dummy") continue;
     CHECK(candidate.at("claimed_error").get<double>() > 0.0);

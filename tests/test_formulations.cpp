@@ -62,10 +62,10 @@ TEST_CASE("a scene that a formulation cannot run names those that can") {
                    R"(, "formulation": {"kind": ")" + kind + R"("}})");
     return refusal_of([&] { require_runnable(scene); });
   };
-  CHECK_THAT(
-      refused("closed_form", kRamp),
-      Contains("key /formulation") && Contains("'closed_form' is no formulation that runs on "
-                                               "any network; expected one of linear, "));
+  CHECK_THAT(refused("closed_form", kRamp),
+             Contains("key /formulation") &&
+                 Contains("'closed_form' is no formulation that runs on "
+                          "any network, not only on the star; expected one of linear, "));
   CHECK_THAT(refused("rk4", kRamp + R"(, "contacts": [{"kind": "ball", "radius": "10 mm"}])"),
              Contains("lets tools touch and leave; expected one of static, network_step, "
                       "quasi_static, inertial"));

@@ -141,6 +141,27 @@ TEST_CASE("The surface lets go at zero force, recovers, and is met again where i
   CHECK_THAT(answer.force_N, WithinRel(contact.stiffness_N_per_m() * 1e-4, 0.05));
 }
 
+TEST_CASE("One-sided contact is a contact model itself, whatever it wraps") {
+  ElementContact inner(slow_liver(), 1e-3), same(slow_liver(), 1e-3);
+  OneSidedContact wrapped(inner, Eigen::Vector3d::UnitZ());
+  OneSidedContact pressed(same, Eigen::Vector3d::UnitZ());
+  ContactModel& model = wrapped;
+  CHECK(model.period_s() == inner.period_s());
+  CHECK(model.instantaneous_stiffness() == inner.instantaneous_stiffness());
+  for (const double depth_m : {1e-3, 3e-3, 2e-3, -1e-3, 0.5e-3, 2e-3}) {
+    const Eigen::Vector3d aside(2e-3, -1e-3, depth_m);  // motion across does not reach the tissue
+    const ContactAnswer answer = model.step(aside);
+    CHECK(answer.force_N.z() == -pressed.press(depth_m).force_N);
+    CHECK(answer.force_N.head(2).isZero(0.0));
+    CHECK(answer.force_N.z() <= 0.0);  // it pushes and never pulls
+  }
+  const Eigen::Quaterniond turned(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitX()));
+  model.reset();
+  pressed.reset();
+  CHECK(model.step({Eigen::Vector3d(0.0, 0.0, 1e-3), turned}).force_N.z() ==
+        -pressed.press(1e-3).force_N);
+}
+
 TEST_CASE("A tool that touches and lets go at random gains nothing from a soft tissue") {
   // What a tool gets back beyond what it gave is what a held force leaks, K dx^2 / 2 a period; with
   // the force taken as linear within a period nothing must be left over.

@@ -614,10 +614,7 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
   const std::vector<const ServoRecord*> rows = moved_rows(recording);
   const Motion motion = motion_of(recording, rows);
   const Tissue tissue = parse_tissue(recording.session.scene, recording.name, {});
-  const Probe probe =
-      parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{recording.name})
-          .front()
-          .probe;
+  const Probe probe = usual_contact(tissue, DocumentPlace{recording.name}).probe;
   const BondSystem bonds = tissue.bonds();
   QuasiStaticOptions settings;
   settings.tolerance = options.tolerance;

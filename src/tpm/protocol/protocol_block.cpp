@@ -93,14 +93,17 @@ std::optional<double>* ProtocolBlock::find(std::string_view key) {
 }
 
 Protocol ProtocolBlock::protocol(const DocumentPlace& place) const {
-  const auto number = [&](const ProtocolKey& key) { return number_of(*this, key, place); };
+  std::array<double, 3> number{};  // in the order of the keys
+  std::size_t count = 0;
+  for (const ProtocolKey& key : protocol_keys(kind))
+    number.at(count++) = number_of(*this, key, place);
   switch (kind) {
     case ProtocolKind::ramp_hold:
-      return ramp_and_hold(number(kDepthKey), number(kRateKey), number(kHoldKey));
+      return ramp_and_hold(number[0], number[1], number[2]);
     case ProtocolKind::step_hold:
-      return step_and_hold(number(kDepthKey), number(kStepHoldKey));
+      return step_and_hold(number[0], number[1]);
     case ProtocolKind::creep:
-      return creep(number(kLoadKey), number(kDurationKey));
+      return creep(number[0], number[1]);
     case ProtocolKind::knots:
       break;
   }

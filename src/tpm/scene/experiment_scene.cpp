@@ -37,8 +37,11 @@ ExperimentScene parse_experiment(const Json& scene, std::string_view where,
                     "what is done to the tissue, such as {\"kind\": \"ramp_hold\", \"depth\": \"8 "
                     "mm\", \"rate\": \"4 mm/s\", \"hold\": \"29 s\"}");
   }
-  std::vector<SceneContact> contacts = parse_contacts(
-      scene.value("contacts", Json::array({{{"kind", "sphere"}}})), tissue, place.key("contacts"));
+  const DocumentPlace at_contacts = place.key("contacts");
+  std::vector<SceneContact> contacts =
+      scene.contains("contacts")
+          ? parse_contacts(scene.at("contacts"), tissue, at_contacts)
+          : std::vector<SceneContact>{usual_contact(tissue, at_contacts.key("0"))};
   const DocumentPlace at_protocol = place.key("protocol");
   Protocol protocol = parse_protocol_block(scene.at("protocol"), at_protocol, Openness::complete)
                           .protocol(at_protocol);
