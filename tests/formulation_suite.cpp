@@ -88,7 +88,7 @@ void check(Broken& broken, bool kept, const char* name, const std::string& found
 
 /// The closed form of the star, or with everything relaxed.
 Eigen::VectorXd exact(const ExperimentScene& scene, const std::vector<double>& times) {
-  const TpmParameters& p = scene.tissue.material;
+  const TpmParameters& p = scene.tissue.element("the suite");
   if (scene.formulation.entry().can().course) {
     return ClosedForm{ModelOptions{}}
         .respond(scene.protocol, times, to_vector(p), Want::values)
@@ -146,7 +146,9 @@ void oscillator(const Formulation& f, Broken& broken) {
   if (!f.can().masses || !f.can().load || !f.can().jumps) return;
   ExperimentScene scene =
       star(R"("protocol": {"kind": "creep", "load": "0.05 N", "duration": "0.1 s"})", f);
-  scene.tissue.material.Eprime_Pa = 0.0;
+  TpmParameters element = scene.tissue.element("the suite");
+  element.Eprime_Pa = 0.0;
+  scene.tissue.set_element(element);
   scene.formulation.masses = true;
   scene.formulation.damping_ratio = 0.1;
   scene.formulation.tolerance = 1e-8;
@@ -157,8 +159,7 @@ void oscillator(const Formulation& f, Broken& broken) {
   const double drag = 2.0 * scene.formulation.damping_ratio * lowest.angular_frequency();
   const std::vector<double> times = even_times(scene.protocol, 10);
   const Eigen::VectorXd truth = tpm_test::loaded_oscillator(
-      scene.tissue.material, mass[static_cast<Eigen::Index>(scene.probe().sphere)], drag, 0.05,
-      times);
+      element, mass[static_cast<Eigen::Index>(scene.probe().sphere)], drag, 0.05, times);
   const auto error = [&](double step_s) {
     scene.formulation.step_s = step_s;
     return apart(run_scene(scene, times, false).response, truth);

@@ -27,7 +27,7 @@ class LoopContact final : public Formulation, public LoopMaker {
 LoopModel network_beside_model(const HilSession& session, bool threads) {
   constexpr double kShortest_s = 0.1;
   const PushedScene scene(session);
-  const double tau_s = scene.tissue.material.relaxation_time_s();
+  const double tau_s = scene.tissue.bonds().shortest_relaxation_time_s();
   if (tau_s < kShortest_s) {
     throw bad_input(session.scene_place,
                     fmt::format("has a relaxation time of {} s, too short for the model "

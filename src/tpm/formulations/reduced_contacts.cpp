@@ -61,7 +61,8 @@ LoopModel element_model(const HilSession& session) {
                     "an organ of the kind star for the model 'element'");
   }
   LoopModel loop;
-  loop.model = std::make_unique<ElementContact>(tissue.material, session.servo.period_s);
+  loop.model =
+      std::make_unique<ElementContact>(tissue.element("the element"), session.servo.period_s);
   loop.name = "element: the paper's star, exact exponential update";
   loop.error_bound = "exact for linear motion within a period, to rounding";
   const std::size_t contact = tissue.network.organ.contact.value();

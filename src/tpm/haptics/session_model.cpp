@@ -25,8 +25,9 @@ bool for_sessions(const Formulation& formulation) {
 LoopModel make_loop_model(const HilSession& session, bool threads, const PlanningTold& told) {
   LoopModel loop = model_of(session, threads, told);
   if (!session.law) {
-    loop.relaxation_times_s = {
-        parse_tissue(session.scene, session.scene_place, {}).material.relaxation_time_s()};
+    const BondSystem bonds = parse_tissue(session.scene, session.scene_place, {}).bonds();
+    const std::span<const double> times_s = bonds.relaxation_times_s();
+    loop.relaxation_times_s.assign(times_s.begin(), times_s.end());
   }
   loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
   return loop;

@@ -28,13 +28,15 @@ class Recorder {
 
   /// Takes the state at the next of those times. Throws Interrupted, with a checkpoint of the last
   /// whole part left behind, and Error(numerical) where a load goes through the organ.
-  void see(const QuasiStaticState& state);
+  /// @param contact_push_N of each contact where bodies have mass
+  void see(const QuasiStaticState& state, const Eigen::VectorXd& contact_push_N = {});
 
   /// Ends a part at the state last seen; now and then writes a checkpoint.
   /// @param error_estimate of the part, N or m
   void close_part(double error_estimate);
   /// The same where spheres have mass.
-  void close_part(InertialState motion, const InertialEnergy& energy);
+  void close_part(InertialState motion, const InertialEnergy& energy,
+                  const std::vector<ProbeBlow>& blows);
 
   /// The state at the end of the last part; none before the first.
   [[nodiscard]] const QuasiStaticState* latest() const {
@@ -78,8 +80,7 @@ class Recorder {
 template <class RunPart>
 [[nodiscard]] SimulationRun run_in_parts(const ExperimentScene& scene, const RunNetwork& network,
                                          const SimulationControls& controls, RunPart&& run_part) {
-  constexpr std::size_t kParts = 16;
-  Recorder recorder(scene, network, controls, kParts);
+  Recorder recorder(scene, network, controls, kRunParts);
   SimulationRun result;
   if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
   for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {

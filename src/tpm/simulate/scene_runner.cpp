@@ -70,12 +70,12 @@ Trajectory run_inertial(const ExperimentScene& scene, const RunNetwork& network,
                            masses_kg(scene, network), options);
   Trajectory result;
   const Eigen::Index spheres = network.network.organ.position.cols();
-  const auto see = [&](const QuasiStaticState& state) {
+  const auto see = [&](const QuasiStaticState& state, const Eigen::VectorXd& /*pushes*/) {
     result.displacement.emplace_back(state.position.leftCols(spheres) -
                                      driven.rest.leftCols(spheres));
   };
   const InertialRun run =
-      equations.run(scene.protocol, times_s, with_field ? QuasiStaticObserver(see) : nullptr);
+      equations.run(scene.protocol, times_s, with_field ? InertialObserver(see) : nullptr);
   result.response = run.response;
   const auto& pattern = driven.bonds.pattern();
   const auto bonds = static_cast<double>(driven.bonds.size());

@@ -1,6 +1,7 @@
 #include "tpm/simulate/simulation.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "tpm/core/error.hpp"
 #include "tpm/network/lowest_mode.hpp"
@@ -12,7 +13,10 @@ namespace {
 /// A network with the contacts of a scene; tools in their order.
 DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bonds) {
   const Organ& organ = scene.tissue.network.organ;
-  const double usual = usual_contact_stiffness_N_per_m(bonds);
+  // With mass, contacts ring unless they are much stiffer; a stiffer one costs no more steps there.
+  constexpr double kStifferWithMass = 100.0;
+  const double usual =
+      usual_contact_stiffness_N_per_m(bonds) * (scene.formulation.masses ? kStifferWithMass : 1.0);
   std::vector<Probe> driven;
   std::vector<PressedTool> tools;
   for (const SceneContact& contact : scene.contacts) {
@@ -36,16 +40,15 @@ DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bond
 RunNetwork network_to_run(const ExperimentScene& scene) {
   const Tissue& tissue = scene.tissue;
   if (!scene.formulation.mass_spring) {
-    return {tissue.network, tissue.material, with_contacts(scene, tissue.bonds())};
+    return {tissue.network, with_contacts(scene, tissue.bonds())};
   }
   const Freedom freedom = tissue.freedom();
   const double stiffness = contact_stiffness_N_per_m(tissue.bonds(), tissue.network.organ.position,
                                                      freedom, scene.probe(), 1.0);
   Network msm = msm_network(tissue.network, scene.formulation.springs);
-  const TpmParameters material =
-      msm_material(msm, tissue.material, freedom, scene.probe(), stiffness);
-  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, material));
-  return {std::move(msm), material, std::move(driven)};
+  const BondMaterial springs = msm_material(msm, freedom, scene.probe(), stiffness);
+  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, springs));
+  return {std::move(msm), std::move(driven)};
 }
 
 Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network) {
