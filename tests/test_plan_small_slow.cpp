@@ -220,7 +220,7 @@ TEST_CASE("what a hand can feel is a tolerance") {
   set_tolerance(felt, "jnd");
   CHECK(felt.tolerance == 0.07);
   CHECK(felt.measure.relative_weight > 0.0);
-  PlanTrajectory truth, model;
+  Trajectory truth, model;
   truth.response = Eigen::Vector3d(0.5, 1.0, 0.01);
   model.response = Eigen::Vector3d(0.55, 1.0, 0.01);
   // 10 % of the force there: 5 % of the peak, and above what is felt of stiffness.
@@ -272,10 +272,10 @@ TEST_CASE("a claim names its quantity, and what is not claimed stands beside it"
   CHECK_THAT(plan_text(plan), Contains("nothing is claimed of the contact force: verified error"));
   // The error of the force, found once more: the pick against the nonlinear network at 1e-9.
   const std::vector<double> times{0.3, 0.9, 1.4, 1.6, 2.0, 3.5};
-  const PlanTrajectory answer = run_planned(plan, scene, times);
+  const Trajectory answer = run_planned(plan, scene, times);
   QuasiStaticOptions tight;
   tight.tolerance = 1e-9;
-  const PlanTrajectory truth = PlanScene(scene).quasi_static(tight, times, false);
+  const Trajectory truth = PlanScene(scene).quasi_static(tight, times, false);
   CHECK(trajectory_error(answer, truth, {}) <= 1.05 * *plan.chosen().verified_response_error);
   const test::TempFolder folder;
   write_planned_run(plan, scene, times, answer, folder / "p.h5");

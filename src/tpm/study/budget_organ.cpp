@@ -18,7 +18,7 @@ constexpr double kTighterRun = 0.01;   // of the scene's tolerance: what its run
 constexpr double kInertialRun = 1e-6;  // of a step, of the run with masses
 constexpr int kTimesPerPiece = 160, kMostBudgetTimes = 600;
 
-std::vector<double> response_of(const PlanTrajectory& run) {
+std::vector<double> response_of(const Trajectory& run) {
   return {run.response.begin(), run.response.end()};
 }
 
