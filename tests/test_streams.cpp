@@ -125,6 +125,26 @@ TEST_CASE("Slurm tasks that are submitted again alone run the shards of the firs
                      "' > /dev/null") == 0);
 }
 
+TEST_CASE("a place between those of an axis is told, not taken silently") {
+  const test::TempFolder folder;
+  const std::string file = folder / "s.h5", pictures = folder / "p", told = folder / "told";
+  std::ofstream(folder / "sweep.json") << R"({"title": "t", "model": "single_contact",
+    "indentation": {"kind": "step_hold"}, "outputs": ["peak_force"], "axes": [
+    {"parameter": "depth", "values": ["2 mm", "4 mm"]}, {"parameter": "spacing", "values": ["20 mm", "30 mm"]},
+    {"parameter": "E1", "values": ["6 kPa", "12 kPa"]}]})";
+  REQUIRE(exit_code_of("$TPM sweep '" + std::string(folder / "sweep.json") + "' -o '" + file +
+                       "' > /dev/null 2>&1") == 0);
+  const auto plot = [&](const std::string& at) {
+    return exit_code_of("$TPM sweep plot '" + file + "' -o '" + pictures + "' --at 'depth=" + at +
+                        "' 2> '" + told + "'");
+  };
+  CHECK(plot("4 mm") == 0);
+  CHECK(exit_code_of("grep -q 'between places' '" + told + "'") == 1);
+  CHECK(plot("3.5 mm") == 0);
+  CHECK_THAT(read_file(told),
+             Contains("--at depth: 0.0035 m lies between places of that axis; 0.004 m is taken"));
+}
+
 /// A file whose attribute `text` of the root holds so many texts.
 void write_attribute(const std::string& file, hsize_t count) {
   const hid_t made = H5Fcreate(file.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);

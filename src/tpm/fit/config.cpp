@@ -44,7 +44,7 @@ LawSpec parse_law(const Json& j, const DocumentPlace& place) {
   LawSpec spec = parse_law_name(j.at("name").get<std::string>(), place.key("name").where);
   const std::string drive = j.value("drive", std::string(quantity_name(spec.drive)));
   spec.drive = parse_quantity_name(drive, place.key("drive").where);
-  if (spec.drive == Quantity::relative_length) spec.response = Quantity::stress;
+  if (is_answered_by_stress(spec.drive)) spec.response = Quantity::stress;
   spec.reference = quantity_at(j, "reference", quantity_dimension(spec.drive), place);
   require_valid(spec, place.where);
   return spec;

@@ -140,11 +140,13 @@ Eigen::VectorXd PlanScene::masses_kg() const {
 OperationCount PlanScene::iteration_work() const {
   return OperationCount()
       .add(Operation::lane_bond, static_cast<double>(driven().bonds.size()))
-      .add(Operation::lane_block, blocks_of_solve(driven().bonds.pattern()));
+      .add(Operation::lane_block,
+           blocks_of_solve(moving_graph(driven().bonds, driven().freedom)->pattern));
 }
 
 OperationCount PlanScene::factorisation_work() const {
-  const auto products = static_cast<double>(driven().bonds.pattern().factor_products());
+  const auto graph = moving_graph(driven().bonds, driven().freedom);
+  const auto products = static_cast<double>(graph->pattern.factor_products());
   return OperationCount()
       .add(Operation::bond_stiffness, static_cast<double>(driven().bonds.size()))
       .add(Operation::factor_product, products);
@@ -170,7 +172,8 @@ PlanTrajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
   // Back-solves are those of all lanes, one an iteration; outputs cost an evaluation per kLanes.
   result.work += iteration_work().times(run.work.iterations);
   result.work.add(Operation::solve_block,
-                  blocks_of_solve(driven().bonds.pattern()) * run.work.factorisations);
+                  blocks_of_solve(moving_graph(driven().bonds, driven().freedom)->pattern) *
+                      run.work.factorisations);
   result.work += factorisation_work().times(run.work.factorisations);
   result.steps = run.work.steps;
   return result;

@@ -33,15 +33,14 @@ void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hd
   file.attribute("/", "scene_sha256", sha256_hex(scene.text));
   file.attribute("/", "formulation", std::string(word_of(f.kind)));
   file.attribute("/", "network", f.mass_spring ? "mass_spring" : "tissue");
-  file.attribute("/", "tolerance", shortest(f.tolerance));
   file.attribute("/", "provenance", "model");
+  file.numbers("/settings/tolerance", {f.tolerance});
   if (f.inertial()) {
-    file.attribute("/", "damping_ratio", shortest(f.damping_ratio));
+    file.numbers("/settings/damping_ratio", {f.damping_ratio});
     if (tool_count(scene) > 0) {
-      file.attribute("/", "contact_damping_ratio",
-                     shortest(InertialOptions{}.contact_damping_ratio));
+      file.numbers("/settings/contact_damping_ratio", {InertialOptions{}.contact_damping_ratio});
     }
-    file.attribute("/", "lowest_frequency_Hz", significant(run.lowest_frequency_Hz, 6));
+    file.numbers("/settings/lowest_frequency_Hz", {run.lowest_frequency_Hz});
   }
   file.numbers("/probe/sphere", {static_cast<double>(scene.probe().sphere + 1)});
   file.numbers("/probe/direction", list_of(scene.probe().direction));
