@@ -58,7 +58,8 @@ TEST_CASE("A device of a plugin goes through a session") {
     from_m = end_m;
     most_N = std::max(most_N, row.commanded_N[2]);
   }
-  CHECK(most_N > 0.5);
+  CHECK(most_N > 0.4);
+  CHECK(run.rendering.friction_N_s_per_m == 0.1);  // what the plugin says, not a simulated Omega.7
   CHECK(worst_m < 1e-12);
 }
 
