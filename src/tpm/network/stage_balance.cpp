@@ -429,16 +429,16 @@ QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double 
   const double half = 0.5 * (until - from);
   std::array<double, kLanes> fractions{};
   LaneVector weight;
+  const auto put = [&](std::size_t lane, double abscissa, double share) {
+    fractions[lane] = from + half * (1.0 + abscissa);
+    weight[static_cast<Eigen::Index>(lane)] = half * h * share;
+  };
   const auto add = [&] {
     const Within states = within(state, fractions, h, rate);
     response_integral += rate * weight.dot(responses(states));
     const LaneVector heat =
         (states.elongation - states.memory).cwiseAbs2() * relaxing;  // times the relaxation time
     energy.dissipated_J += weight.dot(heat) / tissue_.bonds().relaxation_time_s();
-  };
-  const auto put = [&](std::size_t lane, double abscissa, double share) {
-    fractions[lane] = from + half * (1.0 + abscissa);
-    weight[static_cast<Eigen::Index>(lane)] = half * h * share;
   };
   if (until - from > kLongPart) {
     for (const double side : {-1.0, 1.0}) {
