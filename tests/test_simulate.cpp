@@ -44,7 +44,7 @@ void check_same(const SimulationRecord& a, const SimulationRecord& b) {
   REQUIRE(a.outputs.size() == b.outputs.size());
   for (std::size_t i = 0; i < a.outputs.size(); ++i) {
     CHECK(a.outputs[i].position == b.outputs[i].position);
-    CHECK(a.outputs[i].remembered == b.outputs[i].remembered);
+    CHECK(a.outputs[i].viscous == b.outputs[i].viscous);
   }
   CHECK(a.error_estimate == b.error_estimate);
   CHECK(a.validity.deepest_m == b.validity.deepest_m);

@@ -131,7 +131,10 @@ struct FitConfig {
                                                    std::span<const double> natural,
                                                    std::size_t choice);
 
-/// The same as parameters of the paper's element; not for a law of the family.
+/// False for a law of the family and for an organ of a material of its own.
+[[nodiscard]] bool has_element(const FitConfig& config);
+
+/// The same as parameters of the paper's element. Throws Error(bad_input) unless has_element().
 [[nodiscard]] TpmParameters element_parameters(const FitConfig& config,
                                                std::span<const double> natural, std::size_t choice);
 

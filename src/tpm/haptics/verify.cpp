@@ -645,7 +645,7 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
   ask(v, "the second opinion by CVODE",
       [&] { ask_cvode(v, recording, driven, protocol, options); });
   if (recording.session.model == LoopModelKind::element) {
-    ask_others(v, recording, motion, protocol, rows, tissue.material, options);
+    ask_others(v, recording, motion, protocol, rows, tissue.element("hil verify"), options);
   }
   v.motion_error_N = options.motion_tolerance_m *
                      recording.header.at("model").at("stiffness_at_once_N_per_m").get<double>();

@@ -19,7 +19,7 @@ namespace {
 constexpr double kStepShare = 0.1;   // of the tolerance, for one step
 constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
 constexpr double kLeastMove = 1e-9;  // of a jump
-constexpr double kFirstStep = 3.0;   // after a change of rate, in relaxation times
+constexpr double kFirstStep = 3.0;   // after a change of rate, in the shortest relaxation times
 constexpr double kSafety = 0.8;
 constexpr int kUnlimited = std::numeric_limits<int>::max();
 constexpr double kMostGrowth = 30.0;           // from one step to the next
@@ -91,7 +91,7 @@ class Run {
     result_.solver = tissue_.equilibrium().choice();
     if (options_.energies) result_.energy = energy_of(state_, energy_);
     result_.position = state_.position;
-    result_.remembered = state_.remembered;
+    result_.viscous = state_.viscous;
     return std::move(result_);
   }
 
@@ -128,8 +128,9 @@ class Run {
     set_scales(begin.time_s);
     stages_.see(begin.response);
     state_.position = begin.position;
-    state_.remembered = begin.remembered;
-    tissue_.bonds().elongations(state_.position, state_.elongation);
+    state_.viscous = begin.viscous;
+    state_.mean = tissue_.bonds().mean_viscous(begin.viscous);
+    tissue_.bonds().followed(state_.position, state_.followed);
     state_.imposed = begin.imposed;
     if (begin.energy) energy_ = *begin.energy;
     follow(begin.imposed, false);
@@ -138,13 +139,13 @@ class Run {
   void jump(double value) { move_to(value, false); }
 
   [[nodiscard]] double stored_J() const {
-    return tissue_.bonds().stored_energy_J(state_.position, state_.remembered);
+    return tissue_.bonds().stored_energy_J(state_.position, state_.viscous);
   }
 
   /// The account of the energy where the tissue is in a state.
   [[nodiscard]] QuasiStaticEnergy energy_of(const TissueState& state,
                                             QuasiStaticEnergy spent) const {
-    spent.stored_J = tissue_.bonds().stored_energy_J(state.position, state.remembered);
+    spent.stored_J = tissue_.bonds().stored_energy_J(state.position, state.viscous);
     return spent;
   }
 
@@ -196,8 +197,8 @@ class Run {
     const double length = to.time_s - from.time_s;
     const double rate = (to.value - from.value) / length;
     StepGrowth growth(options_.stages + 1);
-    double h = std::min(length,
-                        options_.step_s.value_or(kFirstStep * tissue_.bonds().relaxation_time_s()));
+    double h = std::min(length, options_.step_s.value_or(
+                                    kFirstStep * tissue_.bonds().shortest_relaxation_time_s()));
     if (rate == 0.0 && from.value == 0.0 && is_relaxed()) return stand_still(to.time_s);
     while (state_.time_s < to.time_s) {
       const double left = to.time_s - state_.time_s;
@@ -269,7 +270,7 @@ class Run {
     throw failed(state_.imposed, "contacts with a tool open and close without end");
   }
 
-  [[nodiscard]] bool is_relaxed() const { return state_.remembered.isZero(0.0); }
+  [[nodiscard]] bool is_relaxed() const { return state_.viscous.isZero(0.0); }
 
   void stand_still(double until_s) {
     while (next_ < order_.size() && times_s_[order_[next_]] < until_s) {
@@ -365,8 +366,8 @@ class Run {
     const double time_s = times_s_[order_[next_]];
     put(response);
     if (!observer_) return;
-    QuasiStaticState shown{time_s,         state.imposed,    response,
-                           state.position, state.remembered, std::nullopt};
+    QuasiStaticState shown{time_s,         state.imposed, response,
+                           state.position, state.viscous, std::nullopt};
     if (options_.energies) shown.energy = energy_of(state, spent);
     observer_(shown);
   }
@@ -395,10 +396,14 @@ class Run {
 
 void require_same_network(const QuasiStaticState& from, const BondSystem& bonds) {
   const auto spheres = static_cast<std::size_t>(from.position.cols());
-  const auto remembered = static_cast<std::size_t>(from.remembered.size());
-  if (spheres == bonds.spheres() && remembered == bonds.size()) return;
-  throw bad_input("state", fmt::format("{} spheres and {} bonds", spheres, remembered),
-                  fmt::format("{} and {}, as the network has", bonds.spheres(), bonds.size()));
+  const auto rows = static_cast<std::size_t>(from.viscous.rows());
+  const bool same_branches = from.viscous.cols() == bonds.most_branches();
+  if (spheres == bonds.spheres() && rows == bonds.size() && same_branches) return;
+  throw bad_input(
+      "state",
+      fmt::format("{} spheres and {} bonds of {} branches", spheres, rows, from.viscous.cols()),
+      fmt::format("{}, {} and {}, as the network has", bonds.spheres(), bonds.size(),
+                  bonds.most_branches()));
 }
 
 void require_later(std::span<const double> times_s, double from_s) {

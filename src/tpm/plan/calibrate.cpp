@@ -110,7 +110,7 @@ class Bench {
       all.push_back({b, bonds_.end_a()[b], bonds_.end_b()[b]});
     }
     ServoBonds servo(bonds_, rest(), all, static_cast<std::uint32_t>(spheres), true);
-    const ServoWeights weights = servo_weights(kPeriodOverTau);
+    const ServoWeights weights = servo_weights(bonds_, kPeriodOverTau * bonds_.relaxation_time_s());
     const std::vector<float> displacement(4 * (spheres + 1), 1e-4F);
     std::vector<float> force(8 * (spheres + 1), 0.0F);
     return time_of([&] {
