@@ -89,7 +89,7 @@ EquilibriumSearch Equilibrium::find_directly(Positions& position, const BondMemo
   int kept = 0;
   const auto solve = [&](const Positions& at, const BondMemory& with, Eigen::Matrix3Xd& forces) {
     const double residual_N = forces.colwise().norm().maxCoeff();
-    const bool serves = residual_N <= kServes * last_residual_N;
+    const bool serves = factorised_at.size() > 0 && residual_N <= kServes * last_residual_N;
     last_residual_N = residual_N;
     if (serves) {
       ++kept;
