@@ -30,7 +30,7 @@ int run(const std::string& file, double hours, const std::filesystem::path& fold
   session.servo.model_push = loop.push;
   session.servo.to_model = loop.to_model;
   const double tau_s =
-      parse_tissue(session.scene, session.scene_place, {}).material.relaxation_time_s();
+      parse_tissue(session.scene, session.scene_place, {}).bonds().relaxation_time_s();
   const double period_s = session.servo.period_s;
   const auto cycles = [period_s](double seconds) {
     return static_cast<std::uint64_t>(std::llround(seconds / period_s));

@@ -39,7 +39,7 @@ Inertia inertia_of(const BondSystem& bonds, const Eigen::VectorXd& mass, const L
                   options.contact_damping_ratio};
   const double beta = 2.0 * options.damping_ratio * options.stiffness_share / omega;
   if (beta > 0.0) {
-    inertia.dashpot_N_s_m = beta * (bonds.stiffness() - lowest.following * bonds.relaxing());
+    inertia.dashpot_N_s_m = beta * bonds.stiffness_when(lowest.following);
     inertia.dashpot_N_s_m.tail(static_cast<Eigen::Index>(bonds.contact_count())).setZero();
   }
   return inertia;
@@ -109,7 +109,7 @@ class MotionRun {
                       fmt::format("{}, as the network has", equation_.size()));
     }
     integration_.emplace(equation_, options,
-                         from ? from->motion : equation_.pack(start.position, start.remembered),
+                         from ? from->motion : equation_.pack(start.position, start.viscous),
                          step_error(depth, omega), energy_error(response_scale),
                          from ? from->spent_J : Eigen::Vector4d::Zero());
     if (from) go_on_from(*from);
@@ -149,7 +149,7 @@ class MotionRun {
         QuasiStatic(bonds, rest, freedom, probes, {std::min(options_.tolerance, 1e-6), 5})
             .run(held, std::span(&forever, 1));
     state.position = run.position;
-    state.remembered = run.remembered;
+    state.viscous = run.viscous;
   }
 
   [[nodiscard]] Eigen::VectorXd step_error(double depth, double omega) const {
@@ -225,7 +225,7 @@ class MotionRun {
 
   void show(double time_s, double response) {
     const TissueMotion& now = equation_.unpack(time_s, integration_->state());
-    observer_({time_s, value_at(protocol_, time_s), response, now.position, now.remembered, {}},
+    observer_({time_s, value_at(protocol_, time_s), response, now.position, now.viscous, {}},
               equation_.contact_pushes_N(time_s, integration_->state()));
   }
 
@@ -245,7 +245,7 @@ class MotionRun {
     const TissueMotion& last = equation_.unpack(end, integration_->state());
     result_.position = last.position;
     result_.velocity = last.velocity;
-    result_.remembered = last.remembered;
+    result_.viscous = last.viscous;
     result_.end = {end, integration_->state(),
                    options_.energy ? integration_->spent_J() : Eigen::Vector4d::Zero(), blow_work_,
                    stored_at_start_};

@@ -69,7 +69,7 @@ struct ProbeBlow {
 /// Where a run stands; another run can go on from there.
 struct InertialState {
   double time_s = 0.0;
-  Eigen::VectorXd motion;  ///< the integrator's: displacements, velocities, what bonds remember
+  Eigen::VectorXd motion;  ///< the integrator's: displacements, velocities, viscous elongations
   /// Work, heat of bonds, of damping and of contacts.
   Eigen::Vector4d spent_J = Eigen::Vector4d::Zero();
   double blow_work_J = 0.0;
@@ -92,17 +92,17 @@ struct InertialRun {
   std::vector<ProbeBlow> blows;
   InertialWork work;
   std::optional<InertialEnergy> energy;
-  Positions position;          ///< where the run ended
-  Eigen::Matrix3Xd velocity;   ///< there, m/s
-  Eigen::VectorXd remembered;  ///< y of each bond there, m; 0 where nothing relaxes
+  Positions position;         ///< where the run ended
+  Eigen::Matrix3Xd velocity;  ///< there, m/s
+  Eigen::MatrixXd viscous;    ///< m_j by (bond, branch) there, m; 0 where nothing relaxes
   InertialState end;
 };
 
 /// The inertial network (docs/inertial.md): spheres with mass, joined by bonds
-/// with memory, damped:
+/// with viscous elongations m_j (BondSystem), damped:
 ///
 ///     dx/dt = v,   m dv/dt = f(x, y) - alpha m v - beta sum of k_w (dl/dt) along the bond,
-///     dy/dt = (l(x) - y)/tau
+///     dm_j/dt = (V(l(x)) - m_j)/tau_j,   y = sum_j gamma_j m_j
 ///
 /// with alpha = 2 zeta omega (1 - s), 0 for tools, beta = 2 zeta s/omega, zeta the damping ratio, s
 /// the stiffness share, omega that of lowest_mode() and k_w the bond's storage stiffness there. A
@@ -125,7 +125,8 @@ class Inertial {
   /// @param times_s any order, finite, within the protocol; at a jump the value just after it
   /// Throws Error(bad_input) for times outside it and for a jump of depth, which would need an
   /// infinite force; Error(numerical) where CVODES gives up, with the time.
-  /// @param observer if any, sees positions, memory and contacts at each asked time in turn
+  /// @param observer if any, sees positions, viscous elongations and contacts at each asked time in
+  /// turn
   /// @param from if any, where to go on in the protocol instead of beginning at rest: the end of a
   ///        run of the same network and options. No time before it can be asked for; the account of
   ///        the energy and `stored_at_start_J` go on, the blows and the work counted do not.

@@ -11,6 +11,20 @@ namespace {
 using Spheres = Eigen::Map<Eigen::Matrix3Xd>;
 using ConstSpheres = Eigen::Map<const Eigen::Matrix3Xd>;
 
+/// The share of the viscous elongations of each law that follows in an implicit step of size gamma.
+Following following_over(const BondSystem& bonds, double gamma) {
+  std::vector<double> of_law;
+  for (const ViscousLaw& law : bonds.laws()) {
+    double share = 0.0;
+    for (const ViscousLaw::Branch& branch : law.branches) {
+      const double ratio = gamma / branch.relaxation_time_s;
+      share += branch.share * ratio / (1.0 + ratio);
+    }
+    of_law.push_back(share);
+  }
+  return Following(std::move(of_law));
+}
+
 constexpr double kTouching_m = 1e-14;  // a gap that is none: above the rounding of positions
 
 /// c of each contact.
@@ -40,13 +54,16 @@ InertialEquation::InertialEquation(const DrivenTissue& tissue, const Positions& 
       matrix_(tissue.bonds().pattern()),
       factor_(tissue.bonds().pattern()) {
   const BondSystem& bonds = tissue.bonds();
+  size_ = 2 * coordinates();
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const bool relaxes = bonds.relaxing()[static_cast<Eigen::Index>(i)] > 0.0;
-    memory_of_.push_back(relaxes ? 2 * coordinates() + static_cast<Eigen::Index>(relaxing_.size())
-                                 : -1);
-    if (relaxes) relaxing_.push_back(i);
+    viscous_of_.push_back(relaxes ? size_ : -1);
+    if (!relaxes) continue;
+    relaxing_.push_back(i);
+    size_ += static_cast<Eigen::Index>(branches_of(i).size());
   }
-  motion_.remembered.setZero(static_cast<Eigen::Index>(bonds.size()));
+  motion_.viscous.setZero(static_cast<Eigen::Index>(bonds.size()), bonds.most_branches());
+  motion_.mean.setZero(static_cast<Eigen::Index>(bonds.size()));
   drag_per_s_ = Vector::Constant(rest_.cols(), inertia_.drag_per_s);
   tissue_mass_kg_ = inertia_.mass_kg;
   for (const ToolContact& contact : bonds.contacts()) {
@@ -56,7 +73,7 @@ InertialEquation::InertialEquation(const DrivenTissue& tissue, const Positions& 
 }
 
 Eigen::Index InertialEquation::size() const {
-  return 2 * coordinates() + static_cast<Eigen::Index>(relaxing_.size());
+  return size_;
 }
 
 double InertialEquation::driven_mass_kg() const {
@@ -81,13 +98,15 @@ double InertialEquation::imposed_speed() const {
 }
 
 InertialEquation::Vector InertialEquation::pack(const Positions& position,
-                                                const Vector& remembered) const {
+                                                const Eigen::MatrixXd& viscous) const {
   Vector state = Vector::Zero(size());
   Spheres displacement(state.data(), 3, rest_.cols());
   displacement = position - rest_;
   tissue_.freedom().project(displacement);
   for (const std::size_t bond : relaxing_) {
-    state[memory_of_[bond]] = remembered[static_cast<Eigen::Index>(bond)];
+    const auto count = static_cast<Eigen::Index>(branches_of(bond).size());
+    state.segment(viscous_of_[bond], count) =
+        viscous.row(static_cast<Eigen::Index>(bond)).head(count).transpose();
   }
   return state;
 }
@@ -99,7 +118,14 @@ const TissueMotion& InertialEquation::unpack(double time_s, const ConstVector& s
   tissue_.impose(motion_.position, imposed(time_s));
   tissue_.add_imposed_velocity(imposed_speed(), motion_.velocity);
   for (const std::size_t bond : relaxing_) {
-    motion_.remembered[static_cast<Eigen::Index>(bond)] = state[memory_of_[bond]];
+    const auto row = static_cast<Eigen::Index>(bond);
+    Eigen::Index j = 0;
+    double mean = 0.0;
+    for (const ViscousLaw::Branch& branch : branches_of(bond)) {
+      motion_.viscous(row, j) = state[viscous_of_[bond] + j];
+      mean += branch.share * motion_.viscous(row, j++);
+    }
+    motion_.mean[row] = mean;
   }
   return motion_;
 }
@@ -189,7 +215,7 @@ void InertialEquation::add_dashpot_forces(const Positions& position,
 void InertialEquation::forces(double time_s, Eigen::Matrix3Xd& force) {
   find_pressing();
   tissue_.load(imposed(time_s), force);
-  tissue_.bonds().add_forces(motion_.position, {motion_.remembered, 0.0, pressing_}, force);
+  tissue_.bonds().add_forces(motion_.position, {motion_.mean, 0.0, pressing_}, force);
   add_dashpot_forces(motion_.position, motion_.velocity, force);
   add_contact_dashpot_forces(motion_.position, motion_.velocity, pressing_, force);
 }
@@ -203,11 +229,13 @@ void InertialEquation::rate(double time_s, const ConstVector& state, Eigen::Ref<
   acceleration -= now.velocity * drag_per_s_.asDiagonal();
   tissue_.freedom().project(acceleration);
   rate.head(coordinates()) = state.segment(coordinates(), coordinates());
-  tissue_.bonds().elongations(now.position, elongation_);
+  tissue_.bonds().followed(now.position, followed_);
   for (const std::size_t bond : relaxing_) {
-    const Eigen::Index y = memory_of_[bond];
-    rate[y] = (elongation_[static_cast<Eigen::Index>(bond)] - state[y]) /
-              tissue_.bonds().relaxation_time_s();
+    Eigen::Index m = viscous_of_[bond];
+    for (const ViscousLaw::Branch& branch : branches_of(bond)) {
+      rate[m] = (followed_[static_cast<Eigen::Index>(bond)] - state[m]) / branch.relaxation_time_s;
+      ++m;
+    }
   }
 }
 
@@ -300,8 +328,8 @@ Eigen::Vector4d InertialEquation::powers_W(double time_s, const ConstVector& sta
             ? contact_dashpot_N_s_m_[static_cast<Eigen::Index>(i)] * lies.rate_m_s * lies.rate_m_s
             : -tissue_.bonds().contacts()[i].stiffness_N_per_m * lies.now_m * lies.rate_m_s;
   }
-  return {push * speed, tissue_.bonds().dissipation_W(now.position, now.remembered),
-          dashpots + drag, contacts};
+  return {push * speed, tissue_.bonds().dissipation_W(now.position, now.viscous), dashpots + drag,
+          contacts};
 }
 
 double InertialEquation::kinetic_J(double time_s, const ConstVector& state) {
@@ -311,23 +339,23 @@ double InertialEquation::kinetic_J(double time_s, const ConstVector& state) {
 
 double InertialEquation::stored_J(double time_s, const ConstVector& state) {
   const TissueMotion& now = unpack(time_s, state);
-  return tissue_.bonds().stored_energy_J(now.position, now.remembered);
+  return tissue_.bonds().stored_energy_J(now.position, now.viscous);
 }
 
 bool InertialEquation::factorise(double time_s, const ConstVector& state, double gamma) {
   const BondSystem& bonds = tissue_.bonds();
   const TissueMotion& now = unpack(time_s, state);
-  const double ratio = gamma / bonds.relaxation_time_s();
   gamma_ = gamma;
   factorised_at_ = now.position;
-  memory_.following = ratio / (1.0 + ratio);
-  bonds.elongations(now.position, elongation_);
-  memory_.offset = now.remembered - memory_.following * elongation_;
+  bonds.kernel_slopes(now.position, kernel_slope_);
+  bonds.followed(now.position, followed_);
   find_pressing();
   factorised_pressing_ = pressing_;
-  memory_.closed = factorised_pressing_;
   matrix_.set_zero();
-  bonds.add_stiffness(now.position, memory_, matrix_);
+  bonds.add_stiffness(
+      now.position,
+      bonds.memory_at(now.mean, followed_, following_over(bonds, gamma), factorised_pressing_),
+      matrix_);
   for (Eigen::Matrix3d& block : matrix_.diagonal) block *= gamma * gamma;
   for (Eigen::Matrix3d& block : matrix_.below) block *= gamma * gamma;
   const bool bonds_damped = inertia_.dashpot_N_s_m.size() > 0;
@@ -351,13 +379,13 @@ bool InertialEquation::factorise(double time_s, const ConstVector& state, double
 }
 
 void InertialEquation::solve(Eigen::Ref<Vector> x) {
-  // (1 - gamma J)(du, dv, dy) = (ru, rv, ry):
-  //   du = ru + gamma dv,   dy = (ry + gamma/tau B du)/(1 + gamma/tau),
+  // (1 - gamma J)(du, dv, dm_j) = (ru, rv, r_j), V' the slope of the kernel, B that of l by u:
+  //   du = ru + gamma dv,   dm_j = (r_j + gamma/tau_j V' B du)/(1 + gamma/tau_j),
   //   [M (1 + gamma alpha) + gamma C + gamma^2 K] du
-  //     = [M (1 + gamma alpha) + gamma C] ru + gamma M rv + gamma^2 B' g ry/(1 + gamma/tau).
+  //     = [M (1 + gamma alpha) + gamma C] ru + gamma M rv
+  //       + gamma^2 B' g sum_j gamma_j r_j/(1 + gamma/tau_j).
   const BondSystem& bonds = tissue_.bonds();
   const Eigen::Index n = rest_.cols();
-  const double ratio = gamma_ / bonds.relaxation_time_s();
   Spheres u(x.data(), 3, n);
   Spheres v(x.data() + coordinates(), 3, n);
   force_.setZero(3, n);
@@ -368,8 +396,12 @@ void InertialEquation::solve(Eigen::Ref<Vector> x) {
   for (const std::size_t bond : relaxing_) {
     const std::uint32_t a = bonds.end_a()[bond];
     const std::uint32_t b = bonds.end_b()[bond];
-    const double pull = gamma_ * gamma_ * bonds.relaxing()[static_cast<Eigen::Index>(bond)] *
-                        x[memory_of_[bond]] / (1.0 + ratio);
+    double known = 0.0;
+    Eigen::Index m = viscous_of_[bond];
+    for (const ViscousLaw::Branch& branch : branches_of(bond)) {
+      known += branch.share * x[m++] / (1.0 + gamma_ / branch.relaxation_time_s);
+    }
+    const double pull = gamma_ * gamma_ * bonds.relaxing()[static_cast<Eigen::Index>(bond)] * known;
     const Eigen::Vector3d f = pull * (factorised_at_.col(b) - factorised_at_.col(a)).normalized();
     right.col(a) -= f;
     right.col(b) += f;
@@ -379,10 +411,16 @@ void InertialEquation::solve(Eigen::Ref<Vector> x) {
   tissue_.freedom().project(right);
   v = (right - u) / gamma_;
   u = right;
-  bonds.elongation_changes(factorised_at_, right, elongation_);
+  bonds.elongation_changes(factorised_at_, right, followed_);
   for (const std::size_t bond : relaxing_) {
-    double& y = x[memory_of_[bond]];
-    y = (y + ratio * elongation_[static_cast<Eigen::Index>(bond)]) / (1.0 + ratio);
+    const auto row = static_cast<Eigen::Index>(bond);
+    const double change = kernel_slope_[row] * followed_[row];
+    Eigen::Index m = viscous_of_[bond];
+    for (const ViscousLaw::Branch& branch : branches_of(bond)) {
+      const double ratio = gamma_ / branch.relaxation_time_s;
+      x[m] = (x[m] + ratio * change) / (1.0 + ratio);
+      ++m;
+    }
   }
 }
 

@@ -29,12 +29,14 @@ struct ToolImpact {
 struct TissueMotion {
   Positions position;
   Eigen::Matrix3Xd velocity;
-  Eigen::VectorXd remembered;
+  Eigen::MatrixXd viscous;  ///< m_j by (bond, branch)
+  Eigen::VectorXd mean;     ///< y of each bond
 };
 
 /// The equations of motion of a driven network as a system of first order. The state vector holds
 /// the displacements from rest along free directions (3 a sphere), their velocities (3 a sphere)
-/// and y of each bond that relaxes; what is not free or imposed stays 0 in it.
+/// and the viscous elongations m_j of each bond that relaxes, branch by branch; what is not free or
+/// imposed stays 0 in it.
 class InertialEquation {
  public:
   using Vector = Eigen::VectorXd;
@@ -57,7 +59,7 @@ class InertialEquation {
   /// Rate of an imposed depth, m/s; 0 under a load.
   [[nodiscard]] double imposed_speed() const;
 
-  [[nodiscard]] Vector pack(const Positions& position, const Vector& remembered) const;
+  [[nodiscard]] Vector pack(const Positions& position, const Eigen::MatrixXd& viscous) const;
   [[nodiscard]] const TissueMotion& unpack(double time_s, const ConstVector& state);
 
   void rate(double time_s, const ConstVector& state, Eigen::Ref<Vector> rate);
@@ -84,10 +86,10 @@ class InertialEquation {
   /// The inelastic impact of all that touches (inelastic_impact): changes velocities of the state.
   [[nodiscard]] ToolImpact strike(double time_s, Eigen::Ref<Vector> state);
 
-  /// Factorises 1 - gamma times the Jacobian with the velocities and y eliminated: on the free
-  /// coordinates M (1 + gamma alpha) + gamma C + gamma^2 K, where K follows with a share
-  /// (gamma/tau)/(1 + gamma/tau) of y. The turning of the bonds' dashpots is left out of it (it is
-  /// not symmetric, and small like the velocities). False if it cannot be factorised.
+  /// Factorises 1 - gamma times the Jacobian with the velocities and m_j eliminated: on the free
+  /// coordinates M (1 + gamma alpha) + gamma C + gamma^2 K, where of y a share sum_j gamma_j
+  /// (gamma/tau_j)/(1 + gamma/tau_j) follows in K. The turning of the bonds' dashpots is left out
+  /// of it (it is not symmetric, and small like the velocities). False if it cannot be factorised.
   [[nodiscard]] bool factorise(double time_s, const ConstVector& state, double gamma);
   /// Replaces a right-hand side by the solution, with the last factorisation.
   void solve(Eigen::Ref<Vector> x);
@@ -120,18 +122,23 @@ class InertialEquation {
   const DrivenTissue& tissue_;
   Positions rest_;
   Inertia inertia_;
-  std::vector<Eigen::Index> memory_of_;  ///< of each bond: its y in the state, or -1
-  std::vector<std::size_t> relaxing_;    ///< bond of each y
-  Vector tissue_mass_kg_;                ///< mass, 0 of tools
-  Vector drag_per_s_;                    ///< of each column
-  Vector contact_dashpot_N_s_m_;         ///< of each contact
+  /// The branches of a bond, whose m_j follow each other in the state.
+  [[nodiscard]] const std::vector<ViscousLaw::Branch>& branches_of(std::size_t bond) const {
+    return tissue_.bonds().laws()[tissue_.bonds().law_of(bond)].branches;
+  }
+
+  std::vector<Eigen::Index> viscous_of_;  ///< of each bond: its first m_j in the state, or -1
+  std::vector<std::size_t> relaxing_;     ///< bonds that relax
+  Eigen::Index size_ = 0;
+  Vector tissue_mass_kg_;         ///< mass, 0 of tools
+  Vector drag_per_s_;             ///< of each column
+  Vector contact_dashpot_N_s_m_;  ///< of each contact
   Knot from_{0.0, 0.0};
   double slope_ = 0.0;
 
   TissueMotion motion_;
   Eigen::Matrix3Xd force_;
-  Vector elongation_;
-  BondMemory memory_;
+  Vector followed_;
   std::vector<char> pressing_;  ///< contacts, as BondMemory::closed
 
   // Newton's matrix.
@@ -139,6 +146,7 @@ class InertialEquation {
   BlockLdlt factor_;
   double gamma_ = 0.0;
   Positions factorised_at_;
+  Vector kernel_slope_;  ///< V'(l) of each bond there
   std::vector<char> factorised_pressing_;
 };
 

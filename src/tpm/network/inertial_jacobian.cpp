@@ -49,12 +49,16 @@ void InertialEquation::add_bond_entries(Triplets& entries, std::size_t bond,
       add_block(entries, v, coordinates() + u_there, p * damping);
       add_block(entries, v, v, -(p * damping));
     }
-    const Eigen::Index y = memory_of_[bond];
-    if (y < 0) return;
+    Eigen::Index m = viscous_of_[bond];
+    if (m < 0) return;
     const Eigen::Vector3d pull = sign * bonds.relaxing()[row] * (p * n);
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      entries.emplace_back(v + i, y, -pull[i]);
-      entries.emplace_back(y, u + i, -sign * n[i] / bonds.relaxation_time_s());
+    for (const ViscousLaw::Branch& branch : branches_of(bond)) {
+      for (Eigen::Index i = 0; i < 3; ++i) {
+        entries.emplace_back(v + i, m, -branch.share * pull[i]);
+        entries.emplace_back(m, u + i,
+                             -sign * kernel_slope_[row] * n[i] / branch.relaxation_time_s);
+      }
+      ++m;
     }
   };
   end(a, b, 1.0);
@@ -66,7 +70,8 @@ InertialEquation::Sparse InertialEquation::jacobian(double time_s, const ConstVe
   const TissueMotion& now = unpack(time_s, state);
   BlockMatrix stiffness(bonds.pattern());
   find_pressing();
-  bonds.add_stiffness(now.position, {now.remembered, 0.0, pressing_}, stiffness);
+  bonds.add_stiffness(now.position, {now.mean, 0.0, pressing_}, stiffness);
+  bonds.kernel_slopes(now.position, kernel_slope_);
   Triplets entries;
   for (Eigen::Index i = 0; i < coordinates(); ++i) {
     entries.emplace_back(i, i, 0.0);
@@ -81,8 +86,12 @@ InertialEquation::Sparse InertialEquation::jacobian(double time_s, const ConstVe
   }
   for (std::size_t bond = 0; bond < bonds.size(); ++bond) {
     add_bond_entries(entries, bond, stiffness);
-    const Eigen::Index y = memory_of_[bond];
-    if (y >= 0) entries.emplace_back(y, y, -1.0 / bonds.relaxation_time_s());
+    Eigen::Index m = viscous_of_[bond];
+    if (m < 0) continue;
+    for (const ViscousLaw::Branch& branch : branches_of(bond)) {
+      entries.emplace_back(m, m, -1.0 / branch.relaxation_time_s);
+      ++m;
+    }
   }
   Sparse matrix(size(), size());
   matrix.setFromTriplets(entries.begin(), entries.end());

@@ -28,12 +28,12 @@ struct SeenMode {
 class Lanczos {
  public:
   Lanczos(const PlanScene& scene, const TissueState& rest, const Freedom& freedom,
-          const Eigen::VectorXd& mass_kg, double following)
+          const Eigen::VectorXd& mass_kg, const Following& following)
       : bonds_(scene.driven().bonds),
         rest_(rest),
         freedom_(freedom),
         root_(mass_kg.cwiseSqrt().transpose().replicate(3, 1).reshaped()),
-        memory_{rest.remembered, following, rest.closed} {}
+        memory_{rest.mean, following, rest.closed} {}
 
   /// @param field displacements, m
   [[nodiscard]] std::vector<SeenMode> modes(Eigen::Matrix3Xd field) const {
@@ -197,7 +197,7 @@ InertiaEstimate estimate_inertia(const PlanScene& scene) {
   DrivenTissue tissue(driven.bonds, driven.rest, driven.freedom, driven.probes,
                       scene.protocol().drive());
   const TissueState rest = tissue.at_rest(0.0);
-  const BondMemory memory{rest.remembered, lowest.following, rest.closed};
+  const BondMemory memory{rest.mean, lowest.following, rest.closed};
   if (!tissue.equilibrium().factorise(rest.position, memory)) {
     throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");
   }

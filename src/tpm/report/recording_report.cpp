@@ -6,8 +6,10 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpm/law/law_file.hpp"
 #include "tpm/report/draw.hpp"
+#include "tpm/report/fit_csv.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -21,7 +23,7 @@ struct Units {
 };
 
 Units units_of(const RecordingFit& r) {
-  const bool stretch = r.drive_quantity == Quantity::relative_length;
+  const bool stretch = is_answered_by_stress(r.drive_quantity);
   return {shown_unit(stretch ? Dimension::dimensionless : Dimension::length),
           shown_unit(stretch ? Dimension::stress : Dimension::force)};
 }
@@ -207,34 +209,6 @@ Figure waterfall_figure(const FitResult& fit) {
   return figure;
 }
 
-LawFile fitted_law(const FitResult& fit) {
-  LawFile law;
-  law.spec = fit.config.law.value();
-  law.values = model_parameters(fit.config, fit.best.natural, 0);
-  law.provenance = Provenance::derived;
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  const auto place_of = [&](std::string_view name) {
-    const auto found = std::find_if(parameters.begin(), parameters.end(),
-                                    [&](const LawParameter& p) { return p.name == name; });
-    return static_cast<std::size_t>(found - parameters.begin());
-  };
-  for (const RecordingFit& recording : fit.recordings) {
-    const double contact =
-        model_parameters(fit.config, fit.best.natural, recording.choice)[place_of("contact")];
-    for (std::size_t i = 0; i < recording.drive.size(); ++i) {
-      if (!recording.fitted[i] || recording.drive[i] <= contact) continue;
-      law.fitted_to = std::max(law.fitted_to.value_or(0.0), recording.drive[i] - contact);
-    }
-  }
-  if (fit.config.data.size() > 1) {
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      if (parameters[i].nuisance) law.values[i] = 0.0;
-    }
-  }
-  law.note = fmt::format("fitted: {}", fit.config.title);
-  return law;
-}
-
 FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
   for (DataChoice& data : config.data) {
     const std::filesystem::path path(data.dataset);
@@ -262,6 +236,9 @@ std::vector<std::string> write_recording_report(const std::filesystem::path& fol
   write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
   write_file(folder / files[1], to_text(to_json(selection)));
   write_law(folder / files[2], fitted_law(fit));
+  files.emplace_back("laws.csv");
+  write_file(folder / files.back(), laws_csv(selection));
+  for (std::string& name : write_fit_csv(folder, fit)) files.push_back(std::move(name));
   const std::vector<std::string> drawn = write_figures(folder, figures);
   files.insert(files.end(), drawn.begin(), drawn.end());
   return files;

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "tpm/law/law_file.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/study/selection.hpp"
 
@@ -20,16 +19,13 @@ namespace tpm {
 /// Deviances in which the starts ended, sorted.
 [[nodiscard]] Figure waterfall_figure(const FitResult& fit);
 
-/// The fitted law for law files, with contact point and offset if it was fitted to one recording;
-/// of several each has its own, and they are left out.
-[[nodiscard]] LawFile fitted_law(const FitResult& fit);
-
 /// The configuration with its data sets as a file in the folder finds them.
 [[nodiscard]] FitConfig seen_from(const std::filesystem::path& folder, FitConfig config);
 
-/// Writes config.json (rerun it with tpm fit), law.json, selection.json, figures.json and the
-/// figures as SVG and PNG into `folder`. Returns the names of the files. Throws Error(environment)
-/// if drawing is not possible; the other files are then already there.
+/// Writes config.json (rerun it with tpm fit), law.json, selection.json with its tables as CSV
+/// (fit_csv.hpp), figures.json and the figures as SVG and PNG into `folder`. Returns the names of
+/// the files. Throws Error(environment) if drawing is not possible; the other files are then
+/// already there.
 [[nodiscard]] std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
                                                               const Selection& selection);
 

@@ -20,22 +20,22 @@ void append(std::vector<double>& list, const double* first, Eigen::Index count) 
   list.insert(list.end(), first, first + count);
 }
 
-/// States one after the other: time, imposed, response, work, heat, stored; positions; y.
+/// States one after the other: time, imposed, response, work, heat, stored; positions; m_j.
 void write_states(Hdf5Writer& file, const std::string& group,
                   std::span<const QuasiStaticState> states) {
   std::vector<double> scalars;
   std::vector<double> position;
-  std::vector<double> remembered;
+  std::vector<double> viscous;
   for (const QuasiStaticState& s : states) {
     const QuasiStaticEnergy energy = s.energy.value_or(QuasiStaticEnergy{});
     scalars.insert(scalars.end(), {s.time_s, s.imposed, s.response, energy.work_J,
                                    energy.dissipated_J, energy.stored_J});
     append(position, s.position.data(), s.position.size());
-    append(remembered, s.remembered.data(), s.remembered.size());
+    append(viscous, s.viscous.data(), s.viscous.size());
   }
   file.numbers(group + "/scalars", scalars);
   file.numbers(group + "/position_m", position);
-  file.numbers(group + "/remembered_m", remembered);
+  file.numbers(group + "/viscous_m", viscous);
 }
 
 /// Reads lists whose lengths are known to be multiples of a number; 0 stands for any but empty.
@@ -64,12 +64,14 @@ class ListReader {
   }
 
   [[nodiscard]] std::vector<QuasiStaticState> states(const std::string& group, std::size_t spheres,
-                                                     std::size_t bonds) const {
+                                                     std::size_t bonds,
+                                                     std::size_t branches) const {
     const std::vector<double> scalars = list(group + "/scalars", 6);
     const std::size_t count = scalars.size() / 6;
     const std::vector<double> position = list(group + "/position_m", 3 * spheres);
-    const std::vector<double> remembered = list(group + "/remembered_m", bonds);
-    if (position.size() != 3 * spheres * count || remembered.size() != bonds * count) {
+    const std::size_t of_state = bonds * branches;
+    const std::vector<double> viscous = list(group + "/viscous_m", of_state);
+    if (position.size() != 3 * spheres * count || viscous.size() != of_state * count) {
       throw bad_input(path_.string(), fmt::format("{} is not whole", group), kExpected);
     }
     std::vector<QuasiStaticState> states(count);
@@ -78,8 +80,9 @@ class ListReader {
       states[i] = {s[0], s[1], s[2], {}, {}, QuasiStaticEnergy{s[3], s[4], s[5]}};
       states[i].position = Eigen::Map<const Positions>(position.data() + 3 * spheres * i, 3,
                                                        static_cast<Eigen::Index>(spheres));
-      states[i].remembered = Eigen::Map<const Eigen::VectorXd>(remembered.data() + bonds * i,
-                                                               static_cast<Eigen::Index>(bonds));
+      states[i].viscous = Eigen::Map<const Eigen::MatrixXd>(viscous.data() + of_state * i,
+                                                            static_cast<Eigen::Index>(bonds),
+                                                            static_cast<Eigen::Index>(branches));
     }
     return states;
   }
@@ -192,7 +195,8 @@ void write_checkpoint(const fs::path& path, const std::string& identity,
   Hdf5Writer file(path);
   file.attribute("/", "checkpoint_of", identity);
   file.numbers("/spheres", {static_cast<double>(latest.position.cols())});
-  file.numbers("/bonds", {static_cast<double>(latest.remembered.size())});
+  file.numbers("/bonds", {static_cast<double>(latest.viscous.rows())});
+  file.numbers("/branches", {static_cast<double>(latest.viscous.cols())});
   std::vector<double> curve;
   for (const CurvePoint& p : record.curve) {
     curve.insert(curve.end(), {p.time_s, p.imposed, p.response, p.energy.work_J,
@@ -232,6 +236,7 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   const ListReader lists(file, path);
   const std::size_t spheres = lists.whole(lists.list("/spheres", 0).front(), "the spheres");
   const std::size_t bonds = lists.whole(lists.list("/bonds", 0).front(), "the bonds");
+  const std::size_t branches = lists.whole(lists.list("/branches", 0).front(), "the branches");
   Checkpoint checkpoint;
   constexpr std::size_t kColumns = 9;
   const std::vector<double> curve = lists.list("/curve", kColumns);
@@ -245,10 +250,10 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
                                        p[7],
                                        p[8]});
   }
-  checkpoint.record.outputs = lists.states("/outputs", spheres, bonds);
+  checkpoint.record.outputs = lists.states("/outputs", spheres, bonds, branches);
   checkpoint.record.validity = read_validity(lists);
   checkpoint.record.error_estimate = lists.list("/error_estimate", 0).front();
-  std::vector<QuasiStaticState> latest = lists.states("/latest", spheres, bonds);
+  std::vector<QuasiStaticState> latest = lists.states("/latest", spheres, bonds, branches);
   if (latest.size() != 1) throw bad_input(path.string(), "holds no state", kExpected);
   checkpoint.latest = std::move(latest.front());
   checkpoint.record.contact_pushes_N.resize(checkpoint.record.outputs.size());

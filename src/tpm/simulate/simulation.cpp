@@ -10,6 +10,10 @@
 namespace tpm {
 namespace {
 
+// A static run takes some factorisations at each stride: it iterates earlier than a quasi-static
+// one, which shares a factorisation between many solutions.
+constexpr double kStaticOperations = 2e11;
+
 /// A network with the contacts of a scene; tools in their order.
 DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bonds) {
   const Organ& organ = scene.tissue.network.organ;
@@ -39,8 +43,9 @@ DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bond
 /// the part.
 template <class RunPart>
 SimulationRun run_in_parts(const ExperimentScene& scene, const RunNetwork& network,
-                           const SimulationControls& controls, RunPart&& run_part) {
-  Recorder recorder(scene, network, controls, kRunParts);
+                           const SimulationControls& controls, RunPart&& run_part,
+                           std::size_t parts = kRunParts) {
+  Recorder recorder(scene, network, controls, parts);
   SimulationRun result;
   if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
   for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {
@@ -62,17 +67,38 @@ struct PartOfProtocol {
   double tolerance;
 };
 
+/// Every part of a quasi-static run begins with some factorisations: there are as many parts as
+/// these are cheap, but a long protocol is cut.
+std::size_t parts_of(const ExperimentScene& scene, const RunNetwork& network) {
+  constexpr double kRestart = 3.0;         // factorisations
+  constexpr double kAllRestarts = 2.5e9;   // operations
+  constexpr std::size_t kPiecesAPart = 8;  // of the protocol
+  const std::size_t least = std::min(scene.protocol.knots().size() / kPiecesAPart + 1, kRunParts);
+  const SolverChoice factor = choose_solver(network.driven.bonds, network.driven.freedom,
+                                            {.solver = scene.formulation.solver});
+  if (!factor.direct) return kRunParts;
+  const double cheap = kAllRestarts / (kRestart * factor.operations + 1.0);
+  return std::clamp(cheap < kRunParts ? static_cast<std::size_t>(cheap) : kRunParts, least, kRunParts);
+}
+
 SimulationRun run_quasi_static(const ExperimentScene& scene, const RunNetwork& network,
                                const SimulationControls& controls) {
+  std::optional<SolverChoice> solver;
   const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
     const PartOfProtocol part(scene, times.back());
     const DrivenNetwork& driven = network.driven;
     const QuasiStatic equations(driven.bonds, driven.rest, driven.freedom, driven.probes,
-                                {.tolerance = part.tolerance, .energies = true});
+                                {.tolerance = part.tolerance,
+                                 .energies = true,
+                                 .equilibrium = {.solver = scene.formulation.solver}});
     const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
-    recorder.close_part(equations.run(part.protocol, times, see, recorder.latest()).error_estimate);
+    const QuasiStaticRun run = equations.run(part.protocol, times, see, recorder.latest());
+    solver = run.solver;
+    recorder.close_part(run.error_estimate);
   };
-  return run_in_parts(scene, network, controls, run_part);
+  SimulationRun result = run_in_parts(scene, network, controls, run_part, parts_of(scene, network));
+  result.solver = solver;
+  return result;
 }
 
 SimulationRun run_static(const ExperimentScene& scene, const RunNetwork& network,
@@ -80,7 +106,8 @@ SimulationRun run_static(const ExperimentScene& scene, const RunNetwork& network
   const DrivenNetwork& driven = network.driven;
   StaticPath path(driven.bonds, driven.rest, network.network.organ.spacing, driven.freedom,
                   driven.probes, scene.protocol.drive(), scene.protocol.peak(),
-                  scene.formulation.tolerance);
+                  scene.formulation.tolerance,
+                  {.solver = scene.formulation.solver, .most_operations = kStaticOperations});
   const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
     if (recorder.latest()) path.start_from(*recorder.latest());
     for (const double time : times) {
@@ -88,7 +115,9 @@ SimulationRun run_static(const ExperimentScene& scene, const RunNetwork& network
     }
     recorder.close_part(0.0);
   };
-  return run_in_parts(scene, network, controls, run_part);
+  SimulationRun result = run_in_parts(scene, network, controls, run_part);
+  result.solver = path.solver();
+  return result;
 }
 
 /// kg, of spheres and tools.
@@ -178,16 +207,15 @@ SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& netwo
 RunNetwork network_to_run(const ExperimentScene& scene) {
   const Tissue& tissue = scene.tissue;
   if (!scene.formulation.mass_spring) {
-    return {tissue.network, tissue.material, with_contacts(scene, tissue.bonds())};
+    return {tissue.network, with_contacts(scene, tissue.bonds())};
   }
   const Freedom freedom = tissue.freedom();
   const double stiffness = contact_stiffness_N_per_m(tissue.bonds(), tissue.network.organ.position,
                                                      freedom, scene.probe(), 1.0);
   Network msm = msm_network(tissue.network, scene.formulation.springs);
-  const TpmParameters material =
-      msm_material(msm, tissue.material, freedom, scene.probe(), stiffness);
-  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, material));
-  return {std::move(msm), material, std::move(driven)};
+  const BondMaterial springs = msm_material(msm, freedom, scene.probe(), stiffness);
+  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, springs));
+  return {std::move(msm), std::move(driven)};
 }
 
 SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,

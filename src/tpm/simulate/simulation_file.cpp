@@ -201,7 +201,8 @@ void write_step(const ExperimentScene& scene, const RunNetwork& network,
 
 /// Spheres, bonds and tools at one time.
 std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
-                      const std::string& group, double time_s, std::size_t n, std::size_t m) {
+                      const std::string& group, double time_s, std::size_t n, std::size_t m,
+                      Eigen::Index branches) {
   using Number = XdmfSource::Number;
   using Centre = XdmfSource::Centre;
   const std::string position = group + "/position_m";
@@ -230,7 +231,10 @@ std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
     text += source.scalar("bond_force_N", group + "/bond_force_N", Centre::cell, m, Number::real);
   }
   if (scene.outputs.remembered) {
-    text += source.scalar("remembered_m", group + "/remembered_m", Centre::cell, m, Number::real);
+    for (Eigen::Index j = 0; j < branches; ++j) {
+      const std::string name = viscous_name(j, branches);
+      text += source.scalar(name, group + "/" + name, Centre::cell, m, Number::real);
+    }
   }
   text += "    </Grid>\n";
   if (const std::size_t tools = tool_count(scene); tools > 0) {
@@ -253,7 +257,7 @@ std::string xdmf(const ExperimentScene& scene, const SimulationRecord& record,
       "  <Grid Name=\"simulation\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
   for (std::size_t k = 0; k < record.outputs.size(); ++k) {
     text += step_xdmf(scene, source, step_group(k), record.outputs[k].time_s, network.organ.size(),
-                      network.bonds.size());
+                      network.bonds.size(), record.outputs[k].viscous.cols());
   }
   return text + "  </Grid>\n </Domain>\n</Xdmf>\n";
 }
