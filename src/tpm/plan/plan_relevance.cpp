@@ -94,6 +94,11 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
                                  significant(100.0 * estimate.of_jumps / peak, 3));
       return result;
     }
+    if (!scout.scene().driven().tools.empty()) {
+      // A run would count the instants at which a tool leaves a sphere, and its force is 0.
+      result.note += "; the instants at which a tool leaves and strikes are left out";
+      return result;
+    }
     const double steps = 10.0 * estimate.highest_Hz * scout.scene().duration_s();
     if (steps * static_cast<double>(scout.scene().network().organ.size()) > kAffordable)
       return result;
