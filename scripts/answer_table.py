@@ -3,9 +3,11 @@
 
     python3 scripts/answer_table.py inputs OLD/build/release/tpm build/release/tpm -o reports/faults/inputs.md
     python3 scripts/answer_table.py sessions OLD/build/release/tpm build/release/tpm -o reports/safety/sessions.md
+    python3 scripts/answer_table.py fits OLD/build/release/tpm build/release/tpm -o reports/fits/answers.md
 
 `inputs`: files, names and disks; `sessions`: the haptic loop, on the simulated device and through the stand-in for
-the vendor's library: each version's own, but where a case is about the library's strictness the new one's.
+the vendor's library: each version's own, but where a case is about the library's strictness the new one's; `fits`:
+what fits say (scripts/answer_fits.py).
 
 Each program is build/PRESET/tpm of its own source tree, whose data it uses. Every case runs in a folder of its own,
 with 30 s and 4 GB (cases of many runs: 20 minutes). An answer is the exit code (or the signal, or that time was up),
@@ -13,6 +15,7 @@ how many lines the message has and its first, and what the case looks at afterwa
 column names the test that holds the answer.
 """
 import argparse
+import datetime
 import json
 import os
 import re
@@ -24,6 +27,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Callable, Optional
+
+import answer_fits
 
 SOURCE = Path(__file__).resolve().parent.parent
 SECONDS, BYTES = 30, 4_000_000
@@ -352,6 +357,23 @@ def rows_kept(folder: Path) -> str:
     return "no row is read back" if rows is None else f"{len(rows['time_s'])} rows are read back"
 
 
+def stalled(command: str) -> str:
+    """The command, whose process does not run for 17 ms, a second after its beginning."""
+    return ("$TPM " + command + " > said & tpm=$!; $PYTHON -c 'import os, signal, sys, time\n"
+            "pid = int(sys.argv[1])\ntime.sleep(1.0)\nos.kill(pid, signal.SIGSTOP)\ntime.sleep(0.017)\n"
+            "os.kill(pid, signal.SIGCONT)' $tpm; wait $tpm")
+
+
+def verdict(folder: Path) -> str:
+    said = (folder / "said").read_text().splitlines()
+    return "; ".join(line for line in said if line.startswith(("verdict", "at most")))
+
+
+def said_first(folder: Path) -> str:
+    said = (folder / "said").read_text().splitlines()
+    return next((line for line in said if "missed" in line or "stop" in line), "nothing said")
+
+
 RUN = "$TPM hil run s.json -o r.tpmrec"
 STRICT = "TPM_STAND_IN_SCRIPT=script $TPM hil run s.json -o r.tpmrec --device omega7 --dhd-library $STRICT_STAND_IN "
 LIBRARY = "TPM_STAND_IN_SCRIPT=script $TPM hil run s.json -o r.tpmrec --device omega7 --dhd-library $STAND_IN "
@@ -407,6 +429,10 @@ SESSIONS = [
     Case("8", "a stall of 29 ms at 1 kHz",
          scripted(star(limits={"hang": "0.5 s"}), "wait 250", "period 0.001", "fault hang 1500 29"), LIBRARY + "--time real",
          "test_servo_threads", lateness),
+    Case("9", "`hil check --rate '4 kHz'` on a machine that stands still for 17 ms (68 periods)", files(),
+         stalled("hil check --rate '4 kHz' --duration '2 s'"), "test_servo_threads: The jitter check says no", verdict),
+    Case("9", "the same stall in a session at 4 kHz, `hil run`", files(s__json=star(rate="4 kHz")),
+         stalled("hil run s.json -o r.tpmrec --force"), "test_servo_threads: The jitter check says no", said_first),
     Case("10", "a session that cannot be prepared, then one that can",
          scripted(star(), "wait 250", "initialised 0"),
          LIBRARY + VIRTUAL + " 2> first; sed -i 's/initialised 0/initialised 1/' script; " + LIBRARY + VIRTUAL,
@@ -479,7 +505,7 @@ def main() -> int:
     description = __doc__.split("\n\n")
     parser = argparse.ArgumentParser(description=description[0], formatter_class=argparse.RawDescriptionHelpFormatter,
                                      epilog="\n\n".join(description[1:]))
-    parser.add_argument("cases", choices=["inputs", "sessions"])
+    parser.add_argument("cases", choices=["inputs", "sessions", "fits"])
     parser.add_argument("old", type=Path)
     parser.add_argument("new", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
@@ -490,17 +516,22 @@ def main() -> int:
     TPM_FOR_INPUTS = str(new)
     TPM_FOR_INPUTS_PATH = new
     os.environ["TPMKIT_SHARE"] = str(new.parents[2])
-    title = "Hostile inputs" if options.cases == "inputs" else "Sessions that go wrong"
+    title = {"inputs": "Hostile inputs", "sessions": "Sessions that go wrong", "fits": "What fits say"}[options.cases]
     lines = [f"# {title}", "",
              "Every row: an input, what version dfed67b answered, what this version answers, and the test that holds it.",
-             f"Made by `python3 scripts/answer_table.py {options.cases} OLD NEW -o {options.output}`.", "",
+             f"Made by `python3 scripts/answer_table.py {options.cases} OLD NEW -o {options.output}`.", ""]
+    if options.cases == "fits":
+        lines += [f"{datetime.date.today()}. {answer_fits.INTRODUCTION}", ""]
+    lines += [
              "| item | input | earlier answer | answer | test |", "| --- | --- | --- | --- | --- |"]
-    for case in CASES if options.cases == "inputs" else SESSIONS:
+    for case in {"inputs": CASES, "sessions": SESSIONS, "fits": answer_fits.cases(Case)}[options.cases]:
         if options.only and options.only not in case.what:
             continue
         row = f"| {case.item} | {case.what} | {answer(case, old)} | {answer(case, new)} | {case.test} |"
         print(row, file=sys.stderr, flush=True)
         lines.append(row)
+    if options.cases == "fits":
+        lines += ["", answer_fits.RELATIVES.rstrip()]
     options.output.write_text("\n".join(lines) + "\n")
     return 0
 

@@ -4,6 +4,11 @@
 
     python3 scripts/reference_mittag_leffler.py > tests/fixtures/mittag_leffler.csv
     python3 scripts/reference_mittag_leffler.py --slopes > tests/fixtures/mittag_leffler_slopes.csv
+    python3 scripts/reference_mittag_leffler.py --laws > tests/fixtures/springpot_laws.csv
+
+The last holds G(t), J(t), G' and G'' of the three laws with two spring-pots (docs/laws.md), k_inf = 1, k1 = 2, k2 = 3,
+tau1 = 1: G and J from E_{a,b}(-z) by the series, but the Zener form's J, which has no closed form, from its Laplace
+transform by mpmath's Talbot contour in 60 digits.
 
 Needs mpmath. Shares no formula with src/tpm/solve/mittag_leffler.cpp beyond the definition: up to
 t = z^(1/alpha) = 95 the power series in enough digits to survive its cancellation (terms reach
@@ -139,8 +144,56 @@ def print_slopes():
                 print(f"{a!r},{b!r},{z!r},{','.join(texts)}")
 
 
+LAW_ORDERS = [(0.5, 0.1), (0.9, 0.3), (0.7, 0.15), (0.3, 0.02), (0.98, 0.5), (0.6, 0.55)]
+LAW_TIMES = [1e-4, 1e-3, 0.01, 0.1, 0.4, 1.0, 2.5, 10.0, 100.0, 1e4]
+K_INF, K1, K2 = mp.mpf(1), mp.mpf(2), mp.mpf(3)
+
+
+def free_orders(a, b, z):
+    """E_{a,b}(-z): the value of the slopes' series."""
+    time = z ** (1 / a)
+    return (slopes_by_power_series(a, b, z) if time <= 110 else slopes_by_asymptotic_series(a, b, z))[0]
+
+
+def law_stiffness(law, alpha, beta, s):
+    """s times the Laplace transform of G(t), and with s = i omega storage and loss."""
+    if law == "fkelvin_voigt2":
+        return K1 * s ** alpha + K2 * s ** beta
+    series = K1 * s ** alpha / (1 + s ** (alpha - beta))
+    return series + (K_INF if law == "fzener2" else 0)
+
+
+def law_functions(law, alpha, beta, t):
+    d = alpha - beta
+    if law == "fkelvin_voigt2":
+        g = K1 * t ** -alpha * mp.rgamma(1 - alpha) + K2 * t ** -beta * mp.rgamma(1 - beta)
+        return g, t ** alpha / K1 * free_orders(d, 1 + alpha, K2 / K1 * t ** d)
+    g = K1 * t ** -beta * free_orders(d, 1 - beta, t ** d)
+    if law == "fmaxwell2":
+        return g, (t ** alpha * mp.rgamma(1 + alpha) + t ** beta * mp.rgamma(1 + beta)) / K1
+    with mp.workdps(60):
+        creep = mp.invertlaplace(lambda s: 1 / (s * law_stiffness(law, alpha, beta, s)), t, method="talbot")
+    return g + K_INF, creep
+
+
+def print_laws():
+    print("# laws with two spring-pots, written by scripts/reference_mittag_leffler.py --laws")
+    print("law,alpha,beta,t,G,J,storage_at_1_over_t,loss_at_1_over_t")
+    for law in ("fmaxwell2", "fkelvin_voigt2", "fzener2"):
+        for orders in LAW_ORDERS:
+            for time in LAW_TIMES:
+                alpha, beta, t = mp.mpf(orders[0]), mp.mpf(orders[1]), mp.mpf(time)
+                complex_modulus = law_stiffness(law, alpha, beta, mp.mpc(0, 1) / t)
+                numbers = (*law_functions(law, alpha, beta, t), complex_modulus.real, complex_modulus.imag)
+                texts = [mp.nstr(v, SLOPE_DIGITS, min_fixed=1, max_fixed=0) for v in numbers]
+                print(f"{law},{orders[0]!r},{orders[1]!r},{time!r},{','.join(texts)}", flush=True)
+
+
 def main():
     mp.mp.dps = DIGITS + 20
+    if sys.argv[1:] == ["--laws"]:
+        print_laws()
+        return
     if sys.argv[1:] == ["--slopes"]:
         print_slopes()
         return

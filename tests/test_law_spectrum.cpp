@@ -298,8 +298,9 @@ TEST_CASE("a modulus from a depth that is deep for the ball is exported with a w
   law.spec.reference = 8e-3;
   for (const char* target : {"abaqus", "ansys", "febio", "json"}) {
     options.target = parse_export_target(target, "test");
-    CHECK_THAT(export_law(law, options),
-               Catch::Contains("WARNING: the reference depth is 1.07 of the radius"));
+    CHECK_THAT(
+        export_law(law, options),
+        Catch::Contains("WARNING: the depth of 8 mm is 1.07 of the sphere's radius (7.5 mm)"));
   }
   law.spec.reference = 0.5e-3;
   CHECK_THAT(export_law(law, options), !Catch::Contains("WARNING"));

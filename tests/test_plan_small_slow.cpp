@@ -87,7 +87,7 @@ TEST_CASE("a scalar model under a load goes to the depth whose force it is") {
 TEST_CASE("the spectrum of the star is its two stiffnesses and one time") {
   const PlanScene scene(star(ramp("1 mm")));
   const ContactSpectrum spectrum = contact_spectrum(scene);
-  const HeldStiffness exact = star_stiffness(scene.scene().tissue.material);
+  const HeldStiffness exact = star_stiffness(scene.scene().tissue.element());
   CHECK_THAT(spectrum.at_once(), WithinRel(exact.at_once, 1e-12));
   CHECK_THAT(spectrum.relaxed(), WithinRel(exact.relaxed, 1e-12));
   const auto branches = fitted_branches(spectrum, 1);

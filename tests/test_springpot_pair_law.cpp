@@ -5,7 +5,9 @@
 #include <boost/math/quadrature/tanh_sinh.hpp>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <sstream>
 
 #include "tpm/core/error.hpp"
 #include "tpm/law/frequency_response.hpp"
@@ -14,7 +16,9 @@
 #include "tpm/law/law_model.hpp"
 #include "tpm/law/prony_table.hpp"
 #include "tpm/law/relaxation.hpp"
+#include "tpm/protocol/protocol.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
+#include "tpm/store/file.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;
@@ -434,5 +438,90 @@ TEST_CASE("laws of two spring-pots go through files and exports", "[pair]") {
     }
     ExportOptions options;
     CHECK_THAT(export_law(law, options), Catch::Contains("two spring-pots"));
+  }
+}
+
+TEST_CASE("G, J, G' and G'' of two spring-pots agree with the table of 20 digits", "[pair]") {
+  std::istringstream table(
+      read_file(std::string(TPM_TEST_SOURCE_DIR) + "/tests/fixtures/springpot_laws.csv"));
+  std::map<std::string, std::array<double, 4>> worst;  // of G, J, storage and loss, relative
+  int rows = 0;
+  for (std::string line; std::getline(table, line);) {
+    if (line.starts_with("#") || line.starts_with("law,")) continue;
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream cells(line);
+    std::string law;
+    std::array<double, 7> x{};
+    cells >> law;
+    for (double& number : x) cells >> number;
+    const auto [alpha, beta, t, modulus, compliance, storage, loss] = x;
+    const LawSpec spec = law_of(("linear-" + law).c_str());
+    std::vector<double> values;
+    for (const LawParameter& q : law_parameters(spec)) {
+      values.push_back(q.name == "k1"      ? 2.0
+                       : q.name == "k2"    ? 3.0
+                       : q.name == "alpha" ? alpha
+                       : q.name == "beta"  ? beta
+                       : q.nuisance        ? 0.0
+                                           : 1.0);  // k_inf and tau1
+    }
+    const std::vector<double> frequency{0.5 / (std::numbers::pi * t)};
+    const auto spectrum = respond_spectrum(spec, values, frequency, std::nullopt, Want::values);
+    const std::array<double, 4> off{law_relaxation(spec, values, t).value / modulus - 1.0,
+                                    law_creep(spec, values, t).value / compliance - 1.0,
+                                    spectrum.storage[0] / storage - 1.0,
+                                    spectrum.loss[0] / loss - 1.0};
+    for (std::size_t i = 0; i < off.size(); ++i) {
+      worst[law][i] = std::max(worst[law][i], std::abs(off[i]));
+    }
+    ++rows;
+  }
+  CHECK(rows == 3 * 6 * 10);
+  for (const auto& [law, off] : worst) {
+    INFO(law << ": largest relative difference of G " << off[0] << ", J " << off[1] << ", G' "
+             << off[2] << ", G'' " << off[3]);
+    CHECK(*std::max_element(off.begin(), off.end()) < 1e-9);
+  }
+}
+
+TEST_CASE("a curved kernel creeps by J as the straight one does", "[pair]") {
+  // V(u(t)) = J(t) F for every kernel, and the slopes by every parameter follow.
+  const std::vector<double> times_s{0.01, 0.3, 4.0, 70.0};
+  constexpr double kLoad = 0.05;
+  for (const char* name :
+       {"power-fzener", "hertz-fspringpot", "power-fzener2", "linear-fmaxwell-relaxing"}) {
+    const LawSpec spec = law_of(name);
+    std::vector<double> values;
+    for (const LawParameter& q : law_parameters(spec)) {
+      values.push_back(q.dimension == Dimension::stiffness ? 25.0
+                       : q.name == "tau1"                  ? 2.0
+                       : q.name == "alpha"                 ? 0.6
+                       : q.name == "beta"                  ? 0.2
+                       : q.name == "exponent"              ? 1.8
+                       : q.name == "tension_share"         ? 0.3
+                       : q.name == "spacing"               ? 0.03
+                       : q.name == "contact"               ? 2e-4
+                                                           : 1e-3);
+    }
+    const LawModel model(spec);
+    const Protocol load = creep(kLoad, 100.0);
+    const Response r = model.respond(load, times_s, values, Want::values_and_sensitivity);
+    for (std::size_t i = 0; i < times_s.size(); ++i) {
+      INFO(name << " at " << times_s[i] << " s");
+      const double v = law_creep(spec, values, times_s[i]).value * (kLoad - 1e-3);
+      const double u = r.value[static_cast<Eigen::Index>(i)] - 2e-4;
+      const double u_ref = spec.reference;
+      if (spec.kernel != Kernel::linear) {
+        const double m = spec.kernel == Kernel::hertz ? 1.5 : 1.8;
+        CHECK_THAT(u_ref * std::pow(u / u_ref, m), WithinRel(v, 1e-12));
+      }
+      check_slopes(
+          values, r.sensitivity.row(static_cast<Eigen::Index>(i)).transpose(),
+          [&](const std::vector<double>& at) {
+            return model.respond(load, times_s, at, Want::values)
+                .value[static_cast<Eigen::Index>(i)];
+          },
+          1e-6);
+    }
   }
 }

@@ -12,7 +12,7 @@ namespace {
 struct ExportTexts {
   std::string law;
   std::string to;
-  std::optional<std::string> radius, area, length, poisson, from, until, terms;
+  std::optional<std::string> radius, cone, punch, area, length, poisson, from, until, terms;
   std::string output;
   bool relaxation_only = false;
 };
@@ -28,6 +28,8 @@ ExportOptions options_of(const ExportTexts& texts) {
   options.relaxation_only = texts.relaxation_only;
   ContactGeometry& geometry = options.geometry;
   set_quantity(geometry.sphere_radius_m, texts.radius, Dimension::length, "--radius");
+  set_quantity(geometry.cone_half_angle_rad, texts.cone, Dimension::angle, "--cone-angle");
+  set_quantity(geometry.punch_radius_m, texts.punch, Dimension::length, "--punch-radius");
   set_quantity(geometry.area_m2, texts.area, Dimension::area, "--area");
   set_quantity(geometry.length_m, texts.length, Dimension::length, "--length");
   if (texts.poisson) geometry.poisson_ratio = parse_number(*texts.poisson, "--poisson");
@@ -47,6 +49,9 @@ void add_export_command(CLI::App& app, Session& session) {
   command->add_option("law", texts->law, "Law file (docs/laws.md)")->required();
   command->add_option("--to", texts->to, "abaqus, ansys, febio or json")->required();
   command->add_option("--radius", texts->radius, "Sphere that was pressed in, for moduli in Pa");
+  command->add_option("--cone-angle", texts->cone,
+                      "Or cone: angle between its axis and its surface, such as \"45 deg\"");
+  command->add_option("--punch-radius", texts->punch, "Or flat punch");
   command->add_option("--area", texts->area, "Or cross section of a bar");
   command->add_option("--length", texts->length, "and its length");
   command->add_option("--poisson", texts->poisson, "Poisson's ratio (0.49)");
@@ -61,7 +66,13 @@ void add_export_command(CLI::App& app, Session& session) {
       "  tpm export fractional.json --to febio --from \"0.1 s\" --until \"30 s\"");
   command->callback([texts, &session] {
     session.run = [texts] {
-      deliver(export_law(read_law(texts->law), options_of(*texts)), texts->output);
+      const LawFile law = read_law(texts->law);
+      const ExportOptions options = options_of(*texts);
+      const std::string text = export_law(law, options);
+      for (const std::string& warning : export_warnings(law, options)) {
+        tell_user("tpm: warning: {}\n", warning);
+      }
+      deliver(text, texts->output);
       return 0;
     };
   });

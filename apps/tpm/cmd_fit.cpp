@@ -13,11 +13,15 @@
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/tables.hpp"
+#include "tpm/law/contact_geometry.hpp"
+#include "tpm/report/fit_csv.hpp"
 #include "tpm/report/fit_report.hpp"
 #include "tpm/report/function_report.hpp"
 #include "tpm/report/recording_report.hpp"
+#include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/specimens.hpp"
+#include "tpm/study/young_moduli.hpp"
 
 namespace tpm::app {
 namespace {
@@ -36,7 +40,28 @@ struct FitOptions {
   std::string resample;
   std::string reference;
   std::string group_by;
+  std::string radius, cone_angle, punch_radius, poisson;
 };
+
+/// The probe, if the options name one; none else.
+std::optional<ContactGeometry> probe_of(const FitOptions& options) {
+  ContactGeometry probe;
+  const auto set = [](std::optional<double>& size, const std::string& text, Dimension dimension,
+                      const char* option) {
+    if (!text.empty()) size = parse_quantity(text, dimension, option);
+  };
+  set(probe.sphere_radius_m, options.radius, Dimension::length, "--radius");
+  set(probe.cone_half_angle_rad, options.cone_angle, Dimension::angle, "--cone-angle");
+  set(probe.punch_radius_m, options.punch_radius, Dimension::length, "--punch-radius");
+  if (!options.poisson.empty()) probe.poisson_ratio = parse_number(options.poisson, "--poisson");
+  if (probe.is_given()) {
+    static_cast<void>(modulus_Pa(LawSpec{}, 1.0, probe));  // refuses sizes that cannot be
+    return probe;
+  }
+  if (options.poisson.empty()) return std::nullopt;
+  throw Error(ExitCode::usage, "--poisson", "without a probe",
+              "--radius, --cone-angle or --punch-radius");
+}
 
 /// --bootstrap and --resample, over what the configuration says.
 void configure_bootstrap(const FitOptions& options, FitConfig& config) {
@@ -87,6 +112,10 @@ SelectionOptions selection_options(const FitOptions& options) {
   SelectionOptions selection;
   if (!options.law.empty()) selection.laws = {parse_law_name(options.law, "--law")};
   selection.only_listed = !options.law.empty();
+  if (const auto probe = probe_of(options)) {
+    selection.setup.exponent = probe_exponent(*probe);
+    if (options.law.empty()) selection.laws = laws_of_probe(classical_family(), *probe);
+  }
   if (!options.starts.empty()) {
     selection.setup.starts = parse_whole_number(options.starts, "--starts", 1);
   }
@@ -167,6 +196,18 @@ std::string figure_folder(const FitOptions& options, const std::string& input) {
   return path.stem().string() + "_fit";
 }
 
+/// A probe goes with recordings of a force over a depth alone.
+void require_indentation(const FitOptions& options,
+                         const std::vector<PreparedRecording>& recordings) {
+  if (!probe_of(options)) return;
+  for (const PreparedRecording& r : recordings) {
+    if (r.recording.drive_quantity == Quantity::indentation_depth) continue;
+    throw Error(ExitCode::usage, "--radius, --cone-angle, --punch-radius",
+                fmt::format("'{}' is no indentation", printable(r.name)),
+                "them with a contact force over an indentation depth");
+  }
+}
+
 int fit_configuration(const FitOptions& options, const Session& session) {
   if (!options.no_draw) will_write_into(options.folder, {"figures.json", "law.json"});
   const FitResult result = run_fit(configured(options));
@@ -190,6 +231,7 @@ int fit_folder(const FitOptions& options, const Session& session) {
   const std::optional<LawSpec> law =
       selection.laws.empty() ? std::nullopt : std::optional<LawSpec>(selection.laws.front());
   std::vector<PreparedRecording> recordings = read_recordings(input);
+  require_indentation(options, recordings);
   set_reference(options, recordings, selection);
   set_specimens(options, recordings);
   const SpecimenStudy study = study_specimens(recordings, law, selection);
@@ -210,22 +252,36 @@ int fit_recordings(const FitOptions& options, const Session& session) {
                     {"figures.json", "config.json", "selection.json", "law.json"});
   }
   SelectionOptions choices = selection_options(options);
+  require_indentation(options, recordings);
   set_reference(options, recordings, choices);
   const Selection selection = select_law(recordings, choices);
   const FitResult& best = selection.candidates[selection.recommended].fit;
+  std::optional<YoungModuli> moduli;
+  if (const auto probe = probe_of(options)) {
+    moduli = young_moduli(best, *probe, options.poisson.empty());
+  }
   std::string text;
   if (session.json()) {
-    text = to_text(to_json(selection));
+    Json json = to_json(selection);
+    if (moduli) json["young_moduli"] = to_json(*moduli);
+    text = to_text(json);
   } else {
     for (const PreparedRecording& r : recordings) {
+      if (!r.read_as.empty()) text += fmt::format("{}\n", r.read_as);
       for (const std::string& words : r.phases.words) text += fmt::format("{}\n", words);
     }
     text += fmt::format("\n{}\n{}", to_terminal_text(selection), to_terminal_text(best));
     for (const std::string& words : outside_words(best)) text += fmt::format("! {}\n", words);
+    if (moduli) text += "\n" + to_terminal_text(*moduli);
   }
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, recordings.front().name);
-    const auto files = write_recording_report(folder, selection);
+    auto files = write_recording_report(folder, selection);
+    if (moduli) {
+      write_file(std::filesystem::path(folder) / "young_moduli.json", to_text(to_json(*moduli)));
+      write_file(std::filesystem::path(folder) / "young_moduli.csv", moduli_csv(*moduli));
+      files.insert(files.end(), {"young_moduli.json", "young_moduli.csv"});
+    }
     if (!session.json()) text += written(folder, files);
   }
   if (!session.json()) {
@@ -243,8 +299,10 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
   const Selection selection = select_law(function, selection_options(options));
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::string text =
-      session.json() ? to_text(to_json(selection))
-                     : fmt::format("{}\n{}", to_terminal_text(selection), to_terminal_text(best));
+      session.json()
+          ? to_text(to_json(selection))
+          : fmt::format("{}{}{}\n{}", function.read_as, function.read_as.empty() ? "" : "\n",
+                        to_terminal_text(selection), to_terminal_text(best));
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, function.name);
     const auto files = write_function_report(folder, function, selection);
@@ -257,8 +315,10 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
 int fit(const FitOptions& options, const Session& session) {
   const std::vector<std::string>& files = options.recordings.files;
   if (is_configuration(files)) {
-    if (!options.reference.empty() || !options.group_by.empty()) {
-      throw Error(ExitCode::usage, "--reference, --group-by", "with a configuration",
+    if (!options.reference.empty() || !options.group_by.empty() || probe_of(options)) {
+      throw Error(ExitCode::usage,
+                  "--reference, --group-by, --radius, --cone-angle, --punch-radius",
+                  "with a configuration",
                   "them only with recordings; a configuration has its own reference");
     }
     return fit_configuration(options, session);
@@ -276,6 +336,11 @@ int fit(const FitOptions& options, const Session& session) {
   }
   if (files.size() == 1) {
     const auto function = find_material_function(files.front(), import_options(options.recordings));
+    if (function && probe_of(options)) {
+      throw Error(ExitCode::usage, "--radius, --cone-angle, --punch-radius",
+                  fmt::format("with a {}", function->kind()),
+                  "them with a contact force over an indentation depth");
+    }
     if (function) return fit_function(options, *function, session);
   }
   return fit_recordings(options, session);
@@ -320,9 +385,19 @@ void add_fit_command(CLI::App& app, Session& session) {
       "Folder: what tells the specimens apart: a pattern of the file names with one "
       "group, e.g. \"(liver[0-9]+)_\", or a column or key of the files");
   add_format_option(*command, session);
+  const auto add_probe = [&](const char* name, std::string& target, const char* help) {
+    command->add_option(name, target, help)->group("Young's modulus of an indentation, in Pa");
+  };
+  add_probe("--radius", options->radius,
+            "Of the sphere that was pressed in (Hertz), e.g. \"2 mm\"");
+  add_probe("--cone-angle", options->cone_angle,
+            "Or of a cone: between its axis and its surface, e.g. \"45 deg\" (Sneddon)");
+  add_probe("--punch-radius", options->punch_radius, "Or of a flat punch (Sneddon)");
+  add_probe("--poisson", options->poisson, "Poisson's ratio, 0 to 0.5 (0.49, assumed)");
   command->footer(
       "Example:\n  tpm fit configs/liver_relaxation.json\n"
-      "  tpm fit meat.csv\n  tpm fit folder_of_recordings --law power-2\n"
+      "  tpm fit meat.csv\n  tpm fit liver.csv --radius \"2 mm\" --poisson 0.5\n  tpm fit "
+      "folder_of_recordings --law power-2\n"
       "  tpm fit configs/liver_relaxation.json --hold-out \"8 mm\" --format json -o fit.json");
   command->callback([options, &session] {
     session.run = [options, &session] { return fit(*options, session); };

@@ -9,7 +9,9 @@
 #include "plan_options.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
+#include "tpm/core/text.hpp"
 #include "tpm/core/units.hpp"
+#include "tpm/plan/operations.hpp"
 #include "tpm/report/plan_report.hpp"
 #include "tpm/report/simulation_figures.hpp"
 #include "tpm/report/simulation_report.hpp"
@@ -68,9 +70,30 @@ SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& networ
   return simulate(scene, network, controls);
 }
 
+/// Of large networks what the first output waits for: until then nothing says how long a run takes.
+void tell_cost(const RunNetwork& network, const ExperimentScene& scene) {
+  constexpr std::size_t kLarge = 2000;  // spheres; smaller ones take seconds
+  constexpr double kWorthSaying_s = 1.0;
+  if (network.driven.spheres() < kLarge) return;
+  const fs::path calibrated = usual_costs_file();
+  const OperationCosts costs =
+      !calibrated.empty() && fs::exists(calibrated) ? read_costs(calibrated) : nominal_costs();
+  const auto products = static_cast<double>(network.driven.bonds.pattern().factor_products());
+  const double seconds =
+      costs.seconds_of(OperationCount().add(Operation::factor_product, products));
+  if (seconds < kWorthSaying_s) return;
+  tell_user(
+      "tpm: {} spheres: a factorisation takes about {} s (costs of operations: {}), and a run of "
+      "{} s at least {} of them, one for each part: {} min or more\n",
+      network.driven.spheres(), significant(seconds, 2), costs.source,
+      significant(scene.protocol.end_s() - scene.protocol.start_s(), 3), kRunParts,
+      significant(static_cast<double>(kRunParts) * seconds / 60.0, 2));
+}
+
 Simulated simulated(ExperimentScene scene, fs::path file, double checkpoint_every_s) {
   (void)Hdf5Writer(file);  // before a long run, not after it: can the result be written?
   RunNetwork network = network_to_run(scene);
+  tell_cost(network, scene);
   fs::path checkpoint = file.string() + ".checkpoint";
   SimulationRun run = run_watched(scene, network, checkpoint_every_s, checkpoint);
   return {std::move(scene), std::move(network), std::move(run), std::move(file),

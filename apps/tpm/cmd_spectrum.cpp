@@ -40,7 +40,7 @@ std::vector<double> frequencies(const SpectrumTexts& texts) {
 
 std::optional<double> operating_depth(const SpectrumTexts& texts, const LawSpec& spec) {
   if (texts.depth.empty()) return std::nullopt;
-  const bool strip = spec.drive == Quantity::relative_length;
+  const bool strip = is_answered_by_stress(spec.drive);
   return parse_quantity(texts.depth, strip ? Dimension::dimensionless : Dimension::length,
                         "--depth");
 }

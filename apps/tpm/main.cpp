@@ -1,6 +1,7 @@
 // The program `tpm`: reads the command line, runs one command, turns errors into one line.
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "command.hpp"
+#include "out_of_memory.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/file.hpp"
@@ -157,25 +159,27 @@ void require_output_written() {
 
 namespace {
 
-/// Says so without asking for memory.
-int out_of_memory() noexcept {
-  static constexpr std::string_view kWords =
-      "tpm: out of memory; expected more, or a smaller input\n";
-  (void)!::write(STDERR_FILENO, kWords.data(), kWords.size());
-  return static_cast<int>(tpm::ExitCode::environment);
-}
-
-/// Libraries that ask for memory where they must not throw (nlohmann-json does in its destructor)
-/// end here: then nothing is unwound, and the next run removes the temporary file (Replacement).
+/// During a session (OutOfMemoryIsThrown), libraries that ask for memory where they must not throw
+/// (nlohmann-json does in its destructor) end here: then nothing is unwound.
 [[noreturn]] void end_without_memory() noexcept {
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
   } catch (const std::bad_alloc&) {
-    ::_exit(out_of_memory());
+    ::_exit(tpm::app::say_out_of_memory());
   } catch (...) {
     std::abort();
   }
   std::abort();
+}
+
+/// Keeps large freed arrays for the next of their size. By default the C library gives every array
+/// above 32 MB back to the system, and a fit of a million samples makes such arrays anew in each
+/// evaluation: each time the system clears 4 kB pages one by one, which costs more than the
+/// arithmetic where page faults are dear (virtual machines).
+void keep_large_arrays() noexcept {
+  constexpr int kLargestKept = 1 << 30;
+  ::mallopt(M_MMAP_THRESHOLD, kLargestKept);
+  ::mallopt(M_TRIM_THRESHOLD, kLargestKept);
 }
 
 /// The exit code; what goes wrong is one line. Throws std::bad_alloc.
@@ -204,9 +208,11 @@ int answer(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   std::set_terminate(end_without_memory);
+  keep_large_arrays();
+  tpm::app::end_when_out_of_memory();
   try {
     return answer(argc, argv);
   } catch (const std::bad_alloc&) {  // telling what went wrong takes memory, too
-    return out_of_memory();
+    return tpm::app::say_out_of_memory();
   }
 }

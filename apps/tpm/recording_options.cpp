@@ -35,11 +35,22 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
   add("--frequency", options.frequency, "Column of the frequency of a spectrum");
   add("--storage", options.storage, "Column of the storage modulus");
   add("--loss", options.loss, "Column of the loss modulus");
-  add("--drive-quantity", options.drive_quantity, "indentation_depth or relative_length");
+  add("--drive-quantity", options.drive_quantity, "indentation_depth, strain or relative_length");
   add("--response-quantity", options.response_quantity,
       "contact_force, stress, relaxation_modulus or creep_compliance");
   command
       .add_option("--unit", options.units, "Unit of a column, e.g. \"Force=N\" (may be repeated)")
+      ->group("What the files do not say");
+  add("--rest-length", options.rest_length,
+      "Unloaded length of a stretched specimen, for columns of its length or elongation");
+  add("--area", options.area, "Cross section of that specimen, for a column of its force");
+  command
+      .add_flag("--negate-drive", options.negate_drive,
+                "The machine counts the imposed motion negative")
+      ->group("What the files do not say");
+  command
+      .add_flag("--negate-response", options.negate_response,
+                "The machine counts the force or stress negative")
       ->group("What the files do not say");
   add("--contact-force", options.contact_response,
       "Contact begins where the force passes this, e.g. \"0.05 N\"; default: found");
@@ -62,6 +73,17 @@ ImportOptions import_options(const RecordingOptions& options) {
         parse_quantity_name(options.response_quantity, "--response-quantity");
   }
   import.units = unit_options(options.units);
+  import.negate_drive = options.negate_drive;
+  import.negate_response = options.negate_response;
+  const auto size = [](const std::string& text, Dimension dimension,
+                       const char* option) -> std::optional<double> {
+    if (text.empty()) return std::nullopt;
+    const double value = parse_quantity(text, dimension, option);
+    if (value > 0.0) return value;
+    throw Error(ExitCode::usage, option, fmt::format("'{}'", printable(text)), "a size above 0");
+  };
+  import.rest_length_m = size(options.rest_length, Dimension::length, "--rest-length");
+  import.area_m2 = size(options.area, Dimension::area, "--area");
   return import;
 }
 
@@ -81,9 +103,11 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
       throw Error(ExitCode::usage, "FILE", fmt::format("'{}' is given twice", printable(file)),
                   "each recording once");
     }
-    recordings.push_back(
-        prepare_recording(file, read_recording_file(file, import).recording, phases));
+    RecordingFile read = read_recording_file(file, import);
+    std::string read_as = columns_words(read);
+    recordings.push_back(prepare_recording(file, std::move(read.recording), phases));
     recordings.back().import = import;
+    recordings.back().read_as = std::move(read_as);
   }
   return recordings;
 }

@@ -17,6 +17,8 @@ struct RecordingOptions {
   std::string drive_quantity, response_quantity;
   std::vector<std::string> units;
   std::string contact_response;
+  std::string rest_length, area;
+  bool negate_drive = false, negate_response = false;
 };
 
 /// "COLUMN=UNIT" pairs. Throws Error(usage).

@@ -43,6 +43,7 @@ constexpr auto kQuantities = std::to_array<QuantityWords>({
     {Quantity::contact_force, "contact_force", "force", Dimension::force},
     {Quantity::load, "load", "load", Dimension::force},
     {Quantity::relative_length, "relative_length", "relative_length", Dimension::dimensionless},
+    {Quantity::strain, "strain", "strain", Dimension::dimensionless},
     {Quantity::stress, "stress", "stress", Dimension::stress},
     {Quantity::frequency, "frequency", "frequency", Dimension::frequency},
     {Quantity::storage_modulus, "storage_modulus", "storage", Dimension::stress},
@@ -81,6 +82,10 @@ Quantity parse_quantity_name(std::string_view text, std::string_view where) {
 
 Dimension quantity_dimension(Quantity quantity) noexcept {
   return entry_of(kQuantities, quantity).dimension;
+}
+
+bool is_answered_by_stress(Quantity drive) noexcept {
+  return drive == Quantity::relative_length || drive == Quantity::strain;
 }
 
 bool is_step_response(Quantity quantity) noexcept {

@@ -24,6 +24,7 @@ enum class Quantity {
   contact_force,       ///< N, positive in compression
   load,                ///< N, imposed
   relative_length,     ///< length over reference length, dimensionless
+  strain,              ///< of tension, compression or shear, dimensionless, 0 where undeformed
   stress,              ///< Pa
   frequency,           ///< Hz (cycles per second; rad/s is converted)
   storage_modulus,     ///< Pa, in phase with the strain
@@ -43,6 +44,9 @@ enum class Quantity {
 [[nodiscard]] Quantity parse_quantity_name(std::string_view text, std::string_view where);
 
 [[nodiscard]] Dimension quantity_dimension(Quantity quantity) noexcept;
+
+/// True for the drives that a stress answers: relative length and strain.
+[[nodiscard]] bool is_answered_by_stress(Quantity drive) noexcept;
 
 /// The answer to a unit step at time 0: relaxation modulus or creep compliance. A recording of one
 /// has times and no drive.

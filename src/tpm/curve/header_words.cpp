@@ -68,6 +68,7 @@ constexpr Recognized kDisplacement{ColumnRole::drive, Quantity::indentation_dept
 constexpr Recognized kTravel{ColumnRole::drive, Quantity::indentation_depth, 2};
 constexpr Recognized kCrosshead{ColumnRole::drive, Quantity::indentation_depth, 3};
 constexpr Recognized kStretch{ColumnRole::drive, Quantity::relative_length, 4};
+constexpr Recognized kStrain{ColumnRole::drive, Quantity::strain, 5};
 constexpr Recognized kRelaxation{ColumnRole::response, Quantity::relaxation_modulus, 2};
 constexpr Recognized kCompliance{ColumnRole::response, Quantity::creep_compliance, 2};
 constexpr Recognized kSd{ColumnRole::sd, Quantity::contact_force, 0};
@@ -81,6 +82,7 @@ constexpr Recognized kLossTangent{ColumnRole::loss_tangent, Quantity::abscissa, 
 
 constexpr auto kWords = std::to_array<TitleWord>({
     {"time", kTime},
+    {"t", kTime},
     {"temps", kTime},
     {"zeit", kTime},
     {"prufzeit", kTime},
@@ -98,6 +100,8 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"stress", kStress},
     {"spannung", kStress},
     {"contrainte", kStress},
+    {"sigma", kStress},
+    {"tau", kStress},
     {"depth", kDepth},
     {"indentation", kDepth},
     {"penetration", kDepth},
@@ -124,6 +128,17 @@ constexpr auto kWords = std::to_array<TitleWord>({
     {"traversenweg", kCrosshead},
     {"position", kCrosshead},
     {"stretch", kStretch},
+    {"length", kStretch},
+    {"lange", kStretch},
+    {"longueur", kStretch},
+    {"strain", kStrain},
+    {"gamma", kStrain},
+    {"epsilon", kStrain},
+    {"scherung", kStrain},
+    {"stauchung", kStrain},
+    {"deformation", kStrain},
+    {"deformacion", kStrain},
+    {"deformazione", kStrain},
     {"frequency", kFrequency},
     {"freq", kFrequency},
     {"frequenz", kFrequency},
@@ -199,6 +214,14 @@ std::string spelled_out(std::string_view name) {
       text += " omega ";
     } else if (c == U'\u03B4') {
       text += " delta ";
+    } else if (c == U'\u03B3') {
+      text += " gamma ";
+    } else if (c == U'\u03B5') {
+      text += " epsilon ";
+    } else if (c == U'\u03C3') {
+      text += " sigma ";
+    } else if (c == U'\u03C4') {
+      text += " tau ";
     } else {
       utf8::append(c, text);
     }
@@ -248,11 +271,14 @@ std::optional<Recognized> recognize_title(std::string_view name) {
   if (const auto primes = recognize_primes(name)) return primes;
   if (const auto function = recognize_step_response(name)) return function;
   const std::vector<std::string> words = words_of(spelled_out(name));
-  // "tan delta", "loss tangent", "loss factor"; "complex viscosity" is no modulus.
+  // "tan delta", "loss tangent", "loss factor".
   const bool tangent = has_word(words, "tan") || has_word(words, "tangent") ||
                        (has_word(words, "loss") && has_word(words, "factor"));
   if (tangent) return kLossTangent;
-  if (has_word(words, "viscosity")) return std::nullopt;
+  // "complex viscosity" is no modulus, "strain rate" no strain.
+  for (const std::string_view other : {"viscosity", "rate", "geschwindigkeit", "vitesse"}) {
+    if (has_word(words, other)) return std::nullopt;
+  }
   if (has_word(words, "compliance")) return kCompliance;
   if (has_word(words, "modulus") && has_word(words, "relaxation")) return kRelaxation;
   std::optional<Recognized> found;

@@ -58,6 +58,10 @@ struct ImportOptions {
   std::map<std::string, std::string> units;  ///< column name or number -> unit
   bool negate_drive = false;                 ///< for machines that count tension positive
   bool negate_response = false;
+  /// Of the specimen, unloaded: a column of its length, or of how far it was drawn, is divided by
+  /// it.
+  std::optional<double> rest_length_m;
+  std::optional<double> area_m2;  ///< of the specimen: a column of its force is divided by it
   std::optional<double> contact_force_N;  ///< above 0: samples before contact are left out
   int contact_samples = 3;                ///< how many samples in a row must reach it, from 1
 

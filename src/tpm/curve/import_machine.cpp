@@ -10,178 +10,23 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/contact.hpp"
-#include "tpm/curve/header_words.hpp"
+#include "tpm/curve/machine_header.hpp"
+#include "tpm/curve/specimen_size.hpp"
 
 namespace tpm {
 namespace {
 
-/// A column as the header shows it.
-struct Column {
-  std::size_t index;
-  std::string name;  ///< may be empty
-  std::string unit;  ///< may be empty
-  std::optional<Recognized> meaning;
-
-  [[nodiscard]] std::string label() const {
-    return name.empty() ? fmt::format("column {}", index + 1)
-                        : fmt::format("column {} '{}'", index + 1, printable(name));
-  }
-};
-
-struct Header {
-  std::size_t rows = 0;
-  std::string sheet;
-  std::vector<Column> columns;
-};
-
-bool holds_samples(const DelimitedRow& row, bool decimal_comma) {
-  std::size_t filled = 0;
-  std::size_t numbers = 0;
-  for (const std::string_view field : row.fields) {
-    if (field.empty()) continue;
-    ++filled;
-    if (is_number(field, decimal_comma)) ++numbers;
-  }
-  return numbers >= 2 && 2 * numbers > filled;
-}
-
-std::size_t count_header_rows(const DelimitedTable& table, const std::string& file) {
-  const auto& rows = table.rows;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    // One row of numbers may be specimen data in the header; samples come in rows of one width.
-    const bool last = i + 1 == rows.size();
-    if (holds_samples(rows[i], table.decimal_comma) &&
-        (last || (rows[i].fields.size() == rows[i + 1].fields.size() &&
-                  holds_samples(rows[i + 1], table.decimal_comma)))) {
-      return i;
-    }
-  }
-  throw bad_input(file, "no row with two or more numbers",
-                  "samples, or another separator or decimal sign");
-}
-
-bool is_bracketed(std::string_view cell) {
-  return without_brackets(cell).size() < cell.size();
-}
-
-/// A row of units: all cells are units or stand in brackets, or at least half of them are units and
-/// none is a title. A cell that is no unit is refused by whoever reads its column.
-bool is_unit_row(const DelimitedRow& row) {
-  std::size_t filled = 0, units = 0, brackets = 0, titles = 0;
-  for (const std::string_view field : row.fields) {
-    if (field.empty() || field == "-") continue;
-    ++filled;
-    const bool unit = is_unit(without_brackets(field));
-    if (unit) ++units;
-    if (is_bracketed(field)) ++brackets;
-    if (!unit && recognize_title(split_title(field).name)) ++titles;
-  }
-  if (filled == 0) return false;
-  return units == filled || brackets == filled || (2 * units >= filled && titles == 0);
-}
-
-bool is_blank(const DelimitedRow& row) {
-  return std::all_of(row.fields.begin(), row.fields.end(),
-                     [](std::string_view field) { return field.empty(); });
-}
-
-std::size_t recognized_titles(const DelimitedRow& row) {
-  return static_cast<std::size_t>(std::count_if(
-      row.fields.begin(), row.fields.end(),
-      [](std::string_view field) { return recognize_title(split_title(field).name).has_value(); }));
-}
-
-std::string field_or_empty(const DelimitedRow& row, std::size_t index) {
-  return std::string(index < row.fields.size() ? row.fields[index] : std::string_view());
-}
-
-/// A row above the titles that repeats one text names the sheet.
-std::string sheet_name(const DelimitedRow& row) {
-  std::string name;
-  for (const std::string_view field : row.fields) {
-    if (field.empty()) continue;
-    if (!name.empty() && field != name) return {};
-    name = field;
-  }
-  return name;
-}
-
-/// Units given by name or number go before those of the file.
-std::string chosen_unit(const Column& column, const ImportOptions& options) {
-  for (const auto& [selector, unit] : options.units) {
-    if (selector == column.name || selector == std::to_string(column.index + 1)) return unit;
-  }
-  return column.unit;
-}
-
-/// Where titles and units stand; null if nowhere.
-struct HeaderRows {
-  const DelimitedRow* titles = nullptr;
-  const DelimitedRow* units = nullptr;
-};
-
-/// Units and titles stand in any order, with blank rows and rows of other things between them.
-/// Titles are the row with the most names that are known; of several, the one nearest to the
-/// samples.
-HeaderRows header_rows(const DelimitedTable& table, std::size_t count) {
-  HeaderRows found;
-  std::size_t most = 0;
-  for (std::size_t i = count; i-- > 0;) {
-    const DelimitedRow& row = table.rows[i];
-    if (is_blank(row)) continue;
-    if (is_unit_row(row)) {
-      if (found.units == nullptr) found.units = &row;
-      continue;
-    }
-    const std::size_t names = recognized_titles(row);
-    if (found.titles != nullptr && names <= most) continue;
-    found.titles = &row;
-    most = names;
-  }
-  return found;
-}
-
-Header read_header(const DelimitedTable& table, const std::string& file,
-                   const ImportOptions& options) {
-  Header header;
-  header.rows = options.header_rows ? static_cast<std::size_t>(*options.header_rows)
-                                    : count_header_rows(table, file);
-  if (header.rows >= table.rows.size()) {
-    throw bad_input(file,
-                    fmt::format("{} header rows but only {} rows", header.rows, table.rows.size()),
-                    "samples below the header");
-  }
-  const HeaderRows rows = header_rows(table, header.rows);
-  for (std::size_t i = header.rows; i-- > 0 && header.sheet.empty();) {
-    const DelimitedRow& row = table.rows[i];
-    if (&row != rows.units && &row != rows.titles) header.sheet = sheet_name(row);
-  }
-  for (std::size_t i = 0; i < table.rows[header.rows].fields.size(); ++i) {
-    const ColumnTitle title =
-        split_title(rows.titles == nullptr ? std::string() : field_or_empty(*rows.titles, i));
-    const std::string cell = rows.units == nullptr ? std::string() : field_or_empty(*rows.units, i);
-    const std::string unit(without_brackets(cell));
-    Column column{i, title.name, unit.empty() ? title.unit : unit, recognize_title(title.name)};
-    column.unit = chosen_unit(column, options);
-    const bool per_second = is_unit(column.unit) && parse_unit(column.unit, {}).symbol == "Hz" &&
-                            column.unit.find("Hz") == std::string::npos;
-    if (per_second && is_angular(column.name)) column.unit = "rad/s";
-    header.columns.push_back(std::move(column));
-  }
-  return header;
-}
-
-std::string column_list(const Header& header) {
+std::string column_list(const MachineHeader& header) {
   std::string list;
-  for (const Column& column : header.columns) {
+  for (const MachineColumn& column : header.columns) {
     list += fmt::format("{}{}", list.empty() ? "" : ", ", column.label());
   }
   return printable(list, 200);
 }
 
-const Column& column_by_selector(const Header& header, const std::string& selector,
-                                 const std::string& file) {
-  for (const Column& column : header.columns) {
+const MachineColumn& column_by_selector(const MachineHeader& header, const std::string& selector,
+                                        const std::string& file) {
+  for (const MachineColumn& column : header.columns) {
     if (column.name == selector) return column;
   }
   std::size_t number = 0;
@@ -194,23 +39,23 @@ const Column& column_by_selector(const Header& header, const std::string& select
   throw bad_input(file, fmt::format("no column '{}'", printable(selector)), column_list(header));
 }
 
-const Column* column_by_title(const Header& header, ColumnRole role) {
-  const Column* best = nullptr;
-  for (const Column& column : header.columns) {
+const MachineColumn* column_by_title(const MachineHeader& header, ColumnRole role) {
+  const MachineColumn* best = nullptr;
+  for (const MachineColumn& column : header.columns) {
     if (!column.meaning || column.meaning->role != role) continue;
     if (best == nullptr || column.meaning->rank < best->meaning->rank) best = &column;
   }
   return best;
 }
 
-const Column* find_column(const Header& header, ColumnRole role, const std::string& selector,
-                          const std::string& file) {
+const MachineColumn* find_column(const MachineHeader& header, ColumnRole role,
+                                 const std::string& selector, const std::string& file) {
   if (!selector.empty()) return &column_by_selector(header, selector, file);
   return column_by_title(header, role);
 }
 
 /// What to add to the command line. The unit itself is for the user to say.
-std::string unit_option(const Column& column, Dimension dimension) {
+std::string unit_option(const MachineColumn& column, Dimension dimension) {
   const std::string units = units_of(dimension);
   return fmt::format(
       "--unit \"{}=UNIT\" with a unit of {}{}{}",
@@ -218,7 +63,7 @@ std::string unit_option(const Column& column, Dimension dimension) {
       dimension_name(dimension), units.empty() ? "" : ": ", units);
 }
 
-Unit unit_of(const Column& column, Dimension dimension, const std::string& file) {
+Unit unit_of(const MachineColumn& column, Dimension dimension, const std::string& file) {
   const std::string where = fmt::format("{}: {}", file, column.label());
   if (is_unit(column.unit) || column.unit.empty()) return parse_unit(column.unit, dimension, where);
   throw bad_input(where, fmt::format("unknown unit '{}'", printable(column.unit)),
@@ -227,7 +72,7 @@ Unit unit_of(const Column& column, Dimension dimension, const std::string& file)
 
 /// A column that is going to be read.
 struct Use {
-  const Column* column;
+  const MachineColumn* column;
   Quantity quantity;
   Bound bound;
   bool negate;
@@ -245,7 +90,9 @@ void require_units(const std::vector<Use>& uses, const std::string& file) {
   std::size_t missing = 0;
   for (const Use& use : uses) {
     const Dimension dimension = dimension_of(use);
-    if (!use.column->unit.empty() || dimension == Dimension::dimensionless) continue;
+    // A strain without a unit may be a plain number or percent.
+    const bool plain = dimension == Dimension::dimensionless && use.quantity != Quantity::strain;
+    if (!use.column->unit.empty() || plain) continue;
     ++missing;
     labels += fmt::format("{}{}", labels.empty() ? "" : ", ", use.column->label());
     options +=
@@ -257,7 +104,7 @@ void require_units(const std::vector<Use>& uses, const std::string& file) {
 }
 
 /// A column titled "F" in kPa holds a stress: the unit says what the title cannot.
-Quantity response_quantity(const Column& column, const ImportOptions& options) {
+Quantity response_quantity(const MachineColumn& column, const ImportOptions& options) {
   if (options.response_quantity) return *options.response_quantity;
   const Quantity titled = column.meaning && column.meaning->role == ColumnRole::response
                               ? column.meaning->quantity
@@ -272,17 +119,29 @@ Quantity response_quantity(const Column& column, const ImportOptions& options) {
 }
 
 /// Storage and loss in N/m are dynamic stiffnesses, else moduli.
-Quantity spectrum_quantity(const Column& column, bool loss) {
+Quantity spectrum_quantity(const MachineColumn& column, bool loss) {
   const bool stiffness = is_unit(column.unit) &&
                          parse_unit(column.unit, column.name).dimension == Dimension::stiffness;
   const auto known = spectrum_quantities(stiffness ? Dimension::stiffness : Dimension::stress);
   return loss ? known.loss : known.storage;
 }
 
-Quantity drive_quantity(const Column& column, const ImportOptions& options) {
+bool has_dimension(const MachineColumn& column, Dimension dimension) {
+  return is_unit(column.unit) && parse_unit(column.unit, column.name).dimension == dimension;
+}
+
+/// An elongation in percent is a strain.
+Quantity drive_quantity(const MachineColumn& column, const ImportOptions& options) {
   if (options.drive_quantity) return *options.drive_quantity;
-  return column.meaning && column.meaning->role == ColumnRole::drive ? column.meaning->quantity
-                                                                     : Quantity::indentation_depth;
+  const Quantity titled = column.meaning && column.meaning->role == ColumnRole::drive
+                              ? column.meaning->quantity
+                              : Quantity::indentation_depth;
+  if (titled == Quantity::strain && has_dimension(column, Dimension::length)) {
+    return Quantity::indentation_depth;  // a "deformation" in mm
+  }
+  const bool relative = titled == Quantity::indentation_depth && !column.unit.empty() &&
+                        has_dimension(column, Dimension::dimensionless);
+  return relative ? Quantity::strain : titled;
 }
 
 std::string finding_name(const Use& use) {
@@ -296,7 +155,7 @@ std::string finding_name(const Use& use) {
 /// Builds the series column by column and says which column became what.
 class SeriesReader {
  public:
-  SeriesReader(const DelimitedTable& table, const Header& header, const std::string& file)
+  SeriesReader(const DelimitedTable& table, const MachineHeader& header, const std::string& file)
       : table_(table), header_(header), file_(file) {
     series_.lines.reserve(table.rows.size() - header.rows);
     for (std::size_t i = header.rows; i < table.rows.size(); ++i) {
@@ -310,7 +169,7 @@ class SeriesReader {
   }
 
   void add(const Use& use) {
-    const Column& column = *use.column;
+    const MachineColumn& column = *use.column;
     const Bound bound = use.bound;
     const bool negate = use.negate;
     ImportedColumn imported;
@@ -336,7 +195,7 @@ class SeriesReader {
 
   [[nodiscard]] ImportedSeries take() {
     std::string unused;
-    for (const Column& column : header_.columns) {
+    for (const MachineColumn& column : header_.columns) {
       if (std::find(used_.begin(), used_.end(), column.index) != used_.end()) continue;
       unused += fmt::format("{}{}", unused.empty() ? "" : ", ", column.label());
     }
@@ -346,7 +205,7 @@ class SeriesReader {
 
  private:
   const DelimitedTable& table_;
-  const Header& header_;
+  const MachineHeader& header_;
   const std::string& file_;
   ImportedSeries series_;
   std::vector<std::size_t> used_;
@@ -354,20 +213,23 @@ class SeriesReader {
 
 /// The columns of a spectrum, nothing if the file holds something else: a frequency alone may be
 /// that of the sampling, and a column that is named as time, drive or response says what is meant.
-std::vector<Use> spectrum_uses(const Header& header, const std::string& file,
+std::vector<Use> spectrum_uses(const MachineHeader& header, const std::string& file,
                                const ImportOptions& options) {
   const bool chosen = !options.frequency_column.empty() || !options.storage_column.empty() ||
                       !options.loss_column.empty();
   const bool recording = !options.time_column.empty() || !options.drive_column.empty() ||
                          !options.response_column.empty();
   if (recording && !chosen) return {};
-  const Column* frequency =
+  const MachineColumn* frequency =
       find_column(header, ColumnRole::frequency, options.frequency_column, file);
-  const Column* storage = find_column(header, ColumnRole::storage, options.storage_column, file);
-  const Column* loss = find_column(header, ColumnRole::loss, options.loss_column, file);
-  const Column* magnitude = chosen ? nullptr : column_by_title(header, ColumnRole::magnitude);
-  const Column* angle = chosen ? nullptr : column_by_title(header, ColumnRole::phase);
-  const Column* tangent = chosen ? nullptr : column_by_title(header, ColumnRole::loss_tangent);
+  const MachineColumn* storage =
+      find_column(header, ColumnRole::storage, options.storage_column, file);
+  const MachineColumn* loss = find_column(header, ColumnRole::loss, options.loss_column, file);
+  const MachineColumn* magnitude =
+      chosen ? nullptr : column_by_title(header, ColumnRole::magnitude);
+  const MachineColumn* angle = chosen ? nullptr : column_by_title(header, ColumnRole::phase);
+  const MachineColumn* tangent =
+      chosen ? nullptr : column_by_title(header, ColumnRole::loss_tangent);
   const bool polar = magnitude != nullptr && (angle != nullptr || tangent != nullptr);
   if (!chosen && (frequency == nullptr || (storage == nullptr && loss == nullptr && !polar))) {
     return {};
@@ -418,12 +280,59 @@ void resolve_phase(ImportedSeries& series, const std::vector<Use>& uses) {
                                                 : "storage and loss tangent to loss"});
 }
 
-std::vector<Use> recording_uses(const Header& header, const std::string& file,
+/// The response of a strain is a stress, if there is one beside a force.
+const MachineColumn* response_column(const MachineHeader& header, const MachineColumn* drive,
+                                     const ImportOptions& options, const std::string& file) {
+  const MachineColumn* found =
+      find_column(header, ColumnRole::response, options.response_column, file);
+  const bool chosen = !options.response_column.empty() || options.response_quantity;
+  if (chosen || drive == nullptr || !is_answered_by_stress(drive_quantity(*drive, options))) {
+    return found;
+  }
+  const auto stress =
+      std::find_if(header.columns.begin(), header.columns.end(), [](const MachineColumn& column) {
+        return column.meaning && column.meaning->quantity == Quantity::stress &&
+               column.meaning->role == ColumnRole::response;
+      });
+  return stress == header.columns.end() ? found : &*stress;
+}
+
+/// A length, or how far the specimen was drawn, becomes a relative length or a strain by its length
+/// at rest, a force a stress by its cross section. Says which option is missing.
+void resolve_specimen(Use& drive, Use& response, const std::string& file,
+                      const ImportOptions& options) {
+  const bool length = has_dimension(*drive.column, Dimension::length);
+  const bool drawn = drive.quantity == Quantity::indentation_depth &&
+                     (options.rest_length_m || response.quantity == Quantity::stress);
+  const bool of_length = is_answered_by_stress(drive.quantity) && length;
+  const auto missing = [&](const Use& use, const char* what, const char* expected) {
+    throw bad_input(fmt::format("{}: {}", file, use.column->label()), what, expected);
+  };
+  if (drawn || of_length) {
+    if (!options.rest_length_m) {
+      missing(drive, drawn ? "a displacement beside a stress" : "a length of the specimen",
+              "--rest-length with its unloaded length, such as --rest-length \"20 mm\"");
+    }
+    if (drawn) drive.quantity = Quantity::strain;
+    drive.dimension = Dimension::length;
+  }
+  const bool force = response.quantity == Quantity::contact_force &&
+                     has_dimension(*response.column, Dimension::force);
+  if (!force || !is_answered_by_stress(drive.quantity)) return;
+  if (!options.area_m2) {
+    missing(response, "a force beside a strain or relative length",
+            "--area with the cross section of the specimen, such as --area \"12 mm^2\"");
+  }
+  response.quantity = Quantity::stress;
+  response.dimension = Dimension::force;
+}
+
+std::vector<Use> recording_uses(const MachineHeader& header, const std::string& file,
                                 const ImportOptions& options) {
-  const Column* time = find_column(header, ColumnRole::time, options.time_column, file);
-  const Column* drive = find_column(header, ColumnRole::drive, options.drive_column, file);
-  const Column* response = find_column(header, ColumnRole::response, options.response_column, file);
-  const Column* sd = find_column(header, ColumnRole::sd, options.sd_column, file);
+  const MachineColumn* time = find_column(header, ColumnRole::time, options.time_column, file);
+  const MachineColumn* drive = find_column(header, ColumnRole::drive, options.drive_column, file);
+  const MachineColumn* response = response_column(header, drive, options, file);
+  const MachineColumn* sd = find_column(header, ColumnRole::sd, options.sd_column, file);
   if (response == nullptr) {
     throw bad_input(file, "no column is recognised as a force, stress, modulus or compliance",
                     fmt::format("--response with one of {}", column_list(header)));
@@ -436,11 +345,16 @@ std::vector<Use> recording_uses(const Header& header, const std::string& file,
   const Quantity observed = response_quantity(*response, options);
   std::vector<Use> uses;
   if (time != nullptr) uses.push_back({time, Quantity::time, Bound::value, false});
+  Use answer{response, observed, Bound::value, options.negate_response};
   if (drive != nullptr && !is_step_response(observed)) {
-    uses.push_back({drive, drive_quantity(*drive, options), Bound::value, options.negate_drive});
+    Use imposed{drive, drive_quantity(*drive, options), Bound::value, options.negate_drive};
+    resolve_specimen(imposed, answer, file, options);
+    uses.push_back(imposed);
   }
-  uses.push_back({response, observed, Bound::value, options.negate_response});
-  if (sd != nullptr) uses.push_back({sd, observed, Bound::sd, false});
+  uses.push_back(answer);
+  if (sd != nullptr) {
+    uses.push_back({sd, answer.quantity, Bound::sd, false, answer.dimension});
+  }
   return uses;
 }
 
@@ -448,7 +362,7 @@ std::vector<Use> recording_uses(const Header& header, const std::string& file,
 
 ImportedSeries read_machine(const DelimitedTable& table, const std::string& file,
                             const ImportOptions& options) {
-  const Header header = read_header(table, file, options);
+  const MachineHeader header = read_machine_header(table, file, options);
   std::vector<Use> uses = spectrum_uses(header, file, options);
   const bool spectrum = !uses.empty();
   if (!spectrum) uses = recording_uses(header, file, options);
@@ -456,7 +370,12 @@ ImportedSeries read_machine(const DelimitedTable& table, const std::string& file
   SeriesReader reader(table, header, file);
   for (const Use& use : uses) reader.add(use);
   ImportedSeries series = reader.take();
-  if (spectrum) resolve_phase(series, uses);
+  if (spectrum) {
+    resolve_phase(series, uses);
+  } else {
+    divide_by_size(series, options);
+    resolve_kept_step(series);
+  }
   series.name = header.sheet;
   series.findings.insert(
       series.findings.begin(),

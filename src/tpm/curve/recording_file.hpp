@@ -8,6 +8,10 @@
 
 namespace tpm {
 
+/// How the columns of a file and their units were understood: "read as time: column 1 'Time', s;
+/// ...". Empty for a file with a description.
+[[nodiscard]] std::string columns_words(const RecordingFile& file);
+
 /// Any recording from one path, without a configuration:
 ///
 /// - a CSV file with its JSON description beside it (or that description, or the id of a curve that

@@ -206,7 +206,8 @@ struct Refits {
 
   void add(const ResidualFunction& function, std::span<const FitParameter> parameters,
            const Minimum& minimum) {
-    const Minimum m = minimise(function, parameters, minimum.natural);
+    Minimum m = minimise(function, parameters, minimum.natural);
+    function.exchange_order().sort(m.natural);
     if (!m.usable) {
       ++failed;
       return;

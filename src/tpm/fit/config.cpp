@@ -44,7 +44,7 @@ LawSpec parse_law(const Json& j, const DocumentPlace& place) {
   LawSpec spec = parse_law_name(j.at("name").get<std::string>(), place.key("name").where);
   const std::string drive = j.value("drive", std::string(quantity_name(spec.drive)));
   spec.drive = parse_quantity_name(drive, place.key("drive").where);
-  if (spec.drive == Quantity::relative_length) spec.response = Quantity::stress;
+  if (is_answered_by_stress(spec.drive)) spec.response = Quantity::stress;
   spec.reference = quantity_at(j, "reference", quantity_dimension(spec.drive), place);
   require_valid(spec, place.where);
   return spec;
@@ -93,8 +93,15 @@ std::vector<double> model_parameters(const FitConfig& config, std::span<const do
   return values;
 }
 
+bool has_element(const FitConfig& config) {
+  return !config.law && (!config.organ || OrganModel(config.organ).has_element());
+}
+
 TpmParameters element_parameters(const FitConfig& config, std::span<const double> natural,
                                  std::size_t choice) {
+  if (!has_element(config)) {
+    throw bad_input("fit", "the model is not the paper's element", "E1, E2, Eprime and eta1");
+  }
   const std::vector<double> values = model_parameters(config, natural, choice);
   TpmVector vector{};
   std::copy(values.begin(), values.end(), vector.begin());
@@ -129,7 +136,7 @@ FitConfig parse_fit_config(const Json& document, std::string_view where,
   parse_parameters(document, *model, config, place);
   config.fixed = parse_fixed(document, *model, config, place);
   require_each_set_once(config, *model, document, place);
-  if (!config.law) {
+  if (has_element(config)) {
     TpmVector fixed{};
     std::copy(config.fixed.begin(), config.fixed.end(), fixed.begin());
     require_valid(from_vector(fixed), place.key("fixed").where);

@@ -77,11 +77,11 @@ void parse_stiffness_per_modulus(const Json& j, const FitConfig& config, DataCho
                                  const DocumentPlace& place) {
   if (!j.contains("stiffness_per_modulus")) return;
   const DocumentPlace here = place.key("stiffness_per_modulus");
-  const bool strip = config.law && config.law->drive == Quantity::relative_length;
+  const bool strip = config.law && is_answered_by_stress(config.law->drive);
   if (data.protocol.kind != Kind::oscillation || strip) {
     throw bad_input(
         here.where,
-        strip ? "beside a law of stress over relative length"
+        strip ? "beside a law of stress"
               : fmt::format("beside protocol '{}'", protocol_kind_name(data.protocol.kind)),
         "it only with oscillation and a law of contact force over indentation depth");
   }
@@ -108,6 +108,12 @@ ImportOptions parse_import(const Json& j, const DocumentPlace& place) {
     import.response_quantity = parse_quantity_name(j.at("response_quantity").get<std::string>(),
                                                    place.key("response_quantity").where);
   }
+  import.negate_drive = j.value("negate_drive", false);
+  import.negate_response = j.value("negate_response", false);
+  if (j.contains("rest_length")) {
+    import.rest_length_m = quantity_at(j, "rest_length", Dimension::length, place);
+  }
+  if (j.contains("area")) import.area_m2 = quantity_at(j, "area", Dimension::area, place);
   if (j.contains("units")) {
     for (const auto& [column, unit] : j.at("units").items()) {
       import.units[column] = unit.get<std::string>();

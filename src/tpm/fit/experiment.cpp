@@ -165,10 +165,10 @@ void add_step_response(ExperimentSet& set, const FitConfig& config, std::size_t 
                        const Recording& recording) {
   const DataChoice& data = config.data[choice];
   const std::string where = fmt::format("recording '{}'", data.dataset);
-  if (!config.law || config.law->drive != Quantity::relative_length) {
+  if (!config.law || !is_answered_by_stress(config.law->drive)) {
     throw bad_input(where,
                     fmt::format("{} and another law", quantity_name(recording.response_quantity)),
-                    "a law with \"drive\": \"relative_length\", of stress over strain");
+                    "a law of stress: \"drive\": \"strain\" (or \"relative_length\")");
   }
   if (recording.time_s.empty() || !(recording.time_s.front() >= 0.0)) {
     throw bad_input(where, "no times, or times before the step", "times from 0 on");

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/interrupted.hpp"
 
 namespace tpm {
 
@@ -11,7 +12,7 @@ ExperimentResiduals::ExperimentResiduals(const FitConfig& config)
     : ExperimentResiduals(config, load_data(config)) {}
 
 ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vector<DataSet>& data)
-    : config_(config), model_(make_model(config)) {
+    : config_(config), model_(make_model(config)), order_(config) {
   ExperimentSet set = set_up_experiments(config_, data);
   data_ = std::move(set.data);
   experiments_ = std::move(set.experiments);
@@ -233,6 +234,9 @@ std::vector<std::pair<Eigen::Index, Eigen::Index>> ExperimentResiduals::columns_
 
 bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                                    RowMatrix* jacobian) const {
+  if (config_.interrupted && config_.interrupted()) {
+    throw Interrupted("fit: interrupted; nothing was written");
+  }
   RowMatrix sensitivity;
   Eigen::VectorXd answer;
   try {
@@ -344,6 +348,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::thinned(std::size_t mo
   few->model_ = model_;
   few->moving_sigma_ = moving_sigma_;
   few->linear_ = linear_;
+  few->order_ = order_;
   for (Experiment experiment : experiments_) {
     const std::size_t n = experiment.data.size();
     if (experiment.is_recording && n > most) thin(experiment, (n + most - 1) / most);
@@ -369,6 +374,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->moving_sigma_ = moving_sigma_;
   other->counts_ = counts_;
   other->linear_ = linear_;
+  other->order_ = order_;
   other->plain_ = plain_;
   other->residual_count_ = residual_count_;
   other->offset_ = offset_;

@@ -27,6 +27,7 @@ class ExperimentResiduals final : public ResidualFunction {
   [[nodiscard]] double offset() const override { return offset_; }
   [[nodiscard]] bool linear_in(std::size_t parameter) const override { return linear_[parameter]; }
   [[nodiscard]] const ExperimentResiduals* scout() const override { return scout_.get(); }
+  [[nodiscard]] const ExchangeOrder& exchange_order() const override { return order_; }
 
   [[nodiscard]] const std::vector<FitDatum>& data() const { return data_; }
   [[nodiscard]] const std::vector<Experiment>& experiments() const { return experiments_; }
@@ -137,6 +138,7 @@ class ExperimentResiduals final : public ResidualFunction {
   std::vector<std::optional<MovingSigma>> moving_sigma_;  ///< of each data set
   std::vector<int> counts_;                               ///< empty: every datum counts once
   std::vector<bool> linear_;  ///< of each estimated parameter: linear_in
+  ExchangeOrder order_;
   std::optional<PlainResiduals> plain_;
   std::unique_ptr<ExperimentResiduals> scout_;  ///< the same, asking the model's scout
   Eigen::Index residual_count_ = 0;

@@ -112,6 +112,10 @@ Json parameter_json(const ParameterResult& p) {
   if (has_failed(p.profile.below)) failed.push_back("lower");
   if (has_failed(p.profile.above)) failed.push_back("upper");
   if (!failed.empty()) j["profile_failed"] = std::move(failed);
+  Json exchanged = Json::array();
+  if (p.profile.below == ProfileEnd::exchange) exchanged.push_back("lower");
+  if (p.profile.above == ProfileEnd::exchange) exchanged.push_back("upper");
+  if (!exchanged.empty()) j["changes_places"] = std::move(exchanged);
   j["profile_failures"] = p.profile.failures;
   if (p.profile.cut_short) j["interval_cut_short"] = true;
   return j;

@@ -57,13 +57,14 @@ MultiStart run_starts(const ResidualFunction& function, std::span<const FitParam
   std::vector<Minimum> ends;
   Progress progress("fitting from several starts", starts.size());
   for (const auto& start : starts) {
-    const Minimum m = kind == StartKind::solved ? minimise_near(function, parameters, start)
-                                                : minimise_both_ways(function, parameters, start);
+    Minimum m = kind == StartKind::solved ? minimise_near(function, parameters, start)
+                                          : minimise_both_ways(function, parameters, start);
+    function.exchange_order().sort(m.natural);
     ++result.run;
     result.end_deviances.push_back(m.usable ? m.deviance
                                             : std::numeric_limits<double>::quiet_NaN());
     if (m.usable) {
-      ends.push_back(m);
+      ends.push_back(std::move(m));
     } else {
       ++result.failed;
     }
@@ -155,6 +156,7 @@ void profile_all(const ResidualFunction& function, FitResult& result,
           profile_likelihood(function, parameters, candidates, i, result.covariance, threshold);
       if (profile.better) {
         result.best = minimise(function, parameters, profile.better->natural);
+        function.exchange_order().sort(result.best.natural);
         result.covariance = linear_covariance(function, parameters, result.best, threshold);
         deeper = true;
         continue;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fit.hpp"
@@ -90,6 +91,17 @@ std::string recording_line(const FitResult& result, const RecordingFit& r) {
   return text + "\n";
 }
 
+/// What chi-square was counted with, if the size of the noise was estimated.
+std::string noise_line(const FitResult& result) {
+  const bool known = std::all_of(result.config.data.begin(), result.config.data.end(),
+                                 [](const DataChoice& d) { return d.noise.scale_known; });
+  if (known || result.degrees_of_freedom <= 0) return {};
+  return fmt::format(
+      "the size of the noise is estimated: {} times the standard deviations that chi-square was "
+      "counted with\n",
+      significant(std::sqrt(result.variance_factor), 4));
+}
+
 std::string likelihood_line(const Likelihood& l) {
   return fmt::format("-2 ln L {}, AIC {}, AICc {}, BIC {} with {} parameters\n",
                      significant(l.minus_two_log, 6), significant(l.aic, 6),
@@ -124,12 +136,13 @@ std::string to_terminal_text(const FitResult& result) {
     text += reference_words(*result.config.law) + "\n";
   }
   text += "\n";
-  text += fmt::format("chi-square {} from {} values and {} bands, {} degrees of freedom",
-                      significant(result.chi_square, 6), result.value_count, result.band_count,
+  text += fmt::format("chi-square {} from {} values{}, {} degrees of freedom",
+                      significant(result.chi_square, 6), result.value_count,
+                      result.band_count > 0 ? fmt::format(" and {} bands", result.band_count) : "",
                       result.degrees_of_freedom > 0 ? std::to_string(result.degrees_of_freedom)
                                                     : std::string("no"));
   if (result.chi_square_p) text += fmt::format(", p = {}", significant(*result.chi_square_p, 2));
-  text += "\n";
+  text += "\n" + noise_line(result);
   if (result.likelihood) text += likelihood_line(*result.likelihood);
   text += "\n";
   for (const ParameterResult& p : result.parameters) text += "- " + p.words + "\n";

@@ -80,6 +80,11 @@ ceres::Solver::Options solver_options(FirstStep first_step) {
 
 }  // namespace
 
+const ExchangeOrder& ResidualFunction::exchange_order() const {
+  static const ExchangeOrder kNone;
+  return kNone;
+}
+
 double deviance_at(const ResidualFunction& function, std::span<const double> natural) {
   Eigen::VectorXd r;
   if (!function.evaluate(natural, r, nullptr)) return std::numeric_limits<double>::quiet_NaN();

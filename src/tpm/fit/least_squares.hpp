@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/fit/exchange_order.hpp"
 #include "tpm/fit/parameter.hpp"
 #include "tpm/model/model.hpp"
 
@@ -49,6 +50,9 @@ class ResidualFunction {
 
   /// Constant part of the sum of squares that is not deviance.
   [[nodiscard]] virtual double offset() const { return 0.0; }
+
+  /// The order of parameters that can change places without changing the residuals.
+  [[nodiscard]] virtual const ExchangeOrder& exchange_order() const;
 };
 
 /// The end of one descent.

@@ -11,10 +11,10 @@ namespace {
 /// Factor from the readings to what the law answers.
 double law_per_reading(const LawSpec& law, const DataChoice& data, Dimension readings) {
   const std::string where = fmt::format("spectrum '{}'", data.dataset);
-  const bool strip = law.drive == Quantity::relative_length;
+  const bool strip = is_answered_by_stress(law.drive);
   if (readings == Dimension::stiffness) {
     if (strip) {
-      throw bad_input(where, "stiffnesses, and a law of stress over relative length",
+      throw bad_input(where, "stiffnesses, and a law of stress",
                       "moduli, or a law with the drive 'indentation_depth'");
     }
     if (data.stiffness_per_modulus_m) {

@@ -169,49 +169,6 @@ std::vector<bool> linear_parameters(const ExperimentResiduals& function) {
   return linear;
 }
 
-/// Place of an estimated parameter.
-std::optional<std::size_t> place_of(const FitConfig& config, const std::string& name) {
-  for (std::size_t i = 0; i < config.parameters.size(); ++i) {
-    if (config.parameters[i].fit.name == name) return i;
-  }
-  return std::nullopt;
-}
-
-/// Two spring-pots can change places without changing the law: starts have alpha >= beta.
-void sort_springpots(const FitConfig& config, std::vector<double>& start) {
-  const auto alpha = place_of(config, "alpha");
-  const auto beta = place_of(config, "beta");
-  if (!alpha || !beta || start[*alpha] >= start[*beta]) return;
-  if (config.law->fractional == Fractional::kelvin_voigt_pair) {
-    const auto first = place_of(config, "k1");
-    const auto second = place_of(config, "k2");
-    if (!first || !second) return;  // one is fixed: they keep their names
-    std::swap(start[*first], start[*second]);
-  }
-  std::swap(start[*alpha], start[*beta]);
-}
-
-/// Branches can change places without changing the law: starts have them in the order of their
-/// times, so that equal laws are seen to be equal.
-void sort_branches(const FitConfig& config, std::vector<double>& start) {
-  const auto place = [&](const std::string& name) { return place_of(config, name); };
-  const bool series = config.law->form == BranchForm::series;
-  std::vector<std::pair<double, double>> branches;  // time, stiffness
-  std::vector<std::pair<std::size_t, std::size_t>> places;
-  for (int i = 1; i <= config.law->branches; ++i) {
-    const auto time = place(fmt::format("{}{}", series ? "T" : "tau", i));
-    const auto stiffness = place(fmt::format("{}{}", series ? "kc" : "k", i));
-    if (!time || !stiffness) return;  // some are fixed: they keep their names
-    places.emplace_back(*time, *stiffness);
-    branches.emplace_back(start[*time], start[*stiffness]);
-  }
-  std::sort(branches.begin(), branches.end());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    start[places[i].first] = branches[i].first;
-    start[places[i].second] = branches[i].second;
-  }
-}
-
 }  // namespace
 
 StartKind start_kind(const ExperimentResiduals& function) {
@@ -229,12 +186,8 @@ std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
   }
   auto starts = projected_starts(function, parameters, linear_parameters(function), count,
                                  kFollowed, config.seed);
-  if (config.law) {
-    for (auto& start : starts) {
-      sort_branches(config, start);
-      if (has_two_springpots(config.law->fractional)) sort_springpots(config, start);
-    }
-  }
+  // Sorted, so that equal laws are seen to be equal.
+  for (auto& start : starts) function.exchange_order().sort(start);
   return starts;
 }
 

@@ -143,6 +143,11 @@ class ProfileWalk {
       double next = last_.theta + direction * step;
       if ((bound - next) * direction < 1e-3 * step) next = bound;
       const Minimum m = constrained(next, true);
+      if (m.usable && !function_.exchange_order().is_sorted(m.natural)) {
+        step *= 0.25;  // the search may have gone too far
+        if (step > kLeastStep * first_step) continue;
+        return End{ProfileEnd::exchange, last_.theta};
+      }
       if (!m.usable) {
         ++profile.failures;
         step *= 0.25;
@@ -209,12 +214,15 @@ class ProfileWalk {
     const double value = std::clamp(p.natural(theta), p.lower, p.upper);
     std::vector<double> start = predicted(theta);
     start[index_] = value;
-    Minimum m = minimise_near(function_, parameters_, start, fixed_);
+    const ExchangeOrder& order = function_.exchange_order();
+    const std::vector<FitParameter> bounded = order.bounds_around(parameters_, index_, value);
+    Minimum m = minimise_near(function_, bounded, start, fixed_);
     if (both_starts && (!m.usable || m.deviance > best_deviance_ + rise_)) {
       start = minimum_.natural;
       start[index_] = value;
-      const Minimum other = minimise_near(function_, parameters_, start, fixed_);
-      if (other.usable && (!m.usable || other.deviance < m.deviance)) m = other;
+      const Minimum other = minimise_near(function_, bounded, start, fixed_);
+      const bool deeper = other.usable && (!m.usable || other.deviance < m.deviance);
+      if (deeper && order.is_sorted(other.natural)) m = other;
     }
     return m;
   }
@@ -237,8 +245,11 @@ class ProfileWalk {
     std::vector<double> start = minimum_.natural;
     const FitParameter& p = parameters_[index_];
     start[index_] = std::clamp(p.natural(limit), p.lower, p.upper);
-    const Minimum other = minimise_near(function_, parameters_, start, fixed_);
-    if (!other.usable || other.deviance - best_deviance_ > (1.0 - 1e-5) * rise_) return limit;
+    const ExchangeOrder& order = function_.exchange_order();
+    const Minimum other = minimise_near(
+        function_, order.bounds_around(parameters_, index_, start[index_]), start, fixed_);
+    const bool within = other.usable && other.deviance - best_deviance_ <= (1.0 - 1e-5) * rise_;
+    if (!within || !order.is_sorted(other.natural)) return limit;
     return root_between(ends[0], ends[1], true);
   }
 
@@ -362,7 +373,8 @@ double profile_deviance(const ResidualFunction& function, std::span<const FitPar
   double least = std::numeric_limits<double>::infinity();
   for (std::vector<double> start : starts) {
     start[index] = value;
-    const Minimum m = minimise_near(function, parameters, start, fixed);
+    const Minimum m = minimise_near(
+        function, function.exchange_order().bounds_around(parameters, index, value), start, fixed);
     if (m.usable) least = std::min(least, m.deviance);
   }
   return least;

@@ -61,6 +61,8 @@ enum class ProfileEnd {
   not_walked,
   limit,     ///< the deviance rose by the threshold there
   bound,     ///< the bound came first: every value up to it fits
+  exchange,  ///< before the deviance rose by the threshold, two parts of the law were equal and
+             ///< changed places (ExchangeOrder): the data do not tell them apart
   rounding,  ///< failed: the interval is as narrow as the rounding of numbers
   steps,     ///< failed: neither limit nor bound was reached within the allowed number of steps
 };

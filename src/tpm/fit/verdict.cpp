@@ -83,6 +83,23 @@ std::string failure_words(const ParameterResult& p, double level) {
   return words;
 }
 
+/// Whether the walk ended where two parts of the law change places.
+bool exchanges(const ParameterResult& p, bool upper) {
+  return (upper ? p.profile.above : p.profile.below) == ProfileEnd::exchange;
+}
+
+std::string exchange_words(const ParameterResult& p) {
+  const bool below = exchanges(p, false);
+  const bool above = exchanges(p, true);
+  if (!below && !above) return {};
+  return fmt::format(
+      "; {} values it changes places with another part of the law before a limit is reached: the "
+      "data do not tell the two apart",
+      below && above ? "towards smaller and larger"
+      : below        ? "towards smaller"
+                     : "towards larger");
+}
+
 std::string range_words(const ParameterResult& p, double level) {
   const FitParameter& f = p.parameter;
   switch (p.verdict) {
@@ -100,6 +117,9 @@ std::string range_words(const ParameterResult& p, double level) {
       return fmt::format("{} is at most {} ({} interval, one-sided){}", f.name,
                          in_unit(f, *p.upper), percent(level), bound_note(p));
     case Verdict::flat:
+      if (exchanges(p, false) || exchanges(p, true)) {
+        return fmt::format("{} cannot be told from these data{}", f.name, bound_note(p));
+      }
       return fmt::format("{} cannot be told from these data: every value from {} to {} fits{}",
                          f.name, in_unit(f, f.lower), in_unit(f, f.upper), bound_note(p));
     case Verdict::failed:
@@ -114,7 +134,7 @@ std::string range_words(const ParameterResult& p, double level) {
 }  // namespace
 
 std::string parameter_words(const ParameterResult& p, double level) {
-  return range_words(p, level) +
+  return range_words(p, level) + exchange_words(p) +
          (p.profile.cut_short ? "; a limit is where the model can no longer be evaluated" : "");
 }
 

@@ -21,7 +21,8 @@ LoopModel element_model(const HilSession& session) {
                     "an organ of the kind star for the model 'element'");
   }
   LoopModel loop;
-  loop.model = std::make_unique<ElementContact>(tissue.material, session.servo.period_s);
+  loop.model =
+      std::make_unique<ElementContact>(tissue.element("the element"), session.servo.period_s);
   loop.name = "element: the paper's star, exact exponential update";
   loop.error_bound = "exact for linear motion within a period, to rounding";
   const std::size_t contact = tissue.network.organ.contact.value();
@@ -58,7 +59,7 @@ LoopModel network_model(const HilSession& session) {
 LoopModel network_beside_model(const HilSession& session, bool threads) {
   constexpr double kShortest_s = 0.1;
   const PushedScene scene(session);
-  const double tau_s = scene.tissue.material.relaxation_time_s();
+  const double tau_s = scene.tissue.bonds().shortest_relaxation_time_s();
   if (tau_s < kShortest_s) {
     throw bad_input(session.scene_place,
                     fmt::format("has a relaxation time of {} s, too short for the model "
@@ -132,8 +133,9 @@ LoopModel model_of(const HilSession& session, bool threads, const PlanningTold& 
 LoopModel make_loop_model(const HilSession& session, bool threads, const PlanningTold& told) {
   LoopModel loop = model_of(session, threads, told);
   if (!session.law) {
-    loop.relaxation_times_s = {
-        parse_tissue(session.scene, session.scene_place, {}).material.relaxation_time_s()};
+    const BondSystem bonds = parse_tissue(session.scene, session.scene_place, {}).bonds();
+    const std::span<const double> times_s = bonds.relaxation_times_s();
+    loop.relaxation_times_s.assign(times_s.begin(), times_s.end());
   }
   loop.stiffness_N_per_m = loop.push.dot(loop.model->instantaneous_stiffness() * loop.push);
   return loop;

@@ -1,5 +1,6 @@
 #include "tpm/law/contact_history.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -428,45 +429,78 @@ void ContactHistory::move_load(double from, double to, double h, double time_sca
   move_load_adaptive(from, to, h, time_scale, 0);
 }
 
+/// The limit of ever smaller steps from one move made in 1, 2, ..., n steps: the weights add up to
+/// 1 and take the errors of the lowest orders of the step away (Richardson). The branches make the
+/// step one of second order, a dashpot, whose speed is the mean over the step, one of first order.
+ContactHistory::Loaded ContactHistory::extrapolated(const std::vector<Loaded>& ends) const {
+  const auto n = std::ssize(ends);
+  const int order = law_.memory.dashpot > 0.0 ? 1 : 2;
+  Eigen::MatrixXd powers(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    powers(0, j) = 1.0;
+    for (Eigen::Index i = 1; i < n; ++i) {
+      powers(i, j) = std::pow(static_cast<double>(j + 1), -static_cast<double>(order + i - 1));
+    }
+  }
+  const Eigen::VectorXd weight = powers.fullPivLu().solve(Eigen::VectorXd::Unit(n, 0));
+  Loaded limit = ends.front();
+  limit.w *= weight[0];
+  limit.w_by *= weight[0];
+  limit.now.v *= weight[0];
+  limit.now.u_by *= weight[0];
+  limit.now.v_by *= weight[0];
+  for (Eigen::Index j = 1; j < n; ++j) {
+    const Loaded& end = ends[static_cast<std::size_t>(j)];
+    limit.w += weight[j] * end.w;
+    limit.w_by += weight[j] * end.w_by;
+    limit.now.v += weight[j] * end.now.v;
+    limit.now.u_by += weight[j] * end.now.u_by;
+    limit.now.v_by += weight[j] * end.now.v_by;
+  }
+  limit.now.u = law_.kernel.inverse(std::max(limit.now.v, 0.0));
+  return limit;
+}
+
+/// The largest difference of V and of the states of the branches.
+double ContactHistory::distance(const Loaded& a, const Loaded& b) const {
+  const double off = std::abs(a.now.v - b.now.v);
+  return a.w.size() > 0 ? std::max(off, (a.w - b.w).abs().maxCoeff()) : off;
+}
+
 void ContactHistory::move_load_adaptive(double from, double to, double h, double time_scale,
                                         int level) {
-  // The branches make the step one of second order, a dashpot, whose speed is the mean over the
-  // step, one of first order.
-  const bool first_order = law_.memory.dashpot > 0.0;
-  const double gain = first_order ? 1.0 : 1.0 / 3.0;
-  const Eigen::ArrayXd w = w_;
-  const Eigen::ArrayXXd w_by = w_by_;
-  const Point begin = now_;
-  const double middle = 0.5 * (from + to);
-  load_step(to, h, time_scale);
-  const Eigen::ArrayXd w_whole = w_;
-  const Eigen::ArrayXXd w_by_whole = w_by_;
-  const Point whole = now_;
-  w_ = w;
-  w_by_ = w_by;
-  now_ = begin;
-  load_step(middle, 0.5 * h, time_scale);
-  load_step(to, 0.5 * h, time_scale);
-  const double off =
-      std::max(std::abs(now_.v - whole.v), w_.size() > 0 ? (w_ - w_whole).abs().maxCoeff() : 0.0);
-  if (off > 30.0 * v_tolerance_ && level < kMostHalvings) {
-    w_ = w;
-    w_by_ = w_by;
-    now_ = begin;
-    move_load_adaptive(from, middle, 0.5 * h, time_scale, level + 1);
-    move_load_adaptive(middle, to, 0.5 * h, time_scale, level + 1);
+  constexpr int kMostSteps = 6;  // one move in 1, 2, ..., 6 steps, then halved
+  const double allowed = 30.0 * v_tolerance_;
+  const Loaded begin{w_, w_by_, now_};
+  const auto stand_at = [&](const Loaded& place) {
+    w_ = place.w;
+    w_by_ = place.w_by;
+    now_ = place.now;
+  };
+  std::vector<Loaded> ends;
+  Loaded best;
+  double off = std::numeric_limits<double>::infinity();
+  for (int steps = 1; steps <= kMostSteps; ++steps) {
+    stand_at(begin);
+    for (int i = 1; i <= steps; ++i) {
+      load_step(from + (to - from) * i / steps, h / steps, time_scale);
+    }
+    ends.push_back({w_, w_by_, now_});
+    Loaded better = extrapolated(ends);
+    const double change = steps > 1 ? distance(better, best) : off;
+    best = std::move(better);
+    const bool slow = steps > 2 && change > 0.5 * off;  // shorter steps gain more
+    off = change;
+    if (off <= allowed || slow) break;
+  }
+  if (off <= allowed || level >= kMostHalvings) {
+    stand_at(best);
     return;
   }
-  // One extrapolation takes the leading error away.
-  const auto better = [gain](const auto& fine, const auto& coarse) {
-    return (fine + gain * (fine - coarse)).eval();
-  };
-  w_ = better(w_, w_whole);
-  w_by_ = better(w_by_, w_by_whole);
-  now_.v += gain * (now_.v - whole.v);
-  now_.u = law_.kernel.inverse(now_.v);
-  now_.u_by = better(now_.u_by, whole.u_by);
-  now_.v_by = better(now_.v_by, whole.v_by);
+  stand_at(begin);
+  const double middle = 0.5 * (from + to);
+  move_load_adaptive(from, middle, 0.5 * h, time_scale, level + 1);
+  move_load_adaptive(middle, to, 0.5 * h, time_scale, level + 1);
 }
 
 }  // namespace tpm

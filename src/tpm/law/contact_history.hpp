@@ -123,7 +123,15 @@ class ContactHistory {
   [[nodiscard]] Balance balance_at_once() const;
   [[nodiscard]] Balance balance_over_step(double h) const;
   [[nodiscard]] Point surface_under(double load, const Balance& balance, bool loaded) const;
+  /// The surface and its branches, between steps.
+  struct Loaded {
+    Eigen::ArrayXd w;
+    Eigen::ArrayXXd w_by;
+    Point now;
+  };
   void move_load_adaptive(double from, double to, double h, double time_scale, int level);
+  [[nodiscard]] Loaded extrapolated(const std::vector<Loaded>& ends) const;
+  [[nodiscard]] double distance(const Loaded& a, const Loaded& b) const;
   void load_step(double load, double h, double time_scale);
 
   const LawAtParameters& law_;

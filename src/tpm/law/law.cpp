@@ -40,8 +40,9 @@ Error unknown_law(std::string_view text, std::string_view where) {
       "linear-1-elastic, power-2 or hertz-fzener");
 }
 
-bool is_stretch(const LawSpec& spec) {
-  return spec.drive == Quantity::relative_length;
+/// Imposed is a plain number, answered is a stress.
+bool is_strain(const LawSpec& spec) {
+  return is_answered_by_stress(spec.drive);
 }
 
 }  // namespace
@@ -144,7 +145,11 @@ bool depends_on_reference(const LawSpec& spec) noexcept {
 
 std::string reference_words(const LawSpec& spec) {
   if (!depends_on_reference(spec)) return {};
-  if (is_stretch(spec)) {
+  if (spec.drive == Quantity::strain) {
+    return fmt::format("coefficients are secants at a strain of {}",
+                       significant(spec.reference, 4));
+  }
+  if (is_strain(spec)) {
     return fmt::format("coefficients are secants at a stretch of {} above the slack length",
                        significant(spec.reference, 4));
   }
@@ -179,22 +184,24 @@ void require_valid(const LawSpec& spec, std::string_view where) {
   }
   const bool indentation =
       spec.drive == Quantity::indentation_depth && spec.response == Quantity::contact_force;
-  const bool stretch = is_stretch(spec) && spec.response == Quantity::stress;
+  const bool stretch = is_strain(spec) && spec.response == Quantity::stress;
   if (!indentation && !stretch) {
     throw bad_input(
         where,
         fmt::format("{} answered by {}", quantity_name(spec.drive), quantity_name(spec.response)),
-        "indentation_depth with contact_force, or relative_length with stress");
+        "indentation_depth with contact_force, or strain or relative_length with stress");
   }
   if (spec.kernel == Kernel::hertz && stretch) {
-    throw bad_input(where, "a Hertz kernel over a relative length",
+    throw bad_input(where,
+                    fmt::format("a Hertz kernel over a {}",
+                                spec.drive == Quantity::strain ? "strain" : "relative length"),
                     "a linear or power kernel: Hertz is the contact of a ball over its depth");
   }
 }
 
 std::vector<LawParameter> law_parameters(const LawSpec& spec) {
   require_valid(spec, "law");
-  const bool stretch = is_stretch(spec);
+  const bool stretch = is_strain(spec);
   const Dimension stiffness = stretch ? Dimension::stress : Dimension::stiffness;
   const Dimension drive = stretch ? Dimension::dimensionless : Dimension::length;
   std::vector<LawParameter> p;
@@ -261,8 +268,10 @@ std::vector<LawParameter> law_parameters(const LawSpec& spec) {
     p.push_back({"spacing", drive, "distance x of lateral neighbours", false, false, kInfinity, 0.0,
                  kInfinity});
   }
-  p.push_back({"contact", drive, stretch ? "slack length" : "depth at which contact begins", false,
-               true, 0.0, -kInfinity, kInfinity});
+  const char* contact = spec.drive == Quantity::strain ? "strain at which the stress begins"
+                        : stretch                      ? "slack length"
+                                                       : "depth at which contact begins";
+  p.push_back({"contact", drive, contact, false, true, 0.0, -kInfinity, kInfinity});
   p.push_back({"offset", stretch ? Dimension::stress : Dimension::force,
                "zero error of the response", true, true, 0.0, -kInfinity, kInfinity});
   return p;

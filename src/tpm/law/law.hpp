@@ -85,9 +85,9 @@ struct LawSpec {
   bool solid = true;  ///< false: no k_inf, everything relaxes (only with branches, parallel form)
   Tension tension = Tension::none;
   Fractional fractional = Fractional::none;
-  Quantity drive = Quantity::indentation_depth;  ///< or relative_length
+  Quantity drive = Quantity::indentation_depth;  ///< or strain, relative_length
   Quantity response = Quantity::contact_force;   ///< or stress
-  double reference = 1e-3;  ///< u_ref > 0: m, or dimensionless for relative_length
+  double reference = 1e-3;  ///< u_ref > 0: m, or dimensionless for strain and relative_length
 
   bool operator==(const LawSpec&) const = default;
 };

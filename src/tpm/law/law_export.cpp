@@ -63,9 +63,6 @@ void require_terms(const PronyTable& table, ExportTarget target) {
   }
 }
 
-/// Depth over radius up to which Hertz's parabola stands for a sphere.
-constexpr double kShallow = 0.1;
-
 /// What --relaxation-only drops, and how much of the force that is.
 void add_left_out(const LawFile& law, std::vector<std::string>& lines) {
   const LawSpec& spec = law.spec;
@@ -76,7 +73,6 @@ void add_left_out(const LawFile& law, std::vector<std::string>& lines) {
     }
     return 0.0;
   };
-  lines.push_back("relaxation only: what the material model cannot say is left out");
   if (spec.kernel == Kernel::power) {
     lines.push_back(
         fmt::format("left out: the power kernel (exponent {}); the stiffnesses are "
@@ -110,23 +106,20 @@ std::vector<std::string> remarks_of(const LawFile& law, const PronyTable& table,
         "error {}; nothing is said outside",
         shortest(table.from_s), shortest(table.to_s), significant(table.worst_relative_error, 2)));
   }
-  if (options.relaxation_only) add_left_out(law, lines);
+  for (const std::string& warning : export_warnings(law, options)) {
+    lines.push_back("WARNING: " + warning);
+  }
   const ContactGeometry& geometry = options.geometry;
   if (!has_modulus) {
-    lines.push_back("relative moduli only: a modulus in Pa needs --radius, or --area and --length");
+    lines.push_back(
+        "relative moduli only: a modulus in Pa needs the size of the probe, or of a bar");
   } else if (geometry.sphere_radius_m) {
     lines.push_back(fmt::format(
         "modulus from the stiffness at the reference depth {} m under a sphere of {} m (Hertz)",
         shortest(law.spec.reference), shortest(*geometry.sphere_radius_m)));
-    const double depth = law.spec.reference / *geometry.sphere_radius_m;
-    if (depth > kShallow) {
-      lines.push_back(fmt::format(
-          "WARNING: the reference depth is {} of the radius; Hertz's formula is that of "
-          "depths well below it (contact radius {} m): the modulus is that of a deeper "
-          "contact than it is good for",
-          significant(depth, 3),
-          significant(std::sqrt(law.spec.reference * *geometry.sphere_radius_m), 3)));
-    }
+  } else if (geometry.is_given() && !geometry.area_m2) {
+    lines.push_back(fmt::format("modulus from the stiffness at the reference depth {} m under {}",
+                                shortest(law.spec.reference), geometry_words(geometry)));
   } else if (geometry.area_m2) {
     lines.push_back(fmt::format("modulus from the stiffness of a bar of {} m^2 and {} m",
                                 shortest(*geometry.area_m2), shortest(*geometry.length_m)));
@@ -236,34 +229,23 @@ std::vector<std::string> export_target_names() {
   return names;
 }
 
-std::optional<double> modulus_Pa(const LawSpec& spec, double stiffness,
-                                 const ContactGeometry& geometry) {
-  const auto refuse = [](std::string_view what, std::string_view expected) {
-    throw bad_input("geometry", what, expected);
-  };
-  for (const auto& size : {geometry.sphere_radius_m, geometry.area_m2, geometry.length_m}) {
-    if (size && !(*size > 0.0 && std::isfinite(*size))) {
-      refuse(fmt::format("a size of {}", shortest(*size)), "sizes above 0");
-    }
+std::vector<std::string> export_warnings(const LawFile& law, const ExportOptions& options) {
+  std::vector<std::string> warnings;
+  const bool drops = law.spec.kernel == Kernel::power || law.spec.tension != Tension::none;
+  if (options.relaxation_only && drops) add_left_out(law, warnings);
+  for (std::string& warning : geometry_warnings(law.spec, options.geometry, law.fitted_to)) {
+    warnings.push_back(std::move(warning));
   }
-  const double nu = geometry.poisson_ratio;
-  if (!(nu >= 0.0 && nu < 0.5)) {
-    refuse(fmt::format("Poisson's ratio {}", shortest(nu)), "0 to below 0.5");
-  }
-  if (geometry.area_m2.has_value() != geometry.length_m.has_value()) {
-    refuse("an area without a length, or a length without an area", "both");
-  }
-  if (geometry.sphere_radius_m && geometry.area_m2) {
-    refuse("a radius and an area", "one of them");
-  }
-  if (spec.response == Quantity::stress) return stiffness;
-  if (geometry.area_m2) return stiffness * *geometry.length_m / *geometry.area_m2;
-  if (!geometry.sphere_radius_m) return std::nullopt;
-  return 0.75 * stiffness * (1.0 - nu * nu) / std::sqrt(*geometry.sphere_radius_m * spec.reference);
+  return warnings;
 }
 
 std::string export_law(const LawFile& law, const ExportOptions& options) {
   require_sayable(law, options);
+  if (!(options.geometry.poisson_ratio < 0.5)) {
+    throw bad_input("geometry",
+                    fmt::format("Poisson's ratio {}", shortest(options.geometry.poisson_ratio)),
+                    "0 to below 0.5: the program needs a bulk modulus");
+  }
   PronyWindow window = options.window;
   // FEBio's six terms, spread over the window, unless another number is asked for.
   if (options.target == ExportTarget::febio && window.times == 0) window.times = 6;

@@ -13,11 +13,11 @@ namespace tpm {
 namespace {
 
 const char* reference_key(const LawSpec& spec) {
-  return spec.drive == Quantity::relative_length ? "reference" : "reference_m";
+  return is_answered_by_stress(spec.drive) ? "reference" : "reference_m";
 }
 
 const char* fitted_to_key(const LawSpec& spec) {
-  return spec.drive == Quantity::relative_length ? "fitted_to" : "fitted_to_m";
+  return is_answered_by_stress(spec.drive) ? "fitted_to" : "fitted_to_m";
 }
 
 LawSpec spec_of(const Json& json, std::string_view where) {

@@ -274,39 +274,90 @@ std::optional<double> kept_step(const Protocol& protocol) {
   return kept ? std::optional(value) : std::nullopt;
 }
 
-/// A step of the depth or of the load on a linear law with spring-pots: G(t) and J(t), exact at any
-/// time after the step. Nothing for other laws and histories, at the step itself, or where the step
-/// leaves the probe out of contact.
-std::optional<Response> respond_to_step(const LawSpec& spec, std::span<const double> parameters,
+/// The kernel of a law at given parameters, what acts beside it, and where these stand.
+struct KernelAtParameters {
+  KernelPlaces place;
+  double k_tension, spacing, contact, offset;
+  KernelShape kernel;
+};
+
+KernelAtParameters kernel_at(const LawSpec& spec, const std::vector<LawParameter>& table,
+                             std::span<const double> values) {
+  const auto get = [&](std::string_view name, double otherwise, int& place) {
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      if (table[i].name != name) continue;
+      place = static_cast<int>(i);
+      return values[i];
+    }
+    return otherwise;
+  };
+  KernelPlaces place;
+  const double exponent = get("exponent", 1.0, place.exponent);
+  const double share = get("tension_share", 0.0, place.tension_share);
+  const double k_tension = get("k_tension", 0.0, place.k_tension);
+  const double spacing = get("spacing", std::numeric_limits<double>::infinity(), place.spacing);
+  const double contact = get("contact", 0.0, place.contact);
+  const double offset = get("offset", 0.0, place.offset);
+  return {place,
+          k_tension,
+          spacing,
+          contact,
+          offset,
+          KernelShape(spec.kernel, spec.reference, exponent,
+                      place.tension_share < 0 ? std::nullopt : std::optional(share), spacing)};
+}
+
+/// A step of the depth or of the load on a law with spring-pots: G(t) V(u) and V(u) = J(t) F,
+/// exact at any time after the step. Nothing for other laws and histories, for elastic tension, for
+/// a depth on a curved kernel (its slope by the contact depth has no closed form there), at the
+/// step itself, or where the step leaves the probe out of contact.
+std::optional<Response> respond_to_step(const LawSpec& spec, const std::vector<LawParameter>& table,
+                                        std::span<const double> parameters,
                                         const Protocol& protocol, std::span<const double> times_s,
                                         Want want) {
+  const bool depth = protocol.drive() == Drive::displacement;
   const bool curved = spec.kernel != Kernel::linear || spec.tension != Tension::none;
   const auto value = kept_step(protocol);
-  if (spec.fractional == Fractional::none || curved || !value) return std::nullopt;
+  if (spec.fractional == Fractional::none || spec.tension == Tension::elastic ||
+      (curved && depth) || !value) {
+    return std::nullopt;
+  }
   const double start = protocol.start_s();
   if (!std::all_of(times_s.begin(), times_s.end(),
                    [start](double t) { return t > start && std::isfinite(t); })) {
     return std::nullopt;
   }
-  const std::size_t n = parameters.size();  // contact and offset are the last two
-  const double contact = parameters[n - 2], offset = parameters[n - 1];
-  const bool depth = protocol.drive() == Drive::displacement;
-  const double step = *value - (depth ? contact : offset);
+  const KernelAtParameters at = kernel_at(spec, table, parameters);
+  const double step = *value - (depth ? at.contact : at.offset);
   if (!(step > 0.0)) return std::nullopt;
+  const auto n = std::ssize(parameters);
+  const int moved = depth ? at.place.contact : at.place.offset;  // what the step is counted from
+  const int added = depth ? at.place.offset : at.place.contact;
   Response response;
   response.value.resize(std::ssize(times_s));
   const bool want_slopes = want == Want::values_and_sensitivity;
-  if (want_slopes) response.sensitivity.resize(std::ssize(times_s), static_cast<Eigen::Index>(n));
+  if (want_slopes) response.sensitivity.resize(std::ssize(times_s), n);
   for (Eigen::Index i = 0; i < response.value.size(); ++i) {
     const double since = times_s[static_cast<std::size_t>(i)] - start;
     const SlopedNumber f =
         depth ? law_relaxation(spec, parameters, since) : law_creep(spec, parameters, since);
-    response.value[i] = (depth ? offset : contact) + step * f.value;
+    const double v = step * f.value;  // a force, or V(u)
+    const double u = depth ? v : at.kernel.inverse(v);
+    response.value[i] = (depth ? at.offset : at.contact) + u;
     if (!want_slopes) continue;
-    response.sensitivity.row(i) = step * f.by.transpose();
-    const auto last = static_cast<Eigen::Index>(n) - 1;
-    response.sensitivity(i, depth ? last : last - 1) += 1.0;
-    response.sensitivity(i, depth ? last - 1 : last) -= f.value;
+    Eigen::VectorXd by = step * f.by;
+    by[moved] -= f.value;
+    if (!depth) {
+      const KernelShape::Values k = at.kernel.at(u);
+      if (at.place.exponent >= 0) by[at.place.exponent] -= k.d_exponent;
+      if (at.place.tension_share >= 0) {
+        by[at.place.tension_share] -= k.d_share;
+        by[at.place.spacing] -= k.d_spacing;
+      }
+      by /= k.slope;
+    }
+    by[added] += 1.0;
+    response.sensitivity.row(i) = by.transpose();
   }
   return response;
 }
@@ -404,32 +455,16 @@ void LawModel::require_no_jump(const Protocol& protocol, double contact) const {
 
 LawModel::Prepared LawModel::prepare(std::span<const double> values,
                                      const FractionalMemory* rates) const {
-  const auto get = [&](std::string_view name, double otherwise, int& place) {
-    for (std::size_t i = 0; i < parameters_.size(); ++i) {
-      if (parameters_[i].name != name) continue;
-      place = static_cast<int>(i);
-      return values[i];
-    }
-    return otherwise;
-  };
-  KernelPlaces place;
-  const double exponent = get("exponent", 1.0, place.exponent);
-  const double ratio = get("tension_share", 0.0, place.tension_share);
-  const double k_tension = get("k_tension", 0.0, place.k_tension);
-  const double spacing = get("spacing", std::numeric_limits<double>::infinity(), place.spacing);
-  const double contact = get("contact", 0.0, place.contact);
-  const double offset = get("offset", 0.0, place.offset);
-  Prepared prepared{
-      {{},
-       KernelShape(spec_.kernel, spec_.reference, exponent,
-                   place.tension_share < 0 ? std::nullopt : std::optional(ratio), spacing),
-       TensionShape{spec_.reference, spacing},
-       k_tension,
-       contact,
-       offset,
-       place,
-       static_cast<int>(parameters_.size())},
-      {}};
+  const KernelAtParameters at = kernel_at(spec_, parameters_, values);
+  Prepared prepared{{{},
+                     at.kernel,
+                     TensionShape{spec_.reference, at.spacing},
+                     at.k_tension,
+                     at.contact,
+                     at.offset,
+                     at.place,
+                     static_cast<int>(parameters_.size())},
+                    {}};
   if (spec_.form == BranchForm::series) {
     const auto n = static_cast<std::size_t>(spec_.branches);
     KelvinChain chain;
@@ -461,7 +496,7 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
                            std::span<const double> parameters, Want want) const {
   require_times_within(protocol, times_s);
   require_in_range(parameters);
-  if (auto stepped = respond_to_step(spec_, parameters, protocol, times_s, want)) {
+  if (auto stepped = respond_to_step(spec_, parameters_, parameters, protocol, times_s, want)) {
     return *std::move(stepped);
   }
   std::optional<FractionalMemory> rates;

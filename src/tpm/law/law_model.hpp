@@ -30,7 +30,8 @@ struct LawAtParameters;
 /// Fractional laws are answered at the knots and asked times to 1e-10 of G at their smallest
 /// spacing times the total variation of the drive (docs/fractional.md), and creep to 1e-9
 /// (spring-pots 5e-6) of the depth. A single step that is kept is answered by G(t) and J(t)
-/// themselves (law/relaxation.hpp) where the kernel is linear. No spring-pot follows any other jump
+/// themselves (law/relaxation.hpp): of the depth where the kernel is linear, of the load where no
+/// elastic tension acts beside the kernel. No spring-pot follows any other jump
 /// of the depth: Error(bad_input); under a jump of the load it stays where it is and then gives
 /// way.
 class LawModel final : public Model {

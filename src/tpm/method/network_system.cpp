@@ -29,6 +29,7 @@ class NetworkSystem : public StepSystem {
         position_(rest_),
         memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0},
         peak_(protocol.peak()) {
+    require_one_linear_branch(bonds_, "a step rule");
     for (std::size_t i = 0; i < bonds_.size(); ++i) {
       if (bonds_.relaxing()[static_cast<Eigen::Index>(i)] > 0.0) relaxing_.push_back(i);
     }

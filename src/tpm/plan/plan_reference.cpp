@@ -26,7 +26,7 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
                              double tolerance) {
   VerifiedTruth truth;
   const bool field = measure.output == PlanOutput::field;
-  const double tau_s = scene.scene().tissue.material.relaxation_time_s();
+  const double tau_s = scene.driven().bonds.shortest_relaxation_time_s();
   PlanTrajectory judge;
   if (inertial) {
     truth.times_s =

@@ -57,9 +57,8 @@ PlanRelevance relevance_of_viscosity(const PlanScout& scout) {
 PlanRelevance relevance_of_tension(const PlanScout& scout) {
   return switched_off(scout, "tension", "lateral bonds without stiffness",
                       [](const PlanScene& scene) {
-                        TpmParameters material = scene.scene().tissue.material;
-                        material.Eprime_Pa = 0.0;
-                        return scene.with_material(material);
+                        return scene.with_materials(
+                            [](BondMaterial& material) { material.lateral_Pa = 0.0; });
                       });
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tpm/core/error.hpp"
@@ -139,11 +140,13 @@ Eigen::VectorXd PlanScene::masses_kg() const {
 OperationCount PlanScene::iteration_work() const {
   return OperationCount()
       .add(Operation::lane_bond, static_cast<double>(driven().bonds.size()))
-      .add(Operation::lane_block, blocks_of_solve(driven().bonds.pattern()));
+      .add(Operation::lane_block,
+           blocks_of_solve(moving_graph(driven().bonds, driven().freedom)->pattern));
 }
 
 OperationCount PlanScene::factorisation_work() const {
-  const auto products = static_cast<double>(driven().bonds.pattern().factor_products());
+  const auto graph = moving_graph(driven().bonds, driven().freedom);
+  const auto products = static_cast<double>(graph->pattern.factor_products());
   return OperationCount()
       .add(Operation::bond_stiffness, static_cast<double>(driven().bonds.size()))
       .add(Operation::factor_product, products);
@@ -169,7 +172,8 @@ PlanTrajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
   // Back-solves are those of all lanes, one an iteration; outputs cost an evaluation per kLanes.
   result.work += iteration_work().times(run.work.iterations);
   result.work.add(Operation::solve_block,
-                  blocks_of_solve(driven().bonds.pattern()) * run.work.factorisations);
+                  blocks_of_solve(moving_graph(driven().bonds, driven().freedom)->pattern) *
+                      run.work.factorisations);
   result.work += factorisation_work().times(run.work.factorisations);
   result.steps = run.work.steps;
   return result;
@@ -181,12 +185,12 @@ PlanTrajectory PlanScene::inertial(const InertialOptions& options,
                            masses_kg(), options);
   PlanTrajectory result;
   const Eigen::Index spheres = network().organ.position.cols();
-  const auto see = [&](const QuasiStaticState& state) {
+  const auto see = [&](const QuasiStaticState& state, const Eigen::VectorXd& /*pushes*/) {
     result.displacement.emplace_back(state.position.leftCols(spheres) -
                                      driven().rest.leftCols(spheres));
   };
   const InertialRun run =
-      equations.run(protocol(), times_s, with_field ? QuasiStaticObserver(see) : nullptr);
+      equations.run(protocol(), times_s, with_field ? InertialObserver(see) : nullptr);
   result.response = run.response;
   const auto& pattern = driven().bonds.pattern();
   const auto bonds = static_cast<double>(driven().bonds.size());
@@ -220,30 +224,45 @@ PlanScene PlanScene::faster(double factor) const {
 }
 
 PlanScene PlanScene::stiffer(double factor) const {
-  TpmParameters material = scene_.tissue.material;
-  material.E1_Pa *= factor;
-  material.E2_Pa *= factor;
-  material.Eprime_Pa *= factor;
-  return with_material(material);
+  return with_materials([factor](BondMaterial& material) {
+    material.equilibrium_Pa *= factor;
+    material.lateral_Pa *= factor;
+    for (BondMaterial::Branch& branch : material.branches) branch.modulus_Pa *= factor;
+  });
 }
 
 PlanScene PlanScene::nothing_relaxing() const {
   constexpr double kNever = 1e9;  // durations
   const double lasts_s = duration_s() > 0.0 ? duration_s() : 1.0;
-  return with_material(scene_.tissue.material.with_relaxation_time(kNever * lasts_s));
+  double shortest_s = std::numeric_limits<double>::infinity();
+  for (const BondMaterial& material : scene_.tissue.materials.materials) {
+    for (const BondMaterial::Branch& branch : material.branches) {
+      shortest_s = std::min(shortest_s, branch.relaxation_time_s);
+    }
+  }
+  const double longer = kNever * lasts_s / shortest_s;
+  return with_materials([longer](BondMaterial& material) {
+    for (BondMaterial::Branch& branch : material.branches) branch.relaxation_time_s *= longer;
+  });
 }
 
 PlanScene PlanScene::all_relaxed() const {
-  TpmParameters material = scene_.tissue.material;
-  material.E2_Pa = material.E1_Pa * material.E2_Pa / (material.E1_Pa + material.E2_Pa);
-  // E1 decides only how far bonds would relax, which they do not; above 0, as eta1 follows from it.
-  material.E1_Pa = scene_.tissue.material.E1_Pa + scene_.tissue.material.E2_Pa;
-  return with_material(material).nothing_relaxing();
+  const auto at_equilibrium = [](BondMaterial& material) {
+    if (material.lateral == LateralBond::relaxing) {
+      material.lateral_Pa *= material.equilibrium_Pa / material.instantaneous_Pa();
+    }
+    // A branch that never relaxes bears half of it: formulations want something that could relax.
+    material.equilibrium_Pa *= 0.5;
+    material.branches = {{material.equilibrium_Pa, 1.0}};
+    material.kernel = material.potential;
+  };
+  return with_materials(at_equilibrium).nothing_relaxing();
 }
 
-PlanScene PlanScene::with_material(const TpmParameters& material) const {
+PlanScene PlanScene::with_materials(const std::function<void(BondMaterial&)>& change) const {
   ExperimentScene scene = scene_;
-  scene.tissue.material = material;
+  for (BondMaterial& material : scene.tissue.materials.materials) change(material);
+  scene.tissue.paper_element.reset();
   return PlanScene(std::move(scene));
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <vector>
 
 #include "tpm/plan/operations.hpp"
@@ -87,7 +88,7 @@ class PlanScene {
   /// other, not one that relaxes fast: following that takes steps without end where E2 >> E1.
   [[nodiscard]] PlanScene all_relaxed() const;
   [[nodiscard]] PlanScene with_protocol(Protocol protocol) const;
-  [[nodiscard]] PlanScene with_material(const TpmParameters& material) const;
+  [[nodiscard]] PlanScene with_materials(const std::function<void(BondMaterial&)>& change) const;
   /// Spheres of deeper layers held: `layers` outer ones move.
   [[nodiscard]] PlanScene with_layers(int layers) const;
 

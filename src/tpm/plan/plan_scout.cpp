@@ -76,7 +76,7 @@ PlanScout::PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial,
       times_(sampled_times(scene_.protocol(),
                            inertial ? 8 * kScoutedTimesOfPiece : kScoutedTimesOfPiece,
                            inertial ? 8 * kMostScoutedTimes : kMostScoutedTimes,
-                           scene_.scene().tissue.material.relaxation_time_s())) {}
+                           scene_.driven().bonds.shortest_relaxation_time_s())) {}
 
 const PlanTrajectory& PlanScout::collocation(double tolerance) const {
   const auto found = collocation_.find(tolerance);

@@ -126,10 +126,11 @@ class ElementCandidate final : public LinearCandidate {
   [[nodiscard]] double terms() const override { return 2.0; }
   [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
     const ContactSpectrum& spectrum = scout.spectrum();
-    const TpmParameters& material = scout.scene().scene().tissue.material;
+    const Tissue& tissue = scout.scene().scene().tissue;
+    const BondMaterial& material = tissue.materials.materials.front();
     DepthCurve relaxed = straight(spectrum.relaxed());
-    relaxed.tension_N_per_m = 2.0 * material.Eprime_Pa * material.modulus_to_stiffness_m();
-    relaxed.spacing_m = material.spacing_m;
+    relaxed.tension_N_per_m = 2.0 * material.lateral_Pa * material.modulus_to_stiffness_m();
+    relaxed.spacing_m = tissue.network.organ.spacing;
     return {std::move(relaxed), straight(spectrum.at_once() - spectrum.relaxed()),
             fitted_branches(spectrum, 1), 1.0};
   }

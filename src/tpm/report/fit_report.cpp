@@ -11,6 +11,7 @@
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/oscillation.hpp"
 #include "tpm/report/draw.hpp"
+#include "tpm/report/fit_csv.hpp"
 #include "tpm/report/recording_report.hpp"
 #include "tpm/store/file.hpp"
 
@@ -230,20 +231,21 @@ std::vector<std::string> write_fit_report(const std::filesystem::path& folder,
     if (oscillation) figures.push_back(spectrum_figure(fit, i));
   }
   figures.push_back(waterfall_figure(fit));
-  std::vector<std::string> files;
+  std::vector<std::string> files = write_fit_csv(folder, fit);
   if (!no_law_because(fit.config)) {
     files.push_back("law.json");
     write_law(folder / files.back(), fitted_law(fit));
   }
-  const std::vector<std::string> drawn = write_figures(folder, figures);
-  files.insert(files.end(), drawn.begin(), drawn.end());
+  for (std::string& name : write_figures(folder, figures)) files.push_back(std::move(name));
   return files;
 }
 
 std::vector<std::string> write_specimen_report(const std::filesystem::path& folder,
                                                const SpecimenStudy& study) {
   write_file(folder / "specimens.json", to_text(to_json(study)));
-  std::vector<std::string> files{"specimens.json"};
+  write_file(folder / "specimens.csv", specimens_csv(study));
+  write_file(folder / "pooled.csv", pooled_csv(study));
+  std::vector<std::string> files{"specimens.json", "specimens.csv", "pooled.csv"};
   std::vector<Figure> figures = specimen_figures(study);
   for (const SpecimenRow& row : study.rows) {
     if (row.fit) figures.push_back(recording_figure(*row.fit, 0));

@@ -18,14 +18,14 @@ namespace tpm {
 /// three to a figure.
 [[nodiscard]] std::vector<Figure> specimen_figures(const SpecimenStudy& study);
 
-/// Writes law.json (of a law or the element, for tpm predict and tpm hil), figures.json and, as SVG
-/// and PNG, a figure for each recording and each spectrum of a fit
-/// and its waterfall. Returns the names of the files. Throws Error(environment) if drawing is not
+/// Writes the fit's tables as CSV (fit_csv.hpp), law.json (of a law or the element, for tpm predict
+/// and tpm hil), figures.json and, as SVG and PNG, a figure for each recording and each spectrum of a
+/// fit and its waterfall. Returns the names of the files. Throws Error(environment) if drawing is not
 /// possible; figures.json is then already there.
 [[nodiscard]] std::vector<std::string> write_fit_report(const std::filesystem::path& folder,
                                                         const FitResult& fit);
 
-/// The same for recordings that were fitted one by one; writes specimens.json too.
+/// The same for recordings that were fitted one by one; writes specimens.json with its tables too.
 [[nodiscard]] std::vector<std::string> write_specimen_report(const std::filesystem::path& folder,
                                                              const SpecimenStudy& study);
 

@@ -10,9 +10,9 @@
 #include "tpm/law/law_file.hpp"
 #include "tpm/law/law_model.hpp"
 #include "tpm/report/draw.hpp"
+#include "tpm/report/fit_csv.hpp"
 #include "tpm/report/fit_report.hpp"
 #include "tpm/report/recording_report.hpp"
-#include "tpm/report/table_document.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -22,21 +22,6 @@ std::string spaced_name(Quantity quantity) {
   std::string words(quantity_name(quantity));
   std::replace(words.begin(), words.end(), '_', ' ');
   return words;
-}
-
-std::string readings_csv(const FitResult& fit) {
-  const bool spectrum = fit.data.front().datum.frequency_Hz.has_value();
-  std::string text = csv_line({spectrum ? "frequency_Hz" : "time_s", "quantity", "unit", "observed",
-                               "law", "sd", "provenance"});
-  for (const FittedDatum& d : fit.data) {
-    text +=
-        csv_line({shortest(spectrum ? *d.datum.frequency_Hz : d.datum.time_s),
-                  std::string(quantity_name(d.datum.quantity)),
-                  std::string(si_symbol(quantity_dimension(d.datum.quantity))),
-                  significant(*d.datum.value, 9), significant(d.predicted, 9),
-                  significant(d.datum.sigma, 6), std::string(provenance_name(d.datum.provenance))});
-  }
-  return text;
 }
 
 }  // namespace
@@ -59,6 +44,8 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
     if (!(*d->datum.value > 0.0)) continue;
     measured.x.push_back(d->datum.time_s);
     measured.y.push_back(*d->datum.value / unit.to_si);
+    // A bar below 0 would leave the axis.
+    measured.sd.push_back(std::min(d->reading_sd, 0.99 * *d->datum.value) / unit.to_si);
   }
   std::sort(along.begin(), along.end());
   for (const auto& [time, value] : along) {
@@ -74,8 +61,9 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
       std::filesystem::path(fit.config.data.at(choice).dataset).stem().string();
   figure.id = fmt::format("fit_{}", name);
   figure.title = fmt::format("{}: {}", name, law_name(fit.config.law.value()));
-  figure.caption = fmt::format("{} after a unit step at time 0, and the fitted law {}.",
-                               spaced_name(quantity), law_name(*fit.config.law));
+  figure.caption = fmt::format(
+      "{} after a unit step at time 0, and the fitted law {}; bars are standard deviations.",
+      spaced_name(quantity), law_name(*fit.config.law));
   figure.panels = {std::move(panel)};
   return figure;
 }
@@ -92,11 +80,12 @@ std::vector<std::string> write_function_report(const std::filesystem::path& fold
   }
   figures.push_back(selection_figure(selection));
   figures.push_back(waterfall_figure(fit));
-  std::vector<std::string> files{"config.json", "selection.json", "law.json", "readings.csv"};
+  std::vector<std::string> files{"config.json", "selection.json", "law.json", "laws.csv"};
   write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
   write_file(folder / files[1], to_text(to_json(selection)));
   write_law(folder / files[2], fitted_law(fit));
-  write_file(folder / files[3], readings_csv(fit));
+  write_file(folder / files[3], laws_csv(selection));
+  for (std::string& name : write_fit_csv(folder, fit)) files.push_back(std::move(name));
   const std::vector<std::string> drawn = write_figures(folder, figures);
   files.insert(files.end(), drawn.begin(), drawn.end());
   return files;

@@ -9,6 +9,7 @@
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/law/law_file.hpp"
 #include "tpm/report/draw.hpp"
+#include "tpm/report/fit_csv.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm {
@@ -22,7 +23,7 @@ struct Units {
 };
 
 Units units_of(const RecordingFit& r) {
-  const bool stretch = r.drive_quantity == Quantity::relative_length;
+  const bool stretch = is_answered_by_stress(r.drive_quantity);
   return {shown_unit(stretch ? Dimension::dimensionless : Dimension::length),
           shown_unit(stretch ? Dimension::stress : Dimension::force)};
 }
@@ -235,6 +236,9 @@ std::vector<std::string> write_recording_report(const std::filesystem::path& fol
   write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
   write_file(folder / files[1], to_text(to_json(selection)));
   write_law(folder / files[2], fitted_law(fit));
+  files.emplace_back("laws.csv");
+  write_file(folder / files.back(), laws_csv(selection));
+  for (std::string& name : write_fit_csv(folder, fit)) files.push_back(std::move(name));
   const std::vector<std::string> drawn = write_figures(folder, figures);
   files.insert(files.end(), drawn.begin(), drawn.end());
   return files;

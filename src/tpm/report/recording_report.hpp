@@ -22,9 +22,10 @@ namespace tpm {
 /// The configuration with its data sets as a file in the folder finds them.
 [[nodiscard]] FitConfig seen_from(const std::filesystem::path& folder, FitConfig config);
 
-/// Writes config.json (rerun it with tpm fit), law.json, selection.json, figures.json and the
-/// figures as SVG and PNG into `folder`. Returns the names of the files. Throws Error(environment)
-/// if drawing is not possible; the other files are then already there.
+/// Writes config.json (rerun it with tpm fit), law.json, selection.json with its tables as CSV
+/// (fit_csv.hpp), figures.json and the figures as SVG and PNG into `folder`. Returns the names of
+/// the files. Throws Error(environment) if drawing is not possible; the other files are then
+/// already there.
 [[nodiscard]] std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
                                                               const Selection& selection);
 

@@ -144,6 +144,11 @@ Formulation parse_formulation(const Json& block, const DocumentPlace& place) {
   };
   word("kind", kFormulationWords, formulation.kind);
   word("springs", kSpringWords, formulation.springs);
+  word("solver", kStiffnessSolverWords, formulation.solver);
+  if (formulation.inertial() && block.contains("solver")) {
+    throw bad_input(place.key("solver").where, "in the formulation 'inertial'",
+                    "it only where spheres have no mass");
+  }
   formulation.mass_spring = block.contains("comparison");
   if (block.contains("springs") && !formulation.mass_spring) {
     throw bad_input(place.key("springs").where, "without a comparison",

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/network/equilibrium.hpp"
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/protocol/protocol.hpp"
 #include "tpm/scene/scene.hpp"
@@ -26,7 +27,8 @@ struct Formulation {
   double density_kg_m3 = 1060.0;  ///< inertial: of the spheres, > 0
   bool mass_spring = false;       ///< the mass-spring model on the same spheres, not the tissue
   SpringRule springs = SpringRule::like_the_bonds;
-  double tolerance = 1e-6;  ///< QuasiStaticOptions, InertialOptions
+  double tolerance = 1e-6;                              ///< QuasiStaticOptions, InertialOptions
+  StiffnessSolver solver = StiffnessSolver::automatic;  ///< without mass
 
   [[nodiscard]] bool inertial() const { return kind == FormulationKind::inertial; }
 };

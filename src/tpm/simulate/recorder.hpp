@@ -28,13 +28,15 @@ class Recorder {
 
   /// Takes the state at the next of those times. Throws Interrupted, with a checkpoint of the last
   /// whole part left behind, and Error(numerical) where a load goes through the organ.
-  void see(const QuasiStaticState& state);
+  /// @param contact_push_N of each contact where bodies have mass
+  void see(const QuasiStaticState& state, const Eigen::VectorXd& contact_push_N = {});
 
   /// Ends a part at the state last seen; now and then writes a checkpoint.
   /// @param error_estimate of the part, N or m
   void close_part(double error_estimate);
   /// The same where spheres have mass.
-  void close_part(InertialState motion, const InertialEnergy& energy);
+  void close_part(InertialState motion, const InertialEnergy& energy,
+                  const std::vector<ProbeBlow>& blows);
 
   /// The state at the end of the last part; none before the first.
   [[nodiscard]] const QuasiStaticState* latest() const {

@@ -186,11 +186,11 @@ std::optional<MaterialFunction> find_material_function(const std::string& path,
                                                        const ImportOptions& import) {
   MeasuredFile measured = read_measured_file(path, import);
   if (auto* spectrum = std::get_if<Spectrum>(&measured)) {
-    return MaterialFunction{path, std::move(*spectrum), import};
+    return MaterialFunction{path, std::move(*spectrum), import, {}};
   }
-  Recording& recording = std::get<RecordingFile>(measured).recording;
-  if (!is_step_response(recording.response_quantity)) return std::nullopt;
-  return MaterialFunction{path, std::move(recording), import};
+  auto& file = std::get<RecordingFile>(measured);
+  if (!is_step_response(file.recording.response_quantity)) return std::nullopt;
+  return MaterialFunction{path, std::move(file.recording), import, columns_words(file)};
 }
 
 FitConfig function_config(LawSpec law, const MaterialFunction& function,
@@ -203,7 +203,7 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
                     "a law with a linear kernel and no tension: small strains tell no more");
   }
   if (spectrum == nullptr || spectrum->dimension == Dimension::stress) {
-    law.drive = Quantity::relative_length;
+    law.drive = Quantity::strain;
     law.response = Quantity::stress;
     law.reference = 1.0;
   }
@@ -215,6 +215,7 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
   config.seed = options.seed;
   config.level = options.level;
   config.profiles = options.profiles;
+  config.interrupted = options.interrupted;
   int times = 0;
   for (std::size_t i = 0; i < model.law_parameters().size(); ++i) {
     const LawParameter& p = model.law_parameters()[i];
@@ -285,12 +286,11 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
     chosen.fit = run_fit(function_config(chosen.law, function, options.setup), data);
   }
   s.warnings = range_warnings(chosen.fit, sizes_of_function(function));
-  s.words.push_back(
-      fmt::format("{} of {} readings; the least law that they support is {} ({}): {} parameters, "
-                  "rms residual {} "
-                  "% of the largest reading",
-                  function.kind(), s.samples, law_name(chosen.law), law_words(chosen.law),
-                  chosen.parameters - 1, significant(100.0 * chosen.rms_over_peak, 3)));
+  s.words.push_back(fmt::format(
+      "{} of {} readings; {} {} ({}): {} parameters, rms residual {} % of the largest "
+      "reading",
+      function.kind(), s.samples, least_law_words(s, "they"), law_name(chosen.law),
+      law_words(chosen.law), chosen.parameters - 1, significant(100.0 * chosen.rms_over_peak, 3)));
   const Candidate& best = s.candidates[s.best_bic];
   if (s.recommended != s.best_bic) {
     s.words.push_back(fmt::format("{} has the lowest BIC, by {}{}{}", law_name(best.law),

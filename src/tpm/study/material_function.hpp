@@ -13,6 +13,7 @@ struct MaterialFunction {
   std::string name;  ///< a path where the configuration is to be rerun
   std::variant<Spectrum, Recording> data;
   ImportOptions import;  ///< with which it was read, for the configuration
+  std::string read_as;   ///< how its columns and units were understood; empty for spectra
 
   /// "spectrum", "relaxation modulus" or "creep compliance".
   [[nodiscard]] std::string kind() const;

@@ -51,7 +51,18 @@ Sizes sizes_of(std::span<const PreparedRecording> recordings) {
     sizes.longest_s = std::max(sizes.longest_s, r.to_s - r.from_s);
   }
   if (sizes.drive > 0.0 && sizes.response > 0.0) return sizes;
-  throw bad_input(fmt::format("recording '{}'", recordings.front().name),
+  const PreparedRecording& first = recordings.front();
+  const auto falls = [](const std::vector<double>& values, double rise) {
+    return values.front() - *std::min_element(values.begin(), values.end()) > std::max(rise, 0.0);
+  };
+  const std::string where = fmt::format("recording '{}'", first.name);
+  const bool down = falls(first.recording.drive, sizes.drive);
+  if (down || falls(first.recording.response, sizes.response)) {
+    throw bad_input(where, fmt::format("the {} falls", down ? "drive" : "response"),
+                    "values that rise with the load: --negate-drive, --negate-response or both, if "
+                    "the machine counts them the other way");
+  }
+  throw bad_input(where,
                   sizes.drive > 0.0 ? "the response never rises above where it starts"
                                     : "the drive never rises above where contact begins",
                   "a ramp that is answered by a rising response");
@@ -128,6 +139,7 @@ bool bends(const LawSpec& law) {
 /// Whether contact and offset can be told apart: by a bend of the kernel, or by samples on both
 /// sides of contact.
 bool contact_is_seen(const LawSpec& law, const PreparedRecording& r) {
+  if (law.drive == Quantity::strain) return false;  // it counts from the unloaded specimen
   if (bends(law)) return true;
   const double contact_s = r.recording.time_s[r.phases.contact_index];
   return !r.phases.preloaded && r.phases.contact_found && r.phases.contact_index >= 3 &&
@@ -143,7 +155,7 @@ AutomaticBounds contact_bounds(const LawSpec& law, std::span<const PreparedRecor
   fit.name = std::move(name);
   fit.scale = Scale::linear;
   const bool stretch = is_stretch(law);
-  fit.unit = shown_unit(stretch ? Dimension::dimensionless : Dimension::length);
+  fit.unit = shown_unit(quantity_dimension(law.drive));
   const PreparedRecording& r = recordings.front();
   const double begin = start_drive(r);
   const double range = r.phases.peak_drive - begin;
@@ -168,7 +180,7 @@ AutomaticBounds offset_bounds(const LawSpec& law, const PreparedRecording& r, st
   FitParameter fit;
   fit.name = std::move(name);
   fit.scale = Scale::linear;
-  fit.unit = shown_unit(is_stretch(law) ? Dimension::stress : Dimension::force);
+  fit.unit = shown_unit(quantity_dimension(law.response));
   const double peak = std::abs(r.phases.peak_response) + std::abs(r.phases.floor_response);
   fit.start = 0.0;
   fit.lower = -peak;
@@ -290,12 +302,17 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
   config.seed = options.seed;
   config.level = options.level;
   config.profiles = options.profiles;
+  config.interrupted = options.interrupted;
   for (const LawParameter& p : model.law_parameters()) {
     config.fixed.push_back(p.preset.value_or(0.0));
   }
   for (std::size_t i = 0; i < model.law_parameters().size(); ++i) {
     const LawParameter& p = model.law_parameters()[i];
     if (p.nuisance || p.preset) continue;
+    if (p.name == "exponent" && options.exponent) {
+      config.fixed[i] = *options.exponent;
+      continue;
+    }
     add_automatic(config, law_parameter_bounds(p, sizes, law.branches), {{i, {}}});
   }
   for (const PreparedRecording& r : recordings) {
@@ -337,6 +354,12 @@ Json import_json(const ImportOptions& import) {
   if (import.drive_quantity) j["drive_quantity"] = quantity_name(*import.drive_quantity);
   if (import.response_quantity) j["response_quantity"] = quantity_name(*import.response_quantity);
   if (!import.units.empty()) j["units"] = import.units;
+  if (import.negate_drive) j["negate_drive"] = true;
+  if (import.negate_response) j["negate_response"] = true;
+  if (import.rest_length_m) {
+    j["rest_length"] = fmt::format("{} mm", shortest(1e3 * *import.rest_length_m));
+  }
+  if (import.area_m2) j["area"] = fmt::format("{} mm^2", shortest(1e6 * *import.area_m2));
   return j;
 }
 

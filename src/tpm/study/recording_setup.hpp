@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ struct PreparedRecording {
   double to_s = 0.0;          ///< to the end of the first hold (before the drive first falls back)
   ImportOptions import;       ///< with which it was read, for the configuration
   std::string specimen = {};  ///< whose repeat it is, in a folder; empty: a specimen of its own
+  std::string read_as = {};   ///< how its columns and units were understood, in one sentence
 };
 
 /// Finds the phases and chooses the window. Throws Error(bad_input) if there is nothing to fit.
@@ -42,6 +44,9 @@ struct SetupOptions {
   /// Depth (or change of relative length) that the coefficients refer to; reference_drive() if
   /// nobody says.
   std::optional<double> reference;
+  /// Exponent that power kernels keep, where the probe's shape gives it: 2 of a cone.
+  std::optional<double> exponent;
+  std::function<bool()> interrupted;  ///< see FitConfig
 };
 
 /// A reference depth for the kernels: the largest drive above contact among the recordings, to two

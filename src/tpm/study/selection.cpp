@@ -106,6 +106,18 @@ std::string not_identified(const Candidate& candidate, const ProtocolSpans& span
   return {};
 }
 
+bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
+  double longest_s = 0.0;
+  const auto table = law_parameters(candidate.fit.config.law.value());
+  for (const ParameterResult& p : candidate.fit.parameters) {
+    const LawParameter* law = material_parameter(table, p.parameter.name);
+    if (law == nullptr || law->dimension != Dimension::time) continue;
+    if (spans.samples_too_far_for(p.estimate)) return true;
+    longest_s = std::max(longest_s, p.estimate);
+  }
+  return !candidate.law.solid && spans.too_short_to_end(longest_s);
+}
+
 namespace {
 
 Candidate fit_candidate(const LawSpec& law, std::span<const PreparedRecording> recordings,
@@ -125,8 +137,10 @@ Candidate fit_candidate(const LawSpec& law, std::span<const PreparedRecording> r
     return candidate;
   }
   candidate.rms_over_peak = rms_over_peak(candidate.fit);
-  candidate.reason = not_identified(candidate, protocol_spans(recordings));
+  const ProtocolSpans spans = protocol_spans(recordings);
+  candidate.reason = not_identified(candidate, spans);
   candidate.identified = candidate.reason.empty();
+  candidate.contradicted = contradicts(candidate, spans);
   return candidate;
 }
 
@@ -145,6 +159,15 @@ void score(Candidate& c, int samples, double effective) {
 }
 
 }  // namespace
+
+std::string least_law_words(const Selection& s, const std::string& data) {
+  const Candidate& chosen = s.candidates[s.recommended];
+  if (s.candidates.size() == 1) return "the law that was asked for is";
+  if (chosen.identified) return fmt::format("the least law that {} support is", data);
+  return fmt::format("{} identify none of the {} laws; near the best BIC the least{} is", data,
+                     s.candidates.size(),
+                     chosen.contradicted ? "" : " that the protocol does not contradict");
+}
 
 bool plateau_is_not_told(const FitResult& fit) {
   for (const ParameterResult& p : fit.parameters) {
@@ -301,11 +324,10 @@ void describe_prediction(Selection& s, std::size_t i) {
 void describe(Selection& s) {
   const Candidate& chosen = s.candidates[s.recommended];
   const Candidate& best = s.candidates[s.best_bic];
-  s.words.push_back(
-      fmt::format("the least law that the data support is {} ({}): {} parameters, rms residual {} "
-                  "% of the peak",
-                  law_name(chosen.law), law_words(chosen.law), chosen.parameters - 1,
-                  significant(100.0 * chosen.rms_over_peak, 3)));
+  s.words.push_back(fmt::format("{} {} ({}): {} parameters, rms residual {} % of the peak",
+                                least_law_words(s, "the data"), law_name(chosen.law),
+                                law_words(chosen.law), chosen.parameters - 1,
+                                significant(100.0 * chosen.rms_over_peak, 3)));
   if (s.recommended != s.best_bic) {
     s.words.push_back(fmt::format(
         "{} has the lowest BIC, by {}, {}", law_name(best.law), significant(chosen.delta_bic, 3),
@@ -353,9 +375,13 @@ std::vector<LawSpec> fractional_family() {
 
 std::size_t least_within(const std::vector<Candidate>& candidates, double margin) {
   std::optional<std::size_t> chosen;
-  for (const bool only_identified : {true, false}) {
+  // If no law is identified, one whose times the protocol could show goes before one that only
+  // fits.
+  enum class Eligible { identified, not_contradicted, all };
+  for (const Eligible which : {Eligible::identified, Eligible::not_contradicted, Eligible::all}) {
     const auto eligible = [&](const Candidate& c) {
-      return !c.failed && (c.identified || !only_identified);
+      return !c.failed && (c.identified || which == Eligible::all ||
+                           (which == Eligible::not_contradicted && !c.contradicted));
     };
     double best = std::numeric_limits<double>::infinity();
     for (const Candidate& c : candidates) {
@@ -396,8 +422,12 @@ Selection select_law(std::span<const PreparedRecording> recordings,
                      const SelectionOptions& options) {
   std::vector<LawSpec> laws = options.laws.empty() ? classical_family() : options.laws;
   if (!options.only_listed && !recordings.empty() &&
-      recordings.front().recording.drive_quantity == Quantity::relative_length) {
-    std::erase_if(laws, [](const LawSpec& law) { return law.kernel == Kernel::hertz; });
+      is_answered_by_stress(recordings.front().recording.drive_quantity)) {
+    // Hertz is the contact of a ball, tension that of lateral neighbours.
+    const bool strain = recordings.front().recording.drive_quantity == Quantity::strain;
+    std::erase_if(laws, [strain](const LawSpec& law) {
+      return law.kernel == Kernel::hertz || (strain && law.tension != Tension::none);
+    });
   }
   const std::vector<DataSet> data = data_sets(recordings);
   Selection s;

@@ -34,6 +34,8 @@ struct Candidate {
   /// full rank, each stiffness more than two standard errors above 0 (k_inf beside branches may be
   /// 0), each relaxation time sampled by kLeastSamples; of a fluid, a hold that shows its end.
   bool identified = true;
+  /// A relaxation time below the sampling, or a fluid from a hold too short to tell.
+  bool contradicted = false;
   std::vector<HeldOut> held_out;
 };
 
@@ -70,10 +72,10 @@ struct Selection {
 /// (NAME-fluid) is fitted, too.
 ///
 /// Fits every law to the recordings together and recommends the least: of the laws whose parameters
-/// are identified (or, if none is, of all), the one with the fewest parameters whose BIC is within
-/// the margin of the best of these. AICc and BIC count the effective
-/// number of readings, because neighbouring residuals repeat each other; with n samples of n_eff
-/// effective ones, -2 ln L = n_eff ln(RSS/n).
+/// are identified (or, if none is, of those that the protocol does not contradict, or of all), the
+/// one with the fewest parameters whose BIC is within the margin of the best of these. AICc and BIC
+/// count the effective number of readings, because neighbouring residuals repeat each other; with n
+/// samples of n_eff effective ones, -2 ln L = n_eff ln(RSS/n).
 ///
 /// Held-out error: with several recordings each in turn is predicted from the others (its own
 /// nuisance parameters refitted, the material held); with one the second half of its hold is
@@ -119,6 +121,12 @@ struct ProtocolSpans {
 
 /// Of the fitted parts.
 [[nodiscard]] ProtocolSpans protocol_spans(std::span<const PreparedRecording> recordings);
+
+/// See Candidate::contradicted.
+[[nodiscard]] bool contradicts(const Candidate& candidate, const ProtocolSpans& spans);
+
+/// "the least law that the data support is", or what else the recommended law is.
+[[nodiscard]] std::string least_law_words(const Selection& s, const std::string& data);
 
 /// The first reason why a material parameter of a fit is not known; empty if all are.
 [[nodiscard]] std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans);

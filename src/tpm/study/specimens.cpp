@@ -134,6 +134,20 @@ void require_one_reference(const SpecimenRow& first, const SpecimenRow& row) {
                   fmt::format("those of '{}': {}", first.name, reference_words(a)));
 }
 
+/// What is said of theta, said of the parameter.
+std::string in_natural_words(const PooledParameter& p) {
+  constexpr std::string_view kTheta = " in theta";
+  std::string words = p.effects.words;
+  const std::string_view si = si_symbol(p.parameter.unit.dimension);
+  const std::string natural = p.parameter.scale == Scale::log
+                                  ? std::string(" in the natural logarithm")
+                                  : fmt::format("{}{} (SI)", si.empty() ? "" : " ", si);
+  for (auto at = words.find(kTheta); at != std::string::npos; at = words.find(kTheta, at + 1)) {
+    words.replace(at, kTheta.size(), natural);
+  }
+  return words;
+}
+
 }  // namespace
 
 std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows, double level) {
@@ -164,6 +178,7 @@ std::vector<PooledParameter> pool_specimens(const std::vector<SpecimenRow>& rows
     }
     if (estimates.empty()) continue;
     p.effects = random_effects_of_repeats(estimates, level);
+    p.effects.words = in_natural_words(p);
     pooled.push_back(std::move(p));
   }
   return pooled;
@@ -186,6 +201,7 @@ SpecimenStudy study_specimens(std::span<const PreparedRecording> recordings,
   study.law.response = recordings.front().recording.response_quantity;
   study.law.reference = *options.setup.reference;
   study.pooled = pool_specimens(study.rows, options.setup.level);
+  study.level = options.setup.level;
   return study;
 }
 
@@ -219,14 +235,19 @@ Json to_json(const SpecimenStudy& study) {
                {"interval_SI",
                 {rounded(p.parameter.natural(e.interval.lower), 6),
                  rounded(p.parameter.natural(e.interval.upper), 6)}},
+               {"confidence_level", study.level},
                {"specimens", e.specimens},
                {"left_out", p.left_out},
                {"words", e.words}};
-    if (e.tau_squared) entry["between_specimens_sd_of_log"] = rounded(std::sqrt(*e.tau_squared), 6);
+    const char* of = p.parameter.scale == Scale::log ? "of_log" : "SI";
+    const auto sd_key = [&](const char* between) {
+      return fmt::format("between_{}_sd_{}", between, of);
+    };
+    if (e.tau_squared) entry[sd_key("specimens")] = rounded(std::sqrt(*e.tau_squared), 6);
     if (e.i_squared) entry["i_squared"] = rounded(*e.i_squared, 6);
     if (e.q_p_value) entry["spread_p_value"] = rounded(*e.q_p_value, 6);
     if (e.repeat_variance) {
-      entry["between_repeats_sd_of_log"] = rounded(std::sqrt(*e.repeat_variance), 6);
+      entry[sd_key("repeats")] = rounded(std::sqrt(*e.repeat_variance), 6);
       entry["repeat_degrees_of_freedom"] = e.repeat_degrees;
     }
     if (e.new_specimen) {
@@ -281,7 +302,13 @@ std::string to_terminal_text(const SpecimenStudy& study) {
     }
     text += "\n";
   }
-  text += "\npooled (random effects: a typical specimen, its interval, a new specimen)\n";
+  text += fmt::format(
+      "+- is one linearised standard error; of the file's rms residual the share of its peak\n\n"
+      "pooled (random effects): a typical specimen (its {0:.4g} % interval), and where {0:.4g} % "
+      "of "
+      "new specimens are expected\n",
+      100.0 * study.level);
+  if (depends_on_reference(study.law)) text += reference_words(study.law) + "\n";
   for (const PooledParameter& p : study.pooled) {
     const double unit = p.parameter.unit.to_si;
     const auto shown = [&](double theta) {
@@ -291,8 +318,8 @@ std::string to_terminal_text(const SpecimenStudy& study) {
                         p.parameter.unit.symbol, shown(p.effects.interval.lower),
                         shown(p.effects.interval.upper));
     if (p.effects.new_specimen) {
-      text += fmt::format(", new: {} .. {}", shown(p.effects.new_specimen->lower),
-                          shown(p.effects.new_specimen->upper));
+      text += fmt::format(", new: {} .. {} {}", shown(p.effects.new_specimen->lower),
+                          shown(p.effects.new_specimen->upper), p.parameter.unit.symbol);
     }
     if (p.left_out > 0) text += fmt::format(", left out: {}", p.left_out);
     text += fmt::format("\n  {}\n", p.effects.words);

@@ -38,6 +38,7 @@ struct SpecimenStudy {
   std::string why;  ///< how the law was chosen
   std::vector<SpecimenRow> rows;
   std::vector<PooledParameter> pooled;
+  double level = 0.95;  ///< of all intervals
 };
 
 /// Fits one law to each recording by itself and pools the material parameters with random effects:

@@ -234,7 +234,12 @@ class OrganCell final : public CellModel {
   std::optional<CellAnswer> on_reduced(const ExperimentScene& scene, const std::string& structure,
                                        const AskedTimes& times, std::span<double> values,
                                        std::span<std::int64_t> counts) {
-    const TpmParameters& p = scene.tissue.material;
+    // Regions are no part of the key.
+    const MaterialField& field = scene.tissue.materials;
+    if (!scene.tissue.paper_element || field.materials.size() > 1 || field.factor.size() > 0) {
+      return {};
+    }
+    const TpmParameters& p = *scene.tissue.paper_element;
     if (!(p.relaxation_time_s() > 0.0) || !std::isfinite(p.relaxation_time_s())) return {};
     const std::string key =
         fmt::format("{} {} {} {} {} {}", structure, p.E1_Pa, p.E2_Pa, p.Eprime_Pa, p.A0_m2, p.l0_m);
@@ -311,9 +316,11 @@ class OrganCell final : public CellModel {
     key = structure.dump();
     ExperimentScene scene = base_of(structure, key);
     const DocumentPlace place{"scene"};
-    scene.tissue.material =
-        parse_material(changed.value("material", Json::object()),
-                       scene.tissue.network.organ.spacing, place.key("material"));
+    MaterialBlock material =
+        parse_material(changed.value("material", Json::object()), scene.tissue.materials.lateral(),
+                       scene.tissue.network.organ, place.key("material"));
+    scene.tissue.materials = std::move(material.materials);
+    scene.tissue.paper_element = material.element;
     scene.protocol = parse_scene_protocol(changed.at("protocol"), place.key("protocol"));
     require_possible(scene.protocol, scene.contacts, scene.tissue, place.key("protocol"));
     return scene;

@@ -1,0 +1,35 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/study/selection.hpp"
+#include "tpm/study/specimens.hpp"
+#include "tpm/study/young_moduli.hpp"
+
+namespace tpm {
+
+/// The tables of a fit as CSV: the same numbers as in its JSON, SI, one row for each thing, every
+/// row with the unit, the reference depth and the level that its numbers depend on.
+
+/// Each parameter: estimate, standard error, interval, bounds, verdict, conditions.
+[[nodiscard]] std::string parameters_csv(const FitResult& fit);
+/// Each reading of tables, spectra, moduli and compliances with the law's answer.
+[[nodiscard]] std::string readings_csv(const FitResult& fit);
+/// Each sample of a recording with the law's answer and its prediction band.
+[[nodiscard]] std::string samples_csv(const FitResult& fit, std::size_t recording);
+/// Each law of a selection.
+[[nodiscard]] std::string laws_csv(const Selection& selection);
+/// Each parameter of each recording of a folder.
+[[nodiscard]] std::string specimens_csv(const SpecimenStudy& study);
+/// Each pooled parameter.
+[[nodiscard]] std::string pooled_csv(const SpecimenStudy& study);
+
+/// Each Young's modulus.
+[[nodiscard]] std::string moduli_csv(const YoungModuli& moduli);
+
+/// Writes parameters.csv, readings.csv (if there are readings) and samples.csv, samples_2.csv, ...
+/// of a fit into a folder. Returns the names.
+std::vector<std::string> write_fit_csv(const std::filesystem::path& folder, const FitResult& fit);
+
+}  // namespace tpm
