@@ -177,6 +177,11 @@ Identification identify(const PreparedRecording& recording, const IdentifyOption
         "intervals take it for noise",
         significant(id.result().estimate.phi, 4)));
   }
+  for (const SequentialParameter& p : id.result().estimate.parameters) {
+    if (!p.nuisance || !p.at_bound) continue;
+    id.flags.push_back(fmt::format(
+        "{} stands on its automatic bound: the intervals hold only there", p.parameter.name));
+  }
   if (!id.result().estimate.identified) {
     id.flags.push_back("a material parameter stands on a bound or is not told apart from others");
   }
