@@ -198,7 +198,7 @@ TEST_CASE(
   // K q / T with the stiffness at the session's depth: 1.6 N/s at 12 kPa and 0.01 mm.
   CHECK_THAT(refused(limited("12 kPa", 1.0)),
              Contains("the rise of the force is limited too much") &&
-                 Contains("a step of the encoder (0.01 mm) makes 0.0016"));
+                 Contains("a step of the encoder (0.01 mm) makes 0.00159 N"));
   CHECK(held_force_N(limited("12 kPa", 1.0)) < 0.8 * held_force_N(limited("12 kPa", 400.0)));
   CHECK_THAT(held_force_N(limited("12 kPa", 2.0)),
              WithinRel(held_force_N(limited("12 kPa", 400.0)), 0.05));
