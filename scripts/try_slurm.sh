@@ -33,6 +33,12 @@ end() {
 }
 trap end EXIT
 
+# failed WHAT: the last words of its tasks and of the daemons, then the end.
+failed() {
+  tail -n 5 "$folder"/slurm-*.out "$folder/slurmctld.log" "$folder/slurmd.log" >&2 || true
+  die "$1 failed (its words stand above)"
+}
+
 host=$(hostname -s)
 me=$(id -un)
 mkdir -p "$folder"/{state,spool}
@@ -80,7 +86,13 @@ done
 
 say "a job array of $tasks tasks"
 sbatch --wait --cpus-per-task=1 --chdir="$folder" --array="1-$tasks" scripts/sweep.sbatch "$sweep" "$folder/array.h5" ||
-  { tail -n 5 "$folder"/tpm-sweep-*.out >&2; die "the job array failed (its words stand above)"; }
+  failed "the job array"
+again=$((tasks > 2 ? 3 : tasks))
+say "the shard of task $again removed, and that task submitted again alone"
+rm "$folder/array.h5.shard-$again-of-$tasks"*
+sbatch --wait --cpus-per-task=1 --chdir="$folder" --array="$again" scripts/sweep.sbatch "$sweep" "$folder/array.h5" ||
+  failed "the task submitted again"
+[[ -s $folder/array.h5.shard-$again-of-$tasks ]] || die "task $again did not compute its shard"
 say "merging"
 "$TPM" sweep merge "$sweep" -o "$folder/array.h5"
 say "the same in one process"

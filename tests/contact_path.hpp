@@ -40,7 +40,7 @@ class ContactPath {
     before_ = position_;
     position_ = next;
     bonds_.elongations(position_, elongation_);
-    remembered_ = memory_.offset + memory_.following * elongation_;
+    remembered_ = memory_.offset + memory_.following(0) * elongation_;
   }
 
   /// Of the tissue on the contact, N.

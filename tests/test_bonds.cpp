@@ -132,7 +132,8 @@ TEST_CASE("a crowded layer has first neighbours only, as the others have") {
     CHECK(s.radial_count >= 4);
   }
   Freedom held = inner_layer_held(network.organ);
-  CHECK(zero_energy_modes(BondSystem(network, {}), network.organ.position, held).is_rigid());
+  CHECK(zero_energy_modes(BondSystem(network, TpmParameters{}), network.organ.position, held)
+            .is_rigid());
 }
 
 TEST_CASE("a lattice keeps its neighbours whatever its layers' own spacing") {
@@ -154,7 +155,7 @@ TEST_CASE("one radial bond per sphere and a free inner layer is refused, loose s
     if (network.organ.position(2, static_cast<Eigen::Index>(i)) > 0.135) freedom.hold(i);
   }
   // Its curvature alone resists, a little: no mode is exactly free, but the contact is loose.
-  const BondSystem bonds(network, {});
+  const BondSystem bonds(network, TpmParameters{});
   const std::vector<double> support = local_support(bonds, network.organ, freedom);
   CHECK(support[kContact] < 0.01);
   const std::vector<std::size_t> loose = loose_spheres(support);
@@ -164,7 +165,7 @@ TEST_CASE("one radial bond per sphere and a free inner layer is refused, loose s
                         Catch::Contains(fmt::format("sphere{} {}", "s", loose.front() + 1)));
 
   const Network braced = build_network(paper_liver(), {}, "liver");
-  const BondSystem stiff(braced, {});
+  const BondSystem stiff(braced, TpmParameters{});
   CHECK(zero_energy_modes(stiff, braced.organ.position, freedom).is_rigid());
   const std::vector<double> well = local_support(stiff, braced.organ, freedom);
   CHECK(*std::min_element(well.begin(), well.end()) > 0.5);
@@ -177,7 +178,7 @@ TEST_CASE("a flat plate without diagonals is an exact mechanism") {
   const Network plate = build_network(block(4, 4, 1, 0.02, Lattice::cubic), options, "plate");
   Freedom freedom(plate.organ.size());
   for (std::size_t i = 0; i < 5; ++i) freedom.hold(i);  // an edge of the top
-  const BondSystem bonds(plate, {});
+  const BondSystem bonds(plate, TpmParameters{});
   CHECK(zero_energy_modes(bonds, plate.organ.position, freedom).count > 20);
   CHECK(loose_spheres(local_support(bonds, plate.organ, freedom)).size() > 10);
 }
@@ -187,6 +188,6 @@ TEST_CASE("the local support of the star is that of its held neighbours") {
   Freedom freedom(4);
   freedom.guide(1, Vector3d::UnitZ());
   for (const std::size_t i : {0, 2, 3}) freedom.hold(i);
-  CHECK_THAT(local_support(BondSystem(network, {}), network.organ, freedom)[1],
+  CHECK_THAT(local_support(BondSystem(network, TpmParameters{}), network.organ, freedom)[1],
              WithinRel(1.0, 1e-8));
 }

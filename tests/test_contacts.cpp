@@ -330,7 +330,7 @@ TEST_CASE("several tools at once balance, and energy is accounted for") {
     if (state.time_s == 3.0) {
       for (const ToolState& tool : tools) on_tissue += tool.force;
       Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, driven.rest.cols());
-      driven.bonds.add_forces(state.position, {state.remembered, 0.0}, force);
+      driven.bonds.add_forces(state.position, {state.viscous.col(0), 0.0}, force);
       Eigen::Vector3d reaction = Eigen::Vector3d::Zero();
       for (std::size_t i = 0; i < slab.network.organ.size(); ++i) {
         if (slab.network.organ.layer[i] == 2) {

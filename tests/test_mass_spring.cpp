@@ -77,7 +77,7 @@ TEST_CASE(
                                 plate.freedom, plate.probe(), 1.0);
   for (const SpringRule rule : {SpringRule::like_the_bonds, SpringRule::equal}) {
     const Network msm = msm_network(plate.network, rule);
-    const TpmParameters material = msm_material(msm, p, plate.freedom, plate.probe(), relaxed);
+    const BondMaterial material = msm_material(msm, plate.freedom, plate.probe(), relaxed);
     const BondSystem springs(msm, material);
     CHECK(springs.relaxing().isZero(0.0));
     const double load = 1e-4;

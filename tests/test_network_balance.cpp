@@ -110,7 +110,7 @@ TEST_CASE("the load and the reactions of the anchors balance, in force and in mo
   const QuasiStaticRun run = scene.run(material, protocol, end, {.tolerance = 1e-12});
   const BondSystem bonds(scene.network, material);
   Eigen::Matrix3Xd pull = Eigen::Matrix3Xd::Zero(3, run.position.cols());
-  bonds.add_forces(run.position, {run.remembered, 0.0}, pull);
+  bonds.add_forces(run.position, {run.viscous.col(0), 0.0}, pull);
   const auto pushed = static_cast<Eigen::Index>(scene.probe.sphere);
   Eigen::Vector3d force = 0.1 * scene.probe.direction;
   Eigen::Vector3d moment = Eigen::Vector3d(run.position.col(pushed)).cross(force);

@@ -82,7 +82,7 @@ TEST_CASE("the forces of a state balance, and its response is that of its positi
     for (const QuasiStaticState& state : seen.states) {
       CAPTURE(state.time_s, drive == Drive::force);
       Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, state.position.cols());
-      scene.bonds.add_forces(state.position, {state.remembered, 0.0}, force);
+      scene.bonds.add_forces(state.position, {state.viscous.col(0), 0.0}, force);
       const double contact = -force.col(probe).dot(axis);
       const double depth =
           (state.position - scene.organ.network.organ.position).col(probe).dot(axis);

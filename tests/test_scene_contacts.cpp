@@ -1,5 +1,7 @@
 // Contacts of scenes: tools, patches and several at once, from JSON to files.
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
@@ -140,4 +142,67 @@ TEST_CASE("contacts that cannot be are refused", "[heavy]") {
           R"("formulation": {"kind": "inertial"}, )" + kPoke);
   refused(R"({"kind": "ball", "radius": "2 mm"})", R"("protocol": {"kind": "knots", "knots": [
     {"time": "0 s", "load": "0 N"}, {"time": "1 s", "load": "-0.1 N"}]})");
+}
+
+TEST_CASE("a tool with mass reports what the tissue feels, and what its contacts change",
+          "[heavy]") {
+  const std::string fast = R"("formulation": {"kind": "inertial"}, "protocol": {"kind": "knots",
+    "knots": [{"time": "0 s", "depth": "0 mm"}, {"time": "40 ms", "depth": "4 mm"},
+    {"time": "80 ms", "depth": "4 mm"}, {"time": "120 ms", "depth": "-40 mm"}]},
+    "outputs": {"count": 9})";
+  const ExperimentScene scene = small_scene(kBall + fast);
+  const RunNetwork network = network_to_run(scene);
+  const SimulationRun run = simulate(scene, network);
+  for (const CurvePoint& p : run.record.curve) {
+    CHECK(p.response >= 0.0);
+    CHECK(p.force_on_tissue_N == p.response);
+    if (p.touching == 0) CHECK(p.response == 0.0);
+  }
+  CHECK(run.record.curve.back().touching == 0);
+  REQUIRE(run.contact_check.has_value());
+  CHECK_FALSE(run.contact_check->depends_on_stiffness());
+  CHECK(run.record.blows.size() >= 3);
+  const InertialEnergy energy = run.record.inertial_energy.value();
+  CHECK(energy.contact_heat > 0.0);
+  CHECK(std::abs(energy.missing()) < 0.02 * energy.work);
+  const TempFolder folder;
+  (void)write_simulation(scene, network, run, folder / "a.h5");
+  const Hdf5Reader file(folder / "a.h5");
+  CHECK(file.numbers("/blows/time_s").size() == run.record.blows.size());
+  CHECK(file.numbers("/contact_check/difference").front() == run.contact_check->difference);
+  // So soft that the numbers are those of the contact: the run says so.
+  ExperimentScene soft = scene;
+  soft.contacts.front().stiffness_N_per_m = 20.0;
+  CHECK(simulate(soft, network_to_run(soft)).contact_check->depends_on_stiffness());
+}
+
+TEST_CASE("a heavy tool under a load pushes with more than the load as it comes to rest",
+          "[heavy]") {
+  const ExperimentScene scene = small_scene(
+      R"("contacts": [{"kind": "ball", "radius": "8 mm", "mass_kg": 0.5}],
+      "formulation": {"kind": "inertial"}, "protocol": {"kind": "creep", "load": "0.1 N", "duration": "0.5 s"},
+      "outputs": {"count": 11})");
+  const SimulationRun run = run_of(scene);
+  double largest = 0.0;
+  for (const CurvePoint& p : run.record.curve) largest = std::max(largest, p.force_on_tissue_N);
+  CHECK(largest > 0.12);
+  // A run that was stopped goes on to the bit, blows and forces on tissue among it.
+  const TempFolder folder;
+  SimulationControls controls;
+  controls.checkpoint = folder / "c";
+  int seen = 0;
+  controls.interrupted = [&] { return ++seen == 120; };
+  CHECK_THROWS_AS(simulate(scene, network_to_run(scene), controls), Interrupted);
+  controls.interrupted = {};
+  const SimulationRun rest = simulate(scene, network_to_run(scene), controls);
+  CHECK(rest.resumed_at_s.has_value());
+  REQUIRE(rest.record.curve.size() == run.record.curve.size());
+  for (std::size_t i = 0; i < run.record.curve.size(); ++i) {
+    CHECK(rest.record.curve[i].force_on_tissue_N == run.record.curve[i].force_on_tissue_N);
+  }
+  REQUIRE(rest.record.contact_pushes_N.size() == run.record.contact_pushes_N.size());
+  for (std::size_t i = 0; i < run.record.contact_pushes_N.size(); ++i) {
+    CHECK(rest.record.contact_pushes_N[i] == run.record.contact_pushes_N[i]);
+  }
+  CHECK(rest.record.blows.size() == run.record.blows.size());
 }

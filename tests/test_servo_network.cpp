@@ -155,15 +155,15 @@ TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][
       bonds.elongations(position, now);
       remembered = (w.r * remembered + w.w0 * before + w.w1 * now).eval();
       // Advancing twice is advancing once: only what is accepted is remembered.
-      servo.advance(u.data(), servo_weights(z), force.data());
+      servo.advance(u.data(), servo_weights(bonds, z * bonds.relaxation_time_s()), force.data());
       std::fill(force.begin(), force.end(), 0.0F);
-      servo.advance(u.data(), servo_weights(z), force.data());
+      servo.advance(u.data(), servo_weights(bonds, z * bonds.relaxation_time_s()), force.data());
       expect(0, remembered);
       const Eigen::VectorXd later = w.r * remembered + (w.w0 + w.w1) * now;
       expect(4, later);
       servo.accept();
       std::fill(force.begin(), force.end(), 0.0F);
-      servo.add_next(u.data(), servo_weights(z), force.data());
+      servo.add_next(u.data(), servo_weights(bonds, z * bonds.relaxation_time_s()), force.data());
       expect(4, later);
       before = now;
     }

@@ -10,6 +10,7 @@
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/network/mass_spring.hpp"
+#include "tpm/protocol/protocol_block.hpp"
 #include "tpm/simulate/smoothness.hpp"
 
 using namespace tpm;
@@ -44,7 +45,7 @@ void check_same(const SimulationRecord& a, const SimulationRecord& b) {
   REQUIRE(a.outputs.size() == b.outputs.size());
   for (std::size_t i = 0; i < a.outputs.size(); ++i) {
     CHECK(a.outputs[i].position == b.outputs[i].position);
-    CHECK(a.outputs[i].remembered == b.outputs[i].remembered);
+    CHECK(a.outputs[i].viscous == b.outputs[i].viscous);
   }
   CHECK(a.error_estimate == b.error_estimate);
   CHECK(a.validity.deepest_m == b.validity.deepest_m);
@@ -67,7 +68,7 @@ TEST_CASE("every block of a scene reaches the experiment") {
   CHECK(scene.probe().direction == Eigen::Vector3d::UnitZ());
   CHECK(scene.protocol.drive() == Drive::force);
   CHECK_THAT(scene.protocol.peak(), WithinRel(0.03, 1e-12));
-  CHECK(scene.formulation.kind == FormulationKind::inertial);
+  CHECK(scene.formulation.kind == "inertial");
   CHECK(scene.formulation.damping_ratio == 0.3);
   CHECK(scene.formulation.density_kg_m3 == 1000.0);
   CHECK(scene.formulation.mass_spring);
@@ -115,6 +116,32 @@ TEST_CASE("a run in parts is the run of the whole, within its tolerance", "[heav
     }
     CHECK(record.error_estimate < 2 * scene.formulation.tolerance * peak);
   }
+}
+
+TEST_CASE("a scene names its solver; runs without mass answer with either", "[heavy]") {
+  for (const std::string kind : {"quasi_static", "static"}) {
+    const auto run = [&](const std::string& solver) {
+      return run_of(small_scene(R"("formulation": {"kind": ")" + kind + R"(", "solver": ")" +
+                                solver + R"("}, )" + kPush));
+    };
+    const SimulationRun direct = run("direct");
+    const SimulationRun iterative = run("iterative");
+    CAPTURE(kind);
+    REQUIRE(direct.solver);
+    REQUIRE(iterative.solver);
+    CHECK(direct.solver->direct);
+    CHECK_FALSE(iterative.solver->direct);
+    REQUIRE(direct.record.curve.size() == iterative.record.curve.size());
+    for (std::size_t i = 0; i < direct.record.curve.size(); ++i) {
+      CHECK_THAT(iterative.record.curve[i].response,
+                 WithinAbs(direct.record.curve[i].response, 1e-5));
+    }
+  }
+  CHECK_THAT(
+      refusal_of([] {
+        (void)small_scene(R"("formulation": {"kind": "inertial", "solver": "direct"}, )" + kPush);
+      }),
+      Contains("/formulation/solver"));
 }
 
 TEST_CASE("an interrupted run goes on to the same result, to the bit", "[heavy]") {
@@ -307,4 +334,34 @@ TEST_CASE("a load that nothing carries is refused where the tissue gives way", "
                    R"("protocol": {"kind": "creep", "load": "1e6 N", "duration": "1 s"})"));
              }),
              Contains("at t = 0 s and a load of 0.93") && Contains("buckles"));
+}
+
+TEST_CASE("one table says what protocols need, for scenes and for what sets the open numbers") {
+  const DocumentPlace place{"f.json"};
+  const auto parsed = [&](const std::string& text, Openness openness) {
+    return parse_protocol_block(parse_json(text, "f.json"), place, openness);
+  };
+  ProtocolBlock open = parsed(R"({"kind": "ramp_hold", "hold": "2 s"})", Openness::open);
+  CHECK_FALSE(open.depth_m);
+  CHECK_THAT(refusal_of([&] { (void)open.protocol(place); }),
+             Contains("key /depth: is missing; expected 'ramp_hold' needs depth, rate, hold"));
+  *open.find("depth") = 4e-3;
+  *open.find("rate") = 2e-3;
+  CHECK(open.find("load") == nullptr);
+  const Protocol set = open.protocol(place);
+  const Protocol whole =
+      parsed(R"({"kind": "ramp_hold", "depth": "4 mm", "rate": "2 mm/s", "hold": "2 s"})",
+             Openness::complete)
+          .protocol(place);
+  REQUIRE(set.knots().size() == whole.knots().size());
+  for (std::size_t i = 0; i < whole.knots().size(); ++i) {
+    CHECK(set.knots()[i].time_s == whole.knots()[i].time_s);
+    CHECK(set.knots()[i].value == whole.knots()[i].value);
+  }
+  CHECK_THAT(
+      refusal_of([&] { (void)parsed(R"({"kind": "creep", "load": "1 N"})", Openness::complete); }),
+      Contains("key /duration: is missing; expected 'creep' needs load, duration"));
+  CHECK_THAT(
+      refusal_of([&] { (void)parsed(R"({"kind": "creep", "depth": "1 mm"})", Openness::open); }),
+      Contains("is no key of the kind 'creep'; expected load, duration"));
 }

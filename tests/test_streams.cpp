@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -101,19 +102,47 @@ TEST_CASE("Slurm tasks that are submitted again alone run the shards of the firs
                         output + "' > /dev/null 2>&1");
   };
   CHECK(task(3, 3, 3, 1) == 2);  // nothing says yet into how many shards
+  // What another task of the array is just writing bears a temporary name.
+  const std::string unfinished = output + ".shard-2-of-4.part-77";
+  std::ofstream(unfinished) << "a";
   CHECK(task(1, 1, 4, 4) == 0);
+  std::filesystem::remove(unfinished);
   CHECK(task(3, 3, 3, 1) == 0);  // --array=3
   CHECK(task(4, 2, 4, 2) == 0);  // --array=2,4
   for (const int shard : {1, 3, 4}) {
     CHECK(std::filesystem::exists(output + ".shard-" + std::to_string(shard) + "-of-4"));
   }
   CHECK(task(5, 5, 5, 1) == 2);  // there are only four
+  const std::string stale = output + ".shard-1-of-8";
+  std::ofstream(stale) << "a";
+  CHECK(task(3, 3, 3, 1) == 2);  // of four or of eight?
+  std::filesystem::remove(stale);
   const std::string by_hand =
       "$TPM sweep '" + source + "/configs/sweep_x_depth.json' -o '" + output + "' --shard ";
   CHECK(exit_code_of(by_hand + "1/2 2> /dev/null") == 2);
   CHECK(task(2, 2, 2, 1) == 0);
   CHECK(exit_code_of("$TPM sweep merge '" + source + "/configs/sweep_x_depth.json' -o '" + output +
                      "' > /dev/null") == 0);
+}
+
+TEST_CASE("a place between those of an axis is told, not taken silently") {
+  const test::TempFolder folder;
+  const std::string file = folder / "s.h5", pictures = folder / "p", told = folder / "told";
+  std::ofstream(folder / "sweep.json") << R"({"title": "t", "model": "single_contact",
+    "indentation": {"kind": "step_hold"}, "outputs": ["peak_force"], "axes": [
+    {"parameter": "depth", "values": ["2 mm", "4 mm"]}, {"parameter": "spacing", "values": ["20 mm", "30 mm"]},
+    {"parameter": "E1", "values": ["6 kPa", "12 kPa"]}]})";
+  REQUIRE(exit_code_of("$TPM sweep '" + std::string(folder / "sweep.json") + "' -o '" + file +
+                       "' > /dev/null 2>&1") == 0);
+  const auto plot = [&](const std::string& at) {
+    return exit_code_of("$TPM sweep plot '" + file + "' -o '" + pictures + "' --at 'depth=" + at +
+                        "' 2> '" + told + "'");
+  };
+  CHECK(plot("4 mm") == 0);
+  CHECK(exit_code_of("grep -q 'between places' '" + told + "'") == 1);
+  CHECK(plot("3.5 mm") == 0);
+  CHECK_THAT(read_file(told),
+             Contains("--at depth: 0.0035 m lies between places of that axis; 0.004 m is taken"));
 }
 
 /// A file whose attribute `text` of the root holds so many texts.

@@ -157,6 +157,17 @@ fs::path shard_path(const fs::path& output, const Shard& shard) {
   return fmt::format("{}.shard-{}-of-{}", output.string(), shard.index + 1, shard.count);
 }
 
+/// "3-of-8": what follows the beginning of a shard's name. A file that another task is just writing
+/// has a temporary name, with more behind it.
+bool names_a_shard(std::string_view numbers) {
+  const std::size_t between = numbers.find("-of-");
+  if (between == std::string_view::npos) return false;
+  const auto is_number = [](std::string_view text) {
+    return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+  };
+  return is_number(numbers.substr(0, between)) && is_number(numbers.substr(between + 4));
+}
+
 /// Every file beside the output that is named as its shards are.
 std::vector<std::string> shards_beside(const fs::path& output) {
   const std::string begin = output.filename().string() + ".shard-";
@@ -165,7 +176,7 @@ std::vector<std::string> shards_beside(const fs::path& output) {
   std::error_code ec;
   for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, ec)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with(begin) && !name.ends_with(".json")) {
+    if (name.starts_with(begin) && names_a_shard(std::string_view(name).substr(begin.size()))) {
       files.push_back((folder / name).string());
     }
   }

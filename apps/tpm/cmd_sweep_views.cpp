@@ -35,7 +35,7 @@ int show(const SweepViewChoice& choice, const Session& session) {
   return 0;
 }
 
-/// "rate=4 mm/s": the nearest place on that axis.
+/// "rate=4 mm/s": the nearest place on that axis; one that is not the wished one is told.
 std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
                                                  const SweepReader& sweep) {
   const std::size_t equals = text.find('=');
@@ -57,6 +57,10 @@ std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
   const auto nearest = std::min_element(
       axis.places.begin(), axis.places.end(),
       [&](double a, double b) { return std::abs(a - wished) < std::abs(b - wished); });
+  if (std::abs(*nearest - wished) > slack) {
+    tell_user("tpm: --at {}: {} {} lies between places of that axis; {} {} is taken\n", name,
+              shortest(wished), axis.unit, shortest(*nearest), axis.unit);
+  }
   return {name, static_cast<std::uint64_t>(nearest - axis.places.begin())};
 }
 

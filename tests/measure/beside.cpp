@@ -1,4 +1,5 @@
-// Prints the measured numbers of docs/haptics.md, "The network beside the loop", as CSV:
+// Prints the measured numbers of reports/haptics/2026-11-23.md, "The network beside the loop", as
+// CSV:
 //     measure_beside SCENE STEPS SEED
 // The whole network in the loop at 1 kHz, and beside it (without a thread: its answer is used 5 ms
 // later), over random motions in space: how far the second is from the first, its own estimate, and
@@ -49,8 +50,8 @@ void measure(const std::string& file, Eigen::Index steps, std::uint64_t seed) {
       "tau_s,peak_N,off_of_peak,rms_off_of_peak,estimate_of_peak,least_work_J,largest_work_J,"
       "least_work_in_loop_J\n");
   for (const double tau_s : {0.1, 1.0, 10.0}) {
-    const TpmParameters material = tissue.material.with_relaxation_time(tau_s);
-    const BondSystem bonds(tissue.network, material, tissue.lateral);
+    const TpmParameters material = tissue.element().with_relaxation_time(tau_s);
+    const BondSystem bonds(tissue.network, material, tissue.materials.lateral());
     const auto network = [&](double period_s) {
       return std::make_unique<ServoNetwork>(
           bonds, rest, freedom, contact, into,

@@ -68,8 +68,8 @@ struct Scene {
   Eigen::Vector3d into;
 
   [[nodiscard]] BondSystem bonds(double relaxation_time_s) const {
-    return {tissue.network, tissue.material.with_relaxation_time(relaxation_time_s),
-            tissue.lateral};
+    return {tissue.network, tissue.element().with_relaxation_time(relaxation_time_s),
+            tissue.materials.lateral()};
   }
 };
 

@@ -1,4 +1,4 @@
-// Prints the measured numbers of docs/haptics.md, "Ten hours":
+// Prints the measured numbers of reports/haptics/2026-11-23.md, "Ten hours":
 //     measure_hil_long SESSION HOURS FOLDER
 // One motion again and again in virtual time through the whole servo step, with the session's
 // model; every row is written, the log starting anew each simulated hour. Resident memory after
@@ -30,7 +30,7 @@ int run(const std::string& file, double hours, const std::filesystem::path& fold
   session.servo.model_push = loop.push;
   session.servo.to_model = loop.to_model;
   const double tau_s =
-      parse_tissue(session.scene, session.scene_place, {}).material.relaxation_time_s();
+      parse_tissue(session.scene, session.scene_place, {}).bonds().relaxation_time_s();
   const double period_s = session.servo.period_s;
   const auto cycles = [period_s](double seconds) {
     return static_cast<std::uint64_t>(std::llround(seconds / period_s));

@@ -69,7 +69,7 @@ class Scene {
     fmt::print("\n{} s after a load of {} N was put on, damping ratio 0.1\n", time, load);
     std::optional<Eigen::Matrix3Xd> msm;
     for (const Tissue& tissue : tissues_) {
-      const BondSystem bonds(tissue.network, tissue.material);
+      const BondSystem bonds(tissue.network, tissue.materials);
       InertialOptions options;
       options.stiffness_share = tissue.name.starts_with("MSM") ? 1.0 : 0.0;
       const InertialRun run = Inertial(bonds, liver_.organ.position, freedom_, probe_,
@@ -93,12 +93,12 @@ class Scene {
 
   void add_msm(std::string name, SpringRule rule, double contact_stiffness) {
     Network msm = msm_network(liver_, rule);
-    const TpmParameters material = msm_material(msm, {}, freedom_, probe_, contact_stiffness);
+    const BondMaterial material = msm_material(msm, freedom_, probe_, contact_stiffness);
     tissues_.push_back({std::move(name), std::move(msm), material});
   }
 
   [[nodiscard]] Eigen::Matrix3Xd settled(const Tissue& tissue, double load) const {
-    const BondSystem bonds(tissue.network, tissue.material);
+    const BondSystem bonds(tissue.network, tissue.materials);
     const QuasiStaticRun run = QuasiStatic(bonds, liver_.organ.position, freedom_, probe_, {1e-6})
                                    .run(creep(load, kForever), std::span(&kForever, 1));
     return run.position - liver_.organ.position;
@@ -110,7 +110,7 @@ class Scene {
     const Eigen::Matrix3Xd shape = u / u.norm();
     if (!msm) msm = shape;
     fmt::print("{:<28} {:>10.3f} {:>10.4f} {:>12.5f} {:>12.5f} {:>12.1e}\n", tissue.name,
-               stiffness(tissue.network, tissue.material, 1.0),
+               stiffness(tissue.network, tissue.element(), 1.0),
                1e3 * u.col(static_cast<Eigen::Index>(probe_.sphere)).dot(probe_.direction),
                roughness(liver_, u, near_), roughness(liver_, u, rim_), (shape - *msm).norm());
   }

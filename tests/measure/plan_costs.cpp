@@ -54,7 +54,7 @@ int main() {
                costs.seconds[static_cast<std::size_t>(entry.meaning)]);
   }
   const Tissue tissue = read_tissue(TPM_TEST_SOURCE_DIR "/configs/liver_scene.json");
-  const BondSystem bonds(tissue.network, tissue.material, tissue.lateral);
+  const BondSystem bonds(tissue.network, tissue.materials);
   const Positions& rest = tissue.network.organ.position;
   const std::size_t contact = tissue.network.organ.contact.value();
   const Eigen::Vector3d into = -tissue.network.organ.normal.col(static_cast<Eigen::Index>(contact));

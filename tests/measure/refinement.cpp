@@ -1,4 +1,4 @@
-// Prints the tables of refinement and moduli of docs/growth.md:
+// Prints the tables of refinement and moduli of reports/growth/2026-11-23.md:
 // build/release/tests/measure_refinement
 #include <fmt/format.h>
 

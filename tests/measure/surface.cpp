@@ -1,4 +1,4 @@
-// Prints the measured numbers of docs/haptics.md, "Over the surface":
+// Prints the measured numbers of reports/haptics/2026-11-23.md, "Over the surface":
 //     measure_surface SESSION STEPS SEED
 // The ball of a session of the kind `surface` over its organ. First it is pressed, held, and slid
 // 20 mm there and back in three directions, at three depths: the force
@@ -96,8 +96,9 @@ void compare(const Setup& setup, double depth_m, double angle) {
 void claim(const Setup& setup, double speed_m_per_s, double tau_s) {
   constexpr int kParts = 8;
   constexpr double kDeep_m = 4e-3, kFar_m = 10e-3;
-  const TpmParameters material = setup.surface.scene.tissue.material.with_relaxation_time(tau_s);
-  const BondSystem bonds = setup.bonds.with_material(setup.surface.scene.tissue.network, material);
+  const TpmParameters material = setup.surface.scene.tissue.element().with_relaxation_time(tau_s);
+  const BondSystem bonds =
+      setup.bonds.with_materials(setup.surface.scene.tissue.network, BondMaterial::of(material));
   const double period_s = setup.session.servo.period_s;
   SurfaceNetwork network(bonds, setup.surface.scene.rest(), setup.freedom, setup.surface.ball,
                          {.period_s = period_s});

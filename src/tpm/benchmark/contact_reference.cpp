@@ -67,7 +67,9 @@ BalancedContact::BalancedContact(const TouchedTissue& tissue)
     : tissue_(tissue),
       freedom_(with_contact_held(tissue)),
       equilibrium_(tissue.bonds, freedom_),
-      position_(tissue.rest) {}
+      position_(tissue.rest) {
+  require_one_linear_branch(tissue.bonds, "the reference of contact models");
+}
 
 Eigen::Vector3d BalancedContact::go_to(const Eigen::Vector3d& displacement_m,
                                        const BondMemory& memory) {

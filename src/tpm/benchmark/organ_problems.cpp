@@ -14,11 +14,11 @@ namespace {
 std::shared_ptr<PosedNetwork> posed_liver(const Tissue& tissue, double eta1_Pa_s,
                                           const Protocol& protocol, std::vector<double> times_s) {
   const Organ& organ = tissue.network.organ;
-  TpmParameters material = tissue.material;
+  TpmParameters material = tissue.element();
   material.eta1_Pa_s = eta1_Pa_s;
   const std::size_t contact = organ.contact.value();
   const Eigen::Vector3d into = -organ.normal.col(static_cast<Eigen::Index>(contact));
-  const BondSystem bonds(tissue.network, material, tissue.lateral);
+  const BondSystem bonds(tissue.network, material, tissue.materials.lateral());
   return std::make_shared<PosedNetwork>(
       driven_network(bonds, organ, tissue.freedom(), {{contact, into, 1.0}}, {}), protocol,
       std::move(times_s));
@@ -72,7 +72,7 @@ std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guid
   times_s.pop_back();
   // At a kink the force jumps: it is asked for between them.
   for (double& time : times_s) time += 0.5 * kSpacing_s;
-  auto posed = posed_liver(tissue, tissue.material.eta1_Pa_s,
+  auto posed = posed_liver(tissue, tissue.element().eta1_Pa_s,
                            ramp_and_hold(8e-3, 0.1, kMovingPoke_s - 0.08), times_s);
   if (guided) {
     const Probe& probe = posed->network.probes.front();
@@ -183,7 +183,7 @@ BenchmarkProblem organ_poke_mass_problem() {
 std::shared_ptr<const PosedNetwork> posed_elastic_poke() {
   Tissue tissue = liver();
   // A dashpot that gives nothing for 1e9 s leaves E2 alone.
-  tissue.material = tissue.material.with_relaxation_time(1e9);
+  tissue.set_element(tissue.element().with_relaxation_time(1e9));
   // The engines move a sphere as a whole.
   return posed_moving_liver(tissue, true);
 }

@@ -55,8 +55,9 @@ class ServoCase {
         line(along_line),
         compared(motions(into)) {
     for (const double tau_s : taus_s) {
-      const TpmParameters material = tissue.material.with_relaxation_time(tau_s);
-      bonds_.push_back(std::make_unique<BondSystem>(tissue.network, material, tissue.lateral));
+      const TpmParameters material = tissue.element().with_relaxation_time(tau_s);
+      bonds_.push_back(
+          std::make_unique<BondSystem>(tissue.network, material, tissue.materials.lateral()));
     }
   }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -121,6 +122,8 @@ struct FitConfig {
   std::optional<BootstrapOptions> bootstrap;
   std::vector<Hypothesis> hypotheses;
   std::filesystem::path folder;  ///< where relative paths of data sets are looked up
+  /// Asked before each evaluation; true ends the fit with Interrupted. Not part of the result.
+  std::function<bool()> interrupted;
 };
 
 /// The model that the configuration names.
@@ -131,7 +134,10 @@ struct FitConfig {
                                                    std::span<const double> natural,
                                                    std::size_t choice);
 
-/// The same as parameters of the paper's element; not for a law of the family.
+/// False for a law of the family and for an organ of a material of its own.
+[[nodiscard]] bool has_element(const FitConfig& config);
+
+/// The same as parameters of the paper's element. Throws Error(bad_input) unless has_element().
 [[nodiscard]] TpmParameters element_parameters(const FitConfig& config,
                                                std::span<const double> natural, std::size_t choice);
 

@@ -9,6 +9,7 @@
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/law/law_model.hpp"
 #include "tpm/material/tpm_element.hpp"
+#include "tpm/scene/organ_model.hpp"
 
 namespace tpm {
 namespace {
@@ -174,6 +175,8 @@ std::vector<double> parse_fixed(const Json& document, const Model& model, const 
     for (const LawParameter& p : law_parameters(*config.law)) {
       values.push_back(p.preset.value_or(std::numeric_limits<double>::quiet_NaN()));
     }
+  } else if (config.organ) {
+    values = OrganModel(config.organ).own_values();
   } else {
     const TpmVector paper = to_vector(TpmParameters{});
     values.assign(paper.begin(), paper.end());

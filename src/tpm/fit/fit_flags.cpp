@@ -112,7 +112,7 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
       deepest = std::max(deepest, d.predicted);
     }
   }
-  if (result.config.law) return;  // the limits are those of the paper's element
+  if (!has_element(result.config)) return;  // the limits are those of the paper's element
   const TpmParameters element = element_parameters(result.config, result.best.natural, 0);
   for (std::string& flag : validity_flags(element, deepest)) {
     result.flags.push_back(std::move(flag));

@@ -15,7 +15,7 @@ class EmptySpace final : public ContactModel {
  public:
   explicit EmptySpace(double period_s) : period_s_(period_s) {}
   void reset() noexcept override {}
-  ContactAnswer step(const Eigen::Vector3d&) noexcept override { return {}; }
+  ContactAnswer step(const ToolPose&) noexcept override { return {}; }
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return Eigen::Matrix3d::Identity();
@@ -152,6 +152,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   check.late_limit = like.servo.most_late;
   check.missed_limit = like.servo.most_missed;
   DevicePreparation preparation = session.preparation;
+  preparation.period_s = session.servo.period_s;
   preparation.may_move = choice.may_move;
   preparation.take_as_ready = choice.take_as_ready;
   preparation.interrupted = interrupted;

@@ -35,6 +35,7 @@ class RememberingNetwork {
         places_(places),
         balance_(network_.bonds, network_.freedom, work_),
         load_(Eigen::Matrix3Xd::Zero(3, network_.position.cols())) {
+    require_one_linear_branch(bonds, "a ball by CVODE");
     for (std::size_t i = 0; i < bonds.size(); ++i) {
       if (bonds.relaxing()[static_cast<Eigen::Index>(i)] > 0.0) relaxing_.push_back(i);
     }

@@ -19,7 +19,8 @@ void BondProjection::sweep(Positions& position, const BondMemory& memory,
     const double l = length - bonds_.rest_length_m()[row];
     const bool slack = bonds_.is_rope(i) && l < 0.0;
     const double g = bonds_.relaxing()[row];
-    const double slope = slack ? 0.0 : bonds_.stiffness()[row] - memory.following * g;
+    const double following = memory.following(bonds_.law_of(i));
+    const double slope = slack ? 0.0 : bonds_.stiffness()[row] - following * g;
     const double pull = slack ? 0.0 : slope * l - g * memory.offset[row];
     const Eigen::Vector3d move_a = give_m_per_N[a] * (freedom_.projector(a) * n);
     const Eigen::Vector3d move_b = give_m_per_N[b] * (freedom_.projector(b) * n);

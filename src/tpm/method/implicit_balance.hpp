@@ -38,7 +38,8 @@ class ImplicitBalance {
   /// A factor for balances in which bonds follow alike and anchors are as stiff.
   struct KeptFactor {
     BlockLdlt factor;
-    double following = 0.0, anchored = 0.0;
+    Following following;
+    double anchored = 0.0;
     long used = 0;  ///< number of the balance that used it last; 0: holds nothing
   };
 

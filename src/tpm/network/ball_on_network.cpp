@@ -82,6 +82,7 @@ BallOnNetwork::BallOnNetwork(const BondSystem& bonds, const Positions& rest, con
     : network_(bonds, rest, freedom, ball),
       equilibrium_(network_.bonds, network_.freedom),
       tolerance_N_(tolerance_N) {
+  require_one_linear_branch(network_.bonds, "a ball on a network");
   network_.bonds.elongations(network_.position, elongation_);
   remembered_ = Eigen::VectorXd::Zero(elongation_.size());
 }
@@ -118,7 +119,7 @@ Eigen::Vector3d BallOnNetwork::step(const Eigen::Vector3d& ball_m, double step_s
                             significant(1e3 * ball_m.z(), 5)));
   }
   network_.bonds.elongations(network_.position, elongation_);
-  remembered_ = memory.offset + memory.following * elongation_;
+  remembered_ = memory.offset + w.w1 * elongation_;
   Eigen::Matrix3Xd force;
   equilibrium_.forces(network_.position, memory,
                       Eigen::Matrix3Xd::Zero(3, network_.position.cols()), force);

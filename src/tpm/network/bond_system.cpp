@@ -1,44 +1,142 @@
 #include "tpm/network/bond_system.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "tpm/core/error.hpp"
+#include "tpm/network/material_refusal.hpp"
 
 namespace tpm {
 namespace {
 
+constexpr std::size_t kPartsKept = 4;
 constexpr double kTouch_m = 1e-14;  // a gap that is none: above the rounding of positions
+
+/// The formulations that take every material.
+constexpr std::string_view kTakesAnyMaterial =
+    "a formulation that takes it: quasi_static, inertial, static";
 
 }  // namespace
 
-BondSystem::BondSystem(const Network& network, const TpmParameters& material, LateralBond lateral)
+BondSystem::BondSystem(const Network& network, const MaterialField& materials)
     : spheres_(network.organ.size()),
       rest_length_(static_cast<Eigen::Index>(network.bonds.size())),
       stiffness_(rest_length_.size()),
       relaxing_(rest_length_.size()) {
+  const bool ropes = materials.lateral() == LateralBond::tension_only;
   for (const Bond& bond : network.bonds) {
     rest_length_[static_cast<Eigen::Index>(end_a_.size())] = bond.rest_length_m;
     end_a_.push_back(bond.a);
     end_b_.push_back(bond.b);
-    rope_.push_back(bond.kind == BondKind::lateral && lateral == LateralBond::tension_only);
+    rope_.push_back(ropes && bond.kind == BondKind::lateral);
   }
-  set_material(network, material);
+  set_materials(network, materials);
 }
 
-void BondSystem::set_material(const Network& network, const TpmParameters& material) {
-  relaxation_time_s_ = material.relaxation_time_s();
-  const double per_Pa = material.modulus_to_stiffness_m();
-  Eigen::Index i = 0;
-  for (const Bond& bond : network.bonds) {
-    const bool radial = bond.kind == BondKind::radial;
-    stiffness_[i] = bond.factor * per_Pa * (radial ? material.E2_Pa : material.Eprime_Pa);
-    relaxing_[i] = radial ? bond.factor * per_Pa * material.relaxing_modulus_Pa() : 0.0;
-    ++i;
+BondSystem::BondSystem(const Network& network, const TpmParameters& element, LateralBond lateral)
+    : BondSystem(network, BondMaterial::of(element, lateral)) {}
+
+std::uint16_t BondSystem::number_of(const ViscousLaw& law) {
+  for (std::size_t i = 0; i < laws_.size(); ++i) {
+    if (laws_[i].serves(law)) return static_cast<std::uint16_t>(i);
+  }
+  constexpr std::size_t kMostLaws = 60'000;
+  if (laws_.size() == kMostLaws) {
+    throw bad_input("material", fmt::format("more than {} different bonds", kMostLaws),
+                    "a factor of place in one material, or fewer materials");
+  }
+  laws_.push_back(law);
+  return static_cast<std::uint16_t>(laws_.size() - 1);
+}
+
+void BondSystem::number_times() {
+  times_s_.clear();
+  for (const ViscousLaw& law : laws_) {
+    for (const ViscousLaw::Branch& branch : law.branches) {
+      times_s_.push_back(branch.relaxation_time_s);
+    }
+  }
+  std::sort(times_s_.begin(), times_s_.end());
+  times_s_.erase(std::unique(times_s_.begin(), times_s_.end()), times_s_.end());
+  most_branches_ = 1;
+  linear_ = true;
+  for (ViscousLaw& law : laws_) {
+    most_branches_ = std::max(most_branches_, static_cast<Eigen::Index>(law.branches.size()));
+    linear_ = linear_ && law.is_linear();
+    for (ViscousLaw::Branch& branch : law.branches) {
+      const auto found =
+          std::lower_bound(times_s_.begin(), times_s_.end(), branch.relaxation_time_s);
+      branch.time = static_cast<std::size_t>(found - times_s_.begin());
+    }
   }
 }
 
-BondSystem BondSystem::with_material(const Network& network, const TpmParameters& material) const {
+void BondSystem::set_materials(const Network& network, const MaterialField& materials) {
+  BondLaws found(network, materials);
+  laws_.clear();
+  law_.assign(network.bonds.size(), 0);
+  // The first material's branches come first: a law that has none can be any law that has.
+  laws_.emplace_back(materials.materials.front().radial_law());
+  const BondLaw* last = nullptr;
+  std::uint16_t last_number = 0;
+  for (std::size_t bond = 0; bond < network.bonds.size(); ++bond) {
+    const auto i = static_cast<Eigen::Index>(bond);
+    const auto [law, factor] = found.of(bond);
+    stiffness_[i] = network.bonds[bond].factor * factor * law->instantaneous_N_per_m();
+    relaxing_[i] = network.bonds[bond].factor * factor * law->relaxing_N_per_m();
+    const bool blend = materials.materials.size() > 1;
+    if (law != last || blend) last_number = number_of(ViscousLaw(*law));
+    last = law;
+    law_[bond] = last_number;
+  }
+  number_times();
+}
+
+BondSystem BondSystem::with_materials(const Network& network,
+                                      const MaterialField& materials) const {
   BondSystem other = *this;
-  other.set_material(network, material);
+  other.set_materials(network, materials);
   return other;
+}
+
+double BondSystem::shortest_relaxation_time_s() const {
+  return times_s_.empty() ? std::numeric_limits<double>::infinity() : times_s_.front();
+}
+
+double BondSystem::longest_relaxation_time_s() const {
+  return times_s_.empty() ? 0.0 : times_s_.back();
+}
+
+bool BondSystem::relaxes_alike() const {
+  const ViscousLaw* first = nullptr;
+  for (std::size_t i = 0; i < first_contact(); ++i) {
+    if (!(relaxing_[static_cast<Eigen::Index>(i)] > 0.0)) continue;
+    const ViscousLaw& law = laws_[law_[i]];
+    if (first != nullptr && !relax_alike(*first, law)) return false;
+    first = &law;
+  }
+  return true;
+}
+
+double BondSystem::relaxation_time_s() const {
+  if (times_s_.size() > 1) {
+    throw bad_input("material",
+                    fmt::format("has {} relaxation times where one is asked for", times_s_.size()),
+                    "a material of one branch");
+  }
+  return shortest_relaxation_time_s();
+}
+
+Eigen::VectorXd BondSystem::stiffness_when(const Following& following) const {
+  Eigen::VectorXd stiffness = stiffness_;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    stiffness[row] -= following(law_[i]) * relaxing_[row];
+  }
+  return stiffness;
 }
 
 const BondSystem::Graph& BondSystem::graph() const {
@@ -52,8 +150,34 @@ const BondSystem::Graph& BondSystem::graph() const {
   return *graph_->graph;
 }
 
+std::shared_ptr<const BondSystem::PartGraph> BondSystem::part_graph(
+    const std::vector<bool>& without) const {
+  const std::scoped_lock lock(graph_->part_guard);
+  auto& kept = graph_->part;
+  const auto known = std::find_if(kept.begin(), kept.end(),
+                                  [&](const auto& part) { return part.first == without; });
+  if (known != kept.end()) {
+    std::rotate(known, known + 1, kept.end());
+    return kept.back().second;
+  }
+  std::vector<std::array<std::uint32_t, 2>> edges;
+  const auto has_part = [&](std::size_t i) { return !without[end_a_[i]] && !without[end_b_[i]]; };
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (has_part(i)) edges.push_back({end_a_[i], end_b_[i]});
+  }
+  PartGraph part{BlockPattern(spheres_, edges), {}};
+  part.place.resize(size());
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (has_part(i)) part.place[i] = part.pattern.place(end_a_[i], end_b_[i]);
+  }
+  if (kept.size() == kPartsKept) kept.erase(kept.begin());
+  kept.emplace_back(without, std::make_shared<const PartGraph>(std::move(part)));
+  return kept.back().second;
+}
+
 BondSystem BondSystem::with_tools(std::size_t tools, std::span<const ToolContact> contacts) const {
   BondSystem other = *this;
+  if (tools == 0 && contacts.empty() && contacts_.empty()) return other;
   other.spheres_ += tools;
   other.contacts_.assign(contacts.begin(), contacts.end());
   other.graph_ = std::make_shared<LazyGraph>();
@@ -68,9 +192,27 @@ BondSystem BondSystem::with_tools(std::size_t tools, std::span<const ToolContact
     other.end_a_.push_back(contact.sphere);
     other.end_b_.push_back(contact.tool);
     other.rope_.push_back(false);
+    other.law_.push_back(0);
     other.rest_length_[row] = contact.reach_m;
     other.stiffness_[row] = contact.stiffness_N_per_m;
   }
+  return other;
+}
+
+BondSystem BondSystem::without_tools() const {
+  BondSystem other = *this;
+  const std::size_t bonds = first_contact();
+  for (const ToolContact& contact : contacts_) {
+    other.spheres_ = std::min<std::size_t>(other.spheres_, contact.tool);
+  }
+  other.contacts_.clear();
+  other.end_a_.resize(bonds);
+  other.end_b_.resize(bonds);
+  other.rope_.resize(bonds);
+  for (Eigen::VectorXd* numbers : {&other.rest_length_, &other.stiffness_, &other.relaxing_}) {
+    numbers->conservativeResize(static_cast<Eigen::Index>(bonds));
+  }
+  other.graph_ = std::make_shared<LazyGraph>();
   return other;
 }
 
@@ -96,8 +238,17 @@ BondSystem::Pull BondSystem::pull(std::size_t bond, double elongation,
                                   const BondMemory& memory) const {
   if (!carries(bond, elongation, memory.closed)) return {0.0, 0.0};
   const auto i = static_cast<Eigen::Index>(bond);
-  const double slope = stiffness_[i] - relaxing_[i] * memory.following;
-  return {slope * elongation - relaxing_[i] * memory.offset[i], slope};
+  const double k = stiffness_[i];
+  const double g = relaxing_[i];
+  if (linear_ || bond >= first_contact()) {
+    const double slope = k - g * memory.following(law_[bond]);
+    return {slope * elongation - g * memory.offset[i], slope};
+  }
+  const ViscousLaw& law = laws_[law_[bond]];
+  const double now = 1.0 - memory.following(law_[bond]);
+  return {(k - g) * law.equilibrium(elongation) +
+              g * (now * law.kernel.value(elongation) - memory.offset[i]),
+          (k - g) * law.equilibrium_slope(elongation) + g * now * law.kernel.slope(elongation)};
 }
 
 std::vector<char> BondSystem::closed_contacts(const Positions& position) const {
@@ -113,6 +264,38 @@ void BondSystem::elongations(const Positions& position, Eigen::VectorXd& elongat
   for (std::size_t i = 0; i < size(); ++i) {
     elongation[static_cast<Eigen::Index>(i)] = line(i, position).elongation;
   }
+}
+
+void BondSystem::followed(const Positions& position, Eigen::VectorXd& followed) const {
+  elongations(position, followed);
+  if (linear_) return;
+  for (std::size_t i = 0; i < first_contact(); ++i) {
+    double& v = followed[static_cast<Eigen::Index>(i)];
+    v = laws_[law_[i]].kernel.value(v);
+  }
+}
+
+Eigen::VectorXd BondSystem::mean_viscous(const Eigen::MatrixXd& viscous) const {
+  require_branches(viscous);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(viscous.rows());
+  for (std::size_t i = 0; i < first_contact(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    Eigen::Index j = 0;
+    for (const ViscousLaw::Branch& branch : laws_[law_[i]].branches) {
+      mean[row] += branch.share * viscous(row, j++);
+    }
+  }
+  return mean;
+}
+
+BondMemory BondSystem::memory_at(const Eigen::VectorXd& y, const Eigen::VectorXd& followed,
+                                 Following following, std::span<const char> closed) const {
+  BondMemory memory{y, std::move(following), closed};
+  for (std::size_t i = 0; i < size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    memory.offset[row] -= memory.following(law_[i]) * followed[row];
+  }
+  return memory;
 }
 
 void BondSystem::tensions(const Positions& position, const BondMemory& memory,
@@ -164,6 +347,14 @@ void BondSystem::elongation_changes(const Positions& position, const Eigen::Matr
   }
 }
 
+void BondSystem::kernel_slopes(const Positions& position, Eigen::VectorXd& slope) const {
+  slope.setOnes(rest_length_.size());
+  if (linear_) return;
+  for (std::size_t i = 0; i < first_contact(); ++i) {
+    slope[static_cast<Eigen::Index>(i)] = laws_[law_[i]].kernel.slope(line(i, position).elongation);
+  }
+}
+
 void BondSystem::add_stiffness_times(const Positions& position, const BondMemory& memory,
                                      const Eigen::Matrix3Xd& displacement,
                                      Eigen::Matrix3Xd& force) const {
@@ -185,34 +376,94 @@ double BondSystem::potential_J(const Positions& position, const BondMemory& memo
     const auto row = static_cast<Eigen::Index>(i);
     const double l = line(i, position).elongation;
     if (!carries(i, l, memory.closed)) continue;
-    const double k = stiffness_[row] - relaxing_[row] * memory.following;
-    energy += l * (0.5 * k * l - relaxing_[row] * memory.offset[row]);
+    const double k = stiffness_[row];
+    const double g = relaxing_[row];
+    const double following = memory.following(law_[i]);
+    if (linear_ || i >= first_contact()) {
+      energy += l * (0.5 * (k - g * following) * l - g * memory.offset[row]);
+      continue;
+    }
+    const ViscousLaw& law = laws_[law_[i]];
+    energy += (k - g) * law.equilibrium_integral(l) +
+              g * ((1.0 - following) * law.kernel.integral(l) - memory.offset[row] * l);
   }
   return energy;
 }
 
+void BondSystem::require_branches(const Eigen::Ref<const Eigen::MatrixXd>& viscous) const {
+  if (viscous.rows() == rest_length_.size() && viscous.cols() == most_branches_) return;
+  throw bad_input("bonds",
+                  fmt::format("{} by {} viscous elongations", viscous.rows(), viscous.cols()),
+                  fmt::format("{} bonds by {} branches", rest_length_.size(), most_branches_));
+}
+
 double BondSystem::stored_energy_J(const Positions& position,
-                                   const Eigen::VectorXd& remembered) const {
-  // With k = E2, g = E2 a, a = E2/(E1 + E2) and e1 = a y:
-  // E2 (l - a y)^2/2 + E1 (a y)^2/2 = k l^2/2 - g l y + g y^2/2.
+                                   const Eigen::Ref<const Eigen::MatrixXd>& viscous) const {
+  require_branches(viscous);
   double energy = 0.0;
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const double l = line(i, position).elongation;
     if (!carries(i, l, {})) continue;
-    const double y = remembered[row];
-    energy += 0.5 * stiffness_[row] * l * l - relaxing_[row] * y * (l - 0.5 * y);
+    const double g = relaxing_[row];
+    if (i >= first_contact()) {
+      energy += 0.5 * stiffness_[row] * l * l;
+      continue;
+    }
+    const ViscousLaw& law = laws_[law_[i]];
+    energy += (stiffness_[row] - g) * law.equilibrium_integral(l);
+    if (!(g > 0.0)) continue;
+    Eigen::Index j = 0;
+    for (const ViscousLaw::Branch& branch : law.branches) {
+      energy += g * branch.share * law.kernel.gap(l, viscous(row, j++));
+    }
   }
   return energy;
 }
 
 double BondSystem::dissipation_W(const Positions& position,
-                                 const Eigen::VectorXd& remembered) const {
-  // eta1 (de1/dt)^2 = tau g (dy/dt)^2 = g (l - y)^2 / tau.
-  Eigen::VectorXd elongation;
-  elongations(position, elongation);
-  return ((elongation - remembered).array().square() * relaxing_.array()).sum() /
-         relaxation_time_s_;
+                                 const Eigen::Ref<const Eigen::MatrixXd>& viscous) const {
+  require_branches(viscous);
+  double power = 0.0;
+  for (std::size_t i = 0; i < first_contact(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    if (!(relaxing_[row] > 0.0)) continue;
+    const ViscousLaw& law = laws_[law_[i]];
+    const double l = line(i, position).elongation;
+    Eigen::Index j = 0;
+    for (const ViscousLaw::Branch& branch : law.branches) {
+      const double m = viscous(row, j++);
+      power += relaxing_[row] * branch.share * (l - law.kernel.inverse(m)) *
+               (law.kernel.value(l) - m) / branch.relaxation_time_s;
+    }
+  }
+  return power;
+}
+
+void refuse_material(std::string_view formulation, std::string_view takes, std::string_view has) {
+  throw bad_input("material",
+                  fmt::format("{} takes {}, and this material has {}", formulation, takes, has),
+                  kTakesAnyMaterial);
+}
+
+void require_one_relaxation(const BondSystem& bonds, std::string_view formulation) {
+  constexpr std::string_view kTakes = "one relaxation time";
+  const std::size_t times = bonds.relaxation_times_s().size();
+  if (times > 1) refuse_material(formulation, kTakes, fmt::format("{} of them", times));
+  if (!bonds.relaxes_alike()) refuse_material(formulation, kTakes, "kernels of several kinds");
+  for (const ViscousLaw& law : bonds.laws()) {
+    if (!law.branches.empty() && !law.kernel.is_linear()) {
+      refuse_material(formulation, "branches that are linear in elongation",
+                      "branches on a kernel");
+    }
+  }
+}
+
+void require_one_linear_branch(const BondSystem& bonds, std::string_view formulation) {
+  require_one_relaxation(bonds, formulation);
+  if (!bonds.is_linear()) {
+    refuse_material(formulation, "linear bonds", "a potential that stiffens");
+  }
 }
 
 }  // namespace tpm

@@ -40,7 +40,8 @@ double usual_contact_stiffness_N_per_m(const BondSystem& bonds) {
   return kTimesStiffestBond * bonds.stiffness().maxCoeff();
 }
 
-std::vector<ToolState> tool_states(const DrivenNetwork& network, const Positions& position) {
+std::vector<ToolState> tool_states(const DrivenNetwork& network, const Positions& position,
+                                   const Eigen::VectorXd& contact_push_N) {
   std::vector<ToolState> states;
   for (std::size_t i = 0; i < network.tools.size(); ++i) {
     states.push_back({position.col(network.column_of_tool(i)), Eigen::Vector3d::Zero(), 0, 0.0});
@@ -55,11 +56,27 @@ std::vector<ToolState> tool_states(const DrivenNetwork& network, const Positions
     const double gap = contact_gap_m(contact, sphere, state.position);
     const Eigen::Vector3d towards_tool =
         contact.normal ? *contact.normal : (state.position - sphere).normalized();
-    state.force += contact.stiffness_N_per_m * gap * towards_tool;
+    state.force -=
+        towards_tool * (contact_push_N.size() > 0 ? contact_push_N[static_cast<Eigen::Index>(i)]
+                                                  : -contact.stiffness_N_per_m * gap);
     state.touching += 1;
     state.overlap_m = std::max(state.overlap_m, -gap);
   }
   return states;
+}
+
+double force_on_tissue_N(const DrivenNetwork& network, const std::vector<ToolState>& tools,
+                         Drive drive, double imposed, double response) {
+  if (drive == Drive::displacement) return response;
+  double shares = 0.0;
+  for (const Probe& probe : network.probes) shares += probe.share;
+  double force = 0.0;
+  for (const Probe& probe : network.probes) {
+    force += probe.sphere < network.spheres()
+                 ? probe.share / shares * imposed
+                 : tools[probe.sphere - network.spheres()].force.dot(probe.direction);
+  }
+  return force;
 }
 
 void require_expected_contacts(const DrivenNetwork& network, const Positions& position,

@@ -3,6 +3,7 @@
 
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/network/tool.hpp"
+#include "tpm/protocol/protocol.hpp"
 
 namespace tpm {
 
@@ -47,8 +48,19 @@ struct ToolState {
 };
 
 /// @param position of spheres and tools
+/// @param contact_push_N what each contact pushes with, where bodies have mass and contacts
+/// dashpots;
+///        none: what their overlaps say
 [[nodiscard]] std::vector<ToolState> tool_states(const DrivenNetwork& network,
-                                                 const Positions& position);
+                                                 const Positions& position,
+                                                 const Eigen::VectorXd& contact_push_N = {});
+
+/// Force on the tissue along what is driven, N: the contact force under an imposed depth (summed by
+/// share); under a load that of the tools' contacts and of what loads spheres, which differs from
+/// the load by what accelerates the tools.
+[[nodiscard]] double force_on_tissue_N(const DrivenNetwork& network,
+                                       const std::vector<ToolState>& tools, Drive drive,
+                                       double imposed, double response);
 
 /// Throws Error(numerical) if a tool has come into a sphere that is none of its possible_contacts.
 void require_expected_contacts(const DrivenNetwork& network, const Positions& position,

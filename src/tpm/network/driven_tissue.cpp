@@ -5,12 +5,12 @@
 namespace tpm {
 
 DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom,
-                           const Probes& probes, Drive drive)
+                           const Probes& probes, Drive drive, EquilibriumOptions options)
     : bonds_(bonds),
       rest_(std::move(rest)),
       freedom_(std::move(freedom)),
       drive_(drive),
-      equilibrium_(bonds_, freedom_) {
+      equilibrium_(bonds_, freedom_, options) {
   double shares = 0.0;
   for (const Probe& probe : probes) shares += probe.share;
   for (const Probe& probe : probes) {
@@ -27,8 +27,9 @@ TissueState DrivenTissue::at_rest(double time_s) const {
   TissueState state;
   state.time_s = time_s;
   state.position = rest_;
-  bonds_.elongations(rest_, state.elongation);
-  state.remembered = Eigen::VectorXd::Zero(state.elongation.size());
+  bonds_.followed(rest_, state.followed);
+  state.mean = Eigen::VectorXd::Zero(state.followed.size());
+  state.viscous = Eigen::MatrixXd::Zero(state.followed.size(), bonds_.most_branches());
   state.closed = bonds_.closed_contacts(rest_);
   return state;
 }
@@ -168,13 +169,21 @@ double DrivenTissue::held_stiffness(const Positions& position, const BondMemory&
 }
 
 double DrivenTissue::linear_response(const TissueState& rest, double peak) {
-  const BondMemory relaxed{Eigen::VectorXd::Zero(rest.elongation.size()), 1.0};
+  const BondMemory relaxed{Eigen::VectorXd::Zero(rest.followed.size()), 1.0};
   if (!equilibrium_.factorise(rest.position, relaxed)) return 0.0;
   const UnitField field = unit_field(rest, relaxed);
   if (!depth_driven()) return field.stiffness * peak;
   Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest_.cols());
   bonds_.add_stiffness_times(rest.position, relaxed, field.displacement, force);
   return along(force) * peak;
+}
+
+double DrivenTissue::push_on_tissue(const Eigen::Matrix3Xd& on_driven) const {
+  double sum = 0.0;
+  for (const Driven& d : driven_) {
+    sum -= (depth_driven() ? d.weight : 1.0) * on_driven.col(d.column).dot(d.direction);
+  }
+  return sum;
 }
 
 void DrivenTissue::add_imposed_velocity(double rate, Eigen::Matrix3Xd& velocity) const {

@@ -10,12 +10,18 @@ struct TissueState {
   double time_s = 0.0;
   double imposed = 0.0;  ///< depth, m, or load, N
   Positions position;
-  Eigen::VectorXd elongation;  ///< l of each bond, m
-  Eigen::VectorXd remembered;  ///< y of each bond, m
-  std::vector<char> closed;    ///< contacts, as BondMemory::closed
+  Eigen::VectorXd followed;  ///< V(l) of each bond, m: where nothing stiffens its elongation l
+  Eigen::MatrixXd viscous;   ///< m_j by (bond, branch), m
+  Eigen::VectorXd mean;      ///< y of each bond, the mean of its m_j, m
+  std::vector<char> closed;  ///< contacts, as BondMemory::closed
 
-  /// What the bonds remember at this instant.
-  [[nodiscard]] BondMemory memory() const { return {remembered, 0.0, closed}; }
+  /// The viscous elongations at this instant.
+  [[nodiscard]] BondMemory memory() const { return {mean, 0.0, closed}; }
+  /// Every viscous elongation is what it follows: nothing is left to relax.
+  void set_equilibrium() {
+    mean = followed;
+    viscous = followed.replicate(1, viscous.cols());
+  }
 };
 
 /// A network with spheres or tools driven: by an imposed depth, whose response is the contact
@@ -24,7 +30,7 @@ class DrivenTissue {
  public:
   /// Throws Error(bad_input) if what an imposed depth drives touches nothing at rest.
   DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom, const Probes& probes,
-               Drive drive);
+               Drive drive, EquilibriumOptions options = {});
   DrivenTissue(const DrivenTissue&) = delete;
   DrivenTissue& operator=(const DrivenTissue&) = delete;
 
@@ -76,6 +82,9 @@ class DrivenTissue {
   /// Size of the response to a peak of what is imposed, with the relaxed stiffness at rest.
   [[nodiscard]] double linear_response(const TissueState& rest, double peak);
 
+  /// Force on the tissue, N (or impulse, N s), given what the tissue does to what is driven: summed
+  /// with the shares under an imposed depth, as the response is, and plainly under a load.
+  [[nodiscard]] double push_on_tissue(const Eigen::Matrix3Xd& on_driven) const;
   /// Speeds of what is driven where the imposed depth changes at a rate, added to velocities.
   void add_imposed_velocity(double rate, Eigen::Matrix3Xd& velocity) const;
   /// What the masses driven weigh in the force of a probe that moves them, kg.

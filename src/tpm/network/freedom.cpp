@@ -1,5 +1,6 @@
 #include "tpm/network/freedom.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tpm {
@@ -12,6 +13,13 @@ Freedom Freedom::extended(std::size_t more) const {
   all.state_.resize(size() + more, State::free);
   all.projector_.resize(size() + more, Eigen::Matrix3d::Identity());
   return all;
+}
+
+Freedom Freedom::first(std::size_t spheres) const {
+  Freedom some(spheres);
+  std::copy_n(state_.begin(), spheres, some.state_.begin());
+  std::copy_n(projector_.begin(), spheres, some.projector_.begin());
+  return some;
 }
 
 void Freedom::hold(std::size_t sphere) {

@@ -17,6 +17,9 @@ class Freedom {
   /// With more spheres after those there are, all free.
   [[nodiscard]] Freedom extended(std::size_t more) const;
 
+  /// That of the first spheres alone.
+  [[nodiscard]] Freedom first(std::size_t spheres) const;
+
   /// Nothing is free any more.
   void hold(std::size_t sphere);
   /// Only the motion along a unit direction stays free.

@@ -26,15 +26,20 @@ void require_valid(const InertialOptions& options) {
           options.damping_ratio, "0 to 10");
   require(options.stiffness_share >= 0.0 && options.stiffness_share <= 1.0, "stiffness share",
           options.stiffness_share, "0 to 1");
+  require(options.contact_damping_ratio >= 0.0 && options.contact_damping_ratio <= 10.0,
+          "contact damping ratio", options.contact_damping_ratio, "0 to 10");
 }
 
 Inertia inertia_of(const BondSystem& bonds, const Eigen::VectorXd& mass, const LowestMode& lowest,
                    const InertialOptions& options) {
   const double omega = lowest.angular_frequency();
-  Inertia inertia{mass, 2.0 * options.damping_ratio * omega * (1.0 - options.stiffness_share), {}};
+  Inertia inertia{mass,
+                  2.0 * options.damping_ratio * omega * (1.0 - options.stiffness_share),
+                  {},
+                  options.contact_damping_ratio};
   const double beta = 2.0 * options.damping_ratio * options.stiffness_share / omega;
   if (beta > 0.0) {
-    inertia.dashpot_N_s_m = beta * (bonds.stiffness() - lowest.following * bonds.relaxing());
+    inertia.dashpot_N_s_m = beta * bonds.stiffness_when(lowest.following);
     inertia.dashpot_N_s_m.tail(static_cast<Eigen::Index>(bonds.contact_count())).setZero();
   }
   return inertia;
@@ -84,7 +89,7 @@ class MotionRun {
   MotionRun(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
             const Probes& probes, const Inertia& inertia, const InertialOptions& options,
             double omega, const Protocol& protocol, std::span<const double> times_s,
-            const QuasiStaticObserver& observer, const InertialState* from)
+            const InertialObserver& observer, const InertialState* from)
       : options_(options),
         protocol_(protocol),
         observer_(observer),
@@ -104,9 +109,9 @@ class MotionRun {
                       fmt::format("{}, as the network has", equation_.size()));
     }
     integration_.emplace(equation_, options,
-                         from ? from->motion : equation_.pack(start.position, start.remembered),
+                         from ? from->motion : equation_.pack(start.position, start.viscous),
                          step_error(depth, omega), energy_error(response_scale),
-                         from ? from->spent_J : Eigen::Vector3d::Zero());
+                         from ? from->spent_J : Eigen::Vector4d::Zero());
     if (from) go_on_from(*from);
     result_.response.resize(static_cast<Eigen::Index>(times_s.size()));
     result_.of_driven_sphere.resize(result_.response.size());
@@ -144,7 +149,7 @@ class MotionRun {
         QuasiStatic(bonds, rest, freedom, probes, {std::min(options_.tolerance, 1e-6), 5})
             .run(held, std::span(&forever, 1));
     state.position = run.position;
-    state.remembered = run.remembered;
+    state.viscous = run.viscous;
   }
 
   [[nodiscard]] Eigen::VectorXd step_error(double depth, double omega) const {
@@ -172,10 +177,25 @@ class MotionRun {
       const double time = times_s_[order_[next_]];
       // CVODES refuses times that rounding alone separates from where it starts.
       const bool apart = time - begin_s > 1e-14 * std::max(std::abs(time), to.time_s);
-      if (apart) integration_->advance_to(time);
+      if (apart) advance(time, to.time_s);
       put(time);
     }
-    integration_->advance_to(to.time_s);
+    advance(to.time_s, to.time_s);
+  }
+
+  void advance(double time_s, double stop_s) {
+    for (;;) {
+      const double reached = integration_->advance_to(time_s);
+      if (reached == time_s && !equation_.meets(time_s, integration_->state())) return;
+      const ToolImpact impact = integration_->strike(reached);
+      integration_->spend(impact.work_J, impact.lost_J);
+      const double of_probe = tissue_.depth_driven() ? impact.on_tissue_N_s : 0.0;
+      if (impact.on_tissue_N_s != 0.0) {
+        result_.blows.push_back({reached, of_probe, impact.on_tissue_N_s});
+      }
+      if (reached < stop_s) integration_->restart(reached, stop_s);
+      if (!(time_s - reached > 1e-14 * std::max(std::abs(time_s), stop_s))) return;
+    }
   }
 
   void begin(double time_s) {
@@ -186,9 +206,14 @@ class MotionRun {
   void blow(double time_s, double speed_before) {
     const double speed = equation_.imposed_speed();
     if (speed == speed_before) return;
-    const double mass = equation_.driven_mass_kg();
-    result_.blows.push_back({time_s, mass * (speed - speed_before)});
-    blow_work_ += 0.5 * mass * (speed * speed - speed_before * speed_before);
+    const double impulse = equation_.driven_mass_kg() * (speed - speed_before);
+    blow_work_ += 0.5 * impulse * (speed + speed_before);
+    // Spheres that the tool touches are taken along as it gains speed, so that nothing is lost.
+    const ToolImpact impact = integration_->strike(time_s);
+    blow_work_ += impact.work_J - impact.lost_J;
+    const double on_driven_spheres = equation_.driven_sphere_mass_kg() * (speed - speed_before);
+    result_.blows.push_back(
+        {time_s, impulse + impact.on_tissue_N_s, on_driven_spheres + impact.on_tissue_N_s});
   }
 
   void put(double time_s) {
@@ -200,33 +225,35 @@ class MotionRun {
 
   void show(double time_s, double response) {
     const TissueMotion& now = equation_.unpack(time_s, integration_->state());
-    observer_({time_s, value_at(protocol_, time_s), response, now.position, now.remembered, {}});
+    observer_({time_s, value_at(protocol_, time_s), response, now.position, now.viscous, {}},
+              equation_.contact_pushes_N(time_s, integration_->state()));
   }
 
   void finish(double end) {
     result_.work = integration_->work();
     if (options_.energy) {
-      const Eigen::Vector3d spent = integration_->spent_J();
+      const Eigen::Vector4d spent = integration_->spent_J();
       InertialEnergy energy;
       energy.work = spent[0] + blow_work_;
       energy.stored = equation_.stored_J(end, integration_->state()) - stored_at_start_;
       energy.kinetic = equation_.kinetic_J(end, integration_->state());
       energy.bond_heat = spent[1];
       energy.damping_heat = spent[2];
+      energy.contact_heat = spent[3];
       result_.energy = energy;
     }
     const TissueMotion& last = equation_.unpack(end, integration_->state());
     result_.position = last.position;
     result_.velocity = last.velocity;
-    result_.remembered = last.remembered;
+    result_.viscous = last.viscous;
     result_.end = {end, integration_->state(),
-                   options_.energy ? integration_->spent_J() : Eigen::Vector3d::Zero(), blow_work_,
+                   options_.energy ? integration_->spent_J() : Eigen::Vector4d::Zero(), blow_work_,
                    stored_at_start_};
   }
 
   const InertialOptions& options_;
   const Protocol& protocol_;
-  const QuasiStaticObserver& observer_;
+  const InertialObserver& observer_;
   std::span<const double> times_s_;
   std::vector<std::size_t> order_;
   std::size_t next_ = 0;  ///< the first of order_ not answered yet
@@ -263,7 +290,7 @@ Inertial::Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Pro
 }
 
 InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s,
-                          const QuasiStaticObserver& observer, const InertialState* from) const {
+                          const InertialObserver& observer, const InertialState* from) const {
   require_times_within(protocol, times_s);
   require_no_jump_of_depth(protocol);
   if (from) require_after(*from, times_s);

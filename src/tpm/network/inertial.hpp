@@ -28,6 +28,10 @@ struct InertialOptions {
   /// Share of that ratio that comes from a dashpot along each bond, in proportion to its stiffness;
   /// the rest is in proportion to mass and slows every velocity alike. 0 to 1.
   double stiffness_share = 0.0;
+  /// Of each contact of a sphere with a tool, 0 to 10: a dashpot beside its spring, so that what
+  /// the spring's stiffness would make ring comes to rest. 1: the sphere on its contact is
+  /// critically damped.
+  double contact_damping_ratio = 1.0;
   bool energy = false;  ///< keep account of the energy (InertialRun::energy)
 };
 
@@ -48,53 +52,66 @@ struct InertialEnergy {
   double kinetic = 0.0;       ///< at the end; at the start all spheres stand still
   double bond_heat = 0.0;     ///< of the dashpots in the Zener bonds
   double damping_heat = 0.0;  ///< of the damping
+  double contact_heat = 0.0;  ///< of impacts of tools on spheres, and of the contacts' dashpots
   [[nodiscard]] double missing() const {
-    return work - stored - kinetic - bond_heat - damping_heat;
+    return work - stored - kinetic - bond_heat - damping_heat - contact_heat;
   }
 };
 
-/// The blow by which the probe changes the speed of the driven sphere where an imposed depth
-/// changes its rate.
+/// A blow: speeds that change in an instant. The probe changes that of what it drives where an
+/// imposed depth changes its rate, and a tool that of the spheres that it meets.
 struct ProbeBlow {
   double time_s = 0.0;
-  double impulse_N_s = 0.0;
+  double impulse_N_s = 0.0;            ///< of the probe, on tool and tissue
+  double impulse_on_tissue_N_s = 0.0;  ///< the part of it that the tissue takes
 };
 
 /// Where a run stands; another run can go on from there.
 struct InertialState {
   double time_s = 0.0;
-  Eigen::VectorXd motion;  ///< the integrator's: displacements, velocities, what bonds remember
-  Eigen::Vector3d spent_J = Eigen::Vector3d::Zero();  ///< work, heat of bonds, heat of damping
+  Eigen::VectorXd motion;  ///< the integrator's: displacements, velocities, viscous elongations
+  /// Work, heat of bonds, of damping and of contacts.
+  Eigen::Vector4d spent_J = Eigen::Vector4d::Zero();
   double blow_work_J = 0.0;
   double stored_at_start_J = 0.0;
 };
 
+/// Gets the state at every asked time in turn (no energies), and what each contact with a tool
+/// pushes it and its sphere apart with then, N.
+using InertialObserver =
+    std::function<void(const QuasiStaticState&, const Eigen::VectorXd& contact_push_N)>;
+
 struct InertialRun {
-  /// Contact force, N, or depth, m, at each asked time. The force is all that the probe exerts on
-  /// the driven sphere, blows left out.
+  /// Contact force, N, or depth, m, at each asked time. The force is what the probe exerts on the
+  /// tissue, blows left out: on the driven sphere, which is tissue, or through the contacts of a
+  /// tool, whose own inertia is not in it.
   Eigen::VectorXd response;
   /// The part of the contact force that the driven sphere itself takes, N: its mass times (its
-  /// acceleration, which is 0 between kinks, + alpha its velocity). 0 under a load.
+  /// acceleration, which is 0 between kinks, + alpha its velocity). 0 under a load, and for tools.
   Eigen::VectorXd of_driven_sphere;
   std::vector<ProbeBlow> blows;
   InertialWork work;
   std::optional<InertialEnergy> energy;
-  Positions position;          ///< where the run ended
-  Eigen::Matrix3Xd velocity;   ///< there, m/s
-  Eigen::VectorXd remembered;  ///< y of each bond there, m; 0 where nothing relaxes
+  Positions position;         ///< where the run ended
+  Eigen::Matrix3Xd velocity;  ///< there, m/s
+  Eigen::MatrixXd viscous;    ///< m_j by (bond, branch) there, m; 0 where nothing relaxes
   InertialState end;
 };
 
 /// The inertial network (docs/inertial.md): spheres with mass, joined by bonds
-/// with memory, damped:
+/// with viscous elongations m_j (BondSystem), damped:
 ///
 ///     dx/dt = v,   m dv/dt = f(x, y) - alpha m v - beta sum of k_w (dl/dt) along the bond,
-///     dy/dt = (l(x) - y)/tau
+///     dm_j/dt = (V(l(x)) - m_j)/tau_j,   y = sum_j gamma_j m_j
 ///
-/// with alpha = 2 zeta omega (1 - s), beta = 2 zeta s/omega, zeta the damping ratio, s the
-/// stiffness share, omega that of lowest_mode() and k_w the bond's storage stiffness there.
-/// Integrated by CVODES (BDF, Newton), restarted at every kink of the protocol. See
-/// docs/inertial.md.
+/// with alpha = 2 zeta omega (1 - s), 0 for tools, beta = 2 zeta s/omega, zeta the damping ratio, s
+/// the stiffness share, omega that of lowest_mode() and k_w the bond's storage stiffness there. A
+/// tool meets a sphere by inelastic_impact(), which leaves no speed of approach; from then on their
+/// contact pushes with max(0, k d + c dd/dt), d > 0 the overlap and c by the contact damping ratio.
+/// As k rises, forces tend to those of rigid tools: the error falls with 1/k.
+///
+/// Integrated by CVODES (BDF, Newton), restarted at every kink of the protocol and every impact.
+/// See docs/inertial.md.
 class Inertial {
  public:
   /// @param freedom of the network without the probe: what is held and guided
@@ -108,12 +125,13 @@ class Inertial {
   /// @param times_s any order, finite, within the protocol; at a jump the value just after it
   /// Throws Error(bad_input) for times outside it and for a jump of depth, which would need an
   /// infinite force; Error(numerical) where CVODES gives up, with the time.
-  /// @param observer if any, sees positions and memory at each asked time in turn (no energies)
+  /// @param observer if any, sees positions, viscous elongations and contacts at each asked time in
+  /// turn
   /// @param from if any, where to go on in the protocol instead of beginning at rest: the end of a
   ///        run of the same network and options. No time before it can be asked for; the account of
   ///        the energy and `stored_at_start_J` go on, the blows and the work counted do not.
   [[nodiscard]] InertialRun run(const Protocol& protocol, std::span<const double> times_s,
-                                const QuasiStaticObserver& observer = {},
+                                const InertialObserver& observer = {},
                                 const InertialState* from = nullptr) const;
 
   /// The mode that the damping ratio is one of.

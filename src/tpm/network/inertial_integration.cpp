@@ -5,6 +5,7 @@
 #include <sunmatrix/sunmatrix_sparse.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "tpm/core/text.hpp"
 
@@ -30,6 +31,13 @@ int motion_rate(sunrealtype t, N_Vector y, N_Vector y_dot, void* user_data) {
 
 int motion_powers(sunrealtype t, N_Vector y, N_Vector powers, void* user_data) {
   view(powers) = equation(user_data).powers_W(t, view(y));
+  return 0;
+}
+
+int motion_gaps(sunrealtype t, N_Vector y, sunrealtype* gaps, void* user_data) {
+  InertialEquation& motion = equation(user_data);
+  motion.gaps(t, view(y),
+              Eigen::Map<Eigen::VectorXd>(gaps, std::ssize(motion.tissue().bonds().contacts())));
   return 0;
 }
 
@@ -79,7 +87,7 @@ void eliminated_destroy(SUNMatrix matrix) {
 InertialIntegration::InertialIntegration(InertialEquation& eq, const InertialOptions& options,
                                          const Eigen::VectorXd& start, const Eigen::VectorXd& error,
                                          std::optional<double> energy_error,
-                                         const Eigen::Vector3d& spent_J)
+                                         const Eigen::Vector4d& spent_J)
     : equation_(eq),
       context_(sundials::make_context()),
       state_(N_VNew_Serial(eq.size(), context_.get())),
@@ -95,8 +103,9 @@ InertialIntegration::InertialIntegration(InertialEquation& eq, const InertialOpt
   check(CVodeSetMaxNumSteps(m, 50'000'000), "CVodeSetMaxNumSteps");
   sundials::mute(m);
   options.newton == NewtonSolver::klu ? use_klu() : use_elimination();
+  if (equation_.tissue().bonds().contact_count() > 0) watch_gaps();
   if (!energy_error) return;
-  energy_.reset(N_VNew_Serial(3, context_.get()));
+  energy_.reset(N_VNew_Serial(spent_J.size(), context_.get()));
   view(energy_.get()) = spent_J;
   check(CVodeQuadInit(m, motion_powers, energy_.get()), "CVodeQuadInit");
   check(CVodeQuadSStolerances(m, 0.0, *energy_error), "CVodeQuadSStolerances");
@@ -125,6 +134,33 @@ void InertialIntegration::use_elimination() {
   check(CVodeSetLinSysFn(memory_.get(), eliminated_setup), "CVodeSetLinSysFn");
 }
 
+void InertialIntegration::watch_gaps() {
+  // What Newton's iteration leaves of places shows in contact forces multiplied by their stiffness.
+  const BondSystem& bonds = equation_.tissue().bonds();
+  const auto contacts = static_cast<Eigen::Index>(bonds.contact_count());
+  const double stiffer = bonds.stiffness().tail(contacts).maxCoeff() /
+                         bonds.stiffness().head(bonds.stiffness().size() - contacts).maxCoeff();
+  const double newton_tolerance = std::clamp(1.0 / stiffer, 1e-8, 0.1);
+  watches_gaps_ = true;
+  void* m = memory_.get();
+  const auto count = static_cast<int>(contacts);
+  check(CVodeRootInit(m, count, motion_gaps), "CVodeRootInit");
+  std::vector<int> closing(static_cast<std::size_t>(count), -1);
+  check(CVodeSetRootDirection(m, closing.data()), "CVodeSetRootDirection");
+  check(CVodeSetNoInactiveRootWarn(m), "CVodeSetNoInactiveRootWarn");
+  check(CVodeSetNonlinConvCoef(m, newton_tolerance), "CVodeSetNonlinConvCoef");
+}
+
+ToolImpact InertialIntegration::strike(double time_s) {
+  return equation_.strike(time_s, view(state_.get()));
+}
+
+void InertialIntegration::spend(double work_J, double contact_heat_J) {
+  if (!energy_) return;
+  view(energy_.get())[0] += work_J;
+  view(energy_.get())[3] += contact_heat_J;
+}
+
 void InertialIntegration::restart(double time_s, double stop_s) {
   if (started_) before_ = work();
   started_ = true;
@@ -134,8 +170,10 @@ void InertialIntegration::restart(double time_s, double stop_s) {
   check(CVodeSetStopTime(m, stop_s), "CVodeSetStopTime");
 }
 
-void InertialIntegration::advance_to(double time_s) {
+double InertialIntegration::advance_to(double time_s) {
   double reached = 0.0;
+  // Between steps a contact force is not interpolated: gaps are small differences of places.
+  if (watches_gaps_) check(CVodeSetStopTime(memory_.get(), time_s), "CVodeSetStopTime");
   const int flag = CVode(memory_.get(), time_s, state_.get(), &reached, CV_NORMAL);
   if (flag < 0) {
     double at = 0.0;
@@ -144,14 +182,16 @@ void InertialIntegration::advance_to(double time_s) {
                 fmt::format("CVODES gives up at t = {} s: {}", significant(at, 5),
                             sundials::flag_name(flag)));
   }
-  if (energy_) check(CVodeGetQuad(memory_.get(), &reached, energy_.get()), "CVodeGetQuad");
+  double at = 0.0;
+  if (energy_) check(CVodeGetQuad(memory_.get(), &at, energy_.get()), "CVodeGetQuad");
+  return flag == CV_ROOT_RETURN ? reached : time_s;
 }
 
 Eigen::Map<const Eigen::VectorXd> InertialIntegration::state() const {
   return {NV_DATA_S(state_.get()), equation_.size()};
 }
 
-Eigen::Vector3d InertialIntegration::spent_J() const {
+Eigen::Vector4d InertialIntegration::spent_J() const {
   return view(energy_.get());
 }
 

@@ -15,22 +15,28 @@ class InertialIntegration {
   /// @param spent_J at the start, as spent_J() gives it
   InertialIntegration(InertialEquation& equation, const InertialOptions& options,
                       const Eigen::VectorXd& start, const Eigen::VectorXd& error,
-                      std::optional<double> energy_error, const Eigen::Vector3d& spent_J);
+                      std::optional<double> energy_error, const Eigen::Vector4d& spent_J);
 
   /// Begins a piece that ends at `stop_s`, from the state reached.
   void restart(double time_s, double stop_s);
+  /// @returns the time reached: `time_s`, or the first at which a tool meets a sphere
   /// Throws Error(numerical) with the time where CVODES gives up.
-  void advance_to(double time_s);
+  [[nodiscard]] double advance_to(double time_s);
+  /// The impact of what touches, now; to be followed by restart().
+  ToolImpact strike(double time_s);
 
   [[nodiscard]] Eigen::Map<const Eigen::VectorXd> state() const;
-  /// Work of the probe, heat of the bonds, heat of the damping since the start, J.
-  [[nodiscard]] Eigen::Vector3d spent_J() const;
+  /// Work of the probe, heat of the bonds, of the damping and of the contacts since the start, J.
+  [[nodiscard]] Eigen::Vector4d spent_J() const;
+  /// Adds to that.
+  void spend(double work_J, double contact_heat_J);
   /// Of all pieces so far.
   [[nodiscard]] InertialWork work() const;
 
  private:
   void use_klu();
   void use_elimination();
+  void watch_gaps();
   [[nodiscard]] InertialWork work_of_piece() const;
 
   InertialEquation& equation_;
@@ -39,6 +45,7 @@ class InertialIntegration {
   sundials::Matrix matrix_;
   sundials::LinearSolver solver_;
   sundials::Cvodes memory_;
+  bool watches_gaps_ = false;
   bool started_ = false;
   InertialWork before_;  ///< of the pieces that are over
 };

@@ -22,14 +22,15 @@ void InertialEquation::add_bond_entries(Triplets& entries, std::size_t bond,
   const std::uint32_t a = bonds.end_a()[bond];
   const std::uint32_t b = bonds.end_b()[bond];
   double length = 0.0;
-  const Eigen::Vector3d n = along(bond, length);
+  const Eigen::Vector3d n = along(bond, motion_.position, length);
   Eigen::Matrix3d across = stiffness.below[bonds.place(bond).index];  // d f / d x of the other end
   across *= -1.0;
-  const bool damped = inertia_.dashpot_N_s_m.size() > 0;
+  // The same entries whether a contact presses or not.
+  const bool damped = inertia_.dashpot_N_s_m.size() > 0 || bond >= bonds.first_contact();
   Eigen::Matrix3d damping = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();
   if (damped) {
-    const double c = inertia_.dashpot_N_s_m[row];
+    const double c = dashpot_N_s_m(bond);
     const Eigen::Vector3d apart = motion_.velocity.col(b) - motion_.velocity.col(a);
     const double lengthening = n.dot(apart);
     damping = c * n * n.transpose();
@@ -48,12 +49,16 @@ void InertialEquation::add_bond_entries(Triplets& entries, std::size_t bond,
       add_block(entries, v, coordinates() + u_there, p * damping);
       add_block(entries, v, v, -(p * damping));
     }
-    const Eigen::Index y = memory_of_[bond];
-    if (y < 0) return;
+    Eigen::Index m = viscous_of_[bond];
+    if (m < 0) return;
     const Eigen::Vector3d pull = sign * bonds.relaxing()[row] * (p * n);
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      entries.emplace_back(v + i, y, -pull[i]);
-      entries.emplace_back(y, u + i, -sign * n[i] / bonds.relaxation_time_s());
+    for (const ViscousLaw::Branch& branch : branches_of(bond)) {
+      for (Eigen::Index i = 0; i < 3; ++i) {
+        entries.emplace_back(v + i, m, -branch.share * pull[i]);
+        entries.emplace_back(m, u + i,
+                             -sign * kernel_slope_[row] * n[i] / branch.relaxation_time_s);
+      }
+      ++m;
     }
   };
   end(a, b, 1.0);
@@ -64,7 +69,9 @@ InertialEquation::Sparse InertialEquation::jacobian(double time_s, const ConstVe
   const BondSystem& bonds = tissue_.bonds();
   const TissueMotion& now = unpack(time_s, state);
   BlockMatrix stiffness(bonds.pattern());
-  bonds.add_stiffness(now.position, {now.remembered, 0.0}, stiffness);
+  find_pressing();
+  bonds.add_stiffness(now.position, {now.mean, 0.0, pressing_}, stiffness);
+  bonds.kernel_slopes(now.position, kernel_slope_);
   Triplets entries;
   for (Eigen::Index i = 0; i < coordinates(); ++i) {
     entries.emplace_back(i, i, 0.0);
@@ -75,12 +82,16 @@ InertialEquation::Sparse InertialEquation::jacobian(double time_s, const ConstVe
     const Eigen::Matrix3d& p = tissue_.freedom().projector(sphere);
     const Eigen::Index v = coordinates() + 3 * i;
     add_block(entries, v, 3 * i, p / -inertia_.mass_kg[i] * stiffness.diagonal[sphere]);
-    add_block(entries, v, v, -inertia_.drag_per_s * p);
+    add_block(entries, v, v, -drag_per_s_[i] * p);
   }
   for (std::size_t bond = 0; bond < bonds.size(); ++bond) {
     add_bond_entries(entries, bond, stiffness);
-    const Eigen::Index y = memory_of_[bond];
-    if (y >= 0) entries.emplace_back(y, y, -1.0 / bonds.relaxation_time_s());
+    Eigen::Index m = viscous_of_[bond];
+    if (m < 0) continue;
+    for (const ViscousLaw::Branch& branch : branches_of(bond)) {
+      entries.emplace_back(m, m, -1.0 / branch.relaxation_time_s);
+      ++m;
+    }
   }
   Sparse matrix(size(), size());
   matrix.setFromTriplets(entries.begin(), entries.end());

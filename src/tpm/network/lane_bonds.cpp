@@ -1,5 +1,6 @@
 #include "tpm/network/lane_bonds.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -59,23 +60,49 @@ using Pull = std::array<double, kSphere>;
   }
 }
 
+/// Change of u(l) with a change of the law.
+double equilibrium_change(const ViscousLaw& law, const LawChange& change, double l) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < change.spring_share.size(); ++i) {
+    const auto& [share, function] = law.springs[i];
+    sum += change.spring_share[i] * function.value(l) +
+           share * change.spring_log_length[i] * function.d_log_length(l);
+  }
+  return sum;
+}
+
 }  // namespace
 
-LaneBonds::LaneBonds(const BondSystem& bonds) : contacts_(bonds.contacts()) {
+LaneBonds::LaneBonds(const BondSystem& bonds)
+    : contacts_(bonds.contacts()),
+      laws_(bonds.laws().begin(), bonds.laws().end()),
+      linear_(bonds.is_linear()) {
+  std::vector<Data> all;
   std::vector<Data> lasting;
   std::vector<std::size_t> lasting_number;
   for (std::size_t i = 0; i < bonds.first_contact(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     constexpr double kNever = -std::numeric_limits<double>::infinity();
     const Data data{bonds.end_a()[i],       bonds.end_b()[i],      bonds.rest_length_m()[row],
-                    bonds.stiffness()[row], bonds.relaxing()[row], bonds.is_rope(i) ? 0.0 : kNever};
+                    bonds.stiffness()[row], bonds.relaxing()[row], bonds.is_rope(i) ? 0.0 : kNever,
+                    bonds.law_of(i)};
     if (data.g > 0.0) {
       relaxing_.push_back(i);
-      bond_.push_back(data);
     } else {
       lasting.push_back(data);
       lasting_number.push_back(i);
     }
+    all.push_back(data);
+  }
+  std::stable_sort(relaxing_.begin(), relaxing_.end(),
+                   [&](std::size_t x, std::size_t y) { return all[x].law < all[y].law; });
+  for (const std::size_t i : relaxing_) {
+    const auto column = static_cast<Eigen::Index>(bond_.size());
+    if (groups_.empty() || groups_.back().law != all[i].law) {
+      groups_.push_back({all[i].law, column, 0});
+    }
+    ++groups_.back().count;
+    bond_.push_back(all[i]);
   }
   bond_.insert(bond_.end(), lasting.begin(), lasting.end());
   number_ = relaxing_;
@@ -130,25 +157,60 @@ void LaneBonds::elongations(const LaneMatrix& position, LaneMatrix& elongation) 
   });
 }
 
+void LaneBonds::followed(const LaneMatrix& position, LaneMatrix& followed) const {
+  elongations(position, followed);
+  if (linear_) return;
+  double* const v = followed.data();
+  for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+    const ElongationFunction& kernel = laws_[bond_[i].law].kernel;
+    for (std::size_t s = 0; s < kLanes; ++s) v[kLanes * i + s] = kernel.value(v[kLanes * i + s]);
+  }
+}
+
 void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
                            LaneMatrix& force) const {
+  linear_ ? add_bond_forces<true>(position, memory, force)
+          : add_bond_forces<false>(position, memory, force);
+  for (const ToolContact& contact : closed_) {
+    const Lie now = lie(contact, position);
+    const Eigen::Matrix<double, kLanes, 3> pull =
+        now.direction.array().colwise() * now.overlap_force.array();
+    columns_of(force, contact.sphere) += pull;
+    columns_of(force, contact.tool) -= pull;
+  }
+}
+
+template <bool kLinear>
+void LaneBonds::add_bond_forces(const LaneMatrix& position, const LaneMatrix& memory,
+                                LaneMatrix& force) const {
   const double* const x = position.data();
   const double* const y = memory.data();
   double* const f = force.data();
   const std::size_t relaxing = relaxing_.size();
-  run_wide([&]() __attribute__((always_inline)) {
+  const auto sweep = [&]() __attribute__((always_inline)) {
     constexpr std::array<double, kLanes> kNothing{};
     Span span;
     for (std::size_t i = 0; i < bond_.size(); ++i) {
       const Data bond = bond_[i];
-      const double* const remembered = i < relaxing ? y + kLanes * i : kNothing.data();
+      const double* const viscous = i < relaxing ? y + kLanes * i : kNothing.data();
       measure(x + kSphere * bond.a, x + kSphere * bond.b, span);
       std::array<double, kLanes> share;
+      if constexpr (kLinear) {
 #pragma omp simd
-      for (std::size_t s = 0; s < kLanes; ++s) {
-        const double l = span.length[s] - bond.rest_length_m;
-        const double taut = l >= bond.least ? 1.0 : 0.0;
-        share[s] = taut * (bond.k * l - bond.g * remembered[s]) * span.inverse[s];
+        for (std::size_t s = 0; s < kLanes; ++s) {
+          const double l = span.length[s] - bond.rest_length_m;
+          const double taut = l >= bond.least ? 1.0 : 0.0;
+          share[s] = taut * (bond.k * l - bond.g * viscous[s]) * span.inverse[s];
+        }
+      } else {
+        const ViscousLaw& law = laws_[bond.law];
+        for (std::size_t s = 0; s < kLanes; ++s) {
+          const double l = span.length[s] - bond.rest_length_m;
+          const double taut = l >= bond.least ? 1.0 : 0.0;
+          const double pull =
+              (bond.k - bond.g) * law.equilibrium(l) + bond.g * (law.kernel.value(l) - viscous[s]);
+          share[s] = taut * pull * span.inverse[s];
+        }
       }
       Pull pull;
 #pragma omp simd
@@ -159,18 +221,17 @@ void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
       }
       pull_ends(pull, f + kSphere * bond.a, f + kSphere * bond.b);
     }
-  });
-  for (const ToolContact& contact : closed_) {
-    const Lie now = lie(contact, position);
-    const Eigen::Matrix<double, kLanes, 3> pull =
-        now.direction.array().colwise() * now.overlap_force.array();
-    columns_of(force, contact.sphere) += pull;
-    columns_of(force, contact.tool) -= pull;
+  };
+  // Calls of laws are not inlined.
+  if constexpr (kLinear) {
+    run_wide(sweep);
+  } else {
+    sweep();
   }
 }
 
-void LaneBonds::elongation_changes(const LaneMatrix& position, const LaneMatrix& displacement,
-                                   LaneMatrix& change) const {
+void LaneBonds::followed_changes(const LaneMatrix& position, const LaneMatrix& displacement,
+                                 std::span<const LawChange> laws, LaneMatrix& change) const {
   change.resize(kLanes, static_cast<Eigen::Index>(relaxing_.size()));
   const double* const x = position.data();
   const double* const u = displacement.data();
@@ -187,41 +248,71 @@ void LaneBonds::elongation_changes(const LaneMatrix& position, const LaneMatrix&
       }
     }
   });
+  if (linear_) return;
+  Span span;
+  for (std::size_t i = 0; i < relaxing_.size(); ++i) {
+    const ElongationFunction& kernel = laws_[bond_[i].law].kernel;
+    measure(x + kSphere * bond_[i].a, x + kSphere * bond_[i].b, span);
+    for (std::size_t s = 0; s < kLanes; ++s) {
+      const double l = span.length[s] - bond_[i].rest_length_m;
+      dl[kLanes * i + s] = kernel.slope(l) * dl[kLanes * i + s] +
+                           laws[bond_[i].law].kernel_log_length * kernel.d_log_length(l);
+    }
+  }
 }
 
-void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
-                                  const LaneMatrix& displacement, const LaneMatrix& memory_change,
-                                  const Eigen::VectorXd& k_change, const Eigen::VectorXd& g_change,
-                                  LaneMatrix& force) const {
+template <bool kLinear>
+void LaneBonds::add_bond_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+                                       const Changes& changes, LaneMatrix& force) const {
   const double* const x = position.data();
-  const double* const u = displacement.data();
+  const double* const u = changes.displacement.data();
   const double* const y = memory.data();
-  const double* const dy = memory_change.data();
+  const double* const dy = changes.mean.data();
   double* const f = force.data();
   const std::size_t relaxing = relaxing_.size();
-  run_wide([&]() __attribute__((always_inline)) {
+  const auto sweep = [&]() __attribute__((always_inline)) {
     constexpr std::array<double, kLanes> kNothing{};
     Span span;
     for (std::size_t i = 0; i < bond_.size(); ++i) {
       const Data bond = bond_[i];
-      const double dk = k_change[static_cast<Eigen::Index>(i)];
-      const double dg = g_change[static_cast<Eigen::Index>(i)];
-      const double* const remembered = i < relaxing ? y + kLanes * i : kNothing.data();
+      const double dk = changes.stiffness[static_cast<Eigen::Index>(i)];
+      const double dg = changes.relaxing[static_cast<Eigen::Index>(i)];
+      const double* const viscous = i < relaxing ? y + kLanes * i : kNothing.data();
       const double* const aged = i < relaxing ? dy + kLanes * i : kNothing.data();
       const double* const ua = u + kSphere * bond.a;
       const double* const ub = u + kSphere * bond.b;
       measure(x + kSphere * bond.a, x + kSphere * bond.b, span);
       // N t with t the unit vector: dN t + N (du - t dl)/length, where dl = t du.
       std::array<double, kLanes> with_span, with_change;
+      if constexpr (kLinear) {
 #pragma omp simd
-      for (std::size_t s = 0; s < kLanes; ++s) {
-        const double l = span.length[s] - bond.rest_length_m;
-        const double taut = l >= bond.least ? 1.0 : 0.0;
-        const double share = taut * span.inverse[s] * (bond.k * l - bond.g * remembered[s]);
-        const double dl = span.inverse[s] * along(span, ua, ub, s);
-        const double dn = bond.k * dl - bond.g * aged[s] + dk * l - dg * remembered[s];
-        with_span[s] = span.inverse[s] * (taut * dn - share * dl);
-        with_change[s] = share;
+        for (std::size_t s = 0; s < kLanes; ++s) {
+          const double l = span.length[s] - bond.rest_length_m;
+          const double taut = l >= bond.least ? 1.0 : 0.0;
+          const double share = taut * span.inverse[s] * (bond.k * l - bond.g * viscous[s]);
+          const double dl = span.inverse[s] * along(span, ua, ub, s);
+          const double dn = bond.k * dl - bond.g * aged[s] + dk * l - dg * viscous[s];
+          with_span[s] = span.inverse[s] * (taut * dn - share * dl);
+          with_change[s] = share;
+        }
+      } else {
+        const ViscousLaw& law = laws_[bond.law];
+        for (std::size_t s = 0; s < kLanes; ++s) {
+          const double l = span.length[s] - bond.rest_length_m;
+          const double taut = l >= bond.least ? 1.0 : 0.0;
+          const double shape = law.equilibrium(l);
+          const double v = law.kernel.value(l) - viscous[s];
+          const double slope =
+              (bond.k - bond.g) * law.equilibrium_slope(l) + bond.g * law.kernel.slope(l);
+          const double share = taut * span.inverse[s] * ((bond.k - bond.g) * shape + bond.g * v);
+          const double dl = span.inverse[s] * along(span, ua, ub, s);
+          const double dn =
+              slope * dl - bond.g * aged[s] + dk * shape + dg * (v - shape) +
+              (bond.k - bond.g) * equilibrium_change(law, changes.laws[bond.law], l) +
+              bond.g * changes.laws[bond.law].kernel_log_length * law.kernel.d_log_length(l);
+          with_span[s] = span.inverse[s] * (taut * dn - share * dl);
+          with_change[s] = share;
+        }
       }
       Pull pull;
 #pragma omp simd
@@ -234,11 +325,23 @@ void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& 
       }
       pull_ends(pull, f + kSphere * bond.a, f + kSphere * bond.b);
     }
-  });
+  };
+  // Calls of laws are not inlined.
+  if constexpr (kLinear) {
+    run_wide(sweep);
+  } else {
+    sweep();
+  }
+}
+
+void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+                                  const Changes& changes, LaneMatrix& force) const {
+  linear_ ? add_bond_force_changes<true>(position, memory, changes, force)
+          : add_bond_force_changes<false>(position, memory, changes, force);
   for (const ToolContact& contact : closed_) {
     const Lie now = lie(contact, position);
-    const Eigen::Matrix<double, kLanes, 3> apart =
-        columns_of(displacement, contact.tool) - columns_of(displacement, contact.sphere);
+    const Eigen::Matrix<double, kLanes, 3> apart = columns_of(changes.displacement, contact.tool) -
+                                                   columns_of(changes.displacement, contact.sphere);
     const LaneVector along = now.direction.cwiseProduct(apart).rowwise().sum();
     const LaneVector straight =
         along.cwiseProduct(LaneVector::Constant(contact.stiffness_N_per_m) - now.turning);

@@ -2,14 +2,15 @@
 #include <vector>
 
 #include "tpm/network/bond_system.hpp"
+#include "tpm/network/quasistatic.hpp"
 #include "tpm/solve/lanes.hpp"
 
 namespace tpm {
 
 /// The bonds of a system, working on several states of the network at once, over which the same
-/// contacts with tools are closed. Positions and forces
-/// have three columns per sphere; elongations and memories have one column per bond that relaxes,
-/// in the order of relaxing_bonds().
+/// contacts with tools are closed. Positions and forces have three columns per sphere; what bonds
+/// follow, V(l) (l where nothing stiffens), and mean viscous elongations y have one column per bond
+/// that relaxes, in the order of relaxing_bonds().
 class LaneBonds {
  public:
   explicit LaneBonds(const BondSystem& bonds);
@@ -17,8 +18,15 @@ class LaneBonds {
   /// Says which contacts are closed, as BondMemory::closed; at first none is.
   void close_contacts(std::span<const char> closed);
 
-  /// The bonds with g > 0, by their number in the system.
+  /// The bonds with g > 0, by their number in the system, those of one law together.
   [[nodiscard]] const std::vector<std::size_t>& relaxing_bonds() const { return relaxing_; }
+
+  /// The relaxing bonds of one law: columns first to first + count.
+  struct Group {
+    std::size_t law = 0;  ///< of the system
+    Eigen::Index first = 0, count = 0;
+  };
+  [[nodiscard]] const std::vector<Group>& groups() const { return groups_; }
 
   /// The values that belong to relaxing bonds.
   [[nodiscard]] Eigen::VectorXd of_relaxing(const Eigen::VectorXd& all) const;
@@ -28,27 +36,36 @@ class LaneBonds {
 
   /// l of the relaxing bonds.
   void elongations(const LaneMatrix& position, LaneMatrix& elongation) const;
+  /// V(l) of the relaxing bonds.
+  void followed(const LaneMatrix& position, LaneMatrix& followed) const;
 
   /// Adds what all bonds pull their spheres with, N.
   /// @param memory y of the relaxing bonds, m
   void add_forces(const LaneMatrix& position, const LaneMatrix& memory, LaneMatrix& force) const;
 
-  /// Changes of l of the relaxing bonds with small displacements of the spheres.
-  void elongation_changes(const LaneMatrix& position, const LaneMatrix& displacement,
-                          LaneMatrix& change) const;
+  /// Changes of V(l) of the relaxing bonds with small displacements of the spheres and changes of
+  /// the laws.
+  void followed_changes(const LaneMatrix& position, const LaneMatrix& displacement,
+                        std::span<const LawChange> laws, LaneMatrix& change) const;
 
-  /// Adds the change of what all bonds pull their spheres with, N, with small displacements of the
-  /// spheres, changes of y of the relaxing bonds, and changes of k and g of all, in_order().
+  /// Small changes of everything that forces depend on.
+  struct Changes {
+    const LaneMatrix& displacement;    ///< of the spheres
+    const LaneMatrix& mean;            ///< of y of the relaxing bonds
+    const Eigen::VectorXd& stiffness;  ///< of k of all bonds, in_order()
+    const Eigen::VectorXd& relaxing;   ///< of g of all bonds, in_order()
+    std::span<const LawChange> laws;   ///< of each law
+  };
+  /// Adds the change of what all bonds pull their spheres with, N.
   void add_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
-                         const LaneMatrix& displacement, const LaneMatrix& memory_change,
-                         const Eigen::VectorXd& k_change, const Eigen::VectorXd& g_change,
-                         LaneMatrix& force) const;
+                         const Changes& changes, LaneMatrix& force) const;
 
  private:
   struct Data {
     std::uint32_t a, b;
     double rest_length_m, k, g;
     double least;  ///< elongation below which the bond is slack, m
+    std::size_t law;
   };
   /// How a contact lies in every lane.
   struct Lie {
@@ -57,8 +74,18 @@ class LaneBonds {
   };
   [[nodiscard]] Lie lie(const ToolContact& contact, const LaneMatrix& position) const;
 
+  template <bool kLinear>
+  void add_bond_forces(const LaneMatrix& position, const LaneMatrix& memory,
+                       LaneMatrix& force) const;
+  template <bool kLinear>
+  void add_bond_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+                              const Changes& changes, LaneMatrix& force) const;
+
   std::vector<ToolContact> contacts_, closed_;
+  std::vector<ViscousLaw> laws_;
+  bool linear_;
   std::vector<std::size_t> relaxing_;
+  std::vector<Group> groups_;
   std::vector<Data> bond_;           ///< the relaxing ones first
   std::vector<std::size_t> number_;  ///< of each in the system
 };

@@ -30,7 +30,7 @@ class InverseIteration {
   }
 
   /// The lowest omega^2 where a share of the relaxing stiffness has relaxed.
-  double lowest(double following) {
+  double lowest(const Following& following) {
     const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())),
                             following};
     BlockMatrix matrix(bonds_.pattern());
@@ -82,6 +82,20 @@ class InverseIteration {
   Eigen::MatrixXd basis_;  ///< one column a vector, M-orthonormal
 };
 
+/// The relaxed share of each law at the square of an angular frequency.
+Following relaxed_at(const BondSystem& bonds, double square) {
+  std::vector<double> of_law;
+  for (const ViscousLaw& law : bonds.laws()) {
+    double share = 0.0;
+    for (const ViscousLaw::Branch& branch : law.branches) {
+      const double tau = branch.relaxation_time_s;
+      share += branch.share / (1.0 + square * tau * tau);
+    }
+    of_law.push_back(share);
+  }
+  return Following(std::move(of_law));
+}
+
 }  // namespace
 
 double LowestMode::angular_frequency() const {
@@ -95,6 +109,15 @@ Eigen::VectorXd sphere_masses_kg(const Organ& organ, double density_kg_per_m3) {
 
 LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
                        const Eigen::VectorXd& mass_kg) {
+  if (bonds.contact_count() > 0) {
+    const BondSystem tissue = bonds.without_tools();
+    const auto spheres = static_cast<Eigen::Index>(tissue.spheres());
+    LowestMode mode = lowest_mode(tissue, rest.leftCols(spheres), freedom.first(tissue.spheres()),
+                                  mass_kg.head(spheres));
+    mode.shape.conservativeResize(Eigen::NoChange, rest.cols());
+    mode.shape.rightCols(rest.cols() - spheres).setZero();
+    return mode;
+  }
   require_rigid(bonds, rest, freedom, "lowest mode");
   if (freedom.count() == 0) throw bad_input("lowest mode", "nothing is free", "a free coordinate");
   InverseIteration iteration(bonds, rest, freedom, mass_kg);
@@ -102,8 +125,7 @@ LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest, const Fre
   // From the unrelaxed network downwards: omega falls steadily to its own fixed point.
   double square = iteration.lowest(0.0);
   for (int i = 0; i < kMostModeIterations; ++i) {
-    const double tau = bonds.relaxation_time_s();
-    mode.following = 1.0 / (1.0 + square * tau * tau);
+    mode.following = relaxed_at(bonds, square);
     const double last = square;
     square = iteration.lowest(mode.following);
     if (std::abs(square - last) > 10.0 * kConverged * square) continue;

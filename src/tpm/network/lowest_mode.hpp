@@ -12,18 +12,21 @@ namespace tpm {
 /// The slowest free vibration of a network about rest.
 struct LowestMode {
   double frequency_Hz = 0.0;
-  /// Share of the relaxing stiffness that has relaxed at that frequency, 1/(1 + (omega tau)^2).
-  double following = 0.0;
-  /// Displacements of the spheres, modal mass 1: the sum of m |shape|^2 is 1 kg (m^2). Up to sign,
-  /// and within their span where several modes have one frequency.
+  /// Share of the relaxing stiffness that has relaxed at that frequency, of each law the sum of
+  /// gamma_j/(1 + (omega tau_j)^2).
+  Following following;
+  /// Displacements of the spheres (of tools 0), modal mass 1: the sum of m |shape|^2 is 1 kg (m^2).
+  /// Up to sign, and within their span where several modes have one frequency.
   Eigen::Matrix3Xd shape;
 
   [[nodiscard]] double angular_frequency() const;  ///< rad/s
 };
 
+/// Tools are left out: what they weigh and how stiff their contacts are is not the tissue's.
+///
 /// Solves K(omega) shape = omega^2 M shape for the smallest omega, where K is the storage stiffness
-/// that the bonds have at this frequency: a vibrating Zener bond resists with k - g/(1 + (omega
-/// tau)^2). What its dashpot takes out of the motion is left out.
+/// that the bonds have at this frequency: a vibrating bond resists with k - g sum_j gamma_j/(1 +
+/// (omega tau_j)^2). What its dashpot takes out of the motion is left out.
 ///
 /// Inverse iteration of a few vectors at once, by the factorisation of K (Bathe, Finite Element
 /// Procedures, section 11.6), inside a fixed-point iteration for omega.

@@ -36,18 +36,19 @@ Network msm_network(const Network& network, SpringRule rule) {
   return msm;
 }
 
-TpmParameters msm_material(const Network& msm, TpmParameters material, const Freedom& freedom,
-                           const Probe& probe, double stiffness_N_per_m) {
+BondMaterial msm_material(const Network& msm, const Freedom& freedom, const Probe& probe,
+                          double stiffness_N_per_m) {
   if (!(stiffness_N_per_m > 0.0) || !std::isfinite(stiffness_N_per_m)) {
     throw bad_input("mass-spring model",
                     fmt::format("a contact stiffness of {} N/m", shortest(stiffness_N_per_m)),
                     "a stiffness above 0");
   }
-  material.Eprime_Pa = 1e4;  // any will do: the stiffness is in proportion to it
+  BondMaterial material;
+  material.lateral_Pa = 1e4;  // any will do: the stiffness is in proportion to it
   const double per_Pa = contact_stiffness_N_per_m(BondSystem(msm, material), msm.organ.position,
                                                   freedom, probe, 0.0) /
-                        material.Eprime_Pa;
-  material.Eprime_Pa = stiffness_N_per_m / per_Pa;
+                        material.lateral_Pa;
+  material.lateral_Pa = stiffness_N_per_m / per_Pa;
   return material;
 }
 

@@ -22,12 +22,11 @@ enum class SpringRule {
 /// spheres', the dampers those of InertialOptions with stiffness_share = 1: one beside each spring.
 [[nodiscard]] Network msm_network(const Network& network, SpringRule rule);
 
-/// The material with which the springs of an msm_network, held and pushed alike, meet a small depth
-/// with the given stiffness: the one given, E' set to do so.
+/// The elastic material with which the springs of an msm_network, held and pushed alike, meet a
+/// small depth with the given stiffness.
 /// @param stiffness_N_per_m > 0, as contact_stiffness_N_per_m gives it for the tissue
 /// Throws Error(bad_input) as contact_stiffness_N_per_m does, and for a stiffness that is not > 0.
-[[nodiscard]] TpmParameters msm_material(const Network& msm, TpmParameters material,
-                                         const Freedom& freedom, const Probe& probe,
-                                         double stiffness_N_per_m);
+[[nodiscard]] BondMaterial msm_material(const Network& msm, const Freedom& freedom,
+                                        const Probe& probe, double stiffness_N_per_m);
 
 }  // namespace tpm

@@ -1,5 +1,9 @@
 #include "tpm/network/material_directions.hpp"
 
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+
 namespace tpm {
 
 std::array<TangentDirection, 3> material_directions(const Network& network,
@@ -19,6 +23,63 @@ std::array<TangentDirection, 3> material_directions(const Network& network,
   return {{{zero, -share2 * share2 * radial, -1.0 / sum_Pa, 0.0},
            {radial, (2.0 - share2) * share2 * radial, -1.0 / sum_Pa, 0.0},
            {lateral, zero, 0.0, 0.0}}};
+}
+
+namespace {
+
+/// Changes of one law.
+LawChange change_between(const ViscousLaw& minus, const ViscousLaw& plus, double step) {
+  const auto log_of = [](const ElongationFunction& f) {
+    return f.is_linear() ? 0.0 : std::log(f.length_m);
+  };
+  LawChange change;
+  for (std::size_t j = 0; j < minus.branches.size(); ++j) {
+    const ViscousLaw::Branch& a = minus.branches[j];
+    const ViscousLaw::Branch& b = plus.branches[j];
+    change.share.push_back((b.share - a.share) / step);
+    change.log_time.push_back(std::log(b.relaxation_time_s / a.relaxation_time_s) / step);
+  }
+  for (std::size_t i = 0; i < minus.springs.size(); ++i) {
+    const ViscousLaw::Spring& a = minus.springs[i];
+    const ViscousLaw::Spring& b = plus.springs[i];
+    change.spring_share.push_back((b.share - a.share) / step);
+    change.spring_log_length.push_back((log_of(b.function) - log_of(a.function)) / step);
+  }
+  change.kernel_log_length = (log_of(plus.kernel) - log_of(minus.kernel)) / step;
+  return change;
+}
+
+bool correspond(const BondSystem& minus, const BondSystem& plus) {
+  if (minus.size() != plus.size() || minus.laws().size() != plus.laws().size()) return false;
+  for (std::size_t i = 0; i < minus.laws().size(); ++i) {
+    const ViscousLaw& a = minus.laws()[i];
+    const ViscousLaw& b = plus.laws()[i];
+    if (a.branches.size() != b.branches.size() || a.springs.size() != b.springs.size()) {
+      return false;
+    }
+  }
+  for (std::size_t i = 0; i < minus.size(); ++i) {
+    if (minus.law_of(i) != plus.law_of(i)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+TangentDirection direction_between(const BondSystem& minus, const BondSystem& bonds,
+                                   const BondSystem& plus, double step) {
+  if (!correspond(minus, bonds) || !correspond(bonds, plus)) {
+    throw bad_input("material", "its laws change their form where a derivative is taken",
+                    "moduli above 0, relaxation times that differ, and regions of one law varied "
+                    "together");
+  }
+  TangentDirection direction;
+  direction.stiffness = (plus.stiffness() - minus.stiffness()) / step;
+  direction.relaxing = (plus.relaxing() - minus.relaxing()) / step;
+  for (std::size_t i = 0; i < minus.laws().size(); ++i) {
+    direction.laws.push_back(change_between(minus.laws()[i], plus.laws()[i], step));
+  }
+  return direction;
 }
 
 }  // namespace tpm

@@ -10,4 +10,11 @@ namespace tpm {
 [[nodiscard]] std::array<TangentDirection, 3> material_directions(const Network& network,
                                                                   const TpmParameters& material);
 
+/// The change of everything about the bonds of a system: a central difference between two systems
+/// of the same graph on either side of it, over the step from one to the other. Throws
+/// Error(bad_input) if their laws do not correspond: a branch has vanished, or materials that were
+/// one part.
+[[nodiscard]] TangentDirection direction_between(const BondSystem& minus, const BondSystem& bonds,
+                                                 const BondSystem& plus, double step);
+
 }  // namespace tpm

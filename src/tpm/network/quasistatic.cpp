@@ -19,7 +19,7 @@ namespace {
 constexpr double kStepShare = 0.1;   // of the tolerance, for one step
 constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
 constexpr double kLeastMove = 1e-9;  // of a jump
-constexpr double kFirstStep = 3.0;   // after a change of rate, in relaxation times
+constexpr double kFirstStep = 3.0;   // after a change of rate, in the shortest relaxation times
 constexpr double kSafety = 0.8;
 constexpr int kUnlimited = std::numeric_limits<int>::max();
 constexpr double kMostGrowth = 30.0;           // from one step to the next
@@ -59,7 +59,7 @@ class Run {
         options_(options),
         times_s_(times_s),
         observer_(observer),
-        tissue_(bonds, rest, freedom, probes, protocol.drive()),
+        tissue_(bonds, rest, freedom, probes, protocol.drive(), options.equilibrium),
         stages_(tissue_, options.stages, !options.step_s) {
     order_ = rising_order(times_s);
     const auto asked = static_cast<Eigen::Index>(times_s.size());
@@ -88,9 +88,10 @@ class Run {
     const int rejected = result_.work.rejected;
     result_.work = stages_.work();
     result_.work.rejected = rejected;
+    result_.solver = tissue_.equilibrium().choice();
     if (options_.energies) result_.energy = energy_of(state_, energy_);
     result_.position = state_.position;
-    result_.remembered = state_.remembered;
+    result_.viscous = state_.viscous;
     return std::move(result_);
   }
 
@@ -127,8 +128,9 @@ class Run {
     set_scales(begin.time_s);
     stages_.see(begin.response);
     state_.position = begin.position;
-    state_.remembered = begin.remembered;
-    tissue_.bonds().elongations(state_.position, state_.elongation);
+    state_.viscous = begin.viscous;
+    state_.mean = tissue_.bonds().mean_viscous(begin.viscous);
+    tissue_.bonds().followed(state_.position, state_.followed);
     state_.imposed = begin.imposed;
     if (begin.energy) energy_ = *begin.energy;
     follow(begin.imposed, false);
@@ -137,13 +139,13 @@ class Run {
   void jump(double value) { move_to(value, false); }
 
   [[nodiscard]] double stored_J() const {
-    return tissue_.bonds().stored_energy_J(state_.position, state_.remembered);
+    return tissue_.bonds().stored_energy_J(state_.position, state_.viscous);
   }
 
   /// The account of the energy where the tissue is in a state.
   [[nodiscard]] QuasiStaticEnergy energy_of(const TissueState& state,
                                             QuasiStaticEnergy spent) const {
-    spent.stored_J = tissue_.bonds().stored_energy_J(state.position, state.remembered);
+    spent.stored_J = tissue_.bonds().stored_energy_J(state.position, state.viscous);
     return spent;
   }
 
@@ -195,8 +197,8 @@ class Run {
     const double length = to.time_s - from.time_s;
     const double rate = (to.value - from.value) / length;
     StepGrowth growth(options_.stages + 1);
-    double h = std::min(length,
-                        options_.step_s.value_or(kFirstStep * tissue_.bonds().relaxation_time_s()));
+    double h = std::min(length, options_.step_s.value_or(
+                                    kFirstStep * tissue_.bonds().shortest_relaxation_time_s()));
     if (rate == 0.0 && from.value == 0.0 && is_relaxed()) return stand_still(to.time_s);
     while (state_.time_s < to.time_s) {
       const double left = to.time_s - state_.time_s;
@@ -268,7 +270,7 @@ class Run {
     throw failed(state_.imposed, "contacts with a tool open and close without end");
   }
 
-  [[nodiscard]] bool is_relaxed() const { return state_.remembered.isZero(0.0); }
+  [[nodiscard]] bool is_relaxed() const { return state_.viscous.isZero(0.0); }
 
   void stand_still(double until_s) {
     while (next_ < order_.size() && times_s_[order_[next_]] < until_s) {
@@ -279,6 +281,7 @@ class Run {
 
   /// Answers the times asked for within the step just found, its end left out.
   void report_within(double h, double rate) {
+    Spent spent{0.0, energy_};
     std::array<double, kLanes> fractions{};
     for (;;) {
       std::size_t count = 0;
@@ -288,31 +291,43 @@ class Run {
         fractions[count++] = std::max((time - state_.time_s) / h, 0.0);
       }
       if (count == 0) return;
+      const std::span<const double> asked(fractions.data(), count);
       if (tangents_) {
-        const Eigen::MatrixXd rows =
-            tangents_->responses_within(state_, {fractions.data(), count}, h, rate);
+        const Eigen::MatrixXd rows = tangents_->responses_within(state_, asked, h, rate);
         for (std::size_t i = 0; i < count; ++i) {
           derivative_row(next_ + i) = rows.row(static_cast<Eigen::Index>(i));
         }
       }
-      const LaneVector responses =
-          stages_.responses_within(state_, {fractions.data(), count}, h, rate);
-      for (std::size_t i = 0; i < count; ++i) {
-        const double response = responses[static_cast<Eigen::Index>(i)];
-        observer_ ? show_within(response, fractions[i], h, rate) : put(response);
+      const LaneVector responses = stages_.responses_within(state_, asked, h, rate);
+      if (observer_) {
+        show_within(responses, asked, h, rate, spent);
+        continue;
       }
+      for (std::size_t i = 0; i < count; ++i) put(responses[static_cast<Eigen::Index>(i)]);
     }
   }
 
-  /// A response within the step just found, with the state there.
-  void show_within(double response, double fraction, double h, double rate) {
-    QuasiStaticEnergy spent = energy_;
-    if (options_.energies) {
-      const QuasiStaticEnergy part = stages_.energy_of_step(state_, h, rate, fraction);
-      spent.work_J += part.work_J;
-      spent.dissipated_J += part.dissipated_J;
+  /// Work and heat from the start of the run up to a fraction of a step.
+  struct Spent {
+    double fraction;
+    QuasiStaticEnergy energy;
+  };
+
+  /// Responses within the step just found, with the states there.
+  /// @param fractions rising
+  void show_within(const LaneVector& responses, std::span<const double> fractions, double h,
+                   double rate, Spent& spent) {
+    const std::vector<TissueState> states = stages_.states_within(state_, fractions, h, rate);
+    for (std::size_t i = 0; i < fractions.size(); ++i) {
+      if (options_.energies && fractions[i] > spent.fraction) {
+        const QuasiStaticEnergy part =
+            stages_.energy_of_step(state_, h, rate, spent.fraction, fractions[i]);
+        spent.energy.work_J += part.work_J;
+        spent.energy.dissipated_J += part.dissipated_J;
+        spent.fraction = fractions[i];
+      }
+      put(responses[static_cast<Eigen::Index>(i)], states[i], spent.energy);
     }
-    put(response, stages_.state_within(state_, fraction, h, rate), spent);
   }
 
   /// The last value held for as long as is asked, and for ever.
@@ -351,8 +366,8 @@ class Run {
     const double time_s = times_s_[order_[next_]];
     put(response);
     if (!observer_) return;
-    QuasiStaticState shown{time_s,         state.imposed,    response,
-                           state.position, state.remembered, std::nullopt};
+    QuasiStaticState shown{time_s,         state.imposed, response,
+                           state.position, state.viscous, std::nullopt};
     if (options_.energies) shown.energy = energy_of(state, spent);
     observer_(shown);
   }
@@ -381,10 +396,14 @@ class Run {
 
 void require_same_network(const QuasiStaticState& from, const BondSystem& bonds) {
   const auto spheres = static_cast<std::size_t>(from.position.cols());
-  const auto remembered = static_cast<std::size_t>(from.remembered.size());
-  if (spheres == bonds.spheres() && remembered == bonds.size()) return;
-  throw bad_input("state", fmt::format("{} spheres and {} bonds", spheres, remembered),
-                  fmt::format("{} and {}, as the network has", bonds.spheres(), bonds.size()));
+  const auto rows = static_cast<std::size_t>(from.viscous.rows());
+  const bool same_branches = from.viscous.cols() == bonds.most_branches();
+  if (spheres == bonds.spheres() && rows == bonds.size() && same_branches) return;
+  throw bad_input(
+      "state",
+      fmt::format("{} spheres and {} bonds of {} branches", spheres, rows, from.viscous.cols()),
+      fmt::format("{}, {} and {}, as the network has", bonds.spheres(), bonds.size(),
+                  bonds.most_branches()));
 }
 
 void require_later(std::span<const double> times_s, double from_s) {

@@ -43,13 +43,23 @@ void require_valid(const Probe& probe, const Freedom& freedom);
 /// The same for each, and none may be driven twice.
 void require_valid(const Probes& probes, const Freedom& freedom);
 
+/// Changes of one law of a BondSystem (viscous_law.hpp).
+struct LawChange {
+  std::vector<double> share;                            ///< of each gamma_j; they add up to 0
+  std::vector<double> log_time;                         ///< of each ln tau_j
+  std::vector<double> spring_share, spring_log_length;  ///< of each part of u
+  double kernel_log_length = 0.0;
+};
+
 /// A direction in which material and imposed history may change: a run can answer derivatives. They
 /// are found to an accuracy in parts of the response: choose units that make them of its size.
 struct TangentDirection {
   Eigen::VectorXd stiffness;         ///< change of k of each bond, N/m
   Eigen::VectorXd relaxing;          ///< change of g of each bond, N/m
-  double log_relaxation_time = 0.0;  ///< change of ln tau
+  double log_relaxation_time = 0.0;  ///< change of ln tau of every branch
   double imposed = 0.0;              ///< change of a factor on all that is imposed
+  std::vector<LawChange> laws =
+      {};  ///< one for each law of the system; empty: nothing else changes
 };
 
 struct QuasiStaticOptions {
@@ -61,7 +71,8 @@ struct QuasiStaticOptions {
   std::optional<double> step_s = std::nullopt;
   /// If given, a run that takes more iterations throws Error(numerical).
   std::optional<int> most_iterations = std::nullopt;
-  bool energies = false;                          ///< work and dissipation are integrated along
+  bool energies = false;  ///< work and dissipation are integrated along
+  EquilibriumOptions equilibrium = {.solver = StiffnessSolver::automatic};
   std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
   /// What is left unbalanced of a derivative, as `tolerance`; none: that.
   std::optional<double> derivative_tolerance = std::nullopt;
@@ -89,7 +100,7 @@ struct QuasiStaticState {
   double imposed = 0.0;                     ///< depth, m, or load, N
   double response = 0.0;                    ///< contact force, N, or depth, m
   Positions position;                       ///< of all spheres, m
-  Eigen::VectorXd remembered;               ///< y of each bond, m
+  Eigen::MatrixXd viscous;                  ///< m_j by (bond, branch), m; see BondSystem
   std::optional<QuasiStaticEnergy> energy;  ///< if asked for; until here
 };
 
@@ -101,16 +112,17 @@ struct QuasiStaticRun {
   Eigen::MatrixXd derivative;   ///< of each response (row) along each direction (column)
   double error_estimate = 0.0;  ///< sum of the steps' error estimates, N or m
   QuasiStaticWork work;
+  SolverChoice solver;
   std::optional<QuasiStaticEnergy> energy;  ///< if asked for
   Positions position;                       ///< where the run ended
-  Eigen::VectorXd remembered;               ///< y of each bond there, m
+  Eigen::MatrixXd viscous;                  ///< m_j by (bond, branch) there, m
 };
 
 /// The quasi-static network: force balance on every free sphere at each instant
-/// (docs/notation.md). The elongations of a step are a polynomial through its Radau nodes, under
-/// which what the bonds remember is advanced exactly; the stages are balanced together with one
-/// factorisation, that many steps share. Steps follow an estimate of the error of the response,
-/// found with the displacement field of the probe as its own adjoint.
+/// (docs/notation.md). What the bonds follow within a step, V(l), is a polynomial through its Radau
+/// nodes, under which every viscous elongation is advanced exactly; the stages are balanced
+/// together with one factorisation, that many steps share. Steps follow an estimate of the error of
+/// the response, found with the displacement field of the probe as its own adjoint.
 ///
 /// Over a step the same contacts with tools are closed; a step in which one would change ends
 /// there.

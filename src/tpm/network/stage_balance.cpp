@@ -23,6 +23,7 @@ constexpr Eigen::Index kMemoryDepth = 6;
 constexpr double kLongestMove = 0.25;    // of a bond
 constexpr double kSnap = 2.0;            // times what the stiffness says
 constexpr double kGrains = 8.0;          // roundings of a coordinate that no balance gets below
+constexpr double kLongPart = 0.25;       // of a step: its quadrature takes 16 points instead of 8
 constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the force
 
 std::vector<double> with_start(std::vector<double> nodes) {
@@ -53,11 +54,26 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
       bonds_(tissue.bonds()),
       full_(with_start(radau_nodes(stages))),
       inner_(radau_nodes(stages)),
-      factor_(tissue.bonds().pattern()),
+      factor_(tissue.equilibrium()),
       anderson_(coordinates_ * kLanes, kMemoryDepth),
       x_(kLanes, coordinates_),
       d_(kLanes, coordinates_),
-      force_(kLanes, coordinates_) {}
+      force_(kLanes, coordinates_) {
+  for (int lane = 0; lane < kLanes; ++lane) {
+    lane_nodes_[static_cast<std::size_t>(lane)] = node(lane);
+    stage_places_.push_back(full_.place(node(lane)));
+  }
+  // The error is judged where outputs are taken from: at the stages, of which the last is more
+  // accurate than the others, and before the first of them, where a step that is long against the
+  // relaxation time hides how the tissue settles after a change of rate.
+  std::vector<double> judged = inner_.nodes();
+  judged.push_back(0.25 * inner_.nodes().front());
+  judged.push_back(0.5 * inner_.nodes().front());
+  for (const double place : judged) {
+    judge_full_.push_back(full_.place(place));
+    judge_inner_.push_back(inner_.place(place));
+  }
+}
 
 double StageBalance::node(int lane) const {
   return inner_.nodes()[static_cast<std::size_t>(std::min(lane, stages_ - 1))];
@@ -65,7 +81,7 @@ double StageBalance::node(int lane) const {
 
 TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, double tolerance) {
   const BondMemory memory{
-      relaxed ? Eigen::VectorXd(Eigen::VectorXd::Zero(state.remembered.size())) : state.remembered,
+      relaxed ? Eigen::VectorXd(Eigen::VectorXd::Zero(state.mean.size())) : state.mean,
       relaxed ? 1.0 : 0.0};
   Positions position = state.position;
   tissue_.impose(position, imposed);
@@ -88,8 +104,8 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   if (change_m > *furthest_m) return TissueMove::unbalanced;
   state.imposed = imposed;
   state.position = std::move(position);
-  tissue_.bonds().elongations(state.position, state.elongation);
-  if (relaxed) state.remembered = state.elongation;
+  tissue_.bonds().followed(state.position, state.followed);
+  if (relaxed) state.set_equilibrium();
   state.closed = tissue_.bonds().closed_contacts(state.position);
   return TissueMove::done;
 }
@@ -110,40 +126,168 @@ std::optional<double> StageBalance::furthest_depth_change_m(const TissueState& s
   return std::min(kSnap * expected, longest);
 }
 
-void StageBalance::set_weights(double z) {
-  weights_.of_stages.setZero();
-  for (int lane = 0; lane < kLanes; ++lane) {
-    const Eigen::VectorXd weight = full_.weights(node(lane), z);
-    weights_.of_start[lane] = weight[0];
-    weights_.of_stages.row(lane).head(stages_) = weight.tail(stages_).transpose();
-    weights_.of_memory[lane] = std::exp(-z * node(lane));
+StageBalance::StepWeights StageBalance::weights_at(const Places& places,
+                                                   std::span<const double> fractions,
+                                                   double h) const {
+  const std::span<const double> times = tissue_.bonds().relaxation_times_s();
+  std::vector<MemoryWeights> of_time(times.size());
+  for (std::size_t t = 0; t < times.size(); ++t) {
+    const double z = h / times[t];
+    of_time[t].of_stages.setZero();
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const std::size_t place = std::min(static_cast<std::size_t>(lane), fractions.size() - 1);
+      const Eigen::VectorXd weight = places[place].weights(z);
+      of_time[t].of_start[lane] = weight[0];
+      of_time[t].of_stages.row(lane).head(stages_) = weight.tail(stages_).transpose();
+      of_time[t].of_memory[lane] = std::exp(-z * fractions[place]);
+    }
   }
-  // The error is judged where outputs are taken from: at the stages, of which the last is more
-  // accurate than the others, and before the first of them, where a step that is long against the
-  // relaxation time hides how the tissue settles after a change of rate.
-  std::vector<double> places = inner_.nodes();
-  places.push_back(0.25 * inner_.nodes().front());
-  places.push_back(0.5 * inner_.nodes().front());
-  const auto count = static_cast<Eigen::Index>(places.size());
-  judge_.setZero(count, kLanes);
-  judge_start_.resize(count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    Eigen::VectorXd difference = full_.weights(places[static_cast<std::size_t>(i)], z);
-    difference.tail(stages_) -= inner_.weights(places[static_cast<std::size_t>(i)], z);
-    judge_start_[i] = difference[0];
-    judge_.row(i).head(stages_) = difference.tail(stages_).transpose();
+  StepWeights weights;
+  for (const LaneBonds::Group& group : bonds_.groups()) {
+    LawWeights law;
+    law.mean.of_stages.setZero();
+    law.mean.of_start.setZero();
+    law.mean.of_memory.setZero();
+    for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
+      const MemoryWeights& weight = of_time[branch.time];
+      law.mean.of_stages += branch.share * weight.of_stages;
+      law.mean.of_start += branch.share * weight.of_start;
+      law.mean.of_memory += branch.share * weight.of_memory;
+      law.branch.push_back(weight);
+    }
+    weights.push_back(std::move(law));
+  }
+  return weights;
+}
+
+StageBalance::Start StageBalance::start_of(const TissueState& state) const {
+  Start start;
+  start.followed = bonds_.of_relaxing(state.followed).transpose();
+  start.mean = bonds_.of_relaxing(state.mean).transpose();
+  const std::vector<std::size_t>& relaxing = bonds_.relaxing_bonds();
+  start.viscous.resize(state.viscous.cols(), static_cast<Eigen::Index>(relaxing.size()));
+  for (Eigen::Index j = 0; j < state.viscous.cols(); ++j) {
+    for (std::size_t i = 0; i < relaxing.size(); ++i) {
+      start.viscous(j, static_cast<Eigen::Index>(i)) =
+          state.viscous(static_cast<Eigen::Index>(relaxing[i]), j);
+    }
+  }
+  return start;
+}
+
+void StageBalance::find_known(const StepWeights& weights, const Start& start,
+                              LaneMatrix& known) const {
+  known.resize(kLanes, start.followed.size());
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const LaneBonds::Group& group = bonds_.groups()[i];
+    const LawWeights& law = weights[i];
+    if (law.branch.size() == 1) continue;
+    auto here = known.middleCols(group.first, group.count);
+    here.noalias() = law.mean.of_start * start.followed.segment(group.first, group.count);
+    Eigen::Index j = 0;
+    for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
+      const LaneVector kept = branch.share * law.branch[static_cast<std::size_t>(j)].of_memory;
+      here.noalias() += kept * start.viscous.row(j).segment(group.first, group.count);
+      ++j;
+    }
   }
 }
 
-bool StageBalance::refactorise(const TissueState& state, double following) {
+void StageBalance::apply(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
+                         const LaneMatrix& known, LaneMatrix& mean) const {
+  mean.resize(kLanes, followed.cols());
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const auto [law, first, count] = bonds_.groups()[i];
+    if (weights[i].branch.size() == 1) {
+      weights[i].mean.apply(followed.middleCols(first, count), start.followed.segment(first, count),
+                            start.mean.segment(first, count), mean.middleCols(first, count));
+    } else {
+      weights[i].mean.apply(followed.middleCols(first, count), known.middleCols(first, count),
+                            mean.middleCols(first, count));
+    }
+  }
+}
+
+void StageBalance::viscous_in_lane(const StepWeights& weights, const LaneMatrix& followed,
+                                   const Start& start, Eigen::Index lane,
+                                   Eigen::MatrixXd& viscous) const {
+  viscous.setZero(start.viscous.rows(), start.viscous.cols());
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const auto [law, first, count] = bonds_.groups()[i];
+    for (std::size_t b = 0; b < weights[i].branch.size(); ++b) {
+      const MemoryWeights& weight = weights[i].branch[b];
+      const auto j = static_cast<Eigen::Index>(b);
+      viscous.row(j).segment(first, count) =
+          weight.of_stages.row(lane) * followed.middleCols(first, count) +
+          weight.of_start[lane] * start.followed.segment(first, count) +
+          weight.of_memory[lane] * start.viscous.row(j).segment(first, count);
+    }
+  }
+}
+
+void StageBalance::put_viscous(const Eigen::MatrixXd& viscous, TissueState& state) const {
+  for (const LaneBonds::Group& group : bonds_.groups()) {
+    const std::vector<ViscousLaw::Branch>& branches = tissue_.bonds().laws()[group.law].branches;
+    for (Eigen::Index i = group.first; i < group.first + group.count; ++i) {
+      const auto bond =
+          static_cast<Eigen::Index>(bonds_.relaxing_bonds()[static_cast<std::size_t>(i)]);
+      double mean = 0.0;
+      for (std::size_t b = 0; b < branches.size(); ++b) {
+        const auto j = static_cast<Eigen::Index>(b);
+        state.viscous(bond, j) = viscous(j, i);
+        mean += branches[b].share * viscous(j, i);
+      }
+      state.mean[bond] = mean;
+    }
+  }
+}
+
+void StageBalance::set_weights(double h) {
+  weights_ = weights_at(stage_places_, lane_nodes_, h);
+  const std::span<const double> times = tissue_.bonds().relaxation_times_s();
+  judge_.resize(times.size());
+  const auto count = static_cast<Eigen::Index>(judge_full_.size());
+  for (std::size_t t = 0; t < times.size(); ++t) {
+    const double z = h / times[t];
+    Judge& judge = judge_[t];
+    judge.of_stages.setZero(count, kLanes);
+    judge.of_start.resize(count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto place = static_cast<std::size_t>(i);
+      Eigen::VectorXd difference = judge_full_[place].weights(z);
+      difference.tail(stages_) -= judge_inner_[place].weights(z);
+      judge.of_start[i] = difference[0];
+      judge.of_stages.row(i).head(stages_) = difference.tail(stages_).transpose();
+    }
+  }
+}
+
+Following StageBalance::following_of_step() const {
+  std::vector<double> of_law(tissue_.bonds().laws().size(), 0.0);
+  for (std::size_t i = 0; i < weights_.size(); ++i) {
+    of_law[bonds_.groups()[i].law] = weights_[i].mean.of_stages.diagonal().head(stages_).mean();
+  }
+  return of_law.size() == 1 ? Following(of_law.front()) : Following(std::move(of_law));
+}
+
+double StageBalance::difference(const Following& a, const Following& b) const {
+  double largest = 0.0;
+  for (const LaneBonds::Group& group : bonds_.groups()) {
+    largest = std::max(largest, std::abs(a(group.law) - b(group.law)));
+  }
+  return largest;
+}
+
+bool StageBalance::refactorise(const TissueState& state, const Following& following) {
   following_ = following;
-  // The same memory at this instant, of which a share follows.
-  const BondMemory memory{state.remembered - following * state.elongation, following, state.closed};
+  // The same viscous elongations at this instant, of which a share follows.
+  const BondMemory memory =
+      tissue_.bonds().memory_at(state.mean, state.followed, following, state.closed);
   ++work_.factorisations;
   Equilibrium& equilibrium = tissue_.equilibrium();
   factorised_ = equilibrium.factorise(state.position, memory) && equilibrium.is_stable();
   if (!factorised_) return false;
-  factor_.copy(equilibrium.factor());
+  factor_.take();
   const DrivenTissue::UnitField field = tissue_.unit_field(state, memory);
   path_stiffness_ = field.stiffness;
   lane_field_ = by_coordinate(field.displacement);
@@ -158,8 +302,8 @@ bool StageBalance::refactorise(const TissueState& state, double following) {
   return true;
 }
 
-void StageBalance::require_factor(const TissueState& state, double following) {
-  if (factorised_ && following_ == following) return;
+void StageBalance::require_factor(const TissueState& state, const Following& following) {
+  if (factorised_ && difference(following_, following) == 0.0) return;
   if (refactorise(state, following)) return;
   throw Error(ExitCode::numerical, "network",
               "the stiffness behind a jump is not positive: its derivatives do not exist");
@@ -190,8 +334,8 @@ void StageBalance::predict(const TissueState& state, double h, double rate) {
 }
 
 void StageBalance::update_memory() {
-  bonds_.elongations(x_, elongation_);
-  weights_.apply(elongation_, start_elongation_, start_memory_, memory_);
+  bonds_.followed(x_, followed_);
+  apply(weights_, followed_, begin_, known_, memory_);
 }
 
 void StageBalance::residuals() {
@@ -233,20 +377,39 @@ StageBalance::Balance StageBalance::balance(double tolerance) {
 }
 
 double StageBalance::error() const {
-  Eigen::MatrixXd change = judge_ * elongation_;
-  change.noalias() += judge_start_ * start_elongation_;
-  const Eigen::VectorXd sum = change * goal_;
-  const Eigen::VectorXd size = change.cwiseAbs() * goal_.cwiseAbs();
-  return (sum.cwiseAbs() + 0.1 * size).maxCoeff();
+  const auto places = static_cast<Eigen::Index>(judge_full_.size());
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(places);
+  Eigen::VectorXd size = sum;
+  for (const LaneBonds::Group& group : bonds_.groups()) {
+    const auto goal = goal_.segment(group.first, group.count);
+    const auto followed = followed_.middleCols(group.first, group.count);
+    const auto start = begin_.followed.segment(group.first, group.count);
+    const LaneVector aimed = followed * goal;
+    const double start_aimed = start * goal;
+    Judge mean;
+    mean.of_stages.setZero(places, kLanes);
+    mean.of_start.setZero(places);
+    for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
+      // Branch by branch, whose later errors do not cancel even where they do now.
+      const Judge& judge = judge_[branch.time];
+      sum += branch.share * (judge.of_stages * aimed + judge.of_start * start_aimed).cwiseAbs();
+      mean.of_stages += branch.share * judge.of_stages;
+      mean.of_start += branch.share * judge.of_start;
+    }
+    Eigen::MatrixXd change = mean.of_stages * followed;
+    change.noalias() += mean.of_start * start;
+    size += change.cwiseAbs() * goal.cwiseAbs();
+  }
+  return (sum + 0.1 * size).maxCoeff();
 }
 
 StepOutcome StageBalance::try_step(const TissueState& state, double h, double rate,
                                    double tolerance) {
-  set_weights(h / tissue_.bonds().relaxation_time_s());
+  set_weights(h);
   StepOutcome outcome;
-  const double following = weights_.of_stages.diagonal().head(stages_).mean();
+  const Following following = following_of_step();
   const bool stale = !factorised_ || last_iterations_ > kTooManyIterations ||
-                     std::abs(following - following_) > kFollowingChange;
+                     difference(following, following_) > kFollowingChange;
   if (stale && !refactorise(state, following)) {
     outcome.unstable = true;
     return outcome;
@@ -254,8 +417,8 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   closed_ = state.closed;
   bonds_.close_contacts(closed_);
   start_ = by_coordinate(state.position);
-  start_elongation_ = bonds_.of_relaxing(state.elongation).transpose();
-  start_memory_ = bonds_.of_relaxing(state.remembered).transpose();
+  begin_ = start_of(state);
+  find_known(weights_, begin_, known_);
   predict(state, h, rate);
   outcome.allowed = tolerance * scale_;
   const Balance balanced = balance(std::max(outcome.allowed, grain_));
@@ -319,48 +482,46 @@ void StageBalance::change_contact(TissueState& state, std::size_t contact) {
   has_last_ = false;
 }
 
-StageBalance::Shapes StageBalance::shapes(std::span<const double> fractions, double z) const {
+StageBalance::Shapes StageBalance::shapes(std::span<const double> fractions, double h) const {
   Shapes shapes;
+  Places places;
+  for (const double c : fractions) places.push_back(full_.place(c));
+  shapes.weights = weights_at(places, fractions, h);
   shapes.interpolation.setZero();
-  shapes.memory.of_stages.setZero();
   for (int lane = 0; lane < kLanes; ++lane) {
-    const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
-    const Eigen::VectorXd weight = full_.weights(c, z);
-    shapes.interpolation.row(lane).head(stages_) = full_.interpolation(c).tail(stages_).transpose();
-    shapes.memory.of_start[lane] = weight[0];
-    shapes.memory.of_stages.row(lane).head(stages_) = weight.tail(stages_).transpose();
-    shapes.memory.of_memory[lane] = std::exp(-z * c);
+    const std::size_t place = std::min(static_cast<std::size_t>(lane), fractions.size() - 1);
+    shapes.interpolation.row(lane).head(stages_) =
+        places[place].interpolation().tail(stages_).transpose();
   }
   return shapes;
 }
 
-std::array<double, kLanes> StageBalance::lane_nodes() const {
-  std::array<double, kLanes> nodes{};
-  for (int lane = 0; lane < kLanes; ++lane) nodes[static_cast<std::size_t>(lane)] = node(lane);
-  return nodes;
-}
-
-LaneMatrix StageBalance::aging(std::span<const double> fractions, double z) const {
-  // y depends on z = h / tau by its weights and by what is left of the start, exp(-z c) y0.
-  Eigen::Matrix<double, kLanes, kLanes> slopes = Eigen::Matrix<double, kLanes, kLanes>::Zero();
+LaneMatrix StageBalance::aging(const Places& places, std::span<const double> fractions, double h,
+                               std::size_t group, std::size_t branch) const {
+  // m depends on z = h / tau by its weights and by what is left of the start, exp(-z c) m0.
+  const auto [law, first, count] = bonds_.groups()[group];
+  const double z = h / tissue_.bonds().laws()[law].branches[branch].relaxation_time_s;
+  LaneSquare slopes = LaneSquare::Zero();
   LaneVector start_slope, decay_slope;
   for (int lane = 0; lane < kLanes; ++lane) {
-    const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
-    const Eigen::VectorXd slope = full_.weight_slopes(c, z);
+    const std::size_t place = std::min(static_cast<std::size_t>(lane), fractions.size() - 1);
+    const double c = fractions[place];
+    const Eigen::VectorXd slope = places[place].weight_slopes(z);
     start_slope[lane] = slope[0];
     slopes.row(lane).head(stages_) = slope.tail(stages_).transpose();
     decay_slope[lane] = -c * std::exp(-z * c);
   }
-  LaneMatrix change = slopes * elongation_;
-  change.noalias() += start_slope * start_elongation_;
-  change.noalias() += decay_slope * start_memory_;
+  LaneMatrix change = slopes * followed_.middleCols(first, count);
+  change.noalias() += start_slope * begin_.followed.segment(first, count);
+  change.noalias() +=
+      decay_slope * begin_.viscous.row(static_cast<Eigen::Index>(branch)).segment(first, count);
   return -z * change;
 }
 
 StageBalance::Within StageBalance::within(const TissueState& state,
                                           std::span<const double> fractions, double h,
                                           double rate) const {
-  const Shapes at = shapes(fractions, h / tissue_.bonds().relaxation_time_s());
+  Shapes at = shapes(fractions, h);
   Within states;
   for (int lane = 0; lane < kLanes; ++lane) {
     const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
@@ -369,8 +530,10 @@ StageBalance::Within StageBalance::within(const TissueState& state,
   // Of displacements, not of coordinates, for the sake of rounding.
   states.position.noalias() = at.interpolation * (x_.rowwise() - start_);
   states.position.rowwise() += start_;
-  bonds_.elongations(states.position, states.elongation);
-  at.memory.apply(elongation_, start_elongation_, start_memory_, states.memory);
+  LaneMatrix known;
+  find_known(at.weights, begin_, known);
+  apply(at.weights, followed_, begin_, known, states.memory);
+  states.weights = std::move(at.weights);
   return states;
 }
 
@@ -389,9 +552,10 @@ LaneVector StageBalance::responses_within(const TissueState& state,
   return responses(within(state, fractions, h, rate));
 }
 
-TissueState StageBalance::state_within(const TissueState& state, double fraction, double h,
-                                       double rate) {
-  Within states = within(state, {&fraction, 1}, h, rate);
+std::vector<TissueState> StageBalance::states_within(const TissueState& state,
+                                                     std::span<const double> fractions, double h,
+                                                     double rate) {
+  Within states = within(state, fractions, h, rate);
   force_.setZero();
   tissue_.add_load(states.imposed, force_);
   bonds_.add_forces(states.position, states.memory, force_);
@@ -399,48 +563,101 @@ TissueState StageBalance::state_within(const TissueState& state, double fraction
   d_ = force_;
   factor_.solve(d_);
   tissue_.freedom().project(d_);
-  ++work_.back_solves;
-  TissueState at = state;
-  at.time_s += fraction * h;
-  at.imposed = states.imposed[0];
-  const Eigen::RowVectorXd place = states.position.row(0) + d_.row(0);
-  at.position = Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3);
-  tissue_.bonds().elongations(at.position, at.elongation);
-  for (std::size_t i = 0; i < bonds_.relaxing_bonds().size(); ++i) {
-    at.remembered[static_cast<Eigen::Index>(bonds_.relaxing_bonds()[i])] =
-        states.memory(0, static_cast<Eigen::Index>(i));
+  std::vector<TissueState> all(fractions.size(), state);
+  Eigen::MatrixXd viscous;
+  for (std::size_t lane = 0; lane < fractions.size(); ++lane) {
+    const auto row = static_cast<Eigen::Index>(lane);
+    TissueState& at = all[lane];
+    ++work_.back_solves;
+    at.time_s += fractions[lane] * h;
+    at.imposed = states.imposed[row];
+    const Eigen::RowVectorXd place = states.position.row(row) + d_.row(row);
+    at.position = Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3);
+    tissue_.bonds().followed(at.position, at.followed);
+    viscous_in_lane(states.weights, followed_, begin_, row, viscous);
+    put_viscous(viscous, at);
   }
-  return at;
+  return all;
+}
+
+LaneVector StageBalance::heat_W(const Within& states) const {
+  LaneVector heat = LaneVector::Zero();
+  LaneMatrix elongation;
+  bonds_.elongations(states.position, elongation);
+  const Eigen::VectorXd relaxing = bonds_.of_relaxing(tissue_.bonds().relaxing());
+  std::vector<LaneBonds::Group> general;
+  for (const LaneBonds::Group& group : bonds_.groups()) {
+    const ViscousLaw& law = tissue_.bonds().laws()[group.law];
+    if (!law.is_linear() || law.branches.size() != 1) {
+      general.push_back(group);
+      continue;
+    }
+    // V(l) = l, and the only branch is what the bond remembers: all lanes at once.
+    const auto apart = elongation.middleCols(group.first, group.count) -
+                       states.memory.middleCols(group.first, group.count);
+    heat += apart.cwiseAbs2() * relaxing.segment(group.first, group.count) /
+            law.branches.front().relaxation_time_s;
+  }
+  if (general.empty()) return heat;
+  Eigen::MatrixXd viscous;
+  for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+    viscous_in_lane(states.weights, followed_, begin_, lane, viscous);
+    for (const LaneBonds::Group& group : general) {
+      const ViscousLaw& law = tissue_.bonds().laws()[group.law];
+      for (std::size_t b = 0; b < law.branches.size(); ++b) {
+        double sum = 0.0;
+        for (Eigen::Index i = group.first; i < group.first + group.count; ++i) {
+          const double l = elongation(lane, i);
+          const double m = viscous(static_cast<Eigen::Index>(b), i);
+          sum += relaxing[i] * (l - law.kernel.inverse(m)) * (law.kernel.value(l) - m);
+        }
+        heat[lane] += law.branches[b].share * sum / law.branches[b].relaxation_time_s;
+      }
+    }
+  }
+  return heat;
 }
 
 QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double h, double rate,
-                                               double until) {
-  using Rule = boost::math::quadrature::gauss<double, 2 * kLanes>;
-  const Eigen::VectorXd relaxing = bonds_.of_relaxing(tissue_.bonds().relaxing());
+                                               double from, double until) {
+  using Long = boost::math::quadrature::gauss<double, 2 * kLanes>;
+  using Short = boost::math::quadrature::gauss<double, kLanes>;
   QuasiStaticEnergy energy;
   double response_integral = 0.0;  // over the imposed value
-  for (const double side : {-1.0, 1.0}) {
-    std::array<double, kLanes> fractions{};
-    LaneVector weight;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const auto i = static_cast<std::size_t>(lane);
-      fractions[i] = 0.5 * until * (1.0 + side * Rule::abscissa()[i]);
-      weight[lane] = 0.5 * until * h * Rule::weights()[i];
-    }
+  const double half = 0.5 * (until - from);
+  std::array<double, kLanes> fractions{};
+  LaneVector weight;
+  const auto put = [&](std::size_t lane, double abscissa, double share) {
+    fractions[lane] = from + half * (1.0 + abscissa);
+    weight[static_cast<Eigen::Index>(lane)] = half * h * share;
+  };
+  const auto add = [&] {
     const Within states = within(state, fractions, h, rate);
     response_integral += rate * weight.dot(responses(states));
-    const LaneVector heat =
-        (states.elongation - states.memory).cwiseAbs2() * relaxing;  // times the relaxation time
-    energy.dissipated_J += weight.dot(heat) / tissue_.bonds().relaxation_time_s();
+    energy.dissipated_J += weight.dot(heat_W(states));
+  };
+  if (until - from > kLongPart) {
+    for (const double side : {-1.0, 1.0}) {
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        put(i, side * Long::abscissa()[i], Long::weights()[i]);
+      }
+      add();
+    }
+  } else {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const double side = i % 2 == 0 ? -1.0 : 1.0;
+      put(i, side * Short::abscissa()[i / 2], Short::weights()[i / 2]);
+    }
+    add();
   }
   if (tissue_.depth_driven()) {
     energy.work_J = response_integral;
   } else {
     // The integral of F du, by parts.
-    const std::array<double, 2> ends{0.0, until};
+    const std::array<double, 2> ends{from, until};
     const LaneVector depth = responses_within(state, ends, h, rate);
-    energy.work_J = (state.imposed + until * h * rate) * depth[1] - state.imposed * depth[0] -
-                    response_integral;
+    energy.work_J = (state.imposed + until * h * rate) * depth[1] -
+                    (state.imposed + from * h * rate) * depth[0] - response_integral;
   }
   return energy;
 }
@@ -454,11 +671,10 @@ void StageBalance::accept(TissueState& state, double h, double rate) {
   state.imposed += h * rate;
   const Eigen::RowVectorXd end = x_.row(stages_ - 1);
   state.position = Eigen::Map<const Positions>(end.data(), 3, coordinates_ / 3);
-  tissue_.bonds().elongations(state.position, state.elongation);
-  for (std::size_t i = 0; i < bonds_.relaxing_bonds().size(); ++i) {
-    state.remembered[static_cast<Eigen::Index>(bonds_.relaxing_bonds()[i])] =
-        memory_(stages_ - 1, static_cast<Eigen::Index>(i));
-  }
+  tissue_.bonds().followed(state.position, state.followed);
+  Eigen::MatrixXd viscous;
+  viscous_in_lane(weights_, followed_, begin_, stages_ - 1, viscous);
+  put_viscous(viscous, state);
   ++work_.steps;
   see(tissue_.response(state));
 }

@@ -6,9 +6,9 @@
 
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/lane_bonds.hpp"
+#include "tpm/network/lane_stiffness.hpp"
 #include "tpm/solve/anderson.hpp"
 #include "tpm/solve/exponential_collocation.hpp"
-#include "tpm/solve/lane_factor.hpp"
 
 namespace tpm {
 
@@ -62,40 +62,75 @@ class StageBalance {
   [[nodiscard]] LaneVector responses_within(const TissueState& state,
                                             std::span<const double> fractions, double h,
                                             double rate);
-  /// The tissue at one fraction of the step just balanced; its forces are balanced once more there.
-  [[nodiscard]] TissueState state_within(const TissueState& state, double fraction, double h,
-                                         double rate);
-  /// Work done and heat made up to a fraction of the step just balanced, by Gauss quadrature.
+  /// The tissue at fractions of the step just balanced; its forces are balanced once more there,
+  /// for all fractions at once.
+  /// @param fractions in [0, 1], at most kLanes of them
+  [[nodiscard]] std::vector<TissueState> states_within(const TissueState& state,
+                                                       std::span<const double> fractions, double h,
+                                                       double rate);
+  /// Work done and heat made between two fractions of the step just balanced, by Gauss quadrature.
   [[nodiscard]] QuasiStaticEnergy energy_of_step(const TissueState& state, double h, double rate,
-                                                 double until = 1.0);
+                                                 double from = 0.0, double until = 1.0);
   /// Moves the state to the end of the step just balanced.
   void accept(TissueState& state, double h, double rate);
 
  private:
   friend class StageTangents;
 
+  /// How the viscous elongations of one law follow over a step, lane by lane.
+  struct LawWeights {
+    MemoryWeights mean;                 ///< of_memory only where there is one branch
+    std::vector<MemoryWeights> branch;  ///< one for each branch
+  };
+  using Places = std::vector<ExponentialCollocation::Place>;  ///< one per lane
+  /// One for each group of relaxing bonds.
+  using StepWeights = std::vector<LawWeights>;
+  [[nodiscard]] StepWeights weights_at(const Places& places, std::span<const double> fractions,
+                                       double h) const;
+  /// Viscous elongations at the start of a step, of the relaxing bonds.
+  struct Start {
+    Eigen::RowVectorXd followed, mean;
+    Eigen::MatrixXd viscous;  ///< by (branch, bond)
+  };
+  [[nodiscard]] Start start_of(const TissueState& state) const;
+  /// The part of the mean viscous elongations that the start decides, in every lane, of the groups
+  /// with several branches.
+  void find_known(const StepWeights& weights, const Start& start, LaneMatrix& known) const;
+  /// The mean viscous elongations in every lane.
+  void apply(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
+             const LaneMatrix& known, LaneMatrix& mean) const;
+  /// Every viscous elongation in one lane, by (branch, bond).
+  void viscous_in_lane(const StepWeights& weights, const LaneMatrix& followed, const Start& start,
+                       Eigen::Index lane, Eigen::MatrixXd& viscous) const;
+  /// Puts viscous elongations of the relaxing bonds in a state.
+  void put_viscous(const Eigen::MatrixXd& viscous, TissueState& state) const;
+
   /// How states at fractions of a step follow from its stages, lane by lane.
   struct Shapes {
     LaneSquare interpolation;  ///< of the way from the start
-    MemoryWeights memory;
+    StepWeights weights;
   };
-  [[nodiscard]] Shapes shapes(std::span<const double> fractions, double z) const;
-  /// Change of y of the relaxing bonds at fractions of a step per change of ln tau, with
-  /// elongations and the start held.
-  [[nodiscard]] LaneMatrix aging(std::span<const double> fractions, double z) const;
+  [[nodiscard]] Shapes shapes(std::span<const double> fractions, double h) const;
+  /// Change of the viscous elongation of one branch of a group at fractions of a step per change of
+  /// ln tau, with what it follows and the start held.
+  [[nodiscard]] LaneMatrix aging(const Places& places, std::span<const double> fractions, double h,
+                                 std::size_t group, std::size_t branch) const;
   /// The fractions of the step at which the lanes stand.
-  [[nodiscard]] std::array<double, kLanes> lane_nodes() const;
+  [[nodiscard]] const std::array<double, kLanes>& lane_nodes() const { return lane_nodes_; }
   /// A factorisation at a state, for what follows a move.
-  void require_factor(const TissueState& state, double following);
+  void require_factor(const TissueState& state, const Following& following);
 
   /// States within a step, one per lane.
   struct Within {
     LaneVector imposed;
-    LaneMatrix position, elongation, memory;
+    LaneMatrix position, memory;
+    StepWeights weights;
   };
   [[nodiscard]] Within within(const TissueState& state, std::span<const double> fractions, double h,
                               double rate) const;
   [[nodiscard]] LaneVector responses(const Within& states);
+  /// Power that the branches turn into heat.
+  [[nodiscard]] LaneVector heat_W(const Within& states) const;
 
   /// By how much the depth may change with a load before it is suspected that the tissue has
   /// snapped to another place; infinite where the depth is imposed or the load stays, none if the
@@ -107,8 +142,12 @@ class StageBalance {
   enum class Balance { found, hopeless, failed };
 
   [[nodiscard]] double node(int lane) const;
-  void set_weights(double z);
-  [[nodiscard]] bool refactorise(const TissueState& state, double following);
+  void set_weights(double h);
+  /// The share of the viscous elongation of each law that follows in a step, the mean over stages.
+  [[nodiscard]] Following following_of_step() const;
+  /// The largest difference of two such shares.
+  [[nodiscard]] double difference(const Following& a, const Following& b) const;
+  [[nodiscard]] bool refactorise(const TissueState& state, const Following& following);
   void predict(const TissueState& state, double h, double rate);
   [[nodiscard]] Balance balance(double tolerance);
   /// The forces left on the free spheres of every stage, and from them the next correction.
@@ -126,7 +165,10 @@ class StageBalance {
   LaneBonds bonds_;
   ExponentialCollocation full_;   ///< through the start and the stages
   ExponentialCollocation inner_;  ///< through the stages alone
-  LaneFactor factor_;
+  Places stage_places_;           ///< of full_, where the lanes stand
+  std::array<double, kLanes> lane_nodes_{};
+  Places judge_full_, judge_inner_;  ///< where the error is judged
+  LaneStiffness factor_;
   Anderson anderson_;
   QuasiStaticWork work_;
   double scale_ = 0.0;
@@ -134,7 +176,7 @@ class StageBalance {
 
   // The factorisation in use.
   bool factorised_ = false;
-  double following_ = 0.0;
+  Following following_;
   int last_iterations_ = 0;
   Eigen::RowVectorXd lane_field_;  ///< displacement per unit imposed, by coordinate
   Eigen::VectorXd goal_;           ///< change of the response per change of each bond's y
@@ -144,15 +186,19 @@ class StageBalance {
   // The step being balanced, stages in lanes.
   std::vector<char> closed_;  ///< contacts
   Eigen::RowVectorXd start_;  ///< positions where it begins, by coordinate
-  Eigen::RowVectorXd start_elongation_, start_memory_;  ///< of relaxing bonds
+  Start begin_;
   LaneMatrix x_, d_, force_;
-  LaneMatrix elongation_, memory_;  ///< of relaxing bonds
-  MemoryWeights weights_;
+  LaneMatrix followed_, memory_;  ///< of relaxing bonds
+  LaneMatrix known_;              ///< find_known()
+  StepWeights weights_;
   LaneVector imposed_;
-  /// What tells the two collocations apart, by (place judged, start and stages).
-  Eigen::Matrix<double, Eigen::Dynamic, kLanes> judge_;
-  Eigen::VectorXd judge_start_;
-  double imbalance_ = 0.0;  ///< bound of the response's error from forces left, N or m
+  /// What tells the two collocations apart, for one relaxation time.
+  struct Judge {
+    Eigen::Matrix<double, Eigen::Dynamic, kLanes> of_stages;  ///< by (place judged, stage)
+    Eigen::VectorXd of_start;
+  };
+  std::vector<Judge> judge_;  ///< of each relaxation time of the system
+  double imbalance_ = 0.0;    ///< bound of the response's error from forces left, N or m
   // The step before, for the prediction of the next.
   bool has_last_ = false;
   double last_h_ = 0.0, last_rate_ = 0.0;

@@ -18,11 +18,19 @@ StageTangents::StageTangents(DrivenTissue& tissue, StageBalance& balance,
       balance_(balance),
       tolerance_(tolerance),
       anderson_(kLanes * balance.coordinates_, kTangentMemoryDepth) {
+  const std::span<const ViscousLaw> laws = tissue.bonds().laws();
   for (const TangentDirection& direction : directions) {
     Tangent tangent;
     tangent.stiffness = balance.bonds_.in_order(direction.stiffness);
     tangent.relaxing = balance.bonds_.in_order(direction.relaxing);
-    tangent.log_relaxation_time = direction.log_relaxation_time;
+    tangent.laws = direction.laws;
+    tangent.laws.resize(laws.size());
+    for (std::size_t i = 0; i < laws.size(); ++i) {
+      LawChange& change = tangent.laws[i];
+      change.share.resize(laws[i].branches.size());
+      change.log_time.resize(laws[i].branches.size());
+      for (double& log_time : change.log_time) log_time += direction.log_relaxation_time;
+    }
     tangent.imposed = direction.imposed;
     tangent_.push_back(std::move(tangent));
   }
@@ -33,19 +41,40 @@ void StageTangents::at_rest() {
   const auto relaxing = static_cast<Eigen::Index>(balance_.bonds_.relaxing_bonds().size());
   for (Tangent& tangent : tangent_) {
     tangent.start.setZero(balance_.coordinates_);
-    tangent.start_elongation.setZero(relaxing);
-    tangent.start_memory.setZero(relaxing);
+    tangent.begin.followed.setZero(relaxing);
+    tangent.begin.mean.setZero(relaxing);
+    tangent.begin.viscous.setZero(tissue_.bonds().most_branches(), relaxing);
   }
 }
 
-StageTangents::Stages StageTangents::stages_of_step(double h) const {
-  const double z = h / tissue_.bonds().relaxation_time_s();
+StageTangents::Stages StageTangents::stages_at(const StageBalance::Places& places,
+                                               std::span<const double> fractions, double h) const {
   Stages stages;
+  stages.weights = balance_.weights_at(places, fractions, h);
+  for (std::size_t i = 0; i < stages.weights.size(); ++i) {
+    const auto [law, first, count] = balance_.bonds_.groups()[i];
+    std::vector<LaneMatrix> aging, viscous;
+    for (std::size_t b = 0; b < stages.weights[i].branch.size(); ++b) {
+      const auto j = static_cast<Eigen::Index>(b);
+      const auto start = balance_.begin_.viscous.row(j).segment(first, count);
+      aging.push_back(balance_.aging(places, fractions, h, i, b));
+      const MemoryWeights& weight = stages.weights[i].branch[b];
+      LaneMatrix m = weight.of_stages * balance_.followed_.middleCols(first, count);
+      m.noalias() += weight.of_start * balance_.begin_.followed.segment(first, count);
+      m.noalias() += weight.of_memory * start;
+      viscous.push_back(std::move(m));
+    }
+    stages.aging.push_back(std::move(aging));
+    stages.viscous.push_back(std::move(viscous));
+  }
+  return stages;
+}
+
+StageTangents::Stages StageTangents::stages_of_step(double h) const {
+  Stages stages = stages_at(balance_.stage_places_, balance_.lane_nodes(), h);
   stages.position = balance_.x_;
-  stages.memory = balance_.memory_;
+  stages.mean = balance_.memory_;
   stages.imposed = balance_.imposed_;
-  stages.weights = balance_.weights_;
-  stages.aging = balance_.aging(balance_.lane_nodes(), z);
   return stages;
 }
 
@@ -53,41 +82,69 @@ StageTangents::Stages StageTangents::at_once(const TissueState& state, bool rela
   Stages stages;
   const Eigen::Map<const Eigen::RowVectorXd> position(state.position.data(), state.position.size());
   stages.position = position.replicate(kLanes, 1);
-  const Eigen::RowVectorXd memory = balance_.bonds_.of_relaxing(state.remembered).transpose();
-  stages.memory = memory.replicate(kLanes, 1);
+  const StageBalance::Start start = balance_.start_of(state);
+  stages.mean = start.mean.replicate(kLanes, 1);
   stages.imposed.setConstant(state.imposed);
-  stages.weights.of_stages.setZero();
-  if (relaxed) stages.weights.of_stages.setIdentity();
-  stages.weights.of_start.setZero();
-  stages.weights.of_memory.setConstant(relaxed ? 0.0 : 1.0);
-  stages.aging.setZero(kLanes, memory.size());
+  MemoryWeights weight;
+  weight.of_stages.setZero();
+  if (relaxed) weight.of_stages.setIdentity();
+  weight.of_start.setZero();
+  weight.of_memory.setConstant(relaxed ? 0.0 : 1.0);
+  for (const LaneBonds::Group& group : balance_.bonds_.groups()) {
+    const std::size_t branches = tissue_.bonds().laws()[group.law].branches.size();
+    stages.weights.push_back({weight, std::vector<MemoryWeights>(branches, weight)});
+    stages.aging.emplace_back(branches, LaneMatrix::Zero(kLanes, group.count));
+    std::vector<LaneMatrix> viscous;
+    for (std::size_t b = 0; b < branches; ++b) {
+      const auto row = start.viscous.row(static_cast<Eigen::Index>(b));
+      viscous.emplace_back(row.segment(group.first, group.count).replicate(kLanes, 1));
+    }
+    stages.viscous.push_back(std::move(viscous));
+  }
   return stages;
 }
 
+void StageTangents::prepare(Tangent& tangent, const Stages& stages) const {
+  balance_.find_known(stages.weights, tangent.begin, tangent.known);
+  tangent.drift.setZero(kLanes, tangent.begin.mean.size());
+  for (std::size_t i = 0; i < stages.weights.size(); ++i) {
+    const LaneBonds::Group& group = balance_.bonds_.groups()[i];
+    const std::vector<ViscousLaw::Branch>& branches = tissue_.bonds().laws()[group.law].branches;
+    const LawChange& change = tangent.laws[group.law];
+    auto drift = tangent.drift.middleCols(group.first, group.count);
+    for (std::size_t b = 0; b < branches.size(); ++b) {
+      drift += branches[b].share * change.log_time[b] * stages.aging[i][b];
+      if (change.share[b] != 0.0) drift += change.share[b] * stages.viscous[i][b];
+    }
+  }
+}
+
 void StageTangents::update_memory(Tangent& tangent, const Stages& stages) const {
-  balance_.bonds_.elongation_changes(stages.position, tangent.position, tangent.elongation);
-  stages.weights.apply(tangent.elongation, tangent.start_elongation, tangent.start_memory,
-                       tangent.memory);
-  tangent.memory += tangent.log_relaxation_time * stages.aging;
+  balance_.bonds_.followed_changes(stages.position, tangent.position, tangent.laws,
+                                   tangent.followed);
+  balance_.apply(stages.weights, tangent.followed, tangent.begin, tangent.known, tangent.mean);
+  tangent.mean += tangent.drift;
 }
 
 void StageTangents::force_changes(const Tangent& tangent, const Stages& stages,
-                                  const LaneMatrix& position, const LaneMatrix& memory) {
+                                  const LaneMatrix& position, const LaneMatrix& mean) {
   force_.setZero(kLanes, balance_.coordinates_);
   tissue_.add_load(tangent.imposed * stages.imposed, force_);
-  balance_.bonds_.add_force_changes(stages.position, stages.memory, position, memory,
-                                    tangent.stiffness, tangent.relaxing, force_);
+  balance_.bonds_.add_force_changes(
+      stages.position, stages.mean,
+      {position, mean, tangent.stiffness, tangent.relaxing, tangent.laws}, force_);
 }
 
 void StageTangents::solve(Tangent& tangent, const Stages& stages) {
   const Freedom& freedom = tissue_.freedom();
+  prepare(tangent, stages);
   tangent.position = tangent.start.replicate(kLanes, 1);
   tissue_.impose_change(tangent.position, tangent.imposed * stages.imposed);
   anderson_.restart();
   const double allowed = std::max(tolerance_ * balance_.scale_, balance_.grain_);
   for (int i = 0; i < kMostTangentIterations; ++i) {
     update_memory(tangent, stages);
-    force_changes(tangent, stages, tangent.position, tangent.memory);
+    force_changes(tangent, stages, tangent.position, tangent.mean);
     freedom.project(force_);
     d_ = force_;
     balance_.factor_.solve(d_);
@@ -105,10 +162,28 @@ void StageTangents::solve(Tangent& tangent, const Stages& stages) {
               "the derivatives of a step are not found: its stiffness is near singular");
 }
 
-void StageTangents::end_at(Tangent& tangent, Eigen::Index lane) const {
+void StageTangents::end_at(Tangent& tangent, const Stages& stages, Eigen::Index lane) const {
   tangent.start = tangent.position.row(lane);
-  tangent.start_elongation = tangent.elongation.row(lane);
-  tangent.start_memory = tangent.memory.row(lane);
+  Eigen::MatrixXd viscous;
+  balance_.viscous_in_lane(stages.weights, tangent.followed, tangent.begin, lane, viscous);
+  for (std::size_t i = 0; i < stages.weights.size(); ++i) {
+    const auto [law, first, count] = balance_.bonds_.groups()[i];
+    for (std::size_t b = 0; b < stages.weights[i].branch.size(); ++b) {
+      viscous.row(static_cast<Eigen::Index>(b)).segment(first, count) +=
+          tangent.laws[law].log_time[b] * stages.aging[i][b].row(lane);
+    }
+  }
+  tangent.begin.viscous = std::move(viscous);
+  tangent.begin.followed = tangent.followed.row(lane);
+  // Of the law as it was: what the changes of its shares add is drift, found anew in each step.
+  tangent.begin.mean.setZero();
+  for (const LaneBonds::Group& group : balance_.bonds_.groups()) {
+    Eigen::Index j = 0;
+    for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
+      tangent.begin.mean.segment(group.first, group.count) +=
+          branch.share * tangent.begin.viscous.row(j++).segment(group.first, group.count);
+    }
+  }
 }
 
 void StageTangents::follow_move(const TissueState& state, bool relaxed) {
@@ -117,17 +192,17 @@ void StageTangents::follow_move(const TissueState& state, bool relaxed) {
   const Stages stages = at_once(state, relaxed);
   for (Tangent& tangent : tangent_) {
     solve(tangent, stages);
-    end_at(tangent, 0);
+    end_at(tangent, stages, 0);
   }
 }
 
 void StageTangents::follow_step(double h) {
-  const Stages stages = stages_of_step(h);
-  for (Tangent& tangent : tangent_) solve(tangent, stages);
+  step_ = stages_of_step(h);
+  for (Tangent& tangent : tangent_) solve(tangent, step_);
 }
 
 void StageTangents::accept() {
-  for (Tangent& tangent : tangent_) end_at(tangent, balance_.stages_ - 1);
+  for (Tangent& tangent : tangent_) end_at(tangent, step_, balance_.stages_ - 1);
 }
 
 LaneVector StageTangents::response_changes(const LaneMatrix& position) {
@@ -139,23 +214,24 @@ LaneVector StageTangents::response_changes(const LaneMatrix& position) {
 Eigen::MatrixXd StageTangents::responses_within(const TissueState& state,
                                                 std::span<const double> fractions, double h,
                                                 double rate) {
-  const double z = h / tissue_.bonds().relaxation_time_s();
-  const StageBalance::Shapes shapes = balance_.shapes(fractions, z);
+  StageBalance::Places places;
+  for (const double c : fractions) places.push_back(balance_.full_.place(c));
   const StageBalance::Within within = balance_.within(state, fractions, h, rate);
-  Stages stages;
+  Stages stages = stages_at(places, fractions, h);
   stages.position = within.position;
-  stages.memory = within.memory;
+  stages.mean = within.memory;
   stages.imposed = within.imposed;
-  const LaneMatrix aging = balance_.aging(fractions, z);
+  const LaneSquare interpolation = balance_.shapes(fractions, h).interpolation;
   Eigen::MatrixXd answer(static_cast<Eigen::Index>(fractions.size()), count());
   for (Eigen::Index i = 0; i < count(); ++i) {
-    const Tangent& tangent = tangent_[static_cast<std::size_t>(i)];
-    LaneMatrix position = shapes.interpolation * (tangent.position.rowwise() - tangent.start);
+    Tangent& tangent = tangent_[static_cast<std::size_t>(i)];
+    LaneMatrix position = interpolation * (tangent.position.rowwise() - tangent.start);
     position.rowwise() += tangent.start;
-    LaneMatrix memory;
-    shapes.memory.apply(tangent.elongation, tangent.start_elongation, tangent.start_memory, memory);
-    memory += tangent.log_relaxation_time * aging;
-    force_changes(tangent, stages, position, memory);
+    prepare(tangent, stages);
+    LaneMatrix mean;
+    balance_.apply(stages.weights, tangent.followed, tangent.begin, tangent.known, mean);
+    mean += tangent.drift;
+    force_changes(tangent, stages, position, mean);
     answer.col(i) = response_changes(position).head(answer.rows());
   }
   return answer;
@@ -165,10 +241,12 @@ Eigen::RowVectorXd StageTangents::response(const TissueState& state) {
   const Stages stages = at_once(state, false);
   Eigen::RowVectorXd answer(count());
   for (Eigen::Index i = 0; i < count(); ++i) {
-    const Tangent& tangent = tangent_[static_cast<std::size_t>(i)];
+    Tangent& tangent = tangent_[static_cast<std::size_t>(i)];
+    prepare(tangent, stages);
     const LaneMatrix position = tangent.start.replicate(kLanes, 1);
-    const LaneMatrix memory = tangent.start_memory.replicate(kLanes, 1);
-    force_changes(tangent, stages, position, memory);
+    LaneMatrix mean = tangent.begin.mean.replicate(kLanes, 1);
+    mean += tangent.drift;
+    force_changes(tangent, stages, position, mean);
     answer[i] = tissue_.response_change(position, force_)[0];
   }
   return answer;

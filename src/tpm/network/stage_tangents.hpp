@@ -21,7 +21,8 @@ class StageTangents {
 
   /// Nothing depends on anything yet: the tissue is at rest.
   void at_rest();
-  /// After a move of the state at an instant, with what the bonds remember held or all relaxed.
+  /// After a move of the state at an instant, with the viscous elongations held or all at
+  /// equilibrium.
   void follow_move(const TissueState& state, bool relaxed);
   /// After the stages of a step were balanced, before the state is moved to its end.
   void follow_step(double h);
@@ -35,30 +36,38 @@ class StageTangents {
   [[nodiscard]] Eigen::RowVectorXd response(const TissueState& state);
 
  private:
-  /// States side by side, and how their memory depends on elongations.
+  /// States side by side, and how their viscous elongations depend on what they follow.
   struct Stages {
-    LaneMatrix position, memory;
+    LaneMatrix position, mean;
     LaneVector imposed;
-    MemoryWeights weights;
-    LaneMatrix aging;  ///< change of y per change of ln tau, elongations held
+    StageBalance::StepWeights weights;
+    /// One for each branch of each group, by (lane, bond of the group).
+    std::vector<std::vector<LaneMatrix>> aging;    ///< change of m_j per change of ln tau_j
+    std::vector<std::vector<LaneMatrix>> viscous;  ///< m_j
   };
   /// The derivatives by one direction.
   struct Tangent {
     Eigen::VectorXd stiffness, relaxing;  ///< of the bonds, in the order of LaneBonds
-    double log_relaxation_time, imposed;
-    Eigen::RowVectorXd start, start_elongation, start_memory;
-    LaneMatrix position, elongation, memory;  ///< of the stages
+    std::vector<LawChange> laws;          ///< of each law of the system
+    double imposed;
+    Eigen::RowVectorXd start;
+    StageBalance::Start begin;
+    LaneMatrix position, followed, mean;  ///< of the stages
+    LaneMatrix known, drift;  ///< parts of `mean` that the start and the changes of laws decide
   };
 
   [[nodiscard]] Stages stages_of_step(double h) const;
+  [[nodiscard]] Stages stages_at(const StageBalance::Places& places,
+                                 std::span<const double> fractions, double h) const;
   [[nodiscard]] Stages at_once(const TissueState& state, bool relaxed) const;
+  void prepare(Tangent& tangent, const Stages& stages) const;
   void solve(Tangent& tangent, const Stages& stages);
   void update_memory(Tangent& tangent, const Stages& stages) const;
   /// Change of all forces, loads included.
   void force_changes(const Tangent& tangent, const Stages& stages, const LaneMatrix& position,
-                     const LaneMatrix& memory);
+                     const LaneMatrix& mean);
   [[nodiscard]] LaneVector response_changes(const LaneMatrix& position);
-  void end_at(Tangent& tangent, Eigen::Index lane) const;
+  void end_at(Tangent& tangent, const Stages& stages, Eigen::Index lane) const;
 
   DrivenTissue& tissue_;
   StageBalance& balance_;
@@ -66,6 +75,7 @@ class StageTangents {
   std::vector<Tangent> tangent_;
   Anderson anderson_;
   LaneMatrix force_, d_;
+  Stages step_;  ///< those followed last
 };
 
 }  // namespace tpm

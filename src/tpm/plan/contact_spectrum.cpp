@@ -8,6 +8,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/network/driven_tissue.hpp"
+#include "tpm/network/material_refusal.hpp"
 
 namespace tpm {
 namespace {
@@ -74,18 +75,21 @@ void search(const ContactSpectrum& spectrum, std::vector<double>& ratios, int fi
 
 ContactSpectrum contact_spectrum(const PlanScene& scene) {
   const DrivenNetwork& driven = scene.driven();
-  const TpmParameters& material = scene.scene().tissue.material;
+  // Times a factor, the material of all bonds.
+  const BondMaterial& material = scene.scene().tissue.materials.materials.front();
   DrivenTissue tissue(driven.bonds, driven.rest, driven.freedom, driven.probes,
                       scene.protocol().drive());
   const TissueState rest = tissue.at_rest(0.0);
   ContactSpectrum spectrum;
-  spectrum.tau_s = material.relaxation_time_s();
-  // A bond under a constant force creeps in (E1 + E2)/E1 tau; one without E1 creeps for ever.
+  require_one_relaxation(driven.bonds, "a contact of a few exponentials");
+  spectrum.tau_s = driven.bonds.relaxation_time_s();
+  // A bond under a constant force creeps in k/(k - g) tau; one without equilibrium modulus creeps
+  // for ever.
   spectrum.longest =
-      std::min((material.E1_Pa + material.E2_Pa) / std::max(material.E1_Pa, 1e-3), 1e3);
+      std::min(material.instantaneous_Pa() / std::max(material.equilibrium_Pa, 1e-3), 1e3);
   for (int i = 0; i < kThetas; ++i) {
     const double theta = 0.5 * (1.0 - std::cos(std::numbers::pi * i / (kThetas - 1)));
-    const BondMemory memory{rest.remembered, theta, rest.closed};
+    const BondMemory memory{rest.mean, theta, rest.closed};
     if (!tissue.equilibrium().factorise(rest.position, memory) ||
         !tissue.equilibrium().is_stable()) {
       throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");

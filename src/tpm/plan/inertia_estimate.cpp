@@ -28,12 +28,12 @@ struct SeenMode {
 class Lanczos {
  public:
   Lanczos(const PlanScene& scene, const TissueState& rest, const Freedom& freedom,
-          const Eigen::VectorXd& mass_kg, double following)
+          const Eigen::VectorXd& mass_kg, const Following& following)
       : bonds_(scene.driven().bonds),
         rest_(rest),
         freedom_(freedom),
         root_(mass_kg.cwiseSqrt().transpose().replicate(3, 1).reshaped()),
-        memory_{rest.remembered, following, rest.closed} {}
+        memory_{rest.mean, following, rest.closed} {}
 
   /// @param field displacements, m
   [[nodiscard]] std::vector<SeenMode> modes(Eigen::Matrix3Xd field) const {
@@ -97,6 +97,23 @@ ImpulseResponse impulse(double t, double omega2, double alpha) {
   const double d = std::sqrt(std::max(d2, 1e-6 * omega2));
   const double s = std::sin(d * t) / d, c = std::cos(d * t);
   return {decay * s, (1.0 - decay * (c + half * s)) / omega2, decay * (c - half * s)};
+}
+
+/// Without the modes in which spheres ring on stiff contacts of tools: the network itself damps
+/// those, and its impacts are inelastic.
+std::vector<SeenMode> without_ringing_contacts(std::vector<SeenMode> modes, const BondSystem& bonds,
+                                               const Eigen::VectorXd& mass_kg) {
+  constexpr double kStiff = 100.0;  // times the stiffest bond
+  constexpr double kShare = 0.25;   // of the frequency of a sphere on its contact, squared
+  const Eigen::Index between = bonds.stiffness().size() - std::ssize(bonds.contacts());
+  const double stiffest = bonds.stiffness().head(between).maxCoeff();
+  double least = std::numeric_limits<double>::infinity();
+  for (const ToolContact& contact : bonds.contacts()) {
+    if (contact.stiffness_N_per_m < kStiff * stiffest) continue;
+    least = std::min(least, contact.stiffness_N_per_m / mass_kg[contact.sphere]);
+  }
+  std::erase_if(modes, [&](const SeenMode& mode) { return mode.omega2 > kShare * least; });
+  return modes;
 }
 
 struct Kink {
@@ -173,19 +190,21 @@ double of_jump(double jump, const std::vector<SeenMode>& modes, double alpha, do
 
 InertiaEstimate estimate_inertia(const PlanScene& scene) {
   const DrivenNetwork& driven = scene.driven();
-  const Eigen::VectorXd mass = scene.masses_kg();
+  const Eigen::VectorXd mass = masses_kg(scene.scene(), scene.run_network());
   const LowestMode lowest = lowest_mode(driven.bonds, driven.rest, driven.freedom, mass);
   const double omega = lowest.angular_frequency();
   const double alpha = 2.0 * scene.scene().formulation.damping_ratio * omega;
   DrivenTissue tissue(driven.bonds, driven.rest, driven.freedom, driven.probes,
                       scene.protocol().drive());
   const TissueState rest = tissue.at_rest(0.0);
-  const BondMemory memory{rest.remembered, lowest.following, rest.closed};
+  const BondMemory memory{rest.mean, lowest.following, rest.closed};
   if (!tissue.equilibrium().factorise(rest.position, memory)) {
     throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");
   }
-  const auto modes = Lanczos(scene, rest, tissue.freedom(), mass, lowest.following)
-                         .modes(tissue.unit_field(rest, memory).displacement);
+  const auto modes =
+      without_ringing_contacts(Lanczos(scene, rest, tissue.freedom(), mass, lowest.following)
+                                   .modes(tissue.unit_field(rest, memory).displacement),
+                               driven.bonds, mass);
   InertiaEstimate estimate;
   estimate.lowest_Hz = lowest.frequency_Hz;
   for (const SeenMode& mode : modes) {
@@ -193,7 +212,9 @@ InertiaEstimate estimate_inertia(const PlanScene& scene) {
         std::max(estimate.highest_Hz, std::sqrt(mode.omega2) / (2.0 * std::numbers::pi));
   }
   const double span_s = kPeriods / lowest.frequency_Hz;
-  const double own_drag = tissue.depth_driven() ? alpha * tissue.driven_mass_kg(mass) : 0.0;
+  Eigen::VectorXd damped = mass;  // tools are not
+  for (const ToolContact& contact : driven.bonds.contacts()) damped[contact.tool] = 0.0;
+  const double own_drag = tissue.depth_driven() ? alpha * tissue.driven_mass_kg(damped) : 0.0;
   estimate.of_rates = of_rates(rate_kinks(scene.protocol()), modes, alpha, own_drag, span_s,
                                scene.protocol().knots().back().time_s);
   const double jump = largest_jump(scene.protocol());

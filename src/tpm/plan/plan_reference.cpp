@@ -26,8 +26,8 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
                              double tolerance) {
   VerifiedTruth truth;
   const bool field = measure.output == PlanOutput::field;
-  const double tau_s = scene.scene().tissue.material.relaxation_time_s();
-  PlanTrajectory judge;
+  const double tau_s = scene.driven().bonds.shortest_relaxation_time_s();
+  Trajectory judge;
   if (inertial) {
     truth.times_s =
         sampled_times(scene.protocol(), kTimesOfPieceWithMasses, kMostTimesWithMasses, tau_s);

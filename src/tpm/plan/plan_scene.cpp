@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tpm/core/error.hpp"
@@ -12,8 +13,10 @@ namespace tpm {
 namespace {
 
 ExperimentScene plannable(ExperimentScene scene) {
-  if (scene.formulation.kind == FormulationKind::relaxed) {
-    throw bad_input("scene", "the formulation 'static' has no course in time to plan for",
+  if (!scene.formulation.entry().can().course) {
+    throw bad_input("scene",
+                    fmt::format("the formulation '{}' has no course in time to plan for",
+                                scene.formulation.kind),
                     "quasi_static or inertial");
   }
   if (scene.formulation.mass_spring) {
@@ -22,13 +25,9 @@ ExperimentScene plannable(ExperimentScene scene) {
   return scene;
 }
 
-double blocks_of_solve(const BlockPattern& pattern) {
-  return 2.0 * static_cast<double>(pattern.factor_blocks()) + static_cast<double>(pattern.nodes());
-}
-
 }  // namespace
 
-double trajectory_error(const PlanTrajectory& model, const PlanTrajectory& truth,
+double trajectory_error(const Trajectory& model, const Trajectory& truth,
                         const PlanMeasure& measure) {
   constexpr double kFelt = 0.1;  // of the peak: less is no stiffness to be felt
   if (measure.output == PlanOutput::force) {
@@ -123,81 +122,14 @@ int PlanScene::moving_layers() const {
   return moving;
 }
 
-Eigen::VectorXd PlanScene::masses_kg() const {
-  const Organ& organ = network().organ;
-  Eigen::VectorXd mass(driven().rest.cols());
-  mass.head(organ.position.cols()) = sphere_masses_kg(organ, scene_.formulation.density_kg_m3);
-  Eigen::Index column = organ.position.cols();
-  for (const SceneContact& contact : scene_.contacts) {
-    if (!contact.is_tool()) continue;
-    if (!contact.mass_kg) throw bad_input("scene", "a tool has no mass", "mass_kg of each tool");
-    mass[column++] = *contact.mass_kg;
-  }
-  return mass;
-}
-
-OperationCount PlanScene::iteration_work() const {
-  return OperationCount()
-      .add(Operation::lane_bond, static_cast<double>(driven().bonds.size()))
-      .add(Operation::lane_block, blocks_of_solve(driven().bonds.pattern()));
-}
-
-OperationCount PlanScene::factorisation_work() const {
-  const auto products = static_cast<double>(driven().bonds.pattern().factor_products());
-  return OperationCount()
-      .add(Operation::bond_stiffness, static_cast<double>(driven().bonds.size()))
-      .add(Operation::factor_product, products);
-}
-
-PlanTrajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
-                                       const std::vector<double>& times_s, bool with_field) const {
-  const QuasiStatic equations(driven().bonds, driven().rest, driven().freedom, driven().probes,
-                              options);
-  PlanTrajectory result;
-  ValidityWatch watch(network(), scene_.probe(), depth_limits_apply(scene_.tissue));
-  const Eigen::Index spheres = network().organ.position.cols();
-  const auto see = [&](const QuasiStaticState& state) {
-    watch.see(state.time_s, network_.spheres(state.position));
-    result.displacement.emplace_back(state.position.leftCols(spheres) -
-                                     driven().rest.leftCols(spheres));
-  };
-  const QuasiStaticRun run =
-      equations.run(protocol(), times_s, with_field ? QuasiStaticObserver(see) : nullptr);
-  if (!with_field) watch.see(protocol().end_s(), network_.spheres(run.position));
-  result.response = run.response;
-  result.validity = watch.seen();
-  // Back-solves are those of all lanes, one an iteration; outputs cost an evaluation per kLanes.
-  result.work += iteration_work().times(run.work.iterations);
-  result.work.add(Operation::solve_block,
-                  blocks_of_solve(driven().bonds.pattern()) * run.work.factorisations);
-  result.work += factorisation_work().times(run.work.factorisations);
-  result.steps = run.work.steps;
-  return result;
-}
-
-PlanTrajectory PlanScene::inertial(const InertialOptions& options,
+Trajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
                                    const std::vector<double>& times_s, bool with_field) const {
-  const Inertial equations(driven().bonds, driven().rest, driven().freedom, driven().probes,
-                           masses_kg(), options);
-  PlanTrajectory result;
-  const Eigen::Index spheres = network().organ.position.cols();
-  const auto see = [&](const QuasiStaticState& state) {
-    result.displacement.emplace_back(state.position.leftCols(spheres) -
-                                     driven().rest.leftCols(spheres));
-  };
-  const InertialRun run =
-      equations.run(protocol(), times_s, with_field ? QuasiStaticObserver(see) : nullptr);
-  result.response = run.response;
-  const auto& pattern = driven().bonds.pattern();
-  const auto bonds = static_cast<double>(driven().bonds.size());
-  const auto rates = static_cast<double>(run.work.rates);
-  result.work.add(Operation::bond_force, 2.0 * bonds * rates)
-      .add(Operation::dense_flop, 60.0 * static_cast<double>(driven().rest.cols()) * rates)
-      .add(Operation::solve_block,
-           blocks_of_solve(pattern) * static_cast<double>(run.work.newton_iterations));
-  result.work += factorisation_work().times(static_cast<double>(run.work.factorisations));
-  result.steps = static_cast<double>(run.work.steps);
-  return result;
+  return run_quasi_static(scene_, network_, options, times_s, with_field);
+}
+
+Trajectory PlanScene::inertial(const InertialOptions& options, const std::vector<double>& times_s,
+                               bool with_field) const {
+  return run_inertial(scene_, network_, options, times_s, with_field);
 }
 
 PlanScene PlanScene::with_protocol(Protocol protocol) const {
@@ -220,30 +152,45 @@ PlanScene PlanScene::faster(double factor) const {
 }
 
 PlanScene PlanScene::stiffer(double factor) const {
-  TpmParameters material = scene_.tissue.material;
-  material.E1_Pa *= factor;
-  material.E2_Pa *= factor;
-  material.Eprime_Pa *= factor;
-  return with_material(material);
+  return with_materials([factor](BondMaterial& material) {
+    material.equilibrium_Pa *= factor;
+    material.lateral_Pa *= factor;
+    for (BondMaterial::Branch& branch : material.branches) branch.modulus_Pa *= factor;
+  });
 }
 
 PlanScene PlanScene::nothing_relaxing() const {
   constexpr double kNever = 1e9;  // durations
   const double lasts_s = duration_s() > 0.0 ? duration_s() : 1.0;
-  return with_material(scene_.tissue.material.with_relaxation_time(kNever * lasts_s));
+  double shortest_s = std::numeric_limits<double>::infinity();
+  for (const BondMaterial& material : scene_.tissue.materials.materials) {
+    for (const BondMaterial::Branch& branch : material.branches) {
+      shortest_s = std::min(shortest_s, branch.relaxation_time_s);
+    }
+  }
+  const double longer = kNever * lasts_s / shortest_s;
+  return with_materials([longer](BondMaterial& material) {
+    for (BondMaterial::Branch& branch : material.branches) branch.relaxation_time_s *= longer;
+  });
 }
 
 PlanScene PlanScene::all_relaxed() const {
-  TpmParameters material = scene_.tissue.material;
-  material.E2_Pa = material.E1_Pa * material.E2_Pa / (material.E1_Pa + material.E2_Pa);
-  // E1 decides only how far bonds would relax, which they do not; above 0, as eta1 follows from it.
-  material.E1_Pa = scene_.tissue.material.E1_Pa + scene_.tissue.material.E2_Pa;
-  return with_material(material).nothing_relaxing();
+  const auto at_equilibrium = [](BondMaterial& material) {
+    if (material.lateral == LateralBond::relaxing) {
+      material.lateral_Pa *= material.equilibrium_Pa / material.instantaneous_Pa();
+    }
+    // A branch that never relaxes bears half of it: formulations want something that could relax.
+    material.equilibrium_Pa *= 0.5;
+    material.branches = {{material.equilibrium_Pa, 1.0}};
+    material.kernel = material.potential;
+  };
+  return with_materials(at_equilibrium).nothing_relaxing();
 }
 
-PlanScene PlanScene::with_material(const TpmParameters& material) const {
+PlanScene PlanScene::with_materials(const std::function<void(BondMaterial&)>& change) const {
   ExperimentScene scene = scene_;
-  scene.tissue.material = material;
+  for (BondMaterial& material : scene.tissue.materials.materials) change(material);
+  scene.tissue.paper_element.reset();
   return PlanScene(std::move(scene));
 }
 

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "tpm/core/error.hpp"
+#include "tpm/network/material_refusal.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
 
@@ -64,6 +65,7 @@ void require_valid(const BondSystem& bonds, const Positions& rest, std::size_t c
   positive(options.depth_m, "depth");
   positive(options.tangential_m, "tangential range");
   positive(options.period_s, "period");
+  require_one_relaxation(bonds, "the condensed model");
   positive(bonds.relaxation_time_s(), "relaxation time");
   if (bonds.contact_count() > 0 || bonds.spheres() != static_cast<std::size_t>(rest.cols())) {
     refuse("the network has tools; expected spheres only, one of which is the contact");

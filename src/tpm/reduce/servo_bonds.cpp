@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/network/material_refusal.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
 
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -13,10 +14,64 @@
 
 namespace tpm {
 
-ServoWeights servo_weights(double period_over_tau) {
-  const RelaxationWeights weights = relaxation_weights(period_over_tau);
-  return {static_cast<float>(weights.r), static_cast<float>(weights.w0),
-          static_cast<float>(weights.w1)};
+float ServoWeights::longest_kept() const {
+  float longest = keep;
+  for (const ServoBranch& branch : branches) longest = std::max(longest, branch.keep);
+  return longest;
+}
+
+ServoWeights servo_weights(const BondSystem& bonds, double period_s) {
+  ServoWeights weights{1.0F, 0.0F, 0.0F, {}};
+  for (std::size_t i = 0; i < bonds.first_contact(); ++i) {
+    if (!(bonds.relaxing()[static_cast<Eigen::Index>(i)] > 0.0)) continue;
+    const std::vector<ViscousLaw::Branch>& branches = bonds.laws()[bonds.law_of(i)].branches;
+    double of_start = 0.0;
+    double of_end = 0.0;
+    for (const ViscousLaw::Branch& branch : branches) {
+      const RelaxationWeights w = relaxation_weights(period_s / branch.relaxation_time_s);
+      of_start += branch.share * w.w0;
+      of_end += branch.share * w.w1;
+      weights.branches.push_back({static_cast<float>(branch.share), static_cast<float>(w.r),
+                                  static_cast<float>(w.w0), static_cast<float>(w.w1)});
+    }
+    weights.of_start = static_cast<float>(of_start);
+    weights.of_end = static_cast<float>(of_end);
+    weights.keep = weights.branches.front().keep;
+    if (weights.branches.size() == 1) weights.branches.clear();
+    break;
+  }
+  return weights;
+}
+
+void require_servo_material(const BondSystem& bonds, std::string_view formulation) {
+  const auto refuse = [&](std::string_view takes, std::string_view has) {
+    refuse_material(formulation, takes, has);
+  };
+  if (!bonds.relaxes_alike()) {
+    refuse("bonds that relax by one function of time", "regions that relax differently");
+  }
+  for (std::size_t i = 0; i < bonds.first_contact(); ++i) {
+    const ViscousLaw& law = bonds.laws()[bonds.law_of(i)];
+    const bool relaxes = bonds.relaxing()[static_cast<Eigen::Index>(i)] > 0.0;
+    if (relaxes && !law.kernel.is_linear()) {
+      refuse("branches that are linear in elongation", "branches on a kernel");
+    }
+    for (const ViscousLaw::Spring& spring : law.springs) {
+      if (spring.function.shape != ElongationShape::sinh) continue;
+      refuse("linear and cubic potentials", "a potential of sinh");
+    }
+  }
+}
+
+/// The cubic part of a bond's equilibrium force, N/m^3.
+double cubic_of(const BondSystem& bonds, std::size_t bond) {
+  const auto row = static_cast<Eigen::Index>(bond);
+  double sum = 0.0;
+  for (const ViscousLaw::Spring& spring : bonds.laws()[bonds.law_of(bond)].springs) {
+    const ElongationFunction& f = spring.function;
+    if (!f.is_linear()) sum += spring.share / (f.length_m * f.length_m);
+  }
+  return (bonds.stiffness()[row] - bonds.relaxing()[row]) * sum;
 }
 
 /// What a sweep adds up.
@@ -25,10 +80,18 @@ enum class Sweep { both, now, next };
 struct ServoBondKernels {
   using Group = ServoBonds::Group;
 
-  /// @param group its memory moves on unless only what comes next is asked for
+  /// What a group's viscous elongations move on with.
+  struct Step {
+    const ServoWeights& weights;
+    std::size_t latest;
+    ServoBonds::BranchLane* branch;  ///< of the first group; null: one branch
+  };
+
+  /// @param group its viscous elongations move on unless only what comes next is asked for
   template <Sweep kSweep>
-  static void plain(Group& group, std::size_t latest, const float* u, const ServoWeights& w,
-                    float* force) {
+  static void plain(Group& group, const Step& step, const float* u, float* force) {
+    const ServoWeights& w = step.weights;
+    const std::size_t latest = step.latest;
     for (std::size_t i = 0; i < ServoBonds::kWide; ++i) {
       const float* const ua = u + std::size_t{4} * group.a[i];
       const float* const ub = u + std::size_t{4} * group.b[i];
@@ -43,12 +106,23 @@ struct ServoBondKernels {
                       (length + group.rest[i]);
       const float remembered = group.offset[latest][i] + w.of_end * l;
       const float taut = l >= group.least[i] ? 1.0F / length : 0.0F;
-      float now = taut * (group.k[i] * l - group.g[i] * remembered);
+      const float elastic = (group.k[i] + group.cubic[i] * l * l) * l;
+      float now = taut * (elastic - group.g[i] * remembered);
       float next = now;
       if constexpr (kSweep != Sweep::next) {
-        const float offset = w.keep * remembered + w.of_start * l;
+        float offset = w.keep * remembered + w.of_start * l;
+        if (step.branch != nullptr) {
+          offset = 0.0F;
+          for (std::size_t j = 0; j < w.branches.size(); ++j) {
+            const ServoBranch& branch = w.branches[j];
+            const float m = step.branch[j].offset[latest][i] + branch.of_end * l;
+            const float left = branch.keep * m + branch.of_start * l;
+            step.branch[j].offset[1 - latest][i] = left;
+            offset += branch.share * left;
+          }
+        }
         group.offset[1 - latest][i] = offset;
-        next = taut * (group.k[i] * l - group.g[i] * (offset + w.of_end * l));
+        next = taut * (elastic - group.g[i] * (offset + w.of_end * l));
       }
       float* const fa = force + std::size_t{8} * group.a[i];
       float* const fb = force + std::size_t{8} * group.b[i];
@@ -95,9 +169,13 @@ struct ServoBondKernels {
              _mm256_shuffle_ps(b, d, 0x44), _mm256_shuffle_ps(b, d, 0xEE)}};
   }
 
-  template <Sweep kSweep>
-  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void group_avx2(
-      Group& group, std::size_t latest, const float* u, const ServoWeights& w, float* force) {
+  template <Sweep kSweep, bool kCubic, bool kBranches>
+  [[gnu::target("avx2,fma"), gnu::always_inline]] static inline void group_avx2(Group& group,
+                                                                                const Step& step,
+                                                                                const float* u,
+                                                                                float* force) {
+    const ServoWeights& w = step.weights;
+    const std::size_t latest = step.latest;
     Four apart;
     for (std::size_t i = 0; i < 4; ++i) {
       const __m128 low = _mm_sub_ps(_mm_load_ps(u + std::size_t{4} * group.b[i]),
@@ -127,14 +205,32 @@ struct ServoBondKernels {
     const __m256 k = _mm256_load_ps(group.k.data());
     const __m256 g = _mm256_load_ps(group.g.data());
     const __m256 of_end = _mm256_set1_ps(w.of_end);
-    const __m256 elastic = _mm256_mul_ps(k, l);
+    __m256 elastic = _mm256_mul_ps(k, l);
+    if constexpr (kCubic) {
+      const __m256 cubic = _mm256_mul_ps(_mm256_load_ps(group.cubic.data()), l);
+      elastic = _mm256_mul_ps(_mm256_fmadd_ps(cubic, l, k), l);
+    }
     const __m256 remembered =
         _mm256_fmadd_ps(of_end, l, _mm256_load_ps(group.offset[latest].data()));
     const __m256 now = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, remembered, elastic));
     __m256 next = now;
     if constexpr (kSweep != Sweep::next) {
-      const __m256 offset = _mm256_fmadd_ps(_mm256_set1_ps(w.keep), remembered,
-                                            _mm256_mul_ps(_mm256_set1_ps(w.of_start), l));
+      __m256 offset = _mm256_setzero_ps();
+      if constexpr (kBranches) {
+        for (std::size_t j = 0; j < w.branches.size(); ++j) {
+          const ServoBranch& branch = w.branches[j];
+          ServoBonds::BranchLane& lane = step.branch[j];
+          const __m256 m = _mm256_fmadd_ps(_mm256_set1_ps(branch.of_end), l,
+                                           _mm256_load_ps(lane.offset[latest].data()));
+          const __m256 left = _mm256_fmadd_ps(_mm256_set1_ps(branch.keep), m,
+                                              _mm256_mul_ps(_mm256_set1_ps(branch.of_start), l));
+          _mm256_store_ps(lane.offset[1 - latest].data(), left);
+          offset = _mm256_fmadd_ps(_mm256_set1_ps(branch.share), left, offset);
+        }
+      } else {
+        offset = _mm256_fmadd_ps(_mm256_set1_ps(w.keep), remembered,
+                                 _mm256_mul_ps(_mm256_set1_ps(w.of_start), l));
+      }
       _mm256_store_ps(group.offset[1 - latest].data(), offset);
       next = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, _mm256_fmadd_ps(of_end, l, offset), elastic));
     }
@@ -177,23 +273,37 @@ struct ServoBondKernels {
     _mm_store_ps(fb, _mm_sub_ps(_mm_load_ps(fb), f));
   }
 
+  template <Sweep kSweep, bool kCubic, bool kBranches>
+  [[gnu::target("avx2,fma")]] static void sweep_avx2(ServoBonds& bonds, Step step, const float* u,
+                                                     float* force) {
+    for (Group& group : bonds.group_) {
+      group_avx2<kSweep, kCubic, kBranches>(group, step, u, force);
+      if constexpr (kBranches) step.branch += bonds.branches_;
+    }
+  }
+
   template <Sweep kSweep>
-  [[gnu::target("avx2,fma")]] static void sweep_avx2(Group* group, std::size_t count,
-                                                     std::size_t latest, const float* u,
-                                                     const ServoWeights& w, float* force) {
-    for (std::size_t i = 0; i < count; ++i) group_avx2<kSweep>(group[i], latest, u, w, force);
+  static void sweep_vectors(ServoBonds& bonds, const Step& step, const float* u, float* force) {
+    if (step.branch != nullptr) {
+      bonds.cubic_ ? sweep_avx2<kSweep, true, true>(bonds, step, u, force)
+                   : sweep_avx2<kSweep, false, true>(bonds, step, u, force);
+    } else {
+      bonds.cubic_ ? sweep_avx2<kSweep, true, false>(bonds, step, u, force)
+                   : sweep_avx2<kSweep, false, false>(bonds, step, u, force);
+    }
   }
 #endif
 
   template <Sweep kSweep>
-  static void sweep(Group* group, std::size_t count, std::size_t latest, bool vectors,
-                    const float* u, const ServoWeights& w, float* force) {
+  static void sweep(ServoBonds& bonds, const ServoWeights& weights, const float* u, float* force) {
+    Step step{weights, bonds.latest_, bonds.branches_ > 1 ? bonds.branch_.data() : nullptr};
 #ifdef TPM_HAS_AVX2
-    if (vectors) return sweep_avx2<kSweep>(group, count, latest, u, w, force);
-#else
-    static_cast<void>(vectors);
+    if (bonds.vectors_) return sweep_vectors<kSweep>(bonds, step, u, force);
 #endif
-    for (std::size_t i = 0; i < count; ++i) plain<kSweep>(group[i], latest, u, w, force);
+    for (Group& group : bonds.group_) {
+      plain<kSweep>(group, step, u, force);
+      if (step.branch != nullptr) step.branch += bonds.branches_;
+    }
   }
 };
 
@@ -243,6 +353,8 @@ ServoBonds::ServoBonds(const BondSystem& bonds, const Positions& rest,
   constexpr float kNever = -std::numeric_limits<float>::infinity();
   const std::vector<std::size_t> order = order_in_lanes(chosen);
   group_.resize((order.size() + kWide - 1) / kWide);
+  branches_ = std::max<std::size_t>(servo_weights(bonds, 1.0).branches.size(), 1);
+  if (branches_ > 1) branch_.assign(branches_ * group_.size(), {});
   for (std::size_t n = 0; n < kWide * group_.size(); ++n) {
     Group& group = group_[n / kWide];
     const std::size_t i = n % kWide;
@@ -250,7 +362,7 @@ ServoBonds::ServoBonds(const BondSystem& bonds, const Positions& rest,
     if (n >= order.size()) {
       group.a[i] = group.b[i] = filler;
       group.x[i] = group.rest[i] = 1.0F;
-      group.y[i] = group.z[i] = group.k[i] = group.g[i] = 0.0F;
+      group.y[i] = group.z[i] = group.k[i] = group.g[i] = group.cubic[i] = 0.0F;
       group.least[i] = kNever;
       continue;
     }
@@ -266,30 +378,30 @@ ServoBonds::ServoBonds(const BondSystem& bonds, const Positions& rest,
     group.rest[i] = static_cast<float>(bonds.rest_length_m()[row]);
     group.k[i] = static_cast<float>(bonds.stiffness()[row]);
     group.g[i] = static_cast<float>(bonds.relaxing()[row]);
+    group.cubic[i] = static_cast<float>(cubic_of(bonds, choice.bond));
+    cubic_ = cubic_ || group.cubic[i] != 0.0F;
     group.least[i] = bonds.is_rope(choice.bond) ? 0.0F : kNever;
   }
 }
 
 void ServoBonds::forget() noexcept {
   for (Group& group : group_) group.offset = {};
+  for (BranchLane& branch : branch_) branch.offset = {};
 }
 
 void ServoBonds::advance(const float* displacement, const ServoWeights& weights,
                          float* force) noexcept {
-  ServoBondKernels::sweep<Sweep::both>(group_.data(), group_.size(), latest_, vectors_,
-                                       displacement, weights, force);
+  ServoBondKernels::sweep<Sweep::both>(*this, weights, displacement, force);
 }
 
 void ServoBonds::advance_now(const float* displacement, const ServoWeights& weights,
                              float* force) noexcept {
-  ServoBondKernels::sweep<Sweep::now>(group_.data(), group_.size(), latest_, vectors_, displacement,
-                                      weights, force);
+  ServoBondKernels::sweep<Sweep::now>(*this, weights, displacement, force);
 }
 
 void ServoBonds::add_next(const float* displacement, const ServoWeights& weights,
                           float* force) noexcept {
-  ServoBondKernels::sweep<Sweep::next>(group_.data(), group_.size(), latest_, vectors_,
-                                       displacement, weights, force);
+  ServoBondKernels::sweep<Sweep::next>(*this, weights, displacement, force);
 }
 
 }  // namespace tpm

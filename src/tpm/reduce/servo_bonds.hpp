@@ -9,10 +9,21 @@
 
 namespace tpm {
 
-/// Weights of the exact update over a servo period in which elongations are linear:
-/// y_new = keep y + of_start l_old + of_end l_new.
-struct ServoWeights {
+/// Weights of the exact update of one branch over a servo period in which elongations are linear:
+/// m_new = keep m + of_start l_old + of_end l_new.
+struct ServoBranch {
+  float share = 1.0F;  ///< gamma of the branch
   float keep = 0.0F, of_start = 0.0F, of_end = 0.0F;
+};
+
+/// The same for the mean viscous elongation y = sum of share m: of_start and of_end are means over
+/// the branches; with several the part of the start follows from every branch.
+struct ServoWeights {
+  float keep = 0.0F;  ///< of one branch
+  float of_start = 0.0F, of_end = 0.0F;
+  std::vector<ServoBranch> branches;  ///< where there are several
+
+  [[nodiscard]] float longest_kept() const;  ///< the largest keep
 };
 
 /// What moving all spheres once for their forces takes, counted: for to say what a step costs.
@@ -22,12 +33,19 @@ struct BalanceWork {
   std::size_t products = 0;  ///< multiplications of dense panels and vectors
 };
 
-/// @param period_over_tau > 0
-[[nodiscard]] ServoWeights servo_weights(double period_over_tau);
+/// Weights of the bonds that relax, which do so by one function of time.
+/// @param period_s > 0
+[[nodiscard]] ServoWeights servo_weights(const BondSystem& bonds, double period_s);
 
-/// Bonds of a network in single precision, eight side by side, with what they remember at the end
-/// of the next period if nothing moves apart from its own end. The vector from one end to the
-/// other is kept as that at rest and a small displacement, so that elongations lose no digits.
+/// Refuses what models at servo rate do not take. Throws Error(bad_input) that names the
+/// formulations that do, unless all bonds that relax do so by one function of time (any number of
+/// branches, linear in elongation) and potentials are linear or cubic.
+void require_servo_material(const BondSystem& bonds, std::string_view formulation);
+
+/// Bonds of a network in single precision, eight side by side, with their viscous elongations at
+/// the end of the next period if nothing moves apart from its own end. The vector from one end to
+/// the other is kept as that at rest and a small displacement, so that elongations lose no digits.
+/// A bond pulls with N = (k + c l^2) l - g y, c of its cubic potential.
 ///
 /// Displacements have four floats per sphere and forces eight: the first four are what bonds pull
 /// with now, the other four what they will pull with at the end of the next period if nothing
@@ -49,7 +67,7 @@ class ServoBonds {
   ServoBonds(const BondSystem& bonds, const Positions& rest, std::span<const Choice> chosen,
              std::uint32_t filler, bool portable = false);
 
-  /// Nothing is remembered, as at rest.
+  /// All viscous elongations become 0, as at rest.
   void forget() noexcept;
 
   /// Adds what bonds pull with under displacements, now and at the end of the next period. What
@@ -70,6 +88,7 @@ class ServoBonds {
     Lane x, y, z;  ///< at rest, m
     Lane rest;     ///< length, m
     Lane k, g;     ///< N/m
+    Lane cubic;    ///< c, N/m^3
     Lane least;    ///< elongation below which the bond is slack, m
     /// y at the end of the next period less its part that follows, m: that in use, and the next.
     std::array<Lane, 2> offset;
@@ -77,9 +96,17 @@ class ServoBonds {
   };
   friend struct ServoBondKernels;
 
+  /// The offset of one branch of a group, where there are several.
+  struct alignas(32) BranchLane {
+    std::array<Group::Lane, 2> offset;
+  };
+
   std::vector<Group> group_;
-  std::size_t latest_ = 0;  ///< of each group's offsets
+  std::size_t branches_ = 1;
+  std::vector<BranchLane> branch_;  ///< group by group
+  std::size_t latest_ = 0;          ///< of each group's offsets
   bool vectors_ = false;
+  bool cubic_ = false;
 };
 
 }  // namespace tpm

@@ -59,11 +59,13 @@ ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest, const
                            const ServoNetworkOptions& options)
     : options_(options), into_(into_tissue) {
   require(options, into_tissue);
+  require_servo_material(bonds, "the network at servo rate");
   PushedContact tissue(bonds, rest, freedom, contact);
-  weights_ = servo_weights(options.period_s / bonds.relaxation_time_s());
+  weights_ = servo_weights(bonds, options.period_s);
   at_once_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
   relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
-  const double forgotten = 1.0 - static_cast<double>(weights_.keep);
+  branch_error_.assign(weights_.branches.size(), Eigen::Vector3d::Zero());
+  const double forgotten = 1.0 - static_cast<double>(weights_.longest_kept());
   rounding_ = kRounding + kRememberedRounding / std::max(forgotten, 1.0 / kLongestMemory);
   spheres_ = std::make_unique<ServoStiffness>(bonds, rest, tissue.freedom());
   contact_ = spheres_->column(contact);
@@ -156,6 +158,7 @@ void ServoNetwork::reset() noexcept {
   std::fill(force_.begin(), force_.end(), 0.0F);
   largest_N_ = held_error_N_ = 0.0;
   remembered_error_.setZero();
+  std::fill(branch_error_.begin(), branch_error_.end(), Eigen::Vector3d::Zero());
   remembered_source_.setZero();
   source_.setZero();
 }
@@ -222,30 +225,46 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
                     aside_m <= options_.aside_m && answer_.error_N <= kTrusted * scale_N;
 }
 
-ContactAnswer ServoNetwork::step(const Eigen::Vector3d& displacement_m) noexcept {
+ContactAnswer ServoNetwork::step(const ToolPose& tool) noexcept {
   const FlushDenormals flush;
   float* const contact = displacement_.data() + 4 * contact_;
-  for (Eigen::Index c = 0; c < 3; ++c) contact[c] = static_cast<float>(displacement_m[c]);
+  for (Eigen::Index c = 0; c < 3; ++c) contact[c] = static_cast<float>(tool.displacement_m[c]);
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
-  const double step_error_N = step_error_->advance(displacement_m).norm();
+  const double step_error_N = step_error_->advance(tool.displacement_m).norm();
   const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
   balance(kNext);
-  answer(displacement_m, step_error_N);
+  answer(tool.displacement_m, step_error_N);
   const double elsewhere_N = remembered_error_.norm() + step_error_N;
   for (balances_ = 1; balances_ < options_.most_balances; ++balances_) {
     if (answer_.error_N - elsewhere_N <= options_.balance_again_above * scale_N) break;
     held_error_N_ = 0.0;
     balance(kNow);
-    answer(displacement_m, step_error_N);
+    answer(tool.displacement_m, step_error_N);
   }
   held_error_N_ = answer_.error_N - elsewhere_N;
-  remembered_error_ = static_cast<double>(weights_.keep) * remembered_error_ +
-                      static_cast<double>(weights_.of_start) * remembered_source_ +
-                      static_cast<double>(weights_.of_end) * source_;
-  remembered_source_ = source_;
+  keep_error();
   at_contact_.accept();
   elsewhere_.accept();
   return answer_;
+}
+
+void ServoNetwork::keep_error() noexcept {
+  const auto after = [&](const auto& by, const Eigen::Vector3d& error) -> Eigen::Vector3d {
+    return static_cast<double>(by.keep) * error +
+           static_cast<double>(by.of_start) * remembered_source_ +
+           static_cast<double>(by.of_end) * source_;
+  };
+  if (branch_error_.empty()) {
+    remembered_error_ = after(weights_, remembered_error_);
+  } else {
+    remembered_error_.setZero();
+    for (std::size_t j = 0; j < branch_error_.size(); ++j) {
+      const ServoBranch& branch = weights_.branches[j];
+      branch_error_[j] = after(branch, branch_error_[j]);
+      remembered_error_ += static_cast<double>(branch.share) * branch_error_[j];
+    }
+  }
+  remembered_source_ = source_;
 }
 
 double ServoNetwork::residual_N() const noexcept {

@@ -41,7 +41,7 @@ class ServoNetwork final : public ContactModel {
                const ServoNetworkOptions& options = {});
 
   void reset() noexcept override;
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return options_.period_s; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return at_once_;
@@ -76,6 +76,8 @@ class ServoNetwork final : public ContactModel {
   [[nodiscard]] std::array<Eigen::Vector3d, 3> weighed(
       const std::array<const Field*, 3>& fields) const noexcept;
   void answer(const Eigen::Vector3d& displacement_m, double step_error_N) noexcept;
+  /// The error of the viscous elongations after a step.
+  void keep_error() noexcept;
 
   ServoNetworkOptions options_;
   Eigen::Vector3d into_;
@@ -94,6 +96,7 @@ class ServoNetwork final : public ContactModel {
   double largest_N_ = 0.0, held_error_N_ = 0.0;
   /// Force from what is remembered of places that were not balanced, and its source, N.
   Eigen::Vector3d remembered_error_ = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> branch_error_;  ///< of each branch, where there are several
   Eigen::Vector3d remembered_source_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d source_ = Eigen::Vector3d::Zero();  ///< the same, of the balance just made
   int balances_ = 0;

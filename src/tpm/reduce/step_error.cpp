@@ -1,6 +1,7 @@
 #include "tpm/reduce/step_error.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <limits>
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "tpm/solve/relaxation_filter.hpp"
@@ -18,6 +19,15 @@ Eigen::Matrix3d inverse_where_stiff(const Eigen::Matrix3d& matrix, double scale)
     if (modes.eigenvalues()[i] > kNoMode * scale) inverse[i] = 1.0 / modes.eigenvalues()[i];
   }
   return modes.eigenvectors() * inverse.asDiagonal() * modes.eigenvectors().transpose();
+}
+
+/// The branches of the bonds that relax; one that never does if none relaxes.
+std::vector<ViscousLaw::Branch> branches_of(const BondSystem& bonds) {
+  for (std::size_t i = 0; i < bonds.first_contact(); ++i) {
+    if (!(bonds.relaxing()[static_cast<Eigen::Index>(i)] > 0.0)) continue;
+    return bonds.laws()[bonds.law_of(i)].branches;
+  }
+  return {{1.0, std::numeric_limits<double>::infinity(), 0}};
 }
 
 }  // namespace
@@ -57,42 +67,70 @@ StepError::StepError(PushedContact& tissue, const Positions& position, double re
   SixThree z_of_contact = SixThree::Zero();
   z_of_contact.topRows<3>().setIdentity();
   z_of_contact.bottomRows<3>() = -soft * stiffness.bottomLeftCorner<3, 3>();
-  force_of_memory_ = stiffness.topRows<3>() * z_of_memory - relaxing.topRows<3>();
+  const Eigen::Matrix<double, 3, 6> force_of_mean =
+      stiffness.topRows<3>() * z_of_memory - relaxing.topRows<3>();
 
-  const double z = period_s / tissue.bonds().relaxation_time_s();
-  // The contact moves linearly: (p, u, change of u) is a linear system of its own.
-  Eigen::Matrix<double, 12, 12> rate = Eigen::Matrix<double, 12, 12>::Zero();
-  rate.block<6, 6>(0, 0) = z * (z_of_memory - SixSquare::Identity());
-  rate.block<6, 3>(0, 6) = z * z_of_contact;
-  rate.block<3, 3>(6, 9).setIdentity();
-  const Eigen::Matrix<double, 12, 12> over = rate.exp();
-  exact_.of_memory = over.block<6, 6>(0, 0);
-  exact_.of_end = over.block<6, 3>(0, 9);
-  exact_.of_start = over.block<6, 3>(0, 6) - exact_.of_end;
-
-  const RelaxationWeights w = relaxation_weights(z);
+  const std::vector<ViscousLaw::Branch> branches = branches_of(tissue.bonds());
+  const auto n = static_cast<Eigen::Index>(branches.size());
+  force_of_memory_.resize(3, 6 * n);
+  // The contact moves linearly: (p of all branches, u, change of u) is a linear system of its own,
+  // dp_j/dt = (z - p_j)/tau_j, z = z_of_memory sum of gamma_j p_j + z_of_contact u.
+  Eigen::MatrixXd rate = Eigen::MatrixXd::Zero(6 * n + 6, 6 * n + 6);
   // p_new = r p + w0 z + w1 z_new with both z from the balance.
-  const SixSquare left = SixSquare::Identity() - w.w1 * z_of_memory;
+  Eigen::MatrixXd left = Eigen::MatrixXd::Identity(6 * n, 6 * n);
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(6 * n, 6 * n);
+  Eigen::MatrixXd of_start(6 * n, 3);
+  Eigen::MatrixXd of_end(6 * n, 3);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const double x = period_s / branches[static_cast<std::size_t>(j)].relaxation_time_s;
+    const RelaxationWeights w = relaxation_weights(x);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const SixSquare mean = branches[static_cast<std::size_t>(i)].share * z_of_memory;
+      rate.block<6, 6>(6 * j, 6 * i) += x * mean;
+      left.block<6, 6>(6 * j, 6 * i) -= w.w1 * mean;
+      right.block<6, 6>(6 * j, 6 * i) += w.w0 * mean;
+    }
+    rate.block<6, 6>(6 * j, 6 * j) -= x * SixSquare::Identity();
+    right.block<6, 6>(6 * j, 6 * j) += w.r * SixSquare::Identity();
+    rate.block<6, 3>(6 * j, 6 * n) = x * z_of_contact;
+    of_start.middleRows<6>(6 * j) = w.w0 * z_of_contact;
+    of_end.middleRows<6>(6 * j) = w.w1 * z_of_contact;
+    force_of_memory_.middleCols<6>(6 * j) =
+        branches[static_cast<std::size_t>(j)].share * force_of_mean;
+  }
+  rate.block<3, 3>(6 * n, 6 * n + 3).setIdentity();
+  const Eigen::MatrixXd over = rate.exp();
+  exact_.of_memory = over.topLeftCorner(6 * n, 6 * n);
+  exact_.of_end = over.block(0, 6 * n + 3, 6 * n, 3);
+  exact_.of_start = over.block(0, 6 * n, 6 * n, 3) - exact_.of_end;
   const auto solved = left.partialPivLu();
-  stepped_.of_memory = solved.solve(w.r * SixSquare::Identity() + w.w0 * z_of_memory);
-  stepped_.of_start = solved.solve(w.w0 * z_of_contact);
-  stepped_.of_end = solved.solve(w.w1 * z_of_contact);
+  stepped_.of_memory = solved.solve(right);
+  stepped_.of_start = solved.solve(of_start);
+  stepped_.of_end = solved.solve(of_end);
+  exact_.memory = exact_.next = stepped_.memory = stepped_.next = Eigen::VectorXd::Zero(6 * n);
 }
 
 void StepError::reset() noexcept {
-  exact_memory_.setZero();
-  stepped_memory_.setZero();
+  exact_.memory.setZero();
+  stepped_.memory.setZero();
   at_.setZero();
 }
 
+void StepError::Advance::move(const Eigen::Vector3d& from, const Eigen::Vector3d& to) noexcept {
+  next.noalias() = of_memory * memory;
+  next.noalias() += of_start * from;
+  next.noalias() += of_end * to;
+  memory.swap(next);
+}
+
 Eigen::Vector3d StepError::advance(const Eigen::Vector3d& displacement_m) noexcept {
-  const auto move = [&](const Advance& by, Six& memory) {
-    memory = (by.of_memory * memory + by.of_start * at_ + by.of_end * displacement_m).eval();
-  };
-  move(exact_, exact_memory_);
-  move(stepped_, stepped_memory_);
+  exact_.move(at_, displacement_m);
+  stepped_.move(at_, displacement_m);
   at_ = displacement_m;
-  return force_of_memory_ * (exact_memory_ - stepped_memory_);
+  Eigen::Vector3d error_N;
+  error_N.noalias() = force_of_memory_ * exact_.memory;
+  error_N.noalias() -= force_of_memory_ * stepped_.memory;
+  return error_N;
 }
 
 }  // namespace tpm

@@ -18,19 +18,19 @@ class StepError {
   Eigen::Vector3d advance(const Eigen::Vector3d& displacement_m) noexcept;
 
  private:
-  using Six = Eigen::Matrix<double, 6, 1>;
   using SixSquare = Eigen::Matrix<double, 6, 6>;
   using SixThree = Eigen::Matrix<double, 6, 3>;
 
-  /// One way to advance: what is remembered follows from itself and the contact's displacements.
+  /// One way to advance: the viscous elongations, six of each branch, follow from themselves and
+  /// the contact's displacements.
   struct Advance {
-    SixSquare of_memory = SixSquare::Zero();
-    SixThree of_start = SixThree::Zero(), of_end = SixThree::Zero();
+    Eigen::MatrixXd of_memory, of_start, of_end;
+    Eigen::VectorXd memory, next;
+    void move(const Eigen::Vector3d& from, const Eigen::Vector3d& to) noexcept;
   };
 
   Advance exact_, stepped_;
-  Eigen::Matrix<double, 3, 6> force_of_memory_ = Eigen::Matrix<double, 3, 6>::Zero();
-  Six exact_memory_ = Six::Zero(), stepped_memory_ = Six::Zero();
+  Eigen::MatrixXd force_of_memory_;  ///< 3 by the viscous elongations
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();
 };
 

@@ -75,9 +75,10 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
                                const SurfaceNetworkOptions& options)
     : options_(options), ball_(std::move(ball)), rest_(rest), stiffness_(bonds, rest, freedom) {
   require_valid(options, ball_);
+  require_servo_material(bonds, "the network under a ball at servo rate");
   require_unstretched(bonds, rest);
   require_touching_nothing(ball_, rest);
-  weights_ = servo_weights(options.period_s / bonds.relaxation_time_s());
+  weights_ = servo_weights(bonds, options.period_s);
   std::vector<ServoBonds::Choice> chosen;
   for (std::size_t b = 0; b < bonds.size(); ++b) {
     const std::uint32_t from = bonds.end_a()[b];
@@ -100,12 +101,17 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   find_stiffness(bonds, freedom);
   // An elongation that bends by b between periods lies b v (1 - v)/2 off the line, v from the end;
   // what it leaves in the memory is the integral of that over exp(-z v) z dv.
-  const double z = options.period_s / bonds.relaxation_time_s();
-  const RelaxationWeights w = relaxation_weights(z);
   const double lasting = at_once_.norm() > 0.0 ? relaxed_.norm() / at_once_.norm() : 1.0;
   // Not all of a bond relaxes: all of its force is taken.
-  bend_ = (w.w1 - w.w0) / (2.0 * z);
+  const double z = options.period_s / bonds.longest_relaxation_time_s();
   bend_kept_ = std::exp(-lasting * z);
+  bend_ = 0.0;
+  for (const double time_s : bonds.relaxation_times_s()) {
+    // The fastest branch leaves most: of several all are taken to be that.
+    const double x = options.period_s / time_s;
+    const RelaxationWeights w = relaxation_weights(x);
+    bend_ = std::max(bend_, (w.w1 - w.w0) / (2.0 * x));
+  }
 }
 
 void SurfaceNetwork::add_skin() {
@@ -398,13 +404,13 @@ bool SurfaceNetwork::has_fallen_in() const noexcept {
   return false;
 }
 
-ContactAnswer SurfaceNetwork::step(const Eigen::Vector3d& displacement_m) noexcept {
+ContactAnswer SurfaceNetwork::step(const ToolPose& tool) noexcept {
   const FlushDenormals flush;
-  if (!displacement_m.allFinite()) {
+  if (!tool.displacement_m.allFinite()) {
     return {Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()), 0.0, false};
   }
-  const double way_m = (displacement_m - ball_at_).norm();
-  ball_at_ = displacement_m;
+  const double way_m = (tool.displacement_m - ball_at_).norm();
+  ball_at_ = tool.displacement_m;
   balance(kForceNext, way_m);
   answer();
   for (balances_ = 1; balances_ < options_.most_balances; ++balances_) {

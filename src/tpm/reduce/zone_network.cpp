@@ -15,7 +15,8 @@ constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
 /// What the surroundings miss in motion over what they miss in equilibrium: what they remember of
 /// deeper places is missed too.
 constexpr double kMissedInMotion = 1.5;
-constexpr double kUnbalanced = 0.1;  // what is left of the correction for what is unbalanced
+constexpr double kMissedStiffening = 3.0;  // times that where bonds of the surroundings stiffen
+constexpr double kUnbalanced = 0.1;        // what is left of the correction for what is unbalanced
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
 
 void require(const ZoneNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
@@ -54,8 +55,10 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest, const F
       kernels_(panel_kernels(options.portable)),
       contact_(contact) {
   require(options, into_tissue);
+  require_servo_material(bonds, "the zone");
+  missed_in_motion_ = kMissedInMotion * (bonds.is_linear() ? 1.0 : kMissedStiffening);
   PushedContact tissue(bonds, rest, freedom, contact);
-  weights_ = servo_weights(options.period_s / bonds.relaxation_time_s());
+  weights_ = servo_weights(bonds, options.period_s);
   at_once_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
   relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
   choose_zone(tissue);
@@ -126,6 +129,7 @@ void ZoneNetwork::reset() noexcept {
                                    &pull_, &offset_pull_, &next_pull_}) {
     std::fill(all->begin(), all->end(), 0.0F);
   }
+  for (AlignedFloats& offset : branch_offset_) std::fill(offset.begin(), offset.end(), 0.0F);
   largest_N_ = 0.0;
 }
 
@@ -141,9 +145,22 @@ void ZoneNetwork::gather(std::size_t first) noexcept {
 
 void ZoneNetwork::add_surroundings() noexcept {
   kernels_.times(stiff_.panel(), moved_.data(), pull_.data());
-  for (std::size_t i = 0; i < stiff_.columns; ++i) {
-    const float remembered = offset_[i] + weights_.of_end * moved_[i];
-    next_offset_[i] = weights_.keep * remembered + weights_.of_start * moved_[i];
+  if (branch_offset_.empty()) {
+    for (std::size_t i = 0; i < stiff_.columns; ++i) {
+      const float viscous = offset_[i] + weights_.of_end * moved_[i];
+      next_offset_[i] = weights_.keep * viscous + weights_.of_start * moved_[i];
+    }
+  } else {
+    std::fill(next_offset_.begin(), next_offset_.end(), 0.0F);
+    for (std::size_t j = 0; j < branch_offset_.size(); ++j) {
+      const ServoBranch& branch = weights_.branches[j];
+      float* const offset = branch_offset_[j].data();
+      for (std::size_t i = 0; i < stiff_.columns; ++i) {
+        const float viscous = offset[i] + branch.of_end * moved_[i];
+        offset[i] = branch.keep * viscous + branch.of_start * moved_[i];
+        next_offset_[i] += branch.share * offset[i];
+      }
+    }
   }
   kernels_.times(relaxing_.panel(), next_offset_.data(), next_pull_.data());
   for (std::size_t i = 0; i < stiff_.columns; ++i) {
@@ -155,12 +172,12 @@ void ZoneNetwork::add_surroundings() noexcept {
   }
 }
 
-ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept {
+ContactAnswer ZoneNetwork::step(const ToolPose& tool) noexcept {
   const FlushDenormals flush;
   const std::size_t contact = zone_.size();
   for (std::size_t c = 0; c < 3; ++c) {
     displacement_[4 * contact + c] =
-        static_cast<float>(displacement_m[static_cast<Eigen::Index>(c)]);
+        static_cast<float>(tool.displacement_m[static_cast<Eigen::Index>(c)]);
   }
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
   gather(kZoneNext);
@@ -194,16 +211,16 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
   answer.force_N = at_contact.cast<double>() + correction;
   largest_N_ = std::max(largest_N_, answer.force_N.norm());
 
-  const double depth_m = displacement_m.dot(into_);
-  const double aside_m = (displacement_m - depth_m * into_).norm();
+  const double depth_m = tool.displacement_m.dot(into_);
+  const double aside_m = (tool.displacement_m - depth_m * into_).norm();
   const auto last = static_cast<double>(missed_N_.size() - 1);
   const double at = std::clamp(std::abs(depth_m) / missed_stride_m_, 0.0, last);
   const std::size_t low = std::min(static_cast<std::size_t>(at), missed_N_.size() - 2);
   const double share = at - static_cast<double>(low);
   const double missed_N =
       (1.0 - share) * missed_N_[low] + share * missed_N_[low + 1] + aside_m * missed_aside_N_per_m_;
-  answer.error_N = kMissedInMotion * missed_N + kUnbalanced * correction.norm() +
-                   step_error_->advance(displacement_m).norm();
+  answer.error_N = missed_in_motion_ * missed_N + kUnbalanced * correction.norm() +
+                   step_error_->advance(tool.displacement_m).norm();
   const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * relaxed_.norm());
   answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&
                    answer.error_N <= kTrustedZone * scale_N;

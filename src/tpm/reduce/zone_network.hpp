@@ -42,7 +42,7 @@ class ZoneNetwork final : public ContactModel {
               const ZoneNetworkOptions& options = {});
 
   void reset() noexcept override;
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return options_.period_s; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return at_once_;
@@ -101,12 +101,14 @@ class ZoneNetwork final : public ContactModel {
   std::unique_ptr<StepError> step_error_;
   /// Force missed at even depths from rest on, and per metre across the normal, N and N/m.
   std::vector<double> missed_N_;
+  double missed_in_motion_ = 0.0;  ///< factor on it
   double missed_stride_m_ = 0.0, missed_aside_N_per_m_ = 0.0;
 
   AlignedFloats displacement_, force_;
-  AlignedFloats right_, change_;        ///< by coordinates of zone and own displacements
-  AlignedFloats moved_;                 ///< edge and own displacements
-  AlignedFloats offset_, next_offset_;  ///< as of bonds, of edge and own displacements
+  AlignedFloats right_, change_;              ///< by coordinates of zone and own displacements
+  AlignedFloats moved_;                       ///< edge and own displacements
+  AlignedFloats offset_, next_offset_;        ///< as of bonds, of edge and own displacements
+  std::vector<AlignedFloats> branch_offset_;  ///< the same of each branch, where there are several
   AlignedFloats pull_, offset_pull_, next_pull_;
   double largest_N_ = 0.0;
 };

@@ -213,6 +213,7 @@ void ZoneNetwork::build(PushedContact& tissue) {
        {&moved_, &offset_, &next_offset_, &pull_, &offset_pull_, &next_pull_}) {
     all->assign(std::max<std::size_t>(stiff_.stride, 8), 0.0F);
   }
+  branch_offset_.assign(weights_.branches.size(), AlignedFloats(next_offset_.size(), 0.0F));
   step_error_ = std::make_unique<StepError>(tissue, frozen, relaxed, options_.period_s);
   build_errors(tissue, around, linear);
 }

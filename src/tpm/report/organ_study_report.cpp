@@ -30,7 +30,7 @@ std::string element_words(const TpmParameters& p) {
 }
 
 std::string percent(double share) {
-  return fmt::format("{:+.1f} %", 100.0 * share);
+  return fmt::format("{}{} %", share < 0.0 ? "" : "+", significant(100.0 * share, 3));
 }
 
 /// What was imposed: "4 mm at 2 mm/s", "0.98 N", "static".

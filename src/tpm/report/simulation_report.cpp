@@ -30,6 +30,23 @@ const CurvePoint& largest(const SimulationRecord& record, double tolerance) {
   });
 }
 
+/// The blow that the tissue feels most; none if there is none.
+const ProbeBlow* largest_blow(const std::vector<ProbeBlow>& blows) {
+  const auto most =
+      std::max_element(blows.begin(), blows.end(), [](const ProbeBlow& a, const ProbeBlow& b) {
+        return std::abs(a.impulse_on_tissue_N_s) < std::abs(b.impulse_on_tissue_N_s);
+      });
+  return most == blows.end() ? nullptr : &*most;
+}
+
+/// The point of the largest force on the tissue.
+const CurvePoint& hardest(const SimulationRecord& record) {
+  return *std::max_element(record.curve.begin(), record.curve.end(),
+                           [](const CurvePoint& a, const CurvePoint& b) {
+                             return a.force_on_tissue_N < b.force_on_tissue_N;
+                           });
+}
+
 Json validity_json(const Validity& validity, bool depth_limits) {
   Json json{{"kept", validity.whole()},
             {"depth_limits_apply", depth_limits},
@@ -53,10 +70,12 @@ Json validity_json(const Validity& validity, bool depth_limits) {
 Json energy_json(const SimulationRun& run) {
   if (run.record.inertial_energy) {
     const InertialEnergy& e = *run.record.inertial_energy;
-    return {{"work_J", rounded(e.work, kSimulationDigits)},
-            {"stored_J", rounded(e.stored, kSimulationDigits)},
-            {"dissipated_J", rounded(e.bond_heat + e.damping_heat, kSimulationDigits)},
-            {"kinetic_J", rounded(e.kinetic, kSimulationDigits)}};
+    return {
+        {"work_J", rounded(e.work, kSimulationDigits)},
+        {"stored_J", rounded(e.stored, kSimulationDigits)},
+        {"dissipated_J", rounded(e.bond_heat + e.damping_heat + e.contact_heat, kSimulationDigits)},
+        {"contact_heat_J", rounded(e.contact_heat, kSimulationDigits)},
+        {"kinetic_J", rounded(e.kinetic, kSimulationDigits)}};
   }
   const QuasiStaticEnergy& e = run.record.curve.back().energy;
   return {{"work_J", rounded(e.work_J, kSimulationDigits)},
@@ -64,10 +83,43 @@ Json energy_json(const SimulationRun& run) {
           {"dissipated_J", rounded(e.dissipated_J, kSimulationDigits)}};
 }
 
+/// What spheres with mass have besides: blows, forces that a load does not name, and what the
+/// stiffness of contacts changes.
+Json motion_json(const ExperimentScene& scene, const SimulationRun& run) {
+  const auto number = [](double x) { return Json(rounded(x, kSimulationDigits)); };
+  const std::vector<ProbeBlow>& blows = run.record.blows;
+  Json json{{"blows", {{"count", blows.size()}}}};
+  if (const ProbeBlow* most = largest_blow(blows)) {
+    json["blows"]["largest"] = {{"time_s", number(most->time_s)},
+                                {"impulse_on_tissue_N_s", number(most->impulse_on_tissue_N_s)},
+                                {"impulse_of_probe_N_s", number(most->impulse_N_s)}};
+  }
+  if (!by_depth(scene)) {
+    const CurvePoint& most = hardest(run.record);
+    json["largest_force_on_tissue"] = {{"time_s", number(most.time_s)},
+                                       {"force_N", number(most.force_on_tissue_N)}};
+  }
+  json["contact_check"] = nullptr;
+  if (run.contact_check) {
+    const ContactCheck& check = *run.contact_check;
+    json["contact_check"] = {{"times_softer", ContactCheck::kSofter},
+                             {"largest_response", number(check.largest)},
+                             {"largest_response_softer", number(check.largest_softer)},
+                             {"response_at_end", number(check.end)},
+                             {"response_at_end_softer", number(check.end_softer)},
+                             {"difference", rounded(check.difference, 3)},
+                             {"difference_at_one_time", rounded(check.at_one_time, 3)},
+                             {"depends_on_stiffness", check.depends_on_stiffness()}};
+  }
+  return json;
+}
+
 /// What the contacts are, and the state of the tools among them at the last output.
 Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
                    const SimulationRun& run) {
-  const auto states = tool_states(network.driven, run.record.outputs.back().position);
+  const QuasiStaticState& last = run.record.outputs.back();
+  const auto states =
+      tool_states(network.driven, last.position, run.record.contact_pushes_N.back());
   std::size_t tool = 0;
   Json list = Json::array();
   for (const SceneContact& contact : scene.contacts) {
@@ -110,7 +162,9 @@ std::string sideways_words(const ExperimentScene& scene, const Probe& probe) {
 
 std::string contacts_text(const ExperimentScene& scene, const RunNetwork& network,
                           const SimulationRun& run) {
-  const auto states = tool_states(network.driven, run.record.outputs.back().position);
+  const QuasiStaticState& last = run.record.outputs.back();
+  const auto states =
+      tool_states(network.driven, last.position, run.record.contact_pushes_N.back());
   std::size_t tool = 0;
   std::string text;
   for (const SceneContact& contact : scene.contacts) {
@@ -198,33 +252,89 @@ std::string validity_text(const Validity& validity, bool depth_limits) {
   return text;
 }
 
-std::string equations_text(const ExperimentScene& scene, const SimulationRun& run) {
-  const Formulation& f = scene.formulation;
-  const char* network = f.mass_spring ? "mass-spring model" : "tissue";
-  if (!f.inertial()) {
-    return fmt::format("{}, {}, tolerance {}\n", network,
-                       f.kind == FormulationKind::relaxed
-                           ? "static: everything has relaxed at each time"
-                           : "quasi-static",
-                       shortest(f.tolerance));
+std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) {
+  std::string text;
+  if (!by_depth(scene)) {
+    const CurvePoint& most = hardest(run.record);
+    text += fmt::format("largest force on the tissue: {} N, at {} s\n",
+                        significant(most.force_on_tissue_N, 6), significant(most.time_s, 4));
   }
-  return fmt::format("{} with mass, damping ratio {} of its lowest mode ({} Hz), tolerance {}\n",
-                     network, shortest(f.damping_ratio), significant(run.lowest_frequency_Hz, 4),
-                     shortest(f.tolerance));
+  const std::vector<ProbeBlow>& blows = run.record.blows;
+  if (const ProbeBlow* most = largest_blow(blows)) {
+    text += fmt::format(
+        "{} blow{} (a speed that changes in an instant; not in the forces), the largest {} N s on "
+        "the tissue, at {} s\n",
+        blows.size(), blows.size() == 1 ? "" : "s", significant(most->impulse_on_tissue_N_s, 3),
+        significant(most->time_s, 4));
+  }
+  if (!run.contact_check) return text;
+  const ContactCheck& check = *run.contact_check;
+  const double unit = by_depth(scene) ? 1.0 : 1e3;
+  const auto pair = [&](double here, double softer) {
+    return fmt::format("{} {} instead of {}", significant(unit * softer, 6),
+                       by_depth(scene) ? "N" : "mm", significant(unit * here, 6));
+  };
+  text += fmt::format("with contacts {} times softer the largest {} is {}, that at the end {}",
+                      shortest(ContactCheck::kSofter), by_depth(scene) ? "force" : "depth",
+                      pair(check.largest, check.largest_softer), pair(check.end, check.end_softer));
+  text += fmt::format("; the curves differ by {} % of the largest at one time\n",
+                      significant(100.0 * check.at_one_time, 3));
+  if (check.depends_on_stiffness()) {
+    text += fmt::format(
+        "WARNING: numbers of this run depend on the stiffness of its contacts, by {} % of the "
+        "largest; stiffen them\n",
+        significant(100.0 * check.difference, 3));
+  }
+  return text;
+}
+
+std::string equations_text(const ExperimentScene& scene, const SimulationRun& run) {
+  const FormulationChoice& f = scene.formulation;
+  const char* network = f.mass_spring ? "mass-spring model" : "tissue";
+  if (!f.masses) {
+    return fmt::format(
+        "{}, {}, tolerance {}\n", network,
+        !f.entry().can().course ? "static: everything has relaxed at each time" : "quasi-static",
+        shortest(f.tolerance));
+  }
+  return fmt::format(
+      "{} with mass, damping ratio {} of the tissue's lowest mode ({} Hz), tolerance {}\n", network,
+      shortest(f.damping_ratio), significant(run.lowest_frequency_Hz, 4), shortest(f.tolerance));
+}
+
+/// How linear systems were solved.
+Json solver_json(const SolverChoice& solver) {
+  Json json{{"kind", solver.direct ? "direct" : "iterative"}};
+  if (solver.operations > 0.0) {
+    json["factor_operations"] = rounded(solver.operations, kSimulationDigits);
+    json["factor_bytes"] = solver.bytes;
+  }
+  return json;
+}
+
+/// Of a run that iterates.
+std::string solver_text(const SolverChoice& solver) {
+  std::string text = "linear systems are solved by conjugate gradients with multigrid";
+  if (solver.operations > 0.0) {
+    text +=
+        fmt::format(": a factorisation would take {} operations and {} GiB",
+                    significant(solver.operations, 3), significant(solver.bytes / 1073741824.0, 3));
+  }
+  return text + "\n";
 }
 
 }  // namespace
 
 Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                      const SimulationRun& run) {
-  const Formulation& f = scene.formulation;
+  const FormulationChoice& f = scene.formulation;
   const SimulationRecord& record = run.record;
   const bool depth = by_depth(scene);
   Json json{{"title", scene.tissue.title},
             {"version", version()},
             {"scene_sha256", sha256_hex(scene.text)},
             {"network", f.mass_spring ? "mass_spring" : "tissue"},
-            {"formulation", word_of(f.kind)},
+            {"formulation", f.kind},
             {"tolerance", f.tolerance},
             {"spheres", scene.tissue.network.organ.size()},
             {"bonds", scene.tissue.network.bonds.size()},
@@ -240,10 +350,11 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
   json["last"] = point(record.curve.back());
   json["outputs"] = record.outputs.size();
   json["energy"] = energy_json(run);
+  if (f.masses) json["motion"] = motion_json(scene, run);
+  if (run.solver) json["solver"] = solver_json(*run.solver);
   json["roughness"] = smoothness_json(smoothness_of(scene, record.outputs.back().position));
-  json["error_estimate"] = f.kind == FormulationKind::quasi_static
-                               ? Json(rounded(record.error_estimate, 3))
-                               : Json(nullptr);
+  json["error_estimate"] =
+      f.kind == "quasi_static" ? Json(rounded(record.error_estimate, 3)) : Json(nullptr);
   json["resumed_at_s"] = run.resumed_at_s ? Json(*run.resumed_at_s) : Json(nullptr);
   json["validity"] = validity_json(record.validity, depth_limits_apply(scene.tissue));
   return json;
@@ -264,6 +375,8 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
                   scene.tissue.network.organ.size(), depth ? "pushed to a depth" : "loaded");
   text += contacts_text(scene, network, run);
   text += equations_text(scene, run);
+  if (scene.formulation.masses) text += motion_text(scene, run);
+  if (run.solver && !run.solver->direct) text += solver_text(*run.solver);
   if (run.resumed_at_s) {
     text += fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
   }

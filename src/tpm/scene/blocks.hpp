@@ -21,9 +21,13 @@ struct OrganBlock {
 [[nodiscard]] NetworkOptions parse_bonds(const Json& block, const DocumentPlace& place);
 [[nodiscard]] LateralBond parse_lateral(const Json& block, const DocumentPlace& place);
 
-/// Block `material`. The spacing is that of the organ.
-[[nodiscard]] TpmParameters parse_material(const Json& block, double spacing_m,
-                                           const DocumentPlace& place);
+/// What a block `material` leads to.
+struct MaterialBlock {
+  MaterialField materials;
+  std::optional<TpmParameters> element;  ///< the paper's, where the block gives its constants
+};
+[[nodiscard]] MaterialBlock parse_material(const Json& block, LateralBond lateral,
+                                           const Organ& organ, const DocumentPlace& place);
 
 /// The spheres that an entry of `anchors` holds, and that in words.
 struct AnchorBlock {

@@ -53,7 +53,8 @@ NetworkInspection inspect(const Tissue& tissue) {
   const HeldStiffness held =
       held_stiffness(tissue.bonds(), organ.position, *organ.contact,
                      organ.normal.col(static_cast<Eigen::Index>(*organ.contact)));
-  const HeldStiffness star = star_stiffness(tissue.material);
+  const BondLaw star_bond = tissue.materials.materials.front().radial_law();
+  const HeldStiffness star{star_bond.instantaneous_N_per_m(), star_bond.equilibrium_N_per_m()};
   result.contact_over_star = HeldStiffness{held.at_once / star.at_once, 0.0};
   // A material that relaxes to nothing has no relaxed stiffness to compare.
   if (star.relaxed > 0.0) result.contact_over_star->relaxed = held.relaxed / star.relaxed;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -15,6 +16,7 @@ namespace {
 
 constexpr double kTolerance = 1e-6;            // of the response, in parts of its largest value
 constexpr double kDerivativeTolerance = 1e-5;  // likewise, of relative changes
+constexpr double kDifference = 1e-5;           // of a parameter, where laws are differentiated
 
 /// How the organ of a scene and one of another spacing answer each other.
 struct Similarity {
@@ -92,17 +94,42 @@ Probe probe_of(const Tissue& tissue) {
 
 OrganModel::OrganModel(std::shared_ptr<const Tissue> tissue)
     : tissue_(std::move(tissue)),
+      element_(tissue_->paper_element && tissue_->materials.factor.size() == 0),
       bonds_(tissue_->bonds()),
       freedom_(tissue_->freedom()),
       probe_(probe_of(*tissue_)) {
   require_valid(probe_, freedom_);
+  if (element_) {
+    table_.assign(kTpmParameterTable.begin(), kTpmParameterTable.end());
+    return;
+  }
+  names_ = parameters_of(tissue_->materials.materials.front());
+  for (const MaterialParameter& p : names_) table_.push_back({p.name, p.dimension, p.meaning});
+}
+
+std::pair<double, double> OrganModel::range(std::size_t parameter) const {
+  if (element_) return Model::range(parameter);
+  return {names_[parameter].least, std::numeric_limits<double>::infinity()};
+}
+
+std::vector<double> OrganModel::own_values() const {
+  if (element_) {
+    const TpmVector paper = to_vector(TpmParameters{});
+    return {paper.begin(), paper.end()};
+  }
+  std::vector<double> values;
+  for (const MaterialParameter& p : names_) {
+    values.push_back(*value_of(tissue_->materials.materials.front(), p.name));
+  }
+  return values;
 }
 
 Response OrganModel::respond(const Protocol& protocol, std::span<const double> times_s,
                              std::span<const double> parameters, Want want) const {
-  const Eigen::Index columns = want == Want::values ? 0 : kTpmParameterCount;
-  Response response = respond_along(protocol, times_s, parameters,
-                                    Eigen::MatrixXd::Identity(kTpmParameterCount, columns));
+  const auto count = static_cast<Eigen::Index>(table_.size());
+  const Eigen::Index columns = want == Want::values ? 0 : count;
+  Response response =
+      respond_along(protocol, times_s, parameters, Eigen::MatrixXd::Identity(count, columns));
   if (want == Want::values) response.sensitivity.resize(0, 0);
   return response;
 }
@@ -110,6 +137,59 @@ Response OrganModel::respond(const Protocol& protocol, std::span<const double> t
 Response OrganModel::respond_along(const Protocol& protocol, std::span<const double> times_s,
                                    std::span<const double> parameters,
                                    const Eigen::MatrixXd& along) const {
+  return element_ ? respond_by_element(protocol, times_s, parameters, along)
+                  : respond_by_table(protocol, times_s, parameters, along);
+}
+
+MaterialField OrganModel::materials_with(std::span<const double> parameters) const {
+  MaterialField materials = tissue_->materials;
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    set_value(materials.materials.front(), names_[i].name, parameters[i], "organ");
+  }
+  return materials;
+}
+
+Response OrganModel::respond_by_table(const Protocol& protocol, std::span<const double> times_s,
+                                      std::span<const double> parameters,
+                                      const Eigen::MatrixXd& along) const {
+  const Network& network = tissue_->network;
+  const BondSystem bonds = bonds_.with_materials(network, materials_with(parameters));
+  QuasiStaticOptions options{.tolerance = kTolerance};
+  options.derivative_tolerance = kDerivativeTolerance;
+  const Eigen::Map<const Eigen::VectorXd> at(parameters.data(), std::ssize(parameters));
+  Eigen::VectorXd per_unit = Eigen::VectorXd::Ones(along.cols());
+  for (Eigen::Index j = 0; j < along.cols(); ++j) {
+    // In units in which the parameter that changes most does so by its own size.
+    for (Eigen::Index i = 0; i < at.size(); ++i) {
+      if (along(i, j) == 0.0 || at[i] > 0.0) continue;
+      throw bad_input("organ", fmt::format("{} = 0", table_[static_cast<std::size_t>(i)].name),
+                      "a value above 0, by which it can be differentiated");
+    }
+    const double fastest = along.col(j).cwiseQuotient(at).cwiseAbs().maxCoeff();
+    if (fastest > 0.0) per_unit[j] = 1.0 / fastest;
+    const Eigen::VectorXd change = kDifference * per_unit[j] * along.col(j);
+    const auto beside = [&](double sign) {
+      const Eigen::VectorXd values = at + sign * change;
+      return bonds_.with_materials(
+          network, materials_with({values.data(), static_cast<std::size_t>(values.size())}));
+    };
+    options.directions.push_back(
+        direction_between(beside(-1.0), bonds, beside(1.0), 2.0 * kDifference));
+  }
+  const QuasiStaticRun run =
+      QuasiStatic(bonds, network.organ.position, freedom_, probe_, options).run(protocol, times_s);
+  Response response;
+  response.value = run.response;
+  response.sensitivity.resize(run.response.size(), along.cols());
+  if (along.cols() > 0) {
+    response.sensitivity = run.derivative * per_unit.cwiseInverse().asDiagonal();
+  }
+  return response;
+}
+
+Response OrganModel::respond_by_element(const Protocol& protocol, std::span<const double> times_s,
+                                        std::span<const double> parameters,
+                                        const Eigen::MatrixXd& along) const {
   TpmVector values{};
   std::copy(parameters.begin(), parameters.end(), values.begin());
   const TpmParameters p = from_vector(values);
@@ -134,7 +214,8 @@ Response OrganModel::respond_along(const Protocol& protocol, std::span<const dou
       options.directions.push_back(std::move(basis[static_cast<std::size_t>(i)]));
     }
   }
-  const BondSystem bonds = bonds_.with_material(network, p);
+  const BondSystem bonds =
+      bonds_.with_materials(network, BondMaterial::of(p, tissue_->materials.lateral()));
   const QuasiStaticRun run = QuasiStatic(bonds, network.organ.position, freedom_, probe_, options)
                                  .run(protocol.scaled(1.0 / similarity.of_imposed(drive)), times_s);
   const double factor = similarity.of_response(drive);
@@ -148,6 +229,7 @@ Response OrganModel::respond_along(const Protocol& protocol, std::span<const dou
 }
 
 std::unique_ptr<Model> OrganModel::scout() const {
+  if (!element_) return nullptr;
   return make_model("closed_form");
 }
 

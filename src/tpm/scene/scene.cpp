@@ -66,6 +66,22 @@ void read_guides(const Json& numbers, Tissue& tissue, const DocumentPlace& place
 
 }  // namespace
 
+const TpmParameters& Tissue::element(std::string_view user) const {
+  const bool regions = materials.materials.size() > 1 || materials.factor.size() > 0;
+  if (paper_element && !regions) return *paper_element;
+  throw bad_input(
+      "material",
+      fmt::format("{} takes the paper's element alone, and this material has {}", user,
+                  regions ? "regions" : "laws of its own"),
+      "E1, E2, Eprime and eta1, or a formulation that takes it: quasi_static, inertial, "
+      "static");
+}
+
+void Tissue::set_element(const TpmParameters& element) {
+  paper_element = element;
+  materials.materials.front() = BondMaterial::of(element, materials.lateral());
+}
+
 Freedom Tissue::freedom() const {
   Freedom freedom(network.organ.size());
   for (const Guide& guide : guides) freedom.guide(guide.sphere, guide.direction);
@@ -85,10 +101,14 @@ Tissue parse_tissue(const Json& scene, std::string_view where,
   tissue.liver = organ.liver;
   tissue.star = organ.star;
   tissue.title = scene.value("title", organ.organ.name);
-  tissue.material = parse_material(block("material"), organ.organ.spacing, place.key("material"));
-  tissue.lateral = parse_lateral(block("bonds"), place.key("bonds"));
+  const LateralBond lateral = parse_lateral(block("bonds"), place.key("bonds"));
+  const Json material = block("material");
   tissue.network =
       joined(std::move(organ), parse_bonds(block("bonds"), place.key("bonds")), place.where);
+  MaterialBlock read =
+      parse_material(material, lateral, tissue.network.organ, place.key("material"));
+  tissue.materials = std::move(read.materials);
+  tissue.paper_element = read.element;
   read_anchors(anchors, tissue, place.key("anchors"));
   read_guides(guides, tissue, place.key("guides"));
   for (const char* key : kOtherBlocks) {

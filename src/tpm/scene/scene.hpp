@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,16 +24,24 @@ struct Tissue {
   bool liver = false;  ///< x is to the patient's right, y up, z to the back
   bool star = false;   ///< the paper's element of four spheres
   Network network;
-  TpmParameters material;
-  LateralBond lateral = LateralBond::elastic;
+  MaterialField materials;
+  /// The paper's element, where the scene gives its constants; regions may vary it.
+  std::optional<TpmParameters> paper_element;
   std::vector<std::size_t> anchors;       ///< held spheres, rising, from 0
   std::vector<std::string> anchor_words;  ///< one entry per anchor block, for people
   std::vector<Guide> guides;
   std::vector<std::string>
       unused_blocks;  ///< blocks of the scene that say nothing about the tissue
 
-  [[nodiscard]] BondSystem bonds() const { return {network, material, lateral}; }
+  [[nodiscard]] BondSystem bonds() const { return {network, materials}; }
   [[nodiscard]] Freedom freedom() const;
+
+  /// The paper's element everywhere, for what takes no other material. Throws Error(bad_input) for
+  /// a tissue of another material or with regions.
+  /// @param user in words, for the message: "the element"
+  [[nodiscard]] const TpmParameters& element(std::string_view user = "this formulation") const;
+  /// Puts the element in place of the first material; regions stay.
+  void set_element(const TpmParameters& element);
 };
 
 /// Reads the blocks organ, bonds, material, anchors and guides of a scene

@@ -14,8 +14,9 @@ constexpr std::array<Word<StiffnessRule>, 2> kRuleWords{
     {{StiffnessRule::normalised, "normalised"}, {StiffnessRule::per_bond, "per_bond"}}};
 constexpr std::array<Word<SpacingLaw>, 2> kSpacingLawWords{
     {{SpacingLaw::paper, "paper"}, {SpacingLaw::continuum, "continuum"}}};
-constexpr std::array<Word<LateralBond>, 2> kLateralWords{
-    {{LateralBond::elastic, "elastic"}, {LateralBond::tension_only, "rope"}}};
+constexpr std::array<Word<LateralBond>, 3> kLateralWords{{{LateralBond::elastic, "elastic"},
+                                                          {LateralBond::tension_only, "rope"},
+                                                          {LateralBond::relaxing, "relaxing"}}};
 
 /// The part of the organ's depth along the probe's axis that is held at its far side.
 constexpr double kFarSide = 0.3;
@@ -128,19 +129,6 @@ LateralBond parse_lateral(const Json& block, const DocumentPlace& place) {
   LateralBond lateral = LateralBond::elastic;
   read_word(block, "lateral", kLateralWords, place, lateral);
   return lateral;
-}
-
-TpmParameters parse_material(const Json& block, double spacing_m, const DocumentPlace& place) {
-  TpmVector values = to_vector({});
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const ParameterDescription& parameter = kTpmParameterTable[i];
-    if (!block.contains(parameter.name)) continue;
-    values[i] = quantity_at(block, parameter.name, parameter.dimension, place);
-  }
-  values[kSpacing] = spacing_m;
-  const TpmParameters material = from_vector(values);
-  require_valid(material, place.where);
-  return material;
 }
 
 AnchorBlock parse_anchor(const Json& entry, const Organ& organ, const DocumentPlace& place) {

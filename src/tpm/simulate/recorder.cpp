@@ -58,20 +58,24 @@ std::span<const double> Recorder::next_part() const {
   return std::span(times_).subspan(begin, end - begin);
 }
 
-void Recorder::see(const QuasiStaticState& state) {
+void Recorder::see(const QuasiStaticState& state, const Eigen::VectorXd& contact_push_N) {
   require_within(state);
   require_expected_contacts(network_.driven, state.position, network_.network.organ.radius,
                             state.time_s);
   CurvePoint point{state.time_s, state.imposed, state.response,
                    state.energy.value_or(QuasiStaticEnergy{})};
-  for (const ToolState& tool : tool_states(network_.driven, state.position)) {
+  const auto tools = tool_states(network_.driven, state.position, contact_push_N);
+  for (const ToolState& tool : tools) {
     point.touching += tool.touching;
     point.overlap_m = std::max(point.overlap_m, tool.overlap_m);
   }
+  point.force_on_tissue_N = force_on_tissue_N(network_.driven, tools, scene_.protocol.drive(),
+                                              state.imposed, state.response);
   record_.curve.push_back(point);
   const std::vector<double>& wanted = scene_.outputs.times_s;
   if (std::binary_search(wanted.begin(), wanted.end(), state.time_s)) {
     record_.outputs.push_back(state);
+    record_.contact_pushes_N.push_back(contact_push_N);
   }
   watch_.see(state.time_s, state.position);
   record_.validity = watch_.seen();
@@ -98,7 +102,9 @@ void Recorder::close_part(double error_estimate) {
   close();
 }
 
-void Recorder::close_part(InertialState motion, const InertialEnergy& energy) {
+void Recorder::close_part(InertialState motion, const InertialEnergy& energy,
+                          const std::vector<ProbeBlow>& blows) {
+  record_.blows.insert(record_.blows.end(), blows.begin(), blows.end());
   record_.inertial_energy = energy;
   whole_.motion = std::move(motion);
   close();
@@ -122,6 +128,7 @@ void Recorder::save() {
 void Recorder::stop(double time_s) {
   record_.curve.resize(whole_.curve);
   record_.outputs.resize(whole_.outputs);
+  record_.contact_pushes_N.resize(whole_.outputs);
   record_.validity = whole_.validity;
   save();
   const bool saved = !controls_.checkpoint.empty() && whole_.curve > 0;
@@ -131,6 +138,12 @@ void Recorder::stop(double time_s) {
       saved ? fmt::format("the same command goes on from t = {} s ({})",
                           significant(whole_.state.time_s, 4), controls_.checkpoint.string())
             : std::string("there is no checkpoint to go on from")));
+}
+
+PartOfProtocol::PartOfProtocol(const ExperimentScene& scene, double end_s)
+    : protocol(history_until(scene.protocol, end_s)), tolerance(scene.formulation.tolerance) {
+  if (protocol.peak() > 0.0) tolerance *= scene.protocol.peak() / protocol.peak();
+  tolerance = std::min(tolerance, 0.1);
 }
 
 }  // namespace tpm

@@ -28,13 +28,15 @@ class Recorder {
 
   /// Takes the state at the next of those times. Throws Interrupted, with a checkpoint of the last
   /// whole part left behind, and Error(numerical) where a load goes through the organ.
-  void see(const QuasiStaticState& state);
+  /// @param contact_push_N of each contact where bodies have mass
+  void see(const QuasiStaticState& state, const Eigen::VectorXd& contact_push_N = {});
 
   /// Ends a part at the state last seen; now and then writes a checkpoint.
   /// @param error_estimate of the part, N or m
   void close_part(double error_estimate);
   /// The same where spheres have mass.
-  void close_part(InertialState motion, const InertialEnergy& energy);
+  void close_part(InertialState motion, const InertialEnergy& energy,
+                  const std::vector<ProbeBlow>& blows);
 
   /// The state at the end of the last part; none before the first.
   [[nodiscard]] const QuasiStaticState* latest() const {
@@ -71,6 +73,30 @@ class Recorder {
   SimulationRecord record_;
   QuasiStaticState seen_;
   Whole whole_;
+};
+
+/// Runs part by part. `run_part` shows the recorder the states at the times of a part, and closes
+/// it.
+template <class RunPart>
+[[nodiscard]] SimulationRun run_in_parts(const ExperimentScene& scene, const RunNetwork& network,
+                                         const SimulationControls& controls, RunPart&& run_part,
+                                         std::size_t parts = kRunParts) {
+  Recorder recorder(scene, network, controls, parts);
+  SimulationRun result;
+  if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
+  for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {
+    run_part(recorder, times);
+  }
+  result.record = recorder.take();
+  return result;
+}
+
+/// The protocol up to the end of a part, and the tolerance there: that of the scene is one of the
+/// whole, and a part of a ramp has a lower peak.
+struct PartOfProtocol {
+  PartOfProtocol(const ExperimentScene& scene, double end_s);
+  Protocol protocol;
+  double tolerance;
 };
 
 }  // namespace tpm

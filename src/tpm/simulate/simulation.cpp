@@ -1,20 +1,22 @@
 #include "tpm/simulate/simulation.hpp"
 
 #include <algorithm>
+#include <cmath>
 
+#include "tpm/core/error.hpp"
 #include "tpm/network/lowest_mode.hpp"
-#include "tpm/simulate/recorder.hpp"
-#include "tpm/simulate/static_path.hpp"
+#include "tpm/simulate/scene_runner.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr std::size_t kParts = 16;  // of a run; a checkpoint can be written after each
-
 /// A network with the contacts of a scene; tools in their order.
 DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bonds) {
   const Organ& organ = scene.tissue.network.organ;
-  const double usual = usual_contact_stiffness_N_per_m(bonds);
+  // With mass, contacts ring unless they are much stiffer; a stiffer one costs no more steps there.
+  constexpr double kStifferWithMass = 100.0;
+  const double usual =
+      usual_contact_stiffness_N_per_m(bonds) * (scene.formulation.masses ? kStifferWithMass : 1.0);
   std::vector<Probe> driven;
   std::vector<PressedTool> tools;
   for (const SceneContact& contact : scene.contacts) {
@@ -33,126 +35,42 @@ DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bond
   return driven_network(bonds, organ, scene.tissue.freedom(), std::move(driven), std::move(tools));
 }
 
-/// Runs that go part by part. `run_part` shows the recorder the states at some times, and closes
-/// the part.
-template <class RunPart>
-SimulationRun run_in_parts(const ExperimentScene& scene, const RunNetwork& network,
-                           const SimulationControls& controls, RunPart&& run_part) {
-  Recorder recorder(scene, network, controls, kParts);
-  SimulationRun result;
-  if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
-  for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {
-    run_part(recorder, times);
+}  // namespace
+
+RunNetwork network_to_run(const ExperimentScene& scene) {
+  const Tissue& tissue = scene.tissue;
+  if (!scene.formulation.mass_spring) {
+    return {tissue.network, with_contacts(scene, tissue.bonds())};
   }
-  result.record = recorder.take();
-  return result;
+  const Freedom freedom = tissue.freedom();
+  const double stiffness = contact_stiffness_N_per_m(tissue.bonds(), tissue.network.organ.position,
+                                                     freedom, scene.probe(), 1.0);
+  Network msm = msm_network(tissue.network, scene.formulation.springs);
+  const BondMaterial springs = msm_material(msm, freedom, scene.probe(), stiffness);
+  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, springs));
+  return {std::move(msm), std::move(driven)};
 }
 
-/// The protocol up to the end of a part, and the tolerance there: that of the scene is one of the
-/// whole, and a part of a ramp has a lower peak.
-struct PartOfProtocol {
-  PartOfProtocol(const ExperimentScene& scene, double end_s)
-      : protocol(history_until(scene.protocol, end_s)), tolerance(scene.formulation.tolerance) {
-    if (protocol.peak() > 0.0) tolerance *= scene.protocol.peak() / protocol.peak();
-    tolerance = std::min(tolerance, 0.1);
-  }
-  Protocol protocol;
-  double tolerance;
-};
-
-SimulationRun run_quasi_static(const ExperimentScene& scene, const RunNetwork& network,
-                               const SimulationControls& controls) {
-  const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
-    const PartOfProtocol part(scene, times.back());
-    const DrivenNetwork& driven = network.driven;
-    const QuasiStatic equations(driven.bonds, driven.rest, driven.freedom, driven.probes,
-                                {.tolerance = part.tolerance, .energies = true});
-    const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
-    recorder.close_part(equations.run(part.protocol, times, see, recorder.latest()).error_estimate);
-  };
-  return run_in_parts(scene, network, controls, run_part);
-}
-
-SimulationRun run_static(const ExperimentScene& scene, const RunNetwork& network,
-                         const SimulationControls& controls) {
-  const DrivenNetwork& driven = network.driven;
-  StaticPath path(driven.bonds, driven.rest, network.network.organ.spacing, driven.freedom,
-                  driven.probes, scene.protocol.drive(), scene.protocol.peak(),
-                  scene.formulation.tolerance);
-  const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
-    if (recorder.latest()) path.start_from(*recorder.latest());
-    for (const double time : times) {
-      recorder.see(path.move_to(value_at(scene.protocol, time), time));
-    }
-    recorder.close_part(0.0);
-  };
-  return run_in_parts(scene, network, controls, run_part);
-}
-
-/// kg, of spheres and tools.
 Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network) {
   const Organ& organ = network.network.organ;
   Eigen::VectorXd mass(network.driven.rest.cols());
   mass.head(organ.position.cols()) = sphere_masses_kg(organ, scene.formulation.density_kg_m3);
   Eigen::Index column = organ.position.cols();
   for (const SceneContact& contact : scene.contacts) {
-    if (contact.is_tool()) mass[column++] = contact.mass_kg.value();
+    if (!contact.is_tool()) continue;
+    if (!contact.mass_kg) throw bad_input("scene", "a tool has no mass", "mass_kg of each tool");
+    mass[column++] = *contact.mass_kg;
   }
   return mass;
 }
 
-SimulationRun run_inertial(const ExperimentScene& scene, const RunNetwork& network,
-                           const SimulationControls& controls) {
-  const DrivenNetwork& driven = network.driven;
-  const Eigen::VectorXd mass_kg = masses_kg(scene, network);
-  InertialOptions options;
-  options.damping_ratio = scene.formulation.damping_ratio;
-  // The mass-spring model has a damper beside each spring.
-  options.stiffness_share = scene.formulation.mass_spring ? 1.0 : 0.0;
-  options.energy = true;
-  const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
-    const PartOfProtocol part(scene, times.back());
-    options.tolerance = part.tolerance;
-    const Inertial equations(driven.bonds, driven.rest, driven.freedom, driven.probes, mass_kg,
-                             options);
-    const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
-    const InertialRun run = equations.run(part.protocol, times, see, recorder.motion());
-    recorder.close_part(run.end, run.energy.value());
-  };
-  SimulationRun result = run_in_parts(scene, network, controls, run_part);
-  result.lowest_frequency_Hz =
-      lowest_mode(driven.bonds, driven.rest, driven.freedom, mass_kg).frequency_Hz;
-  return result;
-}
-
-}  // namespace
-
-RunNetwork network_to_run(const ExperimentScene& scene) {
-  const Tissue& tissue = scene.tissue;
-  if (!scene.formulation.mass_spring) {
-    return {tissue.network, tissue.material, with_contacts(scene, tissue.bonds())};
-  }
-  const Freedom freedom = tissue.freedom();
-  const double stiffness = contact_stiffness_N_per_m(tissue.bonds(), tissue.network.organ.position,
-                                                     freedom, scene.probe(), 1.0);
-  Network msm = msm_network(tissue.network, scene.formulation.springs);
-  const TpmParameters material =
-      msm_material(msm, tissue.material, freedom, scene.probe(), stiffness);
-  DrivenNetwork driven = with_contacts(scene, BondSystem(msm, material));
-  return {std::move(msm), material, std::move(driven)};
-}
-
 SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,
                        const SimulationControls& controls) {
-  switch (scene.formulation.kind) {
-    case FormulationKind::inertial:
-      return run_inertial(scene, network, controls);
-    case FormulationKind::relaxed:
-      return run_static(scene, network, controls);
-    case FormulationKind::quasi_static:
-      break;
-  }
-  return run_quasi_static(scene, network, controls);
+  require_runnable(scene);
+  return formulation_with<StateRunner>(scene.formulation.kind, "formulation of whole states",
+                                       scene.formulation.where)
+      .as<StateRunner>()
+      ->simulate(scene, network, controls);
 }
 
 }  // namespace tpm

@@ -28,16 +28,19 @@ std::string step_group(std::size_t step) {
 }
 
 void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hdf5Writer& file) {
-  const Formulation& f = scene.formulation;
+  const FormulationChoice& f = scene.formulation;
   file.attribute("/", "scene", scene.text);
   file.attribute("/", "scene_sha256", sha256_hex(scene.text));
-  file.attribute("/", "formulation", std::string(word_of(f.kind)));
+  file.attribute("/", "formulation", f.kind);
   file.attribute("/", "network", f.mass_spring ? "mass_spring" : "tissue");
-  file.attribute("/", "tolerance", shortest(f.tolerance));
   file.attribute("/", "provenance", "model");
-  if (f.inertial()) {
-    file.attribute("/", "damping_ratio", shortest(f.damping_ratio));
-    file.attribute("/", "lowest_frequency_Hz", significant(run.lowest_frequency_Hz, 6));
+  file.numbers("/settings/tolerance", {f.tolerance});
+  if (f.masses) {
+    file.numbers("/settings/damping_ratio", {f.damping_ratio});
+    if (tool_count(scene) > 0) {
+      file.numbers("/settings/contact_damping_ratio", {InertialOptions{}.contact_damping_ratio});
+    }
+    file.numbers("/settings/lowest_frequency_Hz", {run.lowest_frequency_Hz});
   }
   file.numbers("/probe/sphere", {static_cast<double>(scene.probe().sphere + 1)});
   file.numbers("/probe/direction", list_of(scene.probe().direction));
@@ -65,11 +68,12 @@ void write_tools(const DrivenNetwork& network, Hdf5Writer& file) {
 
 /// Where the tools are at an output and what they do, one row each.
 void write_tool_states(const DrivenNetwork& network, const QuasiStaticState& state,
-                       const std::string& group, Hdf5Writer& file) {
+                       const Eigen::VectorXd& contact_push_N, const std::string& group,
+                       Hdf5Writer& file) {
   if (network.tools.empty()) return;
   std::vector<double> position, force, overlap;
   std::vector<std::int32_t> touching;
-  for (const ToolState& tool : tool_states(network, state.position)) {
+  for (const ToolState& tool : tool_states(network, state.position, contact_push_N)) {
     position.insert(position.end(), tool.position.begin(), tool.position.end());
     force.insert(force.end(), tool.force.begin(), tool.force.end());
     overlap.push_back(tool.overlap_m);
@@ -81,8 +85,38 @@ void write_tool_states(const DrivenNetwork& network, const QuasiStaticState& sta
   file.integers(group + "/tools/touching", touching, 1);
 }
 
+/// What spheres with mass have besides a curve: blows, and what contacts do to the numbers.
+void write_motion(const SimulationRun& run, Hdf5Writer& file) {
+  std::vector<double> time, impulse, on_tissue;
+  for (const ProbeBlow& blow : run.record.blows) {
+    time.push_back(blow.time_s);
+    impulse.push_back(blow.impulse_N_s);
+    on_tissue.push_back(blow.impulse_on_tissue_N_s);
+  }
+  file.numbers("/blows/time_s", time);
+  file.numbers("/blows/impulse_of_probe_N_s", impulse);
+  file.numbers("/blows/impulse_on_tissue_N_s", on_tissue);
+  file.attribute("/blows", "meaning",
+                 "speeds that change in an instant: where an imposed depth changes its rate, and "
+                 "where a tool meets a sphere (inelastic); not in the forces of /curve");
+  if (!run.contact_check) return;
+  const ContactCheck& check = *run.contact_check;
+  file.numbers("/contact_check/largest_response", {check.largest});
+  file.numbers("/contact_check/largest_response_softer", {check.largest_softer});
+  file.numbers("/contact_check/response_at_end", {check.end});
+  file.numbers("/contact_check/response_at_end_softer", {check.end_softer});
+  file.numbers("/contact_check/difference", {check.difference});
+  file.numbers("/contact_check/difference_at_one_time", {check.at_one_time});
+  file.attribute(
+      "/contact_check", "meaning",
+      fmt::format("against the same run with contacts {} times softer, in parts of the "
+                  "largest response; difference: of the largest responses, of those at "
+                  "the end, or of the curves in the mean over time, whichever is largest",
+                  shortest(ContactCheck::kSofter)));
+}
+
 void write_curve(const ExperimentScene& scene, const SimulationRecord& record, Hdf5Writer& file) {
-  std::vector<double> time, imposed, response, work, heat, stored, overlap;
+  std::vector<double> time, imposed, response, work, heat, stored, overlap, on_tissue;
   std::vector<std::int32_t> touching;
   for (const CurvePoint& p : record.curve) {
     time.push_back(p.time_s);
@@ -93,6 +127,7 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
     stored.push_back(p.energy.stored_J);
     touching.push_back(p.touching);
     overlap.push_back(p.overlap_m);
+    on_tissue.push_back(p.force_on_tissue_N);
   }
   const bool depth = scene.protocol.drive() == Drive::displacement;
   file.numbers("/curve/time_s", time);
@@ -102,7 +137,10 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
     file.integers("/curve/touching", touching, 1);
     file.numbers("/curve/overlap_m", overlap);
   }
-  if (scene.formulation.inertial()) return;
+  if (scene.formulation.masses) {
+    if (!depth) file.numbers("/curve/force_on_tissue_N", on_tissue);
+    return;
+  }
   file.numbers("/curve/work_J", work);
   file.numbers("/curve/dissipated_J", heat);
   file.numbers("/curve/stored_J", stored);
@@ -151,9 +189,10 @@ void write_field(const StepField& field, const std::string& group, Hdf5Writer& f
 }
 
 void write_step(const ExperimentScene& scene, const RunNetwork& network,
-                const QuasiStaticState& state, const std::string& group, Hdf5Writer& file) {
+                const QuasiStaticState& state, const Eigen::VectorXd& contact_push_N,
+                const std::string& group, Hdf5Writer& file) {
   file.table(group + "/position_m", list_of(network.spheres(state.position)), 3);
-  write_tool_states(network.driven, state, group, file);
+  write_tool_states(network.driven, state, contact_push_N, group, file);
   const StepFields fields = fields_of(scene, network, state);
   for (const StepField& field : fields.of_spheres) write_field(field, group, file);
   file.integers(group + "/validity", fields.validity, 1);
@@ -162,7 +201,8 @@ void write_step(const ExperimentScene& scene, const RunNetwork& network,
 
 /// Spheres, bonds and tools at one time.
 std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
-                      const std::string& group, double time_s, std::size_t n, std::size_t m) {
+                      const std::string& group, double time_s, std::size_t n, std::size_t m,
+                      Eigen::Index branches) {
   using Number = XdmfSource::Number;
   using Centre = XdmfSource::Centre;
   const std::string position = group + "/position_m";
@@ -191,7 +231,10 @@ std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
     text += source.scalar("bond_force_N", group + "/bond_force_N", Centre::cell, m, Number::real);
   }
   if (scene.outputs.remembered) {
-    text += source.scalar("remembered_m", group + "/remembered_m", Centre::cell, m, Number::real);
+    for (Eigen::Index j = 0; j < branches; ++j) {
+      const std::string name = viscous_name(j, branches);
+      text += source.scalar(name, group + "/" + name, Centre::cell, m, Number::real);
+    }
   }
   text += "    </Grid>\n";
   if (const std::size_t tools = tool_count(scene); tools > 0) {
@@ -214,7 +257,7 @@ std::string xdmf(const ExperimentScene& scene, const SimulationRecord& record,
       "  <Grid Name=\"simulation\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
   for (std::size_t k = 0; k < record.outputs.size(); ++k) {
     text += step_xdmf(scene, source, step_group(k), record.outputs[k].time_s, network.organ.size(),
-                      network.bonds.size());
+                      network.bonds.size(), record.outputs[k].viscous.cols());
   }
   return text + "  </Grid>\n </Domain>\n</Xdmf>\n";
 }
@@ -228,12 +271,14 @@ fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& networ
   write_provenance(scene, run, file);
   write_tools(network.driven, file);
   write_curve(scene, run.record, file);
+  if (scene.formulation.masses) write_motion(run, file);
   write_validity(run.record.validity, file);
   write_roughness(scene, run.record, file);
   std::vector<double> times;
   for (std::size_t k = 0; k < run.record.outputs.size(); ++k) {
     times.push_back(run.record.outputs[k].time_s);
-    write_step(scene, network, run.record.outputs[k], step_group(k), file);
+    write_step(scene, network, run.record.outputs[k], run.record.contact_pushes_N[k], step_group(k),
+               file);
   }
   file.numbers("/steps/time_s", times);
   file.attribute("/steps", "validity",

@@ -21,8 +21,8 @@ constexpr double kLeastBalance = 1e-13;  // of the force: below, rounding decide
 
 StaticPath::StaticPath(const BondSystem& bonds, Positions rest, double spacing_m,
                        const Freedom& freedom, const Probes& probes, Drive drive, double peak,
-                       double tolerance)
-    : tissue_(bonds, std::move(rest), freedom, probes, drive),
+                       double tolerance, EquilibriumOptions equilibrium)
+    : tissue_(bonds, std::move(rest), freedom, probes, drive, equilibrium),
       state_(tissue_.at_rest(0.0)),
       longest_move_m_(kLongestMove * spacing_m) {
   require_valid(probes, freedom);
@@ -33,14 +33,14 @@ StaticPath::StaticPath(const BondSystem& bonds, Positions rest, double spacing_m
 
 void StaticPath::start_from(const QuasiStaticState& state) {
   state_.position = state.position;
-  state_.remembered = state.remembered;
-  state_.elongation = state.remembered;
+  tissue_.bonds().followed(state_.position, state_.followed);
+  state_.set_equilibrium();
   state_.closed = tissue_.bonds().closed_contacts(state.position);
   state_.imposed = state.imposed;
 }
 
 bool StaticPath::stride_to(double imposed) {
-  const BondMemory relaxed{Eigen::VectorXd::Zero(state_.remembered.size()), 1.0};
+  const BondMemory relaxed{Eigen::VectorXd::Zero(state_.mean.size()), 1.0};
   Positions position = state_.position;
   tissue_.impose(position, imposed);
   const auto moved_far = [&] {
@@ -57,8 +57,8 @@ bool StaticPath::stride_to(double imposed) {
   if (moved_far()) return false;
   state_.imposed = imposed;
   state_.position = std::move(position);
-  tissue_.bonds().elongations(state_.position, state_.elongation);
-  state_.remembered = state_.elongation;
+  tissue_.bonds().followed(state_.position, state_.followed);
+  state_.set_equilibrium();
   state_.closed = tissue_.bonds().closed_contacts(state_.position);
   return true;
 }
@@ -86,9 +86,9 @@ QuasiStaticState StaticPath::move_to(double imposed, double time_s) {
                     unstable_ ? "buckles: its stiffness is no longer positive"
                               : "snaps through: no equilibrium is near"));
   }
-  const double stored_J = tissue_.bonds().stored_energy_J(state_.position, state_.remembered);
-  return {time_s,          state_.imposed,    tissue_.response(state_),
-          state_.position, state_.remembered, QuasiStaticEnergy{stored_J, 0.0, stored_J}};
+  const double stored_J = tissue_.bonds().stored_energy_J(state_.position, state_.viscous);
+  return {time_s,          state_.imposed, tissue_.response(state_),
+          state_.position, state_.viscous, QuasiStaticEnergy{stored_J, 0.0, stored_J}};
 }
 
 }  // namespace tpm

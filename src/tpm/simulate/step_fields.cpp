@@ -1,11 +1,17 @@
 #include "tpm/simulate/step_fields.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 namespace tpm {
 std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
   return {numbers.data(), numbers.data() + numbers.size()};
+}
+
+std::string viscous_name(Eigen::Index branch, Eigen::Index branches) {
+  return branches == 1 ? "remembered_m" : fmt::format("remembered_{}_m", branch + 1);
 }
 
 StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
@@ -21,7 +27,8 @@ StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
   if (scene.outputs.force) {
     const std::vector<char> open(network.driven.bonds.contact_count(), 0);
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, state.position.cols());
-    network.driven.bonds.add_forces(state.position, {state.remembered, 0.0, open}, force);
+    network.driven.bonds.add_forces(
+        state.position, {network.driven.bonds.mean_viscous(state.viscous), 0.0, open}, force);
     fields.of_spheres.push_back({"force_N", 3, list_of(network.spheres(force))});
     fields.of_spheres.push_back(
         {"largest_bond_force_N", 1, largest_bond_forces_N(network.network, bond_force)});
@@ -31,14 +38,17 @@ StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
   }
   if (scene.outputs.remembered) {
     const auto bonds = static_cast<Eigen::Index>(network.network.bonds.size());
-    fields.of_bonds.push_back({"remembered_m", 1, list_of(state.remembered.head(bonds))});
+    for (Eigen::Index j = 0; j < state.viscous.cols(); ++j) {
+      fields.of_bonds.push_back(
+          {viscous_name(j, state.viscous.cols()), 1, list_of(state.viscous.col(j).head(bonds))});
+    }
   }
   return fields;
 }
 
 Eigen::VectorXd bond_forces_N(const BondSystem& bonds, const QuasiStaticState& state) {
   Eigen::VectorXd tension;
-  bonds.tensions(state.position, {state.remembered, 0.0}, tension);
+  bonds.tensions(state.position, {bonds.mean_viscous(state.viscous), 0.0}, tension);
   return tension.head(static_cast<Eigen::Index>(bonds.first_contact()));
 }
 

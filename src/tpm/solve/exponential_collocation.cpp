@@ -8,22 +8,9 @@
 namespace tpm {
 namespace {
 
-/// z times an interval behind which exp(-z s) is below rounding.
-constexpr double kForgotten = 40.0;
-
-/// Visits the abscissas s in (0, c) and weights of a quadrature of exp(-z (c - s)) times a
-/// polynomial, 1e-16 for degrees up to 10: Gauss over what is not forgotten.
-template <class Visit>
-void quadrature(double c, double z, Visit&& visit) {
-  using Rule = boost::math::quadrature::gauss<double, 30>;
-  const double half = 0.5 * (z * c > kForgotten ? kForgotten / z : c);
-  for (std::size_t i = 0; i < Rule::abscissa().size(); ++i) {
-    for (const double side : {-1.0, 1.0}) {
-      const double ago = half * (1.0 + side * Rule::abscissa()[i]);
-      visit(c - ago, half * Rule::weights()[i] * std::exp(-z * ago));
-    }
-  }
-}
+/// Above this z c the quadrature gives way to the asymptotic sum, which then is exact to rounding:
+/// exp(-60) times the largest of its terms is below 1e-17.
+constexpr double kForgotten = 60.0;
 
 }  // namespace
 
@@ -52,17 +39,66 @@ std::vector<double> radau_nodes(int count) {
 ExponentialCollocation::ExponentialCollocation(std::vector<double> nodes)
     : nodes_(std::move(nodes)) {}
 
-Eigen::VectorXd ExponentialCollocation::weights(double c, double z) const {
-  Eigen::VectorXd weight = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(nodes_.size()));
-  quadrature(c, z, [&](double s, double part) { weight += z * part * interpolation(s); });
-  return weight;
+ExponentialCollocation::Place ExponentialCollocation::place(double c) const {
+  // Gauss with 30 abscissas: to rounding for exp(-z (c - s)) times a polynomial up to z c = 60.
+  using Rule = boost::math::quadrature::gauss<double, 30>;
+  const auto n = static_cast<Eigen::Index>(nodes_.size());
+  const auto half_count = static_cast<Eigen::Index>(Rule::abscissa().size());
+  Place place;
+  place.c_ = c;
+  place.here_ = interpolation(c);
+  place.ago_.resize(2 * half_count);
+  place.part_.resize(2 * half_count);
+  place.shape_.resize(n, 2 * half_count);
+  for (Eigen::Index i = 0; i < 2 * half_count; ++i) {
+    const auto pair = static_cast<std::size_t>(i / 2);
+    const double side = i % 2 == 0 ? -1.0 : 1.0;
+    place.ago_[i] = 0.5 * c * (1.0 + side * Rule::abscissa()[pair]);
+    place.part_[i] = 0.5 * c * Rule::weights()[pair];
+    place.shape_.col(i) = interpolation(c - place.ago_[i]);
+  }
+  place.coefficient_ = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    place.coefficient_(k, 0) = 1.0;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      if (j == k) continue;
+      const double node = nodes_[static_cast<std::size_t>(j)];
+      const double apart = nodes_[static_cast<std::size_t>(k)] - node;
+      // Times (c - node - a)/apart.
+      for (Eigen::Index m = n - 1; m >= 0; --m) {
+        const double lower = m > 0 ? place.coefficient_(k, m - 1) : 0.0;
+        place.coefficient_(k, m) = ((c - node) * place.coefficient_(k, m) - lower) / apart;
+      }
+    }
+  }
+  return place;
 }
 
-Eigen::VectorXd ExponentialCollocation::weight_slopes(double c, double z) const {
-  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(nodes_.size()));
-  quadrature(
-      c, z, [&](double s, double part) { slope += (1.0 - z * (c - s)) * part * interpolation(s); });
-  return slope;
+Eigen::VectorXd ExponentialCollocation::Place::weights(double z) const {
+  if (z * c_ <= kForgotten) {
+    return shape_ * (z * part_.array() * (-z * ago_.array()).exp()).matrix();
+  }
+  // z integral of a^m exp(-z a) = m!/z^m.
+  Eigen::VectorXd power(coefficient_.cols());
+  power[0] = 1.0;
+  for (Eigen::Index m = 1; m < power.size(); ++m) {
+    power[m] = power[m - 1] * static_cast<double>(m) / z;
+  }
+  return coefficient_ * power;
+}
+
+Eigen::VectorXd ExponentialCollocation::Place::weight_slopes(double z) const {
+  if (z * c_ <= kForgotten) {
+    return shape_ * ((1.0 - z * ago_.array()) * part_.array() * (-z * ago_.array()).exp()).matrix();
+  }
+  Eigen::VectorXd power(coefficient_.cols());
+  double term = 1.0;
+  power[0] = 0.0;
+  for (Eigen::Index m = 1; m < power.size(); ++m) {
+    term *= static_cast<double>(m) / z;
+    power[m] = -static_cast<double>(m) * term / z;
+  }
+  return coefficient_ * power;
 }
 
 Eigen::VectorXd ExponentialCollocation::interpolation(double c) const {

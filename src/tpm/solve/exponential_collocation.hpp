@@ -15,18 +15,38 @@ namespace tpm {
 ///     weight_k(c) = z * integral_0^c exp(-z (c - s)) L_k(s) ds,   L_k the Lagrange polynomials
 class ExponentialCollocation {
  public:
+  /// A fraction c of the step, prepared for the weights of many z.
+  class Place {
+   public:
+    /// The weights of all nodes, to rounding.
+    /// @param z >= 0
+    [[nodiscard]] Eigen::VectorXd weights(double z) const;
+    /// The derivatives of the weights by z.
+    [[nodiscard]] Eigen::VectorXd weight_slopes(double z) const;
+    /// L_k(c) of all nodes: what interpolates at c.
+    [[nodiscard]] const Eigen::VectorXd& interpolation() const { return here_; }
+
+   private:
+    friend class ExponentialCollocation;
+    double c_ = 0.0;
+    Eigen::VectorXd here_;
+    Eigen::VectorXd ago_, part_;   ///< c - s and weights of the quadrature over [0, c]
+    Eigen::MatrixXd shape_;        ///< L_k(s), by (node, abscissa)
+    Eigen::MatrixXd coefficient_;  ///< L_k(c - a) = sum_m coefficient(k, m) a^m
+  };
+
   /// @param nodes different numbers in [0, 1], at most 10
   explicit ExponentialCollocation(std::vector<double> nodes);
 
   [[nodiscard]] const std::vector<double>& nodes() const { return nodes_; }
 
+  /// @param c in [0, 1]
+  [[nodiscard]] Place place(double c) const;
+
   /// The weights of all nodes, to rounding.
   /// @param c in [0, 1]
   /// @param z >= 0
-  [[nodiscard]] Eigen::VectorXd weights(double c, double z) const;
-
-  /// The derivatives of the weights by z.
-  [[nodiscard]] Eigen::VectorXd weight_slopes(double c, double z) const;
+  [[nodiscard]] Eigen::VectorXd weights(double c, double z) const { return place(c).weights(z); }
 
   /// L_k(c) of all nodes: what interpolates at c.
   [[nodiscard]] Eigen::VectorXd interpolation(double c) const;

@@ -6,9 +6,12 @@
 
 namespace tpm {
 
-void MemoryWeights::apply(const LaneMatrix& stages, const Eigen::RowVectorXd& start,
-                          const Eigen::RowVectorXd& memory, LaneMatrix& out) const {
-  out.resize(kLanes, stages.cols());
+// A Ref is a view: what it shows is changed.
+// NOLINTBEGIN(performance-unnecessary-value-param)
+void MemoryWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
+                          const Eigen::Ref<const Eigen::RowVectorXd>& start,
+                          const Eigen::Ref<const Eigen::RowVectorXd>& memory,
+                          Eigen::Ref<LaneMatrix> out) const {
   const double* const weight = of_stages.data();
   const double* const from_start = of_start.data();
   const double* const from_memory = of_memory.data();
@@ -32,5 +35,30 @@ void MemoryWeights::apply(const LaneMatrix& stages, const Eigen::RowVectorXd& st
     }
   });
 }
+
+void MemoryWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
+                          const Eigen::Ref<const LaneMatrix>& known,
+                          Eigen::Ref<LaneMatrix> out) const {
+  const double* const weight = of_stages.data();
+  const double* const at_start = known.data();
+  const double* const in = stages.data();
+  double* const to = out.data();
+  const auto bonds = static_cast<std::size_t>(stages.cols());
+  run_wide([=]() __attribute__((always_inline)) {
+    for (std::size_t i = 0; i < bonds; ++i) {
+      std::array<double, kLanes> sum;
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) {
+        double lane = at_start[kLanes * i + s];
+        for (std::size_t j = 0; j < kLanes; ++j)
+          lane += weight[kLanes * j + s] * in[kLanes * i + j];
+        sum[s] = lane;
+      }
+#pragma omp simd
+      for (std::size_t s = 0; s < kLanes; ++s) to[kLanes * i + s] = sum[s];
+    }
+  });
+}
+// NOLINTEND(performance-unnecessary-value-param)
 
 }  // namespace tpm

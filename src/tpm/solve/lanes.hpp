@@ -20,8 +20,12 @@ struct MemoryWeights {
   LaneVector of_start, of_memory;
 
   /// What is remembered in every lane, one column per bond; `stages` is no part of `out`.
-  void apply(const LaneMatrix& stages, const Eigen::RowVectorXd& start,
-             const Eigen::RowVectorXd& memory, LaneMatrix& out) const;
+  void apply(const Eigen::Ref<const LaneMatrix>& stages,
+             const Eigen::Ref<const Eigen::RowVectorXd>& start,
+             const Eigen::Ref<const Eigen::RowVectorXd>& memory, Eigen::Ref<LaneMatrix> out) const;
+  /// The same where the part from the start of the step is known in every lane.
+  void apply(const Eigen::Ref<const LaneMatrix>& stages, const Eigen::Ref<const LaneMatrix>& known,
+             Eigen::Ref<LaneMatrix> out) const;
 };
 
 /// All numbers of all states as one vector.
