@@ -333,7 +333,6 @@ TEST_CASE("Indentations answer Young's modulus with its interval", "[rheometer]"
     }
     const std::vector<PreparedRecording> one{prepare_recording("p.csv", r)};
     SetupOptions setup;
-    setup.nuisance = Nuisance::offset;
     setup.exponent = probe_exponent(probe.geometry);
     const FitResult fit =
         run_fit(recording_config(parse_law_name(probe.law, "test"), one, setup), data_sets(one));
