@@ -128,7 +128,7 @@ ErrorBudget organ_budget(const std::optional<LawFile>& law, const ExperimentScen
     fine.emplace(std::move(other));
   }
   std::vector<double> times_s = sampled_times(scene.protocol, kTimesPerPiece, kMostBudgetTimes,
-                                              scene.tissue.material.relaxation_time_s());
+                                              network.driven().bonds.shortest_relaxation_time_s());
   std::vector<BudgetStage> stages;
   if (law) stages.push_back(law_stage(at_surface(*law), scene.protocol, times_s));
   add_organ_stages(stages, network, fine, times_s);
