@@ -45,6 +45,14 @@ endif()
 find_path(TPM_CSV_INCLUDE csv.h REQUIRED)
 find_library(TPM_CSV_LIBRARY csv REQUIRED)
 mark_as_advanced(TPM_CSV_INCLUDE TPM_CSV_LIBRARY)
+find_path(TPM_DEFLATE_INCLUDE libdeflate.h REQUIRED)
+find_library(TPM_DEFLATE_LIBRARY deflate REQUIRED)
+mark_as_advanced(TPM_DEFLATE_INCLUDE TPM_DEFLATE_LIBRARY)
+
+# METIS 5 has no CMake package; its header says how wide its integers are.
+find_path(TPM_METIS_INCLUDE metis.h REQUIRED)
+find_library(TPM_METIS_LIBRARY metis REQUIRED)
+mark_as_advanced(TPM_METIS_INCLUDE TPM_METIS_LIBRARY)
 
 # Debian's library of httplib; what it was compiled with changes the layout of its types, so the
 # sources that include its header take the flags of its pkg-config file.
@@ -71,6 +79,13 @@ target_link_libraries(tpm_assimp INTERFACE assimp::assimp)
 add_library(tpm_csv INTERFACE IMPORTED)
 target_include_directories(tpm_csv INTERFACE ${TPM_CSV_INCLUDE})
 target_link_libraries(tpm_csv INTERFACE ${TPM_CSV_LIBRARY})
+add_library(tpm_deflate INTERFACE IMPORTED)
+target_include_directories(tpm_deflate INTERFACE ${TPM_DEFLATE_INCLUDE})
+target_link_libraries(tpm_deflate INTERFACE ${TPM_DEFLATE_LIBRARY})
+
+add_library(tpm_metis INTERFACE IMPORTED)
+target_include_directories(tpm_metis INTERFACE ${TPM_METIS_INCLUDE})
+target_link_libraries(tpm_metis INTERFACE ${TPM_METIS_LIBRARY})
 
 add_library(tpm_httplib INTERFACE IMPORTED)
 target_link_libraries(tpm_httplib INTERFACE ${TPM_HTTPLIB_LIBRARY})

@@ -1,21 +1,20 @@
 # The floors of src/tpm, each a library of objects, so that a library can be put together of floors
 # compiled in one way and floors compiled in another.
-set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_assimp tpm_httplib OpenSSL::Crypto
-    Threads::Threads TBB::tbb ZLIB::ZLIB ${CMAKE_DL_LIBS}
+set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_deflate tpm_assimp tpm_httplib
+    tpm_metis OpenSSL::Crypto Threads::Threads TBB::tbb ZLIB::ZLIB ${CMAKE_DL_LIBS}
     $<$<BOOL:${TPM_MPI}>:$<LINK_ONLY:MPI::MPI_C>>)
 
 function(tpm_floor_options target)
-  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
   target_link_libraries(${target} PRIVATE Eigen3::Eigen nlohmann_json::nlohmann_json fmt::fmt
                                           ${TPM_PRIVATE_LIBRARIES} tpm_header_only tpm_options)
   target_compile_definitions(${target} PRIVATE TPM_VERSION="${PROJECT_VERSION}"
     TPM_SOURCE_SHARE="${PROJECT_SOURCE_DIR}"
     TPM_INSTALL_SHARE="${CMAKE_INSTALL_FULL_DATADIR}/tpmkit")
   target_compile_options(${target} PRIVATE ${ARGN})
-  if(TPM_SANITIZED_TWINS OR BUILD_SHARED_LIBS)
-    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-    target_compile_options(${target} PRIVATE -fno-semantic-interposition)
-  endif()
+  # One compilation serves the program, the shared library of the C interface and the Python module.
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE -fno-semantic-interposition)
 endfunction()
 
 # tpm_floors(SUFFIX FLAGS FLOOR...): targets tpm_floor_FLOOR+SUFFIX with these flags; their objects

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# What a maintainer checks beyond scripts/test.sh: formatting, the slow tests (with Chromium, ParaView and
-# full disks), every source compiled with warnings as errors, the fast tests with the floors of
+# What a maintainer checks beyond scripts/test.sh: formatting, the slow tests (with Chromium, ParaView, the
+# Python package, notebooks and full disks), every source compiled with warnings as errors, the fast tests with the floors of
 # TPM_SANITIZED_FLOORS (cmake/TpmFloors.cmake) under AddressSanitizer and UndefinedBehaviorSanitizer, those
-# with threads under ThreadSanitizer, clang-tidy on what changed. Stops at the first failure; ends with the
+# with threads under ThreadSanitizer, a minute of fuzzing, clang-tidy on what changed. Stops at the first failure; ends with the
 # closing lines of the slow tests. Everything under sanitizers: presets asan-ubsan and tsan.
 #
 #   TPM_TIDY_BASE=COMMIT  clang-tidy checks the sources changed since COMMIT; `all` checks all.
@@ -15,6 +15,7 @@ source scripts/tidy.sh
 install_missing "to build, run and test tpm" "${packages_run[@]}" "${packages_test[@]}"
 unpack_headers "${packages_unpacked[@]}"
 install_missing "to check its sources and to show its results to other programs" "${packages_check[@]}"
+install_missing "to build and test the Python package" "${packages_python[@]}"
 find_python numpy matplotlib scipy h5py
 
 step "formatting (clang-format)"
@@ -26,11 +27,19 @@ twice=$(git ls-files 'src/tpm/*.hpp' | xargs grep -hoE '^(struct|class|enum clas
 [[ -z "$twice" ]] || die "src/tpm defines more than one type named: $twice; expected one of a name"
 
 step "building the slow tests (build/release)"
-configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=ON
+configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=ON -DTPM_PYTHON=ON
 build release
 step "slow tests"
 slow_log=build/ctest-slow.log
 ctest --preset slow --parallel "$(nproc)" --no-tests=error | tee "$slow_log"
+
+step "the wheel, installed without network"
+scripts/wheel.sh >build/wheel.out || die "no wheel; its words: $(tail -n 3 build/wheel.out)"
+rm -rf build/wheel_environment
+/usr/bin/python3 -m venv --system-site-packages build/wheel_environment
+build/wheel_environment/bin/pip install -q --no-index --no-deps dist/tpmkit-*.whl
+(cd / && "$OLDPWD/build/wheel_environment/bin/python" -c 'import tpmkit; tpmkit.example("configs/liver_poke.json")')
+(cd / && "$OLDPWD/build/wheel_environment/bin/tpm" version)
 
 step "clang-tidy on $(tidy_scope)"
 configure tidy
@@ -41,6 +50,9 @@ configure check
 build check
 step "fast tests with sanitized floors, tests with threads under ThreadSanitizer"
 ctest --preset sanitized --parallel "$(nproc)" --no-tests=error | tail -n 4
+
+# 20 kinds of input, 6 s of processor time each, on two cores: a minute. scripts/fuzz.sh 310 is the whole of it.
+scripts/fuzz.sh --readers 6
 
 step "all checks passed; the slow tests ended with:"
 sed -n '/% tests passed/,$p' "$slow_log"

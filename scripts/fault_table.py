@@ -7,7 +7,8 @@ After each fault the answer has to be one line that begins with "tpm: ", exit co
 besides those of an undisturbed run, and each of those either as it was or as an undisturbed run writes it. A
 command may also get by without the call; then its files are those of an undisturbed run. Exit code 1 if any
 run did otherwise. --first and --spread say how many n are tried: 1 to FIRST, then SPREAD evenly up to the
-last call. A command that takes long gets fewer (its weight).
+last call. A command that takes long gets fewer (its weight), unless --all is given. With --keep FILE what is
+done is kept there, and the same command goes on from it.
 """
 import argparse
 import concurrent.futures
@@ -92,14 +93,16 @@ COMMANDS = [
     Command("spectrum", "spectrum in/law.json -o spectrum.txt", ["spectrum.txt"]),
     Command("export", "export in/law.json --to febio -o law.feb", ["law.feb"]),
     Command("design", "design in/design.json --check 0 -o design.txt", ["design.txt"]),
-    Command("recovery", "recovery --laws linear-1 --trials 1 -o recovery.txt", ["recovery.txt"], weight=50, code=1),
+    Command("recovery", "recovery --laws linear-1 --trials 1 -o recovery.txt", ["recovery.txt"]),
     Command("plan", "plan in/indented.json --costs nominal --brief", [], weight=20),
-    Command("benchmark", "benchmark bond_paper --no-timing -o bench", [], weight=50),
+    Command("benchmark", "benchmark bond_paper --no-timing -o bench", [], varies=["bench/report.run.json"],
+            weight=50),
     Command("hil run", "hil run in/session.json -o s.tpmrec --force", ["s.tpmrec"], varies=["s.tpmrec"],  # ends early where the disk is full
             weight=4),
     Command("hil export", "hil export in/s.tpmrec -o s.h5", ["s.h5"]),
     Command("report", "report -o paper", [], varies=["paper/report.run.json"], weight=100),
-    Command("stability", "stability -o stability", [], weight=100),
+    Command("stability", "stability --points 2 -o stability", [], varies=["stability/report.run.json"],
+            weight=100),
 ]
 
 
@@ -156,7 +159,7 @@ def run(tpm: Path, preload: Path, inputs: Path, command: Command, call: str, how
             code, said = done.returncode, done.stderr.decode(errors="replace")
         except subprocess.TimeoutExpired:
             code, said = 1000, "no end within 120 s"
-        lines = mark.read_text().splitlines() if mark.exists() else []
+        lines = mark.read_text().rstrip("\0").splitlines() if mark.exists() else []
         fired = next((line for line in lines if line.startswith("fired ")), "")
         calls = max((int(line.split()[1]) for line in lines if line.startswith("calls ")), default=0)
         return Run(code, said, files_in(folder), fired, calls)
@@ -205,6 +208,12 @@ def arguments_of(description: str) -> argparse.ArgumentParser:
     return parser
 
 
+def kept_rows(file: Path | None) -> dict:
+    """Rows of an earlier run, by command, call and fault."""
+    lines = file.read_text().splitlines() if file and file.exists() else []
+    return {tuple(done["row"][:3]): done for done in map(json.loads, lines)}
+
+
 def is_wanted(command: Command, options: argparse.Namespace) -> bool:
     only = tuple(options.only.split(",")) if options.only else ("",)
     return command.name.startswith(only) and command.weight <= options.heaviest
@@ -213,7 +222,10 @@ def is_wanted(command: Command, options: argparse.Namespace) -> bool:
 def main() -> int:
     parser = arguments_of(__doc__)
     parser.add_argument("--calls", help="kinds of calls, separated by commas")
+    parser.add_argument("--all", action="store_true", help="as many n of commands that take long")
+    parser.add_argument("--keep", type=Path, help="file of rows that are done")
     options = parser.parse_args()
+    kept = kept_rows(options.keep)
     tpm, preload = options.tpm.resolve(), options.preload.resolve()
     calls = options.calls.split(",") if options.calls else None
     rows, failures = [], []
@@ -227,11 +239,15 @@ def main() -> int:
             for call, how in FAULTS:
                 if calls and call not in calls:
                     continue
+                if (done := kept.get((command.name, call, how))) is not None:
+                    rows.append(tuple(done["row"]))
+                    failures += done["failures"]
+                    continue
                 plain = run(tpm, preload, inputs, command, call, how, 0)
                 if plain.code != command.code:
                     raise SystemExit(f"fault_table.py: {command.name}: exit code {plain.code} without a fault: "
                                      f"{plain.said.strip()}")
-                tried = numbers(plain.calls, options.first, options.spread, command.weight)
+                tried = numbers(plain.calls, options.first, options.spread, 1 if options.all else command.weight)
                 results = list(pool.map(lambda n: run(tpm, preload, inputs, command, call, how, n), tried))
                 fired = [result for result in results if result.fired]
                 wrong = [(n, result, faults) for n, result in zip(tried, results)
@@ -239,12 +255,17 @@ def main() -> int:
                 survived = sum(result.code in (0, command.code) for result in fired)
                 rows.append((command.name, call, how, plain.calls, len(fired), len(fired) - survived, survived,
                              len(wrong)))
+                found = []
                 for n, result, faults in wrong:
                     last = result.said.strip().split("\n")[-1][:160]
-                    failures.append(f"{command.name}: {call} {n} ({how}; {result.fired}): {', '.join(faults)}: {last}")
-                    print(failures[-1], file=sys.stderr)
+                    found.append(f"{command.name}: {call} {n} ({how}; {result.fired}): {', '.join(faults)}: {last}")
+                    print(found[-1], file=sys.stderr)
+                failures += found
+                if options.keep:
+                    with options.keep.open("a") as file:
+                        file.write(json.dumps({"row": rows[-1], "failures": found}) + "\n")
                 print(*rows[-1], sep="\t", flush=True)
-    arguments = [a for a in sys.argv[1:]]
+    arguments = [a for a in sys.argv[1:] if a != "--keep" and a != str(options.keep)]
     text = (f"`python3 scripts/fault_table.py {' '.join(arguments)}`\n\n# Faults of the system, one at a time\n\n"
             "Every row: a command, the call that fails and how; calls in an undisturbed run, runs with a fault, how many\n"
             "ended in one line with exit code 5, how many got by with the same files, how many did otherwise.\n\n"

@@ -6,20 +6,28 @@
 #
 #   scripts/fuzz.sh 60             a minute each
 #   scripts/fuzz.sh 300 scene stl  five minutes for two of them
+#   scripts/fuzz.sh --readers 3    only what reads is instrumented, the rest is that of build/release, which has to be
+#                                  there: built in a minute; scripts/check.sh runs it
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
 
-[[ "${1:-}" =~ ^[1-9][0-9]*$ ]] || die "usage: scripts/fuzz.sh SECONDS [INPUT...]"
+preset=fuzz
+if [[ "${1:-}" == --readers ]]; then
+  preset=fuzz-readers
+  shift
+  [[ -f build/release/libtpmkit.a ]] || die "no build/release/libtpmkit.a; expected scripts/run.sh before"
+fi
+[[ "${1:-}" =~ ^[1-9][0-9]*$ ]] || die "usage: scripts/fuzz.sh [--readers] SECONDS [INPUT...]"
 seconds=$1
 shift
 install_missing "to build and run tpm" "${packages_run[@]}"
 unpack_headers "${packages_unpacked[@]}"
 install_missing "to fuzz what tpm reads" clang
 
-step "building the fuzzer (build/fuzz)"
-configure fuzz
-build fuzz fuzz_inputs
+step "building the fuzzer (build/$preset)"
+configure "$preset"
+build "$preset" fuzz_inputs
 
 shopt -s nullglob
 names=("$@")
@@ -58,13 +66,13 @@ reader_of() {
     organ_study) echo study/organ_study_file.cpp ;;
     costs) echo plan/operations.cpp ;;
     law) echo law/law_file.cpp ;;
-    claims) echo study/claims.cpp ;;
+    claims) echo study/claim_reader.cpp ;;
     stl | obj) echo network/mesh_file.cpp ;;
     recording) echo haptics/recording.cpp ;;
     row_log) echo store/row_log.cpp ;;
     sweep_log) echo sweep/block_log.cpp ;;
     checkpoint) echo simulate/checkpoint.cpp ;;
-    hdf5) echo store/hdf5_reader.cpp ;;
+    hdf5) echo store/hdf5_contents.cpp ;;
   esac
 }
 
@@ -103,11 +111,11 @@ fuzz() { # NAME
   if [[ $name == curve_description ]]; then sed -i 's/"id": "[a-z_]*"/"id": "case"/' "$seeds"/*; fi
   local -r begun=$(processor_seconds)
   for quarter in 1 2 3 4; do
-    local log=build/fuzz/$name.$quarter.log
+    local log=build/$preset/$name.$quarter.log
     local -i left=$((begun + quarter * seconds / 4 - $(processor_seconds)))
     while true; do  # again while a busy machine gave less than the time that passed
       TPM_FUZZ=$name TPM_FUZZ_FOLDER=$place ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1 \
-        build/fuzz/fuzz_inputs -max_total_time=$((left > 1 ? left : 1)) -timeout=60 -report_slow_units=60 -rss_limit_mb=4096 -max_len=20000 \
+        build/$preset/fuzz_inputs -max_total_time=$((left > 1 ? left : 1)) -timeout=60 -report_slow_units=60 -rss_limit_mb=4096 -max_len=20000 \
         -artifact_prefix="$kept/found-" -print_final_stats=1 -print_coverage=1 "$seeds" >"$log" 2>&1 ||
         { status=1; found="${found#none} $quarter"; }
       runs=$((runs + $(sed -n 's/^stat::number_of_executed_units: *//p' "$log")))
@@ -130,10 +138,10 @@ processor_seconds() {
 
 step "fuzzing ${#names[@]} kinds of input, $seconds s each"
 export -f fuzz seeds_of reader_of covered processor_seconds
-export folder seconds blocks_for_livers
+export folder seconds preset blocks_for_livers
 found=0
 echo "| input | executions | processor time / s | executions / s | file | edges covered / %: first quarter | second |" \
   "third | last | finding in quarter |"
 echo "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
 printf '%s\n' "${names[@]}" | xargs -P "$(nproc)" -I{} bash -c 'shopt -s nullglob; fuzz {}' || found=1
-[[ $found -eq 0 ]] || die "findings are in tests/fuzz/corpus; logs in build/fuzz"
+[[ $found -eq 0 ]] || die "findings are in tests/fuzz/corpus; logs in build/$preset"

@@ -135,7 +135,7 @@ def main() -> int:
             if done.returncode != command.code:
                 raise SystemExit(f"kill_table.py: {command.name}: exit code {done.returncode} undisturbed: "
                                  f"{done.stderr.decode(errors='replace').strip()}")
-            calls = max(int(line.split()[1]) for line in mark.read_text().splitlines() if line.startswith("calls "))
+            calls = max(int(line.split()[1]) for line in mark.read_text().rstrip("\0").splitlines() if line.startswith("calls "))
             plain = files_in(folder)
             recording = next((content for output, content in plain.items() if output.endswith(RECORDING)), None)
             places = places_in(tpm, recording) if recording else None

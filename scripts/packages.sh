@@ -7,7 +7,7 @@ packages_run=(
   libeigen3-dev libceres-dev libsundials-dev libboost-dev
   libhdf5-dev nlohmann-json3-dev libcsv-dev libutfcpp-dev libssl-dev
   libmuparser-dev libcpp-httplib-dev pkg-config libcli11-dev libfmt-dev libassimp-dev libnanoflann-dev
-  libtbb-dev zlib1g-dev
+  libtbb-dev zlib1g-dev libdeflate-dev libmetis-dev
   python3 python3-numpy python3-matplotlib
 )
 
@@ -17,6 +17,17 @@ packages_unpacked=(
   libvalijson-dev
 )
 
+# What the Python package needs to be built, installed and used.
+packages_python=(
+  pybind11-dev python3-dev python3-setuptools python3-wheel python3-pip python3-venv
+  python3-numpy python3-pandas python3-xarray python3-matplotlib python3-h5py python3-h5netcdf
+)
+
+# What makes Debian packages and looks at them.
+packages_debian=(
+  dpkg-dev file lintian
+)
+
 # What the tests need besides.
 packages_test=(
   catch2 python3-scipy python3-h5py python3-xarray python3-h5netcdf
@@ -24,5 +35,5 @@ packages_test=(
 
 # What checks the sources, and programs that have to read what tpm writes.
 packages_check=(
-  git clang-format clang-tidy chromium python3-paraview
+  git clang-format clang-tidy chromium python3-paraview python3-nbconvert python3-ipykernel
 )

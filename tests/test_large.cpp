@@ -6,6 +6,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/network/liver.hpp"
+#include "tpm/network/quasistatic.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/solve/preconditioners.hpp"
 
@@ -169,4 +170,59 @@ TEST_CASE("an indentation refuses what it cannot do") {
   PatchIndentation far = scene.push;
   far.depth_m = 0.05;  // through the block
   CHECK_THROWS_AS(run(far), Error);
+}
+
+TEST_CASE("a solver is chosen by what the factor takes, counted before it is made") {
+  const IndentedScene scene(solid_liver(700), 0.02, 0.03);
+  const SolverChoice usual =
+      choose_solver(scene.bonds, scene.freedom, {.solver = StiffnessSolver::automatic});
+  CHECK(usual.direct);
+  CHECK(usual.operations > 1e6);
+  CHECK(usual.bytes > 1e6);
+  const auto chosen = [&](double operations, double bytes) {
+    return choose_solver(scene.bonds, scene.freedom,
+                         {.solver = StiffnessSolver::automatic,
+                          .most_operations = operations,
+                          .most_bytes = bytes})
+        .direct;
+  };
+  CHECK(chosen(usual.operations, usual.bytes));
+  CHECK_FALSE(chosen(0.99 * usual.operations, usual.bytes));
+  CHECK_FALSE(chosen(usual.operations, 0.99 * usual.bytes));
+  CHECK(
+      choose_solver(scene.bonds, scene.freedom,
+                    {.solver = StiffnessSolver::direct, .most_operations = 0.0, .most_bytes = 0.0})
+          .direct);
+  CHECK_FALSE(
+      choose_solver(scene.bonds, scene.freedom, {.solver = StiffnessSolver::iterative}).direct);
+}
+
+TEST_CASE("a quasi-static run is the same with either solver, within its tolerance", "[heavy]") {
+  const Organ organ = solid_liver(700);
+  const Network network = build_network(organ, {}, "liver");
+  const BondSystem bonds(network, TpmParameters{}.with_relaxation_time(0.7));
+  Freedom freedom(organ.size());
+  for (const std::size_t i : far_side(organ, Eigen::Vector3d::UnitZ(), 0.02)) freedom.hold(i);
+  Eigen::Index front = 0;
+  organ.position.row(2).minCoeff(&front);
+  const Probe probe{static_cast<std::size_t>(front), Eigen::Vector3d::UnitZ()};
+  const double spacing = organ.spacing;
+  const Protocol push{
+      Drive::displacement, {{0.0, 0.0}, {1.0, 0.1 * spacing}, {2.0, 0.1 * spacing}}, "push", true};
+  const Protocol load{Drive::force, {{0.0, 0.0}, {1.0, 1e-3}, {2.0, 1e-3}}, "load", true};
+  const std::vector<double> times{0.0, 0.3, 1.0, 1.5, 2.0};
+  for (const Protocol& protocol : {push, load}) {
+    const auto run = [&](StiffnessSolver solver) {
+      return QuasiStatic(bonds, organ.position, freedom, probe,
+                         {.tolerance = 1e-6, .equilibrium = {.solver = solver}})
+          .run(protocol, times);
+    };
+    const QuasiStaticRun direct = run(StiffnessSolver::direct);
+    const QuasiStaticRun iterative = run(StiffnessSolver::iterative);
+    CHECK(direct.solver.direct);
+    CHECK_FALSE(iterative.solver.direct);
+    const double peak = direct.response.cwiseAbs().maxCoeff();
+    CHECK(peak > 0.0);
+    CHECK((direct.response - iterative.response).cwiseAbs().maxCoeff() < 2e-6 * peak);
+  }
 }

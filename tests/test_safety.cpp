@@ -167,6 +167,44 @@ TEST_CASE("What would be unstable is refused before a device is opened, with the
              Contains("--accept-unstable: is not for the device 'omega7'"));
 }
 
+/// Mean of the force sent in the second half of the first hold, N.
+double held_force_N(const Json& json) {
+  const test::TempFolder folder;
+  const HilSession session = test::parsed(json);
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  options.accept_unstable = true;
+  (void)run_session(session, {}, options);
+  const HilRecording recording = read_recording(folder / "r");
+  const SessionPhase& hold = session.phases.at(2);
+  REQUIRE(hold.kind == SessionPhaseKind::hold);
+  const double begin_s = 0.5 * (session.phases.at(1).end_s + hold.end_s);
+  double sum_N = 0.0;
+  std::size_t count = 0;
+  for (const ServoRecord& row : recording.rows) {
+    if (recording.time_s(row) < begin_s || recording.time_s(row) > hold.end_s) continue;
+    sum_N += recording.commanded_N(row);
+    ++count;
+  }
+  REQUIRE(count > 10);
+  return sum_N / static_cast<double>(count);
+}
+
+TEST_CASE(
+    "A rise limited below a step of the encoder is refused, because the force would be lost") {
+  const auto limited = [](const char* modulus, double slew_N_per_s) {
+    return test::with(stiff_session(modulus), "/limits", {{"slew_N_per_s", slew_N_per_s}});
+  };
+  // K q / T with the stiffness at the session's depth: 1.6 N/s at 12 kPa and 0.01 mm.
+  CHECK_THAT(refused(limited("12 kPa", 1.0)),
+             Contains("the rise of the force is limited too much") &&
+                 Contains("a step of the encoder (0.01 mm) makes 0.0016"));
+  CHECK(held_force_N(limited("12 kPa", 1.0)) < 0.8 * held_force_N(limited("12 kPa", 400.0)));
+  CHECK_THAT(held_force_N(limited("12 kPa", 2.0)),
+             WithinRel(held_force_N(limited("12 kPa", 400.0)), 0.05));
+  CHECK(refused(limited("12 kPa", 2.0)) == "nothing was refused");
+}
+
 TEST_CASE("The borders of a set-up are those of the theory") {
   const HilSession session = test::parsed(test::short_session());
   const LoopModel loop = make_loop_model(session);

@@ -118,6 +118,32 @@ TEST_CASE("a run in parts is the run of the whole, within its tolerance", "[heav
   }
 }
 
+TEST_CASE("a scene names its solver; runs without mass answer with either", "[heavy]") {
+  for (const std::string kind : {"quasi_static", "static"}) {
+    const auto run = [&](const std::string& solver) {
+      return run_of(small_scene(R"("formulation": {"kind": ")" + kind + R"(", "solver": ")" +
+                                solver + R"("}, )" + kPush));
+    };
+    const SimulationRun direct = run("direct");
+    const SimulationRun iterative = run("iterative");
+    CAPTURE(kind);
+    REQUIRE(direct.solver);
+    REQUIRE(iterative.solver);
+    CHECK(direct.solver->direct);
+    CHECK_FALSE(iterative.solver->direct);
+    REQUIRE(direct.record.curve.size() == iterative.record.curve.size());
+    for (std::size_t i = 0; i < direct.record.curve.size(); ++i) {
+      CHECK_THAT(iterative.record.curve[i].response,
+                 WithinAbs(direct.record.curve[i].response, 1e-5));
+    }
+  }
+  CHECK_THAT(
+      refusal_of([] {
+        (void)small_scene(R"("formulation": {"kind": "inertial", "solver": "direct"}, )" + kPush);
+      }),
+      Contains("/formulation/solver"));
+}
+
 TEST_CASE("an interrupted run goes on to the same result, to the bit", "[heavy]") {
   for (const std::string& protocol :
        {kPush, kLoad, kStatic + kPush, kMoving + kPush, kMoving + kLoad}) {

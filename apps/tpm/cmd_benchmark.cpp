@@ -12,6 +12,7 @@
 #include "tpm/report/benchmark_report.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
+#include "tpm/report/speed_record.hpp"
 #include "tpm/report/trajectory_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
@@ -27,6 +28,8 @@ struct BenchmarkChoice {
   bool no_timing = false;
   bool keep = false;
   bool list = false;
+  std::string record;
+  std::string commit = "unknown";
 };
 
 int list_problems(const Session& session) {
@@ -69,7 +72,43 @@ void print_summary(const BenchmarkRecord& record) {
   }
 }
 
+int list_works(const Session& session) {
+  Json json = Json::array();
+  for (const SpeedWork& work : speed_works()) {
+    if (session.json()) {
+      json.push_back({{"name", work.name}, {"summary", work.summary}});
+    } else {
+      say("{:<22} {}\n", work.name, work.summary);
+    }
+  }
+  if (session.json()) say("{}", to_text(Json{{"works", std::move(json)}}));
+  return 0;
+}
+
+/// Measures named pieces of work by processor time, and appends them to a file.
+int record_speed(const BenchmarkChoice& choice, const Session& session) {
+  if (choice.list) return list_works(session);
+  if (choice.no_timing || choice.keep) {
+    throw Error(ExitCode::usage, "--record", "with --no-timing or --keep", "neither of them");
+  }
+  SpeedOptions options;
+  options.repeats = static_cast<int>(parse_whole_number(choice.repeats, "--repeats", 1));
+  const std::vector<SpeedWork> works = chosen_speed_works(choice.problems);
+  will_update({choice.record});
+  Progress progress("measuring", works.size() * static_cast<std::size_t>(options.repeats));
+  const std::vector<SpeedRow> rows = measure_speed(works, options, [&] { progress.advance(); });
+  const SpeedOrigin origin{choice.commit};
+  append_speed_record(choice.record, rows, origin);
+  if (session.json()) {
+    say("{}", to_text(speed_json(rows, origin)));
+    return 0;
+  }
+  say("{}appended to {}\n", speed_text(rows), choice.record);
+  return 0;
+}
+
 int benchmark(const BenchmarkChoice& choice, const Session& session) {
+  if (!choice.record.empty()) return record_speed(choice, session);
   if (choice.list) return list_problems(session);
   BenchmarkRecord record;
   record.options.repeats = static_cast<int>(parse_whole_number(choice.repeats, "--repeats", 1));
@@ -120,14 +159,22 @@ void add_benchmark_command(CLI::App& app, Session& session) {
   command->add_flag("--keep", choice->keep,
                     "Keep what the folder holds: run the problems that are missing there, or those "
                     "named; goes on from a run that was interrupted");
-  command->add_flag("--list", choice->list,
-                    "Name the problems and all formulations, and do nothing");
+  command->add_flag(
+      "--list", choice->list,
+      "Name the problems and all formulations (with --record the pieces of work) and do "
+      "nothing");
+  command->add_option("--record", choice->record,
+                      "Instead: measure named pieces of work (all, or those given in place of "
+                      "problems) by processor time, and append a row for each to this CSV file");
+  command->add_option("--commit", choice->commit, "With --record: what the program was built from")
+      ->capture_default_str();
   add_format_option(*command, session);
   command->footer(
       "Run it on an otherwise idle machine. Example:\n"
       "  tpm benchmark -o reports/accuracy\n"
       "  tpm benchmark -o reports/accuracy --keep\n"
-      "  tpm benchmark bond_paper organ_poke --repeats 50");
+      "  tpm benchmark bond_paper organ_poke --repeats 50\n"
+      "  tpm benchmark --record speed.csv --commit $(git rev-parse --short HEAD)");
   command->callback([choice, &session] {
     session.run = [choice, &session] { return benchmark(*choice, session); };
   });

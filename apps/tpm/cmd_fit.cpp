@@ -209,7 +209,7 @@ void require_indentation(const FitOptions& options,
 }
 
 int fit_configuration(const FitOptions& options, const Session& session) {
-  if (!options.no_draw) will_write_into(options.folder, {"figures.json"});
+  if (!options.no_draw) will_write_into(options.folder, {"figures.json", "law.json"});
   const FitResult result = run_fit(configured(options));
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
   if (!options.folder.empty() && !options.no_draw) {

@@ -16,9 +16,11 @@
 #include "hil_options.hpp"
 #include "hil_page.hpp"
 #include "interrupt_watch.hpp"
+#include "out_of_memory.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/device/force_dimension.hpp"
+#include "tpm/device/plugin_device.hpp"
 #include "tpm/report/hil_report.hpp"
 
 namespace tpm::app {
@@ -59,7 +61,49 @@ std::string seen_text(const SeenDevice& device) {
                      limits_of(device.kind).tried ? "" : " (never tried with this device)");
 }
 
+/// What a plugin says of its devices; nothing is opened.
+int list_plugin(const DeviceOptions& options, const Session& session) {
+  const DevicePlugin plugin(options.plugin);
+  Json list = Json::array();
+  std::string text = fmt::format("{}: {}\n", plugin.file(), plugin.name());
+  for (const SeenDevice& device : seen_devices(plugin)) {
+    if (!device.problem.empty()) {
+      list.push_back({{"index", device.index}, {"problem", device.problem}});
+      text += fmt::format("{:<8} {}\n", device.index, device.problem);
+      continue;
+    }
+    const tpm_device_description said = plugin.describe(device.index);
+    const tpm_device_limits& limits = said.limits;
+    const bool hardware = said.hardware != 0;
+    list.push_back({{"index", device.index},
+                    {"name", device.name},
+                    {"serial", device.serial < 0 ? Json() : Json(device.serial)},
+                    {"simulated_device", !hardware},
+                    {"force_N", limits.force_N},
+                    {"reach_m", limits.reach_m},
+                    {"stiffness_N_per_m", limits.stiffness_N_per_m},
+                    {"damping_N_s_per_m", limits.damping_N_s_per_m},
+                    {"slew_N_per_s", limits.slew_N_per_s},
+                    {"least_ramp_in_s", limits.least_ramp_in_s},
+                    {"friction_N_s_per_m", limits.friction_N_s_per_m},
+                    {"delay_periods", limits.delay_periods}});
+    text += fmt::format(
+        "{:<8} {}{}: --device plugin --index {}\n"
+        "         at most {} N, {} mm from the centre, {} N/m; friction {} N s/m, {} periods "
+        "late\n",
+        device.index, device.name, hardware ? "" : ", SIMULATED DEVICE", device.index,
+        limits.force_N, 1e3 * limits.reach_m, limits.stiffness_N_per_m, limits.friction_N_s_per_m,
+        limits.delay_periods);
+  }
+  if (list.empty()) text += "none     the plugin is there, and sees no device\n";
+  const Json json{
+      {"plugin", {{"file", plugin.file()}, {"name", plugin.name()}, {"devices", list}}}};
+  say("{}", session.json() ? to_text(json) : text);
+  return 0;
+}
+
 int list_devices(const DeviceOptions& options, const Session& session) {
+  if (!options.plugin.empty()) return list_plugin(options, session);
   std::vector<SeenDevice> devices;
   std::string reason;
   try {
@@ -191,7 +235,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   DeviceChoice device = chosen_device(choice.device);
   if (!choice.changes.motion.empty() && device.kind == "virtual") device.kind = "replay";
   SessionRunOptions options;
-  const bool hardware = limits_of(device.kind).hardware();
+  const bool hardware = limits_of(device).hardware();
   options.real_time = choice.time.empty() ? hardware : choice.time == "real";
   options.notes = choice.notes;
   require_short(choice.notes.date, "--date");
@@ -215,8 +259,10 @@ int run_hil(const RunChoice& choice, const Session& session) {
     if (page) page->see(row);
   };
   options.planning = [&guide](const std::string&) { guide->plan(); };
-  options.opened = [&guide, opened = options.opened](const DeviceIdentity& identity,
-                                                     const LoopModel& model) {
+  std::optional<OutOfMemoryIsThrown> while_the_device_is_open;
+  options.opened = [&, opened = options.opened](const DeviceIdentity& identity,
+                                                const LoopModel& model) {
+    while_the_device_is_open.emplace();
     guide->begin();
     if (opened) opened(identity, model);
   };
@@ -247,10 +293,12 @@ int run_hil(const RunChoice& choice, const Session& session) {
 }  // namespace
 
 void add_device_options(CLI::App& command, DeviceOptions& options) {
+  std::vector<std::string> kinds = device_kinds();
+  kinds.emplace_back("plugin");
   command
       .add_option("--device", options.choice.kind,
-                  "virtual, replay, omega7 or another device of Force Dimension")
-      ->check(CLI::IsMember(device_kinds()))
+                  "virtual, replay, plugin, omega7 or another device of Force Dimension")
+      ->check(CLI::IsMember(kinds))
       ->capture_default_str();
   command.add_option("--serial", options.serial, "Of the device, where there are several")
       ->check(CLI::Range(0, 65535));
@@ -258,6 +306,8 @@ void add_device_options(CLI::App& command, DeviceOptions& options) {
       ->check(CLI::Range(0, 127));
   command.add_option("--dhd-library", options.library,
                      "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
+  command.add_option("--plugin", options.plugin,
+                     "Of --device plugin: a shared library after tpmkit/haptic_device.h");
   command.add_option("--recording", options.replay, "What --device replay plays");
   command.add_flag("--may-move", options.choice.may_move,
                    "The device may move by itself to initialise");
@@ -276,6 +326,7 @@ DeviceChoice chosen_device(const DeviceOptions& options) {
   if (options.serial >= 0) choice.which.serial = options.serial;
   if (options.index >= 0) choice.which.index = options.index;
   choice.replay = options.replay;
+  choice.plugin = options.plugin;
   return choice;
 }
 
@@ -291,8 +342,10 @@ void add_hil_command(CLI::App& app, Session& session) {
   auto listed = std::make_shared<DeviceOptions>();
   devices->add_option("--dhd-library", listed->library,
                       "libdrd.so.3 or libdhd.so.3 of the Force Dimension SDK, version 3");
+  devices->add_option("--plugin", listed->plugin,
+                      "Those of a device plugin instead (docs/c_interface.md)");
   add_format_option(*devices, session);
-  devices->footer("Example:\n  tpm hil devices");
+  devices->footer("Examples:\n  tpm hil devices\n  tpm hil devices --plugin ./my_device.so");
   devices->callback([listed, &session] {
     session.run = [listed, &session] { return list_devices(*listed, session); };
   });

@@ -6,6 +6,7 @@
 #include "command.hpp"
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
+#include "out_of_memory.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/units.hpp"
@@ -37,6 +38,7 @@ int check_hil(const CheckChoice& choice, const Session& session) {
   }
   const double duration = within(choice.duration, Dimension::time, "--duration", kLeast_s, kMost_s);
   const InterruptWatch interrupts(InterruptWatch::Of::motors);
+  const OutOfMemoryIsThrown while_the_device_is_open;
   const JitterCheck check = check_jitter(chosen_device(choice.device), hil, duration,
                                          chosen_wish(choice.device), InterruptWatch::seen);
   say("{}", session.json() ? to_text(check_json(check)) : check_text(check));

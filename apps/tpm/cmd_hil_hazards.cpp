@@ -11,24 +11,45 @@
 
 namespace tpm::app {
 
+namespace {
+
+struct HazardChoice {
+  std::string output;
+  bool wall_clock = false;
+};
+
+int try_hazards(const HazardChoice& choice, const Session& session) {
+  std::optional<Progress> progress;
+  progress.emplace("hazards", choice.wall_clock ? clock_hazard_count() : hazard_count());
+  const auto told = [&progress] { progress->advance(); };
+  const auto answer = [&](const auto& study, const auto& as_json, const auto& as_text) {
+    progress.reset();
+    deliver(session.json() ? to_text(as_json(study)) : as_text(study), choice.output);
+    return static_cast<int>(study.safe() ? ExitCode::success : ExitCode::answer_is_no);
+  };
+  if (choice.wall_clock) {
+    return answer(study_hazards_on_the_clock(told), clock_hazard_json, clock_hazard_text);
+  }
+  return answer(study_hazards(told), hazard_json, hazard_text);
+}
+
+}  // namespace
+
 void add_hil_hazards_command(CLI::App& hil, Session& session) {
   CLI::App* command = hil.add_subcommand(
       "hazards",
       "What can go wrong in a session, tried on the simulated device; exit code 1 if "
       "force, energy, travel or time leave their bounds");
-  auto output = std::make_shared<std::string>();
-  command->add_option("-o,--output", *output, "File to write instead of the terminal");
+  auto choice = std::make_shared<HazardChoice>();
+  command->add_option("-o,--output", choice->output, "File to write instead of the terminal");
+  command->add_flag("--wall-clock", choice->wall_clock,
+                    "Those that take time of their own: hangs, stalls, interruptions; half a "
+                    "minute, times differ from run to run");
   add_format_option(*command, session);
-  command->footer("Example:\n  tpm hil hazards -o hazards.md");
-  command->callback([output, &session] {
-    session.run = [output, &session] {
-      std::optional<Progress> progress;
-      progress.emplace("hazards", hazard_count());
-      const HazardStudy study = study_hazards([&progress] { progress->advance(); });
-      progress.reset();
-      deliver(session.json() ? to_text(hazard_json(study)) : hazard_text(study), *output);
-      return static_cast<int>(study.safe() ? ExitCode::success : ExitCode::answer_is_no);
-    };
+  command->footer(
+      "Examples:\n  tpm hil hazards -o hazards.md\n  tpm hil hazards --wall-clock -o clock.md");
+  command->callback([choice, &session] {
+    session.run = [choice, &session] { return try_hazards(*choice, session); };
   });
 }
 

@@ -1,6 +1,7 @@
 // tpm plan: the least model for a scene.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -10,6 +11,8 @@
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/plan_report.hpp"
+#include "tpm/store/json.hpp"
+#include "tpm/study/error_budget.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;
@@ -17,8 +20,10 @@ namespace fs = std::filesystem;
 void add_plan_options(CLI::App& command, PlanChoice& choice) {
   command
       .add_option("--tolerance", choice.tolerance,
-                  "Error in parts of the peak, such as 1% or 0.01, or jnd: what a hand can feel")
+                  "Error in parts of the peak, such as 1% or 0.01; jnd: what a hand can feel; "
+                  "data: what the data know (with --budget)")
       ->capture_default_str();
+  command.add_option("--budget", choice.budget, "budget.json of tpm budget, for --tolerance data");
   command
       .add_option("--outputs", choice.outputs,
                   "What the tolerance is about: force (the response) or field (displacements)")
@@ -31,9 +36,32 @@ void add_plan_options(CLI::App& command, PlanChoice& choice) {
       "File of --calibrate, or nominal; default: this machine's, if it was calibrated");
 }
 
+namespace {
+
+/// No finer than the data know, and no coarser than a plan may be.
+void set_tolerance_of_data(PlanRequest& request, const PlanChoice& choice) {
+  if (choice.budget.empty()) {
+    throw Error(ExitCode::usage, "--tolerance data", "without a budget",
+                "--budget budget.json, as tpm budget --folder writes it");
+  }
+  constexpr double kMost = 0.5, kLeast = 1e-6;
+  const double part = tolerance_of_data(read_json(choice.budget), choice.budget);
+  request.tolerance = std::clamp(part, kLeast, kMost);
+  request.tolerance_source = fmt::format("what the data know, {} % of the peak, after {}",
+                                         significant(100.0 * part, 3), choice.budget);
+}
+
+}  // namespace
+
 PlanRequest plan_request(const PlanChoice& choice) {
   PlanRequest request;
-  set_tolerance(request, choice.tolerance);
+  if (choice.tolerance == "data") {
+    set_tolerance_of_data(request, choice);
+  } else if (choice.budget.empty()) {
+    set_tolerance(request, choice.tolerance);
+  } else {
+    throw Error(ExitCode::usage, "--budget", "without --tolerance data", "both or none");
+  }
   if (choice.outputs == "field") request.measure = {PlanOutput::field, 0.0};
   if (!choice.rate.empty()) {
     const auto rate = find_number(choice.rate);

@@ -3,8 +3,10 @@
 
 #include <chrono>
 #include <memory>
+#include <string>
 
 #include "command.hpp"
+#include "tpm/core/error.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/stability_report.hpp"
 #include "tpm/store/writable.hpp"
@@ -12,11 +14,11 @@
 namespace tpm::app {
 namespace {
 
-int stability(const std::string& folder, const Session& session) {
+int stability(const std::string& folder, int along, const Session& session) {
   const std::string python = find_drawing_python();  // before the work, not after
   require_writable_folder(folder);
   const auto start = std::chrono::steady_clock::now();
-  const StabilityStudy study = run_stability_study();
+  const StabilityStudy study = run_stability_study(along);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_stability(study, folder, python, took.count());
   if (session.json()) {
@@ -37,10 +39,22 @@ void add_stability_command(CLI::App& app, Session& session) {
       "stability", "Where each step rule fails: maps, limits against theory, degenerate corners");
   auto folder = std::make_shared<std::string>("out/stability");
   command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
+  auto along = std::make_shared<std::string>(std::to_string(kPointsAlongMaps));
+  command->add_option("--points", *along, "Points along each axis of the maps, 2 to 200")
+      ->capture_default_str();
   add_format_option(*command, session);
-  command->footer("Example:\n  tpm stability --output out/stability");
-  command->callback([folder, &session] {
-    session.run = [folder, &session] { return stability(*folder, session); };
+  command->footer(
+      "Examples:\n  tpm stability --output out/stability\n  tpm stability --points 5  (a quick "
+      "look)");
+  command->callback([folder, along, &session] {
+    session.run = [folder, along, &session] {
+      constexpr std::uint64_t kMost = 200;
+      const std::uint64_t points = parse_whole_number(*along, "--points", 2);
+      if (points > kMost) {
+        throw Error(ExitCode::usage, "--points", *along, fmt::format("2 to {}", kMost));
+      }
+      return stability(*folder, static_cast<int>(points), session);
+    };
   });
 }
 

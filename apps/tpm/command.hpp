@@ -61,6 +61,9 @@ void tell_user(fmt::format_string<Arguments...> text, Arguments&&... arguments) 
 void add_version_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
 void add_select_command(CLI::App& app, Session& session);
+void add_budget_command(CLI::App& app, Session& session);
+void add_identify_command(CLI::App& app, Session& session);
+void add_predict_command(CLI::App& app, Session& session);
 void add_recovery_command(CLI::App& app, Session& session);
 void add_check_gradient_command(CLI::App& app, Session& session);
 void add_design_command(CLI::App& app, Session& session);

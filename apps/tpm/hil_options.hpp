@@ -7,7 +7,7 @@ namespace tpm::app {
 /// Options that every command with a device has.
 struct DeviceOptions {
   DeviceChoice choice;
-  std::string library, replay;
+  std::string library, replay, plugin;
   int serial = -1, index = -1;  ///< -1: not given
   std::string real_time = "ignore";
 };

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "command.hpp"
+#include "out_of_memory.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/file.hpp"
@@ -92,11 +93,12 @@ void add_commands(CLI::App& app, Session& session) {
   };
   const std::vector<Group> groups = {
       {"Data: recordings, laws and fits",
-       {add_data_command, add_fit_command, add_select_command, add_laws_command,
-        add_spectrum_command, add_export_command, add_design_command}},
+       {add_data_command, add_fit_command, add_select_command, add_predict_command,
+        add_identify_command, add_laws_command, add_spectrum_command, add_export_command,
+        add_design_command}},
       {"Tissue: organs of spheres",
        {add_network_command, add_simulate_command, add_plan_command, add_sweep_command}},
-      {"Hand: haptic devices", {add_hil_command}},
+      {"Hand: haptic devices", {add_hil_command, add_budget_command}},
       {"Evidence: the paper, and tpm itself",
        {add_report_command, add_tables_command, add_audit_command, add_experiments_command,
         add_benchmark_command, add_stability_command, add_recovery_command, add_coverage_command,
@@ -157,21 +159,13 @@ void require_output_written() {
 
 namespace {
 
-/// Says so without asking for memory.
-int out_of_memory() noexcept {
-  static constexpr std::string_view kWords =
-      "tpm: out of memory; expected more, or a smaller input\n";
-  (void)!::write(STDERR_FILENO, kWords.data(), kWords.size());
-  return static_cast<int>(tpm::ExitCode::environment);
-}
-
-/// Libraries that ask for memory where they must not throw (nlohmann-json does in its destructor)
-/// end here: then nothing is unwound, and the next run removes the temporary file (Replacement).
+/// During a session (OutOfMemoryIsThrown), libraries that ask for memory where they must not throw
+/// (nlohmann-json does in its destructor) end here: then nothing is unwound.
 [[noreturn]] void end_without_memory() noexcept {
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
   } catch (const std::bad_alloc&) {
-    ::_exit(out_of_memory());
+    ::_exit(tpm::app::say_out_of_memory());
   } catch (...) {
     std::abort();
   }
@@ -215,9 +209,10 @@ int answer(int argc, char** argv) {
 int main(int argc, char** argv) {
   std::set_terminate(end_without_memory);
   keep_large_arrays();
+  tpm::app::end_when_out_of_memory();
   try {
     return answer(argc, argv);
   } catch (const std::bad_alloc&) {  // telling what went wrong takes memory, too
-    return out_of_memory();
+    return tpm::app::say_out_of_memory();
   }
 }

@@ -11,6 +11,7 @@ struct PlanChoice {
   std::string tolerance = "1%";
   std::string outputs = "force";
   std::string rate, wall, costs;
+  std::string budget;  ///< budget.json, of --tolerance data
 };
 
 void add_plan_options(CLI::App& command, PlanChoice& choice);

@@ -1,7 +1,8 @@
 // Makes the n-th call of one kind fail in a process: preloaded into `tpm` by fault_table.py and
 // kill_table.py. The environment says what fails; without it every call goes through.
 //
-//   TPM_FAULT_CALL     read, write, sync, rename, open (for writing), open_read, truncate, folder,
+//   TPM_FAULT_CALL     read, write, sync, rename (and linkat), open (for writing), open_read,
+//   truncate, folder,
 //                      close (of what was open for writing), memory, thread, process, or change:
 //                      any call that changes a file; a write counts twice there, before it and
 //                      half-way
@@ -9,12 +10,14 @@
 //   TPM_FAULT_HOW      ENOSPC, EIO, EMFILE, EINTR, ENOMEM, EAGAIN; short: half of a write;
 //                      kill: SIGKILL
 //   TPM_FAULT_ONWARD   set: all later calls fail too
+//   TPM_FAULT_NO_TMPFILE  set: no file system knows files without a name (O_TMPFILE)
 //   TPM_FAULT_UNDER    only files in this folder count
 //   TPM_FAULT_PROGRAM  only a program whose file name begins so is touched
 //   TPM_FAULT_MARK     file for what became of it: "fired ..." when a call failed, "calls N" at
 //                      the end
 //
-// Calls are counted from main() on, in all threads together. Files are reached by system calls, so
+// Calls are counted from main() on, in all threads and child processes together; a child that is
+// killed takes its parent with it. Files are reached by system calls, so
 // that nothing here needs memory or another library to be ready.
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -26,6 +29,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/syscall.h>
 #include <sys/types.h>
 #include <sys/uio.h>
@@ -35,6 +39,7 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 #include <utility>
 
 // NOLINTBEGIN(bugprone-reserved-identifier): the C library's own
@@ -70,25 +75,43 @@ struct Fault {
   long at = 0;
   int error_number = EIO;
   bool cut_short = false, kill = false, onward = false;
-  char under[PATH_MAX] = "", mark[PATH_MAX] = "";
+  char under[PATH_MAX] = "";
 };
 
 Fault fault;
 std::atomic<bool> armed{false};
-std::atomic<long> calls{0};
+pid_t counted_process = 0;
+bool no_tmpfile = false;
 
 void keep_text(char* to, const char* name) {
   const char* text = getenv(name);
   if (text != nullptr && strlen(text) < PATH_MAX) memcpy(to, text, strlen(text) + 1);
 }
 
-void write_mark(const char* text) {
-  if (fault.mark[0] == '\0') return;
-  const long file =
-      syscall(SYS_openat, AT_FDCWD, fault.mark, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-  if (file < 0) return;
-  (void)syscall(SYS_write, file, text, strlen(text));
+/// The mark is a file in memory, which a child can still reach when it may open no more files.
+constexpr std::size_t kMarkSize = 1U << 15U;
+char* mark = nullptr;
+
+struct Shared {
+  std::atomic<long> calls{0};
+  std::atomic<std::size_t> marked{0};
+};
+Shared* shared = nullptr;  ///< with children
+
+void open_mark(const char* name) {
+  const auto file = static_cast<int>(
+      syscall(SYS_openat, AT_FDCWD, name, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  if (file < 0 || syscall(SYS_ftruncate, file, kMarkSize) != 0) abort();
+  void* bytes = mmap(nullptr, kMarkSize, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  if (bytes == MAP_FAILED) abort();
+  mark = static_cast<char*>(bytes);
   (void)syscall(SYS_close, file);
+}
+
+void write_mark(const char* text) {
+  if (mark == nullptr) return;
+  const std::size_t size = strlen(text), place = shared->marked.fetch_add(size);
+  if (place + size <= kMarkSize) memcpy(mark + place, text, size);
 }
 
 bool is_wanted_program() {
@@ -129,7 +152,7 @@ void read_environment() {
   fault.at = at == nullptr ? 0 : strtol(at, nullptr, 10);
   fault.onward = getenv("TPM_FAULT_ONWARD") != nullptr;
   keep_text(fault.under, "TPM_FAULT_UNDER");
-  keep_text(fault.mark, "TPM_FAULT_MARK");
+  if (const char* name = getenv("TPM_FAULT_MARK"); name != nullptr) open_mark(name);
   if (fault.call == Call::none || !(known || fault.cut_short || fault.kill)) {
     static const char kWords[] = "fault_at: TPM_FAULT_CALL or TPM_FAULT_HOW says nothing known\n";
     (void)syscall(SYS_write, STDERR_FILENO, kWords, sizeof kWords - 1);
@@ -159,7 +182,7 @@ bool watches(Call call) {
 
 /// Counts a call; true if it is to fail. A killed process does not come back.
 bool fails(const char* name, const char* path) {
-  const long number = calls.fetch_add(1) + 1;
+  const long number = shared->calls.fetch_add(1) + 1;
   if (fault.at == 0 || number < fault.at || (number > fault.at && !fault.onward)) return false;
   if (number == fault.at) {
     char line[PATH_MAX + 80] = "";
@@ -171,6 +194,7 @@ bool fails(const char* name, const char* path) {
     write_mark(line);
   }
   if (fault.kill) {
+    if (getpid() != counted_process) (void)syscall(SYS_kill, counted_process, SIGKILL);
     (void)syscall(SYS_kill, getpid(), SIGKILL);
     for (;;) pause();
   }
@@ -218,7 +242,7 @@ template <class WriteHalf>
 ssize_t allowed(int file, std::size_t size, const WriteHalf& write_half) {
   if (watches(Call::change)) {
     note_change("before write", file);
-    if (counts_file(file) && fault.at == calls.load() + 1 && size > 1) write_half();
+    if (counts_file(file) && fault.at == shared->calls.load() + 1 && size > 1) write_half();
     note_change("within write", file);
   }
   if (fails_on(Call::write, "write", file)) {
@@ -232,9 +256,13 @@ bool writes(int flags) {
 }
 
 int open_counted(int folder, const char* path, int flags, mode_t mode) {
+  if (no_tmpfile && (flags & O_TMPFILE) == O_TMPFILE) {
+    errno = EOPNOTSUPP;
+    return -1;
+  }
   if (writes(flags)) {
     if (fails_on(Call::open, "open", path)) return -1;
-    if ((flags & (O_CREAT | O_TRUNC)) != 0) note_change("open", path);
+    if ((flags & (O_CREAT | O_TRUNC | __O_TMPFILE)) != 0) note_change("open", path);
   } else if (fails_on(Call::open_read, "open", path)) {
     return -1;
   }
@@ -242,7 +270,7 @@ int open_counted(int folder, const char* path, int flags, mode_t mode) {
 }
 
 mode_t mode_of(int flags, va_list arguments) {
-  return (flags & (O_CREAT | O_TMPFILE)) != 0 ? va_arg(arguments, mode_t) : 0;
+  return (flags & (O_CREAT | __O_TMPFILE)) != 0 ? va_arg(arguments, mode_t) : 0;
 }
 
 FILE* fopen_counted(const char* name, const char* path, const char* mode) {
@@ -271,6 +299,12 @@ int armed_main(int count, char** arguments, char** environment) {
 }
 
 __attribute__((constructor)) void begin_counting() {
+  void* bytes =
+      mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (bytes == MAP_FAILED) abort();
+  shared = new (bytes) Shared;
+  counted_process = getpid();
+  no_tmpfile = getenv("TPM_FAULT_NO_TMPFILE") != nullptr;
   read_environment();
 }
 
@@ -278,7 +312,7 @@ __attribute__((destructor)) void end_counting() {
   if (fault.call == Call::none) return;
   armed = false;
   char line[40] = "";
-  snprintf(line, sizeof line, "calls %ld\n", calls.load());
+  snprintf(line, sizeof line, "calls %ld\n", shared->calls.load());
   write_mark(line);
 }
 
@@ -371,6 +405,12 @@ int rename(const char* from, const char* to) {
 
 int renameat(int from_folder, const char* from, int to_folder, const char* to) {
   return rename_counted(from_folder, from, to_folder, to);
+}
+
+int linkat(int from_folder, const char* from, int to_folder, const char* to, int flags) {
+  if (fails_on(Call::rename, "linkat", to)) return -1;
+  note_change("linkat", to);
+  return static_cast<int>(syscall(SYS_linkat, from_folder, from, to_folder, to, flags));
 }
 
 int unlink(const char* path) {

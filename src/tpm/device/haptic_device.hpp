@@ -71,6 +71,7 @@ struct DeviceMounting {
 /// How a device is set up before a session.
 struct DevicePreparation {
   DeviceMounting mounting;
+  double period_s = 1e-3;      ///< of the loop
   double max_force_N = 12.0;   ///< > 0
   double watchdog_s = 0.008;   ///< forces are cut without a command for so long; 0.004 to 0.016
   bool may_move = false;       ///< the device may move by itself to initialise

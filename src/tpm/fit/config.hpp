@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -121,6 +122,8 @@ struct FitConfig {
   std::optional<BootstrapOptions> bootstrap;
   std::vector<Hypothesis> hypotheses;
   std::filesystem::path folder;  ///< where relative paths of data sets are looked up
+  /// Asked before each evaluation; true ends the fit with Interrupted. Not part of the result.
+  std::function<bool()> interrupted;
 };
 
 /// The model that the configuration names.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/interrupted.hpp"
 
 namespace tpm {
 
@@ -233,6 +234,9 @@ std::vector<std::pair<Eigen::Index, Eigen::Index>> ExperimentResiduals::columns_
 
 bool ExperimentResiduals::evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                                    RowMatrix* jacobian) const {
+  if (config_.interrupted && config_.interrupted()) {
+    throw Interrupted("fit: interrupted; nothing was written");
+  }
   RowMatrix sensitivity;
   Eigen::VectorXd answer;
   try {

@@ -109,11 +109,15 @@ void keep_bounds(FitResult& result, const std::vector<FitParameter>& parameters)
 }  // namespace
 
 FitResult run_fit(const FitConfig& config) {
-  return fit_experiments(ExperimentResiduals(config));
+  return run_fit(config, load_data(config));
 }
 
 FitResult run_fit(const FitConfig& config, const std::vector<DataSet>& data) {
-  return fit_experiments(ExperimentResiduals(config, data));
+  FitResult result = fit_experiments(ExperimentResiduals(config, data));
+  for (const DataSet& set : data) {
+    result.data_sha256.push_back(std::visit([](const auto& d) { return d.header.sha256; }, set));
+  }
+  return result;
 }
 
 FitResult fit_experiments(const ExperimentResiduals& function) {

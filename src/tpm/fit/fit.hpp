@@ -85,6 +85,7 @@ struct FittedDatum {
   double standardised = 0.0;  ///< (predicted - value) / sigma after the noise model
   std::optional<Limits> confidence;  ///< pointwise band of the curve, at the fit's level
   std::optional<Limits> prediction;  ///< where one new reading falls
+  std::optional<double> imposed_depth_m = std::nullopt;  ///< largest of the history it belongs to
 };
 
 /// One recording with the fitted model's answer.
@@ -127,7 +128,8 @@ struct FitResult {
   std::optional<BootstrapResult> bootstrap;
   std::vector<FittedDatum> data;  ///< separate readings
   std::vector<RecordingFit> recordings;
-  std::vector<std::string> flags;  ///< what a reader must know (text, one line each)
+  std::vector<std::string> data_sha256;  ///< of the files, one for each of config.data
+  std::vector<std::string> flags;        ///< what a reader must know (text, one line each)
 };
 
 /// Minimum over many starts, intervals, verdicts, hypotheses. Deterministic for a given config.

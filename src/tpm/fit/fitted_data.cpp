@@ -169,6 +169,10 @@ void fill_data(FitResult& result, const ExperimentResiduals& function,
         datum.sigma = function.noise_scale(i, predicted[row], result.best.natural);
       }
       FittedDatum d{std::move(datum), predicted[row], std::nullopt, 0.0, z, {}, {}};
+      const auto* course = std::get_if<TimeCourse>(&experiment.imposed);
+      if (course != nullptr && course->protocol.drive() == Drive::displacement) {
+        d.imposed_depth_m = course->protocol.peak();
+      }
       if (d.datum.value) {
         d.reading_sd = sd_of_reading(result.config.data[d.datum.choice].noise, d.datum) *
                        std::sqrt(result.variance_factor);

@@ -1,9 +1,26 @@
 // The network in balance at each instant: by collocation, and with one step a period.
+#include <algorithm>
+
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/simulate/recorder.hpp"
 
 namespace tpm {
 namespace {
+
+/// Every part of a quasi-static run begins with some factorisations: there are as many parts as
+/// these are cheap, but a long protocol is cut.
+std::size_t parts_of(const ExperimentScene& scene, const RunNetwork& network) {
+  constexpr double kRestart = 3.0;         // factorisations
+  constexpr double kAllRestarts = 2.5e9;   // operations
+  constexpr std::size_t kPiecesAPart = 8;  // of the protocol
+  const std::size_t least = std::min(scene.protocol.knots().size() / kPiecesAPart + 1, kRunParts);
+  const SolverChoice factor = choose_solver(network.driven.bonds, network.driven.freedom,
+                                            {.solver = scene.formulation.solver});
+  if (!factor.direct) return kRunParts;
+  const double cheap = kAllRestarts / (kRestart * factor.operations + 1.0);
+  return std::clamp(cheap < kRunParts ? static_cast<std::size_t>(cheap) : kRunParts, least,
+                    kRunParts);
+}
 
 class QuasiStaticFormulation final : public Formulation,
                                      public SceneRunner,
@@ -16,21 +33,29 @@ class QuasiStaticFormulation final : public Formulation,
                                const std::vector<double>& times_s, bool with_field) const override {
     QuasiStaticOptions options;
     options.tolerance = scene.formulation.tolerance;
+    options.equilibrium.solver = scene.formulation.solver;
     return run_quasi_static(scene, network, options, times_s, with_field);
   }
 
   [[nodiscard]] SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,
                                        const SimulationControls& controls) const override {
+    std::optional<SolverChoice> solver;
     const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
       const PartOfProtocol part(scene, times.back());
       const DrivenNetwork& driven = network.driven;
       const QuasiStatic equations(driven.bonds, driven.rest, driven.freedom, driven.probes,
-                                  {.tolerance = part.tolerance, .energies = true});
+                                  {.tolerance = part.tolerance,
+                                   .energies = true,
+                                   .equilibrium = {.solver = scene.formulation.solver}});
       const auto see = [&](const QuasiStaticState& state) { recorder.see(state); };
-      recorder.close_part(
-          equations.run(part.protocol, times, see, recorder.latest()).error_estimate);
+      const QuasiStaticRun run = equations.run(part.protocol, times, see, recorder.latest());
+      solver = run.solver;
+      recorder.close_part(run.error_estimate);
     };
-    return run_in_parts(scene, network, controls, run_part);
+    SimulationRun result =
+        run_in_parts(scene, network, controls, run_part, parts_of(scene, network));
+    result.solver = solver;
+    return result;
   }
 
   [[nodiscard]] PlanModels candidates(const PlanScene& scene) const override {
@@ -75,7 +100,7 @@ Formulations quasi_static_formulations() {
        "estimate of the error",
        kOfNetwork,
        170,
-       {},
+       {"solver"},
        "collocation"});
   static const NetworkStepFormulation step(
       {"network_step",

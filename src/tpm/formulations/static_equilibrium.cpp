@@ -6,6 +6,10 @@
 namespace tpm {
 namespace {
 
+// A static run takes some factorisations at each stride: it iterates earlier than a quasi-static
+// one, which shares a factorisation between many solutions.
+constexpr double kStaticOperations = 2e11;
+
 class StaticFormulation final : public Formulation, public SceneRunner, public StateRunner {
  public:
   using Formulation::Formulation;
@@ -37,7 +41,9 @@ class StaticFormulation final : public Formulation, public SceneRunner, public S
       }
       recorder.close_part(0.0);
     };
-    return run_in_parts(scene, network, controls, run_part);
+    SimulationRun result = run_in_parts(scene, network, controls, run_part);
+    result.solver = path.solver();
+    return result;
   }
 
  private:
@@ -50,7 +56,8 @@ class StaticFormulation final : public Formulation, public SceneRunner, public S
             driven.probes,
             scene.protocol.drive(),
             scene.protocol.peak(),
-            scene.formulation.tolerance};
+            scene.formulation.tolerance,
+            {.solver = scene.formulation.solver, .most_operations = kStaticOperations}};
   }
 };
 
@@ -68,7 +75,8 @@ Formulations static_equilibrium_formulations() {
         .several_contacts = true,
         .tools = true,
         .course = false},
-       150});
+       150,
+       {"solver"}});
   static const std::vector<const Formulation*> all{&equilibrium};
   return all;
 }

@@ -210,34 +210,39 @@ std::vector<Hazard> starts() {
   return list;
 }
 
+/// The star with all its moduli, E1 = E2 = E'.
+Json with_moduli(Json session, const char* modulus) {
+  for (const char* name : {"E1", "E2", "Eprime"}) {
+    session["model"]["scene"]["material"][name] = modulus;
+  }
+  return session;
+}
+
 std::vector<Hazard> renderings() {
   const Json star = star_session();
   std::vector<Hazard> list;
+  const auto add = [&](const char* name, std::string setting, Json session) {
+    list.push_back({name, std::move(setting), std::move(session), {}, {}});
+  };
   for (const int delay : {0, 1, 2, 5, 10, 20, 50}) {
-    list.push_back({"delay",
-                    fmt::format("{} periods", delay),
-                    with(star, "/virtual_device", {{"delay_periods", delay}}),
-                    {},
-                    {}});
+    add("delay", fmt::format("{} periods", delay),
+        with(star, "/virtual_device", {{"delay_periods", delay}}));
   }
   for (const char* modulus : {"1 kPa", "10 kPa", "100 kPa", "1 MPa", "10 MPa", "100 MPa"}) {
-    Json stiff = star;
-    for (const char* name : {"E1", "E2", "Eprime"})
-      stiff["model"]["scene"]["material"][name] = modulus;
-    list.push_back({"stiffness", fmt::format("E1 = E2 = E' = {}", modulus), stiff, {}, {}});
+    add("stiffness", fmt::format("E1 = E2 = E' = {}", modulus), with_moduli(star, modulus));
   }
   // tau = eta1 / (E1 + E2)
   for (const auto& [tau, eta1] : {std::pair{"10 us", "0.24 Pa s"}, std::pair{"1 ms", "24 Pa s"},
                                   std::pair{"100 ms", "2400 Pa s"}, std::pair{"10 s", "2.4e5 Pa s"},
                                   std::pair{"1000 s", "2.4e7 Pa s"}}) {
-    list.push_back(
-        {"relaxation time", tau, with(star, "/model/scene/material/eta1", eta1), {}, {}});
+    add("relaxation time", tau, with(star, "/model/scene/material/eta1", eta1));
   }
-  Json soft_and_late = with(star, "/virtual_device", {{"delay_periods", 5}});
-  for (const char* name : {"E1", "E2", "Eprime"}) {
-    soft_and_late["model"]["scene"]["material"][name] = "200 kPa";
+  add("stiffness and delay", "200 kPa, 5 periods",
+      with_moduli(with(star, "/virtual_device", {{"delay_periods", 5}}), "200 kPa"));
+  for (const auto& [modulus, slew] : {std::pair{"12 kPa", 1.0}, std::pair{"370 kPa", 20.0}}) {
+    add("rise limited below a step of the encoder", fmt::format("{} N/s, {}", slew, modulus),
+        with_moduli(with(star, "/limits", {{"slew_N_per_s", slew}}), modulus));
   }
-  list.push_back({"stiffness and delay", "200 kPa, 5 periods", soft_and_late, {}, {}});
   return list;
 }
 
@@ -435,7 +440,7 @@ HazardRow row_of(const Hazard& hazard, bool accepted, const HazardBounds& bounds
     const HilSession session = parse_session(hazard.session, "session", {});
     const LoopModel model = make_loop_model(session);
     const RenderingCheck rendering = check_rendering(session, *model.model, model, "virtual");
-    row.passive = rendering.passive() && rendering.within_device();
+    row.passive = rendering.passive() && rendering.within_device() && rendering.follows_encoder();
     if (!rendering.acceptable() && !accepted) {
       row.refused = rendering.verdict();
       return;

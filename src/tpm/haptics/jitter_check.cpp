@@ -152,6 +152,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   check.late_limit = like.servo.most_late;
   check.missed_limit = like.servo.most_missed;
   DevicePreparation preparation = session.preparation;
+  preparation.period_s = session.servo.period_s;
   preparation.may_move = choice.may_move;
   preparation.take_as_ready = choice.take_as_ready;
   preparation.interrupted = interrupted;

@@ -56,6 +56,12 @@ void LawContact::reset() noexcept {
   depth_m_ = kernel_m_ = 0.0;
 }
 
+void LawContact::take_over(double depth_m, double relaxed_kernel_m) noexcept {
+  depth_m_ = depth_m;
+  kernel_m_ = law_.kernel.value(std::max(depth_m, 0.0));
+  y_.setConstant(kernel_m_ - relaxed_kernel_m);
+}
+
 ContactAnswer LawContact::step(const ToolPose& tool) noexcept {
   const double depth = tool.displacement_m.z();
   const double u = std::max(depth, 0.0);

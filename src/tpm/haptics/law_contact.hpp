@@ -46,6 +46,20 @@ class LawContact final : public ContactModel {
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
 
+  /// Depth of the surface after the last step, m; 0 or more in contact.
+  [[nodiscard]] double depth_m() const noexcept { return depth_m_; }
+  /// V - y_j: the kernel displacement that each branch has relaxed to, m.
+  [[nodiscard]] Eigen::VectorXd relaxed_kernel_m() const {
+    return (kernel_m_ - y_.array()).matrix();
+  }
+  /// Stiffness of each branch, N/m.
+  [[nodiscard]] const Eigen::VectorXd& branch_stiffness_N_per_m() const noexcept {
+    return law_.memory.stiffness;
+  }
+  /// Goes on from another state: the surface at a depth, all branches relaxed to one kernel
+  /// displacement. Neither allocates nor throws.
+  void take_over(double depth_m, double relaxed_kernel_m) noexcept;
+
   /// Shortest and longest relaxation time of what relaxes, s; empty if nothing does.
   [[nodiscard]] std::vector<double> relaxation_times_s() const;
 

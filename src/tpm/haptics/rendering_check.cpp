@@ -95,6 +95,14 @@ std::string RenderingCheck::verdict() const {
     return fmt::format("too stiff for the device: {}; at most {} N/m", what,
                        significant(largest_N_per_m, 3));
   }
+  if (!follows_encoder()) {
+    return fmt::format(
+        "the rise of the force is limited too much: {}; a step of the encoder ({} mm) makes {} N, "
+        "limits/slew_N_per_s allows {} N within a period and has to be {} at least",
+        what, significant(1e3 * encoder_step_m, 2),
+        significant(stiffness_N_per_m * encoder_step_m, 3), significant(rise_N, 3),
+        significant(stiffness_N_per_m * encoder_step_m * rate_Hz, 3));
+  }
   if (!passive()) {
     return fmt::format(
         "stable with the operator's arm (up to {} N/m), not passive: {}; passive with every "
@@ -108,13 +116,19 @@ std::string RenderingCheck::verdict() const {
 
 RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                                const LoopModel& loop, std::string_view kind) {
-  const DeviceLimits& limits = limits_of(kind);
+  return check_rendering(session, model, loop, limits_of(kind));
+}
+
+RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
+                               const LoopModel& loop, const DeviceLimits& limits) {
   const bool hardware = limits.hardware();
   RenderingCheck check;
   check.rate_Hz = 1.0 / session.servo.period_s;
   check.delay_periods = hardware ? limits.delay_periods : session.plant.delay_periods;
   check.friction_N_s_per_m = hardware ? limits.friction_N_s_per_m : session.plant.damping_N_s_per_m;
   check.largest_N_per_m = limits.stiffness_N_per_m;
+  check.encoder_step_m = hardware ? limits.encoder_step_m : session.plant.encoder_step_m;
+  check.rise_N = session.servo.slew_limit_N_per_s * session.servo.period_s;
   find_stiffness(check, session, model, loop.push);
 
   const double period_s = session.servo.period_s;
@@ -148,6 +162,7 @@ Json to_json(const RenderingCheck& check) {
           {"stable", check.stable()},
           {"passive", check.passive()},
           {"within_device", check.within_device()},
+          {"follows_encoder", check.follows_encoder()},
           {"rate_Hz", rounded(check.rate_Hz, kDigits)},
           {"delay_periods", check.delay_periods},
           {"friction_N_s_per_m", rounded(check.friction_N_s_per_m, kDigits)},

@@ -5,6 +5,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/device/device_limits.hpp"
 #include "tpm/device/force_dimension.hpp"
+#include "tpm/device/plugin_device.hpp"
 #include "tpm/device/replay_device.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/store/row_log.hpp"
@@ -66,16 +67,30 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
   }
   if (rendering.acceptable() || options.accept_unstable || choice.kind == "replay") return;
   throw Error(ExitCode::answer_is_no, "stability", rendering.verdict(),
-              "a softer tissue, a higher rate or a shorter delay; --accept-unstable with --device "
+              "a softer tissue, a higher rate, a shorter delay or a faster rise; --accept-unstable "
+              "with --device "
               "virtual");
 }
 
+std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
+  if (choice.plugin.empty()) {
+    throw Error(ExitCode::usage, "--device plugin", "no plugin is named",
+                "--plugin FILE, a shared library after tpmkit/haptic_device.h");
+  }
+  return std::make_shared<PluginDevice>(choice.plugin, choice.which);
+}
+
 }  // namespace
+
+DeviceLimits limits_of(const DeviceChoice& choice) {
+  return choice.kind == "plugin" ? plugin_of(choice)->limits() : limits_of(choice.kind);
+}
 
 std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilSession& session) {
   if (choice.kind == "virtual") {
     return std::make_shared<VirtualOmega7>(session.plant, session.operator_script());
   }
+  if (choice.kind == "plugin") return plugin_of(choice);
   if (limits_of(choice.kind).hardware()) {
     return std::make_shared<ForceDimension>(choice.library, choice.kind, choice.which);
   }
@@ -108,14 +123,16 @@ ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
 
 SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                        const SessionRunOptions& options) {
-  require_within(session, limits_of(choice.kind));
+  const DeviceLimits limits = limits_of(choice);
+  require_within(session, limits);
   SessionRun run;
   run.model = make_loop_model(session, options.real_time, options.planning);
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
-  run.rendering = check_rendering(session, *stepped, run.model, choice.kind);
+  run.rendering = check_rendering(session, *stepped, run.model, limits);
   require_acceptable(run.rendering, choice, options);
   const std::shared_ptr<HapticDevice> device = make_device(choice, session);
   DevicePreparation preparation = session.preparation;
+  preparation.period_s = session.servo.period_s;
   preparation.may_move = choice.may_move;
   preparation.take_as_ready = choice.take_as_ready;
   preparation.interrupted = options.interrupted;

@@ -10,13 +10,17 @@ namespace tpm {
 
 /// Which device, and what it may do.
 struct DeviceChoice {
-  std::string kind = "virtual";   ///< as limits_of() takes it
+  std::string kind = "virtual";   ///< as limits_of() takes it, or "plugin"
   std::filesystem::path library;  ///< of the vendor; empty: looked for
   std::filesystem::path replay;   ///< recording to be replayed
+  std::filesystem::path plugin;   ///< of the kind "plugin": its shared library
   DeviceSelection which;
   bool may_move = false;
   bool take_as_ready = false;
 };
+
+/// What may be asked of it; a plugin is loaded and asked. Throws as make_device().
+[[nodiscard]] DeviceLimits limits_of(const DeviceChoice& choice);
 
 /// Throws Error(usage) for an unknown kind, Error(environment) if it cannot be had.
 [[nodiscard]] std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice,

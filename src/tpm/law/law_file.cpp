@@ -87,6 +87,10 @@ LawFile law_from_json(const Json& json, std::string_view where) {
   if (const char* key = fitted_to_key(law.spec); json.contains(key)) {
     law.fitted_to = json.at(key).get<double>();
   }
+  if (json.contains("fit")) {
+    law.uncertainty =
+        uncertainty_from_json(json.at("fit"), law.spec, law.values, fmt::format("{}: fit", where));
+  }
   return law;
 }
 
@@ -104,6 +108,7 @@ Json to_json(const LawFile& law) {
   json["provenance"] = provenance_name(law.provenance);
   if (law.fitted_to) json[fitted_to_key(law.spec)] = *law.fitted_to;
   if (!law.note.empty()) json["note"] = law.note;
+  if (law.uncertainty) json["fit"] = to_json(*law.uncertainty, law.spec);
   return json;
 }
 

@@ -6,6 +6,7 @@
 
 #include "tpm/curve/curve.hpp"
 #include "tpm/law/law.hpp"
+#include "tpm/law/law_uncertainty.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm {
@@ -18,6 +19,8 @@ struct LawFile {
   std::string note;
   /// Largest depth (or relative length less the slack) of the data that it was fitted to, > 0.
   std::optional<double> fitted_to = std::nullopt;
+  /// What the fit knows about the parameters: the block "fit" of the file.
+  std::optional<LawUncertainty> uncertainty = std::nullopt;
 };
 
 /// The key of a parameter in files: name and SI unit, "k_inf_N_per_m", "tau1_s", "alpha".

@@ -12,6 +12,7 @@
 namespace tpm {
 namespace {
 
+constexpr std::size_t kPartsKept = 4;
 constexpr double kTouch_m = 1e-14;  // a gap that is none: above the rounding of positions
 
 /// The formulations that take every material.
@@ -149,8 +150,34 @@ const BondSystem::Graph& BondSystem::graph() const {
   return *graph_->graph;
 }
 
+std::shared_ptr<const BondSystem::PartGraph> BondSystem::part_graph(
+    const std::vector<bool>& without) const {
+  const std::scoped_lock lock(graph_->part_guard);
+  auto& kept = graph_->part;
+  const auto known = std::find_if(kept.begin(), kept.end(),
+                                  [&](const auto& part) { return part.first == without; });
+  if (known != kept.end()) {
+    std::rotate(known, known + 1, kept.end());
+    return kept.back().second;
+  }
+  std::vector<std::array<std::uint32_t, 2>> edges;
+  const auto has_part = [&](std::size_t i) { return !without[end_a_[i]] && !without[end_b_[i]]; };
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (has_part(i)) edges.push_back({end_a_[i], end_b_[i]});
+  }
+  PartGraph part{BlockPattern(spheres_, edges), {}};
+  part.place.resize(size());
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (has_part(i)) part.place[i] = part.pattern.place(end_a_[i], end_b_[i]);
+  }
+  if (kept.size() == kPartsKept) kept.erase(kept.begin());
+  kept.emplace_back(without, std::make_shared<const PartGraph>(std::move(part)));
+  return kept.back().second;
+}
+
 BondSystem BondSystem::with_tools(std::size_t tools, std::span<const ToolContact> contacts) const {
   BondSystem other = *this;
+  if (tools == 0 && contacts.empty() && contacts_.empty()) return other;
   other.spheres_ += tools;
   other.contacts_.assign(contacts.begin(), contacts.end());
   other.graph_ = std::make_shared<LazyGraph>();

@@ -177,6 +177,16 @@ class BondSystem {
   [[nodiscard]] const BlockPattern& pattern() const { return graph().pattern; }
   [[nodiscard]] BlockPattern::Place place(std::size_t bond) const { return graph().place[bond]; }
 
+  /// The same without the bonds of some spheres, for factorisations: what is held has no part in
+  /// them.
+  struct PartGraph {
+    BlockPattern pattern;  ///< of all spheres; those left out have no neighbours
+    std::vector<std::optional<BlockPattern::Place>> place;  ///< none for a bond left out
+  };
+  /// The latest few are kept, for this system and its copies.
+  /// @param without for each sphere, whether its bonds are left out
+  [[nodiscard]] std::shared_ptr<const PartGraph> part_graph(const std::vector<bool>& without) const;
+
  private:
   /// How a bond lies.
   struct Line {
@@ -209,6 +219,9 @@ class BondSystem {
   struct LazyGraph {
     std::once_flag once;
     std::optional<Graph> graph;
+    std::mutex part_guard;
+    /// The latest last.
+    std::vector<std::pair<std::vector<bool>, std::shared_ptr<const PartGraph>>> part;
   };
   [[nodiscard]] const Graph& graph() const;
 

@@ -5,12 +5,12 @@
 namespace tpm {
 
 DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom,
-                           const Probes& probes, Drive drive)
+                           const Probes& probes, Drive drive, EquilibriumOptions options)
     : bonds_(bonds),
       rest_(std::move(rest)),
       freedom_(std::move(freedom)),
       drive_(drive),
-      equilibrium_(bonds_, freedom_) {
+      equilibrium_(bonds_, freedom_, options) {
   double shares = 0.0;
   for (const Probe& probe : probes) shares += probe.share;
   for (const Probe& probe : probes) {

@@ -30,7 +30,7 @@ class DrivenTissue {
  public:
   /// Throws Error(bad_input) if what an imposed depth drives touches nothing at rest.
   DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom, const Probes& probes,
-               Drive drive);
+               Drive drive, EquilibriumOptions options = {});
   DrivenTissue(const DrivenTissue&) = delete;
   DrivenTissue& operator=(const DrivenTissue&) = delete;
 

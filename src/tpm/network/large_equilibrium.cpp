@@ -100,10 +100,12 @@ void LargeEquilibrium::prepare() {
   ++work_.preconditioners;
 }
 
-TangentAnswer LargeEquilibrium::solve(const Positions& position, const BondMemory& memory,
-                                      Eigen::Matrix3Xd& vectors, double tolerance) {
+void LargeEquilibrium::assemble(const Positions& position, const BondMemory& memory) {
   stiffness_.assemble(position, memory);
   prepare();
+}
+
+TangentAnswer LargeEquilibrium::displace(Eigen::Matrix3Xd& vectors, double tolerance) {
   freedom_.project(vectors);
   Eigen::Matrix3Xd x;
   const GradientsOutcome outcome = conjugate_gradients(
@@ -119,6 +121,20 @@ TangentAnswer LargeEquilibrium::solve(const Positions& position, const BondMemor
   return answer_of(outcome.end);
 }
 
+TangentAnswer LargeEquilibrium::probe() {
+  const GradientsOutcome outcome =
+      probe_definiteness(stiffness_.matrix(), *preconditioner_, options_.probe_tolerance,
+                         options_.most_iterations, options_.probe_seed);
+  work_.probe_iterations += outcome.iterations;
+  return answer_of(outcome.end);
+}
+
+TangentAnswer LargeEquilibrium::solve(const Positions& position, const BondMemory& memory,
+                                      Eigen::Matrix3Xd& vectors, double tolerance) {
+  assemble(position, memory);
+  return displace(vectors, tolerance);
+}
+
 EquilibriumSearch LargeEquilibrium::find(Positions& position, const BondMemory& memory,
                                          const Eigen::Matrix3Xd& load, double tolerance_N) {
   Forcing forcing(tolerance_N);
@@ -129,14 +145,10 @@ EquilibriumSearch LargeEquilibrium::find(Positions& position, const BondMemory& 
   EquilibriumSearch search =
       newton_balance(bonds_, freedom_, position, memory, load, tolerance_N, step);
   if (!search.converged || !search.stable) return search;
-  stiffness_.assemble(position, memory);
-  prepare();
-  const GradientsOutcome probe =
-      probe_definiteness(stiffness_.matrix(), *preconditioner_, options_.probe_tolerance,
-                         options_.most_iterations, options_.probe_seed);
-  work_.probe_iterations += probe.iterations;
-  search.stable = probe.end != GradientsEnd::not_definite;
-  search.converged = probe.end != GradientsEnd::unfinished;  // an equilibrium nobody judged
+  assemble(position, memory);
+  const TangentAnswer answer = probe();
+  search.stable = answer != TangentAnswer::not_definite;
+  search.converged = answer != TangentAnswer::failed;  // an equilibrium nobody judged
   return search;
 }
 

@@ -56,6 +56,13 @@ class LargeEquilibrium {
   [[nodiscard]] TangentAnswer solve(const Positions& position, const BondMemory& memory,
                                     Eigen::Matrix3Xd& vectors, double tolerance);
 
+  /// Assembles the stiffness at a position, for displace() and probe().
+  void assemble(const Positions& position, const BondMemory& memory);
+  /// As solve(), with the stiffness assembled last.
+  [[nodiscard]] TangentAnswer displace(Eigen::Matrix3Xd& vectors, double tolerance);
+  /// Looks for negative stiffness in the matrix assembled last.
+  [[nodiscard]] TangentAnswer probe();
+
   [[nodiscard]] const LargeEquilibriumWork& work() const { return work_; }
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Freedom& freedom() const { return freedom_; }

@@ -59,7 +59,7 @@ class Run {
         options_(options),
         times_s_(times_s),
         observer_(observer),
-        tissue_(bonds, rest, freedom, probes, protocol.drive()),
+        tissue_(bonds, rest, freedom, probes, protocol.drive(), options.equilibrium),
         stages_(tissue_, options.stages, !options.step_s) {
     order_ = rising_order(times_s);
     const auto asked = static_cast<Eigen::Index>(times_s.size());
@@ -88,6 +88,7 @@ class Run {
     const int rejected = result_.work.rejected;
     result_.work = stages_.work();
     result_.work.rejected = rejected;
+    result_.solver = tissue_.equilibrium().choice();
     if (options_.energies) result_.energy = energy_of(state_, energy_);
     result_.position = state_.position;
     result_.viscous = state_.viscous;
@@ -280,6 +281,7 @@ class Run {
 
   /// Answers the times asked for within the step just found, its end left out.
   void report_within(double h, double rate) {
+    Spent spent{0.0, energy_};
     std::array<double, kLanes> fractions{};
     for (;;) {
       std::size_t count = 0;
@@ -289,31 +291,43 @@ class Run {
         fractions[count++] = std::max((time - state_.time_s) / h, 0.0);
       }
       if (count == 0) return;
+      const std::span<const double> asked(fractions.data(), count);
       if (tangents_) {
-        const Eigen::MatrixXd rows =
-            tangents_->responses_within(state_, {fractions.data(), count}, h, rate);
+        const Eigen::MatrixXd rows = tangents_->responses_within(state_, asked, h, rate);
         for (std::size_t i = 0; i < count; ++i) {
           derivative_row(next_ + i) = rows.row(static_cast<Eigen::Index>(i));
         }
       }
-      const LaneVector responses =
-          stages_.responses_within(state_, {fractions.data(), count}, h, rate);
-      for (std::size_t i = 0; i < count; ++i) {
-        const double response = responses[static_cast<Eigen::Index>(i)];
-        observer_ ? show_within(response, fractions[i], h, rate) : put(response);
+      const LaneVector responses = stages_.responses_within(state_, asked, h, rate);
+      if (observer_) {
+        show_within(responses, asked, h, rate, spent);
+        continue;
       }
+      for (std::size_t i = 0; i < count; ++i) put(responses[static_cast<Eigen::Index>(i)]);
     }
   }
 
-  /// A response within the step just found, with the state there.
-  void show_within(double response, double fraction, double h, double rate) {
-    QuasiStaticEnergy spent = energy_;
-    if (options_.energies) {
-      const QuasiStaticEnergy part = stages_.energy_of_step(state_, h, rate, fraction);
-      spent.work_J += part.work_J;
-      spent.dissipated_J += part.dissipated_J;
+  /// Work and heat from the start of the run up to a fraction of a step.
+  struct Spent {
+    double fraction;
+    QuasiStaticEnergy energy;
+  };
+
+  /// Responses within the step just found, with the states there.
+  /// @param fractions rising
+  void show_within(const LaneVector& responses, std::span<const double> fractions, double h,
+                   double rate, Spent& spent) {
+    const std::vector<TissueState> states = stages_.states_within(state_, fractions, h, rate);
+    for (std::size_t i = 0; i < fractions.size(); ++i) {
+      if (options_.energies && fractions[i] > spent.fraction) {
+        const QuasiStaticEnergy part =
+            stages_.energy_of_step(state_, h, rate, spent.fraction, fractions[i]);
+        spent.energy.work_J += part.work_J;
+        spent.energy.dissipated_J += part.dissipated_J;
+        spent.fraction = fractions[i];
+      }
+      put(responses[static_cast<Eigen::Index>(i)], states[i], spent.energy);
     }
-    put(response, stages_.state_within(state_, fraction, h, rate), spent);
   }
 
   /// The last value held for as long as is asked, and for ever.

@@ -71,7 +71,8 @@ struct QuasiStaticOptions {
   std::optional<double> step_s = std::nullopt;
   /// If given, a run that takes more iterations throws Error(numerical).
   std::optional<int> most_iterations = std::nullopt;
-  bool energies = false;                          ///< work and dissipation are integrated along
+  bool energies = false;  ///< work and dissipation are integrated along
+  EquilibriumOptions equilibrium = {.solver = StiffnessSolver::automatic};
   std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
   /// What is left unbalanced of a derivative, as `tolerance`; none: that.
   std::optional<double> derivative_tolerance = std::nullopt;
@@ -111,6 +112,7 @@ struct QuasiStaticRun {
   Eigen::MatrixXd derivative;   ///< of each response (row) along each direction (column)
   double error_estimate = 0.0;  ///< sum of the steps' error estimates, N or m
   QuasiStaticWork work;
+  SolverChoice solver;
   std::optional<QuasiStaticEnergy> energy;  ///< if asked for
   Positions position;                       ///< where the run ended
   Eigen::MatrixXd viscous;                  ///< m_j by (bond, branch) there, m

@@ -9,6 +9,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/network/local_support.hpp"
+#include "tpm/network/stiffness_blocks.hpp"
 
 namespace tpm {
 namespace {
@@ -27,10 +28,12 @@ BlockMatrix shifted(const BlockMatrix& stiffness, const Freedom& freedom, double
   return matrix;
 }
 
-double mean_diagonal(const BlockMatrix& matrix) {
+double mean_diagonal(const BondSystem& bonds, const Positions& rest, const BondMemory& memory) {
   double sum = 0.0;
-  for (const Eigen::Matrix3d& block : matrix.diagonal) sum += block.trace();
-  return sum / (3.0 * static_cast<double>(matrix.diagonal.size()));
+  for (std::size_t i = 0; i < bonds.size(); ++i) {
+    sum += 2.0 * bonds.stiffness_block(i, rest, memory).trace();
+  }
+  return sum / (3.0 * static_cast<double>(bonds.spheres()));
 }
 
 /// An orthonormal basis of the softest motions, one column each, coordinates of all spheres.
@@ -74,14 +77,13 @@ std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::si
 ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
                                   const Freedom& freedom) {
   const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
-  BlockMatrix stiffness(bonds.pattern());
-  bonds.add_stiffness(rest, none, stiffness);
-  const double mean = mean_diagonal(stiffness);
+  StiffnessBlocks blocks(bonds, freedom);
+  const BlockMatrix& stiffness = blocks.assemble(rest, none);
+  const double mean = mean_diagonal(bonds, rest, none);
   const double size = mean > 0.0 ? mean : 1.0;
-  freedom.constrain(bonds, stiffness);
 
   ZeroEnergyModes modes;
-  BlockLdlt factor(bonds.pattern());
+  BlockLdlt factor(blocks.pattern());
   if (!factor.factorise(shifted(stiffness, freedom, -kZero * size))) {
     throw Error(ExitCode::numerical, "network", "the stiffness at rest cannot be factorised");
   }
@@ -89,7 +91,7 @@ ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest
   if (modes.count == 0) return modes;
   const auto found = static_cast<Eigen::Index>(std::min(modes.count, kMostModes));
   modes.spheres = spheres_that_move(
-      softest(bonds.pattern(), shifted(stiffness, freedom, kZero * size), freedom, found),
+      softest(blocks.pattern(), shifted(stiffness, freedom, kZero * size), freedom, found),
       freedom.size());
   return modes;
 }

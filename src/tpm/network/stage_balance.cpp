@@ -23,6 +23,7 @@ constexpr Eigen::Index kMemoryDepth = 6;
 constexpr double kLongestMove = 0.25;    // of a bond
 constexpr double kSnap = 2.0;            // times what the stiffness says
 constexpr double kGrains = 8.0;          // roundings of a coordinate that no balance gets below
+constexpr double kLongPart = 0.25;       // of a step: its quadrature takes 16 points instead of 8
 constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the force
 
 std::vector<double> with_start(std::vector<double> nodes) {
@@ -53,7 +54,7 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
       bonds_(tissue.bonds()),
       full_(with_start(radau_nodes(stages))),
       inner_(radau_nodes(stages)),
-      factor_(tissue.bonds().pattern()),
+      factor_(tissue.equilibrium()),
       anderson_(coordinates_ * kLanes, kMemoryDepth),
       x_(kLanes, coordinates_),
       d_(kLanes, coordinates_),
@@ -286,7 +287,7 @@ bool StageBalance::refactorise(const TissueState& state, const Following& follow
   Equilibrium& equilibrium = tissue_.equilibrium();
   factorised_ = equilibrium.factorise(state.position, memory) && equilibrium.is_stable();
   if (!factorised_) return false;
-  factor_.copy(equilibrium.factor());
+  factor_.take();
   const DrivenTissue::UnitField field = tissue_.unit_field(state, memory);
   path_stiffness_ = field.stiffness;
   lane_field_ = by_coordinate(field.displacement);
@@ -551,9 +552,10 @@ LaneVector StageBalance::responses_within(const TissueState& state,
   return responses(within(state, fractions, h, rate));
 }
 
-TissueState StageBalance::state_within(const TissueState& state, double fraction, double h,
-                                       double rate) {
-  Within states = within(state, {&fraction, 1}, h, rate);
+std::vector<TissueState> StageBalance::states_within(const TissueState& state,
+                                                     std::span<const double> fractions, double h,
+                                                     double rate) {
+  Within states = within(state, fractions, h, rate);
   force_.setZero();
   tissue_.add_load(states.imposed, force_);
   bonds_.add_forces(states.position, states.memory, force_);
@@ -561,17 +563,21 @@ TissueState StageBalance::state_within(const TissueState& state, double fraction
   d_ = force_;
   factor_.solve(d_);
   tissue_.freedom().project(d_);
-  ++work_.back_solves;
-  TissueState at = state;
-  at.time_s += fraction * h;
-  at.imposed = states.imposed[0];
-  const Eigen::RowVectorXd place = states.position.row(0) + d_.row(0);
-  at.position = Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3);
-  tissue_.bonds().followed(at.position, at.followed);
+  std::vector<TissueState> all(fractions.size(), state);
   Eigen::MatrixXd viscous;
-  viscous_in_lane(states.weights, followed_, begin_, 0, viscous);
-  put_viscous(viscous, at);
-  return at;
+  for (std::size_t lane = 0; lane < fractions.size(); ++lane) {
+    const auto row = static_cast<Eigen::Index>(lane);
+    TissueState& at = all[lane];
+    ++work_.back_solves;
+    at.time_s += fractions[lane] * h;
+    at.imposed = states.imposed[row];
+    const Eigen::RowVectorXd place = states.position.row(row) + d_.row(row);
+    at.position = Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3);
+    tissue_.bonds().followed(at.position, at.followed);
+    viscous_in_lane(states.weights, followed_, begin_, row, viscous);
+    put_viscous(viscous, at);
+  }
+  return all;
 }
 
 LaneVector StageBalance::heat_W(const Within& states) const {
@@ -599,30 +605,44 @@ LaneVector StageBalance::heat_W(const Within& states) const {
 }
 
 QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double h, double rate,
-                                               double until) {
-  using Rule = boost::math::quadrature::gauss<double, 2 * kLanes>;
+                                               double from, double until) {
+  using Long = boost::math::quadrature::gauss<double, 2 * kLanes>;
+  using Short = boost::math::quadrature::gauss<double, kLanes>;
   QuasiStaticEnergy energy;
   double response_integral = 0.0;  // over the imposed value
-  for (const double side : {-1.0, 1.0}) {
-    std::array<double, kLanes> fractions{};
-    LaneVector weight;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const auto i = static_cast<std::size_t>(lane);
-      fractions[i] = 0.5 * until * (1.0 + side * Rule::abscissa()[i]);
-      weight[lane] = 0.5 * until * h * Rule::weights()[i];
-    }
+  const double half = 0.5 * (until - from);
+  std::array<double, kLanes> fractions{};
+  LaneVector weight;
+  const auto add = [&] {
     const Within states = within(state, fractions, h, rate);
     response_integral += rate * weight.dot(responses(states));
     energy.dissipated_J += weight.dot(heat_W(states));
+  };
+  const auto put = [&](std::size_t lane, double abscissa, double share) {
+    fractions[lane] = from + half * (1.0 + abscissa);
+    weight[static_cast<Eigen::Index>(lane)] = half * h * share;
+  };
+  if (until - from > kLongPart) {
+    for (const double side : {-1.0, 1.0}) {
+      for (std::size_t i = 0; i < kLanes; ++i)
+        put(i, side * Long::abscissa()[i], Long::weights()[i]);
+      add();
+    }
+  } else {
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const double side = i % 2 == 0 ? -1.0 : 1.0;
+      put(i, side * Short::abscissa()[i / 2], Short::weights()[i / 2]);
+    }
+    add();
   }
   if (tissue_.depth_driven()) {
     energy.work_J = response_integral;
   } else {
     // The integral of F du, by parts.
-    const std::array<double, 2> ends{0.0, until};
+    const std::array<double, 2> ends{from, until};
     const LaneVector depth = responses_within(state, ends, h, rate);
-    energy.work_J = (state.imposed + until * h * rate) * depth[1] - state.imposed * depth[0] -
-                    response_integral;
+    energy.work_J = (state.imposed + until * h * rate) * depth[1] -
+                    (state.imposed + from * h * rate) * depth[0] - response_integral;
   }
   return energy;
 }

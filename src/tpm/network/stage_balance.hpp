@@ -6,9 +6,9 @@
 
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/lane_bonds.hpp"
+#include "tpm/network/lane_stiffness.hpp"
 #include "tpm/solve/anderson.hpp"
 #include "tpm/solve/exponential_collocation.hpp"
-#include "tpm/solve/lane_factor.hpp"
 
 namespace tpm {
 
@@ -62,12 +62,15 @@ class StageBalance {
   [[nodiscard]] LaneVector responses_within(const TissueState& state,
                                             std::span<const double> fractions, double h,
                                             double rate);
-  /// The tissue at one fraction of the step just balanced; its forces are balanced once more there.
-  [[nodiscard]] TissueState state_within(const TissueState& state, double fraction, double h,
-                                         double rate);
-  /// Work done and heat made up to a fraction of the step just balanced, by Gauss quadrature.
+  /// The tissue at fractions of the step just balanced; its forces are balanced once more there,
+  /// for all fractions at once.
+  /// @param fractions in [0, 1], at most kLanes of them
+  [[nodiscard]] std::vector<TissueState> states_within(const TissueState& state,
+                                                       std::span<const double> fractions, double h,
+                                                       double rate);
+  /// Work done and heat made between two fractions of the step just balanced, by Gauss quadrature.
   [[nodiscard]] QuasiStaticEnergy energy_of_step(const TissueState& state, double h, double rate,
-                                                 double until = 1.0);
+                                                 double from = 0.0, double until = 1.0);
   /// Moves the state to the end of the step just balanced.
   void accept(TissueState& state, double h, double rate);
 
@@ -165,7 +168,7 @@ class StageBalance {
   Places stage_places_;           ///< of full_, where the lanes stand
   std::array<double, kLanes> lane_nodes_{};
   Places judge_full_, judge_inner_;  ///< where the error is judged
-  LaneFactor factor_;
+  LaneStiffness factor_;
   Anderson anderson_;
   QuasiStaticWork work_;
   double scale_ = 0.0;

@@ -48,7 +48,7 @@ class Bench {
         bonds_(network_, TpmParameters{}),
         freedom_(network_.organ.size()),
         equilibrium_(bonds_, freedom_),
-        factor_(bonds_.pattern()),
+        factor_(equilibrium_.pattern()),
         memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0, {}} {
     const Eigen::RowVectorXd height = network_.organ.position.row(2);
     const double middle = height.mean();
@@ -73,19 +73,19 @@ class Bench {
 
   [[nodiscard]] double factor_product_s(double stiffness_s) {
     const double whole = time_of([&] { (void)equilibrium_.factorise(rest(), memory_); });
-    const auto products = static_cast<double>(bonds_.pattern().factor_products());
+    const auto products = static_cast<double>(equilibrium_.pattern().factor_products());
     return std::max(whole - stiffness_s * bonds(), 0.1 * whole) / products;
   }
 
   [[nodiscard]] double solve_block_s() {
     (void)equilibrium_.factorise(rest(), memory_);
     Eigen::Matrix3Xd x = Eigen::Matrix3Xd::Ones(3, rest().cols());
-    return time_of([&] { equilibrium_.factor().solve(x); }) / solved_blocks();
+    return time_of([&] { equilibrium_.factor()->solve(x); }) / solved_blocks();
   }
 
   [[nodiscard]] double lane_block_s() {
     (void)equilibrium_.factorise(rest(), memory_);
-    factor_.copy(equilibrium_.factor());
+    factor_.copy(*equilibrium_.factor());
     LaneMatrix x = LaneMatrix::Ones(kLanes, 3 * rest().cols());
     return time_of([&] { factor_.solve(x); }) / solved_blocks();
   }
@@ -177,7 +177,7 @@ class Bench {
   [[nodiscard]] const Positions& rest() const { return network_.organ.position; }
   [[nodiscard]] double bonds() const { return static_cast<double>(bonds_.size()); }
   [[nodiscard]] double solved_blocks() const {
-    const BlockPattern& pattern = bonds_.pattern();
+    const BlockPattern& pattern = equilibrium_.pattern();
     return 2.0 * static_cast<double>(pattern.factor_blocks()) +
            static_cast<double>(pattern.nodes());
   }

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "tpm/core/error.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/oscillation.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_csv.hpp"
@@ -231,6 +232,10 @@ std::vector<std::string> write_fit_report(const std::filesystem::path& folder,
   }
   figures.push_back(waterfall_figure(fit));
   std::vector<std::string> files = write_fit_csv(folder, fit);
+  if (!no_law_because(fit.config)) {
+    files.push_back("law.json");
+    write_law(folder / files.back(), fitted_law(fit));
+  }
   for (std::string& name : write_figures(folder, figures)) files.push_back(std::move(name));
   return files;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpm/law/law_file.hpp"
 #include "tpm/law/law_model.hpp"
 #include "tpm/report/draw.hpp"

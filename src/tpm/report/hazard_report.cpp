@@ -90,4 +90,48 @@ std::string hazard_text(const HazardStudy& study) {
   return text;
 }
 
+Json clock_hazard_json(const ClockHazardStudy& study) {
+  Json rows = Json::array();
+  for (const ClockHazardRow& row : study.rows) {
+    const bool stopped_by_it = row.expected != StopCause::finished;
+    rows.push_back(
+        {{"hazard", row.hazard},
+         {"setting", row.setting},
+         {"cause", word_of(row.cause)},
+         {"expected_cause", word_of(row.expected)},
+         {"missed_periods_at_once", row.missed_at_once},
+         {"largest_force_N", rounded(row.largest_force_N, kHazardDigits)},
+         {"to_zero_force_s", stopped_by_it ? Json(rounded(row.to_zero_s, kHazardDigits)) : Json()},
+         {"to_zero_force_bound_s", stopped_by_it ? Json(row.bound_s) : Json()},
+         {"tries", row.tries},
+         {"within_bounds", row.within}});
+  }
+  return {{"simulated_device", true},       {"scheduling", study.scheduling},
+          {"most_tries", study.most_tries}, {"force_limit_N", study.force_limit_N},
+          {"safe", study.safe()},           {"rows", std::move(rows)}};
+}
+
+std::string clock_hazard_text(const ClockHazardStudy& study) {
+  std::string text = fmt::format(
+      "Hazards on the clock, on the simulated Omega.7 and operator: no hardware; {}\n\n"
+      "| hazard | setting | outcome | periods missed at once | largest force, N | from the fault "
+      "to forces off, ms | bound, ms | tries | within bounds |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+      study.scheduling);
+  for (const ClockHazardRow& row : study.rows) {
+    const bool stopped_by_it = row.expected != StopCause::finished;
+    text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", row.hazard, row.setting,
+                        word_of(row.cause), row.missed_at_once, significant(row.largest_force_N, 3),
+                        in(row.to_zero_s, 1e3, stopped_by_it), in(row.bound_s, 1e3, stopped_by_it),
+                        row.tries, row.within ? "yes" : "NO");
+  }
+  const auto within = std::count_if(study.rows.begin(), study.rows.end(),
+                                    [](const ClockHazardRow& row) { return row.within; });
+  return text + fmt::format(
+                    "\n{} of {} rows are within bounds: the end that belongs to the hazard, in "
+                    "time, no force above {} N, every missed period counted; other programs can "
+                    "stall a session as well, so a row is tried up to {} times\n",
+                    within, study.rows.size(), study.force_limit_N, study.most_tries);
+}
+
 }  // namespace tpm

@@ -1,6 +1,7 @@
 #pragma once
 #include <string>
 
+#include "tpm/haptics/clock_hazard_study.hpp"
 #include "tpm/haptics/hazard_study.hpp"
 #include "tpm/store/json.hpp"
 
@@ -10,5 +11,7 @@ namespace tpm {
 /// Markdown.
 [[nodiscard]] Json hazard_json(const HazardStudy& study);
 [[nodiscard]] std::string hazard_text(const HazardStudy& study);
+[[nodiscard]] Json clock_hazard_json(const ClockHazardStudy& study);
+[[nodiscard]] std::string clock_hazard_text(const ClockHazardStudy& study);
 
 }  // namespace tpm

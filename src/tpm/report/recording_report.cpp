@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpm/law/law_file.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_csv.hpp"
@@ -206,34 +207,6 @@ Figure waterfall_figure(const FitResult& fit) {
   add_if_any(panel, std::move(ends));
   figure.panels = {std::move(panel)};
   return figure;
-}
-
-LawFile fitted_law(const FitResult& fit) {
-  LawFile law;
-  law.spec = fit.config.law.value();
-  law.values = model_parameters(fit.config, fit.best.natural, 0);
-  law.provenance = Provenance::derived;
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  const auto place_of = [&](std::string_view name) {
-    const auto found = std::find_if(parameters.begin(), parameters.end(),
-                                    [&](const LawParameter& p) { return p.name == name; });
-    return static_cast<std::size_t>(found - parameters.begin());
-  };
-  for (const RecordingFit& recording : fit.recordings) {
-    const double contact =
-        model_parameters(fit.config, fit.best.natural, recording.choice)[place_of("contact")];
-    for (std::size_t i = 0; i < recording.drive.size(); ++i) {
-      if (!recording.fitted[i] || recording.drive[i] <= contact) continue;
-      law.fitted_to = std::max(law.fitted_to.value_or(0.0), recording.drive[i] - contact);
-    }
-  }
-  if (fit.config.data.size() > 1) {
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      if (parameters[i].nuisance) law.values[i] = 0.0;
-    }
-  }
-  law.note = fmt::format("fitted: {}", fit.config.title);
-  return law;
 }
 
 FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "tpm/law/law_file.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/study/selection.hpp"
 
@@ -19,10 +18,6 @@ namespace tpm {
 
 /// Deviances in which the starts ended, sorted.
 [[nodiscard]] Figure waterfall_figure(const FitResult& fit);
-
-/// The fitted law for law files, with contact point and offset if it was fitted to one recording;
-/// of several each has its own, and they are left out.
-[[nodiscard]] LawFile fitted_law(const FitResult& fit);
 
 /// The configuration with its data sets as a file in the folder finds them.
 [[nodiscard]] FitConfig seen_from(const std::filesystem::path& folder, FitConfig config);

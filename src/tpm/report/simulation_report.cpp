@@ -302,6 +302,27 @@ std::string equations_text(const ExperimentScene& scene, const SimulationRun& ru
       shortest(f.damping_ratio), significant(run.lowest_frequency_Hz, 4), shortest(f.tolerance));
 }
 
+/// How linear systems were solved.
+Json solver_json(const SolverChoice& solver) {
+  Json json{{"kind", solver.direct ? "direct" : "iterative"}};
+  if (solver.operations > 0.0) {
+    json["factor_operations"] = rounded(solver.operations, kSimulationDigits);
+    json["factor_bytes"] = solver.bytes;
+  }
+  return json;
+}
+
+/// Of a run that iterates.
+std::string solver_text(const SolverChoice& solver) {
+  std::string text = "linear systems are solved by conjugate gradients with multigrid";
+  if (solver.operations > 0.0) {
+    text +=
+        fmt::format(": a factorisation would take {} operations and {} GiB",
+                    significant(solver.operations, 3), significant(solver.bytes / 1073741824.0, 3));
+  }
+  return text + "\n";
+}
+
 }  // namespace
 
 Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
@@ -330,6 +351,7 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
   json["outputs"] = record.outputs.size();
   json["energy"] = energy_json(run);
   if (f.masses) json["motion"] = motion_json(scene, run);
+  if (run.solver) json["solver"] = solver_json(*run.solver);
   json["roughness"] = smoothness_json(smoothness_of(scene, record.outputs.back().position));
   json["error_estimate"] =
       f.kind == "quasi_static" ? Json(rounded(record.error_estimate, 3)) : Json(nullptr);
@@ -354,6 +376,7 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
   text += contacts_text(scene, network, run);
   text += equations_text(scene, run);
   if (scene.formulation.masses) text += motion_text(scene, run);
+  if (run.solver && !run.solver->direct) text += solver_text(*run.solver);
   if (run.resumed_at_s) {
     text += fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));
   }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tpm/formulation/formulation.hpp"
+#include "tpm/network/equilibrium.hpp"
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/protocol/protocol.hpp"
 #include "tpm/scene/scene.hpp"
@@ -24,7 +25,8 @@ struct FormulationChoice {
   bool mass_spring = false;  ///< the mass-spring model on the same spheres, not the tissue
   SpringRule springs = SpringRule::like_the_bonds;
   double tolerance = 1e-6;  ///< QuasiStaticOptions, InertialOptions, MethodSettings
-  std::string where = {};   ///< the block, for messages
+  StiffnessSolver solver = StiffnessSolver::automatic;  ///< without mass
+  std::string where = {};                               ///< the block, for messages
 
   /// The formulation chosen.
   [[nodiscard]] const Formulation& entry() const;

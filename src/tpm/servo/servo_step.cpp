@@ -105,6 +105,7 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
                .delay_periods = settings_.delay_periods,
                .allowance_J = settings_.energy_allowance_J}),
       oscillation_({.period_s = settings_.period_s}),
+      untrusted_periods_(settings_.untrusted_limit_s / settings_.period_s),
       stiffness_N_per_m_(stiffness_of(model, settings_)),
       least_stiffness_N_per_m_(stiffness_N_per_m_),
       late_(kLateWindow, 0) {
@@ -202,7 +203,7 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
   const Cap most = cap();
   const double from_m = tool_m_ - slip_m_;
   tool_m_ = settings_.push.dot(position_m_ - settings_.surface_m);
-  if (model_N_ == 0.0) slip_m_ = std::max(0.0, slip_m_ - recovery_m());
+  if (model_N_ == 0.0 && slip_m_ > 0.0) slip_m_ = std::max(0.0, slip_m_ - recovery_m());
   const double foretold_N =
       model_N_ + stiffness_N_per_m_ * (tool_m_ - slip_m_ - contact_.surface_m());
   if (foretold_N > most.force_N && !doubted_before_) {
@@ -289,25 +290,27 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
 /// The tissue's force and, once energy has been given away, damping; never above the limit.
 Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
   constexpr double kTolerated = 0.1;  // of what ends the session
-  const Eigen::Vector3d damping =
-      passivity_.damping_N(moved_m_, energy_.given_J() - kTolerated * settings_.energy_allowance_J);
+  sent_size_N_ = tissue_size_N_;
+  const double given_J = energy_.given_J() - kTolerated * settings_.energy_allowance_J;
+  if (!(given_J > 0.0)) return tissue_N_;
+  const Eigen::Vector3d damping = passivity_.damping_N(moved_m_, given_J);
   if (damping.isZero(0.0)) return tissue_N_;
   row.flags |= kDamped;
   Eigen::Vector3d force_N = tissue_N_ + damping;
-  const double size_N = force_N.norm();
-  if (size_N <= settings_.force_limit_N) return force_N;
+  sent_size_N_ = force_N.norm();
+  if (sent_size_N_ <= settings_.force_limit_N) return force_N;
   row.flags |= kForceLimited;
-  force_N *= settings_.force_limit_N / size_N;
+  force_N *= settings_.force_limit_N / sent_size_N_;
+  sent_size_N_ = settings_.force_limit_N;
   return force_N;
 }
 
 StopCause ServoStep::judge_rendering(int periods) noexcept {
   energy_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
-  if (settings_.watch_oscillation) oscillation_.observe(sent_N_.norm(), periods);
+  if (settings_.watch_oscillation) oscillation_.observe(sent_size_N_, periods);
   if (energy_.too_much()) return StopCause::energy;
   if (settings_.watch_oscillation && oscillation_.found()) return StopCause::oscillation;
-  const double limit = settings_.untrusted_limit_s / settings_.period_s;
-  return doubted_ > limit ? StopCause::untrusted : StopCause::none;
+  return doubted_ > untrusted_periods_ ? StopCause::untrusted : StopCause::none;
 }
 
 StopCause ServoStep::write(const Eigen::Vector3d& force_N, ServoRecord& row) noexcept {
@@ -344,6 +347,9 @@ bool ServoStep::storm(int missed) noexcept {
 }
 
 void ServoStep::count_limits(std::uint32_t flags) noexcept {
+  constexpr std::uint32_t kCounted =
+      kBeyondModel | kForceLimited | kSlipping | kRampingIn | kDamped;
+  if ((flags & kCounted) == 0) return;
   const auto count = [flags](ServoFlag flag) -> std::uint64_t {
     return (flags & flag) != 0 ? 1 : 0;
   };

@@ -129,6 +129,7 @@ class ServoStep {
   PassivityControl passivity_;
   EnergyWatch energy_;
   OscillationWatch oscillation_;
+  double untrusted_periods_;  ///< without trust, after which the session ends
   std::optional<StartGate> gate_;
   ServoCounts counts_;
   DeviceStatus status_;
@@ -136,6 +137,7 @@ class ServoStep {
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d moved_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d sent_N_ = Eigen::Vector3d::Zero();
+  double sent_size_N_ = 0.0;    ///< of sent_N_
   double tissue_size_N_ = 0.0;  ///< of tissue_N_
   int to_status_ = 0;           ///< cycles until the device is asked for its status
   Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, after slip and trust

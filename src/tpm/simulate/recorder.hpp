@@ -79,8 +79,9 @@ class Recorder {
 /// the states at the times of a part, and closes it.
 template <class RunPart>
 [[nodiscard]] SimulationRun run_in_parts(const ExperimentScene& scene, const RunNetwork& network,
-                                         const SimulationControls& controls, RunPart&& run_part) {
-  Recorder recorder(scene, network, controls, kRunParts);
+                                         const SimulationControls& controls, RunPart&& run_part,
+                                         std::size_t parts = kRunParts) {
+  Recorder recorder(scene, network, controls, parts);
   SimulationRun result;
   if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
   for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {

@@ -1,7 +1,7 @@
 #pragma once
 #include <functional>
-#include <stdexcept>
 
+#include "tpm/core/interrupted.hpp"
 #include "tpm/network/driven_network.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/scene/experiment_scene.hpp"
@@ -86,12 +86,7 @@ struct SimulationRun {
   std::optional<double> resumed_at_s;         ///< time of the checkpoint it went on from
   double lowest_frequency_Hz = 0.0;           ///< of an inertial run, of the tissue without tools
   std::optional<ContactCheck> contact_check;  ///< of an inertial run with tools
-};
-
-/// A run that was asked to stop; says where it stands.
-class Interrupted : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
+  std::optional<SolverChoice> solver;  ///< of a run without mass; none if a checkpoint held it all
 };
 
 /// Runs a scene by its formulation, which has to show whole states (StateRunner). A run with mass

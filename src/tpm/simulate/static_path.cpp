@@ -21,8 +21,8 @@ constexpr double kLeastBalance = 1e-13;  // of the force: below, rounding decide
 
 StaticPath::StaticPath(const BondSystem& bonds, Positions rest, double spacing_m,
                        const Freedom& freedom, const Probes& probes, Drive drive, double peak,
-                       double tolerance)
-    : tissue_(bonds, std::move(rest), freedom, probes, drive),
+                       double tolerance, EquilibriumOptions equilibrium)
+    : tissue_(bonds, std::move(rest), freedom, probes, drive, equilibrium),
       state_(tissue_.at_rest(0.0)),
       longest_move_m_(kLongestMove * spacing_m) {
   require_valid(probes, freedom);

@@ -1,7 +1,5 @@
 #include "tpm/solve/block_ldlt.hpp"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <stdexcept>
 
@@ -10,106 +8,137 @@
 namespace tpm {
 namespace {
 
-using Edge = std::array<std::uint32_t, 2>;
+constexpr std::size_t kTogether = 48;  // columns eliminated at a time: a multiple of 12
+constexpr std::size_t kSlack = 16;     // numbers that rounded-up tiles may touch behind an array
 
-/// C = A B^T, where A and C are by columns and B is padded.
-[[gnu::always_inline]] inline void multiply_transposed(const double* a, const double* b,
-                                                       double* c) {
-  for (int column = 0; column < 3; ++column) {
-    for (int row = 0; row < 3; ++row) {
-      c[3 * column + row] =
-          a[row] * b[column] + a[3 + row] * b[4 + column] + a[6 + row] * b[8 + column];
+std::size_t up_to_four(std::size_t size) {
+  return (size + 3) / 4 * 4;
+}
+
+/// v[begin..end) -= the three columns of a node times the values of the node.
+[[gnu::always_inline]] inline void subtract_node(const double* column, std::size_t stride,
+                                                 std::size_t begin, std::size_t end,
+                                                 const double* value, double* __restrict v) {
+  const double* const __restrict c0 = column;
+  const double* const __restrict c1 = column + stride;
+  const double* const __restrict c2 = column + 2 * stride;
+  const double v0 = value[0], v1 = value[1], v2 = value[2];
+  for (std::size_t i = begin; i < end; ++i) v[i] -= c0[i] * v0 + c1[i] * v1 + c2[i] * v2;
+}
+
+/// The products of the three columns of a node with v[begin..end): sums of every fourth row, so
+/// that all processors add in one order.
+[[gnu::always_inline]] inline void node_products(const double* column, std::size_t stride,
+                                                 std::size_t begin, std::size_t end,
+                                                 const double* v, double* product) {
+  double sum[3][4] = {};
+  std::size_t i = begin;
+  for (; i + 4 <= end; i += 4) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t k = 0; k < 4; ++k) sum[c][k] += column[c * stride + i + k] * v[i + k];
     }
   }
+  for (std::size_t c = 0; c < 3; ++c) {
+    product[c] = (sum[c][0] + sum[c][1]) + (sum[c][2] + sum[c][3]);
+    for (std::size_t rest = i; rest < end; ++rest)
+      product[c] += column[c * stride + rest] * v[rest];
+  }
 }
 
-/// W -= A F, where A and W are padded and F is by columns.
-[[gnu::always_inline]] inline void subtract_product(const double* a, const double* f, double* w) {
-  using Column [[gnu::vector_size(32)]] = double;
-  const auto* const from = reinterpret_cast<const Column*>(a);
-  auto* const to = reinterpret_cast<Column*>(w);
-  const Column a0 = from[0], a1 = from[1], a2 = from[2];
-  to[0] -= a0 * f[0] + a1 * f[1] + a2 * f[2];
-  to[1] -= a0 * f[3] + a1 * f[4] + a2 * f[5];
-  to[2] -= a0 * f[6] + a1 * f[7] + a2 * f[8];
-}
-
-/// The place of each node in an elimination order with little fill.
-std::vector<std::uint32_t> elimination_order(std::size_t nodes, std::span<const Edge> edges) {
-  using Graph = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
-  std::vector<Eigen::Triplet<double, int>> entries;
-  entries.reserve(2 * edges.size() + nodes);
-  for (std::size_t i = 0; i < nodes; ++i) {
-    entries.emplace_back(static_cast<int>(i), static_cast<int>(i), 1.0);
+/// Of a symmetric matrix: none if its pivots are positive, else by their values.
+std::size_t negative_eigenvalues(const Eigen::Matrix3d& matrix) {
+  const double first = matrix(0, 0);
+  const double second = matrix(1, 1) - matrix(1, 0) * matrix(1, 0) / first;
+  if (first > 0.0 && second > 0.0) {
+    const double across = matrix(2, 1) - matrix(2, 0) * matrix(1, 0) / first;
+    const double third =
+        matrix(2, 2) - matrix(2, 0) * matrix(2, 0) / first - across * across / second;
+    if (third > 0.0) return 0;
   }
-  for (const auto& [a, b] : edges) {
-    entries.emplace_back(static_cast<int>(a), static_cast<int>(b), 1.0);
-    entries.emplace_back(static_cast<int>(b), static_cast<int>(a), 1.0);
-  }
-  const auto n = static_cast<Eigen::Index>(nodes);
-  Graph graph(n, n);
-  graph.setFromTriplets(entries.begin(), entries.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
-  Eigen::AMDOrdering<int>()(graph, permutation);
-  std::vector<std::uint32_t> order(nodes);
-  for (std::size_t place = 0; place < nodes; ++place) {
-    const int node = permutation.indices()[static_cast<Eigen::Index>(place)];
-    order[static_cast<std::size_t>(node)] = static_cast<std::uint32_t>(place);
-  }
-  return order;
-}
-
-/// Rows of each column of the factor: those of the matrix and those of the columns whose first row
-/// this is (their parent in the elimination tree).
-std::vector<std::vector<std::uint32_t>> factor_columns(std::span<const std::uint32_t> order,
-                                                       std::span<const Edge> edges) {
-  std::vector<std::vector<std::uint32_t>> columns(order.size());
-  for (const auto& [a, b] : edges) {
-    const auto [low, high] = std::minmax(order[a], order[b]);
-    columns[low].push_back(high);
-  }
-  for (std::uint32_t j = 0; j < columns.size(); ++j) {
-    auto& rows = columns[j];
-    std::sort(rows.begin(), rows.end());
-    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-    if (rows.empty()) continue;
-    auto& parent = columns[rows.front()];
-    parent.insert(parent.end(), rows.begin() + 1, rows.end());
-  }
-  return columns;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> signs;
+  signs.computeDirect(matrix, Eigen::EigenvaluesOnly);
+  return static_cast<std::size_t>((signs.eigenvalues().array() < 0.0).count());
 }
 
 }  // namespace
 
-BlockPattern::BlockPattern(std::size_t nodes, std::span<const Edge> edges)
-    : order_(elimination_order(nodes, edges)) {
-  const auto columns = factor_columns(order_, edges);
-  std::vector<std::uint32_t> in_row(nodes + 1, 0);
-  for (const auto& rows : columns) {
-    column_.push_back(static_cast<std::uint32_t>(row_.size()));
-    row_.insert(row_.end(), rows.begin(), rows.end());
-    for (const std::uint32_t row : rows) ++in_row[row];
-    products_ += rows.size() * (rows.size() + 1) / 2;
+BlockPattern::BlockPattern(std::size_t nodes, std::span<const std::array<std::uint32_t, 2>> edges)
+    : fronts_(nodes, edges), node_of_(nodes), column_(nodes + 1, 0) {
+  const std::span<const std::uint32_t> order = fronts_.place();
+  for (std::uint32_t node = 0; node < nodes; ++node) node_of_[order[node]] = node;
+  std::vector<std::array<std::uint32_t, 2>> blocks;  // column, row
+  blocks.reserve(edges.size());
+  for (const auto& [a, b] : edges) {
+    const auto [low, high] = std::minmax(order[a], order[b]);
+    blocks.push_back({low, high});
   }
-  column_.push_back(static_cast<std::uint32_t>(row_.size()));
-  row_begin_.assign(nodes + 1, 0);
-  for (std::size_t i = 0; i < nodes; ++i) row_begin_[i + 1] = row_begin_[i] + in_row[i];
-  row_entry_.resize(row_.size());
-  std::vector<std::uint32_t> next(row_begin_.begin(), row_begin_.end() - 1);
-  for (std::uint32_t j = 0; j < nodes; ++j) {
-    for (std::uint32_t p = column_[j]; p < column_[j + 1]; ++p) {
-      row_entry_[next[row_[p]]++] = {j, p};
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  row_.reserve(blocks.size());
+  for (const auto& [column, row] : blocks) {
+    row_.push_back(row);
+    ++column_[column + 1];
+  }
+  for (std::size_t i = 0; i < nodes; ++i) column_[i + 1] += column_[i];
+  front_row_.resize(row_.size());
+  for (const auto& front : fronts_.fronts()) {
+    const std::span<const std::uint32_t> rows = fronts_.row(front);
+    for (std::uint32_t p = column_[front.first]; p < column_[front.first + front.own]; ++p) {
+      const std::uint32_t end = front.first + front.own;
+      front_row_[p] =
+          row_[p] < end
+              ? row_[p] - front.first
+              : front.own + static_cast<std::uint32_t>(
+                                std::lower_bound(rows.begin(), rows.end(), row_[p]) - rows.begin());
     }
+  }
+  lay_out();
+}
+
+void BlockPattern::lay_out() {
+  std::array<std::size_t, 2> top{};
+  for (const auto& front : fronts_.fronts()) {
+    const std::size_t own = front.own;
+    const std::size_t count = front.count;
+    factor_blocks_ += own * (own - 1) / 2 + own * count;
+    for (std::size_t i = 0; i < own; ++i) {
+      const std::size_t below = own - 1 - i + count;
+      products_ += below * (below + 1) / 2;
+    }
+    Layout layout;
+    layout.panel = panel_numbers_;
+    layout.stride = up_to_four(3 * (own + count));
+    layout.update_stride = up_to_four(3 * count);
+    panel_numbers_ += layout.stride * 3 * own;
+    longest_front_ = std::max(longest_front_, layout.stride);
+    // The children's updates are the last ones on the stack of the other parity.
+    std::size_t& here = top[front.depth % 2];
+    std::size_t& below = top[(front.depth + 1) % 2];
+    layout.update = here;
+    here += layout.update_stride * 3 * count;
+    stack_numbers_[front.depth % 2] = std::max(stack_numbers_[front.depth % 2], here);
+    for (const std::uint32_t c : fronts_.child(front)) {
+      below = std::min(below, layout_[c].update);
+    }
+    layout_.push_back(layout);
   }
 }
 
+std::size_t BlockPattern::factor_bytes() const {
+  const std::size_t numbers = panel_numbers_ + stack_numbers_[0] + stack_numbers_[1] +
+                              longest_front_ * (kTogether + 1) + 21 * nodes();
+  return numbers * sizeof(double);
+}
+
 BlockPattern::Place BlockPattern::place(std::uint32_t a, std::uint32_t b) const {
-  const auto [low, high] = std::minmax(order_.at(a), order_.at(b));
+  if (std::max(a, b) >= nodes()) throw std::out_of_range("a node that is none");
+  const std::span<const std::uint32_t> order = fronts_.place();
+  const auto [low, high] = std::minmax(order[a], order[b]);
   const auto begin = row_.begin() + column_[low];
   const auto end = row_.begin() + column_[low + 1];
   const auto found = std::lower_bound(begin, end, high);
   if (found == end || *found != high) throw std::out_of_range("nodes that are not neighbours");
-  return {static_cast<std::uint32_t>(found - row_.begin()), order_[a] == low};
+  return {static_cast<std::uint32_t>(found - row_.begin()), order[a] == low};
 }
 
 void BlockMatrix::set_zero() {
@@ -117,70 +146,223 @@ void BlockMatrix::set_zero() {
   std::fill(below.begin(), below.end(), Eigen::Matrix3d::Zero());
 }
 
-BlockLdlt::BlockLdlt(const BlockPattern& pattern)
+BlockLdlt::BlockLdlt(const BlockPattern& pattern, bool portable)
     : pattern_(pattern),
-      node_of_(pattern.nodes()),
-      lower_(pattern.factor_blocks()),
+      update_(dense_update(portable)),
+      panels_(pattern.panel_numbers_ + kSlack),
+      stacks_{ZeroedNumbers(pattern.stack_numbers_[0] + kSlack),
+              ZeroedNumbers(pattern.stack_numbers_[1] + kSlack)},
       pivot_(pattern.nodes()),
       inverse_(pattern.nodes()),
-      work_(pattern.nodes()),
-      permuted_(3, static_cast<Eigen::Index>(pattern.nodes())) {
-  for (std::uint32_t node = 0; node < node_of_.size(); ++node) {
-    node_of_[pattern.order_[node]] = node;
+      scaled_(pattern.longest_front_ * kTogether + kSlack),
+      lower_inverse_(kTogether * kTogether),
+      permuted_(3, static_cast<Eigen::Index>(pattern.nodes())),
+      local_(pattern.longest_front_) {}
+
+BlockLdlt::Work BlockLdlt::work_on(std::size_t front) {
+  const EliminationFronts::Front& f = pattern_.fronts_.fronts()[front];
+  const BlockPattern::Layout& layout = pattern_.layout_[front];
+  return {{panels_.data() + layout.panel, layout.stride},
+          {stacks_[f.depth % 2].data() + layout.update, layout.update_stride},
+          f.first,
+          std::size_t{3} * f.own,
+          std::size_t{3} * f.count};
+}
+
+void BlockLdlt::gather(const BlockMatrix& matrix, std::size_t front, const Work& work) {
+  std::fill_n(work.panel.numbers, work.panel.stride * work.own, 0.0);
+  for (std::size_t j = 0; j < work.reached; ++j) {
+    const std::size_t begin = j / 4 * 4;
+    double* const column = work.update.numbers + j * work.update.stride;
+    std::fill(column + begin, column + work.update.stride, 0.0);
+  }
+  const EliminationFronts::Front& f = pattern_.fronts_.fronts()[front];
+  for (std::uint32_t i = 0; i < f.own; ++i) {
+    const auto put = [&](const Eigen::Matrix3d& block, std::uint32_t row) {
+      double* to = work.panel.numbers + 3 * (i * work.panel.stride + row);
+      for (int column = 0; column < 3; ++column, to += work.panel.stride) {
+        std::copy_n(block.data() + 3 * column, 3, to);
+      }
+    };
+    const std::uint32_t place = f.first + i;
+    put(matrix.diagonal[pattern_.node_of_[place]], i);
+    for (std::uint32_t p = pattern_.column_[place]; p < pattern_.column_[place + 1]; ++p) {
+      put(matrix.below[p], pattern_.front_row_[p]);
+    }
+  }
+  for (const std::uint32_t c : pattern_.fronts_.child(f)) {
+    add_child(pattern_.fronts_.fronts()[c], work_on(c).update, work);
   }
 }
 
-void BlockLdlt::gather_column(const BlockMatrix& matrix, std::uint32_t column) {
-  work_[column].matrix() = matrix.diagonal[node_of_[column]];
-  for (std::uint32_t p = pattern_.column_[column]; p < pattern_.column_[column + 1]; ++p) {
-    work_[pattern_.row_[p]].matrix() = matrix.below[p];
+void BlockLdlt::add_child(const EliminationFronts::Front& child, const DensePanel& from,
+                          const Work& work) {
+  const std::span<const std::uint32_t> at = pattern_.fronts_.row_in_parent(child);
+  const auto own = static_cast<std::uint32_t>(work.own / 3);
+  for (std::size_t j = 0; j < at.size(); ++j) {
+    // A column of the panel takes all rows, one of what is left to the parent only rows behind it.
+    const bool to_panel = at[j] < own;
+    const DensePanel& into = to_panel ? work.panel : work.update;
+    const std::uint32_t first = to_panel ? 0 : own;
+    double* column = into.numbers + std::size_t{3} * (at[j] - first) * into.stride;
+    const double* source = from.numbers + 3 * j * from.stride;
+    for (int k = 0; k < 3; ++k, column += into.stride, source += from.stride) {
+      for (std::size_t i = j; i < at.size(); ++i) {
+        double* const to = column + std::size_t{3} * (at[i] - first);
+        to[0] += source[3 * i];
+        to[1] += source[3 * i + 1];
+        to[2] += source[3 * i + 2];
+      }
+    }
   }
 }
 
-void BlockLdlt::eliminate_before(std::uint32_t column) {
-  const BlockPattern::RowEntry* const entries = pattern_.row_entry_.data();
-  const std::uint32_t begin = pattern_.row_begin_[column];
-  const std::uint32_t end = pattern_.row_begin_[column + 1];
-  const std::uint32_t* const columns = pattern_.column_.data();
-  const std::uint32_t* const row = pattern_.row_.data();
-  const PaddedBlock* const lower = lower_.data();
-  const Eigen::Matrix3d* const pivot = pivot_.data();
-  PaddedBlock* const work = work_.data();
+bool BlockLdlt::invert_pivot(std::uint32_t place) {
+  const Eigen::Matrix3d& pivot = pivot_[place];
+  if (!pivot.allFinite()) return false;
+  negative_ += negative_eigenvalues(pivot);
+  bool invertible = false;
+  pivot.computeInverseWithCheck(inverse_[place], invertible, 0.0);
+  return invertible;
+}
+
+/// Eliminates a block on the diagonal within itself: L stands below the 3x3 pivots afterwards.
+bool BlockLdlt::eliminate_diagonal(const DensePanel& block, std::size_t size, std::uint32_t place) {
+  double* const a = block.numbers;
+  const std::size_t stride = block.stride;
+  for (std::size_t k = 0; k < size; k += 3, ++place) {
+    Eigen::Matrix3d& pivot = pivot_[place];
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        // What stands above the diagonal has no meaning.
+        pivot(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+            a[(k + std::min(i, j)) * stride + k + std::max(i, j)];
+      }
+    }
+    if (!invert_pivot(place)) return false;
+    // The columns of the node as they are: L D.
+    double* const rest = scaled_.data();
+    for (std::size_t j = 0; j < 3; ++j) {
+      std::copy_n(a + (k + j) * stride, size, rest + j * kTogether);
+    }
+    const double* const inverse = inverse_[place].data();
+    run_wide([=]() __attribute__((always_inline)) {
+      const double* const r0 = rest;
+      const double* const r1 = rest + kTogether;
+      const double* const r2 = rest + 2 * kTogether;
+      for (std::size_t j = 0; j < 3; ++j) {
+        double* const l = a + (k + j) * stride;
+        const double* const factor = inverse + 3 * j;
+        for (std::size_t i = k + 3; i < size; ++i) {
+          l[i] = r0[i] * factor[0] + r1[i] * factor[1] + r2[i] * factor[2];
+        }
+      }
+      const double* const l0 = a + k * stride;
+      const double* const l1 = l0 + stride;
+      const double* const l2 = l1 + stride;
+      for (std::size_t j = k + 3; j < size; ++j) {
+        double* const to = a + j * stride;
+        const double f0 = r0[j], f1 = r1[j], f2 = r2[j];
+        for (std::size_t i = j / 3 * 3; i < size; ++i) {
+          to[i] -= l0[i] * f0 + l1[i] * f1 + l2[i] * f2;
+        }
+      }
+    });
+  }
+  return true;
+}
+
+/// Minus the inverse of the unit lower triangle with 3x3 blocks on its diagonal, by columns.
+void BlockLdlt::invert_lower(const DensePanel& block, std::size_t size) {
+  double* const inverse = lower_inverse_.data();
+  const double* const l = block.numbers;
+  const std::size_t stride = block.stride;
+  std::fill(lower_inverse_.begin(), lower_inverse_.end(), 0.0);
   run_wide([=]() __attribute__((always_inline)) {
-    for (std::uint32_t e = begin; e < end; ++e) {
-      const auto [k, at] = entries[e];
-      std::array<double, 9> factor;  // pivot times the transposed block, by columns
-      multiply_transposed(pivot[k].data(), lower[at].column.data(), factor.data());
-      const std::uint32_t last = columns[k + 1];
-      for (std::uint32_t p = at; p < last; ++p) {
-        subtract_product(lower[p].column.data(), factor.data(), work[row[p]].column.data());
+    for (std::size_t j = 0; j < size; ++j) {
+      double* const x = inverse + j * kTogether;
+      x[j] = -1.0;
+      for (std::size_t k = j / 3 * 3; k + 3 < size; k += 3) {
+        const double* const l0 = l + k * stride;
+        const double* const l1 = l0 + stride;
+        const double* const l2 = l1 + stride;
+        const double f0 = x[k], f1 = x[k + 1], f2 = x[k + 2];
+        for (std::size_t i = k + 3; i < size; ++i) {
+          x[i] -= l0[i] * f0 + l1[i] * f1 + l2[i] * f2;
+        }
       }
     }
   });
 }
 
-bool BlockLdlt::invert_pivot(std::uint32_t column) {
-  Eigen::Matrix3d& pivot = pivot_[column];
-  pivot = 0.5 * (work_[column].matrix() + work_[column].matrix().transpose());
-  if (!pivot.allFinite()) return false;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> signs;
-  signs.computeDirect(pivot, Eigen::EigenvaluesOnly);
-  negative_ += static_cast<std::size_t>((signs.eigenvalues().array() < 0.0).count());
-  bool invertible = false;
-  pivot.computeInverseWithCheck(inverse_[column], invertible, 0.0);
-  return invertible;
+/// Columns of L D times D^-1.
+void BlockLdlt::scale_columns(const DensePanel& from, std::size_t rows, std::size_t columns,
+                              std::uint32_t place, const DensePanel& to) const {
+  const Eigen::Matrix3d* const inverse = inverse_.data() + place;
+  run_wide([=]() __attribute__((always_inline)) {
+    for (std::size_t k = 0; k < columns; k += 3) {
+      const double* const r0 = from.numbers + k * from.stride;
+      const double* const r1 = r0 + from.stride;
+      const double* const r2 = r1 + from.stride;
+      for (std::size_t j = 0; j < 3; ++j) {
+        double* const l = to.numbers + (k + j) * to.stride;
+        const double* const factor = inverse[k / 3].data() + 3 * j;
+        for (std::size_t i = 0; i < rows; ++i) {
+          l[i] = r0[i] * factor[0] + r1[i] * factor[1] + r2[i] * factor[2];
+        }
+      }
+    }
+  });
+}
+
+bool BlockLdlt::eliminate(const Work& work) {
+  const std::size_t size = work.own + work.reached;
+  const std::size_t stride = work.panel.stride;
+  for (std::size_t k = 0; k < work.own; k += kTogether) {
+    const std::size_t columns = std::min(kTogether, work.own - k);
+    const DensePanel block{work.panel.numbers + k * stride + k, stride};
+    const std::uint32_t place = work.first + static_cast<std::uint32_t>(k / 3);
+    if (!eliminate_diagonal(block, columns, place)) return false;
+    const std::size_t below = size - k - columns;
+    if (below == 0) continue;
+    invert_lower(block, columns);
+    // L D = A L^-T of what is on the diagonal; then L, over A.
+    const DensePanel scaled{scaled_.data(), up_to_four(below)};
+    const DensePanel lower{block.numbers + columns, stride};
+    update_.run({.c = scaled,
+                 .a = lower,
+                 .b = {lower_inverse_.data(), kTogether},
+                 .rows = below,
+                 .columns = columns,
+                 .depth = columns,
+                 .b_triangular = true,
+                 .overwrite = true});
+    scale_columns(scaled, below, columns, place, lower);
+    const std::size_t own_left = work.own - k - columns;
+    update_.run({.c = {lower.numbers + columns * stride, stride},
+                 .a = lower,
+                 .b = scaled,
+                 .rows = below,
+                 .columns = own_left,
+                 .depth = columns,
+                 .lower = true});
+    update_.run({.c = work.update,
+                 .a = {lower.numbers + own_left, stride},
+                 .b = {scaled.numbers + own_left, scaled.stride},
+                 .rows = work.reached,
+                 .columns = work.reached,
+                 .depth = columns,
+                 .lower = true});
+  }
+  return true;
 }
 
 bool BlockLdlt::factorise(const BlockMatrix& matrix) {
   negative_ = 0;
-  const auto n = static_cast<std::uint32_t>(pattern_.nodes());
-  for (std::uint32_t j = 0; j < n; ++j) {
-    gather_column(matrix, j);
-    eliminate_before(j);
-    if (!invert_pivot(j)) return false;
-    for (std::uint32_t p = pattern_.column_[j]; p < pattern_.column_[j + 1]; ++p) {
-      lower_[p].matrix() = work_[pattern_.row_[p]].matrix().lazyProduct(inverse_[j]);
-    }
+  for (std::size_t f = 0; f < pattern_.layout_.size(); ++f) {
+    const Work work = work_on(f);
+    gather(matrix, f, work);
+    if (!eliminate(work)) return false;
   }
   return true;
 }
@@ -188,23 +370,57 @@ bool BlockLdlt::factorise(const BlockMatrix& matrix) {
 // A Ref is a view: what it shows is changed.
 // NOLINTNEXTLINE(performance-unnecessary-value-param)
 void BlockLdlt::solve(Eigen::Ref<Eigen::Matrix3Xd> x) const {
+  const EliminationFronts& fronts = pattern_.fronts_;
+  Eigen::Matrix3Xd& permuted = permuted_;
   const auto n = static_cast<std::uint32_t>(pattern_.nodes());
-  Eigen::Matrix3Xd& y = permuted_;
-  for (std::uint32_t j = 0; j < n; ++j) y.col(j) = x.col(node_of_[j]);
-  for (std::uint32_t j = 0; j < n; ++j) {
-    const Eigen::Vector3d value = y.col(j);
-    for (std::uint32_t p = pattern_.column_[j]; p < pattern_.column_[j + 1]; ++p) {
-      y.col(pattern_.row_[p]).noalias() -= lower_[p].matrix() * value;
+  for (std::uint32_t p = 0; p < n; ++p) permuted.col(p) = x.col(pattern_.node_of_[p]);
+  double* const y = permuted.data();
+  double* const v = local_.data();
+  for (std::size_t f = 0; f < fronts.fronts().size(); ++f) {
+    const EliminationFronts::Front& front = fronts.fronts()[f];
+    const std::span<const std::uint32_t> rows = fronts.row(front);
+    const double* const panel = panels_.data() + pattern_.layout_[f].panel;
+    const std::size_t stride = pattern_.layout_[f].stride;
+    const std::size_t own = std::size_t{3} * front.own;
+    const std::size_t size = own + 3 * rows.size();
+    std::copy_n(y + std::size_t{3} * front.first, own, v);
+    std::fill(v + own, v + size, 0.0);
+    run_wide([=]() __attribute__((always_inline)) {
+      for (std::size_t k = 0; k < own; k += 3) {
+        subtract_node(panel + k * stride, stride, k + 3, size, v + k, v);
+      }
+    });
+    std::copy_n(v, own, y + std::size_t{3} * front.first);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) y[std::size_t{3} * rows[i] + k] += v[own + 3 * i + k];
     }
   }
-  for (std::uint32_t j = n; j-- > 0;) {
-    Eigen::Vector3d value = inverse_[j] * y.col(j);
-    for (std::uint32_t p = pattern_.column_[j]; p < pattern_.column_[j + 1]; ++p) {
-      value.noalias() -= lower_[p].matrix().transpose() * y.col(pattern_.row_[p]);
+  for (std::size_t f = fronts.fronts().size(); f-- > 0;) {
+    const EliminationFronts::Front& front = fronts.fronts()[f];
+    const std::span<const std::uint32_t> rows = fronts.row(front);
+    const double* const panel = panels_.data() + pattern_.layout_[f].panel;
+    const std::size_t stride = pattern_.layout_[f].stride;
+    const std::size_t own = std::size_t{3} * front.own;
+    const std::size_t size = own + 3 * rows.size();
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      std::copy_n(y + std::size_t{3} * rows[i], 3, v + own + 3 * i);
     }
-    y.col(j) = value;
+    const Eigen::Matrix3d* const inverse = inverse_.data() + front.first;
+    double* const to = y + std::size_t{3} * front.first;
+    run_wide([=]() __attribute__((always_inline)) {
+      for (std::size_t k = own; k > 0;) {
+        k -= 3;
+        double product[3];
+        node_products(panel + k * stride, stride, k + 3, size, v, product);
+        const double* const d = inverse[k / 3].data();
+        for (std::size_t i = 0; i < 3; ++i) {
+          v[k + i] = d[i] * to[k] + d[3 + i] * to[k + 1] + d[6 + i] * to[k + 2] - product[i];
+        }
+      }
+    });
+    std::copy_n(v, own, to);
   }
-  for (std::uint32_t j = 0; j < n; ++j) x.col(node_of_[j]) = y.col(j);
+  for (std::uint32_t p = 0; p < n; ++p) x.col(pattern_.node_of_[p]) = permuted.col(p);
 }
 
 }  // namespace tpm

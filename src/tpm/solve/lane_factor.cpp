@@ -1,5 +1,7 @@
 #include "tpm/solve/lane_factor.hpp"
 
+#include <algorithm>
+
 #include "tpm/core/wide_vectors.hpp"
 
 namespace tpm {
@@ -24,22 +26,34 @@ namespace {
 
 LaneFactor::LaneFactor(const BlockPattern& pattern)
     : pattern_(pattern),
-      node_of_(pattern.nodes()),
       lower_(pattern.factor_blocks()),
       inverse_(pattern.nodes()),
-      y_(pattern.nodes()) {
-  for (std::uint32_t node = 0; node < node_of_.size(); ++node) {
-    node_of_[pattern.order_[node]] = node;
-  }
-}
+      y_(pattern.nodes()) {}
 
 void LaneFactor::copy(const BlockLdlt& factor) {
-  const auto put = [](const auto& from, Block& to) {
-    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(to.data()) =
-        from.template cast<float>();
-  };
-  for (std::size_t i = 0; i < lower_.size(); ++i) put(factor.lower_[i].matrix(), lower_[i]);
-  for (std::size_t i = 0; i < inverse_.size(); ++i) put(factor.inverse_[i], inverse_[i]);
+  for (std::size_t i = 0; i < inverse_.size(); ++i) {
+    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(inverse_[i].data()) =
+        factor.inverse_[i].cast<float>();
+  }
+  Block* to = lower_.data();
+  for (std::size_t f = 0; f < pattern_.layout_.size(); ++f) {
+    const EliminationFronts::Front& front = pattern_.fronts_.fronts()[f];
+    const std::size_t stride = pattern_.layout_[f].stride;
+    const double* const panel = factor.panels_.data() + pattern_.layout_[f].panel;
+    for (std::uint32_t i = 1; i < front.size(); ++i) {
+      const std::uint32_t columns = std::min(i, front.own);
+      const double* from = panel + std::size_t{3} * i;
+      for (std::uint32_t j = 0; j < columns; ++j, ++to, from += 3 * stride) {
+        const double* const c1 = from + stride;
+        const double* const c2 = c1 + stride;
+        for (std::size_t k = 0; k < 3; ++k) {
+          (*to)[3 * k] = static_cast<float>(from[k]);
+          (*to)[3 * k + 1] = static_cast<float>(c1[k]);
+          (*to)[3 * k + 2] = static_cast<float>(c2[k]);
+        }
+      }
+    }
+  }
 }
 
 void LaneFactor::solve(LaneMatrix& x) {
@@ -47,34 +61,55 @@ void LaneFactor::solve(LaneMatrix& x) {
   constexpr std::size_t kNode = std::size_t{3} * kLanes;
   double* const outside = x.data();
   LaneNode* const y = y_.data();
-  const std::uint32_t* const column = pattern_.column_.data();
-  const std::uint32_t* const row = pattern_.row_.data();
-  const Block* const lower = lower_.data();
+  const std::uint32_t* const node_of = pattern_.node_of_.data();
+  const auto fronts = pattern_.fronts_.fronts();
+  const std::uint32_t* const all_rows = pattern_.fronts_.all_rows().data();
   run_wide([ =, this ]() __attribute__((always_inline)) {
     for (std::uint32_t j = 0; j < n; ++j) {
-      const double* from = outside + kNode * node_of_[j];
+      const double* from = outside + kNode * node_of[j];
       for (int i = 0; i < kLanes; ++i) y[j].x[i] = static_cast<float>(from[i]);
       for (int i = 0; i < kLanes; ++i) y[j].y[i] = static_cast<float>(from[kLanes + i]);
       for (int i = 0; i < kLanes; ++i) y[j].z[i] = static_cast<float>(from[2 * kLanes + i]);
     }
-    for (std::uint32_t j = 0; j < n; ++j) {
-      const LaneNode value = y[j];
-      const std::uint32_t end = column[j + 1];
-      for (std::uint32_t p = column[j]; p < end; ++p) {
-        subtract_product(lower[p].data(), value, y[row[p]]);
+    const Block* lower = lower_.data();
+    for (const EliminationFronts::Front& front : fronts) {
+      LaneNode* const own = y + front.first;
+      const std::uint32_t* const rows = all_rows + front.rows;
+      for (std::uint32_t i = 1; i < front.own + front.count; ++i) {
+        LaneNode& to = i < front.own ? own[i] : y[rows[i - front.own]];
+        const std::uint32_t columns = i < front.own ? i : front.own;
+        LaneNode sum = to;
+        for (std::uint32_t j = 0; j < columns; ++j) {
+          subtract_product((lower++)->data(), own[j], sum);
+        }
+        to = sum;
       }
     }
-    for (std::uint32_t j = n; j-- > 0;) {
-      LaneNode minus{};
-      subtract_product(inverse_[j].data(), y[j], minus);
-      const std::uint32_t end = column[j + 1];
-      for (std::uint32_t p = column[j]; p < end; ++p) {
-        add_transposed(lower[p].data(), y[row[p]], minus);
+    for (std::size_t f = fronts.size(); f-- > 0;) {
+      const EliminationFronts::Front& front = fronts[f];
+      LaneNode* const own = y + front.first;
+      const std::uint32_t* const rows = all_rows + front.rows;
+      // Minus the solution, until it is complete.
+      for (std::uint32_t j = 0; j < front.own; ++j) {
+        LaneNode minus{};
+        subtract_product(inverse_[front.first + j].data(), own[j], minus);
+        own[j] = minus;
       }
-      y[j] = {-minus.x, -minus.y, -minus.z};
+      for (std::uint32_t i = front.count; i-- > 0;) {
+        const LaneNode value = y[rows[i]];
+        lower -= front.own;
+        for (std::uint32_t j = 0; j < front.own; ++j) {
+          add_transposed(lower[j].data(), value, own[j]);
+        }
+      }
+      for (std::uint32_t i = front.own; i-- > 0;) {
+        own[i] = {-own[i].x, -own[i].y, -own[i].z};
+        lower -= i;
+        for (std::uint32_t j = 0; j < i; ++j) add_transposed(lower[j].data(), own[i], own[j]);
+      }
     }
     for (std::uint32_t j = 0; j < n; ++j) {
-      double* to = outside + kNode * node_of_[j];
+      double* to = outside + kNode * node_of[j];
       for (int i = 0; i < kLanes; ++i) to[i] = static_cast<double>(y[j].x[i]);
       for (int i = 0; i < kLanes; ++i) to[kLanes + i] = static_cast<double>(y[j].y[i]);
       for (int i = 0; i < kLanes; ++i) to[2 * kLanes + i] = static_cast<double>(y[j].z[i]);

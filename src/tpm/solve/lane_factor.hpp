@@ -32,9 +32,10 @@ class LaneFactor {
   using Block = std::array<float, 9>;  ///< by rows
 
   const BlockPattern& pattern_;
-  std::vector<std::uint32_t> node_of_;
-  std::vector<Block> lower_, inverse_;
-  std::vector<LaneNode> y_;  ///< in the order of the factor
+  /// L front by front, in each row by row: of its own nodes what is left of the diagonal.
+  std::vector<Block> lower_;
+  std::vector<Block> inverse_;  ///< by place
+  std::vector<LaneNode> y_;     ///< by place
 };
 
 }  // namespace tpm

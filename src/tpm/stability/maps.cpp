@@ -8,14 +8,12 @@
 namespace tpm {
 namespace {
 
-constexpr int kAlong = 21;  // points along each axis
-
-/// From `first` to `last`, evenly in the logarithm.
-std::vector<double> decades(double first, double last) {
+/// So many values from `first` to `last`, evenly in the logarithm.
+std::vector<double> decades(int along, double first, double last) {
   std::vector<double> values;
-  values.reserve(kAlong);
-  for (int i = 0; i < kAlong; ++i) {
-    values.push_back(first * std::pow(last / first, static_cast<double>(i) / (kAlong - 1)));
+  values.reserve(static_cast<std::size_t>(along));
+  for (int i = 0; i < along; ++i) {
+    values.push_back(first * std::pow(last / first, static_cast<double>(i) / (along - 1)));
   }
   return values;
 }
@@ -32,13 +30,13 @@ constexpr double kDepth_m = 0.004;
 constexpr double kTau_s = 0.1;
 constexpr double kDrag_per_s = 20.0;
 
-MapPlan over_relaxation_time() {
+MapPlan over_relaxation_time(int along) {
   return {"relaxation_time",
           "relaxation time",
           "s",
           "element, a depth of 4 mm at once and held",
-          decades(1e-4, 1e2),
-          decades(1e-5, 1e3),
+          decades(along, 1e-4, 1e2),
+          decades(along, 1e-5, 1e3),
           [](double tau, double h) {
             return judged_rest(TpmParameters{}.with_relaxation_time(tau),
                                step_and_hold(kDepth_m, kStudySteps * h), h);
@@ -56,14 +54,14 @@ TpmParameters without_tension(double tau_s) {
   return p;
 }
 
-MapPlan over_load_rate() {
+MapPlan over_load_rate(int along) {
   constexpr double kLoad_N = 0.3;
   return {"load_rate",
           "load rate",
           "N/s",
           "element without tension, tau = 0.1 s, a load rising to 0.3 N and held",
-          decades(0.1, 1e3),
-          decades(1e-3, 10.0),
+          decades(along, 0.1, 1e3),
+          decades(along, 1e-3, 10.0),
           [](double rate, double h) {
             const double rises = kLoad_N / rate;
             const double ends = rises + kStudySteps * h;
@@ -74,7 +72,7 @@ MapPlan over_load_rate() {
           [](double) { return linear_element(without_tension(kTau_s), 0.0); }};
 }
 
-MapPlan over_depth() {
+MapPlan over_depth(int along) {
   const auto load = [](double depth) {
     const TpmParameters p = TpmParameters{}.with_relaxation_time(kTau_s);
     const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
@@ -84,8 +82,8 @@ MapPlan over_depth() {
           "depth in the end",
           "m",
           "element with tension, tau = 0.1 s, a load at once and held that leads to the depth",
-          decades(1e-3, 4e-2),
-          decades(1e-3, 1e3),
+          decades(along, 1e-3, 4e-2),
+          decades(along, 1e-3, 1e3),
           [load](double depth, double h) {
             return judged_rest(TpmParameters{}.with_relaxation_time(kTau_s),
                                creep(load(depth), kStudySteps * h), h);
@@ -99,12 +97,13 @@ MapPlan over_depth() {
 MapPlan in_motion(std::string id, std::string quantity, std::string unit, std::string problem,
                   std::vector<double> x, std::function<LinearElement(double)> linear,
                   std::function<TpmParameters(double)> material) {
+  std::vector<double> steps = decades(static_cast<int>(x.size()), 1e-6, 1e2);
   MapPlan plan{std::move(id),
                std::move(quantity),
                std::move(unit),
                std::move(problem),
                std::move(x),
-               decades(1e-6, 1e2),
+               std::move(steps),
                {},
                linear};
   plan.build = [linear = std::move(linear), material = std::move(material)](double at, double h) {
@@ -122,7 +121,7 @@ LinearElement sphere(const TpmParameters& p, double mass_kg, double drag_per_s) 
   return e;
 }
 
-MapPlan over_stiffness() {
+MapPlan over_stiffness(int along) {
   const auto material = [](double modulus) {
     TpmParameters p = without_tension(kTau_s);
     p.E1_Pa = p.E2_Pa = modulus;
@@ -132,23 +131,24 @@ MapPlan over_stiffness() {
   return in_motion(
       "stiffness", "E1 = E2", "Pa",
       "sphere of 4.4 g, drag 20 1/s, tau = 0.1 s, a load at once and held that leads to 4 mm",
-      decades(1e2, 1e8),
+      decades(along, 1e2, 1e8),
       [material](double x) { return sphere(material(x), kSphereMass_kg, kDrag_per_s); }, material);
 }
 
-MapPlan over_mass() {
+MapPlan over_mass(int along) {
   return in_motion(
       "mass", "mass", "kg",
       "E1 = E2 = 12 kPa, drag 20 1/s, tau = 0.1 s, a load at once and held that leads to 4 mm",
-      decades(1e-8, 1e1), [](double x) { return sphere(without_tension(kTau_s), x, kDrag_per_s); },
+      decades(along, 1e-8, 1e1),
+      [](double x) { return sphere(without_tension(kTau_s), x, kDrag_per_s); },
       [](double) { return without_tension(kTau_s); });
 }
 
-MapPlan over_damping() {
+MapPlan over_damping(int along) {
   return in_motion(
       "damping", "drag", "1/s",
       "sphere of 4.4 g, E1 = E2 = 12 kPa, tau = 0.1 s, a load at once and held that leads to 4 mm",
-      decades(1e-1, 1e6),
+      decades(along, 1e-1, 1e6),
       [](double x) { return sphere(without_tension(kTau_s), kSphereMass_kg, x); },
       [](double) { return without_tension(kTau_s); });
 }
@@ -185,10 +185,11 @@ void draw_plan(const MapPlan& plan, std::vector<StabilityMap>& maps) {
 
 }  // namespace
 
-std::vector<StabilityMap> stability_maps() {
+std::vector<StabilityMap> stability_maps(int along) {
   std::vector<StabilityMap> maps;
-  for (const MapPlan& plan : {over_relaxation_time(), over_load_rate(), over_stiffness(),
-                              over_mass(), over_damping(), over_depth()}) {
+  for (const MapPlan& plan :
+       {over_relaxation_time(along), over_load_rate(along), over_stiffness(along), over_mass(along),
+        over_damping(along), over_depth(along)}) {
     draw_plan(plan, maps);
   }
   return maps;

@@ -72,13 +72,17 @@ struct StabilityStudy {
   std::vector<ServoRow> servo;
 };
 
-[[nodiscard]] std::vector<StabilityMap> stability_maps();
+/// Points along each axis of a map.
+inline constexpr int kPointsAlongMaps = 21;
+/// @param along points along each axis, >= 2
+[[nodiscard]] std::vector<StabilityMap> stability_maps(int along = kPointsAlongMaps);
 [[nodiscard]] std::vector<StabilityLimit> stability_limits();
 [[nodiscard]] std::vector<StabilityCorner> stability_corners();
 [[nodiscard]] std::vector<ServoRow> stability_at_servo_rates();
 /// How the networks of the study are held, in a sentence.
 [[nodiscard]] std::string study_organ_words();
 /// All of it; deterministic.
-[[nodiscard]] StabilityStudy run_stability_study();
+/// @param along points along each axis of the maps, >= 2
+[[nodiscard]] StabilityStudy run_stability_study(int along = kPointsAlongMaps);
 
 }  // namespace tpm

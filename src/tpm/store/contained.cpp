@@ -118,7 +118,7 @@ void allow_cpu_until(double total_s) {
 }
 
 /// Gives up all that the child does not need.
-void confine(int descriptor, int parent, std::uint64_t memory_bytes) {
+void confine(int descriptor, int parent, bool writes, std::uint64_t memory_bytes) {
   for (const int signal : {SIGPROF, SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGTERM, SIGHUP}) {
     (void)std::signal(signal, SIG_DFL);
   }
@@ -139,8 +139,9 @@ void confine(int descriptor, int parent, std::uint64_t memory_bytes) {
   (void)::close_range(kParent + 1, ~0U, 0);
 
   set_limit(RLIMIT_NOFILE, kParent + 1);  // nothing else can be opened from here on
-  set_limit(RLIMIT_FSIZE, 0);
   set_limit(RLIMIT_CORE, 0);
+  if (writes) return;
+  set_limit(RLIMIT_FSIZE, 0);
   if (!kSanitized && memory_bytes > 0) set_limit(RLIMIT_AS, memory_bytes);
 }
 
@@ -152,7 +153,7 @@ void confine(int descriptor, int parent, std::uint64_t memory_bytes) {
   char kind = 0;
   while (receive_message(kParent, kind, request)) {
     char what = kAnswer;
-    allow_cpu_until(cpu_s);
+    allow_cpu_until(limits.writes ? cpu_used_s() + limits.cpu_s : cpu_s);
     try {
       if (!answer) answer = start(kFile);
       reply = answer(request);
@@ -173,13 +174,13 @@ void confine(int descriptor, int parent, std::uint64_t memory_bytes) {
 
 Contained::Contained(std::string where, int descriptor, const ContainedLimits& limits,
                      const Start& start)
-    : where_(std::move(where)), most_bytes_(limits.answer_bytes) {
+    : where_(std::move(where)), writes_(limits.writes), most_bytes_(limits.answer_bytes) {
   std::array<int, 2> ends{};
   const auto cannot = [&](const char* what) {
-    return Error(
-        ExitCode::environment, where_,
-        fmt::format("cannot be read in a process of its own: {}: {}", what, std::strerror(errno)),
-        "a system that can start one more process");
+    return Error(ExitCode::environment, where_,
+                 fmt::format("cannot be {} in a process of its own: {}: {}",
+                             writes_ ? "written" : "read", what, std::strerror(errno)),
+                 "a system that can start one more process");
   };
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
     throw cannot("socketpair");
@@ -190,7 +191,7 @@ Contained::Contained(std::string where, int descriptor, const ContainedLimits& l
   child_ = ::fork();
   if (child_ == 0) {
     try {
-      confine(descriptor, ends[1], memory_bytes);
+      confine(descriptor, ends[1], limits.writes, memory_bytes);
       serve(start, limits);
     } catch (...) {
       ::_exit(1);
@@ -220,9 +221,15 @@ void Contained::report_end() {
     while (::waitpid(child_, &status, 0) < 0 && errno == EINTR) {
     }
     const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-    end_ = signal == SIGPROF ? "its content keeps the reader busy without end"
-                             : "its content crashes the reader";
+    if (writes_) {
+      end_ = signal != 0 ? fmt::format("cannot write: HDF5 ended by signal {}", signal)
+                         : std::string("cannot write: HDF5 ended");
+    } else {
+      end_ = signal == SIGPROF ? "its content keeps the reader busy without end"
+                               : "its content crashes the reader";
+    }
   }
+  if (writes_) throw Error(ExitCode::environment, where_, end_, "more memory");
   throw bad_input(where_, end_, "a whole file");
 }
 
@@ -234,8 +241,10 @@ std::string Contained::ask(std::string_view request) {
       !receive_message(socket_, kind, reply, most_bytes_)) {
     report_end();
   }
-  if (kind == kNoMemory)
+  if (kind == kNoMemory) {
+    if (writes_) throw std::bad_alloc();
     throw bad_input(where_, "its content asks for too much memory", "a whole file");
+  }
   if (kind == kAnswer) return reply;
   const auto code = static_cast<ExitCode>(reply.empty() ? 0 : reply.front());
   throw Error(code, "", std::string_view(reply).substr(std::min<std::size_t>(1, reply.size())));

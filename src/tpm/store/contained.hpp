@@ -8,21 +8,24 @@
 
 namespace tpm {
 
-/// What a contained process may use.
+/// What a contained process may do and use.
 struct ContainedLimits {
+  /// True: the child writes the file with data of ours, without limits but `cpu_s`, which is then
+  /// that of each request. Its end is a fault of the system (Error(environment)), not of the file.
+  bool writes = false;
   std::uint64_t memory_bytes = std::uint64_t{256} << 20U;  ///< beyond that of the parent
   std::uint64_t answer_bytes = std::uint64_t{1} << 20U;    ///< of one answer
-  double cpu_s = 5.0;                                      ///< at the first answer
+  double cpu_s = 5.0;                                      ///< until the first answer
   double cpu_s_per_megabyte = 0.1;                         ///< more for what it answers
 };
 
-/// A child process that answers requests about one open file, for code that cannot be trusted with
-/// the file (HDF5 crashes, loops and takes gigabytes on crafted bytes). What the child does wrong
-/// ends the child and becomes an Error in the parent.
+/// A child process that answers requests about one open file, for code that cannot be trusted: HDF5
+/// crashes, loops and takes gigabytes on crafted bytes, and crashes if it writes while memory is
+/// short. What the child does wrong ends the child and becomes an Error in the parent.
 ///
 /// The child is a copy of this process that keeps nothing open but the file and the way to its
-/// parent. It cannot open or write files, and it has its limits of memory and processor time. It
-/// ends with its parent.
+/// parent. It cannot open files. If it reads, it cannot write either, and it has its limits of
+/// memory and processor time. It ends with its parent.
 class Contained {
  public:
   /// Answers a request with bytes; runs in the child. An Error that it throws is thrown in the
@@ -38,14 +41,16 @@ class Contained {
   Contained(const Contained&) = delete;
   Contained& operator=(const Contained&) = delete;
 
-  /// Throws the Error of the Answer, or Error(bad_input) that says how the child ended, also on
-  /// every later call.
+  /// Throws the Error of the Answer, or one that says how the child ended, also on every later
+  /// call: Error(bad_input) of a child that reads, Error(environment) of one that writes. Throws
+  /// std::bad_alloc if a child that writes got no memory.
   [[nodiscard]] std::string ask(std::string_view request);
 
  private:
   [[noreturn]] void report_end();
 
   std::string where_;
+  bool writes_;
   std::uint64_t most_bytes_;
   int socket_ = -1;
   int child_ = -1;

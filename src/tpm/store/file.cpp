@@ -1,5 +1,6 @@
 #include "tpm/store/file.hpp"
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/sha.h>
@@ -203,6 +204,17 @@ fs::path share_dir() {
   if (!ec) {
     fs::path beside = program.parent_path().parent_path() / "share" / "tpmkit";
     if (has_data(beside)) return beside;
+  }
+  // The shared library or the Python module that this is linked into, which may have been moved:
+  // beside it (a wheel), or up to four folders above it (lib/python3/dist-packages/tpmkit).
+  Dl_info object{};
+  if (dladdr(reinterpret_cast<const void*>(&share_dir), &object) != 0 && object.dli_fname) {
+    constexpr int kFoldersUp = 4;
+    fs::path folder = fs::weakly_canonical(object.dli_fname, ec).parent_path();
+    for (int up = 0; up <= kFoldersUp; ++up, folder = folder.parent_path()) {
+      fs::path place = folder / "share" / "tpmkit";
+      if (has_data(place)) return place;
+    }
   }
   for (const char* place : {TPM_INSTALL_SHARE, TPM_SOURCE_SHARE}) {
     if (has_data(place)) return place;

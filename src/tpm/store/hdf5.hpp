@@ -35,9 +35,11 @@ class Hdf5Handle {
   Closer closer_ = nullptr;
 };
 
-struct Hdf5Storage;  // hdf5_driver.hpp
+class Contained;
 
-/// Writes an HDF5 file through a Replacement; commit() seals it (seal.hpp), passes it to the disk
+/// Writes an HDF5 file through a Replacement. HDF5 itself, which crashes if memory is short, runs
+/// in a child process (contained.hpp) and arranges the file; numbers are written past it, by this
+/// process, to where they stand. commit() seals the file (seal.hpp), passes it to the disk
 /// and gives it its name. A writer that is destroyed without commit() leaves nothing behind. Paths
 /// inside the file are absolute ("/curves/a/time"); groups on the way are created. No time stamps
 /// are stored, so that the same content gives the same bytes. Errors are Error(environment).
@@ -89,27 +91,16 @@ class Hdf5Writer {
   void commit();
 
  private:
-  void write_whole(const std::string& name, Hdf5Handle::Id stored,
-                   const std::vector<std::uint64_t>& extents, Hdf5Handle::Id type,
-                   const void* values);
-  void write_part(const std::string& name, std::uint64_t place, std::size_t size,
-                  const void* values) const;
-  [[nodiscard]] Hdf5Handle dataset(const std::string& name, Hdf5Handle::Id type,
-                                   const std::vector<std::uint64_t>& extents,
-                                   const Hdf5Handle& creation);
-  void attach(const std::string& object, const std::string& name, Hdf5Handle::Id type,
-              const Hdf5Handle& space, const void* values);
-  void require_written(bool done, const std::string& what) const;
-  [[noreturn]] void fail(const std::string& what) const;
+  [[nodiscard]] std::uint64_t arrange(const std::string& name, Number kind,
+                                      const std::vector<std::uint64_t>& extents);
+  void write_at(std::uint64_t place, std::size_t size, const void* values) const;
 
   std::filesystem::path path_;
-  std::unique_ptr<Hdf5Storage> storage_;
   Replacement place_;
-  Hdf5Handle file_;
+  std::unique_ptr<Contained> child_;
   std::map<std::string, std::uint64_t> places_;  ///< of arrays, in bytes from the file's beginning
 };
 
-class Contained;
 enum class SealState;
 
 /// Reads an HDF5 file, of which nothing is trusted: a child process reads it with limits of memory

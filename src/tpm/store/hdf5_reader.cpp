@@ -2,10 +2,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
-#include <cstring>
-#include <type_traits>
-#include <utility>
 
 #include "tpm/core/error.hpp"
 #include "tpm/store/contained.hpp"
@@ -13,6 +11,7 @@
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/hdf5_contents.hpp"
+#include "tpm/store/packed.hpp"
 #include "tpm/store/seal.hpp"
 
 namespace tpm {
@@ -30,77 +29,6 @@ enum class Wish : std::uint8_t {
   texts,
   has_attribute,
   attribute
-};
-
-/// Packs what goes between the processes, both on one machine and of one program.
-class Packer {
- public:
-  template <class T>
-  requires std::is_trivially_copyable_v<T> Packer& put(const T& value) {
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
-    return *this;
-  }
-  Packer& put(std::string_view text) {
-    put(std::uint64_t{text.size()});
-    bytes_.append(text);
-    return *this;
-  }
-  template <class T>
-  Packer& put(const std::vector<T>& list) {
-    put(std::uint64_t{list.size()});
-    if constexpr (std::is_trivially_copyable_v<T>) {
-      bytes_.append(reinterpret_cast<const char*>(list.data()), list.size() * sizeof(T));
-    } else {
-      for (const T& value : list) put(std::string_view(value));
-    }
-    return *this;
-  }
-  [[nodiscard]] std::string take() { return std::move(bytes_); }
-
- private:
-  std::string bytes_;
-};
-
-/// Takes apart what a Packer packed. The child may have been led astray by the file: nothing that
-/// it says is believed, and sizes are checked against what is there.
-class Unpacker {
- public:
-  Unpacker(std::string_view bytes, std::string_view where) : bytes_(bytes), where_(where) {}
-
-  template <class T>
-  requires std::is_trivially_copyable_v<T>
-  void take(T& value) { std::memcpy(&value, next(sizeof value), sizeof value); }
-  void take(std::string& text) {
-    std::uint64_t size = 0;
-    take(size);
-    const char* begin = next(size);
-    text.assign(begin, size);
-  }
-  template <class T>
-  void take(std::vector<T>& list) {
-    std::uint64_t size = 0;
-    take(size);
-    if constexpr (std::is_trivially_copyable_v<T>) {
-      if (size > bytes_.size() / sizeof(T)) next(bytes_.size() + 1);
-      const char* begin = next(size * sizeof(T));
-      list.resize(size);
-      if (size > 0) std::memcpy(list.data(), begin, size * sizeof(T));
-    } else {
-      for (std::uint64_t i = 0; i < size; ++i) take(list.emplace_back());
-    }
-  }
-
- private:
-  const char* next(std::uint64_t size) {
-    if (size > bytes_.size()) {
-      throw bad_input(where_, "its content crashes the reader", "a whole file");
-    }
-    const char* begin = bytes_.data();
-    bytes_.remove_prefix(size);
-    return begin;
-  }
-  std::string_view bytes_;
-  std::string_view where_;
 };
 
 /// In the child.
@@ -146,11 +74,12 @@ constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
 
 /// The open file. HDF5 says the same of a missing file and of garbage: here they are told apart.
 int opened(const fs::path& path) {
+  if (is_device_or_pipe(path)) throw bad_input(path.string(), "is a device or a pipe", "a file");
   std::error_code ec;
   // Not a file, not readable or empty: the reason is read_file's to tell.
   if (!fs::is_regular_file(path, ec) || fs::is_empty(path, ec)) {
     static_cast<void>(read_file(path, 1));
-    throw bad_input(path.string(), "is a device or a pipe", "a file");
+    throw bad_input(path.string(), "cannot be opened for reading", "a readable file");
   }
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0) {

@@ -6,9 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -68,8 +66,8 @@ void remove_abandoned(const fs::path& target) {
 }
 
 /// -1 with errno if that is not possible.
-int create_locked(const fs::path& file, mode_t mode) {
-  const int opened = ::open(file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, mode);
+int create_locked(const char* file, mode_t mode) {
+  const int opened = ::open(file, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, mode);
   if (opened < 0) return -1;
   // Not every file system has locks. Where they are, another process may have found the file
   // abandoned before it was locked, and have removed it.
@@ -80,6 +78,31 @@ int create_locked(const fs::path& file, mode_t mode) {
   errno = EEXIST;
   return -1;
 }
+
+/// The name under which the kernel knows an open file.
+std::string name_of_open(int file) {
+  return fmt::format("/proc/self/fd/{}", file);
+}
+
+/// A file without a name, locked for the moment in which it has a temporary one. -1 with errno;
+/// EOPNOTSUPP where the file system or a missing /proc does not allow it.
+int create_nameless(const fs::path& folder, mode_t mode) {
+  const int opened = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, mode);
+  if (opened < 0) {
+    // Kernels and file systems that do not know it take it for a wish to write into the folder.
+    if (errno == EISDIR || errno == EINVAL || errno == ENOENT) errno = EOPNOTSUPP;
+    return -1;
+  }
+  if (::access(name_of_open(opened).c_str(), F_OK) != 0) {
+    ::close(opened);
+    errno = EOPNOTSUPP;
+    return -1;
+  }
+  (void)::flock(opened, LOCK_EX | LOCK_NB);
+  return opened;
+}
+
+constexpr int kTemporaryNames = 10;
 
 }  // namespace
 
@@ -110,39 +133,73 @@ Replacement::Replacement(fs::path path) : path_(std::move(path)), target_(follow
   const bool replaces = ::stat(target_.c_str(), &old) == 0;
   constexpr mode_t kPermissions = 07777, kNewFile = 0666;
   const mode_t mode = replaces ? old.st_mode & kPermissions : kNewFile;
-  constexpr int kMostTries = 100;
-  const std::string name = fmt::format("{}{}", temporary_beginning(target_), ::getpid());
-  for (int attempt = 1; file_ < 0 && attempt <= kMostTries; ++attempt) {
-    temporary_ = folder_of(target_) / (attempt == 1 ? name : fmt::format("{}-{}", name, attempt));
-    // Nobody may read a private file while it is under way.
-    file_ = create_locked(temporary_, replaces ? mode & 0600 : mode);
-    if (file_ < 0 && errno != EEXIST) throw cannot_write(path_, errno);
-  }
-  if (file_ < 0) throw cannot_write(path_, EEXIST);
+  // Nobody may read a private file while it is under way.
+  create(replaces ? mode & 0600 : mode);
   if (!replaces) return;
   // Who replaces the file of another may not be allowed to hand it to them.
   const bool handed = ::fchown(file_, old.st_uid, old.st_gid) == 0;
   const mode_t kept = handed ? mode : mode & 0777;
   if (::fchmod(file_, kept) != 0) {
     const int error_number = errno;
-    ::close(file_);
-    ::unlink(temporary_.c_str());
+    discard();
     throw cannot_write(path_, error_number);
   }
 }
 
 Replacement::~Replacement() {
-  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  discard();
+}
+
+void Replacement::discard() noexcept {
+  if (temporary_ != nullptr) ::unlink(temporary_);
   if (file_ >= 0) ::close(file_);
+}
+
+void Replacement::create(mode_t mode) {
+  const std::string name =
+      (folder_of(target_) / fmt::format("{}{}", temporary_beginning(target_), ::getpid())).string();
+  for (int i = 1; i <= kTemporaryNames; ++i) {
+    temporary_names_.push_back(i == 1 ? name : fmt::format("{}-{}", name, i));
+  }
+  file_ = create_nameless(folder_of(target_), mode);
+  if (file_ >= 0) {
+    open_file_ = name_of_open(file_);
+    return;
+  }
+  if (errno != EOPNOTSUPP) throw cannot_write(path_, errno);
+  for (const std::string& temporary : temporary_names_) {
+    file_ = create_locked(temporary.c_str(), mode);
+    if (file_ >= 0) temporary_ = temporary.c_str();
+    if (file_ >= 0 || errno != EEXIST) break;
+  }
+  if (file_ < 0) throw cannot_write(path_, errno);
 }
 
 void Replacement::to_disk() const {
   if (::fsync(file_) != 0) throw cannot_write(path_, errno);
 }
 
+/// Links the file to a name. False with errno, EEXIST if there is a file of that name.
+bool Replacement::link_to(const char* name) const noexcept {
+  return ::linkat(AT_FDCWD, open_file_.c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW) == 0;
+}
+
 void Replacement::put_in_place() {
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0) throw cannot_write(path_, errno);
-  temporary_.clear();
+  bool placed = !open_file_.empty() && link_to(target_.c_str());
+  if (!placed && !open_file_.empty()) {
+    if (errno != EEXIST) throw cannot_write(path_, errno);
+    for (const std::string& name : temporary_names_) {
+      if (link_to(name.c_str())) {
+        temporary_ = name.c_str();
+      } else if (errno == EEXIST) {
+        continue;
+      }
+      break;
+    }
+    if (temporary_ == nullptr) throw cannot_write(path_, errno);
+  }
+  if (!placed && ::rename(temporary_, target_.c_str()) != 0) throw cannot_write(path_, errno);
+  temporary_ = nullptr;
   note_written(target_);
 }
 

@@ -1,23 +1,29 @@
 #pragma once
+#include <sys/types.h>
+
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace tpm {
 
-/// A file on its way to a name: written under a temporary name in the same folder and renamed when
-/// it is whole, so that a reader sees the old file or the new one.
+/// A file on its way to a name: written without a name in the same folder (O_TMPFILE) and given its
+/// name when it is whole, so that a reader sees the old file or the new one, and a process that is
+/// killed leaves nothing. Where another file has the name, the new one passes through a temporary
+/// name ("NAME.part.4711"), because only rename() replaces.
+///
+/// File systems without O_TMPFILE get the temporary name at once, created with O_EXCL and locked
+/// while its writer lives. Temporary files of the same name whose writers are dead are removed.
 ///
 /// A symbolic link is followed: the file that it points to is replaced, the link stays. The new
-/// file has the mode of the one that it replaces. The temporary file is created with O_EXCL and
-/// locked while its writer lives; temporary files of the same name whose writers are dead are
-/// removed.
+/// file has the mode of the one that it replaces.
 class Replacement {
  public:
-  /// Creates the parent folders and the temporary file. Throws Error(environment) if that fails or
+  /// Creates the parent folders and the file. Throws Error(environment) if that fails or
   /// if the name is that of a folder, a device or a pipe, and Error(usage) for a file that the
   /// command reads (file_roles.hpp).
   explicit Replacement(std::filesystem::path path);
-  /// Removes the temporary file unless it was put in place.
+  /// The file is gone unless it was put in place.
   ~Replacement();
   Replacement(const Replacement&) = delete;
   Replacement& operator=(const Replacement&) = delete;
@@ -30,9 +36,17 @@ class Replacement {
   void put_in_place();
 
  private:
+  void create(mode_t mode);
+  void discard() noexcept;
+  [[nodiscard]] bool link_to(const char* name) const noexcept;
+
   std::filesystem::path path_;    ///< as it was given, for messages
   std::filesystem::path target_;  ///< what a symbolic link leads to
-  std::filesystem::path temporary_;
+  std::string open_file_;         ///< the file without a name, for linkat(); empty: it has one
+  /// Names that it may have on its way, made before it is written: putting it in place needs no
+  /// memory.
+  std::vector<std::string> temporary_names_;
+  const char* temporary_ = nullptr;  ///< the one that it has
   int file_ = -1;
 };
 

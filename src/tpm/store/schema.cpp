@@ -2,8 +2,7 @@
 
 #include <cstdint>
 #include <limits>
-#include <new>
-#include <stdexcept>
+#include <optional>
 #include <string_view>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/memory_reserve.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 
@@ -163,17 +163,25 @@ void require_signed_range(const Json& value, const std::string& key, std::string
   }
 }
 
-/// valijson asks for memory without an exception and then throws one of its own.
-void populate(const nlohmann::json& document, valijson::Schema& schema) {
-  valijson::SchemaParser parser;
-  try {
-    parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(document), schema);
-  } catch (const std::runtime_error& error) {
-    if (std::string_view(error.what()).starts_with("Failed to allocate memory")) {
-      throw std::bad_alloc();
+/// The innermost violation is the cause; those around it only say that something inside is wrong.
+std::optional<Violation> innermost_violation(const nlohmann::json& rules,
+                                             const nlohmann::json& document) {
+  constexpr std::size_t kReserve = std::size_t{8} << 20U;
+  MemoryReserve reserve(kReserve);  // valijson does not look whether it got what it asked for
+  std::optional<Violation> innermost;
+  {
+    valijson::Schema schema;
+    valijson::SchemaParser().populateSchema(valijson::adapters::NlohmannJsonAdapter(rules), schema);
+    valijson::Validator validator;
+    valijson::ValidationResults results;
+    validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), &results);
+    Violation error;
+    while (results.popError(error)) {
+      if (!innermost || error.context.size() > innermost->context.size()) innermost = error;
     }
-    throw;
   }
+  reserve.require_unused();
+  return innermost;
 }
 
 }  // namespace
@@ -185,22 +193,8 @@ void check_schema(const Json& value, std::string_view schema_name, std::string_v
   const nlohmann::json schema_document = root;
   const nlohmann::json document = value;
 
-  valijson::Schema schema;
-  populate(schema_document, schema);
-  valijson::Validator validator;
-  valijson::ValidationResults results;
-  if (validator.validate(schema, valijson::adapters::NlohmannJsonAdapter(document), &results)) {
-    return;
-  }
-  // The innermost violation is the cause; those around it only say that something inside is wrong.
-  Violation error;
-  Violation innermost;
-  while (results.popError(error)) {
-    if (innermost.description.empty() || error.context.size() > innermost.context.size()) {
-      innermost = error;
-    }
-  }
-  throw in_plain_words(innermost, root, where);
+  const std::optional<Violation> violation = innermost_violation(schema_document, document);
+  if (violation) throw in_plain_words(*violation, root, where);
 }
 
 }  // namespace tpm

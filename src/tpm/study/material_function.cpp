@@ -215,6 +215,7 @@ FitConfig function_config(LawSpec law, const MaterialFunction& function,
   config.seed = options.seed;
   config.level = options.level;
   config.profiles = options.profiles;
+  config.interrupted = options.interrupted;
   int times = 0;
   for (std::size_t i = 0; i < model.law_parameters().size(); ++i) {
     const LawParameter& p = model.law_parameters()[i];

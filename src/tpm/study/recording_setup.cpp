@@ -302,6 +302,7 @@ FitConfig recording_config(LawSpec law, std::span<const PreparedRecording> recor
   config.seed = options.seed;
   config.level = options.level;
   config.profiles = options.profiles;
+  config.interrupted = options.interrupted;
   for (const LawParameter& p : model.law_parameters()) {
     config.fixed.push_back(p.preset.value_or(0.0));
   }

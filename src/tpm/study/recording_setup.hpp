@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -45,6 +46,7 @@ struct SetupOptions {
   std::optional<double> reference;
   /// Exponent that power kernels keep, where the probe's shape gives it: 2 of a cone.
   std::optional<double> exponent;
+  std::function<bool()> interrupted;  ///< see FitConfig
 };
 
 /// A reference depth for the kernels: the largest drive above contact among the recordings, to two

@@ -1,0 +1,138 @@
+// tpm budget: what is lost between a recording and a hand.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "protocol_options.hpp"
+#include "recording_options.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/law/law_file.hpp"
+#include "tpm/report/budget_report.hpp"
+#include "tpm/scene/experiment_scene.hpp"
+#include "tpm/study/error_budget.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct BudgetCommand {
+  std::string law;
+  RecordingOptions recordings;  ///< its file may also hold a protocol
+  RampOptions ramp;
+  std::string scene, finer, tolerance = "1%";
+  std::string loop_rate = "1 kHz", encoder = "10 um", delay = "1", samples = "1000", seed = "0";
+  std::string folder, output;
+};
+
+BudgetOptions budget_options(const BudgetCommand& command) {
+  BudgetOptions options;
+  const double rate = parse_quantity(command.loop_rate, Dimension::frequency, "--loop-rate");
+  if (!(rate >= 1.0 && rate <= 1e6)) {
+    throw Error(ExitCode::usage, "--loop-rate", "'" + printable(command.loop_rate) + "'",
+                "1 Hz to 1 MHz");
+  }
+  options.device.period_s = 1.0 / rate;
+  options.device.encoder_step_m = parse_quantity(command.encoder, Dimension::length, "--encoder");
+  if (!(options.device.encoder_step_m >= 0.0)) {
+    throw Error(ExitCode::usage, "--encoder", "'" + printable(command.encoder) + "'", "0 or more");
+  }
+  options.device.delay_periods = static_cast<int>(parse_whole_number(command.delay, "--delay", 0));
+  constexpr std::uint64_t kFewest = 100;
+  options.samples = static_cast<int>(parse_whole_number(command.samples, "--samples", kFewest));
+  options.seed = parse_whole_number(command.seed, "--seed", 0);
+  return options;
+}
+
+/// An organ's protocol is its scene's, unless another is given.
+ErrorBudget budget_of_organ(const BudgetCommand& command, const LawFile& law) {
+  ExperimentScene scene = read_experiment(command.scene);
+  const bool other = !command.ramp.depth.empty() || !command.ramp.rate.empty() ||
+                     !command.ramp.hold.empty() || !command.recordings.files.empty();
+  if (other) {
+    auto file = chosen_protocol(command.ramp, command.recordings.files);
+    if (!file) {
+      throw Error(ExitCode::usage, "RECORDING", "with --scene",
+                  "a protocol: an organ's budget follows one");
+    }
+    scene.protocol = std::move(file->protocol);
+  }
+  std::optional<ExperimentScene> finer;
+  if (!command.finer.empty()) finer = read_experiment(command.finer);
+  return organ_budget(law, scene, finer, command.tolerance, budget_options(command));
+}
+
+ErrorBudget budget_of_contact(const BudgetCommand& command, const LawFile& law) {
+  if (!command.finer.empty()) {
+    throw Error(ExitCode::usage, "--finer", "without --scene", "both, or none");
+  }
+  const BudgetOptions options = budget_options(command);
+  const auto file = chosen_protocol(command.ramp, command.recordings.files);
+  if (file) return contact_budget(law, file->protocol, file->times_s, options);
+  return contact_budget(law, read_recordings(command.recordings).front(), options);
+}
+
+int run_budget(const BudgetCommand& command, const Session& session) {
+  will_write_into(command.folder, {"budget.json", "budget.csv", "figures.json"});
+  const LawFile law = read_law(command.law);
+  const ErrorBudget budget =
+      command.scene.empty() ? budget_of_contact(command, law) : budget_of_organ(command, law);
+  std::string text = session.json() ? to_text(to_json(budget)) : to_terminal_text(budget);
+  if (!command.folder.empty()) {
+    const auto files = write_budget_report(command.folder, budget);
+    if (!session.json()) {
+      text += fmt::format("\nwritten to {}: {}\n", command.folder, fmt::join(files, ", "));
+    }
+  }
+  deliver(text, command.output);
+  return 0;
+}
+
+}  // namespace
+
+void add_budget_command(CLI::App& app, Session& session) {
+  CLI::App* command =
+      app.add_subcommand("budget", "What is lost between a recording and a hand, stage by stage");
+  auto options = std::make_shared<BudgetCommand>();
+  command->add_option("LAW", options->law, "law.json that tpm fit has written")->required();
+  command
+      ->add_option("PROTOCOL|RECORDING", options->recordings.files,
+                   "A JSON file with a block protocol, or a recording: its motion, and its "
+                   "readings as the first stage")
+      ->expected(0, 1);
+  add_ramp_options(*command, options->ramp);
+  command->add_option(
+      "--scene", options->scene,
+      "An organ (JSON scene) that stands for the contact: its own stages follow the "
+      "law, along its protocol");
+  command->add_option("--finer", options->finer,
+                      "The same organ at a finer spacing: adds the line spacing");
+  command
+      ->add_option("--tolerance", options->tolerance,
+                   "With --scene: of the model that is picked for the loop, as tpm plan takes it")
+      ->capture_default_str();
+  command->add_option("--loop-rate", options->loop_rate, "Of the servo loop")
+      ->capture_default_str();
+  command->add_option("--encoder", options->encoder, "Step of the position, 0 m for none")
+      ->capture_default_str();
+  command->add_option("--delay", options->delay, "Periods from a position to its force")
+      ->capture_default_str();
+  command->add_option("--samples", options->samples, "Laws drawn for the random part, 100 or more")
+      ->capture_default_str();
+  command->add_option("--seed", options->seed, "Of what is drawn, 0 or more")
+      ->capture_default_str();
+  command->add_option("--folder", options->folder,
+                      "Write budget.json, budget.csv and the waterfall into this folder");
+  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  add_recording_options(*command, options->recordings);
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm fit recording.csv --folder fitted\n"
+      "  tpm budget fitted/law.json recording.csv --folder budget\n"
+      "  tpm plan configs/plan/servo.json --tolerance data --budget budget/budget.json");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return run_budget(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

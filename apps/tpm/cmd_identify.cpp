@@ -1,0 +1,110 @@
+// tpm identify: a recording identified sample by sample, as if it were being made.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "command.hpp"
+#include "recording_options.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/report/identification_report.hpp"
+#include "tpm/study/identification.hpp"
+#include "tpm/study/identified_loop.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct IdentifyCommand {
+  RecordingOptions recordings;
+  std::vector<std::string> laws;
+  std::string target = "10%", patience = "1.1", level = "0.95", reference, seed = "0";
+  std::string folder, output;
+  bool no_loop = false;
+};
+
+double share(std::string text, const char* option) {
+  constexpr double kPercent = 100.0;
+  const bool percent = text.ends_with('%');
+  if (percent) text.pop_back();
+  return parse_number(text, option) / (percent ? kPercent : 1.0);
+}
+
+IdentifyOptions identify_options(const IdentifyCommand& command, Quantity drive) {
+  IdentifyOptions options;
+  for (const std::string& name : command.laws) {
+    options.laws.push_back(parse_law_name(name, "--laws"));
+  }
+  options.target = share(command.target, "--target");
+  options.patience = parse_number(command.patience, "--patience");
+  options.level = share(command.level, "--level");
+  options.seed = parse_whole_number(command.seed, "--seed", 0);
+  if (!command.reference.empty()) {
+    options.reference = parse_quantity(command.reference, quantity_dimension(drive), "--reference");
+  }
+  return options;
+}
+
+int run_identify(const IdentifyCommand& command, const Session& session) {
+  will_write_into(command.folder, {"identification.json", "law.json", "figures.json"});
+  const PreparedRecording recording = read_recordings(command.recordings).front();
+  const Quantity drive = recording.recording.drive_quantity;
+  const Identification id = identify(recording, identify_options(command, drive));
+  Json json = to_json(id);
+  std::string text = to_terminal_text(id);
+  if (!command.no_loop && drive == Quantity::indentation_depth) {
+    const IdentifiedLoop loop = replay_in_loop(id, recording, {});
+    json["loop"] = to_json(loop);
+    text += "\n" + to_terminal_text(loop);
+  }
+  if (session.json()) text = to_text(json);
+  if (!command.folder.empty()) {
+    const auto files =
+        write_identification_report(command.folder, id, identified_law(id, recording), json);
+    if (!session.json()) {
+      text += fmt::format("\nwritten to {}: {}\n", command.folder, fmt::join(files, ", "));
+    }
+  }
+  deliver(text, command.output);
+  return 0;
+}
+
+}  // namespace
+
+void add_identify_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "identify", "Replay a recording and fit it sample by sample, with intervals at each");
+  auto options = std::make_shared<IdentifyCommand>();
+  command->add_option("RECORDING", options->recordings.files, "A recording of a ramp and hold")
+      ->required()
+      ->expected(1);
+  command->add_option("--laws", options->laws,
+                      "Laws to choose from, such as linear-1 power-2 (default: linear and power "
+                      "kernels with 0 to 2 branches, and linear-1-elastic)");
+  command
+      ->add_option("--target", options->target,
+                   "Stop when every material parameter is known to this part of its estimate")
+      ->capture_default_str();
+  command
+      ->add_option("--patience", options->patience,
+                   "And stays so until there are this many times as many samples, 1 or more")
+      ->capture_default_str();
+  command->add_option("--level", options->level, "Of the intervals")->capture_default_str();
+  command->add_option("--reference", options->reference,
+                      "Planned depth, that coefficients refer to (default: the recording's)");
+  command->add_option("--seed", options->seed, "Of the searches, 0 or more")->capture_default_str();
+  command->add_flag("--no-loop", options->no_loop,
+                    "Do not hand the laws over to a model in the loop");
+  command->add_option("--folder", options->folder,
+                      "Write identification.json, law.json and the figure into this folder");
+  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  add_recording_options(*command, options->recordings);
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm identify recording.csv --target 5% --folder identified\n"
+      "  tpm hil run configs/hil_law.json --law identified/law.json");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return run_identify(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,118 @@
+// tpm predict: the answer of a fitted law with the band of its uncertainty.
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "command.hpp"
+#include "protocol_options.hpp"
+#include "recording_options.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/law/law_file.hpp"
+#include "tpm/report/prediction_report.hpp"
+#include "tpm/study/law_prediction.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct PredictOptions {
+  std::string law;
+  RecordingOptions recordings;  ///< its file may also hold a protocol
+  RampOptions ramp;
+  std::string level, placement, samples, seed = "0";
+  bool verdict = false;
+  std::string folder, output;
+};
+
+PredictionOptions prediction_options(const PredictOptions& options) {
+  PredictionOptions chosen;
+  if (!options.level.empty()) {
+    constexpr double kPercent = 100.0;
+    std::string text = options.level;
+    const bool percent = text.ends_with('%');
+    if (percent) text.pop_back();
+    chosen.level = parse_number(text, "--level") / (percent ? kPercent : 1.0);
+  }
+  if (!options.placement.empty()) {
+    chosen.placement = parse_placement(options.placement, "--placement");
+  }
+  if (!options.samples.empty()) {
+    constexpr std::uint64_t kFewest = 100;
+    chosen.samples = static_cast<int>(parse_whole_number(options.samples, "--samples", kFewest));
+  }
+  chosen.seed = parse_whole_number(options.seed, "--seed", 0);
+  return chosen;
+}
+
+int predict(const PredictOptions& options, const Session& session) {
+  will_write_into(options.folder, {"prediction.csv", "prediction.json", "figures.json"});
+  const LawFile law = read_law(options.law);
+  const PredictionOptions chosen = prediction_options(options);
+  const auto file = chosen_protocol(options.ramp, options.recordings.files);
+  std::optional<PreparedRecording> recording;
+  if (!file) recording = read_recordings(options.recordings).front();
+  const LawPrediction prediction = file ? predict_law(law, file->protocol, file->times_s, chosen)
+                                        : predict_recording(law, *recording, chosen);
+  Json json = to_json(prediction);
+  std::string text = session.json() ? "" : to_terminal_text(prediction);
+  if (options.verdict) {
+    if (!recording) {
+      throw Error(ExitCode::usage, "--verdict", "without a recording", "it only with one");
+    }
+    const PredictionVerdict verdict = judge_prediction(prediction, *recording, chosen.seed);
+    json["verdict"] = to_json(verdict, prediction.response_dimension());
+    if (!session.json()) text += verdict_words(verdict, prediction.recording->peak);
+  }
+  if (session.json()) text = to_text(json);
+  if (!options.folder.empty()) {
+    const auto files = write_prediction_report(options.folder, prediction, json);
+    if (!session.json()) {
+      text += fmt::format("\nwritten to {}: {}\n", options.folder, fmt::join(files, ", "));
+    }
+  }
+  deliver(text, options.output);
+  return 0;
+}
+
+}  // namespace
+
+void add_predict_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "predict", "Answer a protocol or a recording's motion with the band of a fit's uncertainty");
+  auto options = std::make_shared<PredictOptions>();
+  command->add_option("LAW", options->law, "law.json that tpm fit has written")->required();
+  command
+      ->add_option("PROTOCOL|RECORDING", options->recordings.files,
+                   "A JSON file with a block protocol (a scene, or schemas/protocol.schema.json), "
+                   "or a recording whose motion is answered and whose readings are compared")
+      ->expected(0, 1);
+  add_ramp_options(*command, options->ramp);
+  command->add_option("--level", options->level,
+                      "Of the bands, 0.9 or 90% (default: that of the fit)");
+  command->add_option("--placement", options->placement,
+                      "Contact point and offset: surface (0), fitted (those of the fit) or own "
+                      "(found for the recording); default: surface for a protocol, fitted for a "
+                      "recording that was fitted, own for another");
+  command->add_option("--samples", options->samples,
+                      "Bands from so many laws drawn from the covariance, 100 or more, instead of "
+                      "from derivatives");
+  command->add_option("--seed", options->seed, "Of what is drawn, 0 or more")
+      ->capture_default_str();
+  command->add_flag("--verdict", options->verdict,
+                    "Say whether the law predicts the recording, by the rule of tpm select");
+  command->add_option("--folder", options->folder,
+                      "Write prediction.csv, prediction.json and the figure into this folder");
+  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  add_recording_options(*command, options->recordings);
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm fit recording.csv --folder fitted\n"
+      "  tpm predict fitted/law.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"\n"
+      "  tpm predict fitted/law.json other.csv --verdict --folder predicted");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return predict(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

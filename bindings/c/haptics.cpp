@@ -1,0 +1,263 @@
+// The C interface for haptic loops: errors become codes and one line, nothing is thrown across it.
+#include "tpmkit/haptics.h"
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "tpm/core/error.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/haptics/loop_contact.hpp"
+
+struct tpm_haptics_contact {
+  tpm_haptics_contact(const char* file, const tpm::LoopContactOptions& options)
+      : contact(file, options) {}
+  tpm::LoopContact contact;
+};
+
+namespace {
+
+using tpm::ServoFlag;
+using tpm::StopCause;
+
+void say(char* message, std::size_t room, std::string_view text) noexcept {
+  if (message == nullptr || room == 0) return;
+  const std::size_t length = std::min(room - 1, text.size());
+  std::copy_n(text.data(), length, message);
+  message[length] = '\0';
+}
+
+/// A struct of a caller that was compiled for another version of this library is read as far as
+/// both know it. The first version is the least that there is.
+template <class Struct>
+bool known(const Struct& given, std::size_t least) noexcept {
+  return given.version >= 1 && given.size >= least && given.size <= 65536;
+}
+
+/// Copies as much of a filled struct as the caller has room for; size and version stay the
+/// caller's.
+template <class Struct>
+void hand_over(const Struct& filled, Struct& given) noexcept {
+  const std::size_t head = offsetof(Struct, version) + sizeof given.version;
+  const std::size_t bytes = std::min<std::size_t>(given.size, sizeof filled);
+  std::memcpy(reinterpret_cast<char*>(&given) + head,  // NOLINT: plain data, by its bytes
+              reinterpret_cast<const char*>(&filled) + head, bytes - head);  // NOLINT
+}
+
+int cause_of(StopCause cause) noexcept {
+  switch (cause) {
+    case StopCause::none:
+      return TPM_HAPTICS_RUNNING;
+    case StopCause::finished:
+      return TPM_HAPTICS_FINISHED;
+    case StopCause::position_not_finite:
+      return TPM_HAPTICS_POSITION_NOT_FINITE;
+    case StopCause::position_jump:
+      return TPM_HAPTICS_POSITION_JUMPED;
+    case StopCause::force_not_finite:
+      return TPM_HAPTICS_FORCE_NOT_FINITE;
+    case StopCause::overrun_storm:
+      return TPM_HAPTICS_LATE;
+    case StopCause::not_in_place:
+      return TPM_HAPTICS_NOT_IN_PLACE;
+    case StopCause::untrusted:
+      return TPM_HAPTICS_UNTRUSTED;
+    case StopCause::energy:
+      return TPM_HAPTICS_ENERGY;
+    case StopCause::oscillation:
+      return TPM_HAPTICS_OSCILLATION;
+    default:
+      return TPM_HAPTICS_OTHER;
+  }
+}
+
+std::uint32_t flags_of(std::uint32_t row) noexcept {
+  constexpr std::pair<std::uint32_t, std::uint32_t> kSame[] = {
+      {tpm::kTouching, TPM_HAPTICS_TOUCHING},
+      {tpm::kForceLimited | tpm::kRampingIn, TPM_HAPTICS_FORCE_LIMITED},
+      {tpm::kSlipping, TPM_HAPTICS_SLIPPING},
+      {tpm::kDamped, TPM_HAPTICS_DAMPED},
+      {tpm::kBeyondModel, TPM_HAPTICS_BEYOND_MODEL},
+      {tpm::kWaiting, TPM_HAPTICS_WAITING},
+      {tpm::kOutOfReach, TPM_HAPTICS_OUT_OF_REACH},
+      {tpm::kInTissue, TPM_HAPTICS_IN_TISSUE},
+      {tpm::kMoving, TPM_HAPTICS_MOVING}};
+  std::uint32_t flags = 0;
+  for (const auto& [servo, ours] : kSame) {
+    if ((row & servo) != 0) flags |= ours;
+  }
+  return flags;
+}
+
+template <std::size_t N>
+void copy_text(std::string_view text, char (&to)[N]) noexcept {
+  say(to, N, text);
+}
+
+tpm::LoopContactOptions options_of(const tpm_haptics_options* given) {
+  tpm::LoopContactOptions options;
+  if (given == nullptr) return options;
+  // An option that this library does not know yet must not be ignored.
+  if (!known(*given, sizeof(tpm_haptics_options)) || given->version > TPM_HAPTICS_VERSION) {
+    throw tpm::Error(tpm::ExitCode::usage, "options", "size or version is not one of this library",
+                     "TPM_HAPTICS_OPTIONS_INIT");
+  }
+  options.rate_Hz = given->rate_Hz;
+  options.longest_s = given->longest_s;
+  options.start_gate = given->no_start_gate == 0;
+  options.accept_unstable = given->accept_unstable != 0;
+  const std::string device(given->device, strnlen(given->device, sizeof given->device));
+  if (!device.empty()) options.device = device;
+  return options;
+}
+
+/// Runs what may throw; answers the code, and says why in `message`.
+template <class Work>
+int guarded(char* message, std::size_t room, Work&& work) noexcept {
+  say(message, room, "");
+  try {
+    work();
+    return TPM_HAPTICS_OK;
+  } catch (const tpm::Error& error) {
+    say(message, room, error.what());
+    return static_cast<int>(error.code());
+  } catch (const std::bad_alloc&) {
+    say(message, room, "no memory");
+    return TPM_HAPTICS_ENVIRONMENT;
+  } catch (const std::exception& error) {
+    say(message, room, error.what());
+    return TPM_HAPTICS_ENVIRONMENT;
+  }
+}
+
+int not_given(char* message, std::size_t room) noexcept {
+  say(message, room, "a null pointer; expected a file name and a place for the contact");
+  return TPM_HAPTICS_USAGE;
+}
+
+}  // namespace
+
+extern "C" {
+
+const char* tpm_haptics_version(void) {
+  return tpm::version().data();  // a literal
+}
+
+int tpm_haptics_open(const char* file, const tpm_haptics_options* options,
+                     tpm_haptics_contact** contact, char* message, size_t message_size) {
+  if (contact != nullptr) *contact = nullptr;
+  if (file == nullptr || contact == nullptr) return not_given(message, message_size);
+  return guarded(message, message_size, [&] {
+    *contact = std::make_unique<tpm_haptics_contact>(file, options_of(options)).release();
+  });
+}
+
+int tpm_haptics_step(tpm_haptics_contact* contact, const double position_m[3], double force_N[3]) {
+  return tpm_haptics_step_after(contact, 0, position_m, force_N);
+}
+
+int tpm_haptics_step_after(tpm_haptics_contact* contact, uint32_t missed,
+                           const double position_m[3], double force_N[3]) {
+  if (contact == nullptr || position_m == nullptr || force_N == nullptr) return TPM_HAPTICS_USAGE;
+  constexpr std::uint32_t kMost = 1U << 20U;  // far above what stops a contact
+  Eigen::Vector3d force;
+  const StopCause cause = contact->contact.step(Eigen::Map<const Eigen::Vector3d>(position_m),
+                                                force, static_cast<int>(std::min(missed, kMost)));
+  std::copy_n(force.data(), 3, force_N);
+  return cause == StopCause::none ? TPM_HAPTICS_OK : TPM_HAPTICS_STOPPED;
+}
+
+int tpm_haptics_reset(tpm_haptics_contact* contact) {
+  if (contact == nullptr) return TPM_HAPTICS_USAGE;
+  return guarded(nullptr, 0, [&] { contact->contact.reset(); });
+}
+
+int tpm_haptics_get_info(const tpm_haptics_contact* contact, tpm_haptics_info* info) {
+  if (contact == nullptr || info == nullptr || !known(*info, sizeof *info))
+    return TPM_HAPTICS_USAGE;
+  const tpm::LoopContact& c = contact->contact;
+  const tpm::ServoSettings& servo = c.session().servo;
+  const tpm::TissueShape& shape = c.loop().shape;
+  tpm_haptics_info filled = TPM_HAPTICS_INFO_INIT;
+  filled.period_s = c.period_s();
+  filled.stiffness_N_per_m = c.rendering().stiffness_N_per_m;
+  filled.stable_N_per_m = c.rendering().stable_N_per_m;
+  filled.passive_N_per_m = c.rendering().passive_N_per_m;
+  filled.force_limit_N = servo.force_limit_N;
+  std::copy_n(servo.surface_m.data(), 3, filled.surface_m);
+  std::copy_n(servo.push.data(), 3, filled.push);
+  std::copy_n(c.loop().push.data(), 3, filled.scene_push);
+  filled.sphere_radius_m = shape.radius_m;
+  filled.tool_radius_m = shape.to_model ? shape.tool_radius_m : 0.0;
+  filled.spheres = static_cast<std::uint64_t>(c.spheres());
+  filled.contact_sphere = shape.contact;
+  copy_text(c.loop().name, filled.model);
+  hand_over(filled, *info);
+  return TPM_HAPTICS_OK;
+}
+
+int tpm_haptics_get_state(tpm_haptics_contact* contact, tpm_haptics_state* state) {
+  if (contact == nullptr || state == nullptr || !known(*state, sizeof *state)) {
+    return TPM_HAPTICS_USAGE;
+  }
+  const tpm::LoopContactState newest = contact->contact.state();
+  tpm_haptics_state filled = TPM_HAPTICS_STATE_INIT;
+  filled.time_s = newest.time_s;
+  std::copy_n(newest.row.position_m, 3, filled.position_m);
+  std::copy_n(newest.row.commanded_N, 3, filled.force_N);
+  filled.tool_depth_m = newest.row.tool_depth_m;
+  filled.surface_depth_m = newest.row.surface_depth_m;
+  filled.model_force_N = newest.row.model_force_N;
+  filled.model_error_N = newest.row.model_error_N;
+  filled.flags = flags_of(newest.row.flags);
+  filled.cause = cause_of(newest.row.stop);
+  hand_over(filled, *state);
+  return TPM_HAPTICS_OK;
+}
+
+int tpm_haptics_positions(tpm_haptics_contact* contact, double* positions_m, size_t spheres) {
+  if (contact == nullptr || positions_m == nullptr ||
+      spheres != static_cast<std::size_t>(contact->contact.spheres())) {
+    return TPM_HAPTICS_USAGE;
+  }
+  contact->contact.positions(
+      Eigen::Map<Eigen::Matrix3Xd>(positions_m, 3, contact->contact.spheres()));
+  return TPM_HAPTICS_OK;
+}
+
+void tpm_haptics_close(tpm_haptics_contact* contact) {
+  const std::unique_ptr<tpm_haptics_contact> closed(contact);
+}
+
+const char* tpm_haptics_cause_text(int cause) {
+  switch (cause) {
+    case TPM_HAPTICS_RUNNING:
+      return "running";
+    case TPM_HAPTICS_FINISHED:
+      return "finished";
+    case TPM_HAPTICS_POSITION_NOT_FINITE:
+      return "position not finite";
+    case TPM_HAPTICS_POSITION_JUMPED:
+      return "position jumped";
+    case TPM_HAPTICS_FORCE_NOT_FINITE:
+      return "force not finite";
+    case TPM_HAPTICS_LATE:
+      return "too many periods missed";
+    case TPM_HAPTICS_NOT_IN_PLACE:
+      return "tool not in place";
+    case TPM_HAPTICS_UNTRUSTED:
+      return "model not trusted";
+    case TPM_HAPTICS_ENERGY:
+      return "energy given to the hand";
+    case TPM_HAPTICS_OSCILLATION:
+      return "oscillation";
+    default:
+      return "stopped for another cause";
+  }
+}
+
+}  // extern "C"

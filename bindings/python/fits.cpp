@@ -1,0 +1,279 @@
+// Fits: of recordings and material functions by the least law, of configurations.
+#include <filesystem>
+
+#include "binding.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/curve/recording_file.hpp"
+#include "tpm/fit/prediction.hpp"
+#include "tpm/fit/tables.hpp"
+#include "tpm/fit/verdict.hpp"
+#include "tpm/report/fit_report.hpp"
+#include "tpm/report/function_report.hpp"
+#include "tpm/report/recording_report.hpp"
+#include "tpm/store/json.hpp"
+#include "tpm/study/material_function.hpp"
+#include "tpm/study/selection.hpp"
+
+namespace tpm::python {
+namespace {
+
+/// What a call of fit() asks for, as keywords of Python.
+struct FitRequest {
+  std::vector<std::string> files;
+  std::optional<std::string> law;
+  std::optional<std::size_t> starts;
+  std::optional<std::uint64_t> seed;
+  std::optional<double> reference;
+  ImportOptions import;
+};
+
+ImportOptions import_of(const py::dict& said) {
+  ImportOptions import;
+  for (const auto& [key, value] : said) {
+    const auto name = py::cast<std::string>(key);
+    if (name == "units") {
+      import.units = py::cast<std::map<std::string, std::string>>(value);
+      for (const auto& [column, unit] : import.units) (void)parse_unit(unit, "units: " + column);
+      continue;
+    }
+    const auto text = py::cast<std::string>(value);
+    if (name == "time")
+      import.time_column = text;
+    else if (name == "drive")
+      import.drive_column = text;
+    else if (name == "response")
+      import.response_column = text;
+    else if (name == "sd")
+      import.sd_column = text;
+    else if (name == "frequency")
+      import.frequency_column = text;
+    else if (name == "storage")
+      import.storage_column = text;
+    else if (name == "loss")
+      import.loss_column = text;
+    else if (name == "drive_quantity")
+      import.drive_quantity = parse_quantity_name(text, name);
+    else if (name == "provenance")
+      import.provenance = parse_provenance(text, name);
+    else if (name == "response_quantity")
+      import.response_quantity = parse_quantity_name(text, name);
+    else
+      throw Error(ExitCode::usage, "columns", "'" + printable(name) + "'",
+                  "time, drive, response, sd, frequency, storage, loss, drive_quantity, "
+                  "response_quantity, provenance or units");
+  }
+  return import;
+}
+
+/// What came of it. `selection` is empty for a configuration.
+class Fit {
+ public:
+  Fit(FitResult fit, std::optional<Selection> selection,
+      std::optional<MaterialFunction> function = std::nullopt)
+      : fit_(std::move(fit)), selection_(std::move(selection)), function_(std::move(function)) {}
+
+  [[nodiscard]] const FitResult& fit() const { return fit_; }
+  [[nodiscard]] const std::optional<Selection>& selection() const { return selection_; }
+
+  [[nodiscard]] py::list parameters() const {
+    py::list rows;
+    for (const ParameterResult& p : fit_.parameters) {
+      rows.append(py::dict(py::arg("name") = p.parameter.name, py::arg("estimate") = p.estimate,
+                           py::arg("standard_error") = p.standard_error, py::arg("lower") = p.lower,
+                           py::arg("upper") = p.upper,
+                           py::arg("unit") = std::string(si_symbol(p.parameter.unit.dimension)),
+                           py::arg("verdict") = verdict_text(p), py::arg("nuisance") = p.nuisance,
+                           py::arg("words") = p.words));
+    }
+    return rows;
+  }
+  [[nodiscard]] py::list recordings() const {
+    py::list list;
+    for (const RecordingFit& r : fit_.recordings) {
+      py::dict one(
+          py::arg("dataset") = fit_.config.data[r.choice].dataset,
+          py::arg("drive_key") = si_key(r.drive_quantity),
+          py::arg("response_key") = si_key(r.response_quantity),
+          py::arg("provenance") = std::string(provenance_name(r.provenance)),
+          py::arg("rms_residual") = r.rms_residual, py::arg("peak") = r.peak,
+          py::arg("time_s") = handed_over(r.time_s), py::arg("drive") = handed_over(r.drive),
+          py::arg("observed") = handed_over(r.observed),
+          py::arg("predicted") = handed_over(r.predicted), py::arg("lower") = handed_over(r.lower),
+          py::arg("upper") = handed_over(r.upper));
+      one["fitted"] = py::array(py::cast(std::vector<bool>(r.fitted)));
+      list.append(std::move(one));
+    }
+    return list;
+  }
+  [[nodiscard]] LawFile law() const {
+    if (!fit_.config.law) {
+      throw bad_input("fit", "is not of a law",
+                      "a fit of a recording, or a configuration with 'law'");
+    }
+    return fitted_law(fit_);
+  }
+  /// The response of the fitted model and its standard error by the parameters' covariance (NaN
+  /// where that is not of full rank).
+  [[nodiscard]] py::tuple predict(const Protocol& protocol, const Numbers& times_s,
+                                  std::size_t dataset) const {
+    if (dataset >= fit_.config.data.size()) {
+      throw bad_input("dataset", std::to_string(dataset),
+                      "0 to " + std::to_string(fit_.config.data.size() - 1));
+    }
+    const std::unique_ptr<Model> model = make_model(fit_.config);
+    const std::vector<double> values = model_parameters(fit_.config, fit_.best.natural, dataset);
+    std::vector<FitParameter> parameters;
+    for (const EstimatedParameter& p : fit_.config.parameters) parameters.push_back(p.fit);
+    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(values.size()),
+                                                  static_cast<Eigen::Index>(parameters.size()));
+    for (std::size_t j = 0; j < parameters.size(); ++j) {
+      for (const Target& target : fit_.config.parameters[j].sets) {
+        if (!target.applies_to(dataset)) continue;
+        along(static_cast<Eigen::Index>(target.parameter), static_cast<Eigen::Index>(j)) = 1.0;
+      }
+    }
+    Response response;
+    Eigen::VectorXd error;
+    {
+      const std::span<const double> times = span_of(times_s);
+      const py::gil_scoped_release released;
+      response = model->respond_along(protocol, times, values, along);
+      error = prediction_standard_errors(response.sensitivity, parameters, fit_.best.natural,
+                                         fit_.covariance);
+    }
+    if (error.size() == 0) {
+      error.setConstant(response.value.size(), std::numeric_limits<double>::quiet_NaN());
+    }
+    return py::make_tuple(py::cast(std::move(response.value)), py::cast(std::move(error)));
+  }
+  [[nodiscard]] std::vector<std::string> write(const std::filesystem::path& folder) const {
+    if (!selection_) return write_fit_report(folder, fit_);
+    if (function_) return write_function_report(folder, *function_, *selection_);
+    return write_recording_report(folder, *selection_);
+  }
+
+ private:
+  FitResult fit_;
+  std::optional<Selection> selection_;
+  std::optional<MaterialFunction> function_;
+};
+
+SelectionOptions selection_of(const FitRequest& request, const LongCall& call) {
+  SelectionOptions options;
+  if (request.law) options.laws = {parse_law_name(*request.law, "law")};
+  options.only_listed = request.law.has_value();
+  if (request.starts) options.setup.starts = *request.starts;
+  if (request.seed) options.setup.seed = *request.seed;
+  options.setup.reference = request.reference;
+  options.setup.interrupted = call.interrupted();
+  return options;
+}
+
+Fit fit_configuration(const FitRequest& request, const LongCall& call) {
+  if (request.law || request.reference) {
+    throw Error(ExitCode::usage, "law, reference", "with a configuration",
+                "them only with recordings; a configuration says its own");
+  }
+  FitProblem problem = read_fit_problem(request.files.front());
+  if (request.starts) problem.config.starts = *request.starts;
+  if (request.seed) problem.config.seed = *request.seed;
+  problem.config.interrupted = call.interrupted();
+  return {call.run([&] { return run_fit(problem); }), std::nullopt};
+}
+
+Fit fit_selected(Selection selection, std::optional<MaterialFunction> function) {
+  FitResult best = selection.candidates[selection.recommended].fit;
+  return {std::move(best), std::move(selection), std::move(function)};
+}
+
+Fit fit_files(const FitRequest& request) {
+  if (request.files.empty()) {
+    throw Error(ExitCode::usage, "fit", "no file", "a recording, or several");
+  }
+  const LongCall call;
+  const std::filesystem::path first = request.files.front();
+  if (std::filesystem::is_directory(first)) {
+    throw Error(ExitCode::usage, first.string(), "is a folder",
+                "files; a folder of specimens is pooled by the program: tpm fit FOLDER");
+  }
+  const bool alone = request.files.size() == 1;
+  if (alone && first.extension() == ".json" && !read_json(first).contains("kind")) {
+    return fit_configuration(request, call);
+  }
+  const SelectionOptions options = selection_of(request, call);
+  if (alone) {
+    auto function = find_material_function(first.string(), request.import);
+    if (function) {
+      Selection selection = call.run([&] { return select_law(*function, options); });
+      return fit_selected(std::move(selection), std::move(function));
+    }
+  }
+  std::vector<PreparedRecording> recordings;
+  for (const std::string& file : request.files) {
+    recordings.push_back(
+        prepare_recording(file, read_recording_file(file, request.import).recording));
+    recordings.back().import = request.import;
+  }
+  return fit_selected(call.run([&] { return select_law(recordings, options); }), std::nullopt);
+}
+
+py::dict recording_of(const std::filesystem::path& file, const py::dict& columns) {
+  const RecordingFile read = read_recording_file(file, import_of(columns));
+  const Recording& r = read.recording;
+  py::list findings;
+  for (const ImportFinding& f : read.findings) findings.append(py::make_tuple(f.what, f.value));
+  return py::dict(py::arg("id") = r.header.id, py::arg("title") = r.header.title,
+                  py::arg("citation") = r.header.citation, py::arg("sha256") = r.header.sha256,
+                  py::arg("provenance") = std::string(provenance_name(r.provenance)),
+                  py::arg("drive_key") = si_key(r.drive_quantity),
+                  py::arg("response_key") = si_key(r.response_quantity),
+                  py::arg("time_s") = handed_over(r.time_s),
+                  py::arg("drive") = handed_over(r.drive),
+                  py::arg("response") = handed_over(r.response), py::arg("findings") = findings);
+}
+
+}  // namespace
+
+void bind_fits(py::module_& module) {
+  py::class_<Fit>(module, "Fit")
+      .def_property_readonly("parameters", &Fit::parameters)
+      .def_property_readonly("recordings", &Fit::recordings)
+      .def_property_readonly("law_json", [](const Fit& f) { return to_text(to_json(f.law())); })
+      .def_property_readonly("has_law", [](const Fit& f) { return f.fit().config.law.has_value(); })
+      .def_property_readonly("flags", [](const Fit& f) { return f.fit().flags; })
+      .def_property_readonly("words",
+                             [](const Fit& f) {
+                               return f.selection() ? f.selection()->words
+                                                    : std::vector<std::string>();
+                             })
+      .def_property_readonly("warnings",
+                             [](const Fit& f) {
+                               return f.selection() ? f.selection()->warnings
+                                                    : std::vector<std::string>();
+                             })
+      .def_property_readonly("correlation",
+                             [](const Fit& f) { return f.fit().covariance.correlation; })
+      .def("predict", &Fit::predict)
+      .def("text",
+           [](const Fit& f) {
+             const std::string best = to_terminal_text(f.fit());
+             return f.selection() ? to_terminal_text(*f.selection()) + "\n" + best : best;
+           })
+      .def("to_json",
+           [](const Fit& f) {
+             return to_text(f.selection() ? to_json(*f.selection()) : to_json(f.fit()));
+           })
+      .def("write", [](const Fit& f, const std::filesystem::path& folder) {
+        const LongCall call;
+        return call.run([&] { return f.write(folder); });
+      });
+  module.def("fit", [](std::vector<std::string> files, std::optional<std::string> law,
+                       std::optional<std::size_t> starts, std::optional<std::uint64_t> seed,
+                       std::optional<double> reference, const py::dict& columns) {
+    return fit_files(
+        {std::move(files), std::move(law), starts, seed, reference, import_of(columns)});
+  });
+  module.def("read_recording", &recording_of);
+}
+
+}  // namespace tpm::python

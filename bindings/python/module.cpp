@@ -1,0 +1,70 @@
+// tpmkit._core: the library for Python. The package around it (tpmkit/*.py) makes DataFrames,
+// Datasets and figures of what it answers.
+#include "binding.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/core/units.hpp"
+#include "tpm/core/version.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm::python {
+namespace {
+
+/// tpmkit.Error: str() is the one line, `code` the exit code that the program would end with.
+void bind_errors(py::module_& module) {
+  static PyObject* const kind = PyErr_NewExceptionWithDoc(
+      "tpmkit.Error",
+      "What tpmkit cannot do, in one line: \"WHERE: WHAT; expected ...\".\n\n"
+      "`code` is the exit code of the program `tpm`: 1 the answer is no, "
+      "2 usage, 3 bad input,\n4 numerical, 5 environment.",
+      PyExc_RuntimeError, nullptr);
+  module.add_object("Error", py::reinterpret_borrow<py::object>(kind));
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    const auto raise = [](const std::string& words, int code) {
+      const py::object error = py::reinterpret_borrow<py::object>(kind)(words);
+      error.attr("code") = code;
+      PyErr_SetObject(kind, error.ptr());
+    };
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const Error& error) {
+      raise(error.what(), static_cast<int>(error.code()));
+    } catch (const Interrupted& stop) {
+      PyErr_SetString(PyExc_KeyboardInterrupt, stop.what());
+    }
+  });
+}
+
+}  // namespace
+}  // namespace tpm::python
+
+PYBIND11_MODULE(_core, module) {
+  using namespace tpm::python;
+  module.doc() = "The compiled part of tpmkit; use the package tpmkit.";
+  module.attr("__version__") = std::string(tpm::version());
+  bind_errors(module);
+  module.def(
+      "parse_quantity",
+      [](const std::string& text, const std::string& dimension) {
+        for (const auto& [name, known] :
+             {std::pair<const char*, tpm::Dimension>{"length", tpm::Dimension::length},
+              {"time", tpm::Dimension::time},
+              {"speed", tpm::Dimension::speed},
+              {"force", tpm::Dimension::force},
+              {"stress", tpm::Dimension::stress},
+              {"viscosity", tpm::Dimension::viscosity},
+              {"area", tpm::Dimension::area},
+              {"stiffness", tpm::Dimension::stiffness},
+              {"frequency", tpm::Dimension::frequency}}) {
+          if (dimension == name) return tpm::parse_quantity(text, known, "quantity");
+        }
+        throw tpm::bad_input("dimension", "'" + tpm::printable(dimension) + "'",
+                             "length, time, speed, force, stress, viscosity, area, stiffness or "
+                             "frequency");
+      },
+      py::arg("text"), py::arg("dimension"));
+  module.def("share_dir", [] { return tpm::share_dir(); });
+  bind_laws(module);
+  bind_fits(module);
+  bind_contacts(module);
+  bind_runs(module);
+}

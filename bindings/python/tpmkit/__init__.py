@@ -1,0 +1,41 @@
+"""Soft tissue: laws from recordings, organs of spheres, contacts for haptic loops.
+
+    import tpmkit
+    fit = tpmkit.fit("recording.csv")     # the least law that the recording supports
+    fit.parameters                        # a DataFrame: estimates, intervals, verdicts
+    fit.plot()
+
+Everything is SI: arguments, columns and attributes carry their unit in the name. What goes wrong is a
+`tpmkit.Error` whose text is one line, "WHERE: WHAT; expected ...". Long calls release the interpreter's
+lock; Ctrl-C ends them.
+
+The package calls the library of the program `tpm`; nothing runs in another process, except where a
+docstring says so (figures drawn by `Fit.save`).
+"""
+
+from ._core import Error, Protocol, __version__, share_dir
+from ._contact import Contact, run_session
+from ._data import example, open, read_recording
+from ._fit import Fit, fit
+from ._law import Element, Law
+from ._run import Plan, plan, simulate, sweep
+
+__all__ = [
+    "Contact",
+    "Element",
+    "Error",
+    "Fit",
+    "Law",
+    "Plan",
+    "Protocol",
+    "example",
+    "fit",
+    "open",
+    "plan",
+    "read_recording",
+    "run_session",
+    "share_dir",
+    "simulate",
+    "sweep",
+    "__version__",
+]

@@ -1,0 +1,113 @@
+"""Contacts for loops of one's own, and sessions on the simulated device."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._run import shown
+
+Array = npt.NDArray[np.float64]
+
+
+class Contact:
+    """A tissue at a tool, stepped once in every period of a servo loop.
+
+    A step is a whole cycle of `tpm hil run`: one-sided contact, limits of the force and of its rise,
+    passivity, watch of energy and oscillation. The same contact in C: tpmkit/haptics.h.
+
+    Parameters
+    ----------
+    file
+        A session (schemas/hil.schema.json) or a law file.
+    rate_Hz
+        Of the loop, 500 to 4000. Default: that of the file, or 1000.
+    start_gate
+        Forces wait until the tool was in free air and at rest for 0.25 s.
+    longest_s
+        Of a law file: for how long spring-pots keep their history.
+    accept_unstable
+        Open what would be unstable on the device.
+    device
+        Whose limits apply, as `tpm hil run --device` takes it.
+
+    Raises
+    ------
+    tpmkit.Error
+        A file that cannot be read; a rendering that would be unstable.
+    """
+
+    def __init__(
+        self,
+        file: str | os.PathLike[str],
+        *,
+        rate_Hz: float = 0.0,
+        start_gate: bool = True,
+        longest_s: float = 600.0,
+        accept_unstable: bool = False,
+        device: str = "omega7",
+    ) -> None:
+        self._core = _core.Contact(os.fspath(file), rate_Hz, start_gate, longest_s, accept_unstable, device)
+
+    def step(self, position_m: npt.ArrayLike, *, missed: int = 0) -> Array:
+        """One period: position of the tool (m) to force on the hand (N), both in device coordinates.
+
+        `missed` periods without a step are lived through. Raises tpmkit.Error once the contact has stopped.
+        """
+        return self._core.step(np.asarray(position_m, dtype=float), missed)
+
+    def steps(self, positions_m: npt.ArrayLike) -> Array:
+        """Many periods: positions of shape (n, 3) to forces of shape (n, 3)."""
+        return self._core.steps(np.ascontiguousarray(positions_m, dtype=float))
+
+    def push(self, depths_m: npt.ArrayLike) -> Array:
+        """Many periods along the push: depths below the surface at rest to forces against the push, N."""
+        depths = np.asarray(depths_m, dtype=float)
+        push, surface = self.info["push"], self.info["surface_m"]
+        return -self.steps(surface + depths[:, None] * push) @ push
+
+    def reset(self) -> None:
+        """Back to rest; a contact that has stopped goes on."""
+        self._core.reset()
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """The newest step: time_s, position_m, force_N, tool_depth_m, surface_depth_m, model_force_N,
+        model_error_N, touching, waiting, trusted, stop."""
+        return self._core.state
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """What does not change: model, period_s, stiffness and its borders of stability and passivity,
+        surface_m, push, force_limit_N, spheres."""
+        return self._core.info
+
+    @property
+    def positions_m(self) -> Array:
+        """Centres of all spheres, shape (n, 3), in the coordinates of the scene."""
+        return self._core.positions()
+
+    def __repr__(self) -> str:
+        return f"<tpmkit.Contact {self.info['model']}>"
+
+
+def run_session(
+    session: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    *,
+    law: str | os.PathLike[str] = "",
+    progress: bool | Callable[[int, int], None] = False,
+) -> str:
+    """Runs a session on the simulated device, as fast as it goes, and records it (`tpm hil run --device
+    virtual`).
+
+    `law` replaces the session's tissue. `progress` is True for a line on standard error, or is called with
+    (phases done, phases). Returns the cause of the end, "finished" if all went well; `tpmkit.open(output)`
+    opens the recording.
+    """
+    with shown(progress, "session") as told:
+        return _core.run_session(os.fspath(session), os.fspath(output), os.fspath(law), told)

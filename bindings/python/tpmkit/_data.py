@@ -1,0 +1,112 @@
+"""Recordings, results and sessions as xarray."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Mapping
+
+from . import _core
+
+if TYPE_CHECKING:
+    import xarray
+
+
+
+
+def example(name: str) -> Path:
+    """A file that comes with tpmkit: ``example("configs/liver_poke.json")``. Raises tpmkit.Error if there is
+    none of the name."""
+    path = Path(_core.share_dir()) / name
+    if not path.is_file():
+        folder = path.parent
+        there = sorted(p.name for p in folder.iterdir() if p.is_file()) if folder.is_dir() else []
+        raise _core.Error(f"example: there is no {name}; expected one of {', '.join(there) or 'configs/, data/'}")
+    return path
+
+
+def read_recording(path: str | os.PathLike[str], *, columns: Mapping[str, Any] | None = None) -> xarray.Dataset:
+    """A measured recording as a Dataset over time_s (over the sample, if the file has no times): drive and
+    response under their names with unit. `columns` as for `tpmkit.fit`; attrs: title, citation, provenance,
+    sha256, and `findings`, what was understood of the file."""
+    import numpy as np
+    import xarray
+
+    r = _core.read_recording(os.fspath(path), dict(columns or {}))
+    n = len(r["response"])
+    timed = len(r["time_s"]) == n
+    along = "time_s" if timed else "sample"
+    variables = {r["response_key"]: (along, r["response"])}
+    if len(r["drive"]) == n:
+        variables[r["drive_key"]] = (along, r["drive"])
+    attrs = {k: r[k] for k in ("id", "title", "citation", "provenance", "sha256")}
+    attrs["findings"] = "; ".join(f"{what}: {value}" for what, value in r["findings"])
+    return xarray.Dataset(variables, coords={along: r["time_s"] if timed else np.arange(n)}, attrs=attrs)
+
+
+def open_session(path: str | os.PathLike[str]) -> xarray.Dataset:
+    """A recording of `tpm hil run` as a Dataset over time_s: positions, forces, depths, flags. The phases
+    are in `phase_name`, `phase_start_s` and `phase_end_s`. attrs: `device` (SIMULATED DEVICE where no motor is
+    known to have moved), `simulated_device`, `header` (JSON)."""
+    import xarray
+
+    r = _core.read_session_recording(os.fspath(path))
+    columns = dict(r["columns"])
+    time_s = columns.pop("time_s")
+    variables: dict[str, Any] = {k: ("time_s", v) for k, v in columns.items()}
+    for k in ("phase", "flags"):
+        variables[k] = ("time_s", columns[k].astype("int64"))
+    names, starts, ends = zip(*r["phases"])
+    variables["phase_name"] = ("phase_number", list(names))
+    variables["phase_start_s"] = ("phase_number", list(starts))
+    variables["phase_end_s"] = ("phase_number", list(ends))
+    attrs = {"device": r["device"], "simulated_device": int(r["simulated"]), "header": r["header"]}
+    if r["damage"]:
+        attrs["damage"] = r["damage"]
+    return xarray.Dataset(variables, coords={"time_s": time_s}, attrs=attrs)
+
+
+def open_sweep(path: str | os.PathLike[str]) -> xarray.Dataset:
+    """Results of `tpm sweep`: variables over the axes, with units; status 0 where a cell has an answer."""
+    import xarray
+
+    return xarray.open_dataset(os.fspath(path), engine="h5netcdf")
+
+
+def open_simulation(path: str | os.PathLike[str]) -> xarray.Dataset:
+    """Results of `tpm simulate`, as `tpmkit.simulate` returns them. The library has no reader for its own
+    results; h5py reads them here."""
+    import h5py
+    import numpy as np
+    import xarray
+
+    with h5py.File(os.fspath(path), "r") as file:
+        curve = {k: v[()].ravel() for k, v in file["curve"].items()}
+        times = file["steps/time_s"][()].ravel()
+        steps = sorted(k for k in file["steps"] if k != "time_s")
+        positions = np.stack([file["steps"][k]["position_m"][()] for k in steps])
+        attrs = {k: v.decode() if isinstance(v, bytes) else v for k, v in file.attrs.items()}
+    time_s = curve.pop("time_s")
+    variables: dict[str, Any] = {k: ("time_s", v, {"units": k.rpartition("_")[2]}) for k, v in curve.items()}
+    variables["position_m"] = (("output_s", "sphere", "axis"), positions, {"units": "m"})
+    coords = {"time_s": time_s, "output_s": times, "sphere": np.arange(1, positions.shape[1] + 1), "axis": ["x", "y", "z"]}
+    return xarray.Dataset(variables, coords=coords, attrs=attrs)
+
+
+def open(path: str | os.PathLike[str]) -> xarray.Dataset:  # noqa: A001: tpmkit.open, as xarray.open_dataset
+    """Opens what tpm wrote, or a measured recording, as an xarray Dataset.
+
+    `.h5`: results of `tpm simulate` or `tpm sweep`; `.tpmrec`: a session of `tpm hil run`; anything else: a
+    measured recording (`read_recording`).
+    """
+    suffix = Path(path).suffix
+    if suffix == ".tpmrec":
+        return open_session(path)
+    if suffix != ".h5":
+        return read_recording(path)
+    import h5py
+
+    if not Path(path).is_file():
+        raise _core.Error(f"{os.fspath(path)}: there is no such file; expected a result of tpm simulate or tpm sweep")
+    with h5py.File(os.fspath(path), "r") as file:
+        return open_simulation(path) if "steps" in file else open_sweep(path)

@@ -1,0 +1,192 @@
+"""Laws and the paper's element, asked with protocols."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any, Mapping, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import Protocol
+
+Array = npt.NDArray[np.float64]
+
+
+class Law:
+    """One member of the family of laws (docs/laws.md) with its parameters.
+
+        F(t) = offset + integral G(t - s) dV(u(s)) + k_tension T(u(t)),   u = max(drive - contact, 0)
+
+    Parameters
+    ----------
+    name
+        Kernel, branches and more: "linear-1", "power-2", "hertz-fzener". `Law.describe(name)` lists the
+        parameters.
+    parameters
+        By name with SI unit: ``{"k_inf_N_per_m": 60, "k1_N_per_m": 40, "tau1_s": 0.5}``. Parameters with a
+        preset may be left out.
+    reference
+        Depth (m) or change of relative length at which coefficients are secants, above 0. It has no
+        meaning for linear laws.
+    drive, response
+        "indentation_depth" and "contact_force" (m, N), or "relative_length" and "stress" (1, Pa).
+    provenance
+        Where the numbers come from: "assumed", "measured", "derived", ...
+
+    Raises
+    ------
+    tpmkit.Error
+        An unknown law, a missing or unknown parameter, a value out of range.
+    """
+
+    _core: _core.Law
+
+    def __init__(
+        self,
+        name: str,
+        parameters: Mapping[str, float],
+        *,
+        reference: float = 1e-3,
+        drive: str = "indentation_depth",
+        response: str = "contact_force",
+        provenance: str = "assumed",
+    ) -> None:
+        key = "reference" if drive == "relative_length" else "reference_m"
+        document: dict[str, Any] = {
+            "law": name,
+            "drive": drive,
+            "response": response,
+            key: reference,
+            "parameters": dict(parameters),
+            "provenance": provenance,
+        }
+        self._core = _core.Law.from_json(json.dumps(document))
+
+    @classmethod
+    def _of(cls, core: _core.Law) -> Law:
+        law = cls.__new__(cls)
+        law._core = core
+        return law
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Law:
+        """Reads a law file (schemas/law.schema.json), as `tpm fit` and `Law.write` make it."""
+        return cls._of(_core.Law.read(os.fspath(path)))
+
+    @staticmethod
+    def describe(name: str) -> dict[str, tuple[str, str]]:
+        """Parameters of a law: name to (SI unit, meaning)."""
+        return {key: (unit, meaning) for key, unit, meaning in _core.law_parameters(name)}
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes a law file; haptic sessions and `tpm export` read it."""
+        self._core.write(os.fspath(path))
+
+    @property
+    def name(self) -> str:
+        """The short name, such as "power-2"."""
+        return self._core.name
+
+    @property
+    def words(self) -> str:
+        """The law in words."""
+        return self._core.words
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters by name with SI unit."""
+        return self._core.parameters
+
+    @property
+    def provenance(self) -> str:
+        """Where the numbers come from."""
+        return self._core.provenance
+
+    @property
+    def reference(self) -> float:
+        """Depth (m) or relative length at which coefficients are secants."""
+        return self._core.reference
+
+    @property
+    def fitted_to(self) -> float | None:
+        """Largest depth of the data that the law was fitted to; None if it was not fitted."""
+        return self._core.fitted_to
+
+    @overload
+    def respond(self, protocol: Protocol, times_s: npt.ArrayLike) -> Array: ...
+    @overload
+    def respond(
+        self, protocol: Protocol, times_s: npt.ArrayLike, *, sensitivity: bool
+    ) -> Array | tuple[Array, Array]: ...
+    def respond(
+        self, protocol: Protocol, times_s: npt.ArrayLike, *, sensitivity: bool = False
+    ) -> Array | tuple[Array, Array]:
+        """The response at given times: a force (N) under a displacement, a depth (m) under a load.
+
+        An array of doubles is read where it lies, and the answer is handed over; nothing is copied. With
+        `sensitivity` the answer is (values, derivatives): n times by n parameters, in the order of
+        `parameters`, SI over SI. A value that the law does not predict is NaN.
+        """
+        return self._core.respond(protocol, np.ascontiguousarray(times_s, dtype=float), sensitivity)
+
+    def respond_spectrum(self, frequency_Hz: npt.ArrayLike) -> tuple[Array, Array]:
+        """Storage and loss at given frequencies, about the reference depth; N/m, or Pa for a strip."""
+        return self._core.respond_spectrum(np.ascontiguousarray(frequency_Hz, dtype=float))
+
+    def __repr__(self) -> str:
+        return repr(self._core)
+
+
+class Element:
+    """The paper's element: a spring E2 in series with a Kelvin-Voigt unit (E1, eta1), beside it the tension
+    of two neighbours (Bao et al. 2013, Eqs. 1 to 9).
+
+    Parameters
+    ----------
+    E1_Pa, E2_Pa, Eprime_Pa, eta1_Pa_s, spacing_m, A0_m2, l0_m
+        As in docs/notation.md; all above 0 (E1 and E' may be 0).
+    formulation
+        "closed_form" (exact), or "cvodes", the differential equation, integrated.
+    """
+
+    def __init__(
+        self,
+        E1_Pa: float = 12e3,
+        E2_Pa: float = 12e3,
+        Eprime_Pa: float = 12e3,
+        eta1_Pa_s: float = 5.0,
+        spacing_m: float = 0.030,
+        A0_m2: float = 12.56e-6,
+        l0_m: float = 1e-3,
+        *,
+        formulation: str = "closed_form",
+    ) -> None:
+        self.parameters = {
+            "E1_Pa": E1_Pa,
+            "E2_Pa": E2_Pa,
+            "Eprime_Pa": Eprime_Pa,
+            "eta1_Pa_s": eta1_Pa_s,
+            "spacing_m": spacing_m,
+            "A0_m2": A0_m2,
+            "l0_m": l0_m,
+        }
+        self.formulation = formulation
+
+    @property
+    def relaxation_time_s(self) -> float:
+        """tau = eta1 / (E1 + E2), at constant elongation."""
+        return self.parameters["eta1_Pa_s"] / (self.parameters["E1_Pa"] + self.parameters["E2_Pa"])
+
+    def respond(
+        self, protocol: Protocol, times_s: npt.ArrayLike, *, sensitivity: bool = False
+    ) -> Array | tuple[Array, Array]:
+        """The response at given times; see `Law.respond`. Derivatives are by E1, E2, E', eta1, x, A0, l0."""
+        times = np.ascontiguousarray(times_s, dtype=float)
+        values = list(self.parameters.values())
+        return _core.respond_element(values, self.formulation, protocol, times, sensitivity)
+
+    def __repr__(self) -> str:
+        return "<tpmkit.Element " + ", ".join(f"{k}={v:g}" for k, v in self.parameters.items()) + ">"

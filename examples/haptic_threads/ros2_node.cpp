@@ -1,0 +1,83 @@
+// A ROS 2 node around a tpmkit tissue: it subscribes to the tool's position
+// (geometry_msgs/PointStamped) and publishes the force on the hand (geometry_msgs/WrenchStamped),
+// one for one. Times of arrival decide how many periods were missed in between.
+//
+// Compiled here against a stand-in for rclcpp and the messages (ros2_stand_in.hpp), as ROS 2 is not
+// a dependency of tpmkit: never run inside ROS 2 or with hardware. With ROS 2 include
+// rclcpp/rclcpp.hpp and geometry_msgs/msg/{point_stamped,wrench_stamped}.hpp instead; topics come
+// with jitter, so keep stiff contacts in the loop of the device itself (chai3d_tool.cpp).
+#include <tpmkit/haptics.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#ifdef TPM_WITH_ROS2
+#include <geometry_msgs/msg/point_stamped.hpp>
+#include <geometry_msgs/msg/wrench_stamped.hpp>
+#include <rclcpp/rclcpp.hpp>
+#else
+#include "ros2_stand_in.hpp"
+#endif
+
+class TissueNode : public rclcpp::Node {
+ public:
+  explicit TissueNode(const std::string& session_or_law) : rclcpp::Node("tpm_tissue") {
+    char why[TPM_HAPTICS_MESSAGE];
+    if (tpm_haptics_open(session_or_law.c_str(), nullptr, &tissue_, why, sizeof why) !=
+        TPM_HAPTICS_OK) {
+      throw std::runtime_error(why);
+    }
+    tpm_haptics_info info = TPM_HAPTICS_INFO_INIT;
+    tpm_haptics_get_info(tissue_, &info);
+    period_s_ = info.period_s;
+    force_ = create_publisher<geometry_msgs::msg::WrenchStamped>("tool_force", 1);
+    position_ = create_subscription<geometry_msgs::msg::PointStamped>(
+        "tool_position", 1, std::bind(&TissueNode::moved, this, std::placeholders::_1));
+  }
+  ~TissueNode() { tpm_haptics_close(tissue_); }
+  TissueNode(const TissueNode&) = delete;
+  TissueNode& operator=(const TissueNode&) = delete;
+
+ private:
+  void moved(const geometry_msgs::msg::PointStamped::SharedPtr message) {
+    const double time_s = static_cast<double>(message->header.stamp.sec) +
+                          1e-9 * static_cast<double>(message->header.stamp.nanosec);
+    const double periods = begun_ ? std::round((time_s - last_s_) / period_s_) : 1.0;
+    last_s_ = time_s;
+    begun_ = true;
+    const auto missed = periods > 1.0 ? static_cast<std::uint32_t>(periods - 1.0) : 0U;
+    const double position_m[3] = {message->point.x, message->point.y, message->point.z};
+    double force_N[3];
+    tpm_haptics_step_after(tissue_, missed, position_m, force_N);
+    geometry_msgs::msg::WrenchStamped wrench;
+    wrench.header = message->header;
+    wrench.wrench.force.x = force_N[0];
+    wrench.wrench.force.y = force_N[1];
+    wrench.wrench.force.z = force_N[2];
+    force_->publish(wrench);
+  }
+
+  tpm_haptics_contact* tissue_ = nullptr;
+  double period_s_ = 1e-3, last_s_ = 0.0;
+  bool begun_ = false;
+  rclcpp::Publisher<geometry_msgs::msg::WrenchStamped>::SharedPtr force_;
+  rclcpp::Subscription<geometry_msgs::msg::PointStamped>::SharedPtr position_;
+};
+
+int main(int argc, char** argv) {
+  if (argc != 2) return TPM_HAPTICS_USAGE;
+  try {
+    rclcpp::init(argc, argv);
+    rclcpp::spin(std::make_shared<TissueNode>(argv[1]));
+    rclcpp::shutdown();
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "ros2_node: %s\n", error.what());
+    return TPM_HAPTICS_BAD_INPUT;
+  }
+}

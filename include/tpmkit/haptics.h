@@ -1,0 +1,205 @@
+/* tpmkit/haptics.h: a soft tissue felt by a haptic loop of your own, in plain C.
+ *
+ * Open a contact from a session (schemas/hil.schema.json) or a law (schemas/law.schema.json; `tpm fit`
+ * writes law.json), step it once in every period of your servo loop, close it:
+ *
+ *     tpm_haptics_contact *contact;
+ *     char why[TPM_HAPTICS_MESSAGE];
+ *     if (tpm_haptics_open("session.json", NULL, &contact, why, sizeof why) != TPM_HAPTICS_OK) ...
+ *     for (;;) {
+ *       ...read position_m from your device...
+ *       tpm_haptics_step(contact, position_m, force_N);
+ *       ...send force_N to your device...
+ *     }
+ *     tpm_haptics_close(contact);
+ *
+ * Units are SI. Positions and forces are in the coordinates of the device: the session says where the
+ * tissue begins (`surface`) and which way is into it (`push`). Forces act on the hand.
+ *
+ * Threads: one thread steps. One other may call tpm_haptics_get_state and tpm_haptics_positions. All
+ * other calls belong to neither loop. Contacts are independent of each other.
+ *
+ * tpm_haptics_step neither allocates nor locks nor throws. It includes what `tpm hil run` does for
+ * safety: one-sided contact, limits of the force and of its rise, passivity control, and an end where
+ * the rendering gives energy to the hand or oscillates. It knows nothing of your device's own limits,
+ * and it is no substitute for them.
+ *
+ * Binary interface: every struct begins with its size and the version it was compiled for; the library
+ * reads and writes no more than that size. Members are added at the end only. Symbols carry the version
+ * TPMKIT_HAPTICS_1; one that changes its meaning gets a new version and keeps the old one.
+ */
+#ifndef TPMKIT_HAPTICS_H
+#define TPMKIT_HAPTICS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(_WIN32)
+#define TPM_HAPTICS_API
+#else
+#define TPM_HAPTICS_API __attribute__((visibility("default")))
+#endif
+
+/** Version of the structs below. */
+#define TPM_HAPTICS_VERSION 1u
+/** Room that is enough for any message. */
+#define TPM_HAPTICS_MESSAGE 512
+
+/** What a call answers. 1 to 5 are the exit codes of the program `tpm`. */
+enum tpm_haptics_code {
+  TPM_HAPTICS_OK = 0,
+  TPM_HAPTICS_REFUSED = 1,     /**< the rendering would be unstable, or beyond the device's limits */
+  TPM_HAPTICS_USAGE = 2,       /**< a null pointer, a struct of unknown size or version, a bad option */
+  TPM_HAPTICS_BAD_INPUT = 3,   /**< a file or a value in it */
+  TPM_HAPTICS_NUMERICAL = 4,   /**< a solver gave up */
+  TPM_HAPTICS_ENVIRONMENT = 5, /**< a file that cannot be read; no memory */
+  TPM_HAPTICS_STOPPED = 6      /**< the contact has stopped; the force is zero until it is reset */
+};
+
+/** Why a contact has stopped: tpm_haptics_state.cause. */
+enum tpm_haptics_cause {
+  TPM_HAPTICS_RUNNING = 0,
+  TPM_HAPTICS_FINISHED = 1,             /**< spring-pots keep no longer history (options.longest_s) */
+  TPM_HAPTICS_POSITION_NOT_FINITE = 2,
+  TPM_HAPTICS_POSITION_JUMPED = 3,      /**< faster than 5 m/s */
+  TPM_HAPTICS_FORCE_NOT_FINITE = 4,
+  TPM_HAPTICS_LATE = 5,                 /**< too many periods missed */
+  TPM_HAPTICS_NOT_IN_PLACE = 6,         /**< the tool was never in free air and at rest */
+  TPM_HAPTICS_UNTRUSTED = 7,            /**< the model did not trust its force for too long */
+  TPM_HAPTICS_ENERGY = 8,               /**< the rendering gave energy to the hand */
+  TPM_HAPTICS_OSCILLATION = 9,
+  TPM_HAPTICS_OTHER = 10
+};
+
+/** What happened in a step, bits of tpm_haptics_state.flags. */
+enum tpm_haptics_flag {
+  TPM_HAPTICS_TOUCHING = 1u << 0,
+  TPM_HAPTICS_FORCE_LIMITED = 1u << 1, /**< by the session's limit, or while it grows to it */
+  TPM_HAPTICS_SLIPPING = 1u << 2,      /**< the force rose faster than it may */
+  TPM_HAPTICS_DAMPED = 1u << 3,        /**< by the passivity controller */
+  TPM_HAPTICS_BEYOND_MODEL = 1u << 4,  /**< the model does not trust its force; it is faded out */
+  TPM_HAPTICS_WAITING = 1u << 5,       /**< for the tool to be in free air, in reach and at rest */
+  TPM_HAPTICS_OUT_OF_REACH = 1u << 6,  /**< what it waits for */
+  TPM_HAPTICS_IN_TISSUE = 1u << 7,     /**< what it waits for */
+  TPM_HAPTICS_MOVING = 1u << 8         /**< what it waits for */
+};
+
+/** A tissue at the tool. */
+typedef struct tpm_haptics_contact tpm_haptics_contact;
+
+/** How a contact is opened. TPM_HAPTICS_OPTIONS_INIT sets the defaults. */
+typedef struct tpm_haptics_options {
+  uint32_t size;
+  uint32_t version;
+  double rate_Hz;            /**< of your loop, 500 to 4000; 0: that of the file, or 1000 */
+  double longest_s;          /**< of a law file: spring-pots keep their history so long; default 600 */
+  uint32_t no_start_gate;    /**< 1: forces do not wait until the tool is in free air and at rest */
+  uint32_t accept_unstable;  /**< 1: open what would be unstable; not for a device with motors */
+  char device[32];           /**< whose limits apply, as `tpm hil run --device`; "": omega7 */
+} tpm_haptics_options;
+
+#define TPM_HAPTICS_OPTIONS_INIT \
+  { (uint32_t)sizeof(tpm_haptics_options), TPM_HAPTICS_VERSION, 0.0, 600.0, 0u, 0u, {0} }
+
+/** What does not change while a contact is open. */
+typedef struct tpm_haptics_info {
+  uint32_t size;
+  uint32_t version;
+  double period_s;             /**< of a step */
+  double stiffness_N_per_m;    /**< largest instantaneous stiffness along the push */
+  double stable_N_per_m;       /**< largest that is stable with an operator's arm on the device */
+  double passive_N_per_m;      /**< largest that is passive with every operator */
+  double force_limit_N;
+  double surface_m[3];         /**< where the tissue begins, device coordinates */
+  double push[3];              /**< into the tissue, unit vector, device coordinates */
+  double scene_push[3];        /**< the same in the coordinates of the scene */
+  double sphere_radius_m;      /**< of the spheres that are drawn */
+  double tool_radius_m;        /**< of a ball that moves in space; 0: the tool moves along the push */
+  uint64_t spheres;            /**< that tpm_haptics_positions writes, 1 or more */
+  uint64_t contact_sphere;     /**< the one that the tool meets, from 0 */
+  char model[128];             /**< what is stepped, for people */
+} tpm_haptics_info;
+
+#define TPM_HAPTICS_INFO_INIT \
+  { (uint32_t)sizeof(tpm_haptics_info), TPM_HAPTICS_VERSION, 0.0, 0.0, 0.0, 0.0, 0.0, \
+    {0.0}, {0.0}, {0.0}, 0.0, 0.0, 0u, 0u, {0} }
+
+/** The newest step. */
+typedef struct tpm_haptics_state {
+  uint32_t size;
+  uint32_t version;
+  double time_s;           /**< of the contact, missed periods included */
+  double position_m[3];    /**< of the tool */
+  double force_N[3];       /**< on the hand */
+  double tool_depth_m;     /**< along the push, from the surface at rest; negative in the air */
+  double surface_depth_m;  /**< of the tissue under the tool */
+  double model_force_N;    /**< of the tissue against the push, before limits */
+  double model_error_N;    /**< estimate of how far that is from the full network's */
+  uint32_t flags;          /**< tpm_haptics_flag */
+  int32_t cause;           /**< tpm_haptics_cause */
+} tpm_haptics_state;
+
+#define TPM_HAPTICS_STATE_INIT \
+  { (uint32_t)sizeof(tpm_haptics_state), TPM_HAPTICS_VERSION, 0.0, {0.0}, {0.0}, 0.0, 0.0, 0.0, 0.0, \
+    0u, 0 }
+
+/** Version of the library, such as "0.1.0". */
+TPM_HAPTICS_API const char *tpm_haptics_version(void);
+
+/** Opens a contact. It takes from milliseconds (a law) to a minute (an organ that is planned).
+ * @param file a session or a law
+ * @param options NULL: the defaults
+ * @param contact set to the contact, or to NULL
+ * @param message may be NULL; one line of text that says what is wrong, empty if nothing is
+ * @param message_size its room, with the closing 0; TPM_HAPTICS_MESSAGE is enough
+ */
+TPM_HAPTICS_API int tpm_haptics_open(const char *file, const tpm_haptics_options *options,
+                                     tpm_haptics_contact **contact, char *message,
+                                     size_t message_size);
+
+/** One period of the loop. No allocation, lock or exception.
+ * @param position_m of the tool
+ * @param force_N on the hand; zero unless the answer is TPM_HAPTICS_OK
+ * @returns TPM_HAPTICS_OK, TPM_HAPTICS_STOPPED, or TPM_HAPTICS_USAGE for a null pointer
+ */
+TPM_HAPTICS_API int tpm_haptics_step(tpm_haptics_contact *contact, const double position_m[3],
+                                     double force_N[3]);
+
+/** The same after `missed` periods without a step: the tissue lives through them too. */
+TPM_HAPTICS_API int tpm_haptics_step_after(tpm_haptics_contact *contact, uint32_t missed,
+                                           const double position_m[3], double force_N[3]);
+
+/** Back to rest; a contact that has stopped goes on. Not for the loop: it allocates. No other thread
+ * may use the contact meanwhile. */
+TPM_HAPTICS_API int tpm_haptics_reset(tpm_haptics_contact *contact);
+
+/** Fills what does not change. `size` and `version` have to be set (TPM_HAPTICS_INFO_INIT). */
+TPM_HAPTICS_API int tpm_haptics_get_info(const tpm_haptics_contact *contact, tpm_haptics_info *info);
+
+/** Fills the newest state; never waits. For the thread that draws.
+ * `size` and `version` have to be set (TPM_HAPTICS_STATE_INIT). */
+TPM_HAPTICS_API int tpm_haptics_get_state(tpm_haptics_contact *contact, tpm_haptics_state *state);
+
+/** Writes where the centres of all spheres are, x, y, z of each, in the coordinates of the scene. The
+ * contact sphere is where the last step left it; the others follow 25 times a second. For the thread
+ * that draws.
+ * @param positions_m room for 3 * spheres numbers
+ * @param spheres as tpm_haptics_info.spheres says
+ */
+TPM_HAPTICS_API int tpm_haptics_positions(tpm_haptics_contact *contact, double *positions_m,
+                                          size_t spheres);
+
+/** Closes a contact; NULL does no harm. */
+TPM_HAPTICS_API void tpm_haptics_close(tpm_haptics_contact *contact);
+
+/** A cause in words, such as "energy given to the hand". */
+TPM_HAPTICS_API const char *tpm_haptics_cause_text(int cause);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Makes the Debian packages of this release into dist/: tpmkit (program), libtpmkit-haptics1 (library for
+# haptic loops), libtpmkit-dev (development), python3-tpmkit (Python); has lintian look at them, and fails
+# on its errors. Builds in build/release.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+source scripts/install_packages.sh
+
+install_missing "to make Debian packages" "${packages_run[@]}" "${packages_python[@]}" "${packages_debian[@]}"
+unpack_headers "${packages_unpacked[@]}"
+
+step "building (build/release); some minutes the first time"
+folder=build/release
+configure release -DTPM_PACKAGES=ON -DTPM_PYTHON=ON -DTPM_PYTHON_INSTALL=lib/python3/dist-packages \
+  "-DCMAKE_INSTALL_LIBDIR=lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)"
+build release tpm tpmkit tpmkit_haptics tpmkit_python command_help
+
+step "packing"
+rm -f "$folder"/*.deb
+(cd "$folder" && cpack -G DEB >cpack.log 2>&1) || { tail -n 20 "$folder/cpack.log" >&2; die "cpack failed"; }
+mkdir -p dist
+mv "$folder"/*.deb dist/
+
+step "lintian"
+lintian --fail-on error --no-tag-display-limit dist/*.deb | sed 's/^/   /'
+step "done. The packages:"
+ls -1 "$PWD"/dist/*.deb

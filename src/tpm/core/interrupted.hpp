@@ -1,0 +1,12 @@
+#pragma once
+#include <stdexcept>
+
+namespace tpm {
+
+/// A computation that was asked to stop; says where it stands.
+class Interrupted : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace tpm

@@ -1,0 +1,248 @@
+#include "tpm/fit/fitted_law.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/error.hpp"
+
+namespace tpm {
+namespace {
+
+/// What a law has been asked about: the largest depth beyond the contact point, and for how long.
+struct FittedRange {
+  double depth = 0.0;  ///< of readings without a history: the deepest
+  double duration_s = 0.0;
+};
+
+FittedRange range_of_recording(const RecordingFit& recording, double contact) {
+  FittedRange range;
+  std::optional<double> begin;
+  for (std::size_t i = 0; i < recording.drive.size(); ++i) {
+    if (!recording.fitted[i]) continue;
+    if (!begin) begin = recording.time_s[i];
+    range.duration_s = recording.time_s[i] - *begin;
+    range.depth = std::max(range.depth, recording.drive[i] - contact);
+  }
+  return range;
+}
+
+FittedRange fitted_range(const FitResult& fit, std::size_t contact_place) {
+  FittedRange range;
+  const auto widen = [&range](const FittedRange& other) {
+    range.depth = std::max(range.depth, other.depth);
+    range.duration_s = std::max(range.duration_s, other.duration_s);
+  };
+  for (const RecordingFit& recording : fit.recordings) {
+    const auto values = model_parameters(fit.config, fit.best.natural, recording.choice);
+    widen(range_of_recording(recording, fit.config.law ? values[contact_place] : 0.0));
+  }
+  const bool contact = !fit.config.law || fit.config.law->drive == Quantity::indentation_depth;
+  for (const FittedDatum& reading : fit.data) {
+    if (!contact || reading.datum.held_out || !std::isfinite(reading.datum.time_s)) continue;
+    widen({reading.imposed_depth_m.value_or(0.0), reading.datum.time_s});
+  }
+  return range;
+}
+
+double element_reference(const FitResult& fit) {
+  constexpr double kUsual = 1e-3;  // the paper's reference length
+  const double deepest = fitted_range(fit, 0).depth;
+  return deepest > 0.0 ? deepest : kUsual;
+}
+
+LawSpec spec_of(const FitResult& fit) {
+  if (fit.config.law) return *fit.config.law;
+  LawSpec spec;
+  spec.tension = Tension::elastic;
+  spec.reference = element_reference(fit);
+  return spec;
+}
+
+std::vector<double> values_of_element(const TpmParameters& p, const LawSpec& spec) {
+  const double scale = p.modulus_to_stiffness_m();
+  return {scale * p.relaxed_modulus_Pa(),
+          scale * p.relaxing_modulus_Pa(),
+          p.relaxation_time_s(),
+          scale * lambda1_Pa(p.Eprime_Pa, spec.reference, p.spacing_m),
+          p.spacing_m,
+          0.0,
+          0.0};
+}
+
+/// The law's parameters at values of the fit's, SI.
+std::vector<double> law_values(const FitResult& fit, const LawSpec& spec,
+                               std::span<const double> natural) {
+  if (!fit.config.law) return values_of_element(element_parameters(fit.config, natural, 0), spec);
+  std::vector<double> values = model_parameters(fit.config, natural, 0);
+  if (fit.config.data.size() == 1) return values;
+  const std::vector<LawParameter> parameters = law_parameters(spec);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].nuisance) values[i] = 0.0;
+  }
+  return values;
+}
+
+Coordinate coordinate_of(Scale scale) {
+  if (scale == Scale::log) return Coordinate::log;
+  return scale == Scale::linear ? Coordinate::linear : Coordinate::inverse_square;
+}
+
+/// The coordinate in which each parameter of the law is stated.
+std::vector<Coordinate> law_coordinates(const FitResult& fit, const LawSpec& spec) {
+  const std::vector<LawParameter> parameters = law_parameters(spec);
+  std::vector<Coordinate> coordinates(parameters.size(), Coordinate::linear);
+  if (fit.config.law) {
+    for (const EstimatedParameter& p : fit.config.parameters) {
+      for (const Target& target : p.sets) {
+        coordinates[target.parameter] = coordinate_of(p.fit.scale);
+      }
+    }
+    return coordinates;
+  }
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const bool positive =
+        parameters[i].dimension == Dimension::time ||
+        (parameters[i].dimension == Dimension::stiffness && parameters[i].name != "k_tension");
+    if (positive) coordinates[i] = Coordinate::log;
+    if (parameters[i].name == "spacing") coordinates[i] = Coordinate::inverse_square;
+  }
+  return coordinates;
+}
+
+/// d (law's coordinate) / d (fit's theta) by central differences: the map is smooth and costs
+/// nothing, and its error (1e-10) is far below what a covariance is known to.
+Eigen::MatrixXd coordinate_changes(const FitResult& fit, const LawSpec& spec,
+                                   const std::vector<Coordinate>& coordinates) {
+  const Covariance& c = fit.covariance;
+  const auto columns = static_cast<Eigen::Index>(c.free.size());
+  Eigen::MatrixXd change(static_cast<Eigen::Index>(coordinates.size()), columns);
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    const std::size_t j = c.free[static_cast<std::size_t>(k)];
+    const FitParameter& p = fit.config.parameters[j].fit;
+    const double theta = p.theta(fit.best.natural[j]);
+    double step = std::max(1e-5 * std::abs(theta), 1e-4 * c.theta_sd[k]);
+    if (p.scale == Scale::inverse_square)
+      step = std::min(step, 0.5 * theta);  // not beyond infinity
+    const auto at = [&](double moved) {
+      std::vector<double> natural = fit.best.natural;
+      natural[j] = p.natural(moved);
+      const std::vector<double> values = law_values(fit, spec, natural);
+      Eigen::VectorXd result(change.rows());
+      for (Eigen::Index i = 0; i < change.rows(); ++i) {
+        const auto place = static_cast<std::size_t>(i);
+        const bool usable = coordinates[place] == Coordinate::linear || values[place] > 0.0;
+        result[i] = usable ? to_coordinate(coordinates[place], values[place]) : 0.0;
+      }
+      return result;
+    };
+    const Eigen::VectorXd above = at(theta + step), below = at(theta - step);
+    for (Eigen::Index i = 0; i < change.rows(); ++i) {  // an infinite spacing stays infinite
+      change(i, k) = above[i] == below[i] ? 0.0 : (above[i] - below[i]) / (2.0 * step);
+    }
+  }
+  return change;
+}
+
+ReadingNoise reading_noise(const FitResult& fit) {
+  ReadingNoise noise;
+  const DataChoice& data = fit.config.data.front();
+  const double scale = std::sqrt(fit.variance_factor);
+  if (fit.correlation) noise.lag_1 = fit.correlation->lag1;
+  if (data.noise.shape != ErrorShape::normal || fit.config.loss.kind != Loss::none) {
+    noise.kind = "unknown";
+    return noise;
+  }
+  noise.kind = noise_kind_name(data.noise.kind);
+  const auto estimated = [&](const std::string& name, double stated) {
+    for (std::size_t i = 0; i < fit.config.parameters.size(); ++i) {
+      if (fit.config.parameters[i].fit.name == name) return fit.best.natural[i];
+    }
+    return stated * scale;
+  };
+  if (uses_absolute(data.noise.kind)) noise.absolute = estimated(data.sigma_a, data.noise.absolute);
+  if (uses_relative(data.noise.kind)) noise.relative = estimated(data.sigma_b, data.noise.relative);
+  if (data.noise.kind == NoiseKind::per_row) noise.column = scale;
+  return noise;
+}
+
+std::vector<FittedFile> fitted_files(const FitResult& fit) {
+  std::vector<FittedFile> files;
+  for (std::size_t i = 0; i < fit.config.data.size(); ++i) {
+    FittedFile file{fit.config.data[i].dataset, {}, 0, {}, {}};
+    if (std::isfinite(fit.config.data[i].from_s)) file.from_s = fit.config.data[i].from_s;
+    if (std::isfinite(fit.config.data[i].to_s)) file.to_s = fit.config.data[i].to_s;
+    if (i < fit.data_sha256.size()) file.sha256 = fit.data_sha256[i];
+    for (const RecordingFit& r : fit.recordings) {
+      if (r.choice != i) continue;
+      file.readings += static_cast<int>(std::count(r.fitted.begin(), r.fitted.end(), true));
+    }
+    for (const FittedDatum& d : fit.data) file.readings += d.datum.choice == i && !d.datum.held_out;
+    files.push_back(std::move(file));
+  }
+  return files;
+}
+
+std::optional<LawUncertainty> uncertainty_of(const FitResult& fit, const LawSpec& spec) {
+  Threshold threshold;
+  threshold.level = fit.config.level;
+  threshold.scale_known = fit.config.data.front().noise.scale_known;
+  threshold.data_count = fit.value_count;
+  threshold.parameter_count = static_cast<int>(fit.config.parameters.size());
+  threshold.inflation = fit.inflation;
+  const bool estimable = threshold.scale_known || threshold.data_count > threshold.parameter_count;
+  if (!fit.covariance.full_rank || !estimable) return std::nullopt;
+  const std::vector<Coordinate> coordinates = law_coordinates(fit, spec);
+  const Eigen::MatrixXd change = coordinate_changes(fit, spec, coordinates);
+  LawUncertainty u;
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < change.rows(); ++i) {
+    if (change.row(i).cwiseAbs().maxCoeff() == 0.0) continue;
+    rows.push_back(i);
+    u.place.push_back(static_cast<std::size_t>(i));
+    u.coordinate.push_back(coordinates[static_cast<std::size_t>(i)]);
+  }
+  const Eigen::MatrixXd some = change(rows, Eigen::all);
+  u.covariance = some * fit.covariance.theta_covariance() * some.transpose();
+  u.covariance = 0.5 * (u.covariance + u.covariance.transpose()).eval();
+  u.level = threshold.level;
+  if (!threshold.scale_known) u.degrees_of_freedom = threshold.residual_degrees();
+  u.readings_per_independent = fit.inflation;
+  u.noise = reading_noise(fit);
+  u.duration_s = fitted_range(fit, law_parameters(spec).size() - 2).duration_s;
+  u.data = fitted_files(fit);
+  for (const ParameterResult& p : fit.parameters) {
+    if (p.at_lower_bound || p.at_upper_bound) u.at_bound.push_back(p.parameter.name);
+  }
+  return u;
+}
+
+}  // namespace
+
+std::optional<std::string> no_law_because(const FitConfig& config) {
+  if (config.law) return std::nullopt;
+  if (config.organ) return "an organ was fitted, and no single contact";
+  if (config.tension.kind != TensionRule::Kind::exact) {
+    return "its tension is frozen at one value, which no law of the family does";
+  }
+  return std::nullopt;
+}
+
+LawFile fitted_law(const FitResult& fit) {
+  if (const auto reason = no_law_because(fit.config)) {
+    throw bad_input("law file", *reason, "a law of the family or the paper's element");
+  }
+  LawFile law;
+  law.spec = spec_of(fit);
+  law.values = law_values(fit, law.spec, fit.best.natural);
+  law.provenance = Provenance::derived;
+  // contact and offset stand last.
+  const double depth = fitted_range(fit, law.values.size() - 2).depth;
+  if (depth > 0.0) law.fitted_to = depth;
+  law.note = fmt::format("fitted: {}", fit.config.title);
+  law.uncertainty = uncertainty_of(fit, law.spec);
+  return law;
+}
+
+}  // namespace tpm

@@ -1,0 +1,40 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tpm/servo/servo_record.hpp"
+
+namespace tpm {
+
+/// What became of one hazard on the clock: the loop with its threads, the simulated device.
+struct ClockHazardRow {
+  std::string hazard, setting;
+  StopCause expected = StopCause::none;  ///< what it should end in
+  StopCause cause = StopCause::none;
+  int missed_at_once = 0;        ///< most periods without a cycle
+  double largest_force_N = 0.0;  ///< sent
+  double to_zero_s = 0.0;        ///< from the fault to forces off; of sessions that were stopped
+  double bound_s = 0.0;          ///< for that
+  int tries = 0;                 ///< until one was within bounds
+  bool within = false;           ///< the expected end, in time, forces within the limit
+};
+
+struct ClockHazardStudy {
+  std::string scheduling;  ///< what the system granted to the loop's thread
+  double force_limit_N = 0.0;
+  int most_tries = 0;
+  std::vector<ClockHazardRow> rows;
+  [[nodiscard]] bool safe() const;
+};
+
+/// Hazards that take time of their own: calls and models that hang, slow calls, the device's
+/// watchdog, interruptions, records that cannot be kept. Times differ from run to run, and other
+/// programs on the machine may stall a session as well: a row that leaves its bounds is tried
+/// again, up to `most_tries`.
+/// @param told before each row
+[[nodiscard]] ClockHazardStudy study_hazards_on_the_clock(const std::function<void()>& told = {});
+/// How often `told` is called.
+[[nodiscard]] std::size_t clock_hazard_count();
+
+}  // namespace tpm

@@ -1,0 +1,82 @@
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpm/law/law.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// The coordinate theta in which the uncertainty of a parameter p is stated.
+enum class Coordinate {
+  linear,          ///< theta = p
+  log,             ///< theta = ln p, p > 0
+  inverse_square,  ///< theta = 1/p^2, p > 0; an infinite spacing is the ordinary point 0
+};
+
+[[nodiscard]] std::string_view coordinate_name(Coordinate coordinate) noexcept;
+[[nodiscard]] double to_coordinate(Coordinate coordinate, double natural);
+[[nodiscard]] double from_coordinate(Coordinate coordinate, double theta);
+/// d natural / d theta at a natural value.
+[[nodiscard]] double coordinate_slope(Coordinate coordinate, double natural);
+
+/// A file that a law was fitted to.
+struct FittedFile {
+  std::string name;
+  std::string sha256;                  ///< of its bytes; empty where the data were no file
+  int readings = 0;                    ///< that were fitted
+  std::optional<double> from_s, to_s;  ///< of a recording: samples outside were not fitted
+
+  /// Whether a sample at this time was fitted.
+  [[nodiscard]] bool holds(double time_s) const {
+    return !(from_s && time_s < *from_s) && !(to_s && time_s > *to_s);
+  }
+};
+
+/// Scatter of one reading about the law, after the fit.
+struct ReadingNoise {
+  /// Words of the fit's noise model (docs/fitting.md): absolute, combined, relative_to_datum,
+  /// relative_to_model, log, per_row; "unknown" where the fit's noise is not normal.
+  std::string kind = "absolute";
+  double absolute = 0.0;  ///< a of sigma = a + b |model|, SI unit of the response
+  double relative = 0.0;  ///< b; of `log` the standard deviation of the logarithm
+  double column = 1.0;    ///< per_row: factor of the file's own standard deviations
+  double lag_1 = 0.0;     ///< correlation of neighbouring residuals
+};
+
+/// What a fit knows about the parameters of its law: enough to predict with a band.
+struct LawUncertainty {
+  std::vector<std::size_t> place;  ///< of each uncertain parameter in law_parameters()
+  std::vector<Coordinate> coordinate;
+  /// Of theta, in the order of `place`. Correlated readings and an estimated size of the noise are
+  /// counted in. It may be singular: several parameters of the law may follow from one of the fit.
+  Eigen::MatrixXd covariance;
+  double level = 0.95;  ///< of the fit's intervals
+  /// Of Student's t for the intervals; none: the size of the noise was known, normal quantiles.
+  std::optional<double> degrees_of_freedom;
+  /// Independent readings count n_eff = n / this.
+  double readings_per_independent = 1.0;
+  ReadingNoise noise;
+  double duration_s = 0.0;  ///< longest fitted stretch of time; 0 if it is not known
+  std::vector<FittedFile> data;
+  std::vector<std::string> at_bound;  ///< estimated parameters on a bound, held there
+
+  /// Two-sided quantile: estimate +- this times the standard error is an interval at `level`.
+  [[nodiscard]] double quantile(double at_level) const;
+  [[nodiscard]] double quantile() const { return quantile(level); }
+};
+
+/// The block "fit" of a law file. Keys of `parameters` and `covariance` are law_key() names.
+[[nodiscard]] Json to_json(const LawUncertainty& uncertainty, const LawSpec& spec);
+
+/// Throws Error(bad_input) for names that the law has not, a matrix of another size, one that is
+/// not symmetric or not positive semidefinite.
+[[nodiscard]] LawUncertainty uncertainty_from_json(const Json& block, const LawSpec& spec,
+                                                   std::span<const double> values,
+                                                   std::string_view where);
+
+}  // namespace tpm

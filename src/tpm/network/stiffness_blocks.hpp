@@ -1,0 +1,28 @@
+#pragma once
+#include "tpm/network/freedom.hpp"
+
+namespace tpm {
+
+/// The stiffness matrix of what is free, for factorisations: P K P + s (1 - P) as
+/// Freedom::constrain makes it, without the blocks of spheres that are held.
+class StiffnessBlocks {
+ public:
+  /// @param bonds, freedom must live as long as this
+  StiffnessBlocks(const BondSystem& bonds, const Freedom& freedom);
+
+  /// The matrix at a position; the one before is overwritten.
+  const BlockMatrix& assemble(const Positions& position, const BondMemory& memory);
+  [[nodiscard]] const BlockPattern& pattern() const { return graph_->pattern; }
+
+ private:
+  const BondSystem& bonds_;
+  const Freedom& freedom_;
+  std::shared_ptr<const BondSystem::PartGraph> graph_;
+  BlockMatrix matrix_;
+};
+
+/// The graph of the spheres of a network that can move.
+[[nodiscard]] std::shared_ptr<const BondSystem::PartGraph> moving_graph(const BondSystem& bonds,
+                                                                        const Freedom& freedom);
+
+}  // namespace tpm

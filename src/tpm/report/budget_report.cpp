@@ -1,0 +1,119 @@
+#include "tpm/report/budget_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/plan/perception.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+std::size_t instant_of_largest_sum(const ErrorBudget& b) {
+  std::size_t place = 0;
+  double largest = -1.0;
+  for (std::size_t i = 0; i < b.time_s.size(); ++i) {
+    double sum = 0.0;
+    for (const BudgetLine& line : b.lines) sum += line.difference_N[i];
+    if (std::abs(sum) <= largest) continue;
+    largest = std::abs(sum);
+    place = i;
+  }
+  return place;
+}
+
+Panel waterfall_panel(const ErrorBudget& b) {
+  const std::size_t at = instant_of_largest_sum(b);
+  Panel panel;
+  panel.title = fmt::format("adding up at {} s", significant(b.time_s[at], 4));
+  panel.x = {"", "", false, 0.5, 1.5 + static_cast<double>(b.lines.size())};
+  panel.y = {"sum of the lines so far, of the peak", "%", false, {}, {}};
+  Series steps;
+  steps.kind = Series::Kind::bracket;
+  steps.label = "line";
+  steps.provenance = "derived";
+  Series sums = line("sum so far", {}, {});
+  sums.kind = Series::Kind::points;
+  sums.provenance = "derived";
+  double sum = 0.0;
+  for (const BudgetLine& l : b.lines) {
+    const double next = sum + 100.0 * l.difference_N[at] / b.peak_N;
+    const double x = static_cast<double>(panel.x.names.size() + 1);
+    panel.x.names.push_back(l.name);
+    steps.x.push_back(x);
+    steps.lower.push_back(std::min(sum, next));
+    steps.upper.push_back(std::max(sum, next));
+    sums.x.push_back(x);
+    sums.y.push_back(next);
+    sum = next;
+  }
+  panel.x.names.push_back("sum");
+  const double end = static_cast<double>(panel.x.names.size());
+  steps.x.push_back(end);
+  steps.lower.push_back(std::min(sum, 0.0));
+  steps.upper.push_back(std::max(sum, 0.0));
+  panel.series = {std::move(steps), std::move(sums)};
+  return panel;
+}
+
+Series threshold(const char* words, double share, double until) {
+  Series s = line(words, {0.5, until}, {100.0 * share, 100.0 * share});
+  s.provenance = "abstract";
+  return s;
+}
+
+Panel largest_panel(const ErrorBudget& b) {
+  constexpr double kLeastDrawn = 1e-5;  // of the peak, on a logarithmic axis
+  Panel panel;
+  panel.title = "each line's own largest";
+  panel.x = {"", "", false, 0.5, {}};
+  panel.y = {"of the peak", "%", true, {}, {}};
+  Series own;
+  own.kind = Series::Kind::points;
+  own.label = "largest of the line";
+  own.provenance = "derived";
+  const auto add = [&](const std::string& name, double part) {
+    panel.x.names.push_back(name);
+    own.x.push_back(static_cast<double>(panel.x.names.size()));
+    own.y.push_back(100.0 * std::max(part, kLeastDrawn));
+  };
+  for (const BudgetLine& l : b.lines) add(l.name, l.largest);
+  if (b.random) add("parameters", b.random->largest);
+  add("all", b.combined);
+  const double until = 0.5 + static_cast<double>(panel.x.names.size());
+  panel.x.upper = until;
+  panel.series = {
+      std::move(own), threshold("a hand: force, 7 %", kForceJnd, until),
+      threshold("a hand: stiffness through a tool, 45 %", kStiffnessThroughTool, until)};
+  return panel;
+}
+
+}  // namespace
+
+Figure budget_figure(const ErrorBudget& budget) {
+  Figure figure;
+  figure.id = "budget";
+  figure.title = fmt::format("Error budget: {}", budget.title);
+  figure.caption = fmt::format(
+      "Signed differences between neighbouring stages in parts of the peak ({} N), added up at the "
+      "instant of their largest sum, and each line's own largest. {}.",
+      significant(budget.peak_N, 3), budget.sentences.empty() ? "" : budget.sentences.front());
+  figure.panels = {waterfall_panel(budget), largest_panel(budget)};
+  return figure;
+}
+
+std::vector<std::string> write_budget_report(const std::filesystem::path& folder,
+                                             const ErrorBudget& budget) {
+  std::vector<std::string> files{"budget.json", "budget.csv"};
+  write_file(folder / files[0], to_text(to_json(budget)));
+  write_file(folder / files[1], to_csv(budget));
+  const auto drawn = write_figures(folder, {budget_figure(budget)});
+  files.insert(files.end(), drawn.begin(), drawn.end());
+  return files;
+}
+
+}  // namespace tpm

@@ -1,0 +1,20 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/report/figure.hpp"
+#include "tpm/study/error_budget.hpp"
+
+namespace tpm {
+
+/// The waterfall: how the lines add up at the instant of the largest sum, and beside it each line's
+/// own largest with the thresholds of a hand.
+[[nodiscard]] Figure budget_figure(const ErrorBudget& budget);
+
+/// Writes budget.json, budget.csv, figures.json and the figure into `folder`; returns the names of
+/// the files.
+[[nodiscard]] std::vector<std::string> write_budget_report(const std::filesystem::path& folder,
+                                                           const ErrorBudget& budget);
+
+}  // namespace tpm

@@ -1,0 +1,101 @@
+#include "tpm/report/identification_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "tpm/core/text.hpp"
+#include "tpm/report/draw.hpp"
+#include "tpm/store/file.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kWidestDrawn = 3.0;  // of the estimate; wider says nothing
+
+/// Over the samples at which a law was the least.
+Panel width_panel(const Identification& id) {
+  Panel panel;
+  panel.x = {"time", "s", false, {}, {}};
+  panel.y = {"half width of the interval", "% of the estimate", true, {}, {}};
+  const std::size_t law = id.result().law;
+  std::map<std::string, Series> lines;
+  std::vector<std::string> order;
+  for (const IdentifiedSample& sample : id.history) {
+    if (sample.law != law) continue;
+    for (const SequentialParameter& p : sample.estimate.parameters) {
+      const double width = p.relative_half_width();
+      if (p.nuisance || !(width < kWidestDrawn) || !(width > 0.0)) continue;
+      const auto [at, added] = lines.try_emplace(p.parameter.name, line(p.parameter.name, {}, {}));
+      if (added) order.push_back(p.parameter.name);
+      at->second.provenance = "derived";
+      at->second.x.push_back(sample.time_s);
+      at->second.y.push_back(100.0 * width);
+    }
+  }
+  for (const std::string& name : order) panel.series.push_back(std::move(lines.at(name)));
+  if (panel.series.empty()) return panel;
+  double least = 100.0 * id.options.target, most = least, from = id.end_s, to = id.begin_s;
+  for (const Series& drawn : panel.series) {
+    least = std::min(least, *std::min_element(drawn.y.begin(), drawn.y.end()));
+    most = std::max(most, *std::max_element(drawn.y.begin(), drawn.y.end()));
+    from = std::min(from, drawn.x.front());
+    to = std::max(to, drawn.x.back());
+  }
+  const double target = 100.0 * id.options.target;
+  panel.series.push_back(line("target", {from, to}, {target, target}));
+  panel.series.back().provenance = "assumed";
+  if (id.stopped) {
+    const double stop = id.history[*id.stopped].time_s;
+    panel.series.push_back(line("stopped", {stop, stop}, {least, most}));
+    panel.series.back().provenance = "derived";
+  }
+  return panel;
+}
+
+Panel law_panel(const Identification& id) {
+  Panel panel;
+  panel.x = {"time", "s", false, {}, {}};
+  panel.y = {"least law", "", false, 0.5, 0.5 + static_cast<double>(id.laws.size())};
+  for (const LawSpec& law : id.laws) panel.y.names.push_back(law_name(law));
+  Series s;
+  s.kind = Series::Kind::points;
+  s.label = "least law";
+  s.provenance = "derived";
+  for (const IdentifiedSample& sample : id.history) {
+    s.x.push_back(sample.time_s);
+    s.y.push_back(static_cast<double>(sample.law + 1));
+  }
+  panel.series = {std::move(s)};
+  return panel;
+}
+
+}  // namespace
+
+Figure identification_figure(const Identification& id) {
+  Figure figure;
+  figure.id = "identification";
+  const std::string name = std::filesystem::path(id.name).stem().string();
+  figure.title = fmt::format("{}, sample by sample", name);
+  figure.caption = fmt::format(
+      "Half width of the {} % intervals of {} while the recording is replayed, and the least law "
+      "at each sample.",
+      significant(100.0 * id.options.level, 3), law_name(id.laws[id.result().law]));
+  figure.panels = {width_panel(id), law_panel(id)};
+  return figure;
+}
+
+std::vector<std::string> write_identification_report(const std::filesystem::path& folder,
+                                                     const Identification& identification,
+                                                     const LawFile& law, const Json& answer) {
+  std::vector<std::string> files{"identification.json", "law.json"};
+  write_file(folder / files[0], to_text(answer));
+  write_law(folder / files[1], law);
+  const auto drawn = write_figures(folder, {identification_figure(identification)});
+  files.insert(files.end(), drawn.begin(), drawn.end());
+  return files;
+}
+
+}  // namespace tpm

@@ -1,0 +1,20 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/report/figure.hpp"
+#include "tpm/study/identification.hpp"
+
+namespace tpm {
+
+/// Half width of each parameter's interval over time, and which law was the least.
+[[nodiscard]] Figure identification_figure(const Identification& identification);
+
+/// Writes identification.json, law.json, figures.json and the figure into `folder`; returns the
+/// names of the files.
+[[nodiscard]] std::vector<std::string> write_identification_report(
+    const std::filesystem::path& folder, const Identification& identification, const LawFile& law,
+    const Json& answer);
+
+}  // namespace tpm

@@ -1,0 +1,22 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/report/figure.hpp"
+#include "tpm/study/law_prediction.hpp"
+
+namespace tpm {
+
+/// The mean with both bands over time, beside the recording if there is one; then prediction less
+/// measurement.
+[[nodiscard]] Figure prediction_figure(const LawPrediction& prediction);
+
+/// Writes prediction.csv, prediction.json, figures.json and the figure as SVG and PNG into
+/// `folder`. Returns the names of the files. Throws Error(environment) if drawing is not possible;
+/// the other files are then already there.
+[[nodiscard]] std::vector<std::string> write_prediction_report(const std::filesystem::path& folder,
+                                                               const LawPrediction& prediction,
+                                                               const Json& answer);
+
+}  // namespace tpm

@@ -1,0 +1,96 @@
+"""Contacts stepped from Python, sessions run and opened."""
+
+import json
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import tpmkit
+
+MATERIAL = {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"}
+SESSION = {
+    "title": "short",
+    "model": {"kind": "element", "scene": {"organ": {"kind": "star", "spacing": "30 mm"}, "material": MATERIAL}},
+    "indentations": {"depths": ["4 mm"], "rates": ["4 mm/s"], "hold": "2 s", "rest": "1 s"},
+}
+
+
+class Contacts(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.file = Path(self.folder.name) / "session.json"
+        self.file.write_text(json.dumps(SESSION))
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def test_a_push_is_that_of_the_element(self):
+        contact = tpmkit.Contact(self.file, start_gate=False)
+        contact.push(np.zeros(601))  # forces have grown to their limit
+        depths = 4e-6 * np.minimum(np.arange(1, 2001), 1000)
+        forces = contact.push(depths)
+        element = tpmkit.Element(eta1_Pa_s=2.4e4)
+        exact = element.respond(tpmkit.Protocol.ramp_and_hold(4e-3, 4e-3, 1.0), 1e-3 * np.arange(1, 2001))
+        np.testing.assert_allclose(forces, exact, atol=1e-10)
+        self.assertTrue(contact.state["touching"])
+        self.assertEqual(contact.info["period_s"], 1e-3)
+        self.assertIn("element", repr(contact))
+
+    def test_single_steps_and_many_agree(self):
+        one, many = (tpmkit.Contact(self.file, start_gate=False) for _ in range(2))
+        positions = np.zeros((1500, 3))
+        positions[:, 2] = 1e-3 - 2e-6 * np.arange(1500)
+        forces = many.steps(positions)
+        self.assertTrue(np.array_equal(np.array([one.step(p) for p in positions]), forces))
+        self.assertGreater(forces[:, 2].max(), 0.1)
+
+    def test_it_waits_for_the_tool_and_stops_at_a_jump(self):
+        contact = tpmkit.Contact(self.file)
+        contact.step([0.0, 0.0, 5e-3])
+        self.assertTrue(contact.state["waiting"])
+        contact = tpmkit.Contact(self.file, start_gate=False)
+        contact.push(np.zeros(10))
+        with self.assertRaisesRegex(tpmkit.Error, "position jumped"):
+            contact.step([0.0, 0.0, -0.05])
+        with self.assertRaises(tpmkit.Error):
+            contact.step([0.0, 0.0, 0.0])
+        contact.reset()
+        self.assertEqual(contact.step([0.0, 0.0, 0.0]).tolist(), [0.0, 0.0, 0.0])
+        with self.assertRaisesRegex(tpmkit.Error, "three columns"):
+            contact.steps([1.0, 2.0])
+
+    def test_a_law_file_is_felt(self):
+        law = tpmkit.Law("linear", {"k_inf_N_per_m": 60.0}, reference=3e-3)
+        law.write(Path(self.folder.name) / "law.json")
+        contact = tpmkit.Contact(Path(self.folder.name) / "law.json", start_gate=False)
+        contact.push(np.zeros(600))
+        np.testing.assert_allclose(contact.push(1e-6 * np.arange(2000)), 60e-6 * np.arange(2000), atol=1e-12)
+
+    def test_a_session_is_run_and_opened(self):
+        output, told = Path(self.folder.name) / "s.tpmrec", []
+        self.assertEqual(tpmkit.run_session(self.file, output, progress=lambda *t: told.append(t)), "finished")
+        self.assertTrue(told)
+        data = tpmkit.open(output)
+        self.assertEqual(data.attrs["simulated_device"], 1)
+        self.assertIn("SIMULATED DEVICE", data.attrs["device"])
+        self.assertGreater(float(data.commanded_N.max()), 0.3)
+        deepest = float(data.tool_depth_m.max())
+        self.assertAlmostEqual(deepest, 4e-3, delta=2e-4)
+        self.assertEqual(data.sizes["phase_number"], len(data.phase_name))
+        # What was sent again, asked of a contact that is stepped along the same motion.
+        contact = tpmkit.Contact(self.file, start_gate=False, device="virtual")
+        positions = np.column_stack([data.position_x_m, data.position_y_m, data.position_z_m])[:-1]
+        sent = np.column_stack([data.commanded_x_N, data.commanded_y_N, data.commanded_z_N])[:-1]
+        self.assertTrue(np.array_equal(contact.steps(positions), sent))
+
+    def test_errors(self):
+        with self.assertRaisesRegex(tpmkit.Error, "none.json"):
+            tpmkit.Contact("none.json")
+        with self.assertRaisesRegex(tpmkit.Error, "gloves"):
+            tpmkit.Contact(self.file, device="gloves")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,140 @@
+"""fit() of synthetic recordings."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import textwrap
+import threading
+import time
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import made
+import tpmkit
+
+
+class Fits(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.file = made.recording(cls.folder.name)
+        cls.fit = tpmkit.fit(cls.file)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def test_the_law_that_made_the_recording_is_found(self):
+        self.assertEqual(self.fit.law.name, "linear-1")
+        table = self.fit.parameters
+        for name, key in (("k_inf", "k_inf_N_per_m"), ("k1", "k1_N_per_m"), ("tau1", "tau1_s")):
+            row = table.loc[name]
+            self.assertLess(row.lower, made.LAW[key])
+            self.assertGreater(row.upper, made.LAW[key])
+            self.assertAlmostEqual(row.estimate / made.LAW[key], 1.0, delta=0.02)
+            self.assertEqual(self.fit.verdicts[name], "identified")
+        self.assertEqual(table.loc["tau1", "unit"], "s")
+        self.assertIn("linear-1", self.fit.laws.index)
+        self.assertTrue(self.fit.words)
+
+    def test_predictions_are_those_of_the_fitted_law(self):
+        protocol = tpmkit.Protocol.ramp_and_hold(2e-3, 1e-3, 10.0)
+        times = np.linspace(0.0, 12.0, 25)
+        predicted = self.fit.predict(protocol, times)
+        np.testing.assert_allclose(predicted["value"], self.fit.law.respond(protocol, times), rtol=1e-12)
+        truth = tpmkit.Law("linear-1", made.LAW).respond(protocol, times)
+        off = np.abs(predicted["value"] - truth)[1:] / predicted["standard_error"][1:]
+        self.assertLess(off.max(), 4.0)  # standard errors
+
+    def test_the_data_and_their_band(self):
+        frame = self.fit.data[0]
+        self.assertEqual(frame.attrs["response_key"], "force_N")
+        self.assertEqual(len(frame), 501)
+        inside = (frame.lower_force_N < frame.observed_force_N) & (frame.observed_force_N < frame.upper_force_N)
+        self.assertGreater(inside[frame.fitted].mean(), 0.9)
+        self.assertLess(abs(self.fit.correlation.loc["k1", "tau1"]), 1.0)
+
+    def test_it_is_drawn(self):
+        axes = self.fit.plot()
+        self.assertEqual(axes.get_xlabel(), "time (s)")
+        self.assertEqual(axes.get_ylabel(), "force (N)")
+        self.assertGreaterEqual(len(axes.lines), 3)
+        self.assertIn("tau1", self.fit._repr_html_())
+
+    def test_equal_seeds_give_equal_answers_and_a_law_can_be_asked_for(self):
+        one, two = (tpmkit.fit(self.file, law="power-1", starts=5, seed=0) for _ in range(2))
+        self.assertTrue(one.parameters.equals(two.parameters))
+        self.assertEqual(one.law.name, "power-1")
+
+    def test_a_configuration(self):
+        fit = tpmkit.fit(tpmkit.example("configs/liver_relaxation.json"), starts=3)
+        self.assertIn("verdict", fit.parameters)
+        self.assertEqual(fit.laws.size, 0)
+        with self.assertRaisesRegex(tpmkit.Error, "is not of a law"):
+            fit.law
+
+    def test_columns_can_be_named(self):
+        path = Path(self.folder.name) / "other.csv"
+        rows = self.file.read_text().splitlines()
+        path.write_text("\n".join(["a,b,c", *rows[1:]]))
+        with self.assertRaises(tpmkit.Error) as raised:
+            tpmkit.fit(path)
+        self.assertIn(str(path), str(raised.exception))
+        self.assertEqual(raised.exception.code, 3)
+        columns = {"time": "a", "drive": "b", "response": "c", "drive_quantity": "indentation_depth",
+                   "response_quantity": "contact_force", "units": {"a": "s", "b": "mm", "c": "N"}}
+        fit = tpmkit.fit(path, law="linear-1", starts=3, columns=columns)
+        self.assertAlmostEqual(fit.parameters.estimate["k1"], self.fit.parameters.estimate["k1"], delta=0.01)
+        with self.assertRaisesRegex(tpmkit.Error, "columns: 'tiem'"):
+            tpmkit.fit(path, columns={"tiem": "a"})
+
+    def test_errors(self):
+        for files, words in (([], "no file"), ("none.csv", "none.csv"), (self.folder.name, "is a folder")):
+            with self.assertRaisesRegex(tpmkit.Error, words):
+                tpmkit.fit(files)
+
+    def test_other_threads_run_meanwhile(self):
+        counted, over = 0, False
+
+        def count():
+            nonlocal counted
+            while not over:
+                counted += 1
+                time.sleep(0.001)
+
+        thread = threading.Thread(target=count)
+        thread.start()
+        try:
+            tpmkit.fit(self.file, law="linear-2", starts=20)
+        finally:
+            over = True
+            thread.join()
+        self.assertGreater(counted, 10)
+
+
+class Interruptions(unittest.TestCase):
+    def test_ctrl_c_ends_a_fit(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = made.recording(folder)
+            program = textwrap.dedent(f"""
+                import tpmkit
+                print("begun", flush=True)
+                try:
+                    tpmkit.fit({str(file)!r}, law="power-3", starts=100000)
+                except KeyboardInterrupt:
+                    print("interrupted", flush=True)
+            """)
+            with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as child:
+                self.assertEqual(child.stdout.readline(), "begun\n")
+                time.sleep(1.0)
+                os.kill(child.pid, signal.SIGINT)
+                self.assertEqual(child.communicate(timeout=60)[0], "interrupted\n")
+                self.assertEqual(child.returncode, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,155 @@
+"""Scenes run, sweeps computed, results and recordings opened."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import textwrap
+import time
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import made
+import tpmkit
+
+MATERIAL = {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"}
+SCENE = {
+    "organ": {"kind": "star", "spacing": "30 mm"},
+    "material": MATERIAL,
+    "contacts": [{"kind": "sphere"}],
+    "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "1 s"},
+    "outputs": {"times": ["0 s", "1 s", "2 s"]},
+}
+SWEEP = {
+    "model": "single_contact",
+    "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "5 Pa s"},
+    "indentation": {"kind": "step_hold"},
+    "axes": [
+        {"parameter": "depth", "from": "1 mm", "to": "8 mm", "count": 8},
+        {"parameter": "spacing", "name": "x", "from": "20 mm", "to": "40 mm", "count": 5},
+    ],
+    "outputs": ["peak_force"],
+}
+
+
+class Runs(unittest.TestCase):
+    def test_a_star_answers_as_the_closed_form(self):
+        told = []
+        data = tpmkit.simulate(SCENE, progress=lambda done, total: told.append((done, total)))
+        exact = tpmkit.Element(eta1_Pa_s=2.4e4).respond(
+            tpmkit.Protocol.ramp_and_hold(4e-3, 4e-3, 1.0), data.time_s.to_numpy())
+        np.testing.assert_allclose(data.force_N, exact, atol=1e-4 * exact.max())
+        self.assertEqual(told[-1][0], told[-1][1])
+        self.assertEqual(data.position_m.dims, ("output_s", "sphere", "axis"))
+        self.assertAlmostEqual(float(abs(data.position_m[-1] - data.position_m[0]).max()), 4e-3, delta=1e-9)
+        # the work of the tool is kept or became heat
+        np.testing.assert_allclose(data.work_J, data.stored_J + data.dissipated_J, atol=1e-3 * float(data.work_J.max()))
+
+    def test_a_result_that_was_written_is_opened_as_it_was(self):
+        with tempfile.TemporaryDirectory() as folder:
+            data = tpmkit.simulate(SCENE, output=Path(folder) / "run.h5")
+            again = tpmkit.open(Path(folder) / "run.h5").load()
+            self.assertEqual(sorted(os.listdir(folder)), ["run.h5", "run.xdmf"])
+        np.testing.assert_allclose(again.force_N, data.force_N)
+        np.testing.assert_allclose(again.position_m, data.position_m)
+        np.testing.assert_allclose(again.output_s, data.output_s)
+
+    def test_what_a_progress_raises_ends_the_run(self):
+        def refuse(done, total):
+            raise ValueError("enough")
+
+        with self.assertRaisesRegex(ValueError, "enough"):
+            tpmkit.simulate(SCENE, progress=refuse)
+
+    def test_a_sweep_is_computed_and_opened(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "sweep.json"
+            file.write_text(json.dumps(SWEEP))
+            with tpmkit.sweep(file, Path(folder) / "sweep.h5", workers=1) as data:
+                lambda1 = 2 * 12e3 * (1 - np.cos(np.arctan(data.depth / data.x)))  # Eqs. 2 and 15
+                np.testing.assert_allclose(data.peak_force, (12e3 + lambda1) * data.depth * 12.56e-3, rtol=1e-12)
+            told = []
+            with tpmkit.sweep(file, Path(folder) / "sweep.h5", progress=lambda *t: told.append(t)):
+                self.assertEqual(told, [])  # it was only opened
+
+    def test_ctrl_c_ends_a_run(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = textwrap.dedent(f"""
+                import json, tpmkit
+                scene = json.loads(tpmkit.example("configs/liver_indentation.json").read_text())
+                scene["formulation"] = {{"kind": "inertial"}}
+                print("begun", flush=True)
+                try:
+                    tpmkit.simulate(scene)
+                except KeyboardInterrupt:
+                    print("interrupted", flush=True)
+            """)
+            with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, cwd=folder) as child:
+                self.assertEqual(child.stdout.readline(), "begun\n")
+                time.sleep(1.5)
+                os.kill(child.pid, signal.SIGINT)
+                self.assertEqual(child.communicate(timeout=120)[0], "interrupted\n")
+
+    def test_errors(self):
+        with self.assertRaisesRegex(tpmkit.Error, "organ"):
+            tpmkit.simulate({**SCENE, "organ": {"kind": "kidney"}})
+        with self.assertRaisesRegex(tpmkit.Error, "none.json"):
+            tpmkit.simulate("none.json")
+        with self.assertRaisesRegex(tpmkit.Error, "none.h5"):
+            tpmkit.open("none.h5")
+        with self.assertRaisesRegex(tpmkit.Error, "expected one of .*liver_poke.json"):
+            tpmkit.example("configs/none.json")
+
+
+class Plans(unittest.TestCase):
+    def test_the_star_needs_no_network(self):
+        plan = tpmkit.plan(SCENE, tolerance="1%")
+        self.assertIsNotNone(plan.choice)
+        chosen = plan.candidates.loc[plan.choice]
+        self.assertTrue(chosen.feasible)
+        self.assertLess(chosen.verified_error, 0.01)
+        self.assertEqual(plan.to_dict()["tolerance"], 0.01)
+        with self.assertRaisesRegex(tpmkit.Error, "tolerance"):
+            tpmkit.plan(SCENE, tolerance="much")
+
+
+class Recordings(unittest.TestCase):
+    def test_a_recording_is_read(self):
+        with tempfile.TemporaryDirectory() as folder:
+            data = tpmkit.open(made.recording(folder))
+        self.assertEqual(set(data.data_vars), {"force_N", "depth_m"})
+        self.assertEqual(data.sizes["time_s"], 501)
+        self.assertAlmostEqual(float(data.depth_m.max()), 3e-3)
+        self.assertEqual(data.attrs["provenance"], "measured")
+        self.assertIn("separator", data.attrs["findings"])
+
+
+class Package(unittest.TestCase):
+    def test_everything_public_says_what_it_is(self):
+        for name in tpmkit.__all__:
+            if name.startswith("__"):
+                continue
+            thing = getattr(tpmkit, name)
+            self.assertTrue(thing.__doc__, name)
+            if not isinstance(thing, type):
+                continue
+            for member in vars(thing):
+                if member.startswith("_") or member in ("code",):
+                    continue
+                self.assertTrue(getattr(thing, member).__doc__, f"{name}.{member}")
+
+    def test_the_stub_names_what_the_module_holds(self):
+        stub = (Path(tpmkit.__file__).parent / "_core.pyi").read_text()
+        from tpmkit import _core
+        for name in vars(_core):
+            if not name.startswith("_"):
+                self.assertRegex(stub, rf"\b(class|def) {name}\b", name)
+        self.assertTrue((Path(tpmkit.__file__).parent / "py.typed").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,349 @@
+// The C interface for haptic loops: libtpmkit_haptics, linked as a stranger would.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "counted_allocations.hpp"
+#include "hil_scenes.hpp"
+#include "temp_folder.hpp"
+#include "tpm/haptics/recording.hpp"
+#include "tpm/haptics/session_run.hpp"
+#include "tpm/model/model.hpp"
+#include "tpm/store/file.hpp"
+#include "tpmkit/haptics.h"
+
+namespace tpm {
+namespace {
+
+using Catch::Matchers::Contains;
+
+/// A contact of a session that is written to a file first.
+class Opened {
+ public:
+  explicit Opened(const Json& json, tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT) {
+    options.no_start_gate = 1;
+    write_file(folder_ / "session.json", to_text(json));
+    open(folder_ / "session.json", options);
+  }
+  explicit Opened(const std::string& file) {
+    const tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+    open(file, options);
+  }
+  ~Opened() { tpm_haptics_close(contact_); }
+  Opened(const Opened&) = delete;
+  Opened& operator=(const Opened&) = delete;
+
+  operator tpm_haptics_contact*() const { return contact_; }  // NOLINT: used as one
+  [[nodiscard]] tpm_haptics_info info() const {
+    tpm_haptics_info info = TPM_HAPTICS_INFO_INIT;
+    CHECK(tpm_haptics_get_info(contact_, &info) == TPM_HAPTICS_OK);
+    return info;
+  }
+  [[nodiscard]] tpm_haptics_state state() const {
+    tpm_haptics_state state = TPM_HAPTICS_STATE_INIT;
+    CHECK(tpm_haptics_get_state(contact_, &state) == TPM_HAPTICS_OK);
+    return state;
+  }
+  /// The push back at a depth.
+  double push_back_N(double depth_m, int* answer = nullptr) const {
+    const double position_m[3] = {0.0, 0.0, -depth_m};
+    double force_N[3] = {1.0, 1.0, 1.0};
+    const int code = tpm_haptics_step(contact_, position_m, force_N);
+    if (answer != nullptr) *answer = code;
+    CHECK(force_N[0] == 0.0);
+    CHECK(force_N[1] == 0.0);
+    return force_N[2];
+  }
+
+ private:
+  void open(const std::string& file, const tpm_haptics_options& options) {
+    char why[TPM_HAPTICS_MESSAGE] = "unchanged";
+    const int code = tpm_haptics_open(file.c_str(), &options, &contact_, why, sizeof why);
+    CAPTURE(why);
+    REQUIRE(code == TPM_HAPTICS_OK);
+    CHECK(std::string(why).empty());
+  }
+  test::TempFolder folder_;
+  tpm_haptics_contact* contact_ = nullptr;
+};
+
+std::string refused(const std::string& file, int expected,
+                    tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT) {
+  char why[TPM_HAPTICS_MESSAGE];
+  auto* contact = reinterpret_cast<tpm_haptics_contact*>(&options);  // NOLINT: must be overwritten
+  CHECK(tpm_haptics_open(file.c_str(), &options, &contact, why, sizeof why) == expected);
+  CHECK(contact == nullptr);
+  CHECK(std::string(why).find('\n') == std::string::npos);
+  return why;
+}
+
+TEST_CASE("A contact opened in C answers as the closed form of the paper's element") {
+  const Opened contact(test::short_session());
+  constexpr int kRest = 600, kRamp = 1000, kHold = 1000;
+  for (int i = 0; i <= kRest; ++i) CHECK(contact.push_back_N(0.0) == 0.0);
+  std::vector<double> times_s, forces_N;
+  for (int i = 1; i <= kRamp + kHold; ++i) {
+    times_s.push_back(1e-3 * i);
+    forces_N.push_back(contact.push_back_N(4e-6 * std::min(i, kRamp)));
+  }
+  TpmParameters material;
+  material.E1 = material.E2 = material.Eprime = 12e3;
+  material.eta1 = 2.4e4;
+  const Response exact =
+      make_model("closed_form")
+          ->respond(ramp_and_hold(4e-3, 4e-3, 1.0), times_s, to_vector(material), Want::values);
+  double worst_N = 0.0;
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    worst_N = std::max(worst_N, std::abs(forces_N[i] - exact.value[static_cast<Eigen::Index>(i)]));
+  }
+  CHECK(exact.value.maxCoeff() > 0.4);
+  CHECK(worst_N < 1e-10);
+}
+
+TEST_CASE("A contact opened in C sends the forces of tpm hil run, to the bit") {
+  const Json session =
+      GENERATE(test::short_session(), test::network_session("condensed"), test::slide_session());
+  CAPTURE(session.at("model").dump());
+  const test::TempFolder folder;
+  write_file(folder / "session.json", to_text(session));
+  SessionRunOptions options;
+  options.recording = folder / "r";
+  REQUIRE(run_session(read_session(folder / "session.json"), {}, options).outcome.cause ==
+          StopCause::finished);
+  const HilRecording recording = read_recording(folder / "r");
+  tpm_haptics_options same = TPM_HAPTICS_OPTIONS_INIT;
+  std::strcpy(same.device, "virtual");  // whose friction and delay the run had
+  const Opened contact(session, same);
+  std::size_t different = 0, felt = 0;
+  for (const ServoRecord& row : recording.rows) {
+    if (row.stop != StopCause::none) break;
+    double force_N[3];
+    CHECK(tpm_haptics_step(contact, row.position_m, force_N) == TPM_HAPTICS_OK);
+    different += std::equal(force_N, force_N + 3, row.commanded_N) ? 0 : 1;
+    felt += force_N[2] > 0.01 ? 1 : 0;
+  }
+  CHECK(felt > 300);
+  CHECK(different == 0);
+}
+
+TEST_CASE("A step in C takes nothing from the heap and gives nothing back") {
+  const Json session = GENERATE(
+      test::short_session(), test::network_session("condensed"), test::network_session("network"),
+      test::slide_session(), Json::parse(read_file(TPM_TEST_SOURCE_DIR "/configs/hil_law.json")));
+  CAPTURE(session.at("model").dump());
+  const Opened contact(session);
+  tpm_haptics_state state = TPM_HAPTICS_STATE_INIT;
+  double most_N = 0.0;
+  int answer = TPM_HAPTICS_OK;
+  const testing::HeapWatch heap;
+  for (int i = 0; i < 1500 && answer == TPM_HAPTICS_OK; ++i) {
+    const double position_m[3] = {0.0, 0.0, 2e-3 - 4e-6 * i};
+    double force_N[3];
+    answer = tpm_haptics_step_after(contact, i % 100 == 0 ? 1 : 0, position_m, force_N);
+    (void)tpm_haptics_get_state(contact, &state);
+    most_N = std::max(most_N, force_N[2]);
+  }
+  const long calls = heap.calls();
+  CHECK(answer == TPM_HAPTICS_OK);
+  CHECK(most_N > 0.01);
+  CHECK(calls == 0);
+}
+
+TEST_CASE("What is wrong with a file is a code and one line in C") {
+  const test::TempFolder folder;
+  CHECK_THAT(refused(folder / "none.json", TPM_HAPTICS_BAD_INPUT), Contains("none.json"));
+  write_file(folder / "other.json", "{\"a\": 1}");
+  CHECK_THAT(refused(folder / "other.json", TPM_HAPTICS_BAD_INPUT),
+             Contains("other.json: is neither a session nor a law; expected"));
+  write_file(folder / "key.json",
+             to_text(test::with(test::short_session(), "/indentations/holt", "2 s")));
+  CHECK_THAT(refused(folder / "key.json", TPM_HAPTICS_BAD_INPUT), Contains("holt"));
+  const Json stiff = test::with(test::short_session(), "/model/scene/material/E2", "12 MPa");
+  write_file(folder / "stiff.json", to_text(stiff));
+  CHECK_THAT(refused(folder / "stiff.json", TPM_HAPTICS_REFUSED), Contains("unstable"));
+
+  write_file(folder / "good.json", to_text(test::short_session()));
+  tpm_haptics_options options = TPM_HAPTICS_OPTIONS_INIT;
+  std::strcpy(options.device, "gloves");
+  CHECK_THAT(refused(folder / "good.json", TPM_HAPTICS_USAGE, options), Contains("gloves"));
+  options = TPM_HAPTICS_OPTIONS_INIT;
+  options.rate_Hz = 100.0;
+  CHECK_THAT(refused(folder / "good.json", TPM_HAPTICS_BAD_INPUT, options), Contains("100 Hz"));
+  options.rate_Hz = std::numeric_limits<double>::quiet_NaN();
+  CHECK_FALSE(refused(folder / "good.json", TPM_HAPTICS_BAD_INPUT, options).empty());
+  options = TPM_HAPTICS_OPTIONS_INIT;
+  options.version = TPM_HAPTICS_VERSION + 1;  // may hold an option that is not known here
+  CHECK_THAT(refused(folder / "good.json", TPM_HAPTICS_USAGE, options), Contains("version"));
+
+  char why[8];
+  tpm_haptics_contact* contact = nullptr;
+  CHECK(tpm_haptics_open((folder / "none.json").c_str(), nullptr, &contact, why, sizeof why) ==
+        TPM_HAPTICS_BAD_INPUT);
+  CHECK(std::strlen(why) == sizeof why - 1);
+  CHECK(tpm_haptics_open(nullptr, nullptr, &contact, nullptr, 0) == TPM_HAPTICS_USAGE);
+}
+
+TEST_CASE("Structs of C keep to the size that the caller has") {
+  const Opened contact(test::short_session());
+  tpm_haptics_state state = TPM_HAPTICS_STATE_INIT;
+  state.size -= 8;
+  CHECK(tpm_haptics_get_state(contact, &state) == TPM_HAPTICS_USAGE);
+  state = TPM_HAPTICS_STATE_INIT;
+  state.version = 0;
+  CHECK(tpm_haptics_get_state(contact, &state) == TPM_HAPTICS_USAGE);
+
+  // A caller of a later version, whose struct is longer: what this library does not know stays.
+  struct Later {
+    tpm_haptics_info info;
+    double added;
+  } later{TPM_HAPTICS_INFO_INIT, 17.0};
+  later.info.size = sizeof later;
+  later.info.version = TPM_HAPTICS_VERSION + 1;
+  CHECK(tpm_haptics_get_info(contact, &later.info) == TPM_HAPTICS_OK);
+  CHECK(later.added == 17.0);
+  CHECK(later.info.size == sizeof later);
+  CHECK(later.info.period_s == 1e-3);
+
+  double force_N[3];
+  CHECK(tpm_haptics_step(nullptr, force_N, force_N) == TPM_HAPTICS_USAGE);
+  CHECK(tpm_haptics_step(contact, nullptr, force_N) == TPM_HAPTICS_USAGE);
+  std::vector<double> few(3);
+  CHECK(tpm_haptics_positions(contact, few.data(), 1) == TPM_HAPTICS_USAGE);
+  tpm_haptics_close(nullptr);
+}
+
+TEST_CASE("A contact in C stops at a position that no hand reaches, until it is reset") {
+  const Opened contact(test::short_session());
+  for (int i = 0; i < 600; ++i) (void)contact.push_back_N(0.0);
+  int answer = 0;
+  for (int i = 1; i <= 100; ++i) CHECK(contact.push_back_N(1e-5 * i, &answer) > 0.0);
+  CHECK(answer == TPM_HAPTICS_OK);
+  CHECK((contact.state().flags & TPM_HAPTICS_TOUCHING) != 0);
+  const double far_m = GENERATE(0.05, std::numeric_limits<double>::quiet_NaN());
+  CHECK(contact.push_back_N(far_m, &answer) == 0.0);
+  CHECK(answer == TPM_HAPTICS_STOPPED);
+  CHECK(contact.push_back_N(1e-3, &answer) == 0.0);
+  CHECK(answer == TPM_HAPTICS_STOPPED);
+  CHECK(contact.state().cause ==
+        (std::isnan(far_m) ? TPM_HAPTICS_POSITION_NOT_FINITE : TPM_HAPTICS_POSITION_JUMPED));
+  CHECK(tpm_haptics_reset(contact) == TPM_HAPTICS_OK);
+  CHECK(contact.push_back_N(0.0, &answer) == 0.0);
+  CHECK(answer == TPM_HAPTICS_OK);
+  CHECK(contact.state().cause == TPM_HAPTICS_RUNNING);
+}
+
+TEST_CASE("A contact in C waits until the tool is in the air and at rest, unless told otherwise") {
+  const test::TempFolder folder;
+  write_file(folder / "session.json", to_text(test::short_session()));
+  const Opened contact(folder / "session.json");
+  CHECK(contact.push_back_N(2e-3) == 0.0);
+  CHECK((contact.state().flags & TPM_HAPTICS_IN_TISSUE) != 0);
+  int waited = 0;
+  while ((contact.push_back_N(-2e-3), contact.state().flags & TPM_HAPTICS_WAITING) != 0) ++waited;
+  CHECK(waited >= 250);
+  CHECK(waited < 300);
+  double most_N = 0.0;
+  for (int i = 0; i < 1000; ++i) most_N = std::max(most_N, contact.push_back_N(-2e-3 + 4e-6 * i));
+  CHECK(most_N > 0.1);
+}
+
+TEST_CASE("Periods that the caller missed are lived through") {
+  const Opened every(test::short_session()), some(test::short_session());
+  for (int i = 0; i <= 600; ++i) {
+    (void)every.push_back_N(0.0);
+    (void)some.push_back_N(0.0);
+  }
+  double force_N[3] = {}, whole_N = 0.0;
+  for (int i = 1; i <= 500; ++i) {
+    whole_N = every.push_back_N(4e-6 * i);
+    if (i % 5 != 0) continue;
+    const double position_m[3] = {0.0, 0.0, -4e-6 * i};
+    CHECK(tpm_haptics_step_after(some, 4, position_m, force_N) == TPM_HAPTICS_OK);
+  }
+  CHECK(whole_N > 0.1);
+  CHECK(force_N[2] == Approx(whole_N).epsilon(1e-9));
+  CHECK(some.state().time_s == Approx(every.state().time_s));
+}
+
+TEST_CASE("Spheres are drawn where the contact pushes them") {
+  const Opened contact(test::network_session("condensed"));
+  const tpm_haptics_info info = contact.info();
+  CHECK(info.spheres == 60);
+  CHECK(info.sphere_radius_m > 0.0);
+  CHECK_THAT(info.model, Contains("condensed"));
+  std::vector<double> rest(3 * info.spheres), pushed(3 * info.spheres);
+  CHECK(tpm_haptics_positions(contact, rest.data(), info.spheres) == TPM_HAPTICS_OK);
+  for (int i = 0; i < 1600; ++i) (void)contact.push_back_N(4e-6 * std::max(0, i - 600));
+  CHECK(tpm_haptics_positions(contact, pushed.data(), info.spheres) == TPM_HAPTICS_OK);
+  const tpm_haptics_state state = contact.state();
+  CHECK(state.surface_depth_m == Approx(4e-3).epsilon(0.01));
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < info.spheres; ++i) {
+    double along = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      along += (pushed[3 * i + k] - rest[3 * i + k]) * info.scene_push[k];
+    }
+    if (i == info.contact_sphere)
+      CHECK(along == Approx(state.surface_depth_m));
+    else
+      CHECK(along < state.surface_depth_m);
+    moved += along > 1e-5 ? 1 : 0;
+  }
+  CHECK(moved > 3);
+  CHECK(tpm_haptics_reset(contact) == TPM_HAPTICS_OK);
+  CHECK(tpm_haptics_positions(contact, pushed.data(), info.spheres) == TPM_HAPTICS_OK);
+  CHECK(pushed == rest);
+}
+
+TEST_CASE("A law file is a contact of its own") {
+  const test::TempFolder folder;
+  const Json session = Json::parse(read_file(TPM_TEST_SOURCE_DIR "/configs/hil_law.json"));
+  Json law = session.at("model").at("law");
+  law["law"] = "linear";
+  law["parameters"] = {{"k_inf_N_per_m", 60.0}};
+  write_file(folder / "law.json", to_text(law));
+  const Opened spring(folder / "law.json");
+  for (int i = 0; i < 1000; ++i) (void)spring.push_back_N(-1e-3);
+  for (int i = 1; i <= 500; ++i) {
+    const double depth_m = -1e-3 + 4e-6 * i;
+    CHECK(spring.push_back_N(depth_m) ==
+          Approx(depth_m > 0.0 ? 60.0 * depth_m : 0.0).margin(1e-12));
+  }
+}
+
+TEST_CASE("The library shows the calls of its header, versioned, and nothing else") {
+  const std::string command =
+      std::string("nm -D --defined-only --with-symbol-versions '") + TPM_TEST_HAPTICS + "'";
+  std::FILE* pipe = ::popen(command.c_str(), "r");  // NOLINT: the command is this test's
+  REQUIRE(pipe != nullptr);
+  std::string text;
+  char piece[4096];
+  while (std::fgets(piece, sizeof piece, pipe) != nullptr) text += piece;
+  REQUIRE(::pclose(pipe) == 0);
+  std::istringstream lines(text);
+  std::string line;
+  std::vector<std::string> calls;
+  while (std::getline(lines, line)) {
+    const std::string name = line.substr(line.rfind(' ') + 1);
+    if (name.rfind("TPMKIT_HAPTICS_1", 0) == 0) continue;  // the version itself
+    CHECK(name.substr(name.find('@')) == "@@TPMKIT_HAPTICS_1");
+    calls.push_back(name.substr(0, name.find('@')));
+  }
+  const std::string header = read_file(TPM_TEST_SOURCE_DIR "/include/tpmkit/haptics.h");
+  std::size_t declared = 0;
+  for (std::size_t at = header.find("TPM_HAPTICS_API "); at != std::string::npos;
+       at = header.find("TPM_HAPTICS_API ", at + 1)) {
+    ++declared;
+  }
+  CHECK(calls.size() == declared);
+  for (const std::string& call : calls) CHECK_THAT(header, Contains(call + "("));
+}
+
+}  // namespace
+}  // namespace tpm

@@ -1,0 +1,222 @@
+// Predictions with bands: against the textbook, against the fit's own errors, round trips.
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "coverage_studies.hpp"
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/fit/fitted_law.hpp"
+#include "tpm/fit/prediction.hpp"
+#include "tpm/law/law_file.hpp"
+#include "tpm/law/law_model.hpp"
+#include "tpm/scene/protocol_file.hpp"
+#include "tpm/study/law_prediction.hpp"
+
+namespace tpm {
+namespace {
+
+using Catch::Matchers::Contains;
+
+/// F = k u with k = 100 +- 2 N/m and readings that scatter by 3 mN.
+LawFile spring() {
+  LawFile law;
+  law.spec = parse_law_name("linear", "test");
+  law.spec.reference = 4e-3;
+  law.values = {100.0, 1e-4, 5e-3};  // k_inf, contact, offset
+  law.provenance = Provenance::derived;
+  law.fitted_to = 4e-3;
+  LawUncertainty u;
+  u.place = {0, 2};
+  u.coordinate = {Coordinate::linear, Coordinate::linear};
+  u.covariance = Eigen::MatrixXd::Zero(2, 2);
+  u.covariance(0, 0) = 4.0;
+  u.covariance(1, 1) = 1e-6;
+  u.noise.absolute = 3e-3;
+  u.duration_s = 10.0;
+  law.uncertainty = u;
+  return law;
+}
+
+PreparedRecording noisy_recording(double phi, std::uint64_t seed, const char* sha256) {
+  LawSpec law = parse_law_name("linear-1", "test");
+  law.reference = 4e-3;
+  Recording r = simulated_recording(law, visible_parameters(law), test::even_test(10.0, 0.05));
+  Random random(seed);
+  test::add_noise(r, 2e-3, phi, random);
+  r.header.sha256 = sha256;
+  return prepare_recording("simulated", r);
+}
+
+LawFile fit_of(const PreparedRecording& recording) {
+  SetupOptions setup;
+  setup.profiles = false;
+  setup.reference = 4e-3;
+  const std::span<const PreparedRecording> one(&recording, 1);
+  return fitted_law(
+      run_fit(recording_config(parse_law_name("linear-1", "test"), one, setup), data_sets(one)));
+}
+
+}  // namespace
+
+TEST_CASE("the band of a spring is that of a straight line through the origin") {
+  const LawFile law = spring();
+  const Protocol protocol = ramp_and_hold(4e-3, 1e-3, 6.0);
+  const std::vector<double> times{0.0, 1.0, 2.0, 4.0, 10.0};
+  const LawPrediction p = predict_law(law, protocol, times, {});
+  const double q = 1.959963984540054;
+  CHECK(p.quantile == Approx(q));
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const double u = std::min(times[i], 4.0) * 1e-3;  // surface: no contact depth, no offset
+    CHECK(p.response[i] == Approx(100.0 * u).margin(1e-15));
+    CHECK(p.standard_error[i] == Approx(2.0 * u).margin(1e-15));
+    CHECK(p.mean_upper[i] == Approx(100.0 * u + q * 2.0 * u).margin(1e-15));
+    CHECK(p.reading_upper[i] ==
+          Approx(100.0 * u + q * std::sqrt(4.0 * u * u + 9e-6)).margin(1e-15));
+  }
+  PredictionOptions fitted;
+  fitted.placement = Placement::fitted;
+  const LawPrediction placed = predict_law(law, protocol, times, fitted);
+  CHECK(placed.response[4] == Approx(100.0 * 3.9e-3 + 5e-3));
+  CHECK(placed.standard_error[4] == Approx(std::hypot(2.0 * 3.9e-3, 1e-3)));
+}
+
+TEST_CASE("a t quantile is used where the size of the noise was estimated") {
+  LawFile law = spring();
+  law.uncertainty->degrees_of_freedom = 5.0;
+  const LawPrediction p = predict_law(law, ramp_and_hold(4e-3, 1e-3, 6.0), std::vector{4.0}, {});
+  CHECK(p.quantile == Approx(2.5705818366).epsilon(1e-9));
+  PredictionOptions level;
+  level.level = 0.9;
+  CHECK(predict_law(law, ramp_and_hold(4e-3, 1e-3, 6.0), std::vector{4.0}, level).quantile ==
+        Approx(2.0150483733).epsilon(1e-9));
+}
+
+TEST_CASE("bands from drawn laws agree with bands from derivatives where the law is well known") {
+  const LawFile law = fit_of(noisy_recording(0.0, 4, "a"));
+  const Protocol protocol = ramp_and_hold(3e-3, 2e-3, 8.0);
+  const std::vector<double> times = times_over(protocol, 30);
+  const LawPrediction by_slopes = predict_law(law, protocol, times, {});
+  PredictionOptions sampled;
+  sampled.samples = 4000;
+  const LawPrediction by_draws = predict_law(law, protocol, times, sampled);
+  for (std::size_t i = 5; i < times.size(); ++i) {
+    const double half = by_slopes.mean_upper[i] - by_slopes.response[i];
+    CHECK(by_draws.mean_upper[i] - by_slopes.response[i] == Approx(half).epsilon(0.12));
+    CHECK(by_slopes.response[i] - by_draws.mean_lower[i] == Approx(half).epsilon(0.12));
+  }
+}
+
+TEST_CASE("a law file keeps its uncertainty") {
+  const LawFile law = fit_of(noisy_recording(0.6, 1, "abc"));
+  REQUIRE(law.uncertainty);
+  CHECK(law.uncertainty->readings_per_independent > 1.5);
+  const LawFile back = law_from_json(to_json(law), "test");
+  REQUIRE(back.uncertainty);
+  const LawUncertainty &a = *law.uncertainty, &b = *back.uncertainty;
+  CHECK(a.place == b.place);
+  CHECK(a.coordinate == b.coordinate);
+  CHECK((a.covariance - b.covariance).norm() == 0.0);
+  CHECK(a.degrees_of_freedom == b.degrees_of_freedom);
+  CHECK(a.noise.absolute == b.noise.absolute);
+  CHECK(a.duration_s == b.duration_s);
+  REQUIRE(b.data.size() == 1);
+  CHECK(b.data.front().sha256 == "abc");
+  CHECK(b.data.front().to_s == a.data.front().to_s);
+  CHECK(to_text(to_json(back)) == to_text(to_json(law)));
+}
+
+TEST_CASE("a covariance that is none is refused") {
+  const Json good = to_json(spring());
+  const auto refused = [&](const std::function<void(Json&)>& change) {
+    Json bad = good;
+    change(bad["fit"]);
+    return test::refusal_of([&] { (void)law_from_json(bad, "law.json"); });
+  };
+  CHECK_THAT(refused([](Json& fit) { fit["covariance"][0][1] = 1.0; }), Contains("not symmetric"));
+  CHECK_THAT(refused([](Json& fit) { fit["covariance"][0][1] = fit["covariance"][1][0] = 0.01; }),
+             Contains("negative eigenvalue"));
+  CHECK_THAT(refused([](Json& fit) { fit["covariance"].erase(1); }), Contains("1 rows"));
+  CHECK_THAT(refused([](Json& fit) { fit["parameters"][0] = "k9_N_per_m"; }),
+             Contains("unknown parameter 'k9_N_per_m'"));
+  CHECK_THAT(refused([](Json& fit) { fit["parameters"][1] = fit["parameters"][0]; }),
+             Contains("twice"));
+  LawFile bare = spring();
+  bare.uncertainty.reset();
+  CHECK_THAT(test::refusal_of([&] {
+               (void)predict_law(bare, ramp_and_hold(1e-3, 1e-3, 1.0), std::vector{0.5}, {});
+             }),
+             Contains("carries no uncertainty"));
+}
+
+TEST_CASE("the paper's element becomes a law with the fit's own standard errors") {
+  const FitConfig config = read_fit_config(TPM_TEST_SOURCE_DIR "/configs/liver_relaxation.json");
+  FitConfig fast = config;
+  fast.profiles = false;
+  const FitResult fit = run_fit(fast);
+  const LawFile law = fitted_law(fit);
+  CHECK(law_name(law.spec) == "linear-1-elastic");
+  CHECK(law.fitted_to == Approx(8e-3));
+  int compared = 0;
+  for (const FittedDatum& d : fit.data) {
+    REQUIRE(d.imposed_depth_m);
+    const Protocol protocol =
+        ramp_and_hold(*d.imposed_depth_m, config.data.front().protocol.rate_m_per_s, 40.0);
+    const double end = *d.imposed_depth_m / config.data.front().protocol.rate_m_per_s;
+    const LawPrediction p = predict_law(law, protocol, std::vector{end + d.datum.time_s}, {});
+    CHECK(p.response.front() == Approx(d.predicted).epsilon(1e-8));
+    REQUIRE(d.predicted_sd);
+    CHECK(p.standard_error.front() == Approx(*d.predicted_sd).epsilon(1e-4));
+    ++compared;
+  }
+  CHECK(compared == 8);
+}
+
+TEST_CASE("a recording that was fitted keeps its contact and offset, another finds its own") {
+  const PreparedRecording first = noisy_recording(0.0, 1, "first");
+  PreparedRecording second = noisy_recording(0.0, 2, "second");
+  const LawFile law = fit_of(first);
+  const LawPrediction same = predict_recording(law, first, {});
+  CHECK(same.placement == Placement::fitted);
+  CHECK(same.recording->held_out.samples == 0);
+  CHECK(same.recording->fitted.samples > 100);
+  CHECK(*same.recording->fitted.share_in_reading_band > 0.9);
+  for (double& response : second.recording.response) response += 0.2;  // another zero of the cell
+  const LawPrediction other = predict_recording(law, second, {});
+  CHECK(other.placement == Placement::own);
+  CHECK(other.offset == Approx(0.2).margin(5e-3));
+  CHECK(other.recording->fitted.samples == 0);
+  CHECK(*other.recording->held_out.share_in_reading_band > 0.9);
+  // Its own offset is found from its own noise: nothing is known better than in the fit.
+  CHECK(other.standard_error.back() > 0.5 * same.standard_error.back());
+}
+
+TEST_CASE("what goes beyond the fitted data is said") {
+  const LawFile law = spring();
+  const LawPrediction deep =
+      predict_law(law, ramp_and_hold(8e-3, 1e-3, 30.0), std::vector{0.0, 8.0, 38.0}, {});
+  REQUIRE(deep.flags.size() == 2);
+  CHECK_THAT(deep.flags[0], Contains("8 mm deep, and the law was fitted to 4 mm"));
+  CHECK_THAT(deep.flags[1], Contains("lasts 38 s, and the law was fitted to 10 s"));
+  const LawPrediction load = predict_law(law, creep(0.2, 5.0), std::vector{1.0, 5.0}, {});
+  CHECK(load.reading_lower.empty());
+  CHECK(load.response.front() == Approx(2e-3));
+  CHECK(load.standard_error.front() == Approx(0.02 * 2e-3));
+}
+
+TEST_CASE("a protocol is read from the blocks of a scene, its other blocks unseen") {
+  const Json scene = parse_json(R"({"organ": {"anything": 1},
+    "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "2 mm/s", "hold": "10 s"},
+    "outputs": {"count": 5}})",
+                                "test");
+  REQUIRE(has_protocol(scene));
+  const ProtocolFile file = parse_protocol_file(scene, "test");
+  CHECK(file.protocol.peak() == Approx(4e-3));
+  CHECK(file.times_s.size() == 5);
+  CHECK(file.times_s.back() == Approx(12.0));
+  CHECK_FALSE(has_protocol(parse_json("{\"organ\": {}}", "test")));
+  const std::vector<double> times = times_over(file.protocol, 4);
+  CHECK(times == std::vector<double>{0.0, 2.0, 4.0, 8.0, 12.0});
+}
+
+}  // namespace tpm
