@@ -1,6 +1,6 @@
 #include "tpm/simulate/scene_runner.hpp"
 
-include<algorithm>
+#include <algorithm>
 #include "tpm/network/stiffness_blocks.hpp"
 
     namespace tpm {
