@@ -101,6 +101,10 @@ FormulationChoice parse_formulation(const Json& block, const DocumentPlace& plac
                        formulations_that([](const Formulation&) { return true; }));
   }
   choice.kind = entry->name();
+  if (block.contains("solver")) {
+    choice.solver = parse_word(kStiffnessSolverWords, "solver",
+                               block.at("solver").get<std::string>(), place.key("solver").where);
+  }
   choice.mass_spring = block.contains("comparison");
   if (block.contains("springs") && !choice.mass_spring) {
     throw bad_input(place.key("springs").where, "without a comparison",
