@@ -178,7 +178,7 @@ TEST_CASE("stored energy never rises by more than the work") {
     for (int i = 0; i <= 8000; ++i) {
       const double t = 1e-4 * i;
       const double u = 3e-3 * std::min(1.0, 10.0 * t) * (1.0 + 0.4 * std::sin(15.0 * t));
-      (void)loop.contact.step({0.0, 0.0, u});
+      (void)loop.contact.step(Eigen::Vector3d(0.0, 0.0, u));
       const double force = loop.force_N();
       work += 0.5 * (force + force_before) * (u - before);
       force_before = force;

@@ -41,7 +41,7 @@ SteppedForces law_forces(const LawFile& law, const Protocol& motion, double peri
     contact.take_over(depth, model.at(law.values, nullptr).kernel.value(std::max(depth, 0.0)));
   }
   return stepped_forces(motion, period_s, encoder_step_m, [&](double depth) {
-    return std::max(-contact.step({0.0, 0.0, depth}).force_N.z(), 0.0);
+    return std::max(-contact.step(Eigen::Vector3d(0.0, 0.0, depth)).force_N.z(), 0.0);
   });
 }
 
