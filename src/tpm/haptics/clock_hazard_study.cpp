@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kMostTries = 10;
 constexpr double kStopBound_s = 0.010;
-constexpr std::uint64_t kHeldAt = 700;  // a period in which the tool is held in the tissue
+constexpr std::uint64_t kHeldAt = 1800;  // a period in which the tool is held in the tissue
 
 enum class ClockFaultKind { read_hangs, model_hangs, slow_calls, interrupted, record };
 
@@ -171,8 +171,8 @@ std::vector<ClockHazard> clock_hazards() {
                   kHeldAt, 1.5e-3, StopCause::overrun_storm, 0.5, kPatient_s});
   for (const auto& [at, phase] :
        {std::pair{0, "while the session waits for the operator"},
-        std::pair{400, "during the indentation"}, std::pair{700, "during the hold"},
-        std::pair{1300, "during the release"}}) {
+        std::pair{1300, "during the indentation"}, std::pair{1800, "during the hold"},
+        std::pair{2300, "during the release"}}) {
     list.push_back({"interrupted", phase, ClockFaultKind::interrupted,
                     static_cast<std::uint64_t>(at), 0.0, StopCause::signal, kStopBound_s});
   }
@@ -242,7 +242,8 @@ ClockHazardRow row_of(const ClockHazard& hazard, const HilSession& session,
     const bool finished = row.expected == StopCause::finished;
     row.to_zero_s = finished ? 0.0 : run.to_zero_s.value_or(1e9);
     const bool counted = !finished || row.missed_at_once + 2 >= std::lround(1e3 * hazard.lasts_s);
-    row.within = row.cause == row.expected && row.to_zero_s <= row.bound_s && counted &&
+    const bool felt = hazard.at == 0 || row.largest_force_N > 0.0;  // it came in the tissue
+    row.within = row.cause == row.expected && row.to_zero_s <= row.bound_s && counted && felt &&
                  row.largest_force_N <= session.servo.force_limit_N;
   }
   return row;

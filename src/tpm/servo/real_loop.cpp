@@ -216,7 +216,10 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
   outcome.scheduling = shared->scheduling;
   shared->begin.store(true, std::memory_order_release);
   std::int64_t stop_took_ns = 0;
-  const bool hang = watch(shared, options, stop_took_ns);
+  const bool hang = [&] {
+    const AboveRealTime watching;
+    return watch(shared, options, stop_took_ns);
+  }();
   if (hang) {
     loop.leave_behind();
     outcome.cause = StopCause::hang;

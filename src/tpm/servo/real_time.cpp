@@ -71,6 +71,21 @@ std::string become_real_time(RealTimeWish wish) {
                                 std::strerror(memory)));
 }
 
+AboveRealTime::AboveRealTime() noexcept {
+  sched_param parameter{};
+  if (pthread_getschedparam(pthread_self(), &policy_, &parameter) != 0) return;
+  priority_ = parameter.sched_priority;
+  parameter.sched_priority = kPriority + 1;
+  raised_ = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter) == 0;
+}
+
+AboveRealTime::~AboveRealTime() {
+  if (!raised_) return;
+  sched_param parameter{};
+  parameter.sched_priority = priority_;
+  (void)pthread_setschedparam(pthread_self(), policy_, &parameter);
+}
+
 std::string host_line() {
   utsname name{};
   (void)uname(&name);

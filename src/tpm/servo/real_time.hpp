@@ -21,6 +21,21 @@ void sleep_until_ns(std::int64_t instant_ns) noexcept;
 /// what a refusal means, one line. Throws Error(environment) under `enforce`.
 [[nodiscard]] std::string become_real_time(RealTimeWish wish);
 
+/// While it lives, this thread has a higher priority than the loop's, where the system allows that.
+/// For whoever watches the loop: among other programs a thread of usual priority wakes too late to
+/// cut the forces.
+class AboveRealTime {
+ public:
+  AboveRealTime() noexcept;
+  ~AboveRealTime();
+  AboveRealTime(const AboveRealTime&) = delete;
+  AboveRealTime& operator=(const AboveRealTime&) = delete;
+
+ private:
+  int policy_ = 0, priority_ = 0;  ///< as they were
+  bool raised_ = false;
+};
+
 /// Kernel, processor and number of cores, one line.
 [[nodiscard]] std::string host_line();
 
