@@ -285,13 +285,13 @@ void derivatives(const Formulation& f, Broken& broken) {
   const TpmVector at = to_vector(TpmParameters{}.with_relaxation_time(0.7));
   const Response response = model->respond(protocol, times, at, Want::values_and_sensitivity);
   for (std::size_t i = 0; i < at.size(); ++i) {
-    constexpr double kStep = 1e-4;
+    constexpr double kRelative = 1e-4;
     TpmVector more = at, less = at;
-    more[i] *= 1.0 + kStep;
-    less[i] *= 1.0 - kStep;
+    more[i] *= 1.0 + kRelative;
+    less[i] *= 1.0 - kRelative;
     const Eigen::VectorXd slope = (model->respond(protocol, times, more, Want::values).value -
                                    model->respond(protocol, times, less, Want::values).value) /
-                                  (2.0 * kStep * at[i]);
+                                  (2.0 * kRelative * at[i]);
     const Eigen::VectorXd exact_slope = response.sensitivity.col(static_cast<Eigen::Index>(i));
     const double found =
         at[i] * (slope - exact_slope).cwiseAbs().maxCoeff() / response.value.cwiseAbs().maxCoeff();
