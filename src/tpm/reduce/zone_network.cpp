@@ -15,8 +15,10 @@ constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
 /// What the surroundings miss in motion over what they miss in equilibrium: what they remember of
 /// deeper places is missed too.
 constexpr double kMissedInMotion = 1.5;
-constexpr double kMissedStiffening = 3.0;  // times that where bonds of the surroundings stiffen
-constexpr double kUnbalanced = 0.1;        // what is left of the correction for what is unbalanced
+/// Times that where bonds of the surroundings stiffen: the linear surroundings miss more between
+/// the equilibria that are looked at (set by tests/test_material_servo.cpp).
+constexpr double kMissedStiffening = 16.0;
+constexpr double kUnbalanced = 0.1;  // what is left of the correction for what is unbalanced
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
 
 void require(const ZoneNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
