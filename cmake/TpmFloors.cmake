@@ -68,6 +68,33 @@ function(tpm_floors suffix flags)
   set(TPM_FLOOR_OBJECTS ${objects} PARENT_SCOPE)
 endfunction()
 
+# tpm_formulation_list(LIST FILE...): writes a source that lists the formulations of files. A file NAME.cpp
+# defines the function NAME_formulations().
+function(tpm_formulation_list list)
+  set(declared "")
+  set(called "")
+  foreach(source IN LISTS ARGN)
+    get_filename_component(name ${source} NAME_WE)
+    string(APPEND declared "Formulations ${name}_formulations();\n")
+    list(APPEND called "${name}_formulations()")
+  endforeach()
+  list(JOIN called ", " called)
+  file(CONFIGURE OUTPUT ${list} @ONLY CONTENT [[
+// Written by the build from the files of formulations.
+#include "tpm/formulation/formulation.hpp"
+
+namespace tpm {
+
+@declared@
+Formulations formulations() {
+  static const std::vector<const Formulation*> all = joined({@called@});
+  return all;
+}
+
+}  // namespace tpm
+]])
+endfunction()
+
 set(TPM_SANITIZED_FLOORS core store protocol material solve model law network curve scene simulate method
     reduce device servo haptics sample CACHE STRING "Floors under address and undefined in sanitized twins")
 
@@ -88,7 +115,7 @@ function(tpm_sanitized_twin twin sanitize)
       list(APPEND TPM_FLOOR_OBJECTS $<TARGET_OBJECTS:tpm_floor_${floor}>)
     endif()
   endforeach()
-  add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS})
+  add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS} $<TARGET_OBJECTS:tpm_formulation_list>)
   set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX OUTPUT_NAME tpmkit_${twin})
   target_link_options(${twin} PUBLIC -fsanitize=${sanitize} PRIVATE -Wl,-Bsymbolic-functions)
   target_link_libraries(${twin} PRIVATE fmt::fmt ${TPM_PRIVATE_LIBRARIES})

@@ -37,7 +37,7 @@ function(tpm_package component name section summary description)
 endfunction()
 tpm_package(program tpmkit science "soft-tissue models: fitting, simulation, haptic loop"
   "The program tpm: laws from recordings with intervals and verdicts, organs of spheres, sweeps, sessions with a haptic device."
-  libc6)
+  python3)
 tpm_package(library libtpmkit-haptics1 libs "soft tissue for haptic loops, C interface"
   "The library that steps a contact of tpmkit within a servo loop, without allocation, lock or exception. Sessions are checked with the schemas of the package tpmkit."
   "tpmkit (= ${PROJECT_VERSION})")
@@ -68,7 +68,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_LIBRARY_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)  # with it the trigger of ldconfig
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "python3-numpy, python3-matplotlib")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "python3-matplotlib, python3-h5py, python3-h5netcdf")

@@ -10,7 +10,7 @@
  *              at most 10 N, 75 mm from the centre, 4000 N/m; friction 0.1 N s/m, 0 periods late
  *
  * The device is simulated: a hand without mass on a spring of 400 N/m that is moved down at 2 mm/s after
- * half a second. Replace the bodies of read and write by the calls of your device.
+ * half a second, by 8 mm. Replace the bodies of read and write by the calls of your device.
  */
 #include <math.h>
 #include <stdio.h>
@@ -63,7 +63,7 @@ static int prepare(void *device, const tpm_device_preparation *p, char *message)
 
 static int read_position(void *device, double position_m[3]) {
   (void)device;
-  const double moving_s = hand.time_s > 0.5 ? hand.time_s - 0.5 : 0.0;
+  const double moving_s = hand.time_s < 0.5 ? 0.0 : hand.time_s > 4.5 ? 4.0 : hand.time_s - 0.5;
   position_m[0] = hand.force_N[0] / 400.0;
   position_m[1] = hand.force_N[1] / 400.0;
   position_m[2] = 2e-3 - 2e-3 * moving_s + hand.force_N[2] / 400.0;

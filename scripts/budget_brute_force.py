@@ -40,7 +40,7 @@ def interpolated(knots, t):
 def forces(program, law, knots, times, folder):
     """The exact law along a motion."""
     document = {"protocol": {"kind": "knots", "knots": [{"time": f"{t!r} s", "depth": f"{d!r} m"} for t, d in knots]},
-                "outputs": {"times": [f"{t!r} s" for t in times]}}
+                "outputs": {"times": [f"{min(t, knots[-1][0])!r} s" for t in times]}}
     path = Path(folder) / "motion.json"
     path.write_text(json.dumps(document), encoding="utf-8")
     answer = tpm_json(program, "predict", law, path)
@@ -64,6 +64,19 @@ def largest(a, b):
     return max(abs(x - y) for x, y in zip(a, b))
 
 
+def motion_of(options, arguments):
+    """The motion from the surface, and the budget's law line beside a recording."""
+    if not options.recording:
+        ramp, end = options.depth / options.rate, options.depth / options.rate + options.hold
+        return [(0.0, 0.0), (ramp, options.depth * 1e-3), (end, options.depth * 1e-3)], None
+    prediction = tpm_json(options.tpm, "predict", *arguments)
+    depth = [d - prediction["contact_m"] for d in prediction["depth_m"]]
+    # Long held at the first depth: the fit takes a recording as relaxed when it begins.
+    knots = [(prediction["time_s"][0] - 1e4, depth[0]), *zip(prediction["time_s"], depth)]
+    parts = [prediction["recording"][which] for which in ("fitted", "not_fitted")]
+    return knots, max(part.get("largest_N", 0.0) for part in parts)
+
+
 def contact(options, folder):
     arguments = [options.law]
     if options.recording:
@@ -71,24 +84,19 @@ def contact(options, folder):
     else:
         arguments += ["--depth", f"{options.depth} mm", "--rate", f"{options.rate} mm/s", "--hold", f"{options.hold} s"]
     budget = tpm_json(options.tpm, "budget", *arguments)
-    found = {}
-    if options.recording:
-        prediction = tpm_json(options.tpm, "predict", *arguments)
-        part = prediction["recording"]
-        worst = max(part[which].get("largest_N", 0.0) for which in ("fitted", "not_fitted"))
-        found["law"] = worst / budget["peak_N"]
-        return budget, found
-    ramp = options.depth / options.rate
-    knots, end = [(0.0, 0.0), (ramp, options.depth * 1e-3), (ramp + options.hold, options.depth * 1e-3)], ramp + options.hold
-    times = [ramp * k / 40 for k in range(1, 41)] + [ramp + options.hold * k / 40 for k in range(1, 41)]
+    knots, law_line = motion_of(options, arguments)
+    start = knots[1 if options.recording else 0][0]
+    times = [t for t in budget["time_s"] if t >= start + (DELAY + 1) * PERIOD_S]
+    steps = ([knots[0]] if options.recording else []) + in_steps(knots, start, times[-1] + PERIOD_S)
     exact = forces(options.tpm, options.law, knots, times, folder)
-    quantised = forces(options.tpm, options.law, in_steps(knots, 0.0, end), times, folder)
-    delay = forces(options.tpm, options.law, knots, [t - DELAY * PERIOD_S for t in times], folder)
-    held = forces(options.tpm, options.law, knots, [t - (DELAY + 1) * PERIOD_S for t in times], folder)
-    found["quantisation"] = largest(exact, quantised) / budget["peak_N"]
-    found["delay"] = largest(exact, delay) / budget["peak_N"]
-    found["period"] = largest(delay, held) / budget["peak_N"]
-    return budget, found
+    # In the order of the budget: the encoder's steps, then late, then kept for a period.
+    stages = [forces(options.tpm, options.law, steps, [t - k * PERIOD_S for t in times], folder)
+              for k in (0, DELAY, DELAY + 1)]
+    found = {"quantisation": largest(exact, stages[0]), "delay": largest(stages[0], stages[1]),
+             "period": largest(stages[1], stages[2])}
+    if law_line is not None:
+        found["law"] = law_line
+    return budget, {name: value / budget["peak_N"] for name, value in found.items()}
 
 
 def simulated(options, scene, folder, name, *more):
@@ -106,17 +114,20 @@ def organ(options, folder):
     budget = tpm_json(options.tpm, *arguments)
     scene = json.loads(Path(options.scene).read_text(encoding="utf-8"))
     scene["guides"] = sorted({*scene.get("guides", []), *(c["number"] for c in scene["contacts"] if "number" in c)})
+    scene["outputs"] = {"times": [f"{t!r} s" for t in budget["time_s"]], "fields": ["force"]}
     plain = simulated(options, scene, folder, "plain")
-    times = [t for t, _ in plain]
-    found = {}
-
-    def against(curve, name):
-        values = [interpolated(curve, t) for t in times]
-        found[name] = largest([f for _, f in plain], values) / budget["peak_N"]
-
-    against(simulated(options, {**scene, "formulation": {"kind": "inertial"}}, folder, "masses"), "masses")
-    against(simulated(options, {**scene, "tolerance": 1e-8}, folder, "tight"), "tolerance")
-    return budget, found
+    masses = simulated(options, {**scene, "formulation": {"kind": "inertial"}}, folder, "masses")
+    tight = simulated(options, {**scene, "tolerance": 1e-8}, folder, "tight")
+    planned = simulated(options, scene, folder, "planned", "--plan", "--tolerance", "1%", "--rate", "1000")
+    times = budget["time_s"]
+    (Path(folder) / "asked.json").write_text(json.dumps({"protocol": scene["protocol"],
+                                                         "outputs": {"times": [f"{t!r} s" for t in times]}}))
+    law = tpm_json(options.tpm, "predict", options.law, Path(folder) / "asked.json")["mean_N"]
+    at = {name: [interpolated(curve, t) for t in times]
+          for name, curve in (("plain", plain), ("masses", masses), ("tight", tight), ("planned", planned))}
+    found = {"organ": largest(law, at["masses"]), "masses": largest(at["masses"], at["tight"]),
+             "tolerance": largest(at["plain"], at["tight"]), "reduction": largest(at["planned"], at["plain"])}
+    return budget, {name: value / budget["peak_N"] for name, value in found.items()}
 
 
 def main():

@@ -141,7 +141,7 @@ def draw(options):
     cases = [json.loads(line) for line in pathlib.Path(options.record).read_text().splitlines()]
     print_tables(cases)
     plt.rcParams.update(draw_figures.STYLE)
-    figure, axes = plt.subplots(1, 3, figsize=(draw_figures.PAGE_WIDTH, 3.4), layout="constrained")
+    figure, axes = plt.subplots(1, 3, figsize=(draw_figures.PAGE_WIDTH, 3.5))
     panels = [("shell", "factorise_s", "Shell: one factorisation", "processor time, s"),
               ("solid", "factorise_s", "Solid: one factorisation", "processor time, s"),
               ("shell", "factor_entries", "Shell: numbers of the factor", "numbers")]
@@ -156,7 +156,8 @@ def draw(options):
         axis.set_title(title)
         axis.set_xlabel("spheres")
         axis.set_ylabel(label)
-    figure.legend(handles.values(), [NAMES[s] for s in handles], loc="outside lower center", ncols=3, frameon=False)
+    figure.legend(handles.values(), [NAMES[s] for s in handles], loc="lower center", ncols=3, frameon=False)
+    figure.subplots_adjust(left=0.07, right=0.99, top=0.92, bottom=0.3, wspace=0.3)
     figure.savefig(options.figure, metadata={"Date": None})
 
 

@@ -54,7 +54,7 @@ inline HandOverOutcome random_hand_over(Random& random) {
     double depth =
         rise * (mean * (1.0 + 0.5 * std::sin(slow * t)) + swing * std::sin(fast * t + phase));
     depth = std::max(depth, 0.0);
-    (void)from.contact.step({0.0, 0.0, depth});
+    (void)from.contact.step(Eigen::Vector3d(0.0, 0.0, depth));
     outcome.largest_force_N = std::max(outcome.largest_force_N, std::abs(from.force_N()));
     outcome.largest_energy_J = std::max(outcome.largest_energy_J, from.stored_J());
   }

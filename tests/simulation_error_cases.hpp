@@ -78,6 +78,8 @@ inline std::vector<ErrorCase> simulation_error_cases() {
          "formulation": {"kind": "inertial"})")},
       {type, "damping without mass", simulate,
        pushed(R"("formulation": {"kind": "quasi_static", "damping_ratio": 0.1})")},
+      {type, "solver with mass", simulate,
+       pushed(R"("formulation": {"kind": "inertial", "solver": "direct"})")},
       {type, "springs without a comparison", simulate,
        pushed(R"("formulation": {"springs": "equal"})")},
       {type, "output after the end", simulate, pushed(R"("outputs": {"times": ["3 s"]})")},

@@ -132,7 +132,8 @@ TEST_CASE("a crowded layer has first neighbours only, as the others have") {
     CHECK(s.radial_count >= 4);
   }
   Freedom held = inner_layer_held(network.organ);
-  CHECK(zero_energy_modes(BondSystem(network, TpmParameters{}), network.organ.position, held).is_rigid());
+  CHECK(zero_energy_modes(BondSystem(network, TpmParameters{}), network.organ.position, held)
+            .is_rigid());
 }
 
 TEST_CASE("a lattice keeps its neighbours whatever its layers' own spacing") {

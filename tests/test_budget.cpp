@@ -89,7 +89,7 @@ TEST_CASE("the lines of a linear contact are those of its closed form") {
   const Protocol motion = ramp_and_hold(4e-3, 4e-3, 6.0);
   const std::vector<double> times = times_over(motion, 701);  // a period's multiples
   BudgetOptions options;
-  options.device = {1e-3, 1e-5, 2};
+  options.device = {1e-3, 7e-6, 2};
   const ErrorBudget budget = contact_budget(law, motion, times, options);
   CHECK(budget.stages.front().name == "law");
   // A linear kernel that goes linearly within a period: the update is exact.
@@ -105,11 +105,11 @@ TEST_CASE("the lines of a linear contact are those of its closed form") {
   }
   const double peak = force_of(law, motion, 1.0);
   CHECK(budget.peak_N == Approx(peak));
-  // Positions in steps move each of these by up to a step: 1e-5 m of 150 N/m.
-  CHECK(delay.largest == Approx(most_delay / peak).margin(1.1 * 1.5e-3 / peak));
-  CHECK(period.largest == Approx(most_period / peak).margin(1.1 * 1.5e-3 / peak));
-  CHECK(line_named(budget, "quantisation").largest <= 0.51e-5 * 150.0 / peak);
-  CHECK(line_named(budget, "quantisation").largest > 0.1e-5 * 150.0 / peak);
+  // Positions in steps move each of these by up to a step: 7e-6 m of 150 N/m.
+  CHECK(delay.largest == Approx(most_delay / peak).margin(1.1 * 1.05e-3 / peak));
+  CHECK(period.largest == Approx(most_period / peak).margin(1.1 * 1.05e-3 / peak));
+  CHECK(line_named(budget, "quantisation").largest <= 0.51 * 7e-6 * 150.0 / peak);
+  CHECK(line_named(budget, "quantisation").largest > 0.1 * 7e-6 * 150.0 / peak);
   CHECK(budget.not_closed < 1e-13);
 }
 

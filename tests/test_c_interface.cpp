@@ -93,8 +93,7 @@ TEST_CASE("A contact opened in C answers as the closed form of the paper's eleme
     forces_N.push_back(contact.push_back_N(4e-6 * std::min(i, kRamp)));
   }
   TpmParameters material;
-  material.E1 = material.E2 = material.Eprime = 12e3;
-  material.eta1 = 2.4e4;
+  material.eta1_Pa_s = 2.4e4;  // the other numbers of the session are the presets
   const Response exact =
       make_model("closed_form")
           ->respond(ramp_and_hold(4e-3, 4e-3, 1.0), times_s, to_vector(material), Want::values);
@@ -337,8 +336,8 @@ TEST_CASE("The library shows the calls of its header, versioned, and nothing els
   }
   const std::string header = read_file(TPM_TEST_SOURCE_DIR "/include/tpmkit/haptics.h");
   std::size_t declared = 0;
-  for (std::size_t at = header.find("TPM_HAPTICS_API "); at != std::string::npos;
-       at = header.find("TPM_HAPTICS_API ", at + 1)) {
+  for (std::size_t at = header.find("\nTPM_HAPTICS_API "); at != std::string::npos;
+       at = header.find("\nTPM_HAPTICS_API ", at + 1)) {
     ++declared;
   }
   CHECK(calls.size() == declared);

@@ -37,9 +37,9 @@ struct Plate {
   }
   [[nodiscard]] Probe probe() const { return {5, -Eigen::Vector3d::UnitZ()}; }
   /// Displacements after a load has acted for ever.
-  [[nodiscard]] Eigen::Matrix3Xd displacement(const Network& of, const TpmParameters& p,
+  [[nodiscard]] Eigen::Matrix3Xd displacement(const Network& of, const BondMaterial& material,
                                               double load) const {
-    const BondSystem bonds(of, p);
+    const BondSystem bonds(of, material);
     const QuasiStaticRun run = QuasiStatic(bonds, of.organ.position, freedom, probe(), {1e-6})
                                    .run(creep(load, kForever), std::span(&kForever, 1));
     return run.position - of.organ.position;
@@ -99,12 +99,14 @@ TEST_CASE("where all bonds share one modulus the springs deform in the same shap
   const Network msm = msm_network(plate.network, SpringRule::like_the_bonds);
   const double load = 1e-4;
   const auto shape = [](const Eigen::Matrix3Xd& u) { return Eigen::Matrix3Xd(u / u.norm()); };
-  const Eigen::Matrix3Xd springs = shape(plate.displacement(msm, p, load));
+  const Eigen::Matrix3Xd springs = shape(plate.displacement(msm, BondMaterial::of(p), load));
   p.E1_Pa = 1e12;  // never relaxes
-  const Eigen::Matrix3Xd unrelaxed = shape(plate.displacement(plate.network, p, load));
+  const Eigen::Matrix3Xd unrelaxed =
+      shape(plate.displacement(plate.network, BondMaterial::of(p), load));
   CHECK((springs - unrelaxed).norm() < 1e-6);
   p.E1_Pa = 12e3;  // the radial bonds relax to a half, the lateral ones do not
-  const Eigen::Matrix3Xd relaxed = shape(plate.displacement(plate.network, p, load));
+  const Eigen::Matrix3Xd relaxed =
+      shape(plate.displacement(plate.network, BondMaterial::of(p), load));
   CHECK((springs - relaxed).norm() > 1e-3);
 }
 

@@ -53,12 +53,13 @@ TEST_CASE("A device of a plugin goes through a session") {
     const ServoRecord& row = recording.rows[i];
     if (row.stop != StopCause::none) break;
     const double end_m = row.position_m[2] - recording.rows[i - 1].commanded_N[2] / 400.0;
-    const bool moving = i > 1 && from_m < 1.999e-3;
+    const bool moving = i > 1 && from_m < 1.999e-3 && end_m > -5.999e-3;
     if (moving) worst_m = std::max(worst_m, std::abs(from_m - end_m - 2e-6));
     from_m = end_m;
     most_N = std::max(most_N, row.commanded_N[2]);
   }
-  CHECK(most_N > 0.5);
+  CHECK(most_N > 0.4);
+  CHECK(run.rendering.friction_N_s_per_m == 0.1);  // what the plugin says, not a simulated Omega.7
   CHECK(worst_m < 1e-12);
 }
 

@@ -162,8 +162,7 @@ TEST_CASE("the paper's element becomes a law with the fit's own standard errors"
     REQUIRE(d.imposed_depth_m);
     const Protocol protocol =
         ramp_and_hold(*d.imposed_depth_m, config.data.front().protocol.rate_m_per_s, 40.0);
-    const double end = *d.imposed_depth_m / config.data.front().protocol.rate_m_per_s;
-    const LawPrediction p = predict_law(law, protocol, std::vector{end + d.datum.time_s}, {});
+    const LawPrediction p = predict_law(law, protocol, std::vector{d.datum.time_s}, {});
     CHECK(p.response.front() == Approx(d.predicted).epsilon(1e-8));
     REQUIRE(d.predicted_sd);
     CHECK(p.standard_error.front() == Approx(*d.predicted_sd).epsilon(1e-4));

@@ -407,11 +407,11 @@ class Doubtful final : public ContactModel {
   enum class Way { alternating, for_good };
   explicit Doubtful(Way way) : way_(way) {}
   void reset() noexcept override { steps_ = 0; }
-  ContactAnswer step(const Eigen::Vector3d& at) noexcept override {
+  ContactAnswer step(const ToolPose& tool) noexcept override {
     ++steps_;
     ContactAnswer answer;
     answer.trusted = way_ == Way::alternating ? steps_ < 500 || steps_ % 2 == 0 : steps_ < 500;
-    answer.force_N = (answer.trusted ? -200.0 : -600.0) * at;
+    answer.force_N = (answer.trusted ? -200.0 : -600.0) * tool.displacement_m;
     return answer;
   }
   [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
@@ -523,7 +523,7 @@ TEST_CASE("No part of the watch allocates, also when it acts") {
 class Counting final : public ContactModel {
  public:
   void reset() noexcept override {}
-  ContactAnswer step(const Eigen::Vector3d&) noexcept override {
+  ContactAnswer step(const ToolPose&) noexcept override {
     ++steps;
     return {};
   }

@@ -118,10 +118,10 @@ TEST_CASE("The surface lets go at zero force, recovers, and is met again where i
   const TpmParameters p = slow_liver();
   ElementContact model(p, 1e-3);
   OneSidedContact contact(model, Eigen::Vector3d::UnitZ());
-  for (int i = 1; i <= 2000; ++i) (void)contact.step(4e-3);  // two relaxation times
+  for (int i = 1; i <= 2000; ++i) (void)contact.press(4e-3);  // two relaxation times
   OneSidedContact::Answer answer;
   for (int i = 1; i <= 40; ++i) {
-    answer = contact.step(4e-3 - 1e-4 * i);
+    answer = contact.press(4e-3 - 1e-4 * i);
     REQUIRE(answer.force_N >= 0.0);
   }
   CHECK_FALSE(answer.touching);
@@ -130,15 +130,36 @@ TEST_CASE("The surface lets go at zero force, recovers, and is met again where i
   const double left = answer.surface_m;
   double elapsed = 0.0;
   while (answer.surface_m > 0.5 * left) {
-    answer = contact.step(0.0);
+    answer = contact.press(0.0);
     elapsed += 1e-3;
     REQUIRE(answer.force_N == 0.0);
   }
   CHECK_THAT(elapsed, WithinRel(2.0 * p.relaxation_time_s() * std::log(2.0), 0.01));
   const double met = answer.surface_m;
-  answer = contact.step(met + 1e-4);
+  answer = contact.press(met + 1e-4);
   CHECK(answer.touching);
   CHECK_THAT(answer.force_N, WithinRel(contact.stiffness_N_per_m() * 1e-4, 0.05));
+}
+
+TEST_CASE("One-sided contact is a contact model itself, whatever it wraps") {
+  ElementContact inner(slow_liver(), 1e-3), same(slow_liver(), 1e-3);
+  OneSidedContact wrapped(inner, Eigen::Vector3d::UnitZ());
+  OneSidedContact pressed(same, Eigen::Vector3d::UnitZ());
+  ContactModel& model = wrapped;
+  CHECK(model.period_s() == inner.period_s());
+  CHECK(model.instantaneous_stiffness() == inner.instantaneous_stiffness());
+  for (const double depth_m : {1e-3, 3e-3, 2e-3, -1e-3, 0.5e-3, 2e-3}) {
+    const Eigen::Vector3d aside(2e-3, -1e-3, depth_m);  // motion across does not reach the tissue
+    const ContactAnswer answer = model.step(aside);
+    CHECK(answer.force_N.z() == -pressed.press(depth_m).force_N);
+    CHECK(answer.force_N.head(2).isZero(0.0));
+    CHECK(answer.force_N.z() <= 0.0);  // it pushes and never pulls
+  }
+  const Eigen::Quaterniond turned(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitX()));
+  model.reset();
+  pressed.reset();
+  CHECK(model.step({Eigen::Vector3d(0.0, 0.0, 1e-3), turned}).force_N.z() ==
+        -pressed.press(1e-3).force_N);
 }
 
 TEST_CASE("A tool that touches and lets go at random gains nothing from a soft tissue") {
@@ -151,7 +172,7 @@ TEST_CASE("A tool that touches and lets go at random gains nothing from a soft t
   for (int i = 0; i < 1'000'000; ++i) {
     if (i % 50 == 0) target = -2e-3 + 10e-3 * random.uniform();
     const double next = at + 0.02 * (target - at);
-    const double now = contact.step(next).force_N;
+    const double now = contact.press(next).force_N;
     work += 0.5 * (force + now) * (next - at);
     least = std::min(least, work);
     at = next;
@@ -216,7 +237,7 @@ TEST_CASE("A force that is no number stops the session before it is sent") {
   class Broken final : public ContactModel {
    public:
     void reset() noexcept override {}
-    ContactAnswer step(const Eigen::Vector3d&) noexcept override {
+    ContactAnswer step(const ToolPose&) noexcept override {
       ContactAnswer answer;
       if (++steps_ > 10) answer.force_N.z() = std::numeric_limits<double>::quiet_NaN();
       return answer;

@@ -202,7 +202,7 @@ TEST_CASE("Whatever throws while a session runs, its threads end and the forces 
   class Free final : public ContactModel {
    public:
     void reset() noexcept override {}
-    ContactAnswer step(const Eigen::Vector3d&) noexcept override { return {}; }
+    ContactAnswer step(const ToolPose&) noexcept override { return {}; }
     [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
     [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
       return Eigen::Matrix3d::Identity();

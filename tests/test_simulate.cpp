@@ -10,6 +10,7 @@
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/network/mass_spring.hpp"
+#include "tpm/protocol/protocol_block.hpp"
 #include "tpm/simulate/smoothness.hpp"
 
 using namespace tpm;
@@ -67,7 +68,7 @@ TEST_CASE("every block of a scene reaches the experiment") {
   CHECK(scene.probe().direction == Eigen::Vector3d::UnitZ());
   CHECK(scene.protocol.drive() == Drive::force);
   CHECK_THAT(scene.protocol.peak(), WithinRel(0.03, 1e-12));
-  CHECK(scene.formulation.kind == FormulationKind::inertial);
+  CHECK(scene.formulation.kind == "inertial");
   CHECK(scene.formulation.damping_ratio == 0.3);
   CHECK(scene.formulation.density_kg_m3 == 1000.0);
   CHECK(scene.formulation.mass_spring);
@@ -333,4 +334,34 @@ TEST_CASE("a load that nothing carries is refused where the tissue gives way", "
                    R"("protocol": {"kind": "creep", "load": "1e6 N", "duration": "1 s"})"));
              }),
              Contains("at t = 0 s and a load of 0.93") && Contains("buckles"));
+}
+
+TEST_CASE("one table says what protocols need, for scenes and for what sets the open numbers") {
+  const DocumentPlace place{"f.json"};
+  const auto parsed = [&](const std::string& text, Openness openness) {
+    return parse_protocol_block(parse_json(text, "f.json"), place, openness);
+  };
+  ProtocolBlock open = parsed(R"({"kind": "ramp_hold", "hold": "2 s"})", Openness::open);
+  CHECK_FALSE(open.depth_m);
+  CHECK_THAT(refusal_of([&] { (void)open.protocol(place); }),
+             Contains("key /depth: is missing; expected 'ramp_hold' needs depth, rate, hold"));
+  *open.find("depth") = 4e-3;
+  *open.find("rate") = 2e-3;
+  CHECK(open.find("load") == nullptr);
+  const Protocol set = open.protocol(place);
+  const Protocol whole =
+      parsed(R"({"kind": "ramp_hold", "depth": "4 mm", "rate": "2 mm/s", "hold": "2 s"})",
+             Openness::complete)
+          .protocol(place);
+  REQUIRE(set.knots().size() == whole.knots().size());
+  for (std::size_t i = 0; i < whole.knots().size(); ++i) {
+    CHECK(set.knots()[i].time_s == whole.knots()[i].time_s);
+    CHECK(set.knots()[i].value == whole.knots()[i].value);
+  }
+  CHECK_THAT(
+      refusal_of([&] { (void)parsed(R"({"kind": "creep", "load": "1 N"})", Openness::complete); }),
+      Contains("key /duration: is missing; expected 'creep' needs load, duration"));
+  CHECK_THAT(
+      refusal_of([&] { (void)parsed(R"({"kind": "creep", "depth": "1 mm"})", Openness::open); }),
+      Contains("is no key of the kind 'creep'; expected load, duration"));
 }

@@ -185,7 +185,7 @@ TEST_CASE("static curves are the equilibria, at once and relaxed, also where E2 
           Approx(relaxed.move_to(depth, 0.0).response).epsilon(1e-4 / share));
     const Protocol jump(Drive::displacement, {{0.0, depth}, {1.0, depth}}, "jump");
     const std::vector<double> start{0.0};
-    const PlanTrajectory at_once = scene.with_protocol(jump).quasi_static({}, start, false);
+    const Trajectory at_once = scene.with_protocol(jump).quasi_static({}, start, false);
     CHECK(curves.relaxed(depth) + curves.relaxing(depth) ==
           Approx(at_once.response[0]).epsilon(1e-4 / share));
   }

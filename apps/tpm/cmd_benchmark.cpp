@@ -13,6 +13,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
 #include "tpm/report/speed_record.hpp"
+#include "tpm/report/trajectory_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/writable.hpp"
@@ -40,7 +41,11 @@ int list_problems(const Session& session) {
       say("{:<18} {}\n", entry.name, entry.summary);
     }
   }
-  if (session.json()) say("{}", to_text(Json{{"problems", std::move(json)}}));
+  if (session.json()) {
+    say("{}", to_text(Json{{"problems", std::move(json)}, {"formulations", formulations_json()}}));
+  } else {
+    say("\nFormulations:\n{}", formulations_text());
+  }
   return 0;
 }
 
@@ -154,8 +159,10 @@ void add_benchmark_command(CLI::App& app, Session& session) {
   command->add_flag("--keep", choice->keep,
                     "Keep what the folder holds: run the problems that are missing there, or those "
                     "named; goes on from a run that was interrupted");
-  command->add_flag("--list", choice->list,
-                    "Name the problems (with --record the pieces of work) and do nothing");
+  command->add_flag(
+      "--list", choice->list,
+      "Name the problems and all formulations (with --record the pieces of work), and do "
+      "nothing");
   command->add_option("--record", choice->record,
                       "Instead: measure named pieces of work (all, or those given in place of "
                       "problems) by processor time, and append a row for each to this CSV file");

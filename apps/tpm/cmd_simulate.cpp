@@ -15,6 +15,7 @@
 #include "tpm/report/plan_report.hpp"
 #include "tpm/report/simulation_figures.hpp"
 #include "tpm/report/simulation_report.hpp"
+#include "tpm/report/trajectory_report.hpp"
 #include "tpm/simulate/recorder.hpp"
 #include "tpm/simulate/simulation_file.hpp"
 #include "tpm/simulate/vtkhdf.hpp"
@@ -33,6 +34,7 @@ struct SimulateChoice {
   bool vtkhdf = false;
   std::string checkpoint_every = "5 s";
   bool planned = false;
+  bool list = false;
   PlanChoice plan;
 };
 
@@ -125,10 +127,9 @@ void announce_files(const SimulateChoice& choice) {
   will_write_into(choice.figures, {"pictures.json", "figures.json"});
 }
 
-std::vector<Simulated> simulate_all(const SimulateChoice& choice) {
+std::vector<Simulated> simulate_all(const SimulateChoice& choice, ExperimentScene scene) {
   const double every_s = checkpoint_interval_s(choice);
   announce_files(choice);
-  ExperimentScene scene = read_experiment(choice.scene);
   will_update(
       {choice.output + ".checkpoint", mass_spring_file(choice.output).string() + ".checkpoint"});
   std::vector<Simulated> all;
@@ -169,8 +170,48 @@ std::vector<std::string> write_all(const SimulateChoice& choice,
   return files;
 }
 
+/// Runs a scene by a formulation that does not show whole states: the response, and displacements
+/// where they are known.
+int simulate_trajectory(const SimulateChoice& choice, const ExperimentScene& scene,
+                        const Session& session) {
+  if (choice.beside_mass_spring || choice.vtkhdf || !choice.figures.empty()) {
+    throw Error(
+        ExitCode::usage, "--figures, --vtkhdf or --beside-mass-spring",
+        fmt::format("with the formulation '{}'", scene.formulation.kind),
+        "a formulation that shows whole states: " +
+            formulations_that([](const Formulation& f) { return f.as<StateRunner>() != nullptr; }));
+  }
+  will_write({choice.output});
+  (void)Hdf5Writer(choice.output);  // can the result be written?
+  const std::vector<double> times = times_to_watch(scene);
+  const Trajectory answer = run_scene(scene, times, scene.formulation.entry().can().field);
+  write_scene_run(scene, times, answer, choice.output);
+  if (session.json()) {
+    Json json = scene_run_json(scene, times, answer);
+    json["files"] = {choice.output};
+    say("{}", to_text(json));
+    return 0;
+  }
+  say("{}wrote {}\n", scene_run_text(scene, times, answer), choice.output);
+  return 0;
+}
+
+int list_formulations(const Session& session) {
+  if (session.json()) {
+    say("{}", to_text(Json{{"formulations", formulations_json()}}));
+  } else {
+    say("{}", formulations_text());
+  }
+  return 0;
+}
+
 int simulate_and_report(const SimulateChoice& choice, const Session& session) {
-  const std::vector<Simulated> all = simulate_all(choice);
+  ExperimentScene scene = read_experiment(choice.scene);
+  require_runnable(scene);
+  if (scene.formulation.entry().as<StateRunner>() == nullptr) {
+    return simulate_trajectory(choice, scene, session);
+  }
+  const std::vector<Simulated> all = simulate_all(choice, std::move(scene));
   const std::vector<std::string> files = write_all(choice, all);
   if (session.json()) {
     Json json = simulation_json(all.front().scene, all.front().network, all.front().run);
@@ -201,7 +242,7 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
     return static_cast<int>(ExitCode::answer_is_no);
   }
   const std::vector<double> times = times_to_watch(scene);
-  const PlanTrajectory answer = run_planned(plan, scene, times);
+  const Trajectory answer = run_planned(plan, scene, times);
   write_planned_run(plan, scene, times, answer, choice.output);
   if (session.json()) {
     Json json = planned_run_json(plan, scene, times, answer);
@@ -216,6 +257,10 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
 /// Being stopped is not an error of the run: its line, and the exit code that shells expect.
 int run_command(const SimulateChoice& choice, const Session& session) {
   try {
+    if (choice.list) return list_formulations(session);
+    if (choice.scene.empty()) {
+      throw Error(ExitCode::usage, "SCENE", "is missing", "a JSON scene, or --list-formulations");
+    }
     if (choice.planned) return simulate_planned(choice, session);
     return simulate_and_report(choice, session);
   } catch (const Interrupted& stop) {
@@ -231,7 +276,7 @@ void add_simulate_command(CLI::App& app, Session& session) {
   CLI::App* command =
       app.add_subcommand("simulate", "Push or load an organ as a scene says; HDF5, XDMF, pictures");
   auto choice = std::make_shared<SimulateChoice>();
-  command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)")->required();
+  command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
   command->add_option("-o,--output", choice->output, "HDF5 file; an XDMF goes beside it")
       ->capture_default_str();
   command->add_option("--figures", choice->figures, "Folder for pictures (PNG, SVG)");
@@ -245,6 +290,8 @@ void add_simulate_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_flag("--plan", choice->planned,
                     "Run the least model that tpm plan finds, instead of the scene's formulation");
+  command->add_flag("--list-formulations", choice->list,
+                    "List what a scene's key 'formulation' can name, with what each can do");
   add_plan_options(*command, choice->plan);
   add_format_option(*command, session);
   command->footer(

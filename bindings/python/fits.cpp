@@ -4,6 +4,7 @@
 #include "binding.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/curve/recording_file.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/prediction.hpp"
 #include "tpm/fit/tables.hpp"
 #include "tpm/fit/verdict.hpp"

@@ -47,10 +47,10 @@ py::dict answer_of(const ExperimentScene& scene, const RunNetwork& network,
                   py::arg("output_s") = handed_over(std::move(output_times)),
                   py::arg("position_m") = positions_of(run, network));
   answer["depth_is_imposed"] = scene.protocol.drive() == Drive::displacement;
-  answer["formulation"] = std::string(word_of(scene.formulation.kind));
+  answer["formulation"] = scene.formulation.kind;
   answer["scene"] = scene.text;
   answer["error_estimate"] = run.record.error_estimate;
-  if (scene.formulation.inertial()) return answer;
+  if (scene.formulation.masses) return answer;
   answer["work_J"] = column([](const CurvePoint& p) { return p.energy.work_J; });
   answer["dissipated_J"] = column([](const CurvePoint& p) { return p.energy.dissipated_J; });
   answer["stored_J"] = column([](const CurvePoint& p) { return p.energy.stored_J; });

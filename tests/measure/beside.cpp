@@ -1,4 +1,5 @@
-// Prints the measured numbers of reports/haptics/2026-11-23.md, "The network beside the loop", as CSV:
+// Prints the measured numbers of reports/haptics/2026-11-23.md, "The network beside the loop", as
+// CSV:
 //     measure_beside SCENE STEPS SEED
 // The whole network in the loop at 1 kHz, and beside it (without a thread: its answer is used 5 ms
 // later), over random motions in space: how far the second is from the first, its own estimate, and

@@ -5,8 +5,8 @@
 //
 // KIND is shell (two layers) or solid; the far side, 60 mm deep, is held. Prints one line of JSON,
 // processor times in s. The file: int64 n, int64 entries; then int32 row and column and double
-// value of each entry of the lower triangle, free coordinates alone, by columns. It uses nothing
-// that earlier versions had not, so that the same source measures them.
+// value of each entry of the lower triangle, free coordinates alone, by columns. The same source
+// measures earlier versions, which factorised held spheres along.
 #include <fmt/format.h>
 #include <sys/resource.h>
 
@@ -24,6 +24,30 @@
 #include "tpm/network/liver.hpp"
 #include "tpm/network/liver_surface.hpp"
 #include "tpm/solve/lane_factor.hpp"
+#if __has_include("tpm/network/stiffness_blocks.hpp")
+#include "tpm/network/stiffness_blocks.hpp"
+#else
+namespace tpm {
+/// The whole stiffness matrix.
+class StiffnessBlocks {
+ public:
+  StiffnessBlocks(const BondSystem& bonds, const Freedom& freedom)
+      : bonds_(bonds), freedom_(freedom), matrix_(bonds.pattern()) {}
+  const BlockMatrix& assemble(const Positions& position, const BondMemory& memory) {
+    matrix_.set_zero();
+    bonds_.add_stiffness(position, memory, matrix_);
+    freedom_.constrain(bonds_, matrix_);
+    return matrix_;
+  }
+  [[nodiscard]] const BlockPattern& pattern() const { return bonds_.pattern(); }
+
+ private:
+  const BondSystem& bonds_;
+  const Freedom& freedom_;
+  BlockMatrix matrix_;
+};
+}  // namespace tpm
+#endif
 
 using namespace tpm;
 
@@ -60,8 +84,8 @@ Organ organ_of(const std::string& kind, std::size_t count) {
 }
 
 /// Free coordinates are numbered in the order of the spheres.
-void write_matrix(const BondSystem& bonds, const Freedom& freedom, const BlockMatrix& matrix,
-                  const char* path) {
+void write_matrix(const BondSystem& bonds, const Freedom& freedom, const Positions& rest,
+                  const BondMemory& memory, const char* path) {
   std::vector<std::int32_t> number(freedom.size(), -1);
   std::int32_t free = 0;
   for (std::size_t i = 0; i < freedom.size(); ++i) {
@@ -81,15 +105,17 @@ void write_matrix(const BondSystem& bonds, const Freedom& freedom, const BlockMa
       }
     }
   };
-  for (std::size_t i = 0; i < freedom.size(); ++i) {
-    if (number[i] >= 0) add(number[i], number[i], matrix.diagonal[i]);
-  }
+  std::vector<Eigen::Matrix3d> diagonal(freedom.size(), Eigen::Matrix3d::Zero());
   for (std::size_t i = 0; i < bonds.size(); ++i) {
+    const Eigen::Matrix3d block = bonds.stiffness_block(i, rest, memory);
+    diagonal[bonds.end_a()[i]] += block;
+    diagonal[bonds.end_b()[i]] += block;
     const std::int32_t a = number[bonds.end_a()[i]];
     const std::int32_t b = number[bonds.end_b()[i]];
-    if (a < 0 || b < 0) continue;
-    // A bond's block is symmetric.
-    add(std::max(a, b), std::min(a, b), matrix.below[bonds.place(i).index]);
+    if (a >= 0 && b >= 0) add(std::max(a, b), std::min(a, b), -block);
+  }
+  for (std::size_t i = 0; i < freedom.size(); ++i) {
+    if (number[i] >= 0) add(number[i], number[i], diagonal[i]);
   }
   std::sort(entries.begin(), entries.end(), [](const Entry& x, const Entry& y) {
     return x.column != y.column ? x.column < y.column : x.row < y.row;
@@ -120,17 +146,17 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
     freedom.hold(i);
   }
   (void)lap();
-  const BlockPattern& pattern = bonds.pattern();
+  StiffnessBlocks blocks(bonds, freedom);
+  const BlockPattern& pattern = blocks.pattern();
   const double order_s = lap();
   const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
-  BlockMatrix matrix(pattern);
   BlockLdlt factor(pattern);
   (void)lap();
-  matrix.set_zero();
-  bonds.add_stiffness(network.organ.position, memory, matrix);
-  freedom.constrain(bonds, matrix);
+  const BlockMatrix& matrix = blocks.assemble(network.organ.position, memory);
   const double assemble_s = lap();
-  if (matrix_file != nullptr) write_matrix(bonds, freedom, matrix, matrix_file);
+  if (matrix_file != nullptr) {
+    write_matrix(bonds, freedom, network.organ.position, memory, matrix_file);
+  }
   (void)lap();
   const bool done = factor.factorise(matrix);
   const double first_s = lap();  // with what the system takes to hand out memory

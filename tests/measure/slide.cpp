@@ -1,4 +1,5 @@
-// Prints the measured numbers of reports/haptics/2026-11-23.md, "Over the surface", of slides that follow it:
+// Prints the measured numbers of reports/haptics/2026-11-23.md, "Over the surface", of slides that
+// follow it:
 //     measure_slide SESSION
 // The slides of a session of the kind `surface` by the simulated device in virtual time, following
 // the surface and straight: how deep the ball was under where it would touch the organ at rest, and

@@ -56,7 +56,8 @@ class ServoCase {
         compared(motions(into)) {
     for (const double tau_s : taus_s) {
       const TpmParameters material = tissue.element().with_relaxation_time(tau_s);
-      bonds_.push_back(std::make_unique<BondSystem>(tissue.network, material, tissue.materials.lateral()));
+      bonds_.push_back(
+          std::make_unique<BondSystem>(tissue.network, material, tissue.materials.lateral()));
     }
   }
 

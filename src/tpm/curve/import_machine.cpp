@@ -56,11 +56,14 @@ const MachineColumn* find_column(const MachineHeader& header, ColumnRole role,
 
 /// What to add to the command line. The unit itself is for the user to say.
 std::string unit_option(const MachineColumn& column, Dimension dimension) {
+  const std::string name =
+      column.name.empty() ? std::to_string(column.index + 1) : printable(column.name);
+  if (dimension == Dimension::dimensionless) {
+    return fmt::format("--unit \"{0}=%\", or --unit \"{0}=-\" for a plain number", name);
+  }
   const std::string units = units_of(dimension);
-  return fmt::format(
-      "--unit \"{}=UNIT\" with a unit of {}{}{}",
-      column.name.empty() ? std::to_string(column.index + 1) : printable(column.name),
-      dimension_name(dimension), units.empty() ? "" : ": ", units);
+  return fmt::format("--unit \"{}=UNIT\" with a unit of {}{}{}", name, dimension_name(dimension),
+                     units.empty() ? "" : ": ", units);
 }
 
 Unit unit_of(const MachineColumn& column, Dimension dimension, const std::string& file) {
@@ -301,6 +304,10 @@ const MachineColumn* response_column(const MachineHeader& header, const MachineC
 /// at rest, a force a stress by its cross section. Says which option is missing.
 void resolve_specimen(Use& drive, Use& response, const std::string& file,
                       const ImportOptions& options) {
+  const auto unknown = [](const MachineColumn& column) {
+    return !column.unit.empty() && !is_unit(column.unit);
+  };
+  if (unknown(*drive.column) || unknown(*response.column)) return;  // refused when it is read
   const bool length = has_dimension(*drive.column, Dimension::length);
   const bool drawn = drive.quantity == Quantity::indentation_depth &&
                      (options.rest_length_m || response.quantity == Quantity::stress);

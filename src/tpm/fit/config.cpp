@@ -7,6 +7,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/fit/experiment_refit.hpp"
+#include "tpm/formulation/formulation.hpp"
 #include "tpm/law/law_model.hpp"
 #include "tpm/material/tpm_element.hpp"
 #include "tpm/scene/organ_model.hpp"
@@ -26,6 +27,8 @@ void require_plain_noise_under_loss(const FitConfig& config, const DocumentPlace
                     "either a loss, or a likelihood such as 'student_t'");
   }
 }
+
+constexpr std::string_view kOrganModel = "organ";
 
 BootstrapOptions parse_bootstrap(const Json& j, const FitConfig& config,
                                  const DocumentPlace& place) {
@@ -53,7 +56,15 @@ LawSpec parse_law(const Json& j, const DocumentPlace& place) {
 /// The organ of the scene that the document names, ready for experiments.
 void read_organ(const Json& document, FitConfig& config, const std::filesystem::path& folder,
                 const DocumentPlace& place) {
-  const bool wanted = config.model == "organ";
+  const bool wanted = config.model == kOrganModel;
+  if (!wanted && !config.law) {
+    const auto makes = [](const Formulation& f) { return f.as<ModelMaker>() != nullptr; };
+    const Formulation* found = find_formulation(config.model);
+    if (found == nullptr || !makes(*found)) {
+      refuse_formulation(config.model, "model", place.key("model").where,
+                         fmt::format("{}, {}", formulations_that(makes), kOrganModel));
+    }
+  }
   if (wanted != document.contains("scene")) {
     throw bad_input(place.key("scene").where, wanted ? "missing" : "without the model 'organ'",
                     "\"model\": \"organ\" and the scene that holds the organ, or neither");

@@ -136,10 +136,10 @@ class ProfileWalk {
              minimum_.natural};
     before_ = last_;
     const double rounding = kRounding * std::max(1.0, std::abs(last_.theta));
-    constexpr int kMostSteps = 400;
+    constexpr int kMostMoves = 400;
     for (int steps = 0; (bound - last_.theta) * direction > 0.0; ++steps) {
       if (step < rounding) return End{ProfileEnd::rounding, last_.theta};
-      if (steps == kMostSteps) return End{ProfileEnd::steps, last_.theta};
+      if (steps == kMostMoves) return End{ProfileEnd::steps, last_.theta};
       double next = last_.theta + direction * step;
       if ((bound - next) * direction < 1e-3 * step) next = bound;
       const Minimum m = constrained(next, true);

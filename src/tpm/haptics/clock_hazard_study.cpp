@@ -111,11 +111,11 @@ class SlowModel final : public ContactModel {
       : model_(std::move(model)), hazard_(hazard), moments_(std::move(moments)) {}
 
   void reset() noexcept override { model_->reset(); }
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override {
+  ContactAnswer step(const ToolPose& tool) noexcept override {
     if (++steps_ == hazard_.at && hazard_.kind == ClockFaultKind::model_hangs) {
       hang(*moments_, hazard_.lasts_s);
     }
-    return model_->step(displacement_m);
+    return model_->step(tool);
   }
   [[nodiscard]] double period_s() const noexcept override { return model_->period_s(); }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {

@@ -22,8 +22,8 @@ ElementContact::ElementContact(const TpmParameters& material, double period_s, E
   }
 }
 
-ContactAnswer ElementContact::step(const Eigen::Vector3d& displacement_m) noexcept {
-  const double depth = displacement_m.z();
+ContactAnswer ElementContact::step(const ToolPose& tool) noexcept {
+  const double depth = tool.displacement_m.z();
   const double scale = material_.modulus_to_stiffness_m();
   double force = scale * (material_.relaxed_modulus_Pa() * depth + tension_.value(depth));
   if (rule_ == ElementRule::mass_spring) {

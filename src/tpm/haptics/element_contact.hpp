@@ -22,7 +22,7 @@ class ElementContact final : public ContactModel {
                  ElementRule rule = ElementRule::exact, double dashpot_N_s_per_m = 0.0);
 
   void reset() noexcept override { depth_m_ = followed_m_ = 0.0; }
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
   [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override;

@@ -114,9 +114,9 @@ class DoubtfulModel final : public ContactModel {
     steps_ = 0;
     model_.reset();
   }
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override {
+  ContactAnswer step(const ToolPose& tool) noexcept override {
     constexpr double kWrong = 10.0;
-    ContactAnswer answer = model_.step(displacement_m);
+    ContactAnswer answer = model_.step(tool.displacement_m);
     if (steps_++ < at_) return answer;
     if (doubt_ == Doubt::not_finite) answer.force_N.setConstant(std::nan(""));
     const bool wrong = doubt_ == Doubt::for_good || doubt_ == Doubt::tenfold ||

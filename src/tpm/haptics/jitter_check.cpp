@@ -15,7 +15,7 @@ class EmptySpace final : public ContactModel {
  public:
   explicit EmptySpace(double period_s) : period_s_(period_s) {}
   void reset() noexcept override {}
-  ContactAnswer step(const Eigen::Vector3d&) noexcept override { return {}; }
+  ContactAnswer step(const ToolPose&) noexcept override { return {}; }
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return Eigen::Matrix3d::Identity();

@@ -62,8 +62,8 @@ void LawContact::take_over(double depth_m, double relaxed_kernel_m) noexcept {
   y_.setConstant(kernel_m_ - relaxed_kernel_m);
 }
 
-ContactAnswer LawContact::step(const Eigen::Vector3d& displacement_m) noexcept {
-  const double depth = displacement_m.z();
+ContactAnswer LawContact::step(const ToolPose& tool) noexcept {
+  const double depth = tool.displacement_m.z();
   const double u = std::max(depth, 0.0);
   const double kernel = law_.kernel.value(u);
   const double moved = kernel - kernel_m_;

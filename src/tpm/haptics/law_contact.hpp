@@ -36,7 +36,7 @@ class LawContact final : public ContactModel {
   LawContact(const LawFile& law, const LawContactSettings& settings);
 
   void reset() noexcept override;
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return settings_.period_s; }
   /// Of the session's deepest place, what relaxes within a period included: kernels that stiffen
   /// have less above it.

@@ -14,7 +14,6 @@
 #include "tpm/servo/triple_buffer.hpp"
 
 namespace tpm {
-namespace {
 
 /// The two ends of a step that the caller's loop holds: where the tool is, and the force on it.
 class CallersDevice final : public HapticDevice {
@@ -41,6 +40,8 @@ class CallersDevice final : public HapticDevice {
   Eigen::Vector3d position_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d force_N_ = Eigen::Vector3d::Zero();
 };
+
+namespace {
 
 /// A session around a law: as deep as the law was fitted to.
 Json session_around(const Json& law, const LoopContactOptions& options, const std::string& where) {

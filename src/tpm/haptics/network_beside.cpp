@@ -115,10 +115,10 @@ void NetworkBeside::work() noexcept {
   }
 }
 
-ContactAnswer NetworkBeside::step(const Eigen::Vector3d& displacement_m) noexcept {
+ContactAnswer NetworkBeside::step(const ToolPose& tool) noexcept {
   ++step_;
   const bool due = step_ % every_ == 0;
-  const Place place{run_, step_, displacement_m};
+  const Place place{run_, step_, tool.displacement_m};
   if (threads_) {
     if (due) places_.write(place);
     if (answers_.refresh() && answers_.latest().run == run_) used_ = answers_.latest();
@@ -126,12 +126,13 @@ ContactAnswer NetworkBeside::step(const Eigen::Vector3d& displacement_m) noexcep
     used_ = next_;
     next_ = follow(place);
   }
-  const Eigen::Vector3d moved = displacement_m - used_.displacement_m;
+  const Eigen::Vector3d moved = tool.displacement_m - used_.displacement_m;
   ContactAnswer answer;
   answer.force_N = used_.force_N - used_.stiffness * moved;
   // What relaxes and curves goes on as it did over the last step of the network; beside it, the
   // curvature along the way since.
-  const double curved_N = 0.5 * ((stiffness_.at(displacement_m) - used_.stiffness) * moved).norm();
+  const double curved_N =
+      0.5 * ((stiffness_.at(tool.displacement_m) - used_.stiffness) * moved).norm();
   answer.error_N =
       used_.error_N + curved_N + used_.unforeseen_N_per_s * static_cast<double>(age()) * period_s_;
   answer.trusted = used_.trusted && age() <= kOldest * every_;

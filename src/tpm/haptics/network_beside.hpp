@@ -42,7 +42,7 @@ class NetworkBeside final : public ContactModel {
   [[nodiscard]] static int periods_between(double period_s);
 
   void reset() noexcept override;
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return network_->instantaneous_stiffness();

@@ -7,8 +7,10 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/plan/plan.hpp"
+#include "tpm/plan/plan_model.hpp"
 
 namespace tpm {
 namespace {
@@ -139,6 +141,31 @@ LoopModel planned_model(const HilSession& session, const PlanningTold& told) {
   loop.model = std::move(models.front());
   if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
   return loop;
+}
+
+LoopModel offered_loop(const Formulation& formulation, const HilSession& session) {
+  const PushedScene pushed(session);
+  const ExperimentScene scene = scene_of(pushed, range_of(session, pushed.deepest_m));
+  const PlanScout scout(PlanScene(scene), {}, false);
+  PlanBudget budget;
+  budget.rate_Hz = 1.0 / session.servo.period_s;
+  std::string reason = "no candidate that a loop steps";
+  for (const auto& candidate : formulation.as<PlanOffer>()->candidates(scout.scene())) {
+    if (!candidate->for_loop()) continue;
+    if (const auto why = candidate->why_not(scout, budget)) {
+      reason = *why;
+      continue;
+    }
+    LoopModel loop = pushed.begun(candidate->name(), "seen from");
+    loop.error_bound = "not verified beforehand; what tpm hil verify measures";
+    auto models = candidate->contacts(scout, std::array{session.servo.period_s, kDrawnEvery_s});
+    loop.model = std::move(models.front());
+    if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
+    return loop;
+  }
+  throw bad_input(session.scene_place,
+                  fmt::format("the model '{}' has no answer: {}", formulation.name(), reason),
+                  fmt::format("one of {}, {}", kPlannedModel, formulations_that(for_sessions)));
 }
 
 }  // namespace tpm

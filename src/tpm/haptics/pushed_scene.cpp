@@ -34,10 +34,7 @@ TissueShape shape_of(const Network& network, std::size_t contact, const Eigen::V
 PushedScene::PushedScene(const HilSession& session)
     : tissue(parse_tissue(session.scene, session.scene_place, {})), deepest_m(deepest_of(session)) {
   require_standing(tissue, session.scene_place);
-  probe = parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue,
-                         DocumentPlace{session.scene_place})
-              .front()
-              .probe;
+  probe = usual_contact(tissue, DocumentPlace{session.scene_place}).probe;
 }
 
 LoopModel PushedScene::begun(std::string_view kind, std::string_view how) const {

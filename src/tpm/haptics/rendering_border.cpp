@@ -43,7 +43,7 @@ double damping_at(const RenderedContact& contact, int cycles) {
       moved2 += (at - before_m) * (at - before_m);
     }
     const std::size_t slot = static_cast<std::size_t>(i) % sent.size();
-    sent[slot] = model.step({0.0, 0.0, at}).force_N.z();
+    sent[slot] = model.step(Eigen::Vector3d(0.0, 0.0, at)).force_N.z();
     if (!(std::abs(sent[slot]) < 1e6)) return kInfinite;
     held_N = sent[(static_cast<std::size_t>(i) + 1) % sent.size()];
     before_m = at;

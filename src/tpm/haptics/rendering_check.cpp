@@ -121,13 +121,14 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
 
 RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
                                const LoopModel& loop, const DeviceLimits& limits) {
-  const bool hardware = limits.hardware();
+  // The simulated Omega.7 is what the session says; a plugin speaks for itself, simulated or not.
+  const bool own = limits.hardware() || limits.simulated;
   RenderingCheck check;
   check.rate_Hz = 1.0 / session.servo.period_s;
-  check.delay_periods = hardware ? limits.delay_periods : session.plant.delay_periods;
-  check.friction_N_s_per_m = hardware ? limits.friction_N_s_per_m : session.plant.damping_N_s_per_m;
+  check.delay_periods = own ? limits.delay_periods : session.plant.delay_periods;
+  check.friction_N_s_per_m = own ? limits.friction_N_s_per_m : session.plant.damping_N_s_per_m;
   check.largest_N_per_m = limits.stiffness_N_per_m;
-  check.encoder_step_m = hardware ? limits.encoder_step_m : session.plant.encoder_step_m;
+  check.encoder_step_m = own ? limits.encoder_step_m : session.plant.encoder_step_m;
   check.rise_N = session.servo.slew_limit_N_per_s * session.servo.period_s;
   find_stiffness(check, session, model, loop.push);
 

@@ -9,6 +9,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/device/device_limits.hpp"
+#include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/session_phases.hpp"
 #include "tpm/haptics/surface_scene.hpp"
 #include "tpm/plan/plan.hpp"
@@ -60,7 +61,7 @@ Eigen::Vector3d slide_of(const Json& slides, const Eigen::Vector3d& push,
 
 void parse_tool(HilSession& session, const Json& model, const DocumentPlace& place) {
   for (const char* key : {"tool_radius", "contact_stiffness"}) {
-    if (!model.contains(key) || session.model == LoopModelKind::surface) continue;
+    if (!model.contains(key) || session.model == "surface") continue;
     throw bad_input(place.key(key).where, printable(model.at(key).get<std::string>()),
                     "none but with the kind 'surface'");
   }
@@ -196,20 +197,19 @@ void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& p
   plant.arm.correction_per_s = block.value("correction_per_s", plant.arm.correction_per_s);
 }
 
-LoopModelKind parse_model(const std::string& kind) {
-  if (kind == "element") return LoopModelKind::element;
-  if (kind == "network") return LoopModelKind::network;
-  if (kind == "network_beside") return LoopModelKind::network_beside;
-  if (kind == "surface") return LoopModelKind::surface;
-  if (kind == "condensed") return LoopModelKind::condensed;
-  if (kind == "law") return LoopModelKind::law;
-  return LoopModelKind::planned;
+std::string parse_model(const Json& model, const DocumentPlace& place) {
+  const std::string kind = model.value("kind", std::string(kPlannedModel));
+  if (kind == kPlannedModel) return kind;
+  const Formulation* formulation = find_formulation(kind);
+  if (formulation != nullptr && for_sessions(*formulation)) return std::string(formulation->name());
+  refuse_formulation(kind, "model", place.key("kind").where,
+                     fmt::format("{}, {}", kPlannedModel, formulations_that(for_sessions)));
 }
 
 /// The scene, or the law, from the block or from a file that it names.
 void parse_tissue_of(HilSession& session, const Json& model, const DocumentPlace& place,
                      const std::filesystem::path& folder) {
-  const bool by_law = session.model == LoopModelKind::law;
+  const bool by_law = session.model == "law";
   const char* key = by_law ? "law" : "scene";
   const char* other = by_law ? "scene" : "law";
   const DocumentPlace at = place.key(key);
@@ -236,10 +236,10 @@ void parse_tissue_of(HilSession& session, const Json& model, const DocumentPlace
   }
 }
 
-std::string parse_tolerance(const Json& model, LoopModelKind kind, const DocumentPlace& place) {
+std::string parse_tolerance(const Json& model, std::string_view kind, const DocumentPlace& place) {
   std::string text = model.value("tolerance", std::string("1%"));
   const DocumentPlace at = place.key("tolerance");
-  if (model.contains("tolerance") && kind != LoopModelKind::planned) {
+  if (model.contains("tolerance") && kind != kPlannedModel) {
     throw bad_input(at.where, printable(text), "none but with the kind 'planned'");
   }
   try {
@@ -328,7 +328,7 @@ HilSession parse_session(const Json& json, std::string_view where,
   const DeviceLimits& device = limits_of("omega7");  // the simulated one has the same
   HilSession session;
   session.title = json.value("title", std::string("session"));
-  session.model = parse_model(json.at("model").value("kind", std::string("planned")));
+  session.model = parse_model(json.at("model"), place.key("model"));
   session.tolerance = parse_tolerance(json.at("model"), session.model, place.key("model"));
   parse_tool(session, json.at("model"), place.key("model"));
   parse_tissue_of(session, json.at("model"), place.key("model"), folder);
@@ -346,7 +346,7 @@ HilSession parse_session(const Json& json, std::string_view where,
   session.servo.push = push_of(json, place);
   if (json.contains("slides")) {
     const DocumentPlace slides = place.key("slides");
-    if (session.model != LoopModelKind::surface) {
+    if (session.model != "surface") {
       throw bad_input(slides.where, "the model does not follow a tool across its push",
                       "\"model\": {\"kind\": \"surface\", ...}");
     }

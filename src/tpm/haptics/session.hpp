@@ -48,21 +48,14 @@ struct SessionPhase {
   std::vector<double> surface_m = {};
 };
 
-/// What is stepped in the loop.
-enum class LoopModelKind {
-  element,         ///< the paper's star
-  condensed,       ///< a network seen from its contact sphere, reduced
-  network,         ///< the whole network, every period
-  network_beside,  ///< the whole network at a lower rate beside the loop
-  surface,         ///< the whole network under a ball that moves over it, every period
-  law,             ///< one contact that answers by a law of the family, no organ
-  planned,         ///< the cheapest of those that a plan finds accurate enough
-};
+/// The word of a session whose model a plan picks; all others name a formulation.
+inline constexpr std::string_view kPlannedModel = "planned";
 
 /// A session as its file says.
 struct HilSession {
   std::string title;
-  LoopModelKind model = LoopModelKind::planned;
+  /// What is stepped in the loop: a formulation for_sessions(), or kPlannedModel.
+  std::string model = std::string(kPlannedModel);
   double tool_radius_m = 0.010;                      ///< of the model `surface`, of its ball
   double contact_stiffness_N_per_m = 1e4;            ///< the same, of ball and sphere
   Eigen::Vector3d slide = Eigen::Vector3d::UnitX();  ///< unit vector, square to the push, device

@@ -80,7 +80,7 @@ void follow_surface(HilSession& session) {
   for (const SessionPhase& phase : session.phases) {
     way_m = std::max({way_m, phase.across_from_m, phase.across_to_m});
   }
-  if (session.model != LoopModelKind::surface || !(way_m > 0.0)) return;
+  if (session.model != "surface" || !(way_m > 0.0)) return;
   const SurfaceScene surface(session);
   const SurfaceAlong along(surface, surface.to_model * session.slide, way_m);
   for (SessionPhase& phase : session.phases) {

@@ -142,8 +142,8 @@ void leave_out_what_has_no_reference(Verification& v) {
 }
 
 Verification verify(const HilRecording& recording, const VerifyOptions& options) {
-  if (recording.session.model == LoopModelKind::law) return verify_law(recording, options);
-  if (recording.session.model == LoopModelKind::surface) return verify_in_space(recording, options);
+  if (recording.session.model == "law") return verify_law(recording, options);
+  if (recording.session.model == "surface") return verify_in_space(recording, options);
   return verify_along_push(recording, options);
 }
 

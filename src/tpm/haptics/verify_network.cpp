@@ -209,10 +209,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   const RowList rows = moved_rows(recording);
   const Motion motion = motion_of(recording, rows);
   const Tissue tissue = parse_tissue(recording.session.scene, recording.name, {});
-  const Probe probe =
-      parse_contacts(Json::array({{{"kind", "sphere"}}}), tissue, DocumentPlace{recording.name})
-          .front()
-          .probe;
+  const Probe probe = usual_contact(tissue, DocumentPlace{recording.name}).probe;
   const BondSystem bonds = tissue.bonds();
   QuasiStaticOptions settings;
   settings.tolerance = options.tolerance;
@@ -239,7 +236,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   compare_phases(v, recording, rows, compared, v.reference_N);
   ask(v, "the second opinion by CVODE",
       [&] { ask_cvode(v, recording, driven, protocol, options); });
-  if (recording.session.model == LoopModelKind::element) {
+  if (recording.session.model == "element") {
     ask_others(v, recording, motion, protocol, rows, tissue.element("hil verify"), options);
   }
   v.motion_error_N = options.motion_tolerance_m *

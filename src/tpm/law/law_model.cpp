@@ -307,6 +307,15 @@ KernelAtParameters kernel_at(const LawSpec& spec, const std::vector<LawParameter
                       place.tension_share < 0 ? std::nullopt : std::optional(share), spacing)};
 }
 
+bool has_stiffness(const std::vector<LawParameter>& table, std::span<const double> values) {
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const Dimension dimension = table[i].dimension;
+    const bool stiffness = dimension == Dimension::stiffness || dimension == Dimension::stress;
+    if (stiffness && !table[i].nuisance && values[i] > 0.0) return true;
+  }
+  return false;
+}
+
 /// A step of the depth or of the load on a law with spring-pots: G(t) V(u) and V(u) = J(t) F,
 /// exact at any time after the step. Nothing for other laws and histories, for elastic tension, for
 /// a depth on a curved kernel (its slope by the contact depth has no closed form there), at the
@@ -326,6 +335,9 @@ std::optional<Response> respond_to_step(const LawSpec& spec, const std::vector<L
   if (!std::all_of(times_s.begin(), times_s.end(),
                    [start](double t) { return t > start && std::isfinite(t); })) {
     return std::nullopt;
+  }
+  if (!depth && !has_stiffness(table, parameters)) {
+    throw Error(ExitCode::numerical, "law", "nothing carries the load");
   }
   const KernelAtParameters at = kernel_at(spec, table, parameters);
   const double step = *value - (depth ? at.contact : at.offset);

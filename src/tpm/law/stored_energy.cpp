@@ -1,5 +1,7 @@
 #include "tpm/law/stored_energy.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 
@@ -52,7 +54,7 @@ StoredEnergy::StoredEnergy(const LawFile& law)
                     "branches in parallel");
   }
   for (int i = 1; i <= spec_.branches; ++i) {
-    relaxing_ += value_or(law, "k" + std::to_string(i), 0.0);
+    relaxing_ += value_or(law, fmt::format("k{}", i), 0.0);
   }
 }
 

@@ -28,12 +28,13 @@ struct FreeIda {
 
 /// What the callbacks of an integrator reach.
 struct Side {
-  StepSystem& system;
+  NewtonSystem& system;
   long most_rates;
   MethodEnd last = MethodEnd::completed;  ///< the latest failure of the problem itself
   double at_s = 0.0;                      ///< its time
   bool exhausted = false;
-  double gamma = 0.0;  ///< of IDA's matrix with masses
+  double gamma = 0.0;                ///< of IDA's matrix with masses
+  BalanceSystem* balance = nullptr;  ///< what IDA solves without masses
 
   /// 0, or what SUNDIALS takes for "try a shorter step" or "stop".
   int answer(MethodEnd end, double time_s) {
@@ -83,7 +84,7 @@ SUNLinearSolver_Type method_solver_type(SUNLinearSolver) {
 int method_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
   auto solution = view(x);
   solution = view(b);
-  static_cast<StepSystem*>(solver->content)->solve(solution);
+  static_cast<NewtonSystem*>(solver->content)->solve(solution);
   return 0;
 }
 
@@ -127,7 +128,7 @@ sundials::LinearSolver custom_solver(SUNContext context, void* content,
 
 class CvodeRule final : public AdaptiveRule {
  public:
-  CvodeRule(StepSystem& system, const MethodSettings& settings)
+  CvodeRule(NewtonSystem& system, const MethodSettings& settings)
       : side_{system, settings.most_rates},
         context_(sundials::make_context()),
         state_(N_VNew_Serial(system.size(), context_.get())),
@@ -200,15 +201,14 @@ extern "C" {
 int dae_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
   auto solution = view(x);
   solution = view(b);
-  StepSystem& system = side(solver->content).system;
-  if (system.coordinates() > 0) {
+  BalanceSystem* balance = side(solver->content).balance;
+  if (balance == nullptr) {
     solution *= side(solver->content).gamma;
-    system.solve(solution);
+    side(solver->content).system.solve(solution);
   } else {
-    const Eigen::Index n = system.places();
-    auto place = solution.head(n);
-    auto y = solution.tail(system.remembered());
-    system.solve_pair(place, y);
+    auto place = solution.head(balance->places());
+    auto y = solution.tail(balance->remembered());
+    balance->solve_pair(place, y);
   }
   return 0;
 }
@@ -217,9 +217,11 @@ int dae_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunreal
 /// The unknowns are (x, v, y) with masses, and (positions, y) without.
 class IdaRule final : public AdaptiveRule {
  public:
-  IdaRule(StepSystem& system, const MethodSettings& settings)
-      : side_{system, settings.most_rates},
-        places_(system.coordinates() > 0 ? 0 : system.places()),
+  IdaRule(NewtonSystem& system, const MethodSettings& settings)
+      : side_{.system = system,
+              .most_rates = settings.most_rates,
+              .balance = role_of<BalanceSystem>(system)},
+        places_(side_.balance != nullptr ? side_.balance->places() : 0),
         context_(sundials::make_context()),
         state_(N_VNew_Serial(places_ + system.size(), context_.get())),
         rate_(N_VClone(state_.get())),
@@ -243,7 +245,7 @@ class IdaRule final : public AdaptiveRule {
   }
 
   MethodEnd restart(double time_s, double stop_s, const Vector& state) override {
-    StepSystem& system = side_.system;
+    NewtonSystem& system = side_.system;
     before_ += steps_of_piece();
     started_ = true;
     auto z = view(state_.get());
@@ -253,7 +255,7 @@ class IdaRule final : public AdaptiveRule {
     z.tail(state.size()) = state;
     z_dot.tail(state.size()) = rate;
     if (places_ > 0) {
-      z.head(places_) = system.placed();
+      z.head(places_) = side_.balance->placed();
       Vector moving;
       if (const auto end = place_rate(time_s, stop_s, state, rate, moving);
           end != MethodEnd::completed) {
@@ -288,15 +290,16 @@ class IdaRule final : public AdaptiveRule {
   /// The rate of the positions along the solution, from two balances close to each other.
   MethodEnd place_rate(double time_s, double stop_s, const Vector& state, const Vector& rate,
                        Vector& moving) {
-    StepSystem& system = side_.system;
-    const StepSystem::Place here = system.place();
+    NewtonSystem& system = side_.system;
+    BalanceSystem& balance = *side_.balance;
+    const BalanceSystem::Place here = balance.place();
     const double apart = 1e-4 * std::min(stop_s - time_s, system.relaxation_time_s());
-    const Vector from = system.placed();
+    const Vector from = balance.placed();
     Vector there = state + apart * rate;
     Vector unused(state.size());
     const MethodEnd end = system.rate(time_s + apart, there, unused);
-    moving = (system.placed() - from) / apart;
-    system.set_place(here);
+    moving = (balance.placed() - from) / apart;
+    balance.set_place(here);
     return end;
   }
 
@@ -327,18 +330,19 @@ class IdaRule final : public AdaptiveRule {
 
 extern "C" {
 int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* user_data) {
-  StepSystem& system = side(user_data).system;
+  NewtonSystem& system = side(user_data).system;
+  BalanceSystem* balance = side(user_data).balance;
   auto left = view(r);
   MethodEnd end = MethodEnd::completed;
-  if (system.coordinates() > 0) {
+  if (balance == nullptr) {
     end = system.rate(t, view(z), left);
     left = view(z_dot) - left;
   } else {
-    const Eigen::Index n = system.places();
+    const Eigen::Index n = balance->places();
     const Eigen::Index m = system.remembered();
     Vector elongation;
     auto imbalance = left.head(n);
-    system.imbalance(t, view(z).head(n), view(z).tail(m), imbalance, elongation);
+    balance->imbalance(t, view(z).head(n), view(z).tail(m), imbalance, elongation);
     left.tail(m) =
         view(z_dot).tail(m) - (elongation - view(z).tail(m)) / system.relaxation_time_s();
   }
@@ -348,14 +352,14 @@ int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* us
 
 int dae_setup(sunrealtype t, sunrealtype c, N_Vector z, N_Vector, N_Vector, SUNMatrix,
               void* user_data, N_Vector, N_Vector, N_Vector) {
-  StepSystem& system = side(user_data).system;
-  if (system.coordinates() > 0) {
+  NewtonSystem& system = side(user_data).system;
+  BalanceSystem* balance = side(user_data).balance;
+  if (balance == nullptr) {
     side(user_data).gamma = 1.0 / c;
     return side(user_data).answer(system.factorise(t, view(z), 1.0 / c), t);
   }
-  const Eigen::Index n = system.places();
-  const MethodEnd end =
-      system.factorise_pair(t, view(z).head(n), view(z).tail(system.remembered()), c);
+  const MethodEnd end = balance->factorise_pair(t, view(z).head(balance->places()),
+                                                view(z).tail(system.remembered()), c);
   return side(user_data).answer(end, t);
 }
 }
@@ -363,12 +367,14 @@ int dae_setup(sunrealtype t, sunrealtype c, N_Vector z, N_Vector, N_Vector, SUNM
 }  // namespace
 
 std::unique_ptr<AdaptiveRule> adaptive_rule(StepSystem& system, const MethodSettings& settings) {
+  auto* newton = role_of<NewtonSystem>(system);
+  if (newton == nullptr) return nullptr;
   switch (settings.rule) {
     case StepRule::cvode_adams:
     case StepRule::cvode_bdf:
-      return std::make_unique<CvodeRule>(system, settings);
+      return std::make_unique<CvodeRule>(*newton, settings);
     case StepRule::ida:
-      return std::make_unique<IdaRule>(system, settings);
+      return std::make_unique<IdaRule>(*newton, settings);
     default:
       return nullptr;
   }

@@ -40,7 +40,10 @@ struct Drawn {
   double stiffness = 0.0, to = 0.0;
 };
 
-class ElementSystem final : public StepSystem {
+class ElementSystem final : public StageSystem,
+                            public ProjectionSystem,
+                            public NewtonSystem,
+                            public BalanceSystem {
  public:
   ElementSystem(const TpmParameters& p, const Protocol& protocol,
                 const std::optional<MethodMasses>& mass)
@@ -216,7 +219,7 @@ class ElementSystem final : public StepSystem {
     x[2] = (x[2] + ratio * u) / (1.0 + ratio);
   }
 
-  [[nodiscard]] Eigen::Index places() const override { return moves_ || depth_driven_ ? 0 : 1; }
+  [[nodiscard]] Eigen::Index places() const override { return depth_driven_ ? 0 : 1; }
   [[nodiscard]] Vector placed() const override { return Vector::Constant(places(), e_); }
 
   void imbalance(double t, const ConstVector& place, const ConstVector& y,

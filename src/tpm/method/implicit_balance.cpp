@@ -21,7 +21,7 @@ ImplicitBalance::ImplicitBalance(const BondSystem& bonds, const Freedom& freedom
       work_(work),
       matrix_(bonds.pattern()),
       factor_(bonds.pattern()),
-      kept_{KeptFactor{BlockLdlt(bonds.pattern())}, KeptFactor{BlockLdlt(bonds.pattern())}} {
+      kept_{KeptFactor(bonds.pattern()), KeptFactor(bonds.pattern())} {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.spheres()));
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const double k = bonds.stiffness()[static_cast<Eigen::Index>(i)];

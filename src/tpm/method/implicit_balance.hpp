@@ -37,6 +37,7 @@ class ImplicitBalance {
  private:
   /// A factor for balances in which bonds follow alike and anchors are as stiff.
   struct KeptFactor {
+    explicit KeptFactor(const BlockPattern& pattern) : factor(pattern) {}
     BlockLdlt factor;
     Following following;
     double anchored = 0.0;

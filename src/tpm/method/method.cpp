@@ -73,7 +73,7 @@ class MethodDriver {
 
   MethodRun go() {
     time_s_ = knots_.front().time_s;
-    const MethodEnd end = cross_all();
+    const MethodEnd end = applies() ? cross_all() : MethodEnd::not_applicable;
     run_.end = end;
     run_.end_time_s = time_s_;
     run_.work = system_.work();
@@ -87,6 +87,8 @@ class MethodDriver {
   }
 
  protected:
+  /// The system has what the rule needs.
+  [[nodiscard]] virtual bool applies() const = 0;
   [[nodiscard]] virtual MethodEnd jump() = 0;
   /// Crosses a piece and answers what is asked for before its end.
   [[nodiscard]] virtual MethodEnd cross(const Knot& from, const Knot& to) = 0;
@@ -176,10 +178,13 @@ class FixedDriver final : public MethodDriver {
  public:
   FixedDriver(StepSystem& system, const Protocol& protocol, const MethodSettings& settings,
               std::span<const double> times_s)
-      : MethodDriver(system, protocol, settings, times_s), rule_(fixed_rule(settings)) {}
+      : MethodDriver(system, protocol, settings, times_s),
+        rule_(fixed_rule(system, settings)),
+        balance_(role_of<BalanceSystem>(system)) {}
+  [[nodiscard]] bool applies() const override { return rule_ != nullptr; }
 
  private:
-  MethodEnd jump() override { return rule_->jump(system_, time_s_, state_); }
+  MethodEnd jump() override { return rule_->jump(time_s_, state_); }
 
   MethodEnd cross(const Knot& from, const Knot& to) override {
     const double length = to.time_s - from.time_s;
@@ -197,7 +202,7 @@ class FixedDriver final : public MethodDriver {
       const double until = i + 1 == steps ? to.time_s : at_step(i + 1);
       if (const auto end = answer_before(until, h); end != MethodEnd::completed) return end;
       if (all_answered()) return MethodEnd::completed;
-      if (const auto end = rule_->step(system_, time_s_, h, state_); end != MethodEnd::completed) {
+      if (const auto end = rule_->step(time_s_, h, state_); end != MethodEnd::completed) {
         return cause(end, state_);
       }
       ++steps_;
@@ -220,15 +225,14 @@ class FixedDriver final : public MethodDriver {
         continue;
       }
       Vector there = state_;
-      const StepSystem::Place place = system_.place();
-      if (const auto end = rule_->step(system_, time_s_, part, there);
-          end != MethodEnd::completed) {
+      const auto place = balance_ != nullptr ? balance_->place() : BalanceSystem::Place{};
+      if (const auto end = rule_->step(time_s_, part, there); end != MethodEnd::completed) {
         return cause(end, there);
       }
       ++steps_;
       if (const auto end = judge(there); end != MethodEnd::completed) return end;
       if (const auto end = answer(time_s_ + part, there); end != MethodEnd::completed) return end;
-      system_.set_place(place);
+      if (balance_ != nullptr) balance_->set_place(place);
     }
     return MethodEnd::completed;
   }
@@ -236,6 +240,7 @@ class FixedDriver final : public MethodDriver {
   [[nodiscard]] long steps() const override { return steps_; }
 
   std::unique_ptr<FixedRule> rule_;
+  BalanceSystem* balance_;  ///< of a system without masses
   long steps_ = 0;
 };
 
@@ -244,6 +249,7 @@ class AdaptiveDriver final : public MethodDriver {
   AdaptiveDriver(StepSystem& system, const Protocol& protocol, const MethodSettings& settings,
                  std::span<const double> times_s)
       : MethodDriver(system, protocol, settings, times_s), rule_(adaptive_rule(system, settings)) {}
+  [[nodiscard]] bool applies() const override { return rule_ != nullptr; }
 
  private:
   MethodEnd jump() override { return system_.jump(system_.imposed(time_s_), state_); }
@@ -277,7 +283,7 @@ class AdaptiveDriver final : public MethodDriver {
     return judge(state_);
   }
 
-  [[nodiscard]] long steps() const override { return rule_->steps(); }
+  [[nodiscard]] long steps() const override { return rule_ ? rule_->steps() : 0; }
   [[nodiscard]] std::string detail() const override { return flag_; }
 
   std::unique_ptr<AdaptiveRule> rule_;

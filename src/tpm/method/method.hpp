@@ -35,21 +35,30 @@ struct StepRuleEntry {
   std::string_view text;  ///< its word in files, options and charts
   int order;              ///< nominal, for smooth problems; 0: the rule chooses its order itself
   bool adaptive;          ///< steps are chosen by a tolerance, not given
+  std::string_view words;
 };
 
 inline constexpr std::array<StepRuleEntry, 12> kStepRules{{
-    {StepRule::forward_euler, "forward_euler", 1, false},
-    {StepRule::semi_implicit_euler, "semi_implicit_euler", 1, false},
-    {StepRule::rk4, "rk4", 4, false},
-    {StepRule::backward_euler, "backward_euler", 1, false},
-    {StepRule::implicit_midpoint, "implicit_midpoint", 2, false},
-    {StepRule::newmark, "newmark", 2, false},
-    {StepRule::tr_bdf2, "tr_bdf2", 2, false},
-    {StepRule::exponential, "exponential", 2, false},
-    {StepRule::xpbd, "xpbd", 1, false},
-    {StepRule::cvode_adams, "cvode_adams", 0, true},
-    {StepRule::cvode_bdf, "cvode_bdf", 0, true},
-    {StepRule::ida, "ida", 0, true},
+    {StepRule::forward_euler, "forward_euler", 1, false, "explicit Euler, order 1"},
+    {StepRule::semi_implicit_euler, "semi_implicit_euler", 1, false,
+     "velocities by the forces at the start, positions by the new velocities, order 1"},
+    {StepRule::rk4, "rk4", 4, false, "the classical Runge-Kutta rule, order 4"},
+    {StepRule::backward_euler, "backward_euler", 1, false,
+     "implicit Euler, order 1, strongly damping"},
+    {StepRule::implicit_midpoint, "implicit_midpoint", 2, false,
+     "implicit midpoint rule, order 2, conserves quadratic energies"},
+    {StepRule::newmark, "newmark", 2, false, "average acceleration (beta 1/4, gamma 1/2), order 2"},
+    {StepRule::tr_bdf2, "tr_bdf2", 2, false,
+     "trapezoidal rule and BDF2 in one step, order 2, strongly damping"},
+    {StepRule::exponential, "exponential", 2, false,
+     "viscous elongations exact for linear motion within a step, positions by the trapezoidal "
+     "rule"},
+    {StepRule::xpbd, "xpbd", 1, false, "position-based dynamics with compliance, order 1"},
+    {StepRule::cvode_adams, "cvode_adams", 0, true, "CVODE, Adams formulae, steps by a tolerance"},
+    {StepRule::cvode_bdf, "cvode_bdf", 0, true,
+     "CVODE, backward differentiation formulae, steps by a tolerance"},
+    {StepRule::ida, "ida", 0, true,
+     "IDA, balance of forces as a differential-algebraic equation, steps by a tolerance"},
 }};
 
 /// Its word in kStepRules.

@@ -18,7 +18,7 @@ using Spheres = Eigen::Map<Eigen::Matrix3Xd>;
 using ConstSpheres = Eigen::Map<const Eigen::Matrix3Xd>;
 
 /// What networks with and without masses have in common.
-class NetworkSystem : public StepSystem {
+class NetworkSystem : public StageSystem, public ProjectionSystem, public NewtonSystem {
  public:
   NetworkSystem(const DrivenNetwork& network, const Protocol& protocol)
       : bonds_(network.bonds),
@@ -139,7 +139,7 @@ class NetworkSystem : public StepSystem {
 };
 
 /// Without masses: forces balance at each instant.
-class RestingNetwork final : public NetworkSystem {
+class RestingNetwork final : public NetworkSystem, public BalanceSystem {
  public:
   using NetworkSystem::NetworkSystem;
 
@@ -453,17 +453,6 @@ class MovingNetwork final : public NetworkSystem {
     ++work().solves;
     equation_.solve(x);
   }
-
-  [[nodiscard]] Eigen::Index places() const override { return 0; }
-  [[nodiscard]] Vector placed() const override { return {}; }
-  void imbalance(double, const ConstVector&, const ConstVector&, Eigen::Ref<Vector>,
-                 Vector&) override {}
-  MethodEnd factorise_pair(double, const ConstVector&, const ConstVector&, double) override {
-    return MethodEnd::not_applicable;
-  }
-  void solve_pair(Eigen::Ref<Vector>, Eigen::Ref<Vector>) override {}
-  [[nodiscard]] Place place() const override { return {}; }
-  void set_place(const Place&) override {}
 
  private:
   /// position_ of the displacements with which a vector begins.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "tpm/solve/relaxation_filter.hpp"
 
@@ -20,25 +21,53 @@ void StepSystem::set_piece(const Knot& from, const Knot& to) {
   slope_ = (to.value - from.value) / (to.time_s - from.time_s);
 }
 
-MethodEnd FixedRule::jump(StepSystem& system, double time_s, Eigen::VectorXd& state) {
-  return system.jump(system.imposed(time_s), state);
-}
-
 namespace {
 
 using Vector = Eigen::VectorXd;
 
+/// A rule on a system in the roles that it needs.
+template <class... Roles>
+class RuleOn : public FixedRule {
+ public:
+  explicit RuleOn(Roles&... roles) : roles_(roles...) {}
+  MethodEnd jump(double time_s, Vector& state) override {
+    StepSystem& system = std::get<0>(roles_);
+    return system.jump(system.imposed(time_s), state);
+  }
+
+ protected:
+  template <class Role>
+  [[nodiscard]] Role& as() const {
+    return std::get<Role&>(roles_);
+  }
+
+ private:
+  std::tuple<Roles&...> roles_;
+};
+using RateRule = RuleOn<RateSystem>;
+using StageRule = RuleOn<StageSystem>;
+using RateStageRule = RuleOn<RateSystem, StageSystem>;
+
+/// The rule on a system that has all roles; else none.
+template <class Rule, class... Roles>
+std::unique_ptr<FixedRule> rule_on(Roles*... roles) {
+  if (((roles == nullptr) || ...)) return nullptr;
+  return std::make_unique<Rule>(*roles...);
+}
+
 /// z = known + c rate(t, z).
-MethodEnd solve_stage(StepSystem& system, double time_s, Vector known, double c, Vector& state) {
+MethodEnd solve_stage(StageSystem& system, double time_s, Vector known, double c, Vector& state) {
   return system.stage(
       time_s,
       ImplicitStage::of(std::move(known), c, system.remembered(), system.relaxation_time_s()),
       state);
 }
 
-class ForwardEuler final : public FixedRule {
+class ForwardEuler final : public RateRule {
  public:
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
+  using RuleOn::RuleOn;
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    auto& system = as<RateSystem>();
     rate_.resize(state.size());
     if (const MethodEnd end = system.rate(time_s, state, rate_); end != MethodEnd::completed)
       return end;
@@ -53,9 +82,11 @@ class ForwardEuler final : public FixedRule {
 /// With masses velocities first, by the forces where the step begins and the drag where it ends,
 /// then positions by the new velocities. What bonds remember follows at last, towards the new
 /// elongations; without masses positions balance with what was remembered before.
-class SemiImplicitEuler final : public FixedRule {
+class SemiImplicitEuler final : public RateRule {
  public:
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
+  using RuleOn::RuleOn;
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    auto& system = as<RateSystem>();
     const Eigen::Index n = system.coordinates();
     if (n > 0) {
       rate_.resize(state.size());
@@ -81,9 +112,11 @@ class SemiImplicitEuler final : public FixedRule {
 };
 
 /// The classical Runge-Kutta rule.
-class RungeKutta4 final : public FixedRule {
+class RungeKutta4 final : public RateRule {
  public:
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
+  using RuleOn::RuleOn;
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    auto& system = as<RateSystem>();
     constexpr std::array<double, 4> kNode{0.0, 0.5, 0.5, 1.0};
     constexpr std::array<double, 4> kWeight{1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
     rate_.setZero(state.size());
@@ -105,16 +138,20 @@ class RungeKutta4 final : public FixedRule {
   Vector rate_, sum_, at_;
 };
 
-class BackwardEuler final : public FixedRule {
+class BackwardEuler final : public StageRule {
  public:
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
+  using RuleOn::RuleOn;
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    auto& system = as<StageSystem>();
     return solve_stage(system, time_s + h, state, h, state);
   }
 };
 
-class ImplicitMidpoint final : public FixedRule {
+class ImplicitMidpoint final : public StageRule {
  public:
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
+  using RuleOn::RuleOn;
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    auto& system = as<StageSystem>();
     middle_ = state;
     const MethodEnd end = solve_stage(system, time_s + 0.5 * h, state, 0.5 * h, middle_);
     if (end == MethodEnd::completed) state = 2.0 * middle_ - state;
@@ -127,13 +164,16 @@ class ImplicitMidpoint final : public FixedRule {
 
 /// Average acceleration, beta = 1/4 and gamma = 1/2: the trapezoidal rule for x and v, and with it
 /// for what bonds remember.
-class Newmark final : public FixedRule {
+class Newmark final : public RateStageRule {
  public:
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
+  using RuleOn::RuleOn;
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    auto& system = as<RateSystem>();
+    auto& stages = as<StageSystem>();
     rate_.resize(state.size());
     if (const MethodEnd end = system.rate(time_s, state, rate_); end != MethodEnd::completed)
       return end;
-    return solve_stage(system, time_s + h, state + 0.5 * h * rate_, 0.5 * h, state);
+    return solve_stage(stages, time_s + h, state + 0.5 * h * rate_, 0.5 * h, state);
   }
 
  private:
@@ -142,9 +182,12 @@ class Newmark final : public FixedRule {
 
 /// Bank et al. 1985 with gamma = 2 - sqrt 2: both stages have one Newton matrix, and the rule is
 /// L-stable.
-class TrBdf2 final : public FixedRule {
+class TrBdf2 final : public RateStageRule {
  public:
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
+  using RuleOn::RuleOn;
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    auto& system = as<RateSystem>();
+    auto& stages = as<StageSystem>();
     constexpr double kGamma = 2.0 - std::numbers::sqrt2;
     constexpr double kOfMiddle = 1.0 / (kGamma * (2.0 - kGamma));
     constexpr double kC = (1.0 - kGamma) / (2.0 - kGamma);
@@ -153,13 +196,13 @@ class TrBdf2 final : public FixedRule {
       return end;
     middle_ = state;
     const double c = 0.5 * kGamma * h;
-    if (const auto end = solve_stage(system, time_s + kGamma * h, state + c * rate_, c, middle_);
+    if (const auto end = solve_stage(stages, time_s + kGamma * h, state + c * rate_, c, middle_);
         end != MethodEnd::completed) {
       return end;
     }
     Vector known = kOfMiddle * middle_ + (1.0 - kOfMiddle) * state;
     state = middle_;
-    return solve_stage(system, time_s + h, std::move(known), kC * h, state);
+    return solve_stage(stages, time_s + h, std::move(known), kC * h, state);
   }
 
  private:
@@ -169,9 +212,12 @@ class TrBdf2 final : public FixedRule {
 /// What bonds remember is advanced exactly under elongations that are linear over the step, solved
 /// together with the positions where it ends: those that balance or, with masses, those of the
 /// trapezoidal rule (Newmark).
-class Exponential final : public FixedRule {
+class Exponential final : public RateStageRule {
  public:
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
+  using RuleOn::RuleOn;
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    auto& system = as<RateSystem>();
+    auto& stages = as<StageSystem>();
     const Eigen::Index n = system.coordinates();
     if (const MethodEnd end = system.elongations(time_s, state, elongation_);
         end != MethodEnd::completed) {
@@ -187,21 +233,21 @@ class Exponential final : public FixedRule {
     }
     const Eigen::Index m = system.remembered();
     stage.known.tail(m) = w.r * state.tail(m) + w.w0 * elongation_;
-    return system.stage(time_s + h, stage, state);
+    return stages.stage(time_s + h, stage, state);
   }
 
  private:
   Vector rate_, elongation_;
 };
 
-class Xpbd final : public FixedRule {
+class Xpbd final : public RuleOn<ProjectionSystem> {
  public:
-  explicit Xpbd(int sweeps) : sweeps_(sweeps) {}
-  MethodEnd step(StepSystem& system, double time_s, double h, Vector& state) override {
-    return system.project(time_s + h, h, sweeps_, state);
+  Xpbd(ProjectionSystem& system, int sweeps) : RuleOn(system), sweeps_(sweeps) {}
+  MethodEnd step(double time_s, double h, Vector& state) override {
+    return as<ProjectionSystem>().project(time_s + h, h, sweeps_, state);
   }
-  MethodEnd jump(StepSystem& system, double time_s, Vector& state) override {
-    return system.project(time_s, 0.0, sweeps_, state);
+  MethodEnd jump(double time_s, Vector& state) override {
+    return as<ProjectionSystem>().project(time_s, 0.0, sweeps_, state);
   }
 
  private:
@@ -210,26 +256,30 @@ class Xpbd final : public FixedRule {
 
 }  // namespace
 
-std::unique_ptr<FixedRule> fixed_rule(const MethodSettings& settings) {
+std::unique_ptr<FixedRule> fixed_rule(StepSystem& system, const MethodSettings& settings) {
+  auto* rates = role_of<RateSystem>(system);
+  auto* stages = role_of<StageSystem>(system);
+  auto* projection = role_of<ProjectionSystem>(system);
   switch (settings.rule) {
     case StepRule::forward_euler:
-      return std::make_unique<ForwardEuler>();
+      return rule_on<ForwardEuler>(rates);
     case StepRule::semi_implicit_euler:
-      return std::make_unique<SemiImplicitEuler>();
+      return rule_on<SemiImplicitEuler>(rates);
     case StepRule::rk4:
-      return std::make_unique<RungeKutta4>();
+      return rule_on<RungeKutta4>(rates);
     case StepRule::backward_euler:
-      return std::make_unique<BackwardEuler>();
+      return rule_on<BackwardEuler>(stages);
     case StepRule::implicit_midpoint:
-      return std::make_unique<ImplicitMidpoint>();
+      return rule_on<ImplicitMidpoint>(stages);
     case StepRule::newmark:
-      return std::make_unique<Newmark>();
+      return rule_on<Newmark>(rates, stages);
     case StepRule::tr_bdf2:
-      return std::make_unique<TrBdf2>();
+      return rule_on<TrBdf2>(rates, stages);
     case StepRule::exponential:
-      return std::make_unique<Exponential>();
+      return rule_on<Exponential>(rates, stages);
     case StepRule::xpbd:
-      return std::make_unique<Xpbd>(settings.sweeps);
+      if (projection == nullptr) return nullptr;
+      return std::make_unique<Xpbd>(*projection, settings.sweeps);
     case StepRule::cvode_adams:
     case StepRule::cvode_bdf:
     case StepRule::ida:

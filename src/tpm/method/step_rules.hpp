@@ -4,19 +4,23 @@
 
 namespace tpm {
 
-/// One rule with given steps. Orders are those of kStepRules.
+/// One rule with given steps on a system. Orders are those of kStepRules.
 class FixedRule {
  public:
+  FixedRule() = default;
+  FixedRule(const FixedRule&) = delete;
+  FixedRule& operator=(const FixedRule&) = delete;
   virtual ~FixedRule() = default;
   /// One step from time_s to time_s + h.
   /// @param state where it begins; where it ends, if `completed`
-  [[nodiscard]] virtual MethodEnd step(StepSystem& system, double time_s, double h,
-                                       Eigen::VectorXd& state) = 0;
+  [[nodiscard]] virtual MethodEnd step(double time_s, double h, Eigen::VectorXd& state) = 0;
   /// What is imposed jumps at once, y kept.
-  [[nodiscard]] virtual MethodEnd jump(StepSystem& system, double time_s, Eigen::VectorXd& state);
+  [[nodiscard]] virtual MethodEnd jump(double time_s, Eigen::VectorXd& state) = 0;
 };
 
-/// None for an adaptive rule.
-[[nodiscard]] std::unique_ptr<FixedRule> fixed_rule(const MethodSettings& settings);
+/// None for an adaptive rule, and for a system without a role that the rule needs.
+/// @param system must live as long as the rule
+[[nodiscard]] std::unique_ptr<FixedRule> fixed_rule(StepSystem& system,
+                                                    const MethodSettings& settings);
 
 }  // namespace tpm

@@ -20,7 +20,8 @@ struct ImplicitStage {
                                         double relaxation_time_s);
 };
 
-/// An element or a network as a system of first order for the rules of step_rules.hpp. A state is
+/// An element or a network as a system of first order for the rules of step_rules.hpp: what all of
+/// them need. What only some need stands in the roles below, which a system has as well. A state is
 /// (x, v, y) with masses, x and v of the free directions, and (y) without: there a system keeps the
 /// positions that belong to the last state it saw. Whatever can fail says how.
 class StepSystem {
@@ -54,34 +55,56 @@ class StepSystem {
   [[nodiscard]] virtual MethodEnd start(const Knot& first, bool relaxed, Vector& state) = 0;
   /// What is imposed goes to another value at once, y kept: positions without masses follow.
   [[nodiscard]] virtual MethodEnd jump(double imposed, const ConstVector& state) = 0;
+  /// Contact force, N, or depth, m.
+  [[nodiscard]] virtual MethodEnd response(double time_s, const ConstVector& state,
+                                           double& response) = 0;
 
+ private:
+  Knot from_{0.0, 0.0};
+  double slope_ = 0.0;
+  MethodWork work_;
+};
+
+/// For rules that evaluate rates: explicit ones, CVODE, and the explicit halves of implicit ones.
+class RateSystem : public virtual StepSystem {
+ public:
   [[nodiscard]] virtual MethodEnd rate(double time_s, const ConstVector& state,
                                        Eigen::Ref<Vector> rate) = 0;
   /// l of each y.
   [[nodiscard]] virtual MethodEnd elongations(double time_s, const ConstVector& state,
                                               Vector& elongation) = 0;
+};
+
+/// For implicit rules with given steps.
+class StageSystem : public virtual StepSystem {
+ public:
   /// @param state first guess; the solution
   [[nodiscard]] virtual MethodEnd stage(double time_s, const ImplicitStage& stage,
                                         Vector& state) = 0;
-  /// Contact force, N, or depth, m.
-  [[nodiscard]] virtual MethodEnd response(double time_s, const ConstVector& state,
-                                           double& response) = 0;
+};
 
-  /// A step of position-based dynamics with compliance (XPBD) of length h that ends at `time_s`.
-  /// With h = 0 only positions without masses follow.
+/// For position-based dynamics with compliance (XPBD).
+class ProjectionSystem : public virtual StepSystem {
+ public:
+  /// A step of length h that ends at `time_s`. With h = 0 only positions without masses follow.
   /// @param state where it begins; where it ends
   [[nodiscard]] virtual MethodEnd project(double time_s, double h, int sweeps, Vector& state) = 0;
+};
 
+/// For integrators that solve their Newton iterations with the problem's own matrix.
+class NewtonSystem : public virtual RateSystem {
+ public:
   /// Factorises (1 - gamma d rate/d state) at a state.
   [[nodiscard]] virtual MethodEnd factorise(double time_s, const ConstVector& state,
                                             double gamma) = 0;
   /// Replaces a right-hand side by the solution with it.
   virtual void solve(Eigen::Ref<Vector> x) = 0;
+};
 
-  // Without masses the same problem is a differential-algebraic one for (positions, y): positions
-  // as displacements from rest, those that are not free 0.
-
-  /// 0 with masses.
+/// Without masses the same problem is a differential-algebraic one for (positions, y): positions as
+/// displacements from rest, those that are not free 0. Systems with masses are not balanced.
+class BalanceSystem : public virtual StepSystem {
+ public:
   [[nodiscard]] virtual Eigen::Index places() const = 0;
   /// Displacements that belong to the last state seen.
   [[nodiscard]] virtual Vector placed() const = 0;
@@ -94,7 +117,7 @@ class StepSystem {
                                                  const ConstVector& y, double per_y) = 0;
   virtual void solve_pair(Eigen::Ref<Vector> place, Eigen::Ref<Vector> y) = 0;
 
-  /// Positions without masses, to come back to.
+  /// Positions, to come back to.
   struct Place {
     Vector position;
     double imposed = 0.0;
@@ -102,12 +125,18 @@ class StepSystem {
   };
   [[nodiscard]] virtual Place place() const = 0;
   virtual void set_place(const Place& place) = 0;
-
- private:
-  Knot from_{0.0, 0.0};
-  double slope_ = 0.0;
-  MethodWork work_;
 };
+
+/// A system in a role that a rule needs; null if it has none, or is not in balance because it
+/// moves.
+template <class Role>
+[[nodiscard]] Role* role_of(StepSystem& system) {
+  return dynamic_cast<Role*>(&system);
+}
+template <>
+[[nodiscard]] inline BalanceSystem* role_of<BalanceSystem>(StepSystem& system) {
+  return system.coordinates() > 0 ? nullptr : dynamic_cast<BalanceSystem*>(&system);
+}
 
 [[nodiscard]] std::unique_ptr<StepSystem> element_system(const TpmParameters& material,
                                                          const Protocol& protocol,

@@ -9,15 +9,10 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/model/closed_form.hpp"
-#include "tpm/model/cvodes_element.hpp"
+#include "tpm/formulation/formulation.hpp"
 #include "tpm/model/validity_limits.hpp"
 
 namespace tpm {
-
-std::vector<std::string> model_names() {
-  return {"closed_form", "cvodes"};
-}
 
 Response Model::respond_along(const Protocol& protocol, std::span<const double> times_s,
                               std::span<const double> parameters,
@@ -28,10 +23,9 @@ Response Model::respond_along(const Protocol& protocol, std::span<const double> 
 }
 
 std::unique_ptr<Model> make_model(std::string_view name, const ModelOptions& options) {
-  if (name == "closed_form") return std::make_unique<ClosedForm>(options);
-  if (name == "cvodes") return std::make_unique<CvodesElement>(options);
-  throw bad_input("model", fmt::format("unknown formulation '{}'", printable(name)),
-                  fmt::format("one of {}", fmt::join(model_names(), ", ")));
+  return formulation_with<ModelMaker>(name, "formulation", "model")
+      .as<ModelMaker>()
+      ->model(options);
 }
 
 std::vector<std::string> validity_flags(const TpmParameters& p, double peak_depth_m) {

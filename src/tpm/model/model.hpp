@@ -41,7 +41,7 @@ struct TensionRule {
 };
 
 /// The one question that tables, fits, sweeps and plans ask: how does the tissue respond to this
-/// protocol at these times? A formulation is one implementation, registered in make_model().
+/// protocol at these times?
 class Model {
  public:
   Model() = default;
@@ -89,12 +89,19 @@ struct ModelOptions {
   double relative_tolerance = 1e-10;  ///< CVODES, of states and sensitivities
 };
 
-/// Known formulations: "closed_form" and "cvodes". Throws Error(bad_input) naming them for any
-/// other name.
+/// Makes models of the element: a role of a formulation (formulation/formulation.hpp).
+class ModelMaker {
+ public:
+  ModelMaker() = default;
+  ModelMaker(const ModelMaker&) = delete;
+  ModelMaker& operator=(const ModelMaker&) = delete;
+  virtual ~ModelMaker() = default;
+  [[nodiscard]] virtual std::unique_ptr<Model> model(const ModelOptions& options) const = 0;
+};
+
+/// The model of a formulation of the element. Throws Error(bad_input) naming those there are.
 [[nodiscard]] std::unique_ptr<Model> make_model(std::string_view name,
                                                 const ModelOptions& options = {});
-
-[[nodiscard]] std::vector<std::string> model_names();
 
 /// Limits of the model in the paper that a run has passed (text, one line each): indentation over
 /// 10 mm (validity), over 12 mm (damage), a lateral bond turned by more than pi/6.

@@ -84,12 +84,15 @@ EquilibriumSearch Equilibrium::find(Positions& position, const BondMemory& memor
 
 EquilibriumSearch Equilibrium::find_directly(Positions& position, const BondMemory& memory,
                                              const Eigen::Matrix3Xd& load, double tolerance_N) {
+  // Contacts close and open between iterations: a factor of other contacts serves nothing.
+  const bool keeps = bonds_.contact_count() == 0;
   Positions factorised_at;
   double last_residual_N = 0.0;
   int kept = 0;
   const auto solve = [&](const Positions& at, const BondMemory& with, Eigen::Matrix3Xd& forces) {
     const double residual_N = forces.colwise().norm().maxCoeff();
-    const bool serves = residual_N <= kServes * last_residual_N;
+    const bool serves =
+        keeps && factorised_at.size() > 0 && residual_N <= kServes * last_residual_N;
     last_residual_N = residual_N;
     if (serves) {
       ++kept;
@@ -104,7 +107,7 @@ EquilibriumSearch Equilibrium::find_directly(Positions& position, const BondMemo
   EquilibriumSearch search =
       newton_balance(bonds_, freedom_, position, memory, load, tolerance_N, solve);
   search.factorisations -= kept;
-  if (!search.converged || !search.stable) return search;
+  if (!keeps || !search.converged || !search.stable) return search;
   // The equilibrium itself is looked at, unless the factor was made as good as there.
   const double moved_m = (position - factorised_at).colwise().norm().maxCoeff();
   const auto joined = static_cast<Eigen::Index>(bonds_.first_contact());

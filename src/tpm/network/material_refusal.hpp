@@ -13,8 +13,8 @@ namespace tpm {
 [[noreturn]] void refuse_material(std::string_view formulation, std::string_view takes,
                                   std::string_view has);
 
-/// Refuses materials with several relaxation times, regions that relax differently and branches on a
-/// kernel. Potentials may stiffen.
+/// Refuses materials with several relaxation times, regions that relax differently and branches on
+/// a kernel. Potentials may stiffen.
 void require_one_relaxation(const BondSystem& bonds, std::string_view formulation);
 
 }  // namespace tpm

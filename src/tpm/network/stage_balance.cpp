@@ -585,10 +585,24 @@ LaneVector StageBalance::heat_W(const Within& states) const {
   LaneMatrix elongation;
   bonds_.elongations(states.position, elongation);
   const Eigen::VectorXd relaxing = bonds_.of_relaxing(tissue_.bonds().relaxing());
+  std::vector<LaneBonds::Group> general;
+  for (const LaneBonds::Group& group : bonds_.groups()) {
+    const ViscousLaw& law = tissue_.bonds().laws()[group.law];
+    if (!law.is_linear() || law.branches.size() != 1) {
+      general.push_back(group);
+      continue;
+    }
+    // V(l) = l, and the only branch is what the bond remembers: all lanes at once.
+    const auto apart = elongation.middleCols(group.first, group.count) -
+                       states.memory.middleCols(group.first, group.count);
+    heat += apart.cwiseAbs2() * relaxing.segment(group.first, group.count) /
+            law.branches.front().relaxation_time_s;
+  }
+  if (general.empty()) return heat;
   Eigen::MatrixXd viscous;
   for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
     viscous_in_lane(states.weights, followed_, begin_, lane, viscous);
-    for (const LaneBonds::Group& group : bonds_.groups()) {
+    for (const LaneBonds::Group& group : general) {
       const ViscousLaw& law = tissue_.bonds().laws()[group.law];
       for (std::size_t b = 0; b < law.branches.size(); ++b) {
         double sum = 0.0;
@@ -613,19 +627,20 @@ QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double 
   const double half = 0.5 * (until - from);
   std::array<double, kLanes> fractions{};
   LaneVector weight;
+  const auto put = [&](std::size_t lane, double abscissa, double share) {
+    fractions[lane] = from + half * (1.0 + abscissa);
+    weight[static_cast<Eigen::Index>(lane)] = half * h * share;
+  };
   const auto add = [&] {
     const Within states = within(state, fractions, h, rate);
     response_integral += rate * weight.dot(responses(states));
     energy.dissipated_J += weight.dot(heat_W(states));
   };
-  const auto put = [&](std::size_t lane, double abscissa, double share) {
-    fractions[lane] = from + half * (1.0 + abscissa);
-    weight[static_cast<Eigen::Index>(lane)] = half * h * share;
-  };
   if (until - from > kLongPart) {
     for (const double side : {-1.0, 1.0}) {
-      for (std::size_t i = 0; i < kLanes; ++i)
+      for (std::size_t i = 0; i < kLanes; ++i) {
         put(i, side * Long::abscissa()[i], Long::weights()[i]);
+      }
       add();
     }
   } else {

@@ -142,14 +142,14 @@ class ContactCandidate : public PlanModel {
 
   [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
     const BuiltContact built = build(scout.scene(), budget.period_s().value(), kPortable);
-    const PlanTrajectory answer = moved(scout.scene(), built, scout.times());
+    const Trajectory answer = moved(scout.scene(), built, scout.times());
     OperationCount worst = built.of_balance.times(built.most_balances);
     worst += built.of_step;
     return {scout.claim_of(answer), answer.work, worst};
   }
 
-  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
-                                   const std::vector<double>& times_s) const override {
+  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& budget,
+                               const std::vector<double>& times_s) const override {
     return moved(scout.scene(), build(scout.scene(), budget.period_s().value(), kPortable),
                  times_s);
   }
@@ -171,10 +171,10 @@ class ContactCandidate : public PlanModel {
 
  private:
   static constexpr bool kPortable = true;
-  [[nodiscard]] PlanTrajectory moved(const PlanScene& scene, const BuiltContact& built,
-                                     const std::vector<double>& times_s) const {
+  [[nodiscard]] Trajectory moved(const PlanScene& scene, const BuiltContact& built,
+                                 const std::vector<double>& times_s) const {
     ContactRun run(scene, built);
-    PlanTrajectory answer;
+    Trajectory answer;
     answer.response.resize(std::ssize(times_s));
     for (std::size_t i = 0; i < times_s.size(); ++i) {
       answer.response[static_cast<Eigen::Index>(i)] = run.at(times_s[i]);
@@ -298,10 +298,22 @@ class ServoCandidate final : public ContactCandidate {
 
 }  // namespace
 
-void add_contact_models(PlanModels& models) {
+PlanModels condensed_candidates() {
+  PlanModels models;
   models.push_back(std::make_unique<CondensedCandidate>());
+  return models;
+}
+
+PlanModels zone_candidates() {
+  PlanModels models;
   for (const int rings : {1, 2, 3}) models.push_back(std::make_unique<ZoneCandidate>(rings));
+  return models;
+}
+
+PlanModels servo_network_candidates() {
+  PlanModels models;
   models.push_back(std::make_unique<ServoCandidate>());
+  return models;
 }
 
 }  // namespace tpm

@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "tpm/core/error.hpp"
-#include "tpm/network/material_refusal.hpp"
 #include "tpm/network/driven_tissue.hpp"
+#include "tpm/network/material_refusal.hpp"
 
 namespace tpm {
 namespace {
@@ -85,8 +85,8 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
   spectrum.tau_s = driven.bonds.relaxation_time_s();
   // A bond under a constant force creeps in k/(k - g) tau; one without equilibrium modulus creeps
   // for ever.
-  spectrum.longest = std::min(
-      material.instantaneous_Pa() / std::max(material.equilibrium_Pa, 1e-3), 1e3);
+  spectrum.longest =
+      std::min(material.instantaneous_Pa() / std::max(material.equilibrium_Pa, 1e-3), 1e3);
   for (int i = 0; i < kThetas; ++i) {
     const double theta = 0.5 * (1.0 - std::cos(std::numbers::pi * i / (kThetas - 1)));
     const BondMemory memory{rest.mean, theta, rest.closed};

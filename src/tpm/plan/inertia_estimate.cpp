@@ -190,7 +190,7 @@ double of_jump(double jump, const std::vector<SeenMode>& modes, double alpha, do
 
 InertiaEstimate estimate_inertia(const PlanScene& scene) {
   const DrivenNetwork& driven = scene.driven();
-  const Eigen::VectorXd mass = scene.masses_kg();
+  const Eigen::VectorXd mass = masses_kg(scene.scene(), scene.run_network());
   const LowestMode lowest = lowest_mode(driven.bonds, driven.rest, driven.freedom, mass);
   const double omega = lowest.angular_frequency();
   const double alpha = 2.0 * scene.scene().formulation.damping_ratio * omega;

@@ -64,20 +64,20 @@ class CollocationCandidate final : public LayeredCandidate {
 
   [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
     if (layers() > 0) {
-      const PlanTrajectory answer = run(scout, budget, scout.times());
+      const Trajectory answer = run(scout, budget, scout.times());
       return {scout.claim_of(answer), answer.work, {}};
     }
-    const PlanTrajectory& answer = scout.collocation(tolerance_);
+    const Trajectory& answer = scout.collocation(tolerance_);
     if (scout.inertial()) return {scout.claim_of(answer), answer.work, {}};
     // Against a run much finer: one at a tenth of the tolerance may well take the same steps.
-    const PlanTrajectory& finer =
+    const Trajectory& finer =
         scout.collocation(std::max(0.01 * tolerance_, last_resort() ? kFinest : kUsual));
     const double error = trajectory_error(answer, finer, scout.measure());
     return {kSafety * error + kFloor * tolerance_, answer.work, {}};
   }
 
-  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
-                                   const std::vector<double>& times_s) const override {
+  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
+                               const std::vector<double>& times_s) const override {
     QuasiStaticOptions options;
     options.tolerance = tolerance_;
     return own(scout.scene()).quasi_static(options, times_s, scout.wants_field());
@@ -113,7 +113,7 @@ class NetworkStepCandidate final : public LayeredCandidate {
     // Long protocols are tried at longer steps, of which the error is known to be larger.
     const double period = budget.period_s().value();
     const double step = std::max(period, scene.duration_s() / kTried);
-    const PlanTrajectory answer = stepped(scene, step, scout.times(), scout.wants_field());
+    const Trajectory answer = stepped(scene, step, scout.times(), scout.wants_field());
     ModelClaim claim;
     claim.of_period = answer.work.times(kWorst / answer.steps);
     claim.work = answer.work.times(scene.duration_s() / period / answer.steps);
@@ -121,14 +121,14 @@ class NetworkStepCandidate final : public LayeredCandidate {
       claim.error = scout.claim_of(answer);
       return claim;
     }
-    const PlanTrajectory half = stepped(scene, 0.5 * step, scout.times(), scout.wants_field());
+    const Trajectory half = stepped(scene, 0.5 * step, scout.times(), scout.wants_field());
     const double halved = trajectory_error(answer, half, scout.measure());
     claim.error = kSafety * halved * std::min(1.0, period / step) + kFloor * kTolerance;
     return claim;
   }
 
-  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
-                                   const std::vector<double>& times_s) const override {
+  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& budget,
+                               const std::vector<double>& times_s) const override {
     return stepped(own(scout.scene()), budget.period_s().value(), times_s, scout.wants_field());
   }
 
@@ -140,8 +140,8 @@ class NetworkStepCandidate final : public LayeredCandidate {
   static constexpr double kSafety = 2.0;
   static constexpr double kWorst = 2.0;  // iterations of the costliest step, against the mean
 
-  [[nodiscard]] static PlanTrajectory stepped(const PlanScene& scene, double step_s,
-                                              const std::vector<double>& times_s, bool with_field) {
+  [[nodiscard]] static Trajectory stepped(const PlanScene& scene, double step_s,
+                                          const std::vector<double>& times_s, bool with_field) {
     QuasiStaticOptions options;
     options.tolerance = kTolerance;
     options.stages = kStages;
@@ -173,12 +173,12 @@ class InertialCandidate final : public PlanModel {
   }
   [[nodiscard]] ModelClaim claim(const PlanScout& scout,
                                  const PlanBudget& /*budget*/) const override {
-    const PlanTrajectory& answer = scout.with_masses(tolerance_);
-    const PlanTrajectory& finer = scout.with_masses(0.1 * tolerance_);
+    const Trajectory& answer = scout.with_masses(tolerance_);
+    const Trajectory& finer = scout.with_masses(0.1 * tolerance_);
     return {kSafety * trajectory_error(answer, finer, scout.measure()), answer.work, {}};
   }
-  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
-                                   const std::vector<double>& times_s) const override {
+  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
+                               const std::vector<double>& times_s) const override {
     return scout.scene().inertial(inertial_options(scout.scene(), tolerance_), times_s,
                                   scout.wants_field());
   }
@@ -191,29 +191,31 @@ class InertialCandidate final : public PlanModel {
 
 }  // namespace
 
-void add_network_models(PlanModels& models, const PlanScene& scene) {
+PlanModels network_step_candidates(const PlanScene& scene) {
+  PlanModels models;
   for (int layers = 1; layers < scene.moving_layers(); ++layers) {
     models.push_back(std::make_unique<NetworkStepCandidate>(layers));
-    models.push_back(std::make_unique<CollocationCandidate>(1e-3, layers));
   }
   models.push_back(std::make_unique<NetworkStepCandidate>(0));
+  return models;
+}
+
+PlanModels collocation_candidates(const PlanScene& scene) {
+  PlanModels models;
+  for (int layers = 1; layers < scene.moving_layers(); ++layers) {
+    models.push_back(std::make_unique<CollocationCandidate>(1e-3, layers));
+  }
   for (const double tolerance : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7}) {
     models.push_back(std::make_unique<CollocationCandidate>(tolerance, 0));
   }
+  return models;
 }
 
-void add_inertial_models(PlanModels& models) {
+PlanModels inertial_candidates() {
+  PlanModels models;
   for (const double tolerance : {1e-3, 1e-4, 1e-5, 1e-6, 1e-7}) {
     models.push_back(std::make_unique<InertialCandidate>(tolerance));
   }
-}
-
-PlanModels plan_models(const PlanScene& scene) {
-  PlanModels models;
-  add_scalar_models(models);
-  add_contact_models(models);
-  add_network_models(models, scene);
-  add_inertial_models(models);
   return models;
 }
 

@@ -39,17 +39,6 @@ const std::array<OperationEntry, kOperations>& operation_table() {
   return kTable;
 }
 
-OperationCount& OperationCount::operator+=(const OperationCount& other) {
-  for (std::size_t i = 0; i < kOperations; ++i) n_[i] += other.n_[i];
-  return *this;
-}
-
-OperationCount OperationCount::times(double factor) const {
-  OperationCount result = *this;
-  for (double& n : result.n_) n *= factor;
-  return result;
-}
-
 double OperationCosts::seconds_of(const OperationCount& count) const {
   double sum = 0.0;
   for (const OperationEntry& entry : operation_table()) {

@@ -44,7 +44,7 @@ bool masses_known(const ExperimentScene& scene) {
 bool truth_has_masses(const ExperimentScene& scene, const PlanScout& massless,
                       const PlanRequest& request) {
   if (request.for_loop) return false;
-  if (scene.formulation.inertial()) return true;
+  if (scene.formulation.masses) return true;
   if (!masses_known(scene)) return false;
   const InertiaEstimate& estimate = massless.inertia();
   return !std::isinf(estimate.of_jumps) &&
@@ -170,7 +170,7 @@ class Planning {
 
   /// The error against the reference, whose own uncertainty is added.
   void verify(PlannedCandidate& candidate) {
-    const PlanTrajectory answer =
+    const Trajectory answer =
         model_of(candidate).run(*scout_, plan_.request.budget, truth_.times_s);
     candidate.verified_error = trajectory_error(answer, truth_.trajectory, plan_.request.measure) +
                                truth_.reference.difference;
@@ -301,8 +301,8 @@ struct Chosen {
 
 }  // namespace
 
-PlanTrajectory run_planned(const Plan& plan, const ExperimentScene& scene,
-                           const std::vector<double>& times_s) {
+Trajectory run_planned(const Plan& plan, const ExperimentScene& scene,
+                       const std::vector<double>& times_s) {
   const Chosen chosen(plan, scene);
   return chosen.model->run(chosen.scout, plan.request.budget, times_s);
 }

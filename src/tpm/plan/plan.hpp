@@ -114,8 +114,8 @@ struct PlanClaim {
 
 /// The planned model's answer over the scene's protocol, at the times given.
 /// @param plan with a choice, of the same scene
-[[nodiscard]] PlanTrajectory run_planned(const Plan& plan, const ExperimentScene& scene,
-                                         const std::vector<double>& times_s);
+[[nodiscard]] Trajectory run_planned(const Plan& plan, const ExperimentScene& scene,
+                                     const std::vector<double>& times_s);
 
 /// How a hand will move a contact: what a session knows before it begins.
 struct ContactRange {

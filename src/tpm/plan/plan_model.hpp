@@ -34,8 +34,7 @@ enum class ModelReach {
   full,     ///< the nonlinear network
 };
 
-/// One candidate: a formulation with its settings. A new formulation is one more class and one more
-/// line in plan_models().
+/// One candidate: a formulation with its settings.
 class PlanModel {
  public:
   PlanModel() = default;
@@ -69,19 +68,43 @@ class PlanModel {
   [[nodiscard]] virtual ModelClaim claim(const PlanScout& scout,
                                          const PlanBudget& budget) const = 0;
   /// The answer over the protocol, as the model would be used under the budget.
-  [[nodiscard]] virtual PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
-                                           const std::vector<double>& times_s) const = 0;
+  [[nodiscard]] virtual Trajectory run(const PlanScout& scout, const PlanBudget& budget,
+                                       const std::vector<double>& times_s) const = 0;
 };
 
 using PlanModels = std::vector<std::unique_ptr<PlanModel>>;
 
-/// All candidates for a scene, each family in the order of its table.
+/// Has candidates for plans: a role of a formulation (formulation/formulation.hpp). A formulation
+/// with the capability `planned` that runs scenes and has no such role has one candidate, which
+/// claims what its difference from the coarse run of the network shows (run_candidate.cpp).
+class PlanOffer {
+ public:
+  PlanOffer() = default;
+  PlanOffer(const PlanOffer&) = delete;
+  PlanOffer& operator=(const PlanOffer&) = delete;
+  virtual ~PlanOffer() = default;
+  [[nodiscard]] virtual PlanModels candidates(const PlanScene& scene) const = 0;
+};
+
+/// All candidates for a scene: those of every formulation, by rank.
 [[nodiscard]] PlanModels plan_models(const PlanScene& scene);
 
-// The families.
-void add_scalar_models(PlanModels& models);
-void add_contact_models(PlanModels& models);
-void add_network_models(PlanModels& models, const PlanScene& scene);
-void add_inertial_models(PlanModels& models);
+// The candidates of the formulations that a plan knows well.
+[[nodiscard]] PlanModels linear_candidates();
+[[nodiscard]] PlanModels element_candidates();
+[[nodiscard]] PlanModels curves_candidates();
+[[nodiscard]] PlanModels condensed_candidates();
+[[nodiscard]] PlanModels zone_candidates();
+[[nodiscard]] PlanModels servo_network_candidates();
+[[nodiscard]] PlanModels network_step_candidates(const PlanScene& scene);
+[[nodiscard]] PlanModels collocation_candidates(const PlanScene& scene);
+[[nodiscard]] PlanModels inertial_candidates();
+/// That of any formulation that runs scenes.
+[[nodiscard]] std::unique_ptr<PlanModel> run_candidate(const Formulation& formulation);
+
+/// Runs a scene by a candidate, which is made for it, at the step of the scene's formulation or a
+/// millisecond. Throws Error(bad_input) with the reason where the candidate has no answer.
+[[nodiscard]] Trajectory run_candidate_on(const PlanModel& candidate, const ExperimentScene& scene,
+                                          const std::vector<double>& times_s, bool with_field);
 
 }  // namespace tpm

@@ -27,7 +27,7 @@ VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
   VerifiedTruth truth;
   const bool field = measure.output == PlanOutput::field;
   const double tau_s = scene.driven().bonds.shortest_relaxation_time_s();
-  PlanTrajectory judge;
+  Trajectory judge;
   if (inertial) {
     truth.times_s =
         sampled_times(scene.protocol(), kTimesOfPieceWithMasses, kMostTimesWithMasses, tau_s);

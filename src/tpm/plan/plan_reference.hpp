@@ -6,7 +6,7 @@ namespace tpm {
 /// The truth that a pick is verified against, and how sure it is.
 struct VerifiedTruth {
   std::vector<double> times_s;
-  PlanTrajectory trajectory;
+  Trajectory trajectory;
   PlanReference reference;
 };
 

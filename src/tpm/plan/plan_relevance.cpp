@@ -16,7 +16,7 @@ constexpr double kAffordable = 1.2e6;  // steps times spheres of a run with mass
 constexpr double kInertiaTolerance = 1e-4;
 
 /// The tissue as the truth has it, changed in one part.
-PlanTrajectory answer_of(const PlanScene& scene, const PlanScout& like) {
+Trajectory answer_of(const PlanScene& scene, const PlanScout& like) {
   const PlanScout changed(scene, like.measure(), false);
   QuasiStaticOptions options;
   options.tolerance = PlanScout::kTolerance;
@@ -55,11 +55,10 @@ PlanRelevance relevance_of_viscosity(const PlanScout& scout) {
 }
 
 PlanRelevance relevance_of_tension(const PlanScout& scout) {
-  return switched_off(scout, "tension", "lateral bonds without stiffness",
-                      [](const PlanScene& scene) {
-                        return scene.with_materials(
-                            [](BondMaterial& material) { material.lateral_Pa = 0.0; });
-                      });
+  return switched_off(
+      scout, "tension", "lateral bonds without stiffness", [](const PlanScene& scene) {
+        return scene.with_materials([](BondMaterial& material) { material.lateral_Pa = 0.0; });
+      });
 }
 
 PlanRelevance relevance_of_layers(const PlanScout& scout) {
@@ -76,7 +75,7 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
   result.part = "inertia";
   try {
     if (scout.inertial()) {
-      const PlanTrajectory& massless = scout.coarse();
+      const Trajectory& massless = scout.coarse();
       result.error =
           trajectory_error(massless, scout.with_masses(kInertiaTolerance), scout.measure());
       return result;
@@ -95,11 +94,16 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
                                  significant(100.0 * estimate.of_jumps / peak, 3));
       return result;
     }
+    if (!scout.scene().driven().tools.empty()) {
+      // A run would count the instants at which a tool leaves a sphere, and its force is 0.
+      result.note += "; the instants at which a tool leaves and strikes are left out";
+      return result;
+    }
     const double steps = 10.0 * estimate.highest_Hz * scout.scene().duration_s();
     if (steps * static_cast<double>(scout.scene().network().organ.size()) > kAffordable)
       return result;
     const PlanScout moving(scout.scene(), scout.measure(), true);
-    const PlanTrajectory& truth = moving.with_masses(kInertiaTolerance);
+    const Trajectory& truth = moving.with_masses(kInertiaTolerance);
     result.error = trajectory_error(moving.coarse(), truth, scout.measure());
     result.estimated = false;
     result.note.clear();

@@ -13,8 +13,10 @@ namespace tpm {
 namespace {
 
 ExperimentScene plannable(ExperimentScene scene) {
-  if (scene.formulation.kind == FormulationKind::relaxed) {
-    throw bad_input("scene", "the formulation 'static' has no course in time to plan for",
+  if (!scene.formulation.entry().can().course) {
+    throw bad_input("scene",
+                    fmt::format("the formulation '{}' has no course in time to plan for",
+                                scene.formulation.kind),
                     "quasi_static or inertial");
   }
   if (scene.formulation.mass_spring) {
@@ -23,13 +25,9 @@ ExperimentScene plannable(ExperimentScene scene) {
   return scene;
 }
 
-double blocks_of_solve(const BlockPattern& pattern) {
-  return 2.0 * static_cast<double>(pattern.factor_blocks()) + static_cast<double>(pattern.nodes());
-}
-
 }  // namespace
 
-double trajectory_error(const PlanTrajectory& model, const PlanTrajectory& truth,
+double trajectory_error(const Trajectory& model, const Trajectory& truth,
                         const PlanMeasure& measure) {
   constexpr double kFelt = 0.1;  // of the peak: less is no stiffness to be felt
   if (measure.output == PlanOutput::force) {
@@ -124,84 +122,14 @@ int PlanScene::moving_layers() const {
   return moving;
 }
 
-Eigen::VectorXd PlanScene::masses_kg() const {
-  const Organ& organ = network().organ;
-  Eigen::VectorXd mass(driven().rest.cols());
-  mass.head(organ.position.cols()) = sphere_masses_kg(organ, scene_.formulation.density_kg_m3);
-  Eigen::Index column = organ.position.cols();
-  for (const SceneContact& contact : scene_.contacts) {
-    if (!contact.is_tool()) continue;
-    if (!contact.mass_kg) throw bad_input("scene", "a tool has no mass", "mass_kg of each tool");
-    mass[column++] = *contact.mass_kg;
-  }
-  return mass;
-}
-
-OperationCount PlanScene::iteration_work() const {
-  return OperationCount()
-      .add(Operation::lane_bond, static_cast<double>(driven().bonds.size()))
-      .add(Operation::lane_block,
-           blocks_of_solve(moving_graph(driven().bonds, driven().freedom)->pattern));
-}
-
-OperationCount PlanScene::factorisation_work() const {
-  const auto graph = moving_graph(driven().bonds, driven().freedom);
-  const auto products = static_cast<double>(graph->pattern.factor_products());
-  return OperationCount()
-      .add(Operation::bond_stiffness, static_cast<double>(driven().bonds.size()))
-      .add(Operation::factor_product, products);
-}
-
-PlanTrajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
-                                       const std::vector<double>& times_s, bool with_field) const {
-  const QuasiStatic equations(driven().bonds, driven().rest, driven().freedom, driven().probes,
-                              options);
-  PlanTrajectory result;
-  ValidityWatch watch(network(), scene_.probe(), depth_limits_apply(scene_.tissue));
-  const Eigen::Index spheres = network().organ.position.cols();
-  const auto see = [&](const QuasiStaticState& state) {
-    watch.see(state.time_s, network_.spheres(state.position));
-    result.displacement.emplace_back(state.position.leftCols(spheres) -
-                                     driven().rest.leftCols(spheres));
-  };
-  const QuasiStaticRun run =
-      equations.run(protocol(), times_s, with_field ? QuasiStaticObserver(see) : nullptr);
-  if (!with_field) watch.see(protocol().end_s(), network_.spheres(run.position));
-  result.response = run.response;
-  result.validity = watch.seen();
-  // Back-solves are those of all lanes, one an iteration; outputs cost an evaluation per kLanes.
-  result.work += iteration_work().times(run.work.iterations);
-  result.work.add(Operation::solve_block,
-                  blocks_of_solve(moving_graph(driven().bonds, driven().freedom)->pattern) *
-                      run.work.factorisations);
-  result.work += factorisation_work().times(run.work.factorisations);
-  result.steps = run.work.steps;
-  return result;
-}
-
-PlanTrajectory PlanScene::inertial(const InertialOptions& options,
+Trajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
                                    const std::vector<double>& times_s, bool with_field) const {
-  const Inertial equations(driven().bonds, driven().rest, driven().freedom, driven().probes,
-                           masses_kg(), options);
-  PlanTrajectory result;
-  const Eigen::Index spheres = network().organ.position.cols();
-  const auto see = [&](const QuasiStaticState& state, const Eigen::VectorXd& /*pushes*/) {
-    result.displacement.emplace_back(state.position.leftCols(spheres) -
-                                     driven().rest.leftCols(spheres));
-  };
-  const InertialRun run =
-      equations.run(protocol(), times_s, with_field ? InertialObserver(see) : nullptr);
-  result.response = run.response;
-  const auto& pattern = driven().bonds.pattern();
-  const auto bonds = static_cast<double>(driven().bonds.size());
-  const auto rates = static_cast<double>(run.work.rates);
-  result.work.add(Operation::bond_force, 2.0 * bonds * rates)
-      .add(Operation::dense_flop, 60.0 * static_cast<double>(driven().rest.cols()) * rates)
-      .add(Operation::solve_block,
-           blocks_of_solve(pattern) * static_cast<double>(run.work.newton_iterations));
-  result.work += factorisation_work().times(static_cast<double>(run.work.factorisations));
-  result.steps = static_cast<double>(run.work.steps);
-  return result;
+  return run_quasi_static(scene_, network_, options, times_s, with_field);
+}
+
+Trajectory PlanScene::inertial(const InertialOptions& options, const std::vector<double>& times_s,
+                               bool with_field) const {
+  return run_inertial(scene_, network_, options, times_s, with_field);
 }
 
 PlanScene PlanScene::with_protocol(Protocol protocol) const {

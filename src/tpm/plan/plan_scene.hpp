@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "tpm/plan/operations.hpp"
-#include "tpm/simulate/simulation.hpp"
+#include "tpm/simulate/scene_runner.hpp"
 
 namespace tpm {
 
@@ -21,19 +21,10 @@ struct PlanMeasure {
   double relative_weight = 0.0;
 };
 
-/// What a model answers over a protocol.
-struct PlanTrajectory {
-  Eigen::VectorXd response;                    ///< N or m, at each time
-  std::vector<Eigen::Matrix3Xd> displacement;  ///< of all spheres, m, at each time; if asked for
-  Validity validity;  ///< of networks without masses: limits passed at the times asked for
-  OperationCount work;
-  double steps = 0.0;
-};
-
 /// Largest absolute difference over all times (field: and spheres), in parts of the largest
 /// absolute value of `truth`; with a relative weight, the larger of that and the weighted relative
 /// difference.
-[[nodiscard]] double trajectory_error(const PlanTrajectory& model, const PlanTrajectory& truth,
+[[nodiscard]] double trajectory_error(const Trajectory& model, const Trajectory& truth,
                                       const PlanMeasure& measure);
 
 /// The protocol's pieces sampled densely near their ends, where rates change: 1 to `per_piece`
@@ -64,20 +55,15 @@ class PlanScene {
   [[nodiscard]] bool jumps() const;
   /// Layers of which a sphere moves.
   [[nodiscard]] int moving_layers() const;
-  /// kg, of spheres and tools. Throws Error(bad_input) for a tool without mass.
-  [[nodiscard]] Eigen::VectorXd masses_kg() const;
+  [[nodiscard]] const RunNetwork& run_network() const { return network_; }
 
   /// The network without masses. Throws Error(numerical) as QuasiStatic does.
   /// @param times_s rising
-  [[nodiscard]] PlanTrajectory quasi_static(const QuasiStaticOptions& options,
-                                            const std::vector<double>& times_s,
-                                            bool with_field) const;
-  /// The network with masses.
-  [[nodiscard]] PlanTrajectory inertial(const InertialOptions& options,
+  [[nodiscard]] Trajectory quasi_static(const QuasiStaticOptions& options,
                                         const std::vector<double>& times_s, bool with_field) const;
-  /// Operations of an evaluation of all bonds' forces with a back-solve, and of a factorisation.
-  [[nodiscard]] OperationCount iteration_work() const;
-  [[nodiscard]] OperationCount factorisation_work() const;
+  /// The network with masses.
+  [[nodiscard]] Trajectory inertial(const InertialOptions& options,
+                                    const std::vector<double>& times_s, bool with_field) const;
 
   // The same scene changed in one respect.
   [[nodiscard]] PlanScene deeper(double factor) const;   ///< what is imposed times a factor

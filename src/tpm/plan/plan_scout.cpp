@@ -78,7 +78,7 @@ PlanScout::PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial,
                            inertial ? 8 * kMostScoutedTimes : kMostScoutedTimes,
                            scene_.driven().bonds.shortest_relaxation_time_s())) {}
 
-const PlanTrajectory& PlanScout::collocation(double tolerance) const {
+const Trajectory& PlanScout::collocation(double tolerance) const {
   const auto found = collocation_.find(tolerance);
   if (found != collocation_.end()) return found->second;
   QuasiStaticOptions options;
@@ -88,7 +88,7 @@ const PlanTrajectory& PlanScout::collocation(double tolerance) const {
       .first->second;
 }
 
-const PlanTrajectory& PlanScout::coarse() const {
+const Trajectory& PlanScout::coarse() const {
   return collocation(kTolerance);
 }
 
@@ -96,7 +96,7 @@ double PlanScout::coarse_error() const {
   return trajectory_error(collocation(10.0 * kTolerance), coarse(), measure_);
 }
 
-const PlanTrajectory& PlanScout::with_masses(double tolerance) const {
+const Trajectory& PlanScout::with_masses(double tolerance) const {
   const auto found = with_masses_.find(tolerance);
   if (found != with_masses_.end()) return found->second;
   return with_masses_
@@ -141,12 +141,12 @@ const ContactCurves& PlanScout::curves() const {
   return *curves_;
 }
 
-double PlanScout::claim_of(const PlanTrajectory& model) const {
+double PlanScout::claim_of(const Trajectory& model) const {
   if (!inertial_) {
     return kSafety * trajectory_error(model, coarse(), measure_) + coarse_error() + kRounding;
   }
   // By runs, not by the linear estimate: where tissue stiffens masses do more than that says.
-  const PlanTrajectory& moving = with_masses(kTolerance);
+  const Trajectory& moving = with_masses(kTolerance);
   return kSafety * trajectory_error(model, moving, measure_) +
          trajectory_error(with_masses(10.0 * kTolerance), moving, measure_);
 }

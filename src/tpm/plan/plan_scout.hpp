@@ -31,13 +31,13 @@ class PlanScout {
   [[nodiscard]] const std::vector<double>& times() const { return times_; }
 
   /// The network without masses, by collocation at a tolerance, at times().
-  [[nodiscard]] const PlanTrajectory& collocation(double tolerance) const;
+  [[nodiscard]] const Trajectory& collocation(double tolerance) const;
   /// That at the scout's own tolerance, by which models are judged before they are verified.
-  [[nodiscard]] const PlanTrajectory& coarse() const;
+  [[nodiscard]] const Trajectory& coarse() const;
   /// Its difference from a run at ten times its tolerance.
   [[nodiscard]] double coarse_error() const;
   /// The network with masses.
-  [[nodiscard]] const PlanTrajectory& with_masses(double tolerance) const;
+  [[nodiscard]] const Trajectory& with_masses(double tolerance) const;
 
   [[nodiscard]] const ContactSpectrum& spectrum() const;
   [[nodiscard]] const InertiaEstimate& inertia() const;
@@ -49,7 +49,7 @@ class PlanScout {
   /// A bound of the error of a model without masses that answers `model` at times(): `kSafety`
   /// times its difference from the coarse run, with masses where those are asked for, and what that
   /// run may add.
-  [[nodiscard]] double claim_of(const PlanTrajectory& model) const;
+  [[nodiscard]] double claim_of(const Trajectory& model) const;
 
   static constexpr double kSafety = 1.5;
   static constexpr double kTolerance = 1e-4;
@@ -60,7 +60,7 @@ class PlanScout {
   bool inertial_;
   std::optional<int> most_iterations_;
   std::vector<double> times_;
-  mutable std::map<double, PlanTrajectory> collocation_, with_masses_;
+  mutable std::map<double, Trajectory> collocation_, with_masses_;
   mutable std::optional<ContactSpectrum> spectrum_;
   mutable std::optional<InertiaEstimate> inertia_;
   mutable std::optional<ContactCurves> curves_;

@@ -19,12 +19,12 @@ class ScalarCandidate : public PlanModel {
   }
 
   [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
-    const PlanTrajectory answer = run(scout, budget, scout.times());
+    const Trajectory answer = run(scout, budget, scout.times());
     return {scout.claim_of(answer), answer.work, of_step(scout)};
   }
 
-  [[nodiscard]] PlanTrajectory run(const PlanScout& scout, const PlanBudget& budget,
-                                   const std::vector<double>& times_s) const override;
+  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& budget,
+                               const std::vector<double>& times_s) const override;
 
   [[nodiscard]] bool for_loop() const override { return true; }
   [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
@@ -60,13 +60,13 @@ class ScalarCandidate : public PlanModel {
   }
 };
 
-PlanTrajectory ScalarCandidate::run(const PlanScout& scout, const PlanBudget& budget,
-                                    const std::vector<double>& times_s) const {
+Trajectory ScalarCandidate::run(const PlanScout& scout, const PlanBudget& budget,
+                                const std::vector<double>& times_s) const {
   constexpr double kSteps = 400.0;  // of a protocol, where no rate is given
   const PlanScene& scene = scout.scene();
   ScalarRun run(scene.protocol(), model(scout),
                 budget.period_s().value_or(scene.duration_s() / kSteps));
-  PlanTrajectory answer;
+  Trajectory answer;
   answer.response.resize(std::ssize(times_s));
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     const double response = run.at(times_s[i]);
@@ -166,13 +166,23 @@ class CurvesCandidate final : public ScalarCandidate {
 
 }  // namespace
 
-void add_scalar_models(PlanModels& models) {
-  models.push_back(std::make_unique<LinearCandidate>(1));
+PlanModels linear_candidates() {
+  PlanModels models;
+  for (const int branches : {1, 2, 3})
+    models.push_back(std::make_unique<LinearCandidate>(branches));
+  return models;
+}
+
+PlanModels element_candidates() {
+  PlanModels models;
   models.push_back(std::make_unique<ElementCandidate>());
-  models.push_back(std::make_unique<LinearCandidate>(2));
-  models.push_back(std::make_unique<LinearCandidate>(3));
-  models.push_back(std::make_unique<CurvesCandidate>(1));
-  models.push_back(std::make_unique<CurvesCandidate>(2));
+  return models;
+}
+
+PlanModels curves_candidates() {
+  PlanModels models;
+  for (const int branches : {1, 2}) models.push_back(std::make_unique<CurvesCandidate>(branches));
+  return models;
 }
 
 }  // namespace tpm

@@ -17,8 +17,8 @@ void ScalarContact::reset() noexcept {
   model_.settle(0.0);
 }
 
-ContactAnswer ScalarContact::step(const Eigen::Vector3d& displacement_m) noexcept {
-  const double depth_m = into_.dot(displacement_m);
+ContactAnswer ScalarContact::step(const ToolPose& tool) noexcept {
+  const double depth_m = into_.dot(tool.displacement_m);
   ContactAnswer answer;
   if (!std::isfinite(depth_m)) {
     answer.force_N.setConstant(std::numeric_limits<double>::quiet_NaN());

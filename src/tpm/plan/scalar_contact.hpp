@@ -18,7 +18,7 @@ class ScalarContact final : public ContactModel {
                 double period_s);
 
   void reset() noexcept override;
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return range_.at_once_N_per_m * (into_ * into_.transpose());

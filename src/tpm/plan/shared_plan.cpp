@@ -117,7 +117,7 @@ const std::vector<double>& SharedPlan::claims_at(Place place) {
       const PlanScout scout(scene_.with_protocol(ramp_and_hold(depth, depth / ramp, hold)), {},
                             false, kMostIterations);
       for (std::size_t m = 0; m < claims.size(); ++m) {
-        PlanTrajectory answer;
+        Trajectory answer;
         answer.response = response_of(
             ScalarRun(scout.scene().protocol(), here.models[m], ramp / kStepsOfRamp, true),
             scout.times(), answer.steps);

@@ -140,8 +140,8 @@ CondensedValue CondensedContact::value_of(const Eigen::Vector3d& displacement_m,
   return value_of_condensed(fit_->tables, u.data(), packed.data());
 }
 
-ContactAnswer CondensedContact::step(const Eigen::Vector3d& displacement_m) noexcept {
-  const Eigen::Vector3d u = fit_->frame.local(displacement_m);
+ContactAnswer CondensedContact::step(const ToolPose& tool) noexcept {
+  const Eigen::Vector3d u = fit_->frame.local(tool.displacement_m);
   step_condensed(fit_->tables, rates_, state_, u.data());
   kept_ += state_.kept ? 1 : 0;
   ContactAnswer answer;

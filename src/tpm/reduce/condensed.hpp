@@ -40,7 +40,7 @@ class CondensedContact final : public ContactModel {
   [[nodiscard]] CondensedContact with_period(double period_s) const;
 
   void reset() noexcept override;
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
   [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override;

@@ -1,7 +1,23 @@
 #pragma once
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace tpm {
+
+/// Where a tool is: its displacement from where it touches the tissue at rest, m, and how it has
+/// turned since, in the coordinates of the organ. Models of tools that look alike from all sides,
+/// and of spheres that are moved themselves, do not ask for the orientation.
+struct ToolPose {
+  // NOLINTNEXTLINE(google-explicit-constructor): a tool that does not turn is the usual case
+  ToolPose(const Eigen::Vector3d& displacement) : displacement_m(displacement) {}
+  template <class Expression>  // NOLINTNEXTLINE(google-explicit-constructor)
+  ToolPose(const Eigen::MatrixBase<Expression>& displacement) : displacement_m(displacement) {}
+  ToolPose(const Eigen::Vector3d& displacement, const Eigen::Quaterniond& turned)
+      : displacement_m(displacement), orientation(turned) {}
+
+  Eigen::Vector3d displacement_m;
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+};
 
 /// What a contact model answers after a step.
 struct ContactAnswer {
@@ -10,16 +26,16 @@ struct ContactAnswer {
   bool trusted = true;   ///< false beyond the range the model was built or converges in
 };
 
-/// A tissue seen from one of its contact spheres, stepped at a fixed servo period. The contact
-/// moves linearly within a step. A step neither allocates nor locks nor throws.
+/// A tissue under a tool, stepped at a fixed servo period. The tool moves linearly within a step. A
+/// step neither allocates nor locks nor throws. Contact is two-sided, as if tool and tissue were
+/// glued, unless a model says otherwise; OneSidedContact lets any of them go.
 class ContactModel {
  public:
   virtual ~ContactModel() = default;
   /// Back to rest, everything relaxed.
   virtual void reset() noexcept = 0;
-  /// Advances by one period to a displacement of the contact sphere from rest, m, in the
-  /// coordinates of the organ.
-  virtual ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept = 0;
+  /// Advances by one period, at whose end the tool is there.
+  virtual ContactAnswer step(const ToolPose& tool) noexcept = 0;
   /// s
   [[nodiscard]] virtual double period_s() const noexcept = 0;
   /// Tangent stiffness at rest, all relaxing springs taut, N/m: for limits of passivity.

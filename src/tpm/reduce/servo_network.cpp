@@ -225,21 +225,21 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
                     aside_m <= options_.aside_m && answer_.error_N <= kTrusted * scale_N;
 }
 
-ContactAnswer ServoNetwork::step(const Eigen::Vector3d& displacement_m) noexcept {
+ContactAnswer ServoNetwork::step(const ToolPose& tool) noexcept {
   const FlushDenormals flush;
   float* const contact = displacement_.data() + 4 * contact_;
-  for (Eigen::Index c = 0; c < 3; ++c) contact[c] = static_cast<float>(displacement_m[c]);
+  for (Eigen::Index c = 0; c < 3; ++c) contact[c] = static_cast<float>(tool.displacement_m[c]);
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
-  const double step_error_N = step_error_->advance(displacement_m).norm();
+  const double step_error_N = step_error_->advance(tool.displacement_m).norm();
   const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
   balance(kNext);
-  answer(displacement_m, step_error_N);
+  answer(tool.displacement_m, step_error_N);
   const double elsewhere_N = remembered_error_.norm() + step_error_N;
   for (balances_ = 1; balances_ < options_.most_balances; ++balances_) {
     if (answer_.error_N - elsewhere_N <= options_.balance_again_above * scale_N) break;
     held_error_N_ = 0.0;
     balance(kNow);
-    answer(displacement_m, step_error_N);
+    answer(tool.displacement_m, step_error_N);
   }
   held_error_N_ = answer_.error_N - elsewhere_N;
   keep_error();

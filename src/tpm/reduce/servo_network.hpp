@@ -41,7 +41,7 @@ class ServoNetwork final : public ContactModel {
                const ServoNetworkOptions& options = {});
 
   void reset() noexcept override;
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return options_.period_s; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return at_once_;

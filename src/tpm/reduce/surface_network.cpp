@@ -404,13 +404,13 @@ bool SurfaceNetwork::has_fallen_in() const noexcept {
   return false;
 }
 
-ContactAnswer SurfaceNetwork::step(const Eigen::Vector3d& displacement_m) noexcept {
+ContactAnswer SurfaceNetwork::step(const ToolPose& tool) noexcept {
   const FlushDenormals flush;
-  if (!displacement_m.allFinite()) {
+  if (!tool.displacement_m.allFinite()) {
     return {Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()), 0.0, false};
   }
-  const double way_m = (displacement_m - ball_at_).norm();
-  ball_at_ = displacement_m;
+  const double way_m = (tool.displacement_m - ball_at_).norm();
+  ball_at_ = tool.displacement_m;
   balance(kForceNext, way_m);
   answer();
   for (balances_ = 1; balances_ < options_.most_balances; ++balances_) {

@@ -44,7 +44,7 @@ class SurfaceNetwork final : public ContactModel {
 
   void reset() noexcept override;
   /// @param displacement_m of the ball from its start
-  ContactAnswer step(const Eigen::Vector3d& displacement_m) noexcept override;
+  ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return options_.period_s; }
   /// Against the sphere nearest to the ball's start, with the compliance of the overlap.
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {

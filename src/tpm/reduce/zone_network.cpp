@@ -15,8 +15,10 @@ constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
 /// What the surroundings miss in motion over what they miss in equilibrium: what they remember of
 /// deeper places is missed too.
 constexpr double kMissedInMotion = 1.5;
-constexpr double kMissedStiffening = 3.0;  // times that where bonds of the surroundings stiffen
-constexpr double kUnbalanced = 0.1;        // what is left of the correction for what is unbalanced
+/// Times that where bonds of the surroundings stiffen: the linear surroundings miss more between
+/// the equilibria that are looked at (set by tests/test_material_servo.cpp).
+constexpr double kMissedStiffening = 16.0;
+constexpr double kUnbalanced = 0.1;  // what is left of the correction for what is unbalanced
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
 
 void require(const ZoneNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
@@ -172,12 +174,12 @@ void ZoneNetwork::add_surroundings() noexcept {
   }
 }
 
-ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept {
+ContactAnswer ZoneNetwork::step(const ToolPose& tool) noexcept {
   const FlushDenormals flush;
   const std::size_t contact = zone_.size();
   for (std::size_t c = 0; c < 3; ++c) {
     displacement_[4 * contact + c] =
-        static_cast<float>(displacement_m[static_cast<Eigen::Index>(c)]);
+        static_cast<float>(tool.displacement_m[static_cast<Eigen::Index>(c)]);
   }
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
   gather(kZoneNext);
@@ -211,8 +213,8 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
   answer.force_N = at_contact.cast<double>() + correction;
   largest_N_ = std::max(largest_N_, answer.force_N.norm());
 
-  const double depth_m = displacement_m.dot(into_);
-  const double aside_m = (displacement_m - depth_m * into_).norm();
+  const double depth_m = tool.displacement_m.dot(into_);
+  const double aside_m = (tool.displacement_m - depth_m * into_).norm();
   const auto last = static_cast<double>(missed_N_.size() - 1);
   const double at = std::clamp(std::abs(depth_m) / missed_stride_m_, 0.0, last);
   const std::size_t low = std::min(static_cast<std::size_t>(at), missed_N_.size() - 2);
@@ -220,7 +222,7 @@ ContactAnswer ZoneNetwork::step(const Eigen::Vector3d& displacement_m) noexcept 
   const double missed_N =
       (1.0 - share) * missed_N_[low] + share * missed_N_[low + 1] + aside_m * missed_aside_N_per_m_;
   answer.error_N = missed_in_motion_ * missed_N + kUnbalanced * correction.norm() +
-                   step_error_->advance(displacement_m).norm();
+                   step_error_->advance(tool.displacement_m).norm();
   const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * relaxed_.norm());
   answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&
                    answer.error_N <= kTrustedZone * scale_N;

@@ -58,17 +58,19 @@ Panel width_panel(const Identification& id) {
 Panel law_panel(const Identification& id) {
   Panel panel;
   panel.x = {"time", "s", false, {}, {}};
-  panel.y = {"least law", "", false, 0.5, 0.5 + static_cast<double>(id.laws.size())};
-  for (const LawSpec& law : id.laws) panel.y.names.push_back(law_name(law));
-  Series s;
-  s.kind = Series::Kind::points;
-  s.label = "least law";
-  s.provenance = "derived";
-  for (const IdentifiedSample& sample : id.history) {
-    s.x.push_back(sample.time_s);
-    s.y.push_back(static_cast<double>(sample.law + 1));
+  panel.y = {"least law, by its place", "", false, 0.5, 0.5 + static_cast<double>(id.laws.size())};
+  for (std::size_t law = 0; law < id.laws.size(); ++law) {
+    Series s;
+    s.kind = Series::Kind::points;
+    s.label = law_name(id.laws[law]);
+    s.provenance = "derived";
+    for (const IdentifiedSample& sample : id.history) {
+      if (sample.law != law) continue;
+      s.x.push_back(sample.time_s);
+      s.y.push_back(static_cast<double>(law + 1));
+    }
+    if (!s.x.empty()) panel.series.push_back(std::move(s));
   }
-  panel.series = {std::move(s)};
   return panel;
 }
 

@@ -16,14 +16,13 @@ namespace tpm {
 
 /// What the planned model answered, and the same in words.
 [[nodiscard]] Json planned_run_json(const Plan& plan, const ExperimentScene& scene,
-                                    const std::vector<double>& times_s,
-                                    const PlanTrajectory& answer);
+                                    const std::vector<double>& times_s, const Trajectory& answer);
 [[nodiscard]] std::string planned_run_text(const Plan& plan, const std::vector<double>& times_s,
-                                           const PlanTrajectory& answer);
+                                           const Trajectory& answer);
 
 /// HDF5 with the answer and, as attributes of /, the scene, the model and its errors.
 void write_planned_run(const Plan& plan, const ExperimentScene& scene,
-                       const std::vector<double>& times_s, const PlanTrajectory& answer,
+                       const std::vector<double>& times_s, const Trajectory& answer,
                        const std::filesystem::path& file);
 
 }  // namespace tpm

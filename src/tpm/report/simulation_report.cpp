@@ -289,14 +289,13 @@ std::string motion_text(const ExperimentScene& scene, const SimulationRun& run) 
 }
 
 std::string equations_text(const ExperimentScene& scene, const SimulationRun& run) {
-  const Formulation& f = scene.formulation;
+  const FormulationChoice& f = scene.formulation;
   const char* network = f.mass_spring ? "mass-spring model" : "tissue";
-  if (!f.inertial()) {
-    return fmt::format("{}, {}, tolerance {}\n", network,
-                       f.kind == FormulationKind::relaxed
-                           ? "static: everything has relaxed at each time"
-                           : "quasi-static",
-                       shortest(f.tolerance));
+  if (!f.masses) {
+    return fmt::format(
+        "{}, {}, tolerance {}\n", network,
+        !f.entry().can().course ? "static: everything has relaxed at each time" : "quasi-static",
+        shortest(f.tolerance));
   }
   return fmt::format(
       "{} with mass, damping ratio {} of the tissue's lowest mode ({} Hz), tolerance {}\n", network,
@@ -328,14 +327,14 @@ std::string solver_text(const SolverChoice& solver) {
 
 Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                      const SimulationRun& run) {
-  const Formulation& f = scene.formulation;
+  const FormulationChoice& f = scene.formulation;
   const SimulationRecord& record = run.record;
   const bool depth = by_depth(scene);
   Json json{{"title", scene.tissue.title},
             {"version", version()},
             {"scene_sha256", sha256_hex(scene.text)},
             {"network", f.mass_spring ? "mass_spring" : "tissue"},
-            {"formulation", word_of(f.kind)},
+            {"formulation", f.kind},
             {"tolerance", f.tolerance},
             {"spheres", scene.tissue.network.organ.size()},
             {"bonds", scene.tissue.network.bonds.size()},
@@ -351,12 +350,11 @@ Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
   json["last"] = point(record.curve.back());
   json["outputs"] = record.outputs.size();
   json["energy"] = energy_json(run);
-  if (f.inertial()) json["motion"] = motion_json(scene, run);
+  if (f.masses) json["motion"] = motion_json(scene, run);
   if (run.solver) json["solver"] = solver_json(*run.solver);
   json["roughness"] = smoothness_json(smoothness_of(scene, record.outputs.back().position));
-  json["error_estimate"] = f.kind == FormulationKind::quasi_static
-                               ? Json(rounded(record.error_estimate, 3))
-                               : Json(nullptr);
+  json["error_estimate"] =
+      f.kind == "quasi_static" ? Json(rounded(record.error_estimate, 3)) : Json(nullptr);
   json["resumed_at_s"] = run.resumed_at_s ? Json(*run.resumed_at_s) : Json(nullptr);
   json["validity"] = validity_json(record.validity, depth_limits_apply(scene.tissue));
   return json;
@@ -377,7 +375,7 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
                   scene.tissue.network.organ.size(), depth ? "pushed to a depth" : "loaded");
   text += contacts_text(scene, network, run);
   text += equations_text(scene, run);
-  if (scene.formulation.inertial()) text += motion_text(scene, run);
+  if (scene.formulation.masses) text += motion_text(scene, run);
   if (run.solver && !run.solver->direct) text += solver_text(*run.solver);
   if (run.resumed_at_s) {
     text += fmt::format("resumed at {} s from a checkpoint\n", significant(*run.resumed_at_s, 4));

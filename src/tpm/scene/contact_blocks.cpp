@@ -137,6 +137,11 @@ std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tis
                   "one that is driven first");
 }
 
+SceneContact usual_contact(const Tissue& tissue, const DocumentPlace& place) {
+  const Json block{{"kind", word_of(ContactKind::sphere)}};
+  return parse_contact(block, tissue, place);
+}
+
 std::vector<std::size_t> spheres_of(const SceneContact& contact, const Organ& organ) {
   const std::size_t middle = contact.probe.sphere;
   if (contact.kind == ContactKind::sphere) return {middle};

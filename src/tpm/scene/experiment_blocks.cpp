@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -14,56 +15,11 @@
 namespace tpm {
 namespace {
 
-enum class ProtocolKind { ramp_hold, step_hold, creep, knots };
-
-const std::array<KindKeys<ProtocolKind>, 4>& protocol_kinds() {
-  static const std::array<KindKeys<ProtocolKind>, 4> kinds{{
-      {ProtocolKind::ramp_hold, "ramp_hold", {"depth", "rate", "hold"}, {}},
-      {ProtocolKind::step_hold, "step_hold", {"depth", "hold"}, {}},
-      {ProtocolKind::creep, "creep", {"load", "duration"}, {}},
-      {ProtocolKind::knots, "knots", {"knots"}, {}},
-  }};
-  return kinds;
-}
-
-constexpr auto kFormulationWords =
-    std::to_array<Word<FormulationKind>>({{FormulationKind::quasi_static, "quasi_static"},
-                                          {FormulationKind::inertial, "inertial"},
-                                          {FormulationKind::relaxed, "static"}});
 constexpr auto kSpringWords = std::to_array<Word<SpringRule>>(
     {{SpringRule::like_the_bonds, "like_the_bonds"}, {SpringRule::equal, "equal"}});
 
 constexpr int kUsualOutputs = 61;
 constexpr double kMostOutputs = 100'000;
-
-double hold_at(const Json& block, const DocumentPlace& place) {
-  const double hold = quantity_at(block, "hold", Dimension::time, place);
-  if (hold >= 0.0) return hold;
-  throw bad_input(place.key("hold").where, fmt::format("{} s", shortest(hold)), "0 s or more");
-}
-
-Protocol protocol_of_knots(const Json& list, const DocumentPlace& place) {
-  const bool by_depth = list.front().contains("depth");
-  const char* key = by_depth ? "depth" : "load";
-  std::vector<Knot> knots;
-  for (const Json& entry : list) {
-    const DocumentPlace here = place.key(std::to_string(knots.size()));
-    if (entry.size() != 2 || !entry.contains(key)) {
-      throw bad_input(here.where, "is another thing than the first",
-                      fmt::format("a time and a {}, as in the first", key));
-    }
-    knots.push_back(
-        {quantity_at(entry, "time", Dimension::time, here),
-         quantity_at(entry, key, by_depth ? Dimension::length : Dimension::force, here)});
-    if (knots.size() > 1 && knots.back().time_s < knots[knots.size() - 2].time_s) {
-      throw bad_input(here.where, "is earlier than the one before", "times that do not fall");
-    }
-  }
-  if (!(knots.back().time_s > knots.front().time_s)) {
-    throw bad_input(place.where, "take no time", "a last knot later than the first");
-  }
-  return {by_depth ? Drive::displacement : Drive::force, std::move(knots), place.where};
-}
 
 std::vector<double> even_times(double begin, double end, int count) {
   std::vector<double> times;
@@ -109,68 +65,75 @@ std::vector<double> spaced_times(double spacing, const Protocol& protocol,
   return times;
 }
 
+/// Refuses keys of other formulations than the one chosen.
+void require_keys_taken(const Json& block, const Formulation& entry, const DocumentPlace& place) {
+  for (const auto& [key, value] : block.items()) {
+    const bool common = key == "kind" || key == "comparison" || key == "springs";
+    if (common || entry.takes(key)) continue;
+    throw bad_input(
+        place.key(key).where, fmt::format("in the formulation '{}'", entry.name()),
+        "it only with \"kind\": " +
+            formulations_that([&, &name = key](const Formulation& f) { return f.takes(name); }));
+  }
+  if (block.value("masses", true)) return;
+  for (const char* key : {"damping_ratio", "density_kg_per_m3"}) {
+    if (!block.contains(key)) continue;
+    throw bad_input(place.key(key).where, "without masses", "\"masses\": true beside it");
+  }
+}
+
 }  // namespace
 
-std::string_view word_of(FormulationKind kind) {
-  return entry_of(kFormulationWords, kind).text;
+const Formulation& FormulationChoice::entry() const {
+  const Formulation* found = find_formulation(kind);
+  if (found != nullptr) return *found;
+  refuse_formulation(kind, "formulation", where,
+                     formulations_that([](const Formulation&) { return true; }));
 }
 
-Protocol parse_scene_protocol(const Json& block, const DocumentPlace& place) {
-  const auto name = block.at("kind").get<std::string>();
-  const KindKeys<ProtocolKind>& kind = *find_entry(protocol_kinds(), name);  // the schema knows it
-  require_keys_of(block, kind.text, kind.needed, kind.allowed, place);
-  switch (kind.meaning) {
-    case ProtocolKind::ramp_hold:
-      return ramp_and_hold(positive_at(block, "depth", Dimension::length, place),
-                           positive_at(block, "rate", Dimension::speed, place),
-                           hold_at(block, place));
-    case ProtocolKind::step_hold:
-      return step_and_hold(positive_at(block, "depth", Dimension::length, place),
-                           positive_at(block, "hold", Dimension::time, place));
-    case ProtocolKind::creep:
-      return creep(positive_at(block, "load", Dimension::force, place),
-                   positive_at(block, "duration", Dimension::time, place));
-    case ProtocolKind::knots:
-      break;
+FormulationChoice parse_formulation(const Json& block, const DocumentPlace& place) {
+  FormulationChoice choice;
+  choice.where = place.where;
+  choice.kind = block.value("kind", choice.kind);
+  const Formulation* entry = find_formulation(choice.kind);
+  if (entry == nullptr) {
+    refuse_formulation(choice.kind, "formulation", place.key("kind").where,
+                       formulations_that([](const Formulation&) { return true; }));
   }
-  return protocol_of_knots(block.at("knots"), place.key("knots"));
-}
-
-Formulation parse_formulation(const Json& block, const DocumentPlace& place) {
-  Formulation formulation;
-  const auto word = [&](const char* key, const auto& words, auto& value) {
-    if (!block.contains(key)) return;
-    value = parse_word(words, key, block.at(key).get<std::string>(), place.key(key).where);
-  };
-  word("kind", kFormulationWords, formulation.kind);
-  word("springs", kSpringWords, formulation.springs);
-  word("solver", kStiffnessSolverWords, formulation.solver);
-  if (formulation.inertial() && block.contains("solver")) {
-    throw bad_input(place.key("solver").where, "in the formulation 'inertial'",
-                    "it only where spheres have no mass");
+  choice.kind = entry->name();
+  if (block.contains("solver")) {
+    choice.solver = parse_word(kStiffnessSolverWords, "solver",
+                               block.at("solver").get<std::string>(), place.key("solver").where);
   }
-  formulation.mass_spring = block.contains("comparison");
-  if (block.contains("springs") && !formulation.mass_spring) {
+  choice.mass_spring = block.contains("comparison");
+  if (block.contains("springs") && !choice.mass_spring) {
     throw bad_input(place.key("springs").where, "without a comparison",
                     "springs only with \"comparison\": \"mass_spring\"");
   }
-  for (const char* key : {"damping_ratio", "density_kg_per_m3"}) {
-    if (formulation.inertial() || !block.contains(key)) continue;
-    throw bad_input(place.key(key).where,
-                    fmt::format("in the formulation '{}'", word_of(formulation.kind)),
-                    "it only with \"kind\": \"inertial\"");
+  if (block.contains("springs")) {
+    choice.springs = parse_word(kSpringWords, "springs", block.at("springs").get<std::string>(),
+                                place.key("springs").where);
   }
-  formulation.damping_ratio = block.value("damping_ratio", formulation.damping_ratio);
-  if (!(formulation.damping_ratio >= 0.0 && formulation.damping_ratio <= 10.0)) {
-    throw bad_input(place.key("damping_ratio").where, shortest(formulation.damping_ratio),
-                    "0 to 10");
+  if (block.contains("solver")) {
+    choice.solver = parse_word(kStiffnessSolverWords, "solver",
+                               block.at("solver").get<std::string>(), place.key("solver").where);
   }
-  formulation.density_kg_m3 = block.value("density_kg_per_m3", formulation.density_kg_m3);
-  if (!(formulation.density_kg_m3 > 0.0)) {
-    throw bad_input(place.key("density_kg_per_m3").where, shortest(formulation.density_kg_m3),
-                    "a density above 0");
-  }
-  return formulation;
+  require_keys_taken(block, *entry, place);
+  choice.masses = entry->can().masses && block.value("masses", !entry->takes("masses"));
+  const auto number = [&](const char* key, auto& value, double least, double most,
+                          const char* expected) {
+    value = block.value(key, value);
+    if (value >= least && value <= most) return;
+    throw bad_input(place.key(key).where, shortest(static_cast<double>(value)), expected);
+  };
+  number("damping_ratio", choice.damping_ratio, 0.0, 10.0, "0 to 10");
+  number("density_kg_per_m3", choice.density_kg_m3, std::numeric_limits<double>::min(),
+         std::numeric_limits<double>::max(), "a density above 0");
+  number("sweeps", choice.sweeps, 1, 1e6, "1 to 1000000");
+  number("exponentials", choice.exponentials, 1, 3, "1 to 3");
+  number("rings", choice.rings, 1, 3, "1 to 3");
+  if (block.contains("step")) choice.step_s = positive_at(block, "step", Dimension::time, place);
+  return choice;
 }
 
 Outputs parse_outputs(const Json& block, const Protocol& protocol, const DocumentPlace& place) {

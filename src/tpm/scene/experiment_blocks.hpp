@@ -14,25 +14,20 @@ struct KindKeys {
   std::vector<std::string_view> needed, allowed;
 };
 
-/// Throws unless a block has the keys that its kind needs, and no others but `kind` and those
-/// allowed.
-void require_keys_of(const Json& block, std::string_view kind,
-                     const std::vector<std::string_view>& needed,
-                     const std::vector<std::string_view>& allowed, const DocumentPlace& place);
-
 /// Block `contacts`. At least one of them is driven.
 [[nodiscard]] std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tissue,
                                                        const DocumentPlace& place);
 
-/// Block `protocol`. The kinds and keys are those of fit configurations, with depth and duration.
-[[nodiscard]] Protocol parse_scene_protocol(const Json& block, const DocumentPlace& place);
+/// The contact of a scene that names none, and of sessions: the organ's contact sphere, driven
+/// against its normal.
+[[nodiscard]] SceneContact usual_contact(const Tissue& tissue, const DocumentPlace& place);
 
 /// Throws unless what is imposed leaves every contact inside the organ and no tool pulls.
 void require_possible(const Protocol& protocol, const std::vector<SceneContact>& contacts,
                       const Tissue& tissue, const DocumentPlace& place);
 
 /// Block `formulation`, without the tolerance.
-[[nodiscard]] Formulation parse_formulation(const Json& block, const DocumentPlace& place);
+[[nodiscard]] FormulationChoice parse_formulation(const Json& block, const DocumentPlace& place);
 
 /// Block `outputs`.
 [[nodiscard]] Outputs parse_outputs(const Json& block, const Protocol& protocol,

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/formulation/formulation.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/protocol/protocol.hpp"
@@ -11,26 +12,24 @@
 
 namespace tpm {
 
-enum class FormulationKind {
-  quasi_static,  ///< forces balance at each instant; what the bonds remember relaxes in time
-  inertial,      ///< spheres have mass
-  relaxed,       ///< static: everything has relaxed under what is imposed at each time
-};
-
-/// The word for it in scenes and results: quasi_static, inertial, static.
-[[nodiscard]] std::string_view word_of(FormulationKind kind);
-
-/// By which equations a network moves, and which network.
-struct Formulation {
-  FormulationKind kind = FormulationKind::quasi_static;
-  double damping_ratio = 0.1;     ///< inertial: of the lowest mode, 0 to 10
-  double density_kg_m3 = 1060.0;  ///< inertial: of the spheres, > 0
-  bool mass_spring = false;       ///< the mass-spring model on the same spheres, not the tissue
+/// By which formulation a network moves, with what settings, and which network.
+struct FormulationChoice {
+  std::string kind = "quasi_static";            ///< name of a Formulation
+  bool masses = false;                          ///< spheres have mass
+  double damping_ratio = 0.1;                   ///< with masses: of the lowest mode, 0 to 10
+  double density_kg_m3 = 1060.0;                ///< with masses: of the spheres, > 0
+  std::optional<double> step_s = std::nullopt;  ///< of formulations with given steps, > 0
+  int sweeps = 1;                               ///< of XPBD over the bonds, a step, >= 1
+  int exponentials = 1;                         ///< of reduced contacts, 1 to 3
+  int rings = 2;                                ///< of bonds that a zone keeps, 1 to 3
+  bool mass_spring = false;  ///< the mass-spring model on the same spheres, not the tissue
   SpringRule springs = SpringRule::like_the_bonds;
-  double tolerance = 1e-6;                              ///< QuasiStaticOptions, InertialOptions
-  StiffnessSolver solver = StiffnessSolver::automatic;  ///< without mass
+  double tolerance = 1e-6;  ///< QuasiStaticOptions, InertialOptions, MethodSettings
+  StiffnessSolver solver = StiffnessSolver::automatic;  ///< of quasi_static and static
+  std::string where = {};                               ///< the block, for messages
 
-  [[nodiscard]] bool inertial() const { return kind == FormulationKind::inertial; }
+  /// The formulation chosen.
+  [[nodiscard]] const Formulation& entry() const;
 };
 
 /// What is kept of a run besides positions.
@@ -75,7 +74,7 @@ struct ExperimentScene {
   Tissue tissue;
   std::vector<SceneContact> contacts;  ///< the first is driven; results are shown from there
   Protocol protocol;
-  Formulation formulation;
+  FormulationChoice formulation;
   Outputs outputs;
   std::string text;  ///< of the scene, for the record
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tpm/protocol/protocol_block.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 
 namespace tpm {
@@ -17,7 +18,9 @@ ProtocolFile parse_protocol_file(const Json& document, std::string_view where) {
   }
   check_schema(blocks, "protocol", where);
   const DocumentPlace place{std::string(where)};
-  Protocol protocol = parse_scene_protocol(blocks.at("protocol"), place.key("protocol"));
+  const DocumentPlace at = place.key("protocol");
+  Protocol protocol =
+      parse_protocol_block(blocks.at("protocol"), at, Openness::complete).protocol(at);
   const Json outputs = blocks.value("outputs", Json::object());
   std::vector<double> times = parse_outputs(outputs, protocol, place.key("outputs")).times_s;
   return {std::move(protocol), std::move(times)};

@@ -15,7 +15,7 @@ void OneSidedContact::reset() noexcept {
   touching_ = false;
 }
 
-OneSidedContact::Answer OneSidedContact::step(double tool_m) noexcept {
+OneSidedContact::Answer OneSidedContact::press(double tool_m) noexcept {
   const double free_m = surface_m_ - left_N_ / stiffness_N_per_m_;
   if (!touching_ && tool_m >= free_m) touching_ = true;
   surface_m_ = touching_ ? tool_m : free_m;
@@ -26,6 +26,11 @@ OneSidedContact::Answer OneSidedContact::step(double tool_m) noexcept {
   // Written so that a force that is no number is passed on, and found.
   return {touching_ ? force_N : 0.0 * force_N, surface_m_, touching_, answer.error_N,
           answer.trusted};
+}
+
+ContactAnswer OneSidedContact::step(const ToolPose& tool) noexcept {
+  const Answer answer = press(push_.dot(tool.displacement_m));
+  return {-answer.force_N * push_, answer.error_N, answer.trusted};
 }
 
 }  // namespace tpm

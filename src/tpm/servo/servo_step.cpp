@@ -215,9 +215,9 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
   const bool touched = model_N_ > 0.0;
   for (int i = 1; i < steps; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(steps);
-    answer = contact_.step(begun_ ? from_m + part * (to_m - from_m) : to_m);
+    answer = contact_.press(begun_ ? from_m + part * (to_m - from_m) : to_m);
   }
-  answer = contact_.step(to_m);
+  answer = contact_.press(to_m);
   if (touched && answer.touching && answer.trusted && !doubted_before_) {
     learn_stiffness(answer.force_N - model_N_, to_m - from_m);
   }

@@ -140,4 +140,10 @@ void Recorder::stop(double time_s) {
             : std::string("there is no checkpoint to go on from")));
 }
 
+PartOfProtocol::PartOfProtocol(const ExperimentScene& scene, double end_s)
+    : protocol(history_until(scene.protocol, end_s)), tolerance(scene.formulation.tolerance) {
+  if (protocol.peak() > 0.0) tolerance *= scene.protocol.peak() / protocol.peak();
+  tolerance = std::min(tolerance, 0.1);
+}
+
 }  // namespace tpm

@@ -75,4 +75,28 @@ class Recorder {
   Whole whole_;
 };
 
+/// Runs part by part. `run_part` shows the recorder the states at the times of a part, and closes
+/// it.
+template <class RunPart>
+[[nodiscard]] SimulationRun run_in_parts(const ExperimentScene& scene, const RunNetwork& network,
+                                         const SimulationControls& controls, RunPart&& run_part,
+                                         std::size_t parts = kRunParts) {
+  Recorder recorder(scene, network, controls, parts);
+  SimulationRun result;
+  if (recorder.restore()) result.resumed_at_s = recorder.latest()->time_s;
+  for (auto times = recorder.next_part(); !times.empty(); times = recorder.next_part()) {
+    run_part(recorder, times);
+  }
+  result.record = recorder.take();
+  return result;
+}
+
+/// The protocol up to the end of a part, and the tolerance there: that of the scene is one of the
+/// whole, and a part of a ramp has a lower peak.
+struct PartOfProtocol {
+  PartOfProtocol(const ExperimentScene& scene, double end_s);
+  Protocol protocol;
+  double tolerance;
+};
+
 }  // namespace tpm

@@ -25,6 +25,9 @@ struct RunNetwork {
 /// Throws as msm_material does.
 [[nodiscard]] RunNetwork network_to_run(const ExperimentScene& scene);
 
+/// kg, of spheres and tools. Throws Error(bad_input) for a tool without mass.
+[[nodiscard]] Eigen::VectorXd masses_kg(const ExperimentScene& scene, const RunNetwork& network);
+
 /// A point of the response. The same history is watched whatever is written: it is fine enough to
 /// be drawn, and dates what passes a limit.
 struct CurvePoint {
@@ -86,12 +89,13 @@ struct SimulationRun {
   std::optional<SolverChoice> solver;  ///< of a run without mass; none if a checkpoint held it all
 };
 
-/// Runs a scene. A run with mass and tools is run again with softer contacts (ContactCheck). In a
-/// static run everything has relaxed under what is imposed at each time. A run writes a checkpoint
-/// now and then and goes on from one that an earlier run of the same scene and version has left,
-/// with the same result to the bit; the file is left for the caller to remove once the result is
-/// safe. Throws Error(numerical) as the formulations do, Interrupted, Error(environment) where a
-/// checkpoint cannot be written, Error(bad_input) for a damaged checkpoint.
+/// Runs a scene by its formulation, which has to show whole states (StateRunner). A run with mass
+/// and tools is run again with softer contacts (ContactCheck). A run writes a checkpoint now and
+/// then and goes on from one that an earlier run of the same scene and version has left, with the
+/// same result to the bit; the file is left for the caller to remove once the result is safe.
+/// Throws Error(bad_input) as require_runnable() does, Error(numerical) as the formulations do,
+/// Interrupted, Error(environment) where a checkpoint cannot be written, Error(bad_input) for a
+/// damaged checkpoint.
 [[nodiscard]] SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,
                                      const SimulationControls& controls = {});
 

@@ -28,14 +28,14 @@ std::string step_group(std::size_t step) {
 }
 
 void write_provenance(const ExperimentScene& scene, const SimulationRun& run, Hdf5Writer& file) {
-  const Formulation& f = scene.formulation;
+  const FormulationChoice& f = scene.formulation;
   file.attribute("/", "scene", scene.text);
   file.attribute("/", "scene_sha256", sha256_hex(scene.text));
-  file.attribute("/", "formulation", std::string(word_of(f.kind)));
+  file.attribute("/", "formulation", f.kind);
   file.attribute("/", "network", f.mass_spring ? "mass_spring" : "tissue");
   file.attribute("/", "provenance", "model");
   file.numbers("/settings/tolerance", {f.tolerance});
-  if (f.inertial()) {
+  if (f.masses) {
     file.numbers("/settings/damping_ratio", {f.damping_ratio});
     if (tool_count(scene) > 0) {
       file.numbers("/settings/contact_damping_ratio", {InertialOptions{}.contact_damping_ratio});
@@ -137,7 +137,7 @@ void write_curve(const ExperimentScene& scene, const SimulationRecord& record, H
     file.integers("/curve/touching", touching, 1);
     file.numbers("/curve/overlap_m", overlap);
   }
-  if (scene.formulation.inertial()) {
+  if (scene.formulation.masses) {
     if (!depth) file.numbers("/curve/force_on_tissue_N", on_tissue);
     return;
   }
@@ -271,7 +271,7 @@ fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& networ
   write_provenance(scene, run, file);
   write_tools(network.driven, file);
   write_curve(scene, run.record, file);
-  if (scene.formulation.inertial()) write_motion(run, file);
+  if (scene.formulation.masses) write_motion(run, file);
   write_validity(run.record.validity, file);
   write_roughness(scene, run.record, file);
   std::vector<double> times;

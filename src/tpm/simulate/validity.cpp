@@ -64,6 +64,18 @@ double ValidityWatch::turned_rad(const Bond& bond, const Positions& position) co
   return std::atan2(before.cross(now).norm(), before.dot(now));
 }
 
+bool ValidityWatch::may_have_turned_beyond(const Bond& bond, const Positions& position,
+                                           double angle_rad) const {
+  constexpr double kAlmost = 1.0 - 1e-9;
+  const Positions& rest = network_.organ.position;
+  const Eigen::Vector3d before = rest.col(bond.b) - rest.col(bond.a);
+  const Eigen::Vector3d now = position.col(bond.b) - position.col(bond.a);
+  const double along = before.dot(now);
+  if (along <= 0.0 || angle_rad > 1.0) return true;
+  const double across = kAlmost * std::tan(angle_rad) * along;
+  return before.cross(now).squaredNorm() >= across * across;
+}
+
 double ValidityWatch::indentation_m(Eigen::Index sphere, const Positions& position) const {
   return (position.col(sphere) - network_.organ.position.col(sphere)).dot(probe_.direction);
 }
@@ -76,9 +88,9 @@ std::vector<std::int32_t> ValidityWatch::flags(const Positions& position) const 
     if (indentation > kDamageIndentation_m + kRounding_m) flags[i] |= 2;
   }
   for (const Bond& bond : network_.bonds) {
-    if (bond.kind != BondKind::lateral || !(turned_rad(bond, position) > kValidTurning_rad)) {
-      continue;
-    }
+    if (bond.kind != BondKind::lateral) continue;
+    if (!may_have_turned_beyond(bond, position, kValidTurning_rad)) continue;
+    if (!(turned_rad(bond, position) > kValidTurning_rad)) continue;
     flags[bond.a] |= 4;
     flags[bond.b] |= 4;
   }
@@ -99,6 +111,7 @@ void ValidityWatch::see(double time_s, const Positions& position) {
   }
   for (const Bond& bond : network_.bonds) {
     if (bond.kind != BondKind::lateral) continue;
+    if (!may_have_turned_beyond(bond, position, seen_.most_turned_rad)) continue;
     seen_.most_turned_rad = std::max(seen_.most_turned_rad, turned_rad(bond, position));
   }
 }

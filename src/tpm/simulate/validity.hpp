@@ -63,6 +63,9 @@ class ValidityWatch {
 
  private:
   /// The angle by which a bond has turned since rest.
+  /// False if the bond has turned by less, without the cost of the angle.
+  [[nodiscard]] bool may_have_turned_beyond(const Bond& bond, const Positions& position,
+                                            double angle_rad) const;
   [[nodiscard]] double turned_rad(const Bond& bond, const Positions& position) const;
   [[nodiscard]] double indentation_m(Eigen::Index sphere, const Positions& position) const;
 

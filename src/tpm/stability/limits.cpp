@@ -245,7 +245,8 @@ std::vector<ServoRow> stability_at_servo_rates() {
 }
 
 StabilityStudy run_stability_study(int along) {
-  return {stability_maps(along), stability_limits(), stability_corners(), stability_at_servo_rates()};
+  return {stability_maps(along), stability_limits(), stability_corners(),
+          stability_at_servo_rates()};
 }
 
 }  // namespace tpm

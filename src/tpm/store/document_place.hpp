@@ -1,6 +1,7 @@
 #pragma once
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tpm/core/units.hpp"
 #include "tpm/store/json.hpp"
@@ -20,5 +21,11 @@ struct DocumentPlace {
 /// The same; throws too unless it is above 0.
 [[nodiscard]] double positive_at(const Json& object, std::string_view key, Dimension dimension,
                                  const DocumentPlace& place);
+
+/// Throws unless a block has the keys that its kind needs, and no others but `kind` and those
+/// allowed.
+void require_keys_of(const Json& block, std::string_view kind,
+                     const std::vector<std::string_view>& needed,
+                     const std::vector<std::string_view>& allowed, const DocumentPlace& place);
 
 }  // namespace tpm

@@ -41,7 +41,7 @@ SteppedForces law_forces(const LawFile& law, const Protocol& motion, double peri
     contact.take_over(depth, model.at(law.values, nullptr).kernel.value(std::max(depth, 0.0)));
   }
   return stepped_forces(motion, period_s, encoder_step_m, [&](double depth) {
-    return std::max(-contact.step({0.0, 0.0, depth}).force_N.z(), 0.0);
+    return std::max(-contact.step(Eigen::Vector3d(0.0, 0.0, depth)).force_N.z(), 0.0);
   });
 }
 
@@ -69,21 +69,13 @@ void require_contact_law(const LawFile& law) {
 
 }  // namespace
 
-void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& motion,
-                     const BudgetOptions& options) {
-  if (!law.uncertainty) {
-    budget.flags.push_back("the law file carries no uncertainty of a fit: no random part");
-    return;
-  }
-  PredictionOptions prediction;
-  prediction.samples = options.samples;
-  prediction.seed = options.seed;
-  prediction.level = options.level;
-  const LawPrediction p = predict_law(law, motion, budget.time_s, prediction);
+void add_random_part(ErrorBudget& budget, const LawPrediction& p) {
   BudgetRandomPart random;
-  random.samples = options.samples;
-  random.level = options.level;
+  random.samples = p.samples;
+  random.level = p.level;
   for (std::size_t i = 0; i < p.time_s.size(); ++i) {
+    const bool counts = !p.recording || p.recording->in_window[i];
+    if (!counts || !std::isfinite(p.response[i])) continue;
     random.largest =
         std::max(random.largest, 0.5 * (p.mean_upper[i] - p.mean_lower[i]) / budget.peak_N);
   }
@@ -91,19 +83,22 @@ void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& mo
   for (const std::string& flag : p.flags) budget.flags.push_back(flag);
 }
 
-namespace {
-
-ErrorBudget concluded(std::string title, std::vector<double> times_s,
-                      std::vector<BudgetStage> stages, const LawFile& law, const Protocol& motion,
-                      const BudgetOptions& options) {
-  ErrorBudget budget = budget_of(std::move(times_s), std::move(stages));
-  budget.title = std::move(title);
-  add_random_part(budget, law, motion, options);
-  conclude(budget);
-  return budget;
+PredictionOptions random_part_options(const BudgetOptions& options) {
+  PredictionOptions prediction;
+  prediction.samples = options.samples;
+  prediction.seed = options.seed;
+  prediction.level = options.level;
+  return prediction;
 }
 
-}  // namespace
+void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& motion,
+                     const BudgetOptions& options) {
+  if (law.uncertainty) {
+    add_random_part(budget, predict_law(law, motion, budget.time_s, random_part_options(options)));
+  } else {
+    budget.flags.push_back("the law file carries no uncertainty of a fit: no random part");
+  }
+}
 
 BudgetStage law_stage(const LawFile& law, const Protocol& motion,
                       const std::vector<double>& times_s) {
@@ -188,16 +183,20 @@ ErrorBudget contact_budget(const LawFile& law, const Protocol& motion, std::vect
   for (BudgetStage& stage : loop_stages(plain, motion, times_s, options.device)) {
     stages.push_back(std::move(stage));
   }
-  return concluded(fmt::format("{} at one contact", law_name(law.spec)), std::move(times_s),
-                   std::move(stages), plain, motion, options);
+  ErrorBudget budget = budget_of(std::move(times_s), std::move(stages));
+  budget.title = fmt::format("{} at one contact", law_name(law.spec));
+  add_random_part(budget, plain, motion, options);
+  conclude(budget);
+  return budget;
 }
 
 ErrorBudget contact_budget(const LawFile& law, const PreparedRecording& recording,
                            const BudgetOptions& options) {
   require_contact_law(law);
   const Recording& r = recording.recording;
-  // The recording's own contact and offset, found as a prediction finds them.
-  const LawPrediction placed = predict_recording(law, recording, {});
+  // The recording's own contact and offset, found as a prediction finds them. They scatter with
+  // the material: alone, the material would scatter far more than the force does.
+  const LawPrediction placed = predict_recording(law, recording, random_part_options(options));
   std::vector<double> depth = r.drive;
   for (double& d : depth) d -= placed.contact;
   Protocol motion = measured_history(Drive::displacement, r.time_s, depth);
@@ -214,9 +213,12 @@ ErrorBudget contact_budget(const LawFile& law, const PreparedRecording& recordin
   for (BudgetStage& stage : loop_stages(plain, motion, times_s, options.device)) {
     stages.push_back(std::move(stage));
   }
-  return concluded(fmt::format("{} along {}", law_name(law.spec),
-                               std::filesystem::path(recording.name).filename().string()),
-                   std::move(times_s), std::move(stages), plain, motion, options);
+  ErrorBudget budget = budget_of(std::move(times_s), std::move(stages));
+  budget.title = fmt::format("{} along {}", law_name(law.spec),
+                             std::filesystem::path(recording.name).filename().string());
+  add_random_part(budget, placed);
+  conclude(budget);
+  return budget;
 }
 
 }  // namespace tpm

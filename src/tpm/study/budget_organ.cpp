@@ -18,7 +18,7 @@ constexpr double kTighterRun = 0.01;   // of the scene's tolerance: what its run
 constexpr double kInertialRun = 1e-6;  // of a step, of the run with masses
 constexpr int kTimesPerPiece = 160, kMostBudgetTimes = 600;
 
-std::vector<double> response_of(const PlanTrajectory& run) {
+std::vector<double> response_of(const Trajectory& run) {
   return {run.response.begin(), run.response.end()};
 }
 
@@ -128,7 +128,7 @@ ErrorBudget organ_budget(const std::optional<LawFile>& law, const ExperimentScen
     fine.emplace(std::move(other));
   }
   std::vector<double> times_s = sampled_times(scene.protocol, kTimesPerPiece, kMostBudgetTimes,
-                                              scene.tissue.material.relaxation_time_s());
+                                              network.driven().bonds.shortest_relaxation_time_s());
   std::vector<BudgetStage> stages;
   if (law) stages.push_back(law_stage(at_surface(*law), scene.protocol, times_s));
   add_organ_stages(stages, network, fine, times_s);

@@ -3,6 +3,7 @@
 #include <functional>
 
 #include "tpm/study/error_budget.hpp"
+#include "tpm/study/law_prediction.hpp"
 
 namespace tpm {
 
@@ -37,7 +38,11 @@ void add_device_stages(std::vector<BudgetStage>& stages, const SteppedForces& sm
                                                    const std::vector<double>& times_s,
                                                    const BudgetDevice& device);
 
-/// Half the width of the band of the law's force over drawn laws; a flag if the law has none.
+/// Half the width of a prediction's band of the mean, within the ramp and hold of a recording.
+void add_random_part(ErrorBudget& budget, const LawPrediction& prediction);
+/// How a prediction is asked for it.
+[[nodiscard]] PredictionOptions random_part_options(const BudgetOptions& options);
+/// The same along a motion from the surface; a flag if the law carries no uncertainty.
 void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& motion,
                      const BudgetOptions& options);
 

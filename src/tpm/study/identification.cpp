@@ -68,20 +68,18 @@ class StoppingRule {
   bool stops_at(const IdentifiedSample& sample, const HoldWatch& hold) {
     const bool narrow =
         hold.holds() && sample.estimate.widest_relative_half_width() <= options_.target;
-    if (!narrow || law_ != sample.law) {
-      since_.reset();
-      law_ = sample.law;
-      if (!narrow) return false;
-    }
     const auto n = static_cast<double>(sample.estimate.samples);
-    if (!since_) since_ = n;
-    return n >= options_.patience * *since_;
+    if (!was_narrow_ || law_ != sample.law) since_ = n;
+    was_narrow_ = narrow;
+    law_ = sample.law;
+    return narrow && n >= options_.patience * since_;
   }
 
  private:
   const IdentifyOptions& options_;
-  std::optional<double> since_;
-  std::optional<std::size_t> law_;
+  bool was_narrow_ = false;
+  double since_ = 0.0;  ///< samples when the widths became narrow
+  std::size_t law_ = 0;
 };
 
 Coordinate coordinate_of(Scale scale) {
@@ -176,6 +174,11 @@ Identification identify(const PreparedRecording& recording, const IdentifyOption
         "neighbouring residuals are correlated by {}: the law does not fit, or the zero drifts; "
         "intervals take it for noise",
         significant(id.result().estimate.phi, 4)));
+  }
+  for (const SequentialParameter& p : id.result().estimate.parameters) {
+    if (!p.nuisance || !p.at_bound) continue;
+    id.flags.push_back(fmt::format(
+        "{} stands on its automatic bound: the intervals hold only there", p.parameter.name));
   }
   if (!id.result().estimate.identified) {
     id.flags.push_back("a material parameter stands on a bound or is not told apart from others");

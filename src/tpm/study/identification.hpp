@@ -57,7 +57,7 @@ struct Identification {
 /// told from a relaxing one by nothing. It looks at widths, never at estimates or at how well they
 /// fit. A fixed-sample interval at the first time its own estimated width is small enough would
 /// hold the truth too rarely (Chow & Robbins, Ann. Math. Stat. 36 (1965) 457: only in the limit of
-/// narrow widths); `patience` takes most of that away, and docs/identify.md counts what remains.
+/// narrow widths); `patience` takes most of that away, and how much remains is to be counted.
 /// Throws Error(bad_input) for options out of range or a recording without a ramp.
 [[nodiscard]] Identification identify(const PreparedRecording& recording,
                                       const IdentifyOptions& options);

@@ -81,7 +81,7 @@ class ReplayedLoop {
     while (sample < r.time_s.size() && r.time_s[sample] <= known.time_s) move_to(sample++);
   }
 
-  void step(double depth) { (void)current_->contact.step({0.0, 0.0, depth}); }
+  void step(double depth) { (void)current_->contact.step(Eigen::Vector3d(0.0, 0.0, depth)); }
 
   void try_hand_over(double now_s) {
     if (!waiting_) return;

@@ -238,12 +238,6 @@ std::optional<SequentialFit::Prefix> SequentialFit::prefix() const {
   try {
     PreparedRecording prepared = prepare_recording("what was recorded so far", recording_);
     FitConfig config = recording_config(spec_, std::span(&prepared, 1), setup);
-    const std::vector<LawParameter> table = law_parameters(spec_);
-    for (EstimatedParameter& p : config.parameters) {  // no interval is to end at a usual bound
-      if (!p.widest || !table[p.sets.front().parameter].nuisance) continue;
-      p.fit.lower = p.widest->lower;
-      p.fit.upper = p.widest->upper;
-    }
     return Prefix{std::move(prepared), std::move(config)};
   } catch (const Error& error) {  // no ramp yet
     if (error.code() != ExitCode::bad_input) throw;

@@ -10,6 +10,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/model/closed_form.hpp"
+#include "tpm/protocol/protocol_block.hpp"
 #include "tpm/solve/creep_exact.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
 
@@ -263,18 +264,26 @@ ContactSetup read_setup(const Json& document, const DocumentPlace& place) {
                 {kE1, kE2, kEprime, kEta1, kSpacing, kA0, kL0}, setup.values);
     require_valid(element_of(setup.values), place.key("material").where);
   }
-  if (document.contains("indentation")) {
-    const Json& block = document.at("indentation");
-    setup.indentation = block.at("kind").get<std::string>() == "step_hold" ? Indentation::step_hold
-                                                                           : Indentation::ramp_hold;
-    if (setup.indentation == Indentation::step_hold) setup.values[kHold] = kForever;
-    read_values(block, place.key("indentation"), {kDepth, kRate, kHold}, setup.values);
-  }
+  const auto put = [&](std::size_t index, const std::optional<double>& value, double otherwise) {
+    setup.values[index] = value.value_or(otherwise);
+  };
   // What jumps may be held for ever; a ramp's hold has an end.
+  if (document.contains("indentation")) {
+    const ProtocolBlock block =
+        parse_protocol_block(document.at("indentation"), place.key("indentation"), Openness::open);
+    const bool step = block.kind == ProtocolKind::step_hold;
+    setup.indentation = step ? Indentation::step_hold : Indentation::ramp_hold;
+    put(kDepth, block.depth_m, kNotGiven);
+    put(kRate, block.rate_m_per_s, kNotGiven);
+    put(kHold, block.hold_s, step ? kForever : kNotGiven);
+  }
   setup.values[kDuration] = kForever;
   setup.creep = document.contains("creep");
   if (setup.creep) {
-    read_values(document.at("creep"), place.key("creep"), {kLoad, kDuration}, setup.values);
+    const ProtocolBlock block = parse_protocol_block(document.at("creep"), place.key("creep"),
+                                                     Openness::open, ProtocolKind::creep);
+    put(kLoad, block.load_N, kNotGiven);
+    put(kDuration, block.duration_s, kForever);
   }
   setup.outputs = parse_sweep_outputs(document.at("outputs"), place.key("outputs"));
   return setup;

@@ -12,6 +12,7 @@
 #include "tpm/model/model.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/shared_plan.hpp"
+#include "tpm/protocol/protocol_block.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
@@ -32,12 +33,14 @@ struct SceneKey {
 /// What a sweep's document says of the organ.
 struct OrganSetup {
   Json scene;
+  ProtocolBlock protocol;  ///< of the scene
   std::filesystem::path folder;
   bool by_depth = true;
   std::optional<double> tolerance = std::nullopt;  ///< of the sweep; none: that of the scene
   std::vector<SweepOutput> outputs;
 };
 
+constexpr std::string_view kNetwork = "quasi_static";
 constexpr double kLeastOfSweep = 1e-6, kMostOfSweep = 0.5;
 constexpr double kLeastTolerance = 1e-12;  // of QuasiStaticOptions
 
@@ -77,6 +80,19 @@ void put_value(Json& scene, const SceneKey& key, double value, const std::string
     scene.at(key.pointer) = static_cast<std::int64_t>(value);
   } else {
     throw bad_input(target, shortest(value), "a whole number");
+  }
+}
+
+/// Sets the number of a protocol that a JSON pointer into the scene names; leaves others alone.
+void set_number(ProtocolBlock& protocol, const std::string& target, double value) {
+  constexpr std::string_view kProtocol = "/protocol/", kKnots = "/protocol/knots/";
+  if (target.starts_with(kKnots)) {
+    const std::string rest = target.substr(kKnots.size());
+    const std::size_t slash = rest.find('/');
+    Knot& knot = protocol.knots.at(std::stoul(rest.substr(0, slash)));
+    (rest.substr(slash + 1) == "time" ? knot.time_s : knot.value) = value;
+  } else if (target.starts_with(kProtocol)) {
+    *protocol.find(target.substr(kProtocol.size())) = value;
   }
 }
 
@@ -120,14 +136,18 @@ std::vector<std::string> names_of_models(double tolerance) {
   return names;
 }
 
+bool is_of_protocol(const std::string& target) {
+  return target.starts_with("/protocol/");
+}
+
 bool is_light(const std::string& target) {
-  return target.starts_with("/material/") || target.starts_with("/protocol/") ||
+  return target.starts_with("/material/") || is_of_protocol(target) ||
          target.starts_with("/integrator/") || target == "/tolerance";
 }
 
 /// What a shared plan answers to without being made anew.
 bool is_shared(const std::string& target) {
-  return target.starts_with("/protocol/") || target == "/material/eta1";
+  return is_of_protocol(target) || target == "/material/eta1";
 }
 
 /// Whether a grid of claims for the cells that share organ and moduli costs less than running them.
@@ -219,11 +239,12 @@ class OrganCell final : public CellModel {
                  std::span<std::int64_t> counts) override {
     Json changed = setup_.scene;
     for (std::size_t i = 0; i < swept.size(); ++i) {
-      put_value(changed, keys_[i], swept[i], targets_[i]);
+      if (!is_of_protocol(targets_[i])) put_value(changed, keys_[i], swept[i], targets_[i]);
     }
     std::string structure;
     const ExperimentScene scene = scene_of(swept, changed, structure);
     const AskedTimes times(scene.protocol, setup_.outputs);
+    if (scene.formulation.kind != kNetwork) return on_formulation(scene, times, values, counts);
     if (plans_ != nullptr) {
       if (auto answer = on_reduced(scene, structure, times, values, counts)) return *answer;
     }
@@ -252,6 +273,16 @@ class OrganCell final : public CellModel {
     counts[kSteps] = static_cast<std::int64_t>(answer->steps);
     fill(answer->response, scene.protocol, times, values);
     return CellAnswer{answer->claim, static_cast<std::uint8_t>(answer->model)};
+  }
+
+  /// Any formulation that runs scenes.
+  CellAnswer on_formulation(const ExperimentScene& scene, const AskedTimes& times,
+                            std::span<double> values, std::span<std::int64_t> counts) const {
+    const Trajectory answer = run_scene(scene, times.all(), false);
+    counts[kSteps] = static_cast<std::int64_t>(answer.steps);
+    fill(answer.response, scene.protocol, times, values);
+    const double peak = answer.response.cwiseAbs().maxCoeff();
+    return {peak > 0.0 ? answer.error_estimate / peak : 0.0, 0};
   }
 
   CellAnswer on_network(const PlanScene& scene, const Json& changed, const AskedTimes& times,
@@ -321,7 +352,9 @@ class OrganCell final : public CellModel {
                        scene.tissue.network.organ, place.key("material"));
     scene.tissue.materials = std::move(material.materials);
     scene.tissue.paper_element = material.element;
-    scene.protocol = parse_scene_protocol(changed.at("protocol"), place.key("protocol"));
+    ProtocolBlock protocol = setup_.protocol;
+    for (std::size_t i = 0; i < swept.size(); ++i) set_number(protocol, targets_[i], swept[i]);
+    scene.protocol = protocol.protocol(place.key("protocol"));
     require_possible(scene.protocol, scene.contacts, scene.tissue, place.key("protocol"));
     return scene;
   }
@@ -437,7 +470,9 @@ void require_outputs(const OrganSetup& setup, const DocumentPlace& place) {
 std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::string_view where,
                                                     const std::filesystem::path& folder) {
   const DocumentPlace place{std::string(where)};
-  OrganSetup setup{document.at("scene"), folder, true, {}, {}};
+  OrganSetup setup;
+  setup.scene = document.at("scene");
+  setup.folder = folder;
   if (document.contains("tolerance")) {
     const auto text = document.at("tolerance").get<std::string>();
     setup.tolerance = parse_quantity(text, Dimension::dimensionless, place.key("tolerance").where);
@@ -451,9 +486,15 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::s
   setup.outputs = parse_sweep_outputs(document.at("outputs"), place.key("outputs"));
   const ExperimentScene scene =
       parse_experiment(setup.scene, fmt::format("{}: scene", where), folder);
-  if (scene.formulation.kind != FormulationKind::quasi_static || scene.formulation.mass_spring) {
-    throw bad_input(place.key("scene").where, "another formulation than quasi_static",
-                    "a scene of the quasi-static tissue");
+  if (scene.formulation.mass_spring) {
+    throw bad_input(place.key("scene").where, "runs the mass-spring model",
+                    "the tissue: without a comparison");
+  }
+  require_runnable(scene);
+  if (scene.formulation.kind != kNetwork && (setup.tolerance || document.contains("integrator"))) {
+    throw bad_input(place.key(setup.tolerance ? "tolerance" : "integrator").where,
+                    fmt::format("beside the formulation '{}'", scene.formulation.kind),
+                    fmt::format("a scene of the formulation '{}'", kNetwork));
   }
   // Of the sweep, not of the scene; here where pointers find it.
   if (document.contains("integrator")) {
@@ -461,6 +502,8 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::s
     static_cast<void>(positive_at(document.at("integrator"), "step", Dimension::time, at));
     setup.scene["integrator"] = document.at("integrator");
   }
+  setup.protocol =
+      parse_protocol_block(setup.scene.at("protocol"), DocumentPlace{"scene"}, Openness::complete);
   setup.by_depth = scene.protocol.drive() == Drive::displacement;
   require_outputs(setup, place.key("outputs"));
   return std::make_shared<OrganSweepModel>(std::move(setup));

@@ -1,0 +1,151 @@
+#pragma once
+#include <array>
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tpm {
+
+/// What a formulation can do. Whoever asks for more than it can is told which ones can.
+struct Capabilities {
+  bool network = false;           ///< any tissue of a scene; else the star of four spheres only
+  bool depth = false;             ///< driven by an imposed depth
+  bool load = false;              ///< driven by an imposed load
+  bool jumps = false;             ///< what is imposed may jump
+  bool field = false;             ///< displacements of all spheres
+  bool masses = false;            ///< spheres may have mass
+  bool several_contacts = false;  ///< patches, or several driven spheres
+  bool tools = false;             ///< rigid balls and punches
+  bool servo = false;             ///< steps a contact at a fixed rate in bounded time
+  bool derivatives = false;       ///< exact derivatives by the parameters
+  bool course = true;             ///< follows the course of time; else each instant stands alone
+  bool beforehand = false;        ///< needs the whole protocol before it begins
+  bool planned = false;           ///< `tpm plan` considers it
+};
+
+/// A capability with its word in lists and its place in messages: "a formulation that ...".
+struct CapabilityEntry {
+  bool Capabilities::*meaning;
+  std::string_view text;
+  std::string_view words;
+};
+inline constexpr std::array<CapabilityEntry, 13> kCapabilities{{
+    {&Capabilities::network, "network", "runs on any network, not only on the star"},
+    {&Capabilities::depth, "depth", "is driven by a depth"},
+    {&Capabilities::load, "load", "is driven by a load"},
+    {&Capabilities::jumps, "jumps", "takes jumps of what is imposed"},
+    {&Capabilities::field, "field", "knows the displacements of all spheres"},
+    {&Capabilities::masses, "masses", "gives spheres mass"},
+    {&Capabilities::several_contacts, "several_contacts", "drives several spheres"},
+    {&Capabilities::tools, "tools", "lets tools touch and leave"},
+    {&Capabilities::servo, "servo", "steps a contact at a servo's rate"},
+    {&Capabilities::derivatives, "derivatives", "has derivatives by the parameters"},
+    {&Capabilities::course, "course", "follows the course of time"},
+    {&Capabilities::beforehand, "beforehand", "needs the protocol beforehand"},
+    {&Capabilities::planned, "planned", "is considered by tpm plan"},
+}};
+
+/// One way to compute how tissue answers: equations with a method that solves them. It states what
+/// it is and what it can do; what it does for whom stands in its roles, interfaces that it
+/// implements besides this one:
+///
+/// | role | asked by |
+/// | --- | --- |
+/// | ModelMaker (model/model.hpp) | fits, tables, designs: response and derivatives of the element
+/// | | SceneRunner (simulate/scene_runner.hpp) | scenes, sweeps; plans, if `planned` | |
+/// StateRunner (simulate/scene_runner.hpp) | scenes: all states, with checkpoints | | PlanOffer
+/// (plan/plan_model.hpp) | plans: candidates that claim an error and a cost | | LoopMaker
+/// (haptics/loop_maker.hpp) | sessions: what the servo loop steps |
+///
+/// Formulations are objects that never change, one or several in a file of formulations/, which the
+/// build lists (docs/architecture.md, "Adding a formulation").
+class Formulation {
+ public:
+  /// What stands in a list.
+  struct Entry {
+    std::string_view name;     ///< its word in files
+    std::string_view meaning;  ///< one sentence without a full stop
+    Capabilities can;
+    int rank = 1000;  ///< place in lists: the cheap ones first
+    /// Keys of a scene's block `formulation` that it takes besides `kind`.
+    std::vector<std::string_view> keys = {};
+    std::string_view also = {};  ///< an older word for it in files; may be empty
+  };
+
+  explicit Formulation(Entry entry) : entry_(std::move(entry)) {}
+  Formulation(const Formulation&) = delete;
+  Formulation& operator=(const Formulation&) = delete;
+  virtual ~Formulation() = default;
+
+  [[nodiscard]] std::string_view name() const { return entry_.name; }
+  [[nodiscard]] std::string_view meaning() const { return entry_.meaning; }
+  [[nodiscard]] const Capabilities& can() const { return entry_.can; }
+  [[nodiscard]] int rank() const { return entry_.rank; }
+  [[nodiscard]] std::string_view also() const { return entry_.also; }
+  [[nodiscard]] const std::vector<std::string_view>& keys() const { return entry_.keys; }
+  [[nodiscard]] bool takes(std::string_view key) const;
+
+  /// This formulation in one of its roles; null if it does not have it.
+  template <class Role>
+  [[nodiscard]] const Role* as() const {
+    return dynamic_cast<const Role*>(this);
+  }
+
+ private:
+  Entry entry_;
+};
+
+using Formulations = std::span<const Formulation* const>;
+
+/// All formulations by rank. Defined in a source that the build writes from the files of
+/// formulations/: a program that is linked with another list has other formulations.
+[[nodiscard]] Formulations formulations();
+
+/// Those of several lists, by rank and name. Throws std::logic_error if two share a name.
+[[nodiscard]] std::vector<const Formulation*> joined(std::initializer_list<Formulations> lists);
+
+/// The one of this name; null if there is none.
+[[nodiscard]] const Formulation* find_formulation(std::string_view name);
+
+/// The names of those for which `is` holds, separated by commas.
+template <class Predicate>
+[[nodiscard]] std::string formulations_that(Predicate&& is) {
+  std::string names;
+  for (const Formulation* f : formulations()) {
+    if (is(*f)) names.append(names.empty() ? "" : ", ").append(f->name());
+  }
+  return names;
+}
+
+/// Throws Error(bad_input): there is none of this name where `able` are the names that would do.
+/// @param noun what is named, such as "formulation"
+[[noreturn]] void refuse_formulation(std::string_view name, std::string_view noun,
+                                     std::string_view where, const std::string& able);
+/// Throws Error(bad_input): this one cannot, those `able` can.
+[[noreturn]] void refuse_capability(const Formulation& f, bool Capabilities::*capability,
+                                    std::string_view where, const std::string& able);
+
+/// The formulation of this name, which has the role. Throws Error(bad_input) that names those that
+/// have it.
+template <class Role>
+[[nodiscard]] const Formulation& formulation_with(std::string_view name, std::string_view noun,
+                                                  std::string_view where) {
+  const Formulation* f = find_formulation(name);
+  if (f != nullptr && f->as<Role>() != nullptr) return *f;
+  refuse_formulation(name, noun, where, formulations_that([](const Formulation& other) {
+                       return other.as<Role>() != nullptr;
+                     }));
+}
+
+/// Throws Error(bad_input) that names the formulations in the role that can, unless this one can.
+template <class Role>
+void require_can(const Formulation& f, bool Capabilities::*capability, std::string_view where) {
+  if (f.can().*capability) return;
+  refuse_capability(f, capability, where, formulations_that([&](const Formulation& other) {
+                      return other.can().*capability && other.as<Role>() != nullptr;
+                    }));
+}
+
+}  // namespace tpm

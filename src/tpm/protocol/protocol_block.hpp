@@ -1,0 +1,56 @@
+#pragma once
+// Protocols in files: one table of kinds and keys, one parser, one place where they are made.
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "tpm/core/units.hpp"
+#include "tpm/protocol/protocol.hpp"
+#include "tpm/store/document_place.hpp"
+
+namespace tpm {
+
+/// The protocols that files name.
+enum class ProtocolKind {
+  ramp_hold,  ///< from rest to `depth` at `rate`, then held for `hold`
+  step_hold,  ///< at once to `depth`, then held for `hold`
+  creep,      ///< `load` at once, kept for `duration`
+  knots,      ///< linear between corners
+};
+
+/// What a block says of a protocol. Numbers may be open as long as something else will set them: an
+/// axis of a sweep, the data of a fit.
+struct ProtocolBlock {
+  ProtocolKind kind = ProtocolKind::ramp_hold;
+  std::optional<double> depth_m, rate_m_per_s, hold_s, load_N, duration_s;
+  Drive drive = Drive::displacement;  ///< of knots
+  std::vector<Knot> knots;
+
+  /// The number under a key of the block's kind, such as "depth"; null for another key.
+  [[nodiscard]] std::optional<double>* find(std::string_view key);
+  /// Throws Error(bad_input) for a number that is open or out of range, at its key.
+  [[nodiscard]] Protocol protocol(const DocumentPlace& place) const;
+};
+
+/// A key of a block with what it means.
+struct ProtocolKey {
+  std::string_view text;
+  Dimension dimension;
+  std::optional<double> ProtocolBlock::*value;
+  bool may_be_zero;
+};
+/// The keys of a kind, in their order; none of `knots`.
+[[nodiscard]] std::vector<ProtocolKey> protocol_keys(ProtocolKind kind);
+
+enum class Openness {
+  complete,  ///< every key has to be there
+  open,      ///< what is missing stays open
+};
+
+/// A block with the key `kind`, or of a kind that its place in the file says.
+/// Throws Error(bad_input) for unknown kinds, keys of others, and what is not a number of its unit.
+[[nodiscard]] ProtocolBlock parse_protocol_block(const Json& block, const DocumentPlace& place,
+                                                 Openness openness,
+                                                 std::optional<ProtocolKind> kind = std::nullopt);
+
+}  // namespace tpm

@@ -1,0 +1,36 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/simulate/scene_runner.hpp"
+#include "tpm/store/hdf5.hpp"
+#include "tpm/store/json.hpp"
+
+namespace tpm {
+
+/// Adds what is imposed, the response, its largest and last value to a description of a run.
+void add_trajectory(Json& json, const ExperimentScene& scene, const std::vector<double>& times_s,
+                    const Trajectory& answer);
+/// The same in a line.
+[[nodiscard]] std::string trajectory_text(bool by_depth, const std::vector<double>& times_s,
+                                          const Trajectory& answer);
+/// Writes /curve and, where displacements are known, /steps.
+void write_trajectory(const ExperimentScene& scene, const std::vector<double>& times_s,
+                      const Trajectory& answer, Hdf5Writer& file);
+
+// Runs of scenes by formulations that do not show whole states.
+[[nodiscard]] Json scene_run_json(const ExperimentScene& scene, const std::vector<double>& times_s,
+                                  const Trajectory& answer);
+[[nodiscard]] std::string scene_run_text(const ExperimentScene& scene,
+                                         const std::vector<double>& times_s,
+                                         const Trajectory& answer);
+/// Throws Error(environment).
+void write_scene_run(const ExperimentScene& scene, const std::vector<double>& times_s,
+                     const Trajectory& answer, const std::filesystem::path& path);
+
+/// All formulations with what they can do: name, meaning, capabilities, keys in scenes, sessions.
+[[nodiscard]] Json formulations_json();
+[[nodiscard]] std::string formulations_text();
+
+}  // namespace tpm
