@@ -59,22 +59,17 @@ LaneVector StageBalance::responses_within(const TissueState& state,
   return responses(within(state, fractions, h, rate));
 }
 
-std::vector<TissueState> StageBalance::states_within(const TissueState& state,
-                                                     std::span<const double> fractions, double h,
-                                                     double rate) {
-  Within states = within(state, fractions, h, rate);
-  force_.setZero();
-  tissue_.add_load(states.imposed, force_);
-  bonds_.add_forces(states.position, states.memory, force_);
-  tissue_.freedom().project(force_);
-  d_ = force_;
+StatesWithin StageBalance::states_within(const TissueState& state,
+                                         std::span<const double> fractions, double h, double rate) {
+  const Within states = within(state, fractions, h, rate);
+  StatesWithin all{responses(states), std::vector<TissueState>(fractions.size(), state)};
+  d_ = force_;  // what responses() left of them
   factor_.solve(d_);
   tissue_.freedom().project(d_);
-  std::vector<TissueState> all(fractions.size(), state);
   Eigen::MatrixXd viscous;
   for (std::size_t lane = 0; lane < fractions.size(); ++lane) {
     const auto row = static_cast<Eigen::Index>(lane);
-    TissueState& at = all[lane];
+    TissueState& at = all.states[lane];
     ++work_.back_solves;
     at.time_s += fractions[lane] * h;
     at.imposed = states.imposed[row];
