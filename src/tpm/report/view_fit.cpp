@@ -176,41 +176,49 @@ bool is_answer(const Json& json) {
   return json.contains("parameters") && json.contains("model") && json.contains("chi_square");
 }
 
+/// A law, with the figures beside it if there are any.
+void add_law_and_figures(ViewPage& page, const Json& law, const std::filesystem::path& file) {
+  add_law(page, law, file);
+  const std::filesystem::path figures = file.parent_path() / "figures.json";
+  if (!std::filesystem::exists(figures)) {
+    page.fact("curves", "none: there is no figures.json beside the law");
+    return;
+  }
+  page.fact("curves", "from figures.json beside it, SHA-256 " + sha256_hex(read_file(figures)));
+  add_figures(page, read_json(figures), figures.string());
+}
+
+/// Fills the page from whatever of a fit the file is; false if it is nothing of it.
+bool add_fit(ViewPage& page, const Json& json, const std::filesystem::path& file) {
+  try {
+    const Json& fit = json.contains("fit") ? json.at("fit") : json;
+    if (json.contains("figures")) {
+      add_figures(page, json, file.string());
+    } else if (is_law(json)) {
+      add_law_and_figures(page, json, file);
+    } else if (is_answer(fit)) {
+      add_answer(page, fit);
+    } else {
+      return false;
+    }
+  } catch (const Json::exception& e) {
+    throw bad_input(file.string(), fmt::format("is not as tpm fit writes it ({})", e.what()),
+                    "a file of tpm fit");
+  }
+  return true;
+}
+
 }  // namespace
 
 ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes) {
-  const std::string where = file.string();
-  const Json json = parse_json(bytes, where);
+  const Json json = parse_json(bytes, file.string());
   ViewPage page = begun_page("fit", file, bytes);
   page.description["badge"] = "FIT";
-  if (json.contains("figures")) {
-    add_figures(page, json, where);
-    return page;
+  if (!add_fit(page, json, file)) {
+    throw bad_input(file.string(), "is JSON that tpm view does not show",
+                    "law.json, figures.json or the JSON answer of tpm fit");
   }
-  try {
-    if (is_law(json)) {
-      add_law(page, json, file);
-      const std::filesystem::path figures = file.parent_path() / "figures.json";
-      if (std::filesystem::exists(figures)) {
-        page.fact("curves",
-                  "from figures.json beside it, SHA-256 " + sha256_hex(read_file(figures)));
-        add_figures(page, read_json(figures), figures.string());
-      } else {
-        page.fact("curves", "none: there is no figures.json beside the law");
-      }
-      return page;
-    }
-    const Json& fit = json.contains("fit") ? json.at("fit") : json;
-    if (is_answer(fit)) {
-      add_answer(page, fit);
-      return page;
-    }
-  } catch (const Json::exception& e) {
-    throw bad_input(where, fmt::format("is not as tpm fit writes it ({})", e.what()),
-                    "a file of tpm fit");
-  }
-  throw bad_input(where, "is JSON that tpm view does not show",
-                  "law.json, figures.json or the JSON answer of tpm fit");
+  return page;
 }
 
 }  // namespace tpm
