@@ -217,7 +217,7 @@ Organ parse_block(const Json& block, const DocumentPlace& place) {
 }
 
 Organ parse_star(const Json& block, const DocumentPlace& place) {
-  const double spacing = length_at(block, "spacing", place).value_or(TpmParameters{}.spacing_m);
+  const double spacing = length_at(block, "spacing", place).value_or(BondElement{}.spacing_m);
   const double length = length_at(block, "length", place).value_or(0.020);
   return made(place, [&] { return star(spacing, length); });
 }

@@ -255,15 +255,10 @@ class OrganCell final : public CellModel {
   std::optional<CellAnswer> on_reduced(const ExperimentScene& scene, const std::string& structure,
                                        const AskedTimes& times, std::span<double> values,
                                        std::span<std::int64_t> counts) {
-    // Regions are no part of the key.
-    const MaterialField& field = scene.tissue.materials;
-    if (!scene.tissue.paper_element || field.materials.size() > 1 || field.factor.size() > 0) {
-      return {};
-    }
-    const TpmParameters& p = *scene.tissue.paper_element;
-    if (!(p.relaxation_time_s() > 0.0) || !std::isfinite(p.relaxation_time_s())) return {};
-    const std::string key =
-        fmt::format("{} {} {} {} {} {}", structure, p.E1_Pa, p.E2_Pa, p.Eprime_Pa, p.A0_m2, p.l0_m);
+    if (!scene.tissue.is_element()) return {};  // regions are no part of the key
+    const BondElement p = scene.tissue.element();
+    const std::string key = fmt::format("{} {} {} {} {} {}", structure, p.equilibrium_Pa,
+                                        p.relaxing_Pa(), p.lateral_Pa, p.A0_m2, p.l0_m);
     if (plan_ == nullptr || key != plan_key_) {
       plan_ = plans_->of(key, scene);
       plan_key_ = key;
@@ -351,7 +346,7 @@ class OrganCell final : public CellModel {
         parse_material(changed.value("material", Json::object()), scene.tissue.materials.lateral(),
                        scene.tissue.network.organ, place.key("material"));
     scene.tissue.materials = std::move(material.materials);
-    scene.tissue.paper_element = material.element;
+    scene.tissue.by_constants = material.by_constants;
     ProtocolBlock protocol = setup_.protocol;
     for (std::size_t i = 0; i < swept.size(); ++i) set_number(protocol, targets_[i], swept[i]);
     scene.protocol = protocol.protocol(place.key("protocol"));
