@@ -79,7 +79,7 @@ TEST_CASE("A step neither allocates nor frees") {
   VirtualOmega7 device(session.plant, session.operator_script());
   device.prepare(session.preparation);
   ElementContact model(slow_liver(), session.servo.period_s);
-  ServoSettings settings = session.servo;
+  ServoSettings settings{session.servo};
   ServoStep step(device, model, settings);
   ServoRecord row;
   StopCause cause = StopCause::none;

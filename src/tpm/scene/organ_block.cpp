@@ -279,8 +279,7 @@ Eigen::Vector3d parse_point(const Json& list, const DocumentPlace& place) {
   Eigen::Vector3d point;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    point(i) = parse_quantity(list.at(at).get<std::string>(), Dimension::length,
-                              place.key(std::to_string(at)).where);
+    point(i) = quantity_of(list.at(at), Dimension::length, place.key(std::to_string(at)).where);
   }
   return point;
 }
