@@ -22,7 +22,7 @@ inline std::vector<ErrorCase> sweep_error_cases() {
     return files({{"s.json", R"({"model": "organ", "scene": {"organ": {"kind": "star"},
 "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "1 s"}},
 "axes": [{"parameter": ")" + target +
-                                 R"(", "name": "a", "values": [")" + value + R"("]}],
+                                 R"(", "values": [")" + value + R"("]}],
 "outputs": ["peak_force"]})"}});
   };
   const std::string run = "sweep {}/s.json -o {}/out.h5";
