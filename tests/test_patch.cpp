@@ -2,8 +2,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "patch_test.hpp"
 #include "tpm/core/error.hpp"
-#include "tpm/network/patch_test.hpp"
 #include "tpm/network/simple_organs.hpp"
 
 using namespace tpm;
