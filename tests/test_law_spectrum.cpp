@@ -10,6 +10,7 @@
 #include "tpm/law/law_export.hpp"
 #include "tpm/law/law_file.hpp"
 #include "tpm/law/law_model.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/store/file.hpp"
 
 using namespace tpm;

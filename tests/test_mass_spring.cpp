@@ -9,6 +9,7 @@
 
 #include "star_network.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/network/roughness.hpp"

@@ -5,6 +5,7 @@
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/report/organ_study_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/organ_study.hpp"

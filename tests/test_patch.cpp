@@ -4,6 +4,7 @@
 
 #include "patch_test.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/simple_organs.hpp"
 
 using namespace tpm;

@@ -6,6 +6,7 @@
 
 #include "temp_folder.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/scene/inspection.hpp"

@@ -12,6 +12,7 @@
 #include "tpm/haptics/element_contact.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/servo/servo_loop.hpp"
 #include "tpm/store/file.hpp"
 

@@ -8,6 +8,7 @@
 #include "tpm/benchmark/contact_reference.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
