@@ -88,21 +88,20 @@ void check(Broken& broken, bool kept, const char* name, const std::string& found
 
 /// The closed form of the star, or with everything relaxed.
 Eigen::VectorXd exact(const ExperimentScene& scene, const std::vector<double>& times) {
-  const TpmParameters& p = scene.tissue.element("the suite");
+  const BondElement p = scene.tissue.element("the suite");
   if (scene.formulation.entry().can().course) {
     return ClosedForm{ModelOptions{}}
-        .respond(scene.protocol, times, to_vector(p), Want::values)
+        .respond(scene.protocol, times, element_constants(p), Want::values)
         .value;
   }
   Eigen::VectorXd response(std::ssize(times));
-  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
+  const TensionLaw tension = p.tension();
   for (std::size_t i = 0; i < times.size(); ++i) {
     const double imposed = value_at(scene.protocol, times[i]);
     response[static_cast<Eigen::Index>(i)] =
         scene.protocol.drive() == Drive::displacement
-            ? p.modulus_to_stiffness_m() *
-                  (p.relaxed_modulus_Pa() * imposed + tension.value(imposed))
-            : equilibrium_depth_m(p, p.relaxed_modulus_Pa(), imposed);
+            ? p.modulus_to_stiffness_m() * (p.equilibrium_Pa * imposed + tension.value(imposed))
+            : equilibrium_depth_m(p, p.equilibrium_Pa, imposed);
   }
   return response;
 }
@@ -146,9 +145,8 @@ void oscillator(const Formulation& f, Broken& broken) {
   if (!f.can().masses || !f.can().load || !f.can().jumps) return;
   ExperimentScene scene =
       star(R"("protocol": {"kind": "creep", "load": "0.05 N", "duration": "0.1 s"})", f);
-  TpmParameters element = scene.tissue.element("the suite");
-  element.Eprime_Pa = 0.0;
-  scene.tissue.set_element(element);
+  set_value(scene.tissue.materials.materials.front(), "Eprime", 0.0, "the suite");
+  const BondElement element = scene.tissue.element("the suite");
   scene.formulation.masses = true;
   scene.formulation.damping_ratio = 0.1;
   scene.formulation.tolerance = 1e-8;

@@ -16,6 +16,7 @@
 #include <regex>
 
 #include "error_case.hpp"
+#include "material_error_cases.hpp"
 #include "simulation_error_cases.hpp"
 #include "sweep_error_cases.hpp"
 #include "temp_folder.hpp"
@@ -702,7 +703,9 @@ std::vector<ErrorCase> all_cases() {
                             session_recording_cases(),
                             view_cases(),
                             test::simulation_error_cases(),
-                            test::sweep_error_cases()}) {
+                            test::sweep_error_cases(),
+                            test::material_error_cases(),
+                            test::plugin_error_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

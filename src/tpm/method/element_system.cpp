@@ -15,11 +15,11 @@ constexpr double kDepthGrain = 4.0 * std::numeric_limits<double>::epsilon();
 /// following e.
 class ElementForce {
  public:
-  explicit ElementForce(const TpmParameters& p)
+  explicit ElementForce(const BondElement& p)
       : unit_(p.modulus_to_stiffness_m()),
-        stiffness_(p.E2_Pa * unit_),
-        relaxing_(p.relaxing_modulus_Pa() * unit_),
-        tension_{p.Eprime_Pa, p.spacing_m} {}
+        stiffness_(p.instantaneous_Pa() * unit_),
+        relaxing_(p.relaxing_Pa() * unit_),
+        tension_(p.tension()) {}
 
   [[nodiscard]] double relaxing() const { return relaxing_; }
   [[nodiscard]] double force(double e, double offset, double following) const {
@@ -45,7 +45,7 @@ class ElementSystem final : public StageSystem,
                             public NewtonSystem,
                             public BalanceSystem {
  public:
-  ElementSystem(const TpmParameters& p, const Protocol& protocol,
+  ElementSystem(const BondElement& p, const Protocol& protocol,
                 const std::optional<MethodMasses>& mass)
       : law_(p),
         tau_(p.relaxation_time_s()),
@@ -260,14 +260,15 @@ class ElementSystem final : public StageSystem,
 
  private:
   /// Depth that may be expected.
-  static double depth_scale(const TpmParameters& p, const Protocol& protocol) {
+  static double depth_scale(const BondElement& p, const Protocol& protocol) {
     const double peak = protocol.peak();
     if (protocol.drive() == Drive::displacement) return peak;
-    if (p.relaxed_modulus_Pa() > 0.0 || p.Eprime_Pa > 0.0) {
-      return std::abs(equilibrium_depth_m(p, p.relaxed_modulus_Pa(), peak));
+    if (p.equilibrium_Pa > 0.0 || p.lateral_Pa > 0.0) {
+      return std::abs(equilibrium_depth_m(p, p.equilibrium_Pa, peak));
     }
     // A Maxwell fluid flows for as long as it is pushed; with neither spring it is free.
-    const double modulus = p.E2_Pa > 0.0 ? p.E2_Pa : p.E1_Pa;
+    constexpr double kSoft_Pa = 12e3;
+    const double modulus = p.relaxing_Pa() > 0.0 ? p.relaxing_Pa() : kSoft_Pa;
     const double lasts = protocol.knots().back().time_s - protocol.start_s();
     return peak / (modulus * p.modulus_to_stiffness_m()) * (1.0 + lasts / p.relaxation_time_s());
   }
@@ -329,7 +330,7 @@ class ElementSystem final : public StageSystem,
 
 }  // namespace
 
-std::unique_ptr<StepSystem> element_system(const TpmParameters& material, const Protocol& protocol,
+std::unique_ptr<StepSystem> element_system(const BondElement& material, const Protocol& protocol,
                                            const std::optional<MethodMasses>& mass) {
   return std::make_unique<ElementSystem>(material, protocol, mass);
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "tpm/material/bond_element.hpp"
 #include "tpm/network/driven_network.hpp"
 #include "tpm/protocol/protocol.hpp"
 
@@ -121,9 +122,9 @@ class MethodProblem {
                                       std::span<const double> times_s) const = 0;
 };
 
-/// One sphere on the paper's element (Eqs. 1 to 9), moved along its normal.
+/// One sphere on an element with one branch, moved along its normal.
 /// @param mass its mass: under an imposed depth it is dragged along and has no part in the motion
-[[nodiscard]] std::unique_ptr<MethodProblem> element_problem(const TpmParameters& material,
+[[nodiscard]] std::unique_ptr<MethodProblem> element_problem(const BondElement& material,
                                                              Protocol protocol,
                                                              std::optional<MethodMasses> mass = {});
 

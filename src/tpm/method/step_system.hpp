@@ -138,7 +138,7 @@ template <>
   return system.coordinates() > 0 ? nullptr : dynamic_cast<BalanceSystem*>(&system);
 }
 
-[[nodiscard]] std::unique_ptr<StepSystem> element_system(const TpmParameters& material,
+[[nodiscard]] std::unique_ptr<StepSystem> element_system(const BondElement& material,
                                                          const Protocol& protocol,
                                                          const std::optional<MethodMasses>& mass);
 

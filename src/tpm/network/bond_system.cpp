@@ -36,8 +36,8 @@ BondSystem::BondSystem(const Network& network, const MaterialField& materials)
   set_materials(network, materials);
 }
 
-BondSystem::BondSystem(const Network& network, const TpmParameters& element, LateralBond lateral)
-    : BondSystem(network, BondMaterial::of(element, lateral)) {}
+BondSystem::BondSystem(const Network& network, const BondMaterial& material)
+    : BondSystem(network, MaterialField(material)) {}
 
 std::uint16_t BondSystem::number_of(const ViscousLaw& law) {
   for (std::size_t i = 0; i < laws_.size(); ++i) {

@@ -36,7 +36,7 @@ std::optional<RampAndHold> as_ramp_and_hold(const Protocol& protocol) {
 }
 
 ExperimentScene with_unit_relaxation(ExperimentScene scene) {
-  scene.tissue.set_element(scene.tissue.paper_element.value().with_relaxation_time(1.0));
+  set_value(scene.tissue.materials.materials.front(), "tau1", 1.0, "shared plan");
   return scene;
 }
 
