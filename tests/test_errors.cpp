@@ -16,6 +16,7 @@
 #include <regex>
 
 #include "error_case.hpp"
+#include "material_error_cases.hpp"
 #include "simulation_error_cases.hpp"
 #include "sweep_error_cases.hpp"
 #include "temp_folder.hpp"
@@ -663,12 +664,26 @@ std::vector<ErrorCase> session_recording_cases() {
 
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
-  for (const auto& cases :
-       {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
-        hdf5_cases(), fit_config_cases(), oscillation_cases(), fit_tables_cases(), design_cases(),
-        claims_cases(), recording_folder_cases(), law_cases(), scene_cases(), table_option_cases(),
-        session_cases(), session_recording_cases(), test::simulation_error_cases(),
-        test::sweep_error_cases()}) {
+  for (const auto& cases : {curve_csv_cases(),
+                            curve_json_cases(),
+                            machine_cases(),
+                            spectrum_cases(),
+                            digitizer_cases(),
+                            hdf5_cases(),
+                            fit_config_cases(),
+                            oscillation_cases(),
+                            fit_tables_cases(),
+                            design_cases(),
+                            claims_cases(),
+                            recording_folder_cases(),
+                            law_cases(),
+                            scene_cases(),
+                            table_option_cases(),
+                            session_cases(),
+                            session_recording_cases(),
+                            test::simulation_error_cases(),
+                            test::sweep_error_cases(),
+                            test::material_error_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;
