@@ -37,8 +37,6 @@ inline std::vector<ErrorCase> material_error_cases() {
       {type, "two contacts", press,
        both(law, scene(R"(, "contacts": [{"kind": "sphere", "number": 1},
 {"kind": "sphere", "number": 2}])"))},
-      {type, "nothing anchored", press,
-       both(law, R"({"organ": {"kind": "block", "counts": [3, 3, 2], "spacing": "20 mm"}})")},
   };
 }
 

@@ -14,6 +14,7 @@
 #include "tpm/scene/organ_model.hpp"
 #include "tpm/scene/protocol_file.hpp"
 #include "tpm/study/budget_parts.hpp"
+#include "tpm/study/organ_material_parts.hpp"
 
 namespace tpm {
 namespace {
@@ -24,7 +25,8 @@ constexpr double kBoundFactor = 1e4;        // of moduli about their start
 constexpr double kTimeFactor = 100.0;       // of relaxation times
 constexpr double kStiffeningFactor = 20.0;  // of the deepest depth
 constexpr double kUnit_Pa = 1e3;
-constexpr double kAsked = 1e-3;  // of the peak: a unit of the residuals
+constexpr double kLateralRatio = 1.0;  // E' over instantaneous radial modulus: the paper's
+constexpr double kAsked = 1e-3;        // of the peak: a unit of the residuals
 
 /// The relaxation of a law in parallel form, and whether its kernel or tension bends.
 struct Relaxing {
@@ -81,54 +83,6 @@ void keep_corners(const std::vector<double>& t, const std::vector<double>& u, st
   keep_corners(t, u, corner, to, within, kept);
 }
 
-ForceMismatch mismatch(const OrganMaterial& m, const std::vector<double>& force,
-                       const std::vector<double>& target, const Protocol& motion,
-                       const std::vector<bool>& asked = {}) {
-  ForceMismatch r;
-  double squares = 0.0;
-  int count = 0;
-  for (std::size_t i = 0; i < force.size(); ++i) {
-    if (!asked.empty() && !asked[i]) continue;
-    const double part = (force[i] - target[i]) / m.peak_N;
-    squares += part * part;
-    ++count;
-    if (std::abs(part) <= r.largest) continue;
-    r.largest = std::abs(part);
-    r.at_s = m.time_s[i];
-    r.depth_m = m.depth_m[i];
-    const double h = 1e-6 * (motion.end_s() - motion.start_s());
-    const double before = std::max(r.at_s - h, motion.start_s());
-    r.rate_m_per_s = (m.depth_m[i] - value_at(motion, before)) / std::max(r.at_s - before, h);
-  }
-  r.rms = count > 0 ? std::sqrt(squares / count) : 0.0;
-  return r;
-}
-
-std::string quantity(double value, const char* unit) {
-  constexpr int kDigits = 10;
-  return fmt::format("{} {}", shortest(rounded(value, kDigits)), unit);
-}
-
-/// The block `material` of a scene.
-Json material_block(const BondMaterial& m, const Json& before) {
-  Json block{{"Einf", quantity(m.equilibrium_Pa, "Pa")}, {"Eprime", quantity(m.lateral_Pa, "Pa")}};
-  Json branches = Json::array();
-  for (const auto& [modulus, time] : m.branches) {
-    branches.push_back({{"g", quantity(modulus, "Pa")}, {"tau", quantity(time, "s")}});
-  }
-  if (!branches.empty()) block["branches"] = std::move(branches);
-  const auto add_function = [&](const char* key, const ElongationFunction& function) {
-    if (function.is_linear()) return;
-    block[key] = {{"shape", "cubic"}, {"stiffening", quantity(1e3 * function.length_m, "mm")}};
-  };
-  add_function("potential", m.potential);
-  add_function("kernel", m.kernel);
-  for (const char* key : {"A0", "l0", "between", "regions"}) {
-    if (before.contains(key)) block[key] = before.at(key);
-  }
-  return block;
-}
-
 /// An organ whose bonds have the fitted form of material.
 class FittedOrgan {
  public:
@@ -136,7 +90,6 @@ class FittedOrgan {
               const BondMaterial& unit);
 
   [[nodiscard]] const OrganModel& model() const { return *model_; }
-  [[nodiscard]] std::size_t spheres() const { return spheres_; }
   /// The scene with another material.
   [[nodiscard]] Json scene_with(const BondMaterial& material) const;
 
@@ -144,7 +97,6 @@ class FittedOrgan {
   Json scene_;
   Json material_before_ = Json::object();
   std::unique_ptr<OrganModel> model_;
-  std::size_t spheres_ = 0;
 };
 
 FittedOrgan::FittedOrgan(const Json& scene, std::string_view where,
@@ -176,7 +128,6 @@ FittedOrgan::FittedOrgan(const Json& scene, std::string_view where,
     organ.contact = probe->sphere;
     organ.normal.col(static_cast<Eigen::Index>(probe->sphere)) = -probe->direction;
   }
-  spheres_ = organ.size();
   model_ = std::make_unique<OrganModel>(std::move(tissue));
 }
 
@@ -191,12 +142,11 @@ Json FittedOrgan::scene_with(const BondMaterial& material) const {
 class OrganLessLaw final : public ResidualFunction {
  public:
   OrganLessLaw(const OrganModel& model, const MaterialMotion& motion, const OrganMaterial& target,
-               BondMaterial form, double lateral_ratio, bool fit_times)
+               BondMaterial form, bool fit_times)
       : model_(model),
         motion_(motion),
         target_(target),
         form_(std::move(form)),
-        lateral_ratio_(lateral_ratio),
         fit_times_(fit_times) {}
 
   [[nodiscard]] BondMaterial material(std::span<const double> natural) const {
@@ -209,7 +159,7 @@ class OrganLessLaw final : public ResidualFunction {
     }
     if (!m.potential.is_linear()) m.potential.length_m = natural[next++];
     if (!m.kernel.is_linear()) m.kernel = m.potential;
-    m.lateral_Pa = lateral_ratio_ * m.instantaneous_Pa();
+    m.lateral_Pa = kLateralRatio * m.instantaneous_Pa();
     return m;
   }
 
@@ -262,7 +212,7 @@ class OrganLessLaw final : public ResidualFunction {
     Eigen::Index next = 0;
     const auto add = [&](const std::string& name, bool modulus) {
       changes(row(name), next) = 1.0;
-      if (modulus) changes(row("Eprime"), next) = lateral_ratio_;
+      if (modulus) changes(row("Eprime"), next) = kLateralRatio;
       ++next;
     };
     add("Einf", true);
@@ -281,7 +231,6 @@ class OrganLessLaw final : public ResidualFunction {
   const MaterialMotion& motion_;
   const OrganMaterial& target_;
   BondMaterial form_;
-  double lateral_ratio_;
   bool fit_times_;
 };
 
@@ -349,7 +298,9 @@ LawScatter scatter_of(const LawFile& law, const MaterialMotion& motion) {
 }
 
 void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile& law,
-                   const MaterialMotion& motion, const std::vector<double>& natural) {
+                   const MaterialMotion& motion) {
+  std::vector<double> natural;
+  for (const OrganMaterialParameter& p : m.parameters) natural.push_back(p.value);
   if (!law.uncertainty) {
     m.flags.emplace_back("the law carries no uncertainty: no intervals");
     return;
@@ -379,83 +330,6 @@ void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile
     p.lower = p.parameter.natural(theta - half);
     p.upper = p.parameter.natural(theta + half);
   }
-}
-
-/// The motion as a block of a scene, where the scene says nothing: a ramp and a hold.
-Json ramp_block(const OrganMaterial& m, double rate_m_per_s) {
-  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
-  const double ramp_s = deepest / rate_m_per_s;
-  const double hold_s = std::max(m.time_s.back() - m.time_s.front() - ramp_s, 1.0);
-  constexpr int kDigits = 4;
-  const auto text = [](double value, const char* unit) {
-    return fmt::format("{} {}", significant(value, kDigits), unit);
-  };
-  return {{"kind", "ramp_hold"},
-          {"depth", text(1e3 * deepest, "mm")},
-          {"rate", text(1e3 * rate_m_per_s, "mm/s")},
-          {"hold", text(hold_s, "s")}};
-}
-
-/// Depth over time of the ramp: of the way from 10 to 90 % of the depth.
-double ramp_rate(const OrganMaterial& m) {
-  const double first = m.depth_m.front();
-  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
-  const auto when = [&](double share) {
-    const double level = first + share * (deepest - first);
-    std::size_t i = 0;
-    while (m.depth_m[i] < level) ++i;
-    return std::pair{m.time_s[i], m.depth_m[i]};
-  };
-  const auto [t1, u1] = when(0.1);
-  const auto [t2, u2] = when(0.9);
-  if (t2 > t1) return (u2 - u1) / (t2 - t1);
-  return deepest / std::max(m.time_s.back() - m.time_s.front(), 1e-3);
-}
-
-void add_scene_and_session(OrganMaterial& m, const FittedOrgan& organ) {
-  m.scene = organ.scene_with(m.material);
-  const double rate = ramp_rate(m);
-  const Json ramp = ramp_block(m, rate);
-  m.scene["description"] = fmt::format("material: law {} put on the organ {}", m.law, m.motion);
-  if (!m.scene.contains("protocol")) {
-    m.scene["protocol"] = ramp;
-    if (!m.scene.contains("contacts")) m.scene["contacts"] = Json::array({{{"kind", "sphere"}}});
-  }
-  Json tissue = Json::object();
-  for (const char* key : {"organ", "bonds", "material", "anchors", "guides"}) {
-    if (m.scene.contains(key)) tissue[key] = m.scene.at(key);
-  }
-  double longest_s = 0.0;
-  for (const auto& b : m.material.branches) longest_s = std::max(longest_s, b.relaxation_time_s);
-  constexpr double kRests = 8.0, kLeastRest_s = 5.0;
-  m.session = {
-      {"title", fmt::format("{} on an organ", m.law)},
-      {"model", {{"kind", "network"}, {"scene", std::move(tissue)}}},
-      {"rate", "1 kHz"},
-      {"indentations",
-       {{"depths", Json::array({ramp.at("depth")})},
-        {"rates", Json::array({ramp.at("rate")})},
-        {"hold", ramp.at("hold")},
-        {"rest",
-         fmt::format("{} s", significant(std::max(kRests * longest_s, kLeastRest_s), 3))}}}};
-}
-
-void compare(OrganMaterial& m, const Protocol& motion) {
-  m.start = mismatch(m, m.correspondence_N, m.law_N, motion);
-  m.organ = mismatch(m, m.organ_N, m.law_N, motion);
-  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
-  std::vector<bool> ramp(m.time_s.size()), hold(m.time_s.size());
-  constexpr double kHeld = 0.02;  // of the deepest depth from there on
-  bool reached = false;
-  for (std::size_t i = 0; i < m.time_s.size(); ++i) {
-    reached = reached || m.depth_m[i] >= (1.0 - kHeld) * deepest;
-    (reached ? hold : ramp)[i] = true;
-  }
-  m.ramp = mismatch(m, m.organ_N, m.law_N, motion, ramp);
-  m.hold = mismatch(m, m.organ_N, m.law_N, motion, hold);
-  if (m.measured_N.empty()) return;
-  m.law_to_recording = mismatch(m, m.law_N, m.measured_N, motion);
-  m.organ_to_recording = mismatch(m, m.organ_N, m.measured_N, motion);
 }
 
 }  // namespace
@@ -510,10 +384,9 @@ MaterialMotion motion_of_protocol(const Protocol& protocol, std::vector<double> 
   return {protocol, std::move(times), {}, "along the protocol"};
 }
 
-OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, const Json& scene,
-                           std::string_view where, const std::filesystem::path& folder,
-                           const OrganMaterialOptions& options) {
-  const Relaxing relaxing = relaxing_of(law);
+namespace {
+
+OrganMaterial law_along(const LawFile& law, const MaterialMotion& motion) {
   OrganMaterial m;
   m.law = law_name(law.spec);
   m.motion = motion.words;
@@ -522,11 +395,13 @@ OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, con
   for (const double t : m.time_s) m.depth_m.push_back(value_at(motion.protocol, t));
   m.law_N = law_stage(at_surface(law), motion.protocol, m.time_s).force_N;
   m.peak_N = *std::max_element(m.law_N.begin(), m.law_N.end());
-  if (!(m.peak_N > 0.0)) {
-    throw bad_input(fmt::format("law {}", m.law), "answers the motion without a force",
-                    "a motion that presses");
-  }
+  if (m.peak_N > 0.0) return m;
+  throw bad_input(fmt::format("law {}", m.law), "answers the motion without a force",
+                  "a motion that presses");
+}
 
+/// All bonds relax by the law's normalised function; instantaneous moduli of 1 kPa.
+BondMaterial unit_material(const Relaxing& relaxing) {
   BondMaterial unit;
   unit.lateral = LateralBond::relaxing;
   double whole = relaxing.prony.k_inf + relaxing.tension;
@@ -536,11 +411,14 @@ OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, con
     if (!(relaxing.prony.k[j] > 0.0)) continue;
     unit.branches.push_back({kUnit_Pa * relaxing.prony.k[j] / whole, relaxing.prony.tau_s[j]});
   }
-  constexpr double kLateralRatio = 1.0;  // as in the paper, E' = E2
   unit.lateral_Pa = kLateralRatio * unit.instantaneous_Pa();
-  const FittedOrgan plain(scene, where, folder, unit);
-  const OrganLessLaw first(plain.model(), motion, m, unit, kLateralRatio, false);
-  m.correspondence_N = first.force(unit);
+  return unit;
+}
+
+/// The factor on all moduli, and with it on the force, that comes nearest to the law.
+BondMaterial by_correspondence(OrganMaterial& m, const OrganLessLaw& organ, BondMaterial unit,
+                               std::string_view where) {
+  m.correspondence_N = organ.force(unit);
   double product = 0.0, squares = 0.0;
   for (std::size_t i = 0; i < m.law_N.size(); ++i) {
     product += m.correspondence_N[i] * m.law_N[i];
@@ -552,20 +430,15 @@ OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, con
                 "a contact sphere that is not held");
   }
   for (double& f : m.correspondence_N) f *= factor;
-  BondMaterial start = unit;
-  start.equilibrium_Pa *= factor;
-  for (auto& branch : start.branches) branch.modulus_Pa *= factor;
-  start.lateral_Pa *= factor;
-  if (options.stiffens.value_or(relaxing.bends)) {
-    const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
-    start.potential = {ElongationShape::cubic, deepest};
-    if (options.branches_stiffen) start.kernel = start.potential;
-  }
+  unit.equilibrium_Pa *= factor;
+  for (auto& branch : unit.branches) branch.modulus_Pa *= factor;
+  unit.lateral_Pa *= factor;
+  return unit;
+}
 
-  const FittedOrgan organ(scene, where, folder, start);
-  const OrganLessLaw function(organ.model(), motion, m, start, kLateralRatio, options.fit_times);
-  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
-  const std::vector<FitParameter> parameters = fitted_parameters(start, options.fit_times, deepest);
+/// Finds the material near a start, and how it answers.
+void fit_material(OrganMaterial& m, const OrganLessLaw& function,
+                  const std::vector<FitParameter>& parameters, std::string_view where) {
   std::vector<double> begin;
   for (const FitParameter& p : parameters) begin.push_back(p.start);
   const Minimum best = minimise_near(function, parameters, begin);
@@ -581,10 +454,33 @@ OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, con
     m.parameters.push_back({p, p.start, best.natural[i], {}, {}, bound});
     if (bound) m.flags.push_back(fmt::format("{} stands on a bound of its search", p.name));
   }
-  if (!best.converged) m.flags.push_back("the fit ended before it converged");
-  add_intervals(m, function, law, motion, best.natural);
+  if (!best.converged) m.flags.emplace_back("the fit ended before it converged");
+}
+
+}  // namespace
+
+OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, const Json& scene,
+                           std::string_view where, const std::filesystem::path& folder,
+                           const OrganMaterialOptions& options) {
+  const Relaxing relaxing = relaxing_of(law);
+  OrganMaterial m = law_along(law, motion);
+  const BondMaterial unit = unit_material(relaxing);
+  const FittedOrgan plain(scene, where, folder, unit);
+  const OrganLessLaw first(plain.model(), motion, m, unit, false);
+  BondMaterial start = by_correspondence(m, first, unit, where);
+  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
+  if (options.stiffens.value_or(relaxing.bends)) {
+    start.potential = {ElongationShape::cubic, deepest};
+    if (options.branches_stiffen) start.kernel = start.potential;
+  }
+
+  const FittedOrgan organ(scene, where, folder, start);
+  const OrganLessLaw function(organ.model(), motion, m, start, options.fit_times);
+  fit_material(m, function, fitted_parameters(start, options.fit_times, deepest), where);
+  add_intervals(m, function, law, motion);
   compare(m, motion.protocol);
-  add_scene_and_session(m, organ);
+  m.scene = organ.scene_with(m.material);
+  add_protocol_and_session(m);
   return m;
 }
 
