@@ -662,6 +662,26 @@ std::vector<ErrorCase> session_recording_cases() {
   };
 }
 
+std::vector<ErrorCase> view_cases() {
+  const std::string type = "file to view";
+  const std::string show = "view {}/f -o {}/out.html";
+  const auto file = [](std::string bytes) { return files({{"f", std::move(bytes)}}); };
+  return {
+      {type, "missing", show, files({})},
+      {type, "empty", show, file("")},
+      {type, "binary garbage", show, file(kGarbage)},
+      {type, "100 MB line", show, file(long_line())},
+      {type, "signature of HDF5 only", show, file("\x89HDF\r\n\x1a\n")},
+      {type, "pack of curves", "view {}/p.h5 -o {}/out.html", packed(1.0)},
+      {type, "beginning of a recording only", show, file("TPMROWS1")},
+      {type, "JSON of a scene", show, file(R"({"organ": {"kind": "star"}})")},
+      {type, "truncated JSON", show, file(R"({"figures": [)")},
+      {type, "figures that are none", show, file(R"({"figures": [{"panels": [{"x": 1}]}]})")},
+      {type, "answer of a fit without estimates", show,
+       file(R"({"title": "t", "model": "m", "chi_square": 1, "parameters": [{"name": "k"}]})")},
+  };
+}
+
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
   for (const auto& cases : {curve_csv_cases(),
@@ -681,6 +701,7 @@ std::vector<ErrorCase> all_cases() {
                             table_option_cases(),
                             session_cases(),
                             session_recording_cases(),
+                            view_cases(),
                             test::simulation_error_cases(),
                             test::sweep_error_cases(),
                             test::material_error_cases()}) {

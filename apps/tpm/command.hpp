@@ -59,6 +59,7 @@ void tell_user(fmt::format_string<Arguments...> text, Arguments&&... arguments) 
 
 // One function per file cmd_*.cpp.
 void add_version_command(CLI::App& app, Session& session);
+void add_view_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
 void add_select_command(CLI::App& app, Session& session);
 void add_budget_command(CLI::App& app, Session& session);
