@@ -63,6 +63,7 @@ void add_view_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
 void add_select_command(CLI::App& app, Session& session);
 void add_budget_command(CLI::App& app, Session& session);
+void add_material_command(CLI::App& app, Session& session);
 void add_identify_command(CLI::App& app, Session& session);
 void add_predict_command(CLI::App& app, Session& session);
 void add_recovery_command(CLI::App& app, Session& session);
