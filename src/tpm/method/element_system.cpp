@@ -49,6 +49,7 @@ class ElementSystem final : public StageSystem,
                 const std::optional<MethodMasses>& mass)
       : law_(p),
         tau_(p.relaxation_time_s()),
+        times_s_(Vector::Constant(1, tau_)),
         peak_(protocol.peak()),
         depth_driven_(protocol.drive() == Drive::displacement),
         mass_(mass ? mass->mass_kg[0] : 0.0),
@@ -60,7 +61,7 @@ class ElementSystem final : public StageSystem,
 
   [[nodiscard]] Eigen::Index coordinates() const override { return moves_ ? 1 : 0; }
   [[nodiscard]] Eigen::Index remembered() const override { return 1; }
-  [[nodiscard]] double relaxation_time_s() const override { return tau_; }
+  [[nodiscard]] const Vector& relaxation_times_s() const override { return times_s_; }
   [[nodiscard]] double drag_per_s() const override { return drag_; }
   [[nodiscard]] Vector scales() const override {
     Vector scales(size());
@@ -117,11 +118,11 @@ class ElementSystem final : public StageSystem,
       if (depth_driven_) {
         ++work().rates;
         e_ = imposed(t);
-      } else if (const auto end = balance(imposed(t), offset, stage.following, {}, e_);
+      } else if (const auto end = balance(imposed(t), offset, stage.following[0], {}, e_);
                  end != MethodEnd::completed) {
         return end;
       }
-      state[0] = offset + stage.following * e_;
+      state[0] = offset + stage.following[0] * e_;
       known_ = {imposed(t), state[0]};
       return MethodEnd::completed;
     }
@@ -129,11 +130,11 @@ class ElementSystem final : public StageSystem,
     const Drawn inertia{mass_ * held / (stage.c * stage.c),
                         stage.known[0] + stage.c * stage.known[1] / held};
     double e = state[0];
-    if (const auto end = balance(imposed(t), offset, stage.following, inertia, e);
+    if (const auto end = balance(imposed(t), offset, stage.following[0], inertia, e);
         end != MethodEnd::completed) {
       return end;
     }
-    state << e, (e - stage.known[0]) / stage.c, offset + stage.following * e;
+    state << e, (e - stage.known[0]) / stage.c, offset + stage.following[0] * e;
     return MethodEnd::completed;
   }
 
@@ -313,6 +314,7 @@ class ElementSystem final : public StageSystem,
 
   ElementForce law_;
   double tau_;
+  Vector times_s_;
   double peak_;  ///< of what is imposed
   bool depth_driven_;
   double mass_, drag_;

@@ -360,7 +360,7 @@ class NetworkProblem final : public MethodProblem {
 
   [[nodiscard]] const Protocol& protocol() const override { return protocol_; }
   [[nodiscard]] double relaxation_time_s() const override {
-    return network_.bonds.relaxation_time_s();
+    return network_.bonds.shortest_relaxation_time_s();
   }
   [[nodiscard]] bool has_masses() const override { return mass_.has_value(); }
   [[nodiscard]] MethodRun run(const MethodSettings& settings,

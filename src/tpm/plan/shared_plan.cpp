@@ -113,7 +113,7 @@ const std::vector<double>& SharedPlan::claims_at(Place place) {
   const OfDepth& here = of_depth(place.first);
   if (!here.models.empty()) try {
       const double depth = depth_of_place(place.first), ramp = std::exp2(place.second);
-      const double hold = kHoldOfLongest * spectrum_->longest;
+      const double hold = kHoldOfLongest * spectrum_->longest_s;
       const PlanScout scout(scene_.with_protocol(ramp_and_hold(depth, depth / ramp, hold)), {},
                             false, kMostIterations);
       for (std::size_t m = 0; m < claims.size(); ++m) {
