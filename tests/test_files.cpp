@@ -373,7 +373,7 @@ TEST_CASE("Inputs without an end are refused by every command that reads") {
         "hil run $S/configs/hil_omega7.json --law /dev/zero -o o.tpmrec",
         "hil run $S/configs/hil_omega7.json --device replay --recording /dev/zero -o o.tpmrec",
         "sweep show /dev/zero",
-        "sweep best /dev/zero -o o.h5",
+        "sweep best /dev/zero --output peak_force",
         "sweep plot /dev/zero -o o.png",
         "sweep convergence /dev/zero",
         "sweep sensitivity /dev/zero"}) {
