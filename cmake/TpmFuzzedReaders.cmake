@@ -7,7 +7,8 @@ set(readers_curve assemble description drive_pieces header_words import import_d
     recording_file rows)
 set(readers_law law_file)
 set(readers_network mesh_file mesh_surface triangle_mesh)
-set(readers_scene block_keys contact_blocks experiment_blocks experiment_scene organ_block scene tissue_blocks)
+set(readers_scene contact_blocks experiment_blocks experiment_scene material_block organ_block place_function protocol_file scene
+    tissue_blocks)
 set(readers_simulate checkpoint)
 set(readers_fit config config_data config_noise config_parameters tables)
 set(readers_plan operations)

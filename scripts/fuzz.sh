@@ -7,20 +7,24 @@
 #   scripts/fuzz.sh 60             a minute each
 #   scripts/fuzz.sh 300 scene stl  five minutes for two of them
 #   scripts/fuzz.sh --readers 3    only what reads is instrumented, the rest is that of build/release, which has to be
-#                                  there: built in a minute; scripts/check.sh runs it
+#                                  there: built in a minute; scripts/check.sh runs it. Below a minute each it is one
+#                                  run without coverage
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
 
 preset=fuzz quarters="1 2 3 4" coverage=1
 if [[ "${1:-}" == --readers ]]; then
-  preset=fuzz-readers quarters=4 coverage=0  # one run each: naming what it covered takes 20 s
+  preset=fuzz-readers
   shift
   [[ -f build/release/libtpmkit.a ]] || die "no build/release/libtpmkit.a; expected scripts/run.sh before"
 fi
 [[ "${1:-}" =~ ^[1-9][0-9]*$ ]] || die "usage: scripts/fuzz.sh [--readers] SECONDS [INPUT...]"
 seconds=$1
 shift
+if [[ $preset == fuzz-readers && $seconds -lt 60 ]]; then
+  quarters=4 coverage=0  # naming what a run covered takes 20 s
+fi
 install_missing "to build and run tpm" "${packages_run[@]}"
 unpack_headers "${packages_unpacked[@]}"
 install_missing "to fuzz what tpm reads" clang
@@ -115,7 +119,7 @@ fuzz() { # NAME
     local -i left=$((begun + quarter * seconds / 4 - $(processor_seconds)))
     while true; do  # again while a busy machine gave less than the time that passed
       TPM_FUZZ=$name TPM_FUZZ_FOLDER=$place ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1 \
-        build/$preset/fuzz_inputs -max_total_time=$((left > 1 ? left : 1)) -timeout=60 -report_slow_units=60 -rss_limit_mb=4096 -max_len=20000 \
+        build/$preset/fuzz_inputs -max_total_time=$((left > 1 ? left : 1)) -timeout=60 -report_slow_units=60 -rss_limit_mb=4096 -max_len=30000 \
         -artifact_prefix="$kept/found-" -print_final_stats=1 -print_coverage=$coverage "$seeds" >"$log" 2>&1 ||
         { status=1; found="${found#none} $quarter"; }
       runs=$((runs + $(sed -n 's/^stat::number_of_executed_units: *//p' "$log")))

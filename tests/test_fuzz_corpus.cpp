@@ -40,6 +40,7 @@ constexpr std::pair<const char*, const char*> kTaken[] = {
     {"obj", "tests/fuzz/corpus/obj/tetrahedron.obj"},
     {"law", "tests/fuzz/corpus/law/linear_1.json"},
     {"sweep_log", "tests/fuzz/corpus/sweep_log/begun.blocks"},
+    {"checkpoint", "tests/fuzz/corpus/checkpoint/interrupted.h5"},
     {"hdf5", "tests/fuzz/corpus/hdf5/packed.h5"}};
 
 TEST_CASE("what fuzzing has found is read or refused") {

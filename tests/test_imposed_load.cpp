@@ -7,6 +7,7 @@
 #include "tpm/core/random.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/law/law_model.hpp"
+#include "tpm/law/tension_creep.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;
@@ -202,6 +203,107 @@ TEST_CASE("Relaxing tension under a load: the kernel of the depth is that of the
       CHECK_THAT(kernel, WithinRel(v[i], 1e-10));
     }
   }
+}
+
+/// 162 times over four decades, as a creep test is read.
+std::vector<double> creep_times() {
+  std::vector<double> times;
+  for (int i = 0; i < 162; ++i) times.push_back(0.01 * std::pow(10.0, 4.0 * i / 161.0));
+  return times;
+}
+
+/// k_inf, k_i, tau_i over four decades, [exponent], k_tension, spacing, contact, offset.
+std::vector<double> values_with_tension(const LawModel& law) {
+  std::vector<double> values;
+  double stiffness = 15.0, time_s = 0.004;
+  for (const LawParameter& p : law.law_parameters()) {
+    if (p.name == "exponent") {
+      values.push_back(1.7);
+    } else if (p.name == "k_tension") {
+      values.push_back(35.0);
+    } else if (p.name == "spacing") {
+      values.push_back(0.012);
+    } else if (p.name == "contact") {
+      values.push_back(1e-4);
+    } else if (p.name == "offset") {
+      values.push_back(2e-3);
+    } else if (p.dimension == Dimension::time) {
+      values.push_back(time_s *= 25.0);
+    } else {
+      values.push_back(stiffness += 12.0);
+    }
+  }
+  return values;
+}
+
+TEST_CASE("Creep with elastic tension is that of the stepped path", "[law][heavy]") {
+  std::vector<double> times = creep_times();
+  times.insert(times.begin(), 0.0);
+  const Protocol kept = creep(0.3, times.back());
+  // What comes after the last asked time makes it a history that is stepped.
+  const Protocol stepped(Drive::force,
+                         {{0.0, 0.3}, {times.back(), 0.3}, {times.back() + 1.0, 0.4}});
+  for (const char* name : {"linear-elastic", "linear-1-elastic", "linear-3-elastic",
+                           "linear-2-elastic-fluid", "power-2-elastic", "hertz-2-elastic"}) {
+    INFO(name);
+    const LawModel law(parse_law_name(name, "test"));
+    const std::vector<double> values = values_with_tension(law);
+    const Response a = law.respond(kept, times, values, Want::values_and_sensitivity);
+    const Response b = law.respond(stepped, times, values, Want::values_and_sensitivity);
+    CHECK((a.value - b.value).cwiseAbs().maxCoeff() < 1e-8 * b.value.maxCoeff());
+    CHECK((law.respond(kept, times, values, Want::values).value - a.value).cwiseAbs().maxCoeff() <
+          1e-15);
+    for (Eigen::Index j = 0; j < b.sensitivity.cols(); ++j) {
+      INFO(law.law_parameters()[static_cast<std::size_t>(j)].name);
+      const double size = b.sensitivity.col(j).cwiseAbs().maxCoeff();
+      CHECK(size > 0.0);
+      CHECK((a.sensitivity.col(j) - b.sensitivity.col(j)).cwiseAbs().maxCoeff() <= 1e-6 * size);
+    }
+  }
+}
+
+TEST_CASE("Creep with elastic tension of no stiffness is the closed form", "[law]") {
+  const std::vector<double> times = creep_times();
+  for (const char* name : {"linear-1", "linear-3", "linear-2-fluid", "power-2"}) {
+    INFO(name);
+    const LawModel plain(parse_law_name(name, "test"));
+    const Stepped with(plain, values_with_tension(plain));
+    std::vector<double> values = with.values;
+    values.end()[-3] = 0.05;  // spacing
+    const Protocol load = creep(0.3, times.back());
+    const Response a =
+        plain.respond(load, times, values_with_tension(plain), Want::values_and_sensitivity);
+    const Response b = with.law.respond(load, times, values, Want::values_and_sensitivity);
+    CHECK((a.value - b.value).cwiseAbs().maxCoeff() < 1e-8 * a.value.maxCoeff());
+    for (std::size_t j = 0; j < plain.law_parameters().size(); ++j) {
+      INFO(plain.law_parameters()[j].name);
+      const Eigen::VectorXd x = a.sensitivity.col(static_cast<Eigen::Index>(j));
+      const Eigen::VectorXd y = b.sensitivity.col(static_cast<Eigen::Index>(with.place(j)));
+      CHECK((x - y).cwiseAbs().maxCoeff() <= 1e-6 * x.cwiseAbs().maxCoeff());
+    }
+  }
+}
+
+TEST_CASE("Creep with elastic tension takes as many steps as it bends, however densely it is read",
+          "[law]") {
+  const LawModel law(parse_law_name("linear-3-elastic", "test"));
+  const std::vector<double> values = values_with_tension(law);
+  const LawAtParameters at = law.at(values, nullptr);
+  const std::vector<double> dense = creep_times();
+  const std::vector<double> last{dense.back()};
+  int for_dense = 0, for_last = 0;
+  REQUIRE(creep_with_tension(at, 0.3, dense, Want::values, &for_dense));
+  REQUIRE(creep_with_tension(at, 0.3, last, Want::values, &for_last));
+  INFO(for_dense << " and " << for_last << " steps");
+  CHECK(for_dense == for_last);
+  CHECK(for_dense <= 40);
+  // Nothing where the balance cannot be followed: no load, an infinite time, no tension.
+  CHECK_FALSE(creep_with_tension(at, 0.001, dense, Want::values));
+  CHECK_FALSE(creep_with_tension(
+      at, 0.3, std::vector<double>{std::numeric_limits<double>::infinity()}, Want::values));
+  const LawModel plain(parse_law_name("linear-3", "test"));
+  CHECK_FALSE(
+      creep_with_tension(plain.at(values_with_tension(plain), nullptr), 0.3, dense, Want::values));
 }
 
 TEST_CASE("A probe that leaves the surface under a load is stepped", "[law][heavy]") {

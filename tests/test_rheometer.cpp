@@ -20,6 +20,7 @@
 
 using namespace tpm;
 using Catch::Matchers::Contains;
+using Catch::Matchers::StartsWith;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
@@ -139,7 +140,7 @@ TEST_CASE("A length needs the length at rest, a force the cross section", "[rheo
   CHECK(file.recording.drive_quantity == Quantity::relative_length);
   CHECK_THAT(file.recording.drive.back(), WithinRel(1.05, 1e-9));
   CHECK_THAT(file.recording.response.back(), WithinRel(stress.tail(1)[0], 1e-9));
-  CHECK_THAT(columns_words(file), Contains("mm to relative_length by a length at rest of 20 mm"));
+  CHECK_THAT(columns_words(file.findings), Contains("mm to relative_length by a length at rest of 20 mm"));
 
   write_file(folder / "d.csv", tension_csv("time [s],extension [mm],stress [Pa]\n", 20.0, 1.0));
   CHECK_THROWS_WITH(read_recording_file(folder / "d.csv"),
@@ -249,6 +250,7 @@ TEST_CASE("Columns that only their units tell make a spectrum or a modulus", "[r
     const auto function = find_material_function(folder / "f.csv", {});
     REQUIRE(function);
     CHECK(function->kind() == kind);
+    CHECK_THAT(function->read_as, StartsWith("read as ") && Contains("column 1"));
   }
 }
 

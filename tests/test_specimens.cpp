@@ -14,6 +14,7 @@
 #include "tpm/report/fit_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/specimens.hpp"
+#include "tpm/study/young_moduli.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;
@@ -88,7 +89,8 @@ Run run_on(const test::TempFolder& folder, const std::string& arguments) {
   const int status = std::system(fmt::format("cd '{}' && '" TPM_TEST_PROGRAM "' {} > '{}' 2>&1",
                                              folder.path().string(), arguments, out)
                                      .c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out)};
+  const bool silent = std::filesystem::is_empty(out);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, silent ? std::string() : read_file(out)};
 }
 
 }  // namespace
@@ -117,6 +119,90 @@ TEST_CASE("Recordings of one material to unequal depths show no spread", "[speci
   CHECK(json.at("recordings").at(0).at("fit").at("depth_reference_m") == study.law.reference);
   CHECK(json.at("pooled").at(0).contains("spread_p_value"));
   CHECK_THAT(to_terminal_text(*study.rows.front().fit), Contains("secants at a depth of " + shown));
+}
+
+TEST_CASE("A folder's stiffnesses under a probe are Young's moduli", "[specimens]") {
+  // A cone's force is 2/pi E tan(angle)/(1 - nu^2) u^2: the stiffness at u is that times u.
+  ContactGeometry cone;
+  cone.cone_half_angle_rad = std::atan(1.5);
+  cone.poisson_ratio = 0.4;
+  const double truth_Pa = 100.0 / 4e-3 / (2.0 / 3.141592653589793 * 1.5 / (1.0 - 0.16));
+  SelectionOptions options = without_profiles();
+  options.setup.exponent = probe_exponent(cone);
+  const SpecimenStudy study = study_specimens(one_material(), law_at("power-1", 1.0), options);
+  const YoungModuli moduli = pooled_moduli(study, cone, true);
+  REQUIRE(moduli.moduli.size() == 2);
+  CHECK(moduli.poisson_assumed);
+  CHECK(moduli.reference_m == study.law.reference);
+  const YoungModulus& in_the_end = moduli.moduli[0];
+  CHECK(in_the_end.name == "E_inf");
+  CHECK(in_the_end.basis == "pooled");
+  CHECK(in_the_end.verdict == "typical of 5 specimens");
+  CHECK_THAT(in_the_end.estimate, WithinRel(truth_Pa, 0.01));
+  CHECK(in_the_end.lower.value() < truth_Pa);
+  CHECK(in_the_end.upper.value() > truth_Pa);
+  CHECK_THAT(moduli.moduli[1].estimate, WithinRel(1.2 * truth_Pa, 0.01));
+}
+
+/// A folder of two recordings, `pig`.
+void write_folder(const test::TempFolder& folder) {
+  std::filesystem::create_directory(folder.path() / "pig");
+  for (const double depth_mm : {3.0, 5.0}) {
+    write_file(folder.path() / "pig" / fmt::format("{}mm.csv", depth_mm),
+               csv_of(quadratic(1e-3 * depth_mm, 1.0, static_cast<std::uint64_t>(depth_mm))));
+  }
+}
+
+TEST_CASE("Beside an answer in JSON stands its table as CSV", "[specimens]") {
+  const test::TempFolder folder;
+  write_folder(folder);
+  write_file(folder.path() / "law.json", R"({"law": "linear", "drive": "indentation_depth",
+    "response": "contact_force", "reference_m": 0.001, "provenance": "assumed",
+    "parameters": {"k_inf_N_per_m": 20.0}})");
+  struct Case {
+    const char* command;
+    const char* first;  ///< line of the CSV
+  };
+  for (const Case& c : std::vector<Case>{
+           {"select pig/3mm.csv --laws power-1 --no-held-out --no-profiles", "law,recommended,"},
+           {"fit pig/3mm.csv --law power-1 --no-draw", "parameter,SI_unit,estimate,"},
+           {"fit pig --law power-1 --no-draw", "parameter,SI_unit,typical,"},
+           {"coverage " TPM_TEST_SOURCE_DIR "/configs/coverage_absolute.json --sets 3",
+            "parameter,level,data_sets,"},
+           {"recovery --laws linear-1 --trials 1", "law,noise_over_peak,margin,"},
+           {"spectrum law.json --points 3", "frequency_Hz,storage_N_per_m,"}}) {
+    INFO(c.command);
+    const Run json = run_on(folder, std::string(c.command) + " --format json -o answer.json");
+    INFO(json.said);
+    REQUIRE((json.code == 0 || json.code == 1));
+    const Json answer = parse_json(read_file(folder.path() / "answer.json"), "answer");
+    CHECK_FALSE(answer.empty());
+    const std::string csv = read_file(folder.path() / "answer.csv");
+    CHECK(csv.starts_with(c.first));
+    CHECK(std::count(csv.begin(), csv.end(), '\n') > 1);
+    std::filesystem::remove(folder.path() / "answer.csv");
+    // Text has no table beside it.
+    CHECK(run_on(folder, std::string(c.command) + " -o answer.txt").code == json.code);
+    CHECK_FALSE(std::filesystem::exists(folder.path() / "answer.csv"));
+  }
+  const Run over = run_on(folder, "select pig/3mm.csv --format json -o pig/3mm.json");
+  CHECK(over.code == 2);
+  CHECK_THAT(over.said, Contains("pig/3mm.csv: this command reads it and would write over it"));
+}
+
+TEST_CASE("A folder under a probe answers in pascals", "[specimens]") {
+  const test::TempFolder folder;
+  write_folder(folder);
+  const Run text =
+      run_on(folder, "fit pig --law power-1 --cone-angle '45 deg' --poisson 0.4 --folder out");
+  INFO(text.said);
+  REQUIRE(text.code == 0);
+  CHECK_THAT(text.said, Contains("Young's moduli under") && Contains("typical of 2 specimens"));
+  const Json moduli = read_json(folder.path() / "out" / "young_moduli.json");
+  CHECK(moduli.at("moduli").size() == 2);
+  CHECK(moduli.at("moduli").at(0).at("interval_from") == "pooled");
+  CHECK(moduli.at("poisson_ratio_provenance") == "given");
+  CHECK(read_file(folder.path() / "out" / "young_moduli.csv").starts_with("modulus,of,SI_unit"));
 }
 
 TEST_CASE("A reference depth can be chosen, and the coefficients are those at it", "[specimens]") {

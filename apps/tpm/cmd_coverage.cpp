@@ -6,6 +6,7 @@
 #include "command.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/fit/coverage.hpp"
+#include "tpm/report/fit_csv.hpp"
 
 namespace tpm::app {
 namespace {
@@ -14,6 +15,7 @@ struct CoverageOptions {
   std::string config;
   std::string sets = "2000";
   std::string seed = "0";
+  std::string output;
 };
 
 std::uint64_t seed_of(const std::string& text) {
@@ -25,10 +27,12 @@ std::uint64_t seed_of(const std::string& text) {
 }
 
 int coverage(const CoverageOptions& options, const Session& session) {
+  const auto csv = csv_beside(options.output, session);
   const FitConfig config = read_fit_config(options.config);
   const auto sets = static_cast<int>(parse_whole_number(options.sets, "--sets", 1));
   const CoverageResult result = check_coverage(config, sets, seed_of(options.seed));
-  say("{}", session.json() ? to_text(to_json(result)) : to_terminal_text(result));
+  deliver(session.json() ? to_text(to_json(result)) : to_terminal_text(result), options.output);
+  deliver_csv(coverage_csv(result), csv);
   constexpr double kSuspicious = 0.001;
   for (const ParameterCoverage& p : result.parameters) {
     if (p.p_value < kSuspicious) return static_cast<int>(ExitCode::answer_is_no);
@@ -50,6 +54,8 @@ void add_coverage_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed, 0 or more, or 'clock'")
       ->capture_default_str();
+  command->add_option("-o,--output", options->output,
+                      "Write here instead of to the terminal; beside JSON the table as .csv");
   add_format_option(*command, session);
   command->footer(
       "Exit code 1 if a coverage differs from its level at the 0.1 % level (exact binomial test).\n"

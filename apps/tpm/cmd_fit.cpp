@@ -208,7 +208,16 @@ void require_indentation(const FitOptions& options,
   }
 }
 
+void write_moduli(const std::filesystem::path& folder, const std::optional<YoungModuli>& moduli,
+                  std::vector<std::string>& files) {
+  if (!moduli) return;
+  write_file(folder / "young_moduli.json", to_text(to_json(*moduli)));
+  write_file(folder / "young_moduli.csv", moduli_csv(*moduli));
+  files.insert(files.end(), {"young_moduli.json", "young_moduli.csv"});
+}
+
 int fit_configuration(const FitOptions& options, const Session& session) {
+  const auto csv = csv_beside(options.output, session);
   if (!options.no_draw) will_write_into(options.folder, {"figures.json", "law.json"});
   const FitResult result = run_fit(configured(options));
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
@@ -217,10 +226,12 @@ int fit_configuration(const FitOptions& options, const Session& session) {
     if (!session.json()) text += written(options.folder, files);
   }
   deliver(text, options.output);
+  deliver_csv(parameters_csv(result), csv);
   return 0;
 }
 
 int fit_folder(const FitOptions& options, const Session& session) {
+  const auto csv = csv_beside(options.output, session);
   if (!options.no_draw) {
     will_write_into(figure_folder(options, options.recordings.files.front()),
                     {"figures.json", "specimens.json"});
@@ -235,17 +246,32 @@ int fit_folder(const FitOptions& options, const Session& session) {
   set_reference(options, recordings, selection);
   set_specimens(options, recordings);
   const SpecimenStudy study = study_specimens(recordings, law, selection);
-  std::string text = session.json() ? to_text(to_json(study)) : to_terminal_text(study);
+  std::optional<YoungModuli> moduli;
+  if (const auto probe = probe_of(options)) {
+    moduli = pooled_moduli(study, *probe, options.poisson.empty());
+  }
+  std::string text;
+  if (session.json()) {
+    Json json = to_json(study);
+    if (moduli) json["young_moduli"] = to_json(*moduli);
+    text = to_text(json);
+  } else {
+    text = to_terminal_text(study);
+    if (moduli) text += "\n" + to_terminal_text(*moduli);
+  }
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, options.recordings.files.front());
-    const auto files = write_specimen_report(folder, study);
+    auto files = write_specimen_report(folder, study);
+    write_moduli(folder, moduli, files);
     if (!session.json()) text += written(folder, files);
   }
   deliver(text, options.output);
+  deliver_csv(pooled_csv(study), csv);
   return 0;
 }
 
 int fit_recordings(const FitOptions& options, const Session& session) {
+  const auto csv = csv_beside(options.output, session);
   const auto recordings = read_recordings(options.recordings);
   if (!options.no_draw) {
     will_write_into(figure_folder(options, recordings.front().name),
@@ -277,11 +303,7 @@ int fit_recordings(const FitOptions& options, const Session& session) {
   if (!options.no_draw) {
     const std::string folder = figure_folder(options, recordings.front().name);
     auto files = write_recording_report(folder, selection);
-    if (moduli) {
-      write_file(std::filesystem::path(folder) / "young_moduli.json", to_text(to_json(*moduli)));
-      write_file(std::filesystem::path(folder) / "young_moduli.csv", moduli_csv(*moduli));
-      files.insert(files.end(), {"young_moduli.json", "young_moduli.csv"});
-    }
+    write_moduli(folder, moduli, files);
     if (!session.json()) text += written(folder, files);
   }
   if (!session.json()) {
@@ -290,12 +312,14 @@ int fit_recordings(const FitOptions& options, const Session& session) {
                         to_text(config_json(best.config)));
   }
   deliver(text, options.output);
+  deliver_csv(parameters_csv(best), csv);
   return 0;
 }
 
 /// A spectrum, a relaxation modulus or a creep compliance, without a configuration.
 int fit_function(const FitOptions& options, const MaterialFunction& function,
                  const Session& session) {
+  const auto csv = csv_beside(options.output, session);
   const Selection selection = select_law(function, selection_options(options));
   const FitResult& best = selection.candidates[selection.recommended].fit;
   std::string text =
@@ -309,6 +333,7 @@ int fit_function(const FitOptions& options, const MaterialFunction& function,
     if (!session.json()) text += written(folder, files);
   }
   deliver(text, options.output);
+  deliver_csv(parameters_csv(best), csv);
   return 0;
 }
 

@@ -6,6 +6,7 @@
 #include "command.hpp"
 #include "recording_options.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/report/fit_csv.hpp"
 #include "tpm/study/recovery.hpp"
 
 namespace tpm::app {
@@ -52,11 +53,13 @@ int recovery(const RecoveryCommandOptions& options, const Session& session) {
   }
   study.selection.laws = chosen_laws({}, options.family);
   const double order = parse_order(options.order);
+  const auto csv = csv_beside(options.output, session);
   std::vector<RecoveryResult> results;
   for (const LawSpec& law : chosen_laws(options.laws, options.family)) {
     results.push_back(recover(law, visible_parameters(law, order), study));
   }
   deliver(session.json() ? to_text(to_json(results)) : to_terminal_text(results), options.output);
+  deliver_csv(recovery_csv(results), csv);
   const bool all = std::all_of(results.begin(), results.end(),
                                [](const RecoveryResult& r) { return r.fulfilled(); });
   return static_cast<int>(all ? ExitCode::success : ExitCode::answer_is_no);

@@ -5,6 +5,7 @@
 #include "command.hpp"
 #include "recording_options.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/report/fit_csv.hpp"
 #include "tpm/study/selection.hpp"
 
 namespace tpm::app {
@@ -29,6 +30,7 @@ int select(const SelectOptions& options, const Session& session) {
   selection.held_out = !options.no_held_out;
   selection.setup.profiles = !options.no_profiles;
   selection.setup.seed = parse_whole_number(options.seed, "--seed", 0);
+  const auto csv = csv_beside(options.output, session);
   const auto recordings = read_recordings(options.recordings);
   const Selection result = select_law(recordings, selection);
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
@@ -36,6 +38,7 @@ int select(const SelectOptions& options, const Session& session) {
     text += "\n" + to_terminal_text(result.candidates[result.recommended].fit);
   }
   deliver(text, options.output);
+  deliver_csv(laws_csv(result), csv);
   return 0;
 }
 
@@ -64,7 +67,8 @@ void add_select_command(CLI::App& app, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm select meat.csv\n"
-      "  tpm select slow.csv fast.csv --laws linear-1,linear-2,power-2 --format json");
+      "  tpm select slow.csv fast.csv --laws linear-1,linear-2,power-2 --format json -o laws.json\n"
+      "The last one writes its table beside the JSON, too: laws.csv.");
   command->callback([options, &session] {
     session.run = [options, &session] { return select(*options, session); };
   });

@@ -9,6 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/law/frequency_response.hpp"
 #include "tpm/law/law_file.hpp"
+#include "tpm/report/table_document.hpp"
 
 namespace tpm::app {
 namespace {
@@ -92,7 +93,24 @@ void require_finite(const std::vector<double>& frequency_Hz, const SpectrumRespo
   }
 }
 
+std::string csv_of(const LawFile& law, const std::vector<double>& frequency_Hz,
+                   const SpectrumResponse& r) {
+  constexpr int kDigits = 10;
+  const bool strip = law.spec.response == Quantity::stress;
+  std::string text = csv_line({"frequency_Hz", strip ? "storage_Pa" : "storage_N_per_m",
+                               strip ? "loss_Pa" : "loss_N_per_m",
+                               strip ? "complex_viscosity_Pa_s" : "complex_viscosity_N_s_per_m"});
+  const Eigen::VectorXd viscosity = r.complex_viscosity(frequency_Hz);
+  for (std::size_t i = 0; i < frequency_Hz.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    text += csv_line({significant(frequency_Hz[i], kDigits), significant(r.storage[row], kDigits),
+                      significant(r.loss[row], kDigits), significant(viscosity[row], kDigits)});
+  }
+  return text;
+}
+
 int spectrum(const SpectrumTexts& texts, const Session& session) {
+  const auto csv = csv_beside(texts.output, session);
   const LawFile law = read_law(texts.law);
   const std::vector<double> frequency_Hz = frequencies(texts);
   const SpectrumResponse r = respond_spectrum(law.spec, law.values, frequency_Hz,
@@ -100,6 +118,7 @@ int spectrum(const SpectrumTexts& texts, const Session& session) {
   require_finite(frequency_Hz, r);
   deliver(session.json() ? to_text(json_of(law, frequency_Hz, r)) : text_of(law, frequency_Hz, r),
           texts.output);
+  deliver_csv(csv_of(law, frequency_Hz, r), csv);
   return 0;
 }
 

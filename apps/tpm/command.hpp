@@ -29,6 +29,13 @@ void add_format_option(CLI::App& command, Session& session);
 /// Prints the text, or writes it to `file` if that is not empty.
 void deliver(const std::string& text, const std::string& file);
 
+/// The CSV that stands beside an answer in JSON: "laws.csv" of `-o laws.json`. Announced before it
+/// is computed (will_write()). Empty where the answer is no JSON, or goes to the terminal, a device
+/// or a pipe.
+[[nodiscard]] std::filesystem::path csv_beside(const std::string& output, const Session& session);
+/// Writes it, unless the name is empty.
+void deliver_csv(const std::string& csv, const std::filesystem::path& file);
+
 /// Announces the files of these names in a folder, before they are computed (will_write()); none if
 /// the folder is empty.
 void will_write_into(const std::filesystem::path& folder, std::initializer_list<const char*> names);

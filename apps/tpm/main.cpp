@@ -52,6 +52,19 @@ void deliver(const std::string& text, const std::string& file) {
   }
 }
 
+std::filesystem::path csv_beside(const std::string& output, const Session& session) {
+  if (output.empty() || !session.json() || is_device_or_pipe(output)) return {};
+  std::filesystem::path file = output;
+  // One that is called so already keeps its name whole.
+  file = file.extension() == ".csv" ? output + ".csv" : file.replace_extension(".csv").string();
+  will_write({file});
+  return file;
+}
+
+void deliver_csv(const std::string& csv, const std::filesystem::path& file) {
+  if (!file.empty()) write_file(file, csv);
+}
+
 void will_write_into(const std::filesystem::path& folder,
                      std::initializer_list<const char*> names) {
   if (folder.empty()) return;

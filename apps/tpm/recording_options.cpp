@@ -104,7 +104,7 @@ std::vector<PreparedRecording> read_recordings(const RecordingOptions& options) 
                   "each recording once");
     }
     RecordingFile read = read_recording_file(file, import);
-    std::string read_as = columns_words(read);
+    std::string read_as = columns_words(read.findings);
     recordings.push_back(prepare_recording(file, std::move(read.recording), phases));
     recordings.back().import = import;
     recordings.back().read_as = std::move(read_as);

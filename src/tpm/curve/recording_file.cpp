@@ -98,9 +98,9 @@ std::string described_label(const fs::path& path, std::string_view key) {
 
 }  // namespace
 
-std::string columns_words(const RecordingFile& file) {
+std::string columns_words(const std::vector<ImportFinding>& findings) {
   std::string words;
-  for (const ImportFinding& finding : file.findings) {
+  for (const ImportFinding& finding : findings) {
     const bool column = finding.value.starts_with("column ");
     if (!column && finding.what != "converted") continue;
     words +=
@@ -142,7 +142,7 @@ std::string recording_label(const fs::path& path, std::string_view key,
 MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& options) {
   const std::string file = path.string();
   if (is_described(path)) {
-    if (curve_kind_of(path) == "spectrum") return load_spectrum(file);
+    if (curve_kind_of(path) == "spectrum") return SpectrumFile{load_spectrum(file), {}};
     return read_described(path, options);
   }
   require_no_imposed_value(options, file);
@@ -156,9 +156,10 @@ MeasuredFile read_measured_file(const fs::path& path, const ImportOptions& optio
     header.sha256 = imported.sha256;
   };
   if (holds_spectrum(series)) {
+    std::vector<ImportFinding> findings = series.findings;
     Spectrum spectrum = assemble_spectrum(std::move(series), file, options, imported.usual);
     name_it(spectrum.header);
-    return spectrum;
+    return SpectrumFile{std::move(spectrum), std::move(findings)};
   }
   RecordingFile result = assemble_recording(std::move(series), file, options, imported.usual);
   name_it(result.recording.header);
@@ -174,7 +175,7 @@ RecordingFile read_recording_file(const fs::path& path, const ImportOptions& opt
 
 Spectrum read_spectrum_file(const fs::path& path, const ImportOptions& options) {
   MeasuredFile measured = read_measured_file(path, options);
-  if (auto* spectrum = std::get_if<Spectrum>(&measured)) return std::move(*spectrum);
+  if (auto* file = std::get_if<SpectrumFile>(&measured)) return std::move(file->spectrum);
   throw bad_input(path.string(), "holds a recording", "a spectrum: frequency, storage and loss");
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "tpm/curve/import.hpp"
 
@@ -10,7 +11,8 @@ namespace tpm {
 
 /// How the columns of a file and their units were understood: "read as time: column 1 'Time', s;
 /// ...". Empty for a file with a description.
-[[nodiscard]] std::string columns_words(const RecordingFile& file);
+/// @param findings of a RecordingFile or a SpectrumFile
+[[nodiscard]] std::string columns_words(const std::vector<ImportFinding>& findings);
 
 /// Any recording from one path, without a configuration:
 ///
@@ -26,8 +28,14 @@ namespace tpm {
 [[nodiscard]] RecordingFile read_recording_file(const std::filesystem::path& path,
                                                 const ImportOptions& options = {});
 
+/// A spectrum read into memory, and what was understood of its file.
+struct SpectrumFile {
+  Spectrum spectrum;
+  std::vector<ImportFinding> findings;
+};
+
 /// A recording or a spectrum from one path in the same way.
-using MeasuredFile = std::variant<RecordingFile, Spectrum>;
+using MeasuredFile = std::variant<RecordingFile, SpectrumFile>;
 [[nodiscard]] MeasuredFile read_measured_file(const std::filesystem::path& path,
                                               const ImportOptions& options = {});
 

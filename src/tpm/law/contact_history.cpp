@@ -1,6 +1,5 @@
 #include "tpm/law/contact_history.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -268,15 +267,24 @@ ContactHistory::Point ContactHistory::surface_under(double load, const Balance& 
   } else {
     while (law_.k_tension * tension(u).value < right) u *= 2.0;
   }
-  KernelShape::Values k = law_.kernel.at(u);
-  TensionShape::Values t = tension(u);
-  for (int i = 0; i < 200 && law_.k_tension > 0.0; ++i) {
+  KernelShape::Values k{};
+  TensionShape::Values t{};
+  const auto newton_from = [&](double depth) {
+    k = law_.kernel.at(depth);
+    t = tension(depth);
     const double excess = balance.a * k.value + law_.k_tension * t.value - right;
-    const double next = u - excess / (balance.a * k.slope + law_.k_tension * t.slope);
-    if (!(next < u)) break;
+    return depth - excess / (balance.a * k.slope + law_.k_tension * t.slope);
+  };
+  // So is one step from anywhere, and the depth of before is near.
+  if (law_.k_tension > 0.0 && now_.u > 0.0) {
+    const double nearer = newton_from(now_.u);
+    if (nearer > 0.0 && nearer < u) u = nearer;
+  }
+  constexpr int kMostNewtonSteps = 200;
+  double next = newton_from(u);
+  for (int i = 0; law_.k_tension > 0.0 && next < u && i < kMostNewtonSteps; ++i) {
     u = next;
-    k = law_.kernel.at(u);
-    t = tension(u);
+    next = newton_from(u);
   }
   point.u = u;
   point.v = k.value;
@@ -429,28 +437,37 @@ void ContactHistory::move_load(double from, double to, double h, double time_sca
   move_load_adaptive(from, to, h, time_scale, 0);
 }
 
-/// The limit of ever smaller steps from one move made in 1, 2, ..., n steps: the weights add up to
-/// 1 and take the errors of the lowest orders of the step away (Richardson). The branches make the
-/// step one of second order, a dashpot, whose speed is the mean over the step, one of first order.
-ContactHistory::Loaded ContactHistory::extrapolated(const std::vector<Loaded>& ends) const {
-  const auto n = std::ssize(ends);
-  const int order = law_.memory.dashpot > 0.0 ? 1 : 2;
-  Eigen::MatrixXd powers(n, n);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    powers(0, j) = 1.0;
-    for (Eigen::Index i = 1; i < n; ++i) {
-      powers(i, j) = std::pow(static_cast<double>(j + 1), -static_cast<double>(order + i - 1));
+/// Weights of one move made in 1, 2, ..., n steps that extrapolate it to ever smaller ones
+/// (Richardson): the polynomial through the answers, at no step. A step of branches alone is
+/// symmetric: made back with -h it ends where it began, because V runs straight between the depths
+/// that both states balance. So its error has even powers of h only (Hairer, Norsett & Wanner,
+/// Solving Ordinary Differential Equations I, II.8), and n answers reach order 2 n. A dashpot,
+/// whose speed is the mean over the step, has all powers from the first on.
+std::array<double, ContactHistory::kMostSteps> ContactHistory::extrapolation(int n) const {
+  const bool symmetric = law_.memory.dashpot == 0.0;
+  std::array<double, kMostSteps> weight{};
+  for (int j = 1; j <= n; ++j) {
+    double product = 1.0;
+    for (int i = 1; i <= n; ++i) {
+      if (i == j) continue;
+      product *= symmetric ? static_cast<double>(j * j) / (j * j - i * i)
+                           : static_cast<double>(j) / (j - i);
     }
+    weight[static_cast<std::size_t>(j - 1)] = product;
   }
-  const Eigen::VectorXd weight = powers.fullPivLu().solve(Eigen::VectorXd::Unit(n, 0));
+  return weight;
+}
+
+ContactHistory::Loaded ContactHistory::extrapolated(const std::vector<Loaded>& ends) const {
+  const auto weight = extrapolation(static_cast<int>(ends.size()));
   Loaded limit = ends.front();
   limit.w *= weight[0];
   limit.w_by *= weight[0];
   limit.now.v *= weight[0];
   limit.now.u_by *= weight[0];
   limit.now.v_by *= weight[0];
-  for (Eigen::Index j = 1; j < n; ++j) {
-    const Loaded& end = ends[static_cast<std::size_t>(j)];
+  for (std::size_t j = 1; j < ends.size(); ++j) {
+    const Loaded& end = ends[j];
     limit.w += weight[j] * end.w;
     limit.w_by += weight[j] * end.w_by;
     limit.now.v += weight[j] * end.now.v;
@@ -469,7 +486,6 @@ double ContactHistory::distance(const Loaded& a, const Loaded& b) const {
 
 void ContactHistory::move_load_adaptive(double from, double to, double h, double time_scale,
                                         int level) {
-  constexpr int kMostSteps = 6;  // one move in 1, 2, ..., 6 steps, then halved
   const double allowed = 30.0 * v_tolerance_;
   const Loaded begin{w_, w_by_, now_};
   const auto stand_at = [&](const Loaded& place) {

@@ -11,6 +11,16 @@ namespace {
 /// Their derivatives by the times are those of the step they differ from.
 constexpr double kNearlyEqual = 3e-6;
 
+bool is_curved(const DepthPiece& piece) {
+  return piece.course != PieceCourse::straight;
+}
+
+/// `same`: lengths that differ by less are equal.
+bool fits(const DepthPiece& piece, const PieceClass& of, double same) {
+  return is_curved(piece) == of.curved &&
+         std::abs(piece.h - of.h) <= std::max(same, kNearlyEqual * std::min(of.h, piece.h));
+}
+
 }  // namespace
 
 DepthPieces::DepthPieces(const KernelShape& kernel, double contact, const DrivePath& path)
@@ -66,19 +76,12 @@ void DepthPieces::add_stretch(double from, double to, double h, int level) {
   pieces_.push_back({from, to, h, course});
 }
 
-std::size_t DepthPieces::class_of(const DepthPiece& piece, double same, std::size_t guess) {
-  const bool curved = piece.course != PieceCourse::straight;
-  const auto fits = [&](std::size_t i) {
-    const PieceClass& c = classes_[i];
-    return c.curved == curved &&
-           std::abs(piece.h - c.h) <= std::max(same, kNearlyEqual * std::min(c.h, piece.h));
-  };
-  if (guess < classes_.size() && fits(guess)) return guess;
+std::size_t DepthPieces::class_of(const DepthPiece& piece, double same) {
   constexpr std::size_t kRemembered = 8;
   for (std::size_t i = classes_.size(); i > 0 && i + kRemembered > classes_.size(); --i) {
-    if (fits(i - 1)) return i - 1;
+    if (fits(piece, classes_[i - 1], same)) return i - 1;
   }
-  classes_.push_back({piece.h, curved});
+  classes_.push_back({piece.h, is_curved(piece)});
   return classes_.size() - 1;
 }
 
@@ -87,15 +90,18 @@ void DepthPieces::sort_into_runs(double same) {
   std::size_t current = 0;
   for (Eigen::Index k = 0; k < count(); ++k) {
     const DepthPiece& piece = (*this)[k];
-    current = class_of(piece, same, current);
+    if (k == 0 || !fits(piece, classes_[current], same)) {
+      current = class_of(piece, same);
+      if (runs_.empty() || runs_.back().step_class != current) {
+        runs_.push_back({k, k, current, false});
+      }
+    }
     const double h = classes_[current].h;
-    const bool uneven = std::abs(piece.h - h) > same;
-    if (uneven) off_length_[k] = piece.h / h - 1.0;
-    if (runs_.empty() || runs_.back().step_class != current) {
-      runs_.push_back({k, k, current, false});
+    if (std::abs(piece.h - h) > same) {
+      off_length_[k] = piece.h / h - 1.0;
+      runs_.back().uneven = true;
     }
     runs_.back().last = k + 1;
-    runs_.back().uneven = runs_.back().uneven || uneven;
   }
 }
 

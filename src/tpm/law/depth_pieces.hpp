@@ -55,7 +55,7 @@ class DepthPieces {
   void add_step(double from, double to, double h);
   void add_stretch(double from, double to, double h, int level);
   void sort_into_runs(double same);
-  [[nodiscard]] std::size_t class_of(const DepthPiece& piece, double same, std::size_t guess);
+  [[nodiscard]] std::size_t class_of(const DepthPiece& piece, double same);
 
   const KernelShape& kernel_;
   double v_tolerance_ = 0.0;

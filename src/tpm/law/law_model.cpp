@@ -14,6 +14,7 @@
 #include "tpm/law/imposed_load.hpp"
 #include "tpm/law/kelvin_chain.hpp"
 #include "tpm/law/relaxation.hpp"
+#include "tpm/law/tension_creep.hpp"
 #include "tpm/solve/exponential_sum.hpp"
 
 namespace tpm {
@@ -274,6 +275,17 @@ std::optional<double> kept_step(const Protocol& protocol) {
   return kept ? std::optional(value) : std::nullopt;
 }
 
+/// A load imposed at once and kept that elastic tension helps to carry.
+std::optional<Response> respond_to_kept_load(const LawAtParameters& law, const Protocol& protocol,
+                                             std::span<const double> times_s, Want want) {
+  const auto load = kept_step(protocol);
+  if (protocol.drive() != Drive::force || !load) return std::nullopt;
+  std::vector<double> since;
+  since.reserve(times_s.size());
+  for (const double t : times_s) since.push_back(t - protocol.start_s());
+  return creep_with_tension(law, *load, since, want);
+}
+
 /// The kernel of a law at given parameters, what acts beside it, and where these stand.
 struct KernelAtParameters {
   KernelPlaces place;
@@ -523,6 +535,7 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
   std::optional<Response> in_contact;
   if (stops.edges.empty()) in_contact = respond_quickly(law, protocol, times_s, want);
   if (!in_contact) in_contact = respond_to_load(spec_, law, protocol, times_s, want);
+  if (!in_contact) in_contact = respond_to_kept_load(law, protocol, times_s, want);
   response =
       in_contact ? *std::move(in_contact) : respond_by_steps(spec_, law, protocol, stops, want);
   if (want_slopes && prepared.chain_slopes.size() > 0) {

@@ -159,6 +159,32 @@ std::string pooled_csv(const SpecimenStudy& study) {
   return text;
 }
 
+std::string coverage_csv(const CoverageResult& result) {
+  std::string text = csv_line({"parameter", "level", "data_sets", "failed", "covered", "coverage",
+                               "open_intervals", "binomial_p_value", "seed"});
+  for (const ParameterCoverage& p : result.parameters) {
+    text += csv_line({p.name, cell(result.level), std::to_string(result.sets),
+                      std::to_string(result.failed), std::to_string(p.covered),
+                      cell(static_cast<double>(p.covered) / result.sets),
+                      std::to_string(p.one_sided), cell(p.p_value), std::to_string(result.seed)});
+  }
+  return text;
+}
+
+std::string recovery_csv(std::span<const RecoveryResult> results) {
+  std::string text = csv_line({"law", "noise_over_peak", "margin", "trials", "returned",
+                               "equivalent", "larger", "failed", "fulfilled", "seed"});
+  for (const RecoveryResult& r : results) {
+    for (const ChoiceCount& c : r.choices) {
+      text += csv_line({law_name(r.law), cell(r.noise), cell(c.margin), std::to_string(c.trials),
+                        std::to_string(c.returned), std::to_string(c.equivalent),
+                        std::to_string(c.larger), std::to_string(r.failed),
+                        c.fulfilled() ? "yes" : "no", std::to_string(r.seed)});
+    }
+  }
+  return text;
+}
+
 std::string moduli_csv(const YoungModuli& moduli) {
   std::string text = csv_line({"modulus", "of", "SI_unit", "estimate", "standard_error", "lower",
                                "upper", "level", "interval_from", "depth_reference_m",

@@ -1,8 +1,11 @@
 #pragma once
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "tpm/fit/coverage.hpp"
+#include "tpm/study/recovery.hpp"
 #include "tpm/study/selection.hpp"
 #include "tpm/study/specimens.hpp"
 #include "tpm/study/young_moduli.hpp"
@@ -24,6 +27,11 @@ namespace tpm {
 [[nodiscard]] std::string specimens_csv(const SpecimenStudy& study);
 /// Each pooled parameter.
 [[nodiscard]] std::string pooled_csv(const SpecimenStudy& study);
+
+/// How often intervals hold the truth: each parameter of a configuration.
+[[nodiscard]] std::string coverage_csv(const CoverageResult& result);
+/// How often a law was returned from its own data: each law and margin.
+[[nodiscard]] std::string recovery_csv(std::span<const RecoveryResult> results);
 
 /// Each Young's modulus.
 [[nodiscard]] std::string moduli_csv(const YoungModuli& moduli);

@@ -9,6 +9,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/study/printed_number.hpp"
 
 namespace tpm {
 namespace {
@@ -145,9 +146,9 @@ std::string experiment_line(const Verification& v) {
     most = std::max(most, part);
   }
   return fmt::format(
-      "beside the pig-liver readings of the same indentations: {:+.0f} % to {:+.0f} %, which "
+      "beside the pig-liver readings of the same indentations: {} to {}, which "
       "judges the material, not the rendering",
-      least, most);
+      percent_text(least, 0), percent_text(most, 0));
 }
 
 /// To be read in a minute: how it ended and whether it could be rendered safely, whether what was
@@ -293,13 +294,12 @@ void add_experiment(Document& d, const Verification& v) {
                {"difference", true}},
               {}};
   for (const BesideExperiment& e : v.experiment) {
-    table.rows.push_back(
-        {{significant(1e3 * e.depth_m, 3)},
-         {significant(1e3 * e.rate_m_per_s, 3)},
-         {e.label},
-         {significant(e.measured_N, 3)},
-         {significant(e.commanded_N, 3)},
-         {fmt::format("{:+.1f} %", 100.0 * (e.commanded_N / e.measured_N - 1.0))}});
+    table.rows.push_back({{significant(1e3 * e.depth_m, 3)},
+                          {significant(1e3 * e.rate_m_per_s, 3)},
+                          {e.label},
+                          {significant(e.measured_N, 3)},
+                          {significant(e.commanded_N, 3)},
+                          {percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1)}});
   }
   d.table(std::move(table));
 }

@@ -5,6 +5,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/hil_report.hpp"
+#include "tpm/study/printed_number.hpp"
 
 namespace tpm {
 namespace {
@@ -248,11 +249,10 @@ std::string verification_text(const HilRecording& recording, const Verification&
                         significant(1e3 * o.commanded.max_N, 3), significant(1e3 * o.apart_N, 3));
   }
   for (const BesideExperiment& e : v.experiment) {
-    text +=
-        fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, commanded {} N ({:+.1f} %)\n",
-                    significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3), e.label,
-                    significant(e.measured_N, 3), significant(e.commanded_N, 3),
-                    100.0 * (e.commanded_N / e.measured_N - 1.0));
+    text += fmt::format("experiment: {} mm at {} mm/s, {}: measured {} N, commanded {} N ({})\n",
+                        significant(1e3 * e.depth_m, 3), significant(1e3 * e.rate_m_per_s, 3),
+                        e.label, significant(e.measured_N, 3), significant(e.commanded_N, 3),
+                        percent_text(100.0 * (e.commanded_N / e.measured_N - 1.0), 1));
   }
   return text;
 }

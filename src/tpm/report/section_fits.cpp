@@ -6,6 +6,7 @@
 #include "tpm/report/fit_cells.hpp"
 #include "tpm/report/fit_figures.hpp"
 #include "tpm/report/sections.hpp"
+#include "tpm/study/printed_number.hpp"
 
 namespace tpm {
 namespace {
@@ -160,7 +161,7 @@ Table held_out_table(const FitStudy& study) {
                             {d.datum.label},
                             {observed(d.datum)},
                             {predicted(d, true)},
-                            {fmt::format("{:+.1f} %", percent)},
+                            {percent_text(percent, 1)},
                             {fixed(d.standardised, 2), tone_of_residual(d.standardised)}});
     }
   }

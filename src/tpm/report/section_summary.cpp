@@ -7,6 +7,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/fit_figures.hpp"
 #include "tpm/report/sections.hpp"
+#include "tpm/study/printed_number.hpp"
 
 namespace tpm {
 namespace {
@@ -47,8 +48,8 @@ Cell held_out_sentence(const FitStudy& study) {
     }
   }
   return {fmt::format("Held out, {} of {} readings are predicted within two assumed standard "
-                      "deviations; the worst is {} ({:+.0f} %).",
-                      within, predicted, worst_label, worst),
+                      "deviations; the worst is {} ({}).",
+                      within, predicted, worst_label, percent_text(worst, 0)),
           within == predicted ? Tone::good : Tone::fair};
 }
 

@@ -6,6 +6,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/sections.hpp"
+#include "tpm/study/printed_number.hpp"
 
 namespace tpm {
 namespace {
@@ -38,7 +39,8 @@ Cell printed_cell(const TableCell& cell, double unit) {
 
 Cell measured_cell(const TableCell& cell) {
   if (!cell.measured) return {"-"};
-  return {fmt::format("{} ({:+.1f} %)", cell.measured->text, cell.measured->misfit_percent)};
+  return {
+      fmt::format("{} ({})", cell.measured->text, percent_text(cell.measured->misfit_percent, 1))};
 }
 
 Table relaxation_table(const TablesResult& tables, double depth_m) {

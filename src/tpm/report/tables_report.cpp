@@ -4,6 +4,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/study_report.hpp"
+#include "tpm/study/printed_number.hpp"
 
 namespace tpm {
 namespace {
@@ -59,7 +60,7 @@ std::vector<std::string> printed_texts(const TableCell& cell) {
 std::vector<std::string> measured_texts(const TableCell& cell) {
   if (!cell.measured) return {"", ""};
   return {with_unit(cell.measured->text, cell.measured->unit),
-          fmt::format("{:+.1f} %", cell.measured->misfit_percent)};
+          percent_text(cell.measured->misfit_percent, 1)};
 }
 
 /// The comparison columns that follow the computed ones.

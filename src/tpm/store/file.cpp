@@ -57,10 +57,14 @@ bool is_open_stream(const fs::path& path) {
 /// False with errno if reading fails; stops one byte above the limit.
 bool read_all(int fd, std::uint64_t most, std::string& bytes) {
   // A pipe has no size, and a file may change: whatever comes is read in blocks.
-  constexpr std::size_t kBlock = std::size_t{1} << 20;
+  // A block is zeroed before it is read into: of a small file no more than its size is asked for.
+  constexpr std::size_t kBlock = std::size_t{1} << 20U;
+  constexpr std::size_t kLeastGrowth = std::size_t{1} << 16U;
   while (bytes.size() <= most) {
     const std::size_t have = bytes.size();
-    bytes.resize(have + std::min<std::uint64_t>(kBlock, most + 1 - have));
+    const std::size_t room = bytes.capacity() - have;
+    const std::size_t block = std::min(kBlock, room > 0 ? room : std::max(kLeastGrowth, have));
+    bytes.resize(have + std::min<std::uint64_t>(block, most + 1 - have));
     const ssize_t n = ::read(fd, bytes.data() + have, bytes.size() - have);
     bytes.resize(have + static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
     if (n < 0 && errno == EINTR) continue;
@@ -131,8 +135,10 @@ void wait_for_writer(const fs::path& path, int descriptor) {
 }  // namespace
 
 std::string read_file(const fs::path& path, std::uint64_t most) {
+  constexpr std::uint64_t kLargestFromDevice = std::uint64_t{1} << 24U;  // it may have no end
   std::error_code ec;
   const auto status = fs::status(path, ec);
+  if (fs::is_character_file(status)) most = std::min(most, kLargestFromDevice);
   if (!fs::exists(status)) throw bad_input(path.string(), "no such file", "a readable file");
   if (fs::is_directory(status)) throw bad_input(path.string(), "is a folder", "a readable file");
   const bool pipe = is_named_pipe(path, status);

@@ -6,6 +6,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/study/audit_kinds.hpp"
+#include "tpm/study/printed_number.hpp"
 
 namespace tpm {
 namespace {
@@ -176,7 +177,7 @@ void check_misfit(const ClaimReader& claim, Finding& finding) {
       finding.details.push_back({fmt::format("{}, {}", row.words, s.column),
                                  with_unit(row.table->rows[row.row][column], unit),
                                  {model / unit.to_si, unit},
-                                 fmt::format("misfit {:+.1f} %", 100.0 * misfit),
+                                 "misfit " + percent_text(100.0 * misfit, 1),
                                  100.0 * misfit});
     }
   }

@@ -185,12 +185,13 @@ std::string MaterialFunction::kind() const {
 std::optional<MaterialFunction> find_material_function(const std::string& path,
                                                        const ImportOptions& import) {
   MeasuredFile measured = read_measured_file(path, import);
-  if (auto* spectrum = std::get_if<Spectrum>(&measured)) {
-    return MaterialFunction{path, std::move(*spectrum), import, {}};
+  if (auto* spectrum = std::get_if<SpectrumFile>(&measured)) {
+    return MaterialFunction{path, std::move(spectrum->spectrum), import,
+                            columns_words(spectrum->findings)};
   }
   auto& file = std::get<RecordingFile>(measured);
   if (!is_step_response(file.recording.response_quantity)) return std::nullopt;
-  return MaterialFunction{path, std::move(file.recording), import, columns_words(file)};
+  return MaterialFunction{path, std::move(file.recording), import, columns_words(file.findings)};
 }
 
 FitConfig function_config(LawSpec law, const MaterialFunction& function,

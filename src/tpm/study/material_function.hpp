@@ -13,7 +13,8 @@ struct MaterialFunction {
   std::string name;  ///< a path where the configuration is to be rerun
   std::variant<Spectrum, Recording> data;
   ImportOptions import;  ///< with which it was read, for the configuration
-  std::string read_as;   ///< how its columns and units were understood; empty for spectra
+  std::string
+      read_as;  ///< how its columns and units were understood; empty for a file with a description
 
   /// "spectrum", "relaxation modulus" or "creep compliance".
   [[nodiscard]] std::string kind() const;

@@ -66,6 +66,13 @@ std::string percent_text(double percent) {
   return fmt::format("{:+.{}g} %", percent, digits);
 }
 
+std::string percent_text(double percent, int decimals) {
+  constexpr double kShown = 9.5;  // units of the last decimal
+  const double shown = std::abs(percent) * std::pow(10.0, decimals);
+  if (!(shown >= kShown)) return fmt::format("{:+.2g} %", percent);
+  return fmt::format("{:+.{}f} %", percent, decimals);
+}
+
 std::string_view verdict_name(DigitVerdict verdict) noexcept {
   switch (verdict) {
     case DigitVerdict::by_rounding:

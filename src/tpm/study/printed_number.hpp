@@ -19,6 +19,8 @@ struct PrintedNumber {
 
 /// A difference in percent in the way people write it: "+0.82 %", "-34 %", "-100 %".
 [[nodiscard]] std::string percent_text(double percent);
+/// With so many decimals, and two significant digits where these show fewer: "-12.3 %", "+0.012 %".
+[[nodiscard]] std::string percent_text(double percent, int decimals);
 
 /// How a recomputed number relates to the printed digits.
 enum class DigitVerdict {

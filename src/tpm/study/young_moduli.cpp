@@ -37,6 +37,26 @@ std::string modulus_name(const std::string& stiffness) {
   return "E" + stiffness.substr(1);
 }
 
+/// "Pa", of a spring-pot "Pa s^alpha" (its stiffness at 1 s).
+std::string modulus_unit(const LawSpec& law, const std::string& stiffness) {
+  const bool springpots =
+      law.fractional != Fractional::none && !has_relaxation_time(law.fractional);
+  if (!springpots || stiffness == "k_inf") return "Pa";
+  return stiffness == "k2" ? "Pa s^beta" : "Pa s^alpha";
+}
+
+bool is_modulus(const FitParameter& p) {
+  return p.unit.dimension == Dimension::stiffness && p.name != "k_tension";
+}
+
+/// Newtons per metre to pascals. Throws Error(bad_input) for a law of stress.
+double factor_of(const LawSpec& law, const ContactGeometry& geometry) {
+  if (law.response == Quantity::stress) {
+    throw bad_input("probe", "a law of stress", "none: its stiffnesses are moduli already");
+  }
+  return modulus_Pa(law, 1.0, geometry).value();
+}
+
 /// The sum of all stiffnesses, with the variance that the covariance gives it; none if one of them
 /// is not free on a linear scale.
 std::optional<YoungModulus> sum_of(const FitResult& fit, const std::vector<std::size_t>& places,
@@ -67,10 +87,7 @@ std::optional<YoungModulus> sum_of(const FitResult& fit, const std::vector<std::
 YoungModuli young_moduli(const FitResult& fit, const ContactGeometry& geometry,
                          bool poisson_assumed) {
   const LawSpec& law = fit.config.law.value();
-  if (law.response == Quantity::stress) {
-    throw bad_input("probe", "a law of stress", "none: its stiffnesses are moduli already");
-  }
-  const double factor = modulus_Pa(law, 1.0, geometry).value();
+  const double factor = factor_of(law, geometry);
   YoungModuli all{geometry_words(geometry),
                   geometry.poisson_ratio,
                   poisson_assumed,
@@ -79,18 +96,20 @@ YoungModuli young_moduli(const FitResult& fit, const ContactGeometry& geometry,
                   {},
                   geometry_warnings(law, geometry, fitted_depth(fit))};
   std::vector<std::size_t> places;
-  const bool springpots =
-      law.fractional != Fractional::none && !has_relaxation_time(law.fractional);
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     const ParameterResult& p = fit.parameters[i];
     const std::string& name = p.parameter.name;
-    if (p.parameter.unit.dimension != Dimension::stiffness || name == "k_tension") continue;
+    if (!is_modulus(p.parameter)) continue;
     places.push_back(i);
-    YoungModulus m{modulus_name(name), name,           "Pa", factor * p.estimate, {}, {}, {},
-                   "profile",          verdict_text(p)};
-    if (springpots && name != "k_inf") {
-      m.unit = name == "k2" ? "Pa s^beta" : "Pa s^alpha";
-    }
+    YoungModulus m{modulus_name(name),
+                   name,
+                   modulus_unit(law, name),
+                   factor * p.estimate,
+                   {},
+                   {},
+                   {},
+                   "profile",
+                   verdict_text(p)};
     if (p.standard_error) m.standard_error = factor * *p.standard_error;
     if (p.lower) m.lower = factor * *p.lower;
     if (p.upper) m.upper = factor * *p.upper;
@@ -99,6 +118,34 @@ YoungModuli young_moduli(const FitResult& fit, const ContactGeometry& geometry,
   const bool adds_up = law.form == BranchForm::parallel && law.fractional == Fractional::none;
   if (adds_up && places.size() > 1) {
     if (auto sum = sum_of(fit, places, factor)) all.moduli.push_back(*std::move(sum));
+  }
+  return all;
+}
+
+YoungModuli pooled_moduli(const SpecimenStudy& study, const ContactGeometry& geometry,
+                          bool poisson_assumed) {
+  const double factor = factor_of(study.law, geometry);
+  std::optional<double> deepest;
+  for (const SpecimenRow& row : study.rows) {
+    const auto depth = row.fit ? fitted_depth(*row.fit) : std::nullopt;
+    if (depth) deepest = std::max(deepest.value_or(0.0), *depth);
+  }
+  YoungModuli all{geometry_words(geometry),
+                  geometry.poisson_ratio,
+                  poisson_assumed,
+                  study.level,
+                  study.law.reference,
+                  {},
+                  geometry_warnings(study.law, geometry, deepest)};
+  for (const PooledParameter& p : study.pooled) {
+    if (!is_modulus(p.parameter)) continue;
+    const auto pascals = [&](double theta) { return factor * p.parameter.natural(theta); };
+    all.moduli.push_back({modulus_name(p.parameter.name), p.parameter.name,
+                          modulus_unit(study.law, p.parameter.name), pascals(p.effects.mean),
+                          std::nullopt, pascals(p.effects.interval.lower),
+                          pascals(p.effects.interval.upper), "pooled",
+                          fmt::format("typical of {} specimen{}", p.effects.specimens,
+                                      p.effects.specimens == 1 ? "" : "s")});
   }
   return all;
 }

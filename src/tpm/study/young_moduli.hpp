@@ -5,6 +5,7 @@
 
 #include "tpm/fit/fit.hpp"
 #include "tpm/law/contact_geometry.hpp"
+#include "tpm/study/specimens.hpp"
 
 namespace tpm {
 
@@ -15,7 +16,7 @@ struct YoungModulus {
   std::string unit;  ///< "Pa", of a spring-pot "Pa s^alpha", its stiffness at 1 s
   double estimate = 0.0;
   std::optional<double> standard_error, lower, upper;  ///< none: not known, or open
-  std::string basis;                                   ///< "profile", or "linearised" for sums
+  std::string basis;  ///< "profile", "pooled", or "linearised" for sums
   std::string verdict;
 };
 
@@ -35,6 +36,11 @@ struct YoungModuli {
 /// Throws Error(bad_input) for a law of stress, whose stiffnesses are moduli already.
 [[nodiscard]] YoungModuli young_moduli(const FitResult& fit, const ContactGeometry& geometry,
                                        bool poisson_assumed);
+
+/// Those of the typical specimen of a folder: the pooled stiffnesses and the limits of their
+/// intervals times the same constant. The sum has no interval there and is left out.
+[[nodiscard]] YoungModuli pooled_moduli(const SpecimenStudy& study, const ContactGeometry& geometry,
+                                        bool poisson_assumed);
 
 [[nodiscard]] Json to_json(const YoungModuli& moduli);
 [[nodiscard]] std::string to_terminal_text(const YoungModuli& moduli);
