@@ -37,3 +37,8 @@ packages_test=(
 packages_check=(
   git clang-format clang-tidy chromium python3-paraview python3-nbconvert python3-ipykernel
 )
+
+# What builds the site (scripts/docs.sh). CI installs it only where the site is wanted.
+packages_docs=(
+  python3-sphinx furo python3-breathe python3-myst-parser doxygen
+)

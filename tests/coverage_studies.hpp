@@ -113,6 +113,49 @@ inline HeldOutCoverage held_out_coverage(const LawSpec& family, const SimulatedT
   return result;
 }
 
+/// Intervals of a whole recording's fit that hold the truth, one for each material parameter.
+struct FitCoverage {
+  std::vector<std::string> names;
+  std::vector<Count> parameters;
+};
+
+/// Fits of simulated recordings whose contact lies between two samples in noise.
+/// @param nuisance whether contact is estimated, or fixed where it was found
+inline FitCoverage fit_coverage(const LawSpec& family, const SimulatedTest& test, double noise,
+                                double phi, Nuisance nuisance, int simulations,
+                                std::uint64_t seed) {
+  constexpr double kNormal95 = 1.959964;
+  LawSpec law = family;
+  law.reference = test.depth_m;
+  const std::vector<double> truth = visible_parameters(law);
+  const Recording clean = simulated_recording(law, truth, test);
+  const double peak = *std::max_element(clean.response.begin(), clean.response.end());
+  Random random(seed);
+  FitCoverage result;
+  for (int i = 0; i < simulations; ++i) {
+    Recording recording = clean;
+    add_noise(recording, noise * peak, phi, random);
+    const PreparedRecording prepared = prepare_recording("simulated", recording);
+    SetupOptions setup;
+    setup.profiles = false;
+    setup.reference = law.reference;
+    setup.nuisance = nuisance;
+    const std::span<const PreparedRecording> one(&prepared, 1);
+    const FitResult fit = run_fit(recording_config(law, one, setup), data_sets(one));
+    for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
+      const std::string& name = fit.parameters[k].parameter.name;
+      if (name == "offset" || name == "contact") continue;
+      if (k == result.names.size()) {
+        result.names.push_back(name);
+        result.parameters.emplace_back();
+      }
+      const double away = std::abs(fit.parameters[k].estimate - truth[k]);
+      result.parameters[k].add(away <= kNormal95 * fit.parameters[k].standard_error.value_or(0.0));
+    }
+  }
+  return result;
+}
+
 struct StoppedCoverage {
   std::vector<std::string> names;
   std::vector<Count> parameters;  ///< intervals that hold the truth at the stopping time

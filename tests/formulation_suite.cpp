@@ -88,21 +88,20 @@ void check(Broken& broken, bool kept, const char* name, const std::string& found
 
 /// The closed form of the star, or with everything relaxed.
 Eigen::VectorXd exact(const ExperimentScene& scene, const std::vector<double>& times) {
-  const TpmParameters& p = scene.tissue.element("the suite");
+  const BondElement p = scene.tissue.element("the suite");
   if (scene.formulation.entry().can().course) {
     return ClosedForm{ModelOptions{}}
-        .respond(scene.protocol, times, to_vector(p), Want::values)
+        .respond(scene.protocol, times, element_constants(p), Want::values)
         .value;
   }
   Eigen::VectorXd response(std::ssize(times));
-  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
+  const TensionLaw tension = p.tension();
   for (std::size_t i = 0; i < times.size(); ++i) {
     const double imposed = value_at(scene.protocol, times[i]);
     response[static_cast<Eigen::Index>(i)] =
         scene.protocol.drive() == Drive::displacement
-            ? p.modulus_to_stiffness_m() *
-                  (p.relaxed_modulus_Pa() * imposed + tension.value(imposed))
-            : equilibrium_depth_m(p, p.relaxed_modulus_Pa(), imposed);
+            ? p.modulus_to_stiffness_m() * (p.equilibrium_Pa * imposed + tension.value(imposed))
+            : equilibrium_depth_m(p, p.equilibrium_Pa, imposed);
   }
   return response;
 }
@@ -146,9 +145,8 @@ void oscillator(const Formulation& f, Broken& broken) {
   if (!f.can().masses || !f.can().load || !f.can().jumps) return;
   ExperimentScene scene =
       star(R"("protocol": {"kind": "creep", "load": "0.05 N", "duration": "0.1 s"})", f);
-  TpmParameters element = scene.tissue.element("the suite");
-  element.Eprime_Pa = 0.0;
-  scene.tissue.set_element(element);
+  set_value(scene.tissue.materials.materials.front(), "Eprime", 0.0, "the suite");
+  const BondElement element = scene.tissue.element("the suite");
   scene.formulation.masses = true;
   scene.formulation.damping_ratio = 0.1;
   scene.formulation.tolerance = 1e-8;
@@ -275,6 +273,102 @@ void refusals(const Formulation& f, Broken& broken) {
   }
 }
 
+/// Materials that ask something of a formulation.
+struct Asking {
+  bool Capabilities::*capability;
+  std::string blocks;
+};
+std::vector<Asking> asking_materials() {
+  const auto material = [](const std::string& keys) {
+    return R"("material": {"Einf": "6 kPa", "Eprime": "12 kPa", )" + keys + "}";
+  };
+  const std::string one = R"("branches": [{"g": "6 kPa", "tau": "0.7 s"}])";
+  const std::string two =
+      R"("branches": [{"g": "3 kPa", "tau": "0.4 s"}, {"g": "3 kPa", "tau": "3 s"}])";
+  const auto place = [&](const std::string& what) {
+    return material(one + R"(, "regions": [{"kind": "ball", "below_contact": "10 mm",
+      "radius": "25 mm", )" +
+                    what + "}]");
+  };
+  const auto shape = [&](const char* key, const char* name) {
+    return material(
+        fmt::format(R"("{}": {{"shape": "{}", "stiffening": "8 mm"}}, {})", key, name, one));
+  };
+  return {{&Capabilities::branches, material(two)},
+          {&Capabilities::stiffening, shape("potential", "cubic")},
+          {&Capabilities::any_potential, shape("potential", "sinh")},
+          {&Capabilities::kernels, shape("kernel", "cubic")},
+          {&Capabilities::regions, place(R"("factor": 3)")},
+          {&Capabilities::mixed, place(R"("material": {"Einf": "8 kPa", "Eprime": "12 kPa",
+             "branches": [{"g": "9 kPa", "tau": "2 s"}]})")}};
+}
+
+ExperimentScene with_material(const Asking& asking, const Formulation& f) {
+  const std::string text =
+      R"({"organ": {"kind": "liver", "count": 40}, )" + asking.blocks + ", " + kRamp + "}";
+  ExperimentScene scene = parse_experiment(parse_json(text, "scene"), "scene", {});
+  scene.tissue.guides.push_back({scene.probe().sphere, scene.probe().direction});
+  scene.formulation.kind = f.name();
+  scene.formulation.masses = f.can().masses && !f.takes("masses");
+  scene.formulation.where = "scene: key /formulation";
+  return scene;
+}
+
+/// What it takes of materials it answers as the quasi-static network does: by its tolerance, with
+/// its order, or in kind. What it does not take it refuses in one line that names others.
+void materials(const Formulation& f, Broken& broken) {
+  constexpr double kInKind = 0.3;           // reductions claim their errors elsewhere
+  constexpr double kTimesTolerance = 30.0;  // errors gather over a run
+  if (!f.can().depth || !f.can().network) return;
+  for (const Asking& asking : asking_materials()) {
+    const std::string name(words_of(asking.capability));
+    ExperimentScene scene = with_material(asking, f);
+    if (!(f.can().*asking.capability)) {
+      std::string said;
+      try {
+        require_runnable(scene);
+      } catch (const Error& refusal) {
+        said = refusal.what();
+      }
+      const bool names = said.find("is no formulation that " + name) != std::string::npos &&
+                         said.find("quasi_static") != std::string::npos &&
+                         said.find('\n') == std::string::npos;
+      check(broken, names, "materials",
+            "says '" + said + "' where it is asked for one that " + name);
+      continue;
+    }
+    const std::vector<double> times = even_times(scene.protocol, 12);
+    if (!f.can().course) {
+      check(broken, run_scene(scene, times, false).response.allFinite(), "materials", name);
+      continue;
+    }
+    ExperimentScene other = scene;
+    other.formulation.kind = "quasi_static";
+    other.formulation.masses = false;
+    other.formulation.tolerance = 1e-10;
+    const Eigen::VectorXd truth = run_scene(other, times, false).response;
+    constexpr int kSweeps = 300;
+    scene.formulation.sweeps = kSweeps;
+    const auto error = [&](double step_s) {
+      scene.formulation.step_s = step_s;
+      return apart(run_scene(scene, times, false).response, truth);
+    };
+    if (order_of(f) > 0) {
+      constexpr double kStep_s = 0.05, kShort = 0.35;
+      const double coarse = error(kStep_s), fine = error(0.5 * kStep_s);
+      check(broken, std::log2(coarse / fine) >= order_of(f) - kShort, "materials",
+            fmt::format("{}: order {} where {} is stated ({} and {} of the peak)", name,
+                        std::log2(coarse / fine), order_of(f), coarse, fine));
+      continue;
+    }
+    const bool by_tolerance = !f.can().planned || (f.as<StateRunner>() && !f.can().masses);
+    const double allowed = by_tolerance ? kTimesTolerance * scene.formulation.tolerance : kInKind;
+    const double found = error(1e-3);
+    check(broken, found <= allowed, "materials",
+          fmt::format("{}: {} of the peak off, {} allowed", name, found, allowed));
+  }
+}
+
 /// Exact derivatives against differences.
 void derivatives(const Formulation& f, Broken& broken) {
   const auto* maker = f.as<ModelMaker>();
@@ -353,6 +447,7 @@ Broken broken_words(const Formulation& f) {
   energy_account(f, broken);
   field(f, broken);
   refusals(f, broken);
+  materials(f, broken);
   claims(f, broken);
   return broken;
 }

@@ -2,6 +2,7 @@
 // A patch glued to a punch on an organ that stands on its far side, for both equilibrium solvers.
 #include <catch2/catch.hpp>
 
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/indentation.hpp"

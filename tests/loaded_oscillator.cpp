@@ -6,10 +6,10 @@
 
 namespace tpm_test {
 
-Eigen::VectorXd loaded_oscillator(const tpm::TpmParameters& p, double mass_kg, double drag_per_s,
+Eigen::VectorXd loaded_oscillator(const tpm::BondElement& p, double mass_kg, double drag_per_s,
                                   double load_N, std::span<const double> times_s) {
-  const double k = p.E2_Pa * p.modulus_to_stiffness_m();
-  const double g = p.relaxing_modulus_Pa() * p.modulus_to_stiffness_m();
+  const double k = p.instantaneous_Pa() * p.modulus_to_stiffness_m();
+  const double g = p.relaxing_Pa() * p.modulus_to_stiffness_m();
   const double tau = p.relaxation_time_s();
   Eigen::MatrixXd a(3, 3);
   a << 0, 1, 0, -k / mass_kg, -drag_per_s, g / mass_kg, 1 / tau, 0, -1 / tau;

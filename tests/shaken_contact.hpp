@@ -3,6 +3,7 @@
 
 #include "tpm/device/haptic_device.hpp"
 #include "tpm/haptics/element_contact.hpp"
+#include "tpm/material/tpm_element.hpp"
 
 namespace tpm::test {
 

@@ -1,5 +1,6 @@
 #pragma once
 // The four-sphere star of docs/notation.md as a network.
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
 

@@ -18,6 +18,13 @@ inline std::vector<ErrorCase> sweep_error_cases() {
     if (at == std::string::npos) throw std::logic_error("nothing to replace: " + from);
     return files({{"s.json", text.replace(at, from.size(), to)}});
   };
+  const auto by_name = [](const std::string& target, const std::string& value) {
+    return files({{"s.json", R"({"model": "organ", "scene": {"organ": {"kind": "star"},
+"protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "4 mm/s", "hold": "1 s"}},
+"axes": [{"parameter": ")" + target +
+                                 R"(", "values": [")" + value + R"("]}],
+"outputs": ["peak_force"]})"}});
+  };
   const std::string run = "sweep {}/s.json -o {}/out.h5";
   return {
       {type, "missing", run, files({})},
@@ -73,6 +80,8 @@ inline std::vector<ErrorCase> sweep_error_cases() {
       {type, "garbage as log", run, files({{"s.json", good}, {"out.h5.blocks", kGarbage}})},
       {type, "output cannot be written", "sweep {}/s.json -o /proc/none/out.h5",
        files({{"s.json", good}})},
+      {type, "parameter that the material has not", run, by_name("material.tau2", "1 s")},
+      {type, "material's parameter of another unit", run, by_name("material.tau1", "1 kPa")},
       {type, "show of another file", "sweep show {}/s.json", files({{"s.json", good}})},
   };
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tpm/core/error.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/contact_stiffness.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/local_support.hpp"

@@ -21,8 +21,7 @@ struct SmallOrgan {
   CondensedOptions options{4e-3, 1e-3, 1e-3};
 
   [[nodiscard]] BondSystem bonds(double relaxation_time_s) const {
-    return {tissue.network, tissue.element().with_relaxation_time(relaxation_time_s),
-            tissue.materials.lateral()};
+    return {tissue.network, tissue.element().with_relaxation_time(relaxation_time_s)};
   }
   [[nodiscard]] CondensedContact build(double relaxation_time_s) const {
     return build_condensed(bonds(relaxation_time_s), tissue.network.organ.position,

@@ -25,8 +25,8 @@ struct Liver {
 
 /// Ramp to 8 mm and hold, against the quasi-static network in fixed steps.
 double error_of_ramp(const Liver& liver, double relaxation_time_s, double ramp_s, double hold_s) {
-  const TpmParameters material = liver.tissue.element().with_relaxation_time(relaxation_time_s);
-  const BondSystem bonds(liver.tissue.network, material, liver.tissue.materials.lateral());
+  const BondSystem bonds(liver.tissue.network,
+                         liver.tissue.element().with_relaxation_time(relaxation_time_s));
   Freedom freedom = liver.tissue.freedom();
   freedom.guide(liver.contact, liver.into);
   CondensedContact contact = liver.built.with_relaxation_time(relaxation_time_s);

@@ -16,6 +16,8 @@
 #include <regex>
 
 #include "error_case.hpp"
+#include "material_error_cases.hpp"
+#include "organ_law_error_cases.hpp"
 #include "simulation_error_cases.hpp"
 #include "sweep_error_cases.hpp"
 #include "temp_folder.hpp"
@@ -661,14 +663,51 @@ std::vector<ErrorCase> session_recording_cases() {
   };
 }
 
+std::vector<ErrorCase> view_cases() {
+  const std::string type = "file to view";
+  const std::string show = "view {}/f -o {}/out.html";
+  const auto file = [](std::string bytes) { return files({{"f", std::move(bytes)}}); };
+  return {
+      {type, "missing", show, files({})},
+      {type, "empty", show, file("")},
+      {type, "binary garbage", show, file(kGarbage)},
+      {type, "100 MB line", show, file(long_line())},
+      {type, "signature of HDF5 only", show, file("\x89HDF\r\n\x1a\n")},
+      {type, "pack of curves", "view {}/p.h5 -o {}/out.html", packed(1.0)},
+      {type, "beginning of a recording only", show, file("TPMROWS1")},
+      {type, "JSON of a scene", show, file(R"({"organ": {"kind": "star"}})")},
+      {type, "truncated JSON", show, file(R"({"figures": [)")},
+      {type, "figures that are none", show, file(R"({"figures": [{"panels": [{"x": 1}]}]})")},
+      {type, "answer of a fit without estimates", show,
+       file(R"({"title": "t", "model": "m", "chi_square": 1, "parameters": [{"name": "k"}]})")},
+  };
+}
+
 std::vector<ErrorCase> all_cases() {
   std::vector<ErrorCase> all;
-  for (const auto& cases :
-       {curve_csv_cases(), curve_json_cases(), machine_cases(), spectrum_cases(), digitizer_cases(),
-        hdf5_cases(), fit_config_cases(), oscillation_cases(), fit_tables_cases(), design_cases(),
-        claims_cases(), recording_folder_cases(), law_cases(), scene_cases(), table_option_cases(),
-        session_cases(), session_recording_cases(), test::simulation_error_cases(),
-        test::sweep_error_cases()}) {
+  for (const auto& cases : {curve_csv_cases(),
+                            curve_json_cases(),
+                            machine_cases(),
+                            spectrum_cases(),
+                            digitizer_cases(),
+                            hdf5_cases(),
+                            fit_config_cases(),
+                            oscillation_cases(),
+                            fit_tables_cases(),
+                            design_cases(),
+                            claims_cases(),
+                            recording_folder_cases(),
+                            law_cases(),
+                            scene_cases(),
+                            table_option_cases(),
+                            session_cases(),
+                            session_recording_cases(),
+                            view_cases(),
+                            test::simulation_error_cases(),
+                            test::sweep_error_cases(),
+                            test::material_error_cases(),
+                            test::plugin_error_cases(),
+                            test::organ_law_error_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

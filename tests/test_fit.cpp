@@ -13,6 +13,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/store/file.hpp"
 
 using namespace tpm;

@@ -7,6 +7,7 @@
 #include "simulated_scene.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/simulate/scene_runner.hpp"
+#include "tpm/store/file.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;
@@ -39,6 +40,32 @@ TEST_CASE("what a session steps is at rest, repeats itself and takes nothing fro
     }
   }
   CHECK(stepped >= 8);
+}
+
+TEST_CASE("the page of materials says what the flags say") {
+  constexpr std::array kAsked{&Capabilities::branches,      &Capabilities::stiffening,
+                              &Capabilities::any_potential, &Capabilities::kernels,
+                              &Capabilities::regions,       &Capabilities::mixed};
+  // Formulations with the same flags share a row.
+  std::vector<std::pair<std::string, std::string>> rows;
+  for (const Formulation* f : formulations()) {
+    std::string flags;
+    for (const auto capability : kAsked) flags += f->can().*capability ? " yes |" : " no |";
+    const auto same = std::find_if(rows.begin(), rows.end(),
+                                   [&](const auto& row) { return row.second == flags; });
+    if (same != rows.end()) {
+      same->first.append(", ").append(f->name());
+    } else {
+      rows.emplace_back(f->name(), flags);
+    }
+  }
+  std::string table =
+      "| formulation | branches | stiffening | any_potential | kernels | regions | mixed |\n"
+      "| --- | --- | --- | --- | --- | --- | --- |\n";
+  for (const auto& [names, flags] : rows) table += "| " + names + " |" + flags + "\n";
+  const std::string page = read_file(std::string(TPM_TEST_SOURCE_DIR) + "/docs/materials.md");
+  CAPTURE(table);
+  CHECK(page.find(table) != std::string::npos);
 }
 
 TEST_CASE("the list holds the formulations, each once, by rank") {

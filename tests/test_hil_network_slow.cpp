@@ -66,7 +66,7 @@ TEST_CASE("No model of the loop takes from the heap or gives back while it is st
   const LoopModel model = make_loop_model(parsed);
   VirtualOmega7 device(parsed.plant, parsed.operator_script());
   device.prepare(parsed.preparation);
-  ServoSettings settings = parsed.servo;
+  ServoSettings settings{parsed.servo};
   settings.model_push = model.push;
   settings.to_model = model.to_model;
   ServoStep step(device, *model.model, settings);
@@ -153,15 +153,15 @@ struct Endless {
 Endless endless(const Json& json, std::uint64_t rounds) {
   HilSession session = test::parsed(json);
   const LoopModel loop = make_loop_model(session);
-  session.servo.model_push = loop.push;
+  ServoSettings servo{session.servo};
+  servo.model_push = loop.push;
   // The contact's longest relaxation time is twice the bonds': 40 of it.
   constexpr std::uint64_t kRound = 2000, kSettled = 5, kRest = 8000;
   test::EndlessMotion device(kRound, 4e-3);
   double settled_bytes = 0.0, most_bytes = 0.0;
   Endless run;
   run.drift = test::endless_run(
-      device, *loop.model, session.servo, kRound, rounds, kSettled, kRest,
-      [](const ServoRecord&) {},
+      device, *loop.model, servo, kRound, rounds, kSettled, kRest, [](const ServoRecord&) {},
       [&](std::uint64_t done) {
         if (done == kSettled) settled_bytes = test::resident_bytes();
         if (done > kSettled) most_bytes = std::max(most_bytes, test::resident_bytes());

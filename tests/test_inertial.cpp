@@ -13,6 +13,7 @@
 #include "star_network.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/inertial_equation.hpp"
 #include "tpm/network/simple_organs.hpp"

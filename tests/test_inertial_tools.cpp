@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "star_network.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/driven_network.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/tool_impact.hpp"

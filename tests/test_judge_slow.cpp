@@ -4,6 +4,7 @@
 
 #include "python_judge.hpp"
 #include "tpm/fit/fit.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/network_file.hpp"
 

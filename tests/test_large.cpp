@@ -5,6 +5,7 @@
 #include "indented_scene.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/network/simple_organs.hpp"

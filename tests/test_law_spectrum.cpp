@@ -10,6 +10,7 @@
 #include "tpm/law/law_export.hpp"
 #include "tpm/law/law_file.hpp"
 #include "tpm/law/law_model.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/store/file.hpp"
 
 using namespace tpm;
@@ -165,7 +166,7 @@ TEST_CASE("a spring-pot is a power of the frequency", "[spectrum]") {
 TEST_CASE("the paper's element over frequency is linear-1", "[spectrum]") {
   const TpmParameters p;
   const std::vector<double> frequency{0.01, 30.0, 500.0};
-  const auto element = element_spectrum(p, frequency, Want::values_and_sensitivity);
+  const auto element = element_spectrum(to_vector(p), frequency, Want::values_and_sensitivity);
   const auto law = respond_spectrum(
       parse_law_name("linear-1", "test"),
       {{p.relaxed_modulus_Pa(), p.relaxing_modulus_Pa(), p.relaxation_time_s(), 0, 0}}, frequency,
@@ -174,7 +175,7 @@ TEST_CASE("the paper's element over frequency is linear-1", "[spectrum]") {
   CHECK((element.loss - law.loss).norm() < 1e-12 * law.loss.norm());
   TpmParameters more = p;
   more.eta1_Pa_s *= 1.0 + 1e-6;
-  const auto moved = element_spectrum(more, frequency, Want::values);
+  const auto moved = element_spectrum(to_vector(more), frequency, Want::values);
   CHECK_THAT((moved.loss[1] - element.loss[1]) / (1e-6 * p.eta1_Pa_s),
              WithinRel(element.loss_by(1, kEta1), 1e-5));
 }

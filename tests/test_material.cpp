@@ -7,6 +7,7 @@
 #include "organ_scene.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/lowest_mode.hpp"
@@ -204,7 +205,7 @@ TEST_CASE("one table names the parameters of a material") {
 
 TEST_CASE("the paper's element is one material") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.7);
-  const BondMaterial m = BondMaterial::of(p);
+  const BondMaterial m = p.bonds();
   CHECK_THAT(m.instantaneous_Pa(), WithinRel(p.E2_Pa, 1e-15));
   CHECK_THAT(m.equilibrium_Pa, WithinRel(p.relaxed_modulus_Pa(), 1e-15));
   REQUIRE(m.branches.size() == 1);

@@ -3,6 +3,7 @@
 
 #include "method_problems.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/model/cvodes_element.hpp"
 
 using namespace tpm;

@@ -5,6 +5,7 @@
 
 #include "organ_scene.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 
 using namespace tpm;

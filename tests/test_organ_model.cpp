@@ -5,6 +5,7 @@
 
 #include "tpm/fit/config.hpp"
 #include "tpm/fit/scouted_minimum.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/scene/organ_model.hpp"
 
 using namespace tpm;

@@ -5,6 +5,7 @@
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/report/organ_study_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/organ_study.hpp"
@@ -58,7 +59,7 @@ std::string refused(const Json& study) {
 TEST_CASE("the star as a network does every experiment of the paper as its closed form does") {
   const TempFolder folder;
   const OrganStudyConfig config = two_stars(folder);
-  const StudyCurves set = curves_at(config, "liver", some_liver());
+  const StudyCurves set = curves_at(config, "liver", to_vector(some_liver()));
   REQUIRE(set.curves.size() == 2 * config.conditions.size());
   for (std::size_t c = 0; c < config.conditions.size(); ++c) {
     const StudyCurve& closed = set.at(c, 0);
@@ -80,7 +81,7 @@ TEST_CASE("readings stand where their experiment has them") {
   const TpmParameters p = some_liver();
   for (std::size_t c = 0; c < config.conditions.size(); ++c) {
     const StudyCondition& condition = config.conditions[c];
-    const StudyCurve curve = study_curve(config, c, 0, p);
+    const StudyCurve curve = study_curve(config, c, 0, to_vector(p));
     CAPTURE(c);
     const double lambda1 = lambda1_Pa(p.Eprime_Pa, condition.depth_m, p.spacing_m);
     if (condition.kind == Kind::static_) {
@@ -200,7 +201,7 @@ TEST_CASE("the committed readings are what the tissues answer at the committed m
         const Json& stored = answers.at(c * config.tissues.size() + t);
         CAPTURE(m, c, t);
         REQUIRE(stored.at("tissue") == config.tissues[t].name);
-        const StudyCurve curve = study_curve(config, c, t, p);
+        const StudyCurve curve = study_curve(config, c, t, to_vector(p));
         REQUIRE(stored.at("readings").size() == curve.readings.size());
         for (std::size_t i = 0; i < curve.readings.size(); ++i) {
           CHECK_THAT(curve.readings[i].response,

@@ -2,8 +2,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "patch_test.hpp"
 #include "tpm/core/error.hpp"
-#include "tpm/network/patch_test.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/simple_organs.hpp"
 
 using namespace tpm;

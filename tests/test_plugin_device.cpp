@@ -69,7 +69,7 @@ TEST_CASE("A step with a device of a plugin takes nothing from the heap") {
   PluginDevice device(TPM_TEST_DEVICE_PLUGIN);
   (void)device.open();
   device.prepare(session.preparation);
-  ServoSettings settings = session.servo;
+  ServoSettings settings{session.servo};
   settings.gate.reset();
   settings.model_push = loop.push;
   ServoStep step(device, *loop.model, settings);

@@ -1,8 +1,9 @@
 // Refinement: what a body of fixed size answers under the continuum law, at smaller and smaller x.
 #include <catch2/catch.hpp>
 
+#include "patch_test.hpp"
 #include "punch_on_block.hpp"
-#include "tpm/network/patch_test.hpp"
+#include "tpm/material/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

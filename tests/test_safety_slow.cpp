@@ -6,6 +6,7 @@
 #include "shaken_contact.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/device/virtual_omega7.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/servo/servo_loop.hpp"
 
 namespace tpm {

@@ -12,6 +12,7 @@
 #include "tpm/haptics/element_contact.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/servo/servo_loop.hpp"
 #include "tpm/store/file.hpp"
 
@@ -79,7 +80,7 @@ TEST_CASE("A step neither allocates nor frees") {
   VirtualOmega7 device(session.plant, session.operator_script());
   device.prepare(session.preparation);
   ElementContact model(slow_liver(), session.servo.period_s);
-  ServoSettings settings = session.servo;
+  ServoSettings settings{session.servo};
   ServoStep step(device, model, settings);
   ServoRecord row;
   StopCause cause = StopCause::none;

@@ -8,6 +8,7 @@
 #include "tpm/benchmark/contact_reference.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
@@ -114,8 +115,8 @@ TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const double z = 0.3;
-  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(1.0),
-                         LateralBond::tension_only);
+  const BondSystem bonds(
+      scene.network, TpmParameters{}.with_relaxation_time(1.0).bonds(LateralBond::tension_only));
   std::vector<ServoBonds::Choice> all;
   for (std::size_t b = 0; b < bonds.size(); ++b) {
     all.push_back({b, bonds.end_a()[b], bonds.end_b()[b]});

@@ -223,15 +223,15 @@ TEST_CASE("Whatever throws while a session runs, its threads end and the forces 
 
   device->prepare(session.preparation);
   options.interrupted = []() -> bool { throw Error(ExitCode::environment, "asking", "failed"); };
-  CHECK_THROWS_WITH(
-      run_in_real_time(device, std::make_shared<Free>(), session.servo, quiet, options),
-      Catch::Contains("asking: failed"));
+  CHECK_THROWS_WITH(run_in_real_time(device, std::make_shared<Free>(), ServoSettings{session.servo},
+                                     quiet, options),
+                    Catch::Contains("asking: failed"));
   CHECK(device->status().forces_off == ForcesOff::software);
 
   device->prepare(session.preparation);
   options.interrupted = {};
   const ServoOutcome no_error = run_in_real_time(
-      device, std::make_shared<Free>(), session.servo,
+      device, std::make_shared<Free>(), ServoSettings{session.servo},
       [](const ServoRecord& row) {
         if (row.cycle == 50) throw 7;  // NOLINT: what is no error
       },
@@ -241,7 +241,7 @@ TEST_CASE("Whatever throws while a session runs, its threads end and the forces 
   CHECK(device->status().forces_off == ForcesOff::software);
 
   device->prepare(session.preparation);
-  CHECK(run_in_virtual_time(*device, *std::make_shared<Free>(), session.servo,
+  CHECK(run_in_virtual_time(*device, *std::make_shared<Free>(), ServoSettings{session.servo},
                             [](const ServoRecord&) { throw 7; })
             .cause == StopCause::exception);
   CHECK(device->status().forces_off == ForcesOff::software);

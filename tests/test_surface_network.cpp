@@ -8,6 +8,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/surface_scene.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/method/ball_by_cvode.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/simple_organs.hpp"

@@ -20,7 +20,8 @@ std::vector<TangentDirection> all_directions(const Network& network,
                                              const TpmParameters& material) {
   std::vector<TangentDirection> directions;
   const TpmVector values = to_vector(material);
-  for (TangentDirection& d : material_directions(network, material)) {
+  for (TangentDirection& d : material_directions(network, material.E1_Pa, material.E2_Pa,
+                                                 material.modulus_to_stiffness_m())) {
     const double value = values[directions.size()];
     directions.push_back({value * d.stiffness, value * d.relaxing, value * d.log_relaxation_time});
   }

@@ -17,7 +17,7 @@ namespace {
 struct IdentifyCommand {
   RecordingOptions recordings;
   std::vector<std::string> laws;
-  std::string target = "10%", patience = "1.1", level = "0.95", reference, seed = "0";
+  std::string target = "10%", patience = "1.3", level = "0.95", reference, seed = "0";
   std::string folder, output;
   bool no_loop = false;
 };

@@ -66,9 +66,11 @@ void tell_user(fmt::format_string<Arguments...> text, Arguments&&... arguments) 
 
 // One function per file cmd_*.cpp.
 void add_version_command(CLI::App& app, Session& session);
+void add_view_command(CLI::App& app, Session& session);
 void add_fit_command(CLI::App& app, Session& session);
 void add_select_command(CLI::App& app, Session& session);
 void add_budget_command(CLI::App& app, Session& session);
+void add_material_command(CLI::App& app, Session& session);
 void add_identify_command(CLI::App& app, Session& session);
 void add_predict_command(CLI::App& app, Session& session);
 void add_recovery_command(CLI::App& app, Session& session);

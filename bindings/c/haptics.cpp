@@ -180,7 +180,7 @@ int tpm_haptics_get_info(const tpm_haptics_contact* contact, tpm_haptics_info* i
   if (contact == nullptr || info == nullptr || !known(*info, sizeof *info))
     return TPM_HAPTICS_USAGE;
   const tpm::LoopContact& c = contact->contact;
-  const tpm::ServoSettings& servo = c.session().servo;
+  const tpm::SessionServo& servo = c.session().servo;
   const tpm::TissueShape& shape = c.loop().shape;
   tpm_haptics_info filled = TPM_HAPTICS_INFO_INIT;
   filled.period_s = c.period_s();

@@ -77,7 +77,7 @@ py::dict state_of(LoopContact& contact) {
 
 py::dict info_of(const LoopContact& contact) {
   const RenderingCheck& check = contact.rendering();
-  const ServoSettings& servo = contact.session().servo;
+  const SessionServo& servo = contact.session().servo;
   return py::dict(
       py::arg("model") = contact.loop().name, py::arg("error_bound") = contact.loop().error_bound,
       py::arg("period_s") = contact.period_s(),

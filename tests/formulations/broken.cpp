@@ -13,8 +13,8 @@ class BrokenFormulation final : public Formulation, public SceneRunner {
                                const std::vector<double>& times_s,
                                bool /*with_field*/) const override {
     constexpr double kAtRest_N = 1e-3, kGain_N_s_per_m = 5.0;
-    const TpmParameters& p = scene.tissue.element("broken");
-    const double stiffness = p.E2_Pa * p.modulus_to_stiffness_m() + (odd_ ? 1.0 : 0.0);
+    const BondElement p = scene.tissue.element("broken");
+    const double stiffness = p.instantaneous_Pa() * p.modulus_to_stiffness_m() + (odd_ ? 1.0 : 0.0);
     odd_ = !odd_;
     Trajectory answer;
     answer.response.resize(static_cast<Eigen::Index>(times_s.size()));

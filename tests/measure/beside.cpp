@@ -50,8 +50,7 @@ void measure(const std::string& file, Eigen::Index steps, std::uint64_t seed) {
       "tau_s,peak_N,off_of_peak,rms_off_of_peak,estimate_of_peak,least_work_J,largest_work_J,"
       "least_work_in_loop_J\n");
   for (const double tau_s : {0.1, 1.0, 10.0}) {
-    const TpmParameters material = tissue.element().with_relaxation_time(tau_s);
-    const BondSystem bonds(tissue.network, material, tissue.materials.lateral());
+    const BondSystem bonds(tissue.network, tissue.element().with_relaxation_time(tau_s));
     const auto network = [&](double period_s) {
       return std::make_unique<ServoNetwork>(
           bonds, rest, freedom, contact, into,

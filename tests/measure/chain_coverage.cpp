@@ -1,5 +1,6 @@
-// measure_chain_coverage predict|identify SIMULATIONS SEED: how often bands of predictions and
-// intervals at the stopping time hold what they should (reports/chain).
+// measure_chain_coverage predict|contact|identify SIMULATIONS SEED: how often bands of predictions,
+// intervals of fits whose contact is fixed or estimated, and intervals at the stopping time hold
+// what they should (reports/chain).
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -31,6 +32,23 @@ void predict(int simulations, std::uint64_t seed) {
   }
 }
 
+void contact(int simulations, std::uint64_t seed) {
+  fmt::print(
+      "| contact | parameter | interval holds the truth | exact p of 95 % |\n"
+      "| --- | --- | --- | --- |\n");
+  for (const Nuisance nuisance : {Nuisance::offset, Nuisance::automatic}) {
+    const auto c =
+        test::fit_coverage(parse_law_name("linear-1", "law"), test::even_test(20.0, 0.02), 0.02,
+                           0.0, nuisance, simulations, seed);
+    for (std::size_t k = 0; k < c.names.size(); ++k) {
+      fmt::print("| {} | {} | {:.1f} % of {} | {:.2g} |\n",
+                 nuisance == Nuisance::offset ? "fixed where it was found" : "estimated",
+                 c.names[k], 100.0 * c.parameters[k].share(), c.parameters[k].trials,
+                 test::binomial_p(c.parameters[k], 0.95));
+    }
+  }
+}
+
 void identify(int simulations, std::uint64_t seed, double only) {
   fmt::print(
       "| law | phi | parameter | interval holds the truth | exact p of 95 % | stopped | "
@@ -57,13 +75,17 @@ void identify(int simulations, std::uint64_t seed, double only) {
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    fmt::print(stderr, "usage: measure_chain_coverage predict|identify SIMULATIONS SEED [PHI]\n");
+    fmt::print(stderr,
+               "usage: measure_chain_coverage predict|contact|identify SIMULATIONS SEED "
+               "[PHI]\n");
     return 2;
   }
   const int simulations = std::atoi(argv[2]);
   const auto seed = std::strtoull(argv[3], nullptr, 10);
   if (std::string(argv[1]) == "predict") {
     predict(simulations, seed);
+  } else if (std::string(argv[1]) == "contact") {
+    contact(simulations, seed);
   } else {
     identify(simulations, seed, argc > 4 ? std::atof(argv[4]) : -1.0);
   }

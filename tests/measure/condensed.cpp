@@ -68,8 +68,7 @@ struct Scene {
   Eigen::Vector3d into;
 
   [[nodiscard]] BondSystem bonds(double relaxation_time_s) const {
-    return {tissue.network, tissue.element().with_relaxation_time(relaxation_time_s),
-            tissue.materials.lateral()};
+    return {tissue.network, tissue.element().with_relaxation_time(relaxation_time_s)};
   }
 };
 

@@ -18,6 +18,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/freedom.hpp"
 #include "tpm/network/indentation.hpp"

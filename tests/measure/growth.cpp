@@ -19,6 +19,7 @@
 #include <string>
 
 #include "tpm/core/error.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/indentation.hpp"

@@ -27,8 +27,9 @@ int run(const std::string& file, double hours, const std::filesystem::path& fold
                    kForgotten = 80.0;  // relaxation times, the contact's longest is two
   HilSession session = read_session(file);
   LoopModel loop = make_loop_model(session);
-  session.servo.model_push = loop.push;
-  session.servo.to_model = loop.to_model;
+  ServoSettings servo{session.servo};
+  servo.model_push = loop.push;
+  servo.to_model = loop.to_model;
   const double tau_s =
       parse_tissue(session.scene, session.scene_place, {}).bonds().relaxation_time_s();
   const double period_s = session.servo.period_s;
@@ -51,8 +52,8 @@ int run(const std::string& file, double hours, const std::filesystem::path& fold
   };
   tell(0.0);
   const test::Drift drift = test::endless_run(
-      device, *loop.model, session.servo, cycles(kRound_s), rounds, settled,
-      cycles(kForgotten * tau_s), [&](const ServoRecord& row) { log->append(&row); },
+      device, *loop.model, servo, cycles(kRound_s), rounds, settled, cycles(kForgotten * tau_s),
+      [&](const ServoRecord& row) { log->append(&row); },
       [&](std::uint64_t done) {
         if (done % rounds_an_hour != 0 && done != rounds && done != settled) return;
         tell(static_cast<double>(done) * kRound_s / kHour_s);

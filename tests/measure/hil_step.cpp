@@ -55,7 +55,7 @@ void measure(const std::string& file, int rounds) {
   constexpr double kLongest_s = 12.0;
   const HilSession session = read_session(file);
   const LoopModel loop = make_loop_model(session);
-  ServoSettings settings = session.servo;
+  ServoSettings settings{session.servo};
   settings.model_push = loop.push;
   settings.to_model = loop.to_model;
   const auto cycles =

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "far_side.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/liver.hpp"
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "python_judge.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/network_file.hpp"
 

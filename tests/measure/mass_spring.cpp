@@ -10,6 +10,7 @@
 
 #include "far_side.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/mass_spring.hpp"
@@ -85,7 +86,7 @@ class Scene {
     return spheres;
   }
 
-  [[nodiscard]] double stiffness(const Network& network, const TpmParameters& p,
+  [[nodiscard]] double stiffness(const Network& network, const BondMaterial& p,
                                  double following) const {
     return contact_stiffness_N_per_m(BondSystem(network, p), liver_.organ.position, freedom_,
                                      probe_, following);

@@ -7,6 +7,7 @@
 #include <ctime>
 
 #include "organ_scene.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 
 using namespace tpm;

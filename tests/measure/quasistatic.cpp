@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "organ_scene.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 
 using namespace tpm;

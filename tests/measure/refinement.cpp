@@ -4,10 +4,11 @@
 
 #include <numbers>
 
+#include "patch_test.hpp"
 #include "punch_on_block.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/liver.hpp"
-#include "tpm/network/patch_test.hpp"
 
 using namespace tpm;
 

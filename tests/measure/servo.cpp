@@ -35,8 +35,7 @@ struct Setup {
     into = -tissue.network.organ.normal.col(static_cast<Eigen::Index>(contact));
   }
   [[nodiscard]] BondSystem bonds(double tau_s) const {
-    return {tissue.network, tissue.element().with_relaxation_time(tau_s),
-            tissue.materials.lateral()};
+    return {tissue.network, tissue.element().with_relaxation_time(tau_s)};
   }
   [[nodiscard]] const Positions& rest() const { return tissue.network.organ.position; }
 

@@ -96,9 +96,8 @@ void compare(const Setup& setup, double depth_m, double angle) {
 void claim(const Setup& setup, double speed_m_per_s, double tau_s) {
   constexpr int kParts = 8;
   constexpr double kDeep_m = 4e-3, kFar_m = 10e-3;
-  const TpmParameters material = setup.surface.scene.tissue.element().with_relaxation_time(tau_s);
-  const BondSystem bonds =
-      setup.bonds.with_materials(setup.surface.scene.tissue.network, BondMaterial::of(material));
+  const BondMaterial material = setup.surface.scene.tissue.element().with_relaxation_time(tau_s);
+  const BondSystem bonds = setup.bonds.with_materials(setup.surface.scene.tissue.network, material);
   const double period_s = setup.session.servo.period_s;
   SurfaceNetwork network(bonds, setup.surface.scene.rest(), setup.freedom, setup.surface.ball,
                          {.period_s = period_s});

@@ -11,31 +11,29 @@
 namespace tpm {
 namespace {
 
-constexpr double kPaperEta1_Pa_s = 5.0;
-
 /// One bond under a protocol, and the star of four spheres, which is the same thing.
 struct PosedBond {
-  TpmParameters material;
+  BondElement material;
   std::shared_ptr<const PosedNetwork> star;
   std::shared_ptr<const MethodProblem> element;
 };
 
-TpmParameters material_of(double eta1_Pa_s) {
-  TpmParameters material;
-  material.eta1_Pa_s = eta1_Pa_s;
-  return material;
+/// The paper's springs with a dashpot.
+BondElement material_of(double eta1_Pa_s) {
+  const BondElement paper = paper_element();
+  return paper.with_relaxation_time(paper.relaxation_time_s() * eta1_Pa_s / kPaperEta1_Pa_s);
 }
 
 PosedBond posed_bond(double eta1_Pa_s, const Protocol& protocol, std::vector<double> times_s) {
-  const TpmParameters material = material_of(eta1_Pa_s);
+  const BondElement material = material_of(eta1_Pa_s);
   return {material,
           std::make_shared<PosedNetwork>(driven_star(material), protocol, std::move(times_s)),
           element_problem(material, protocol)};
 }
 
-MethodRun run_closed_form(const TpmParameters& material, const Protocol& protocol,
+MethodRun run_closed_form(const BondElement& material, const Protocol& protocol,
                           std::span<const double> times_s) {
-  const TpmVector parameters = to_vector(material);
+  const TpmVector parameters = element_constants(material);
   MethodRun run;
   run.response =
       make_model("closed_form")->respond(protocol, times_s, parameters, Want::values).value;
@@ -93,13 +91,14 @@ PosedBond ramped_bond(double eta1_Pa_s) {
 /// Written down once more here, away from the methods that it judges.
 Eigen::VectorXd integrated_depth(const PosedBond& bond, double load_N) {
   using State = std::array<double, 3>;
-  const TpmParameters& p = bond.material;
-  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
+  const BondElement& p = bond.material;
+  const TensionLaw tension = p.tension();
+  const double at_once_Pa = p.instantaneous_Pa(), relaxing_Pa = p.relaxing_Pa();
   const double mass_kg = bond.star->mass->mass_kg[0];
   const double drag_per_s = bond.star->mass->drag_per_s;
   const auto rates = [&](const State& s, State& rate, double /*time*/) {
-    const double pull = (p.E2_Pa * s[0] - p.relaxing_modulus_Pa() * s[2] + tension.value(s[0])) *
-                        p.modulus_to_stiffness_m();
+    const double pull =
+        (at_once_Pa * s[0] - relaxing_Pa * s[2] + tension.value(s[0])) * p.modulus_to_stiffness_m();
     rate = {s[1], (load_N - pull) / mass_kg - drag_per_s * s[1],
             (s[0] - s[2]) / p.relaxation_time_s()};
   };

@@ -20,7 +20,7 @@ void PosedNetwork::set_masses(Eigen::VectorXd mass_kg, double ratio) {
   mass = MethodMasses{std::move(mass_kg), 2.0 * ratio * lowest.angular_frequency()};
 }
 
-DrivenNetwork driven_star(const TpmParameters& material) {
+DrivenNetwork driven_star(const BondElement& material) {
   constexpr double kRadialLength = 0.020;
   const Organ organ = star(material.spacing_m, kRadialLength);
   const std::vector<NeighbourPair> pairs{{0, 1}, {1, 2}, {1, 3}};

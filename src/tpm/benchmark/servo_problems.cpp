@@ -55,9 +55,9 @@ class ServoCase {
         line(along_line),
         compared(motions(into)) {
     for (const double tau_s : taus_s) {
-      const TpmParameters material = tissue.element().with_relaxation_time(tau_s);
-      bonds_.push_back(
-          std::make_unique<BondSystem>(tissue.network, material, tissue.materials.lateral()));
+      MaterialField materials = tissue.materials;
+      set_value(materials.materials.front(), "tau1", tau_s, "servo problem");
+      bonds_.push_back(std::make_unique<BondSystem>(tissue.network, materials));
     }
   }
 

@@ -5,6 +5,7 @@
 #include "tpm/benchmark/speed.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
+#include "tpm/material/bond_element.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/large_equilibrium.hpp"
 #include "tpm/network/liver.hpp"
@@ -22,7 +23,7 @@ namespace {
 struct StandingLiver {
   StandingLiver(std::size_t count, bool solid)
       : network(build_network(organ_of(count, solid), continuum(), "speed record")),
-        bonds(network, TpmParameters{}),
+        bonds(network, paper_element()),
         freedom(network.organ.size()) {
     const Positions& rest = network.organ.position;
     const double near = rest.row(2).minCoeff();

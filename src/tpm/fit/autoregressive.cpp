@@ -63,16 +63,20 @@ class RestrictedLikelihood {
 
 double AutoregressiveNoise::correlation(double dt_s) const {
   if (phi_ == 0.0) return 0.0;
+  // Times of even sampling differ from a multiple of the step by their rounding.
+  constexpr double kRounding = 1e-9;
   const double steps = dt_s / step_s_;
-  return steps == 1.0 ? phi_ : std::pow(phi_, steps);
+  return std::abs(steps - 1.0) < kRounding ? phi_ : std::pow(phi_, steps);
 }
 
 double AutoregressiveNoise::log_determinant(std::span<const double> time_s) const {
   if (phi_ == 0.0) return 0.0;
-  double sum = 0.0;
+  double sum = 0.0, of_step = 0.0, last_rho = 0.0;
   for (std::size_t i = 1; i < time_s.size(); ++i) {
     const double rho = correlation(time_s[i] - time_s[i - 1]);
-    sum += std::log1p(-rho * rho);
+    if (rho != last_rho) of_step = std::log1p(-rho * rho);
+    last_rho = rho;
+    sum += of_step;
   }
   return sum;
 }

@@ -108,15 +108,14 @@ bool has_element(const FitConfig& config) {
   return !config.law && (!config.organ || OrganModel(config.organ).has_element());
 }
 
-TpmParameters element_parameters(const FitConfig& config, std::span<const double> natural,
-                                 std::size_t choice) {
+TpmVector fitted_element(const FitConfig& config, std::span<const double> natural) {
   if (!has_element(config)) {
     throw bad_input("fit", "the model is not the paper's element", "E1, E2, Eprime and eta1");
   }
-  const std::vector<double> values = model_parameters(config, natural, choice);
+  const std::vector<double> values = model_parameters(config, natural, 0);
   TpmVector vector{};
   std::copy(values.begin(), values.end(), vector.begin());
-  return from_vector(vector);
+  return vector;
 }
 
 FitConfig parse_fit_config(const Json& document, std::string_view where,

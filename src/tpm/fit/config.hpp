@@ -137,9 +137,9 @@ struct FitConfig {
 /// False for a law of the family and for an organ of a material of its own.
 [[nodiscard]] bool has_element(const FitConfig& config);
 
-/// The same as parameters of the paper's element. Throws Error(bad_input) unless has_element().
-[[nodiscard]] TpmParameters element_parameters(const FitConfig& config,
-                                               std::span<const double> natural, std::size_t choice);
+/// The paper's element at estimated parameters, for the first data set. Throws Error(bad_input)
+/// unless has_element().
+[[nodiscard]] TpmVector fitted_element(const FitConfig& config, std::span<const double> natural);
 
 /// Reads and checks a configuration. Throws Error(bad_input) with the file and the key.
 /// @param folder that paths in the document are relative to

@@ -178,7 +178,7 @@ std::vector<double> parse_fixed(const Json& document, const Model& model, const 
   } else if (config.organ) {
     values = OrganModel(config.organ).own_values();
   } else {
-    const TpmVector paper = to_vector(TpmParameters{});
+    const TpmVector paper = to_vector({});
     values.assign(paper.begin(), paper.end());
   }
   if (!document.contains("fixed")) return values;

@@ -113,8 +113,8 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
     }
   }
   if (!has_element(result.config)) return;  // the limits are those of the paper's element
-  const TpmParameters element = element_parameters(result.config, result.best.natural, 0);
-  for (std::string& flag : validity_flags(element, deepest)) {
+  const TpmVector element = fitted_element(result.config, result.best.natural);
+  for (std::string& flag : validity_flags(element[kSpacing], deepest)) {
     result.flags.push_back(std::move(flag));
   }
 }

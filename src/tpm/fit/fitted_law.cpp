@@ -60,12 +60,12 @@ LawSpec spec_of(const FitResult& fit) {
   return spec;
 }
 
-std::vector<double> values_of_element(const TpmParameters& p, const LawSpec& spec) {
+std::vector<double> values_of_element(const BondElement& p, const LawSpec& spec) {
   const double scale = p.modulus_to_stiffness_m();
-  return {scale * p.relaxed_modulus_Pa(),
-          scale * p.relaxing_modulus_Pa(),
+  return {scale * p.equilibrium_Pa,
+          scale * p.relaxing_Pa(),
           p.relaxation_time_s(),
-          scale * lambda1_Pa(p.Eprime_Pa, spec.reference, p.spacing_m),
+          scale * lambda1_Pa(p.lateral_Pa, spec.reference, p.spacing_m),
           p.spacing_m,
           0.0,
           0.0};
@@ -74,7 +74,8 @@ std::vector<double> values_of_element(const TpmParameters& p, const LawSpec& spe
 /// The law's parameters at values of the fit's, SI.
 std::vector<double> law_values(const FitResult& fit, const LawSpec& spec,
                                std::span<const double> natural) {
-  if (!fit.config.law) return values_of_element(element_parameters(fit.config, natural, 0), spec);
+  if (!fit.config.law)
+    return values_of_element(from_vector(fitted_element(fit.config, natural)), spec);
   std::vector<double> values = model_parameters(fit.config, natural, 0);
   if (fit.config.data.size() == 1) return values;
   const std::vector<LawParameter> parameters = law_parameters(spec);

@@ -43,12 +43,16 @@ void refuse_formulation(std::string_view name, std::string_view noun, std::strin
                   fmt::format("one of {}", able));
 }
 
+std::string_view words_of(bool Capabilities::*capability) {
+  return std::find_if(kCapabilities.begin(), kCapabilities.end(),
+                      [&](const CapabilityEntry& e) { return e.meaning == capability; })
+      ->words;
+}
+
 void refuse_capability(const Formulation& f, bool Capabilities::*capability, std::string_view where,
                        const std::string& able) {
-  const auto* entry =
-      std::find_if(kCapabilities.begin(), kCapabilities.end(),
-                   [&](const CapabilityEntry& e) { return e.meaning == capability; });
-  throw bad_input(where, fmt::format("'{}' is no formulation that {}", f.name(), entry->words),
+  throw bad_input(where,
+                  fmt::format("'{}' is no formulation that {}", f.name(), words_of(capability)),
                   fmt::format("one of {}", able));
 }
 

@@ -23,6 +23,13 @@ struct Capabilities {
   bool course = true;             ///< follows the course of time; else each instant stands alone
   bool beforehand = false;        ///< needs the whole protocol before it begins
   bool planned = false;           ///< `tpm plan` considers it
+  // Materials of the bonds (docs/materials.md).
+  bool branches = false;       ///< several relaxation times
+  bool stiffening = false;     ///< a potential that stiffens as a cubic
+  bool any_potential = false;  ///< any potential
+  bool kernels = false;        ///< branches on a kernel
+  bool regions = false;        ///< stiffer or softer by a factor of place
+  bool mixed = false;          ///< regions that relax differently
 };
 
 /// A capability with its word in lists and its place in messages: "a formulation that ...".
@@ -31,7 +38,7 @@ struct CapabilityEntry {
   std::string_view text;
   std::string_view words;
 };
-inline constexpr std::array<CapabilityEntry, 13> kCapabilities{{
+inline constexpr std::array<CapabilityEntry, 19> kCapabilities{{
     {&Capabilities::network, "network", "runs on any network, not only on the star"},
     {&Capabilities::depth, "depth", "is driven by a depth"},
     {&Capabilities::load, "load", "is driven by a load"},
@@ -45,7 +52,20 @@ inline constexpr std::array<CapabilityEntry, 13> kCapabilities{{
     {&Capabilities::course, "course", "follows the course of time"},
     {&Capabilities::beforehand, "beforehand", "needs the protocol beforehand"},
     {&Capabilities::planned, "planned", "is considered by tpm plan"},
+    {&Capabilities::branches, "branches", "takes several relaxation times"},
+    {&Capabilities::stiffening, "stiffening", "takes a potential that stiffens"},
+    {&Capabilities::any_potential, "any_potential", "takes a potential of sinh"},
+    {&Capabilities::kernels, "kernels", "takes branches on a kernel"},
+    {&Capabilities::regions, "regions", "takes regions of another stiffness"},
+    {&Capabilities::mixed, "mixed", "takes regions that relax differently"},
 }};
+
+/// The capabilities with every material added to them.
+[[nodiscard]] constexpr Capabilities with_any_material(Capabilities can) {
+  can.branches = can.stiffening = can.any_potential = true;
+  can.kernels = can.regions = can.mixed = true;
+  return can;
+}
 
 /// One way to compute how tissue answers: equations with a method that solves them. It states what
 /// it is and what it can do; what it does for whom stands in its roles, interfaces that it
@@ -126,6 +146,8 @@ template <class Predicate>
 /// Throws Error(bad_input): this one cannot, those `able` can.
 [[noreturn]] void refuse_capability(const Formulation& f, bool Capabilities::*capability,
                                     std::string_view where, const std::string& able);
+/// The words of a capability in kCapabilities.
+[[nodiscard]] std::string_view words_of(bool Capabilities::*capability);
 
 /// The formulation of this name, which has the role. Throws Error(bad_input) that names those that
 /// have it.

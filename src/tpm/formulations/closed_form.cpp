@@ -35,10 +35,11 @@ class ElementFormulation final : public Formulation, public ModelMaker, public S
     ModelOptions options;
     options.relative_tolerance = std::min(options.relative_tolerance, scene.formulation.tolerance);
     Trajectory answer;
-    answer.response = ElementModel(options)
-                          .respond(scene.protocol, times_s,
-                                   to_vector(scene.tissue.element("the closed form")), Want::values)
-                          .value;
+    answer.response =
+        ElementModel(options)
+            .respond(scene.protocol, times_s,
+                     element_constants(scene.tissue.element("the closed form")), Want::values)
+            .value;
     answer.steps = static_cast<double>(times_s.size());
     if (!with_field) return answer;
     const bool by_depth = scene.protocol.drive() == Drive::displacement;

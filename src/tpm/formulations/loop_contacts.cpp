@@ -76,6 +76,19 @@ LoopModel law_model(const HilSession& session, bool /*threads*/) {
   return loop;
 }
 
+constexpr Capabilities kOfServoNetwork{.network = true,
+                                       .depth = true,
+                                       .field = true,
+                                       .servo = true,
+                                       .branches = true,
+                                       .stiffening = true,
+                                       .regions = true};
+
+Capabilities with_tools(Capabilities can) {
+  can.tools = true;
+  return can;
+}
+
 LoopModel ball_model(const HilSession& session, bool /*threads*/) {
   return surface_model(session);
 }
@@ -87,14 +100,11 @@ Formulations loop_contacts_formulations() {
       {"network_beside",
        "the whole network at 200 Hz beside the loop, which uses its last force "
        "and stiffness",
-       {.network = true, .depth = true, .field = true, .servo = true},
-       300},
+       kOfServoNetwork, 300},
       network_beside_model);
   static const LoopContact surface(
-      {"surface",
-       "the whole network in every period under a ball that moves in space",
-       {.network = true, .depth = true, .field = true, .tools = true, .servo = true},
-       310},
+      {"surface", "the whole network in every period under a ball that moves in space",
+       with_tools(kOfServoNetwork), 310},
       ball_model);
   static const LoopContact law({"law",
                                 "one contact that answers by a law of the family, without an organ",

@@ -76,15 +76,15 @@ class NetworkStepFormulation final : public Formulation, public SceneRunner, pub
   }
 };
 
-constexpr Capabilities kOfNetwork{.network = true,
-                                  .depth = true,
-                                  .load = true,
-                                  .jumps = true,
-                                  .field = true,
-                                  .several_contacts = true,
-                                  .tools = true,
-                                  .beforehand = true,
-                                  .planned = true};
+constexpr Capabilities kOfNetwork = with_any_material({.network = true,
+                                                       .depth = true,
+                                                       .load = true,
+                                                       .jumps = true,
+                                                       .field = true,
+                                                       .several_contacts = true,
+                                                       .tools = true,
+                                                       .beforehand = true,
+                                                       .planned = true});
 
 Capabilities in_steps(Capabilities can) {
   can.beforehand = false;

@@ -112,9 +112,24 @@ constexpr Capabilities kAlongPush{.network = true,
                                   .field = true,
                                   .several_contacts = true,
                                   .servo = true,
-                                  .planned = true};
+                                  .planned = true,
+                                  .branches = true,
+                                  .stiffening = true,
+                                  .any_potential = true,
+                                  .regions = true};
 /// What sees one sphere that is moved in space.
-constexpr Capabilities kInSpace{.network = true, .depth = true, .servo = true, .planned = true};
+constexpr Capabilities kInSpace{.network = true,
+                                .depth = true,
+                                .servo = true,
+                                .planned = true,
+                                .branches = true,
+                                .stiffening = true,
+                                .regions = true};
+
+Capabilities with_any_potential(Capabilities can) {
+  can.any_potential = true;
+  return can;
+}
 
 Capabilities without_field(Capabilities can) {
   can.field = false;
@@ -147,7 +162,7 @@ Formulations reduced_contacts_formulations() {
   static const ReducedLoop condensed(
       {"condensed",
        "the network on its slow manifold, seen from its contact sphere",
-       kInSpace,
+       with_any_potential(kInSpace),
        130,
        {"step"}},
       condensed_candidates, condensed_model);

@@ -67,14 +67,14 @@ Formulations static_equilibrium_formulations() {
   static const StaticFormulation equilibrium(
       {"static",
        "everything has relaxed under what is imposed at each time",
-       {.network = true,
-        .depth = true,
-        .load = true,
-        .jumps = true,
-        .field = true,
-        .several_contacts = true,
-        .tools = true,
-        .course = false},
+       with_any_material({.network = true,
+                          .depth = true,
+                          .load = true,
+                          .jumps = true,
+                          .field = true,
+                          .several_contacts = true,
+                          .tools = true,
+                          .course = false}),
        150,
        {"solver"}});
   static const std::vector<const Formulation*> all{&equilibrium};

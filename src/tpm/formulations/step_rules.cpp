@@ -61,12 +61,12 @@ std::vector<std::unique_ptr<const Formulation>> made_step_rules() {
     Formulation::Entry entry;
     entry.name = rule.text;
     entry.meaning = rule.words;
-    entry.can = {.network = true,
-                 .depth = true,
-                 .load = true,
-                 .jumps = true,
-                 .masses = true,
-                 .several_contacts = true};
+    entry.can = with_any_material({.network = true,
+                                   .depth = true,
+                                   .load = true,
+                                   .jumps = true,
+                                   .masses = true,
+                                   .several_contacts = true});
     entry.rank = kFirstRank + static_cast<int>(all.size());
     entry.keys = {"masses", "damping_ratio", "density_kg_per_m3"};
     if (!rule.adaptive) entry.keys.emplace_back("step");

@@ -8,15 +8,18 @@
 
 namespace tpm {
 
-ElementContact::ElementContact(const TpmParameters& material, double period_s, ElementRule rule,
+ElementContact::ElementContact(const BondElement& material, double period_s, ElementRule rule,
                                double dashpot_N_s_per_m)
-    : material_(material),
-      tension_{material.Eprime_Pa, material.spacing_m},
-      weights_(relaxation_weights(period_s / material.relaxation_time_s())),
+    : equilibrium_N_per_m_(material.equilibrium_Pa * material.modulus_to_stiffness_m()),
+      relaxing_N_per_m_(material.relaxing_Pa() * material.modulus_to_stiffness_m()),
+      per_Pa_m_(material.modulus_to_stiffness_m()),
+      relaxation_time_s_(material.relaxation_time_s()),
+      tension_(material.tension()),
+      weights_(relaxation_weights(period_s / relaxation_time_s_)),
       period_s_(period_s),
       dashpot_N_s_per_m_(dashpot_N_s_per_m),
       rule_(rule) {
-  require_valid(material, "element");
+  require_one_branch(material, "element");
   if (!(period_s > 0.0) || !std::isfinite(period_s)) {
     throw bad_input("element: period", shortest(period_s), "above 0 s");
   }
@@ -24,17 +27,16 @@ ElementContact::ElementContact(const TpmParameters& material, double period_s, E
 
 ContactAnswer ElementContact::step(const ToolPose& tool) noexcept {
   const double depth = tool.displacement_m.z();
-  const double scale = material_.modulus_to_stiffness_m();
-  double force = scale * (material_.relaxed_modulus_Pa() * depth + tension_.value(depth));
+  double force = equilibrium_N_per_m_ * depth + per_Pa_m_ * tension_.value(depth);
   if (rule_ == ElementRule::mass_spring) {
     force += dashpot_N_s_per_m_ * (depth - depth_m_) / period_s_;
   } else {
     if (rule_ == ElementRule::exact) {
       followed_m_ = weights_.r * followed_m_ + weights_.w0 * depth_m_ + weights_.w1 * depth;
     } else {
-      followed_m_ += period_s_ / material_.relaxation_time_s() * (depth_m_ - followed_m_);
+      followed_m_ += period_s_ / relaxation_time_s_ * (depth_m_ - followed_m_);
     }
-    force += scale * material_.relaxing_modulus_Pa() * (depth - followed_m_);
+    force += relaxing_N_per_m_ * (depth - followed_m_);
   }
   depth_m_ = depth;
   ContactAnswer answer;
@@ -47,14 +49,14 @@ ContactAnswer ElementContact::step(const ToolPose& tool) noexcept {
 Eigen::Matrix3d ElementContact::instantaneous_stiffness() const noexcept {
   Eigen::Matrix3d stiffness = relaxed_stiffness();
   if (rule_ != ElementRule::mass_spring) {
-    stiffness(2, 2) += material_.relaxing_modulus_Pa() * material_.modulus_to_stiffness_m();
+    stiffness(2, 2) += relaxing_N_per_m_;
   }
   return stiffness;
 }
 
 Eigen::Matrix3d ElementContact::relaxed_stiffness() const noexcept {
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
-  stiffness(2, 2) = material_.relaxed_modulus_Pa() * material_.modulus_to_stiffness_m();
+  stiffness(2, 2) = equilibrium_N_per_m_;
   return stiffness;
 }
 

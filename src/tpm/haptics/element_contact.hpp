@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/material/tpm_element.hpp"
+#include "tpm/material/bond_element.hpp"
 #include "tpm/reduce/contact_model.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
 
@@ -12,13 +12,13 @@ enum class ElementRule {
   mass_spring,    ///< no relaxing spring: the relaxed stiffness and a dashpot, the MSM of the paper
 };
 
-/// One sphere on the paper's element (Eqs. 1 to 9): the four-sphere star, guided along its normal.
+/// One sphere on an element with one branch: the four-sphere star, guided along its normal.
 /// Across it there is no force. Coordinates: the push is along +z.
 class ElementContact final : public ContactModel {
  public:
   /// @param dashpot_N_s_per_m of the rule mass_spring, >= 0
   /// Throws Error(bad_input) for a material or a period out of range.
-  ElementContact(const TpmParameters& material, double period_s,
+  ElementContact(const BondElement& material, double period_s,
                  ElementRule rule = ElementRule::exact, double dashpot_N_s_per_m = 0.0);
 
   void reset() noexcept override { depth_m_ = followed_m_ = 0.0; }
@@ -30,7 +30,7 @@ class ElementContact final : public ContactModel {
   void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
 
  private:
-  TpmParameters material_;
+  double equilibrium_N_per_m_, relaxing_N_per_m_, per_Pa_m_, relaxation_time_s_;
   TensionLaw tension_;
   RelaxationWeights weights_;
   double period_s_, dashpot_N_s_per_m_;

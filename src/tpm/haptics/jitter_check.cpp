@@ -165,7 +165,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
     check.device = device->open();
     device->prepare(preparation);
     check.outcome = run_in_real_time(
-        device, std::make_shared<EmptySpace>(session.servo.period_s), session.servo,
+        device, std::make_shared<EmptySpace>(session.servo.period_s), ServoSettings{session.servo},
         [](const ServoRecord&) {}, options);
   } catch (...) {
     device->stop();

@@ -72,14 +72,14 @@ HilSession session_of(const std::filesystem::path& file, const LoopContactOption
   return session;
 }
 
-ServoSettings endless(ServoSettings settings, const HilSession& session,
-                      const LoopContactOptions& options) {
+/// The session without its end, and without its start if nobody waits for one.
+HilSession endless(HilSession session, const LoopContactOptions& options) {
   // What spring-pots remember is kept for the length of the session only.
   const bool forgets = session.law && session.law->spec.fractional != Fractional::none;
-  settings.phase_ends = {forgets ? session.servo.phase_ends.back()
-                                 : std::numeric_limits<std::uint64_t>::max()};
-  if (!options.start_gate) settings.gate.reset();
-  return settings;
+  session.servo.phase_ends = {forgets ? session.servo.phase_ends.back()
+                                      : std::numeric_limits<std::uint64_t>::max()};
+  if (!options.start_gate) session.servo.gate.reset();
+  return session;
 }
 
 }  // namespace
@@ -103,7 +103,7 @@ LoopContact::LoopContact(const std::filesystem::path& file, const LoopContactOpt
     throw Error(ExitCode::answer_is_no, file.string(), rendering_.verdict(),
                 "a softer tissue or a higher rate");
   }
-  settings_ = endless(loop_settings(session_, loop_, rendering_, true), session_, options);
+  settings_ = loop_settings(endless(session_, options), loop_, rendering_, true);
   displacement_m_ = Eigen::Matrix3Xd::Zero(3, spheres());
   reset();
 }

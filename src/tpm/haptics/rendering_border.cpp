@@ -53,15 +53,15 @@ double damping_at(const RenderedContact& contact, int cycles) {
 
 /// Force over displacement at 1/z.
 std::complex<double> transfer(const RenderedContact& contact, std::complex<double> back) {
-  const TpmParameters p = contact.material();
+  const BondElement p = contact.material();
   const double scale = p.modulus_to_stiffness_m();
-  const double relaxed = scale * p.relaxed_modulus_Pa();
+  const double relaxed = scale * p.equilibrium_Pa;
   const double h = contact.period_s;
   if (contact.rule == ElementRule::mass_spring) {
     return relaxed + contact.dashpot_N_s_per_m() / h * (1.0 - back);
   }
   const double q = h / contact.relaxation_time_s;
-  const double relaxing = scale * p.relaxing_modulus_Pa();
+  const double relaxing = scale * p.relaxing_Pa();
   if (contact.rule == ElementRule::forward_euler) {
     return relaxed + relaxing * (1.0 - q * back / (1.0 - (1.0 - q) * back));
   }
@@ -117,14 +117,14 @@ bool comes_to_rest(const RenderedContact& contact, PlantSettings plant) {
 
 }  // namespace
 
-TpmParameters RenderedContact::material() const {
-  TpmParameters p;
-  p.Eprime_Pa = 0.0;
-  constexpr double kLeast = 1e-6;  // neither spring of the element may vanish
+BondElement RenderedContact::material() const {
+  BondElement p;
+  constexpr double kLeast = 1e-6;  // of each spring
   const double share = std::clamp(relaxed_share, kLeast, 1.0 - kLeast);
-  p.E2_Pa = stiffness_N_per_m / p.modulus_to_stiffness_m();
-  p.E1_Pa = p.E2_Pa * (share / (1.0 - share));  // E1 E2 / (E1 + E2) is that share of E2
-  return p.with_relaxation_time(relaxation_time_s);
+  const double modulus_Pa = stiffness_N_per_m / p.modulus_to_stiffness_m();
+  p.equilibrium_Pa = share * modulus_Pa;
+  p.branches = {{(1.0 - share) * modulus_Pa, relaxation_time_s}};
+  return p;
 }
 
 double RenderedContact::dashpot_N_s_per_m() const {
@@ -192,10 +192,10 @@ double loop_spectral_radius(const RenderedContact& contact, const PlantSettings&
   const Eigen::Matrix<double, 2, 3> moved = place_propagator(settings);
   // State: x, v, w (followed displacement), x of the period before, forces on their way.
   const Eigen::Index forces = contact.delay_periods, size = 4 + forces;
-  const TpmParameters p = contact.material();
+  const BondElement p = contact.material();
   const double scale = p.modulus_to_stiffness_m();
-  const double relaxed = scale * p.relaxed_modulus_Pa();
-  const double relaxing = scale * p.relaxing_modulus_Pa();
+  const double relaxed = scale * p.equilibrium_Pa;
+  const double relaxing = scale * p.relaxing_Pa();
   const double q = contact.period_s / contact.relaxation_time_s;
   const RelaxationWeights w = relaxation_weights(q);
   // The model steps first: it sees x, remembers w and x before.

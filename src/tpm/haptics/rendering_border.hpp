@@ -15,7 +15,7 @@ struct RenderedContact {
   double stiffness_N_per_m = 300.0;  ///< instantaneous
   double relaxed_share = 0.5;  ///< of it in equilibrium, all there is of the MSM; E1 = E2: 1/2
 
-  [[nodiscard]] TpmParameters material() const;
+  [[nodiscard]] BondElement material() const;
   /// Dashpot of the mass-spring model: damping ratio 0.1 of a sphere of 10 mm radius.
   [[nodiscard]] double dashpot_N_s_per_m() const;
   [[nodiscard]] ElementContact model() const;

@@ -74,7 +74,7 @@ void parse_tool(HilSession& session, const Json& model, const DocumentPlace& pla
 
 void parse_limits(HilSession& session, const Json& limits, const DeviceLimits& device,
                   const DocumentPlace& place) {
-  ServoSettings& servo = session.servo;
+  SessionServo& servo = session.servo;
   constexpr double kLongest_s = 60.0, kLeastSlew_N_per_s = 1.0, kMostUntrusted_s = 2.0;
   servo.force_limit_N =
       in_range(limits, "force", Dimension::force, servo.force_limit_N, 1e-3, device.force_N, place);
@@ -96,7 +96,7 @@ void parse_limits(HilSession& session, const Json& limits, const DeviceLimits& d
 }
 
 /// What has to be before the session begins.
-void parse_start(ServoSettings& servo, const Json& json, const DeviceLimits& device,
+void parse_start(SessionServo& servo, const Json& json, const DeviceLimits& device,
                  const DocumentPlace& place) {
   StartGateSettings gate;
   gate.reach_m = device.reach_m;
@@ -387,7 +387,7 @@ void require_within(const HilSession& session, const DeviceLimits& limits) {
     throw Error(ExitCode::answer_is_no, fmt::format("device '{}'", limits.kind),
                 fmt::format("the session's {} is {}", key, what), "at most " + most);
   };
-  const ServoSettings& servo = session.servo;
+  const SessionServo& servo = session.servo;
   if (servo.force_limit_N > limits.force_N) {
     refuse("limits/force", shortest(servo.force_limit_N) + " N", shortest(limits.force_N) + " N");
   }

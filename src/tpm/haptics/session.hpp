@@ -66,7 +66,7 @@ struct HilSession {
   std::vector<SessionPhase> phases;
   /// Forces of the recording whose motion the last phase is, evenly spaced over it; may be empty.
   std::vector<double> measured_N;
-  ServoSettings servo;
+  SessionServo servo;
   DevicePreparation preparation;
   PlantSettings plant;
   double hang_limit_s = 0.008;

@@ -1,9 +1,25 @@
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/planned_model.hpp"
+#include "tpm/network/material_refusal.hpp"
 #include "tpm/plan/plan_model.hpp"
 
 namespace tpm {
 namespace {
+
+/// Throws Error(bad_input) that names the formulations of sessions that can, unless this one takes
+/// the materials of the session's scene.
+void require_materials(const Formulation& formulation, const HilSession& session) {
+  const Tissue tissue = parse_tissue(session.scene, session.scene_place, {});
+  std::vector<MaterialNeed> needs = needs_of(tissue.bonds());
+  for (const MaterialNeed need : needs_of(tissue.materials)) needs.push_back(need);
+  for (const MaterialNeed need : needs) {
+    if (formulation.can().*need) continue;
+    refuse_capability(formulation, need, session.scene_place,
+                      formulations_that([&](const Formulation& other) {
+                        return other.can().*need && for_sessions(other);
+                      }));
+  }
+}
 
 LoopModel model_of(const HilSession& session, bool threads, const PlanningTold& told) {
   if (session.model == kPlannedModel) return planned_model(session, told);
@@ -11,6 +27,7 @@ LoopModel model_of(const HilSession& session, bool threads, const PlanningTold& 
   if (formulation == nullptr || !for_sessions(*formulation)) {
     refuse_formulation(session.model, "model", "session", formulations_that(for_sessions));
   }
+  if (!session.law) require_materials(*formulation, session);
   if (const auto* maker = formulation->as<LoopMaker>()) return maker->loop(session, threads);
   return offered_loop(*formulation, session);
 }

@@ -107,7 +107,7 @@ std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilS
 
 ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
                             const RenderingCheck& rendering, bool guided) {
-  ServoSettings servo = session.servo;
+  ServoSettings servo{session.servo};
   servo.friction_N_s_per_m = rendering.friction_N_s_per_m;
   servo.delay_periods = guided ? rendering.delay_periods : 0;
   if (!guided) {

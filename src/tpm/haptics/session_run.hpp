@@ -47,7 +47,8 @@ struct SessionRun {
   ServoOutcome outcome;
 };
 
-/// What the loop of a session is set to, with what is known of its model and device.
+/// What the loop of a session is set to: what the session states, with what is known of its model
+/// and device.
 /// @param guided a hand holds the device; else a recorded motion begins where it began, and nobody
 ///        feels it
 [[nodiscard]] ServoSettings loop_settings(const HilSession& session, const LoopModel& model,

@@ -64,9 +64,8 @@ void ask_cvode(Verification& v, const HilRecording& recording, const DrivenNetwo
 
 /// The star's own models: in closed form on every sample, and CVODES on the reference's motion.
 void ask_others(Verification& v, const HilRecording& recording, const Motion& every_sample,
-                const Protocol& thinned, const RowList& rows, const TpmParameters& material,
+                const Protocol& thinned, const RowList& rows, const TpmVector& parameters,
                 const VerifyOptions& options) {
-  const TpmVector parameters = to_vector(material);
   const auto ask = [&](const char* model, const std::string& name, const Protocol& protocol,
                        std::size_t count) {
     const std::vector<double> times(
@@ -237,7 +236,8 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   ask(v, "the second opinion by CVODE",
       [&] { ask_cvode(v, recording, driven, protocol, options); });
   if (recording.session.model == "element") {
-    ask_others(v, recording, motion, protocol, rows, tissue.element("hil verify"), options);
+    ask_others(v, recording, motion, protocol, rows,
+               element_constants(tissue.element("hil verify")), options);
   }
   v.motion_error_N = options.motion_tolerance_m *
                      recording.header.at("model").at("stiffness_at_once_N_per_m").get<double>();

@@ -137,12 +137,13 @@ SpectrumResponse respond_spectrum(const LawSpec& spec, std::span<const double> p
   });
 }
 
-SpectrumResponse element_spectrum(const TpmParameters& p, std::span<const double> frequency_Hz,
+SpectrumResponse element_spectrum(const TpmVector& parameters, std::span<const double> frequency_Hz,
                                   Want want) {
-  require_valid(p, "spectrum");
+  require_valid(from_vector(parameters), "spectrum");
+  const double E1 = parameters[kE1], E2 = parameters[kE2], eta1 = parameters[kEta1];
   return collect(frequency_Hz, kTpmParameterCount, want, [&](double omega) {
-    const Complex part = p.E2_Pa / (p.E1_Pa + Complex(p.E2_Pa, omega * p.eta1_Pa_s));
-    ComplexStiffness e{p.E2_Pa * (1.0 - part), ComplexRow::Zero(kTpmParameterCount)};
+    const Complex part = E2 / (E1 + Complex(E2, omega * eta1));
+    ComplexStiffness e{E2 * (1.0 - part), ComplexRow::Zero(kTpmParameterCount)};
     e.by[kE1] = part * part;
     e.by[kE2] = (1.0 - part) * (1.0 - part);
     e.by[kEta1] = Complex(0.0, omega) * part * part;

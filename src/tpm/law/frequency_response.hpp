@@ -45,7 +45,7 @@ struct SpectrumResponse {
 /// The same for the paper's element about its undeformed state, where its tension has no stiffness:
 /// E* = E2 - E2^2/(E1 + E2 + i omega eta1), Pa. Parameters in the order of TpmIndex.
 /// Throws Error(bad_input).
-[[nodiscard]] SpectrumResponse element_spectrum(const TpmParameters& parameters,
+[[nodiscard]] SpectrumResponse element_spectrum(const TpmVector& parameters,
                                                 std::span<const double> frequency_Hz, Want want);
 
 }  // namespace tpm

@@ -41,17 +41,6 @@ double* place_of(BondMaterial& material, std::string_view name) {
 
 }  // namespace
 
-BondMaterial BondMaterial::of(const TpmParameters& element, LateralBond lateral) {
-  BondMaterial material;
-  material.equilibrium_Pa = element.relaxed_modulus_Pa();
-  material.branches = {{element.relaxing_modulus_Pa(), element.relaxation_time_s()}};
-  material.lateral_Pa = element.Eprime_Pa;
-  material.lateral = lateral;
-  material.A0_m2 = element.A0_m2;
-  material.l0_m = element.l0_m;
-  return material;
-}
-
 double BondMaterial::relaxing_Pa() const {
   double sum = 0.0;
   for (const Branch& branch : branches) sum += branch.modulus_Pa;

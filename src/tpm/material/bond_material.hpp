@@ -6,7 +6,6 @@
 
 #include "tpm/core/units.hpp"
 #include "tpm/material/bond_law.hpp"
-#include "tpm/material/tpm_element.hpp"
 
 namespace tpm {
 
@@ -44,10 +43,6 @@ struct BondMaterial {
   LateralBond lateral = LateralBond::elastic;
   double A0_m2 = 12.56e-6;  ///< > 0
   double l0_m = 1e-3;       ///< > 0
-
-  /// The paper's element.
-  [[nodiscard]] static BondMaterial of(const TpmParameters& element,
-                                       LateralBond lateral = LateralBond::elastic);
 
   [[nodiscard]] double relaxing_Pa() const;  ///< sum of g_j
   [[nodiscard]] double instantaneous_Pa() const { return equilibrium_Pa + relaxing_Pa(); }

@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <limits>
+#include <cmath>
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
@@ -16,6 +15,36 @@ TpmVector to_vector(const TpmParameters& p) {
 
 TpmParameters from_vector(const TpmVector& v) {
   return {v[kE1], v[kE2], v[kEprime], v[kEta1], v[kSpacing], v[kA0], v[kL0]};
+}
+
+BondElement TpmParameters::bonds(LateralBond lateral) const {
+  BondElement element;
+  element.equilibrium_Pa = relaxed_modulus_Pa();
+  element.branches = {{relaxing_modulus_Pa(), relaxation_time_s()}};
+  element.lateral_Pa = Eprime_Pa;
+  element.lateral = lateral;
+  element.A0_m2 = A0_m2;
+  element.l0_m = l0_m;
+  element.spacing_m = spacing_m;
+  return element;
+}
+
+TpmVector element_constants(const BondElement& element) {
+  require_one_branch(element, "element");
+  const double E2 = element.instantaneous_Pa();
+  const double g = element.relaxing_Pa();
+  if (E2 > 0.0 && !(g > 0.0)) {
+    throw bad_input("element", "nothing of it relaxes: E1 would be infinite", "a branch above 0");
+  }
+  // Without E2 every E1 does; its dashpot follows from the relaxation time.
+  const double E1 = E2 > 0.0 ? element.equilibrium_Pa * E2 / g : 1e3;
+  return {E1,
+          E2,
+          element.lateral_Pa,
+          element.relaxation_time_s() * (E1 + E2),
+          element.spacing_m,
+          element.A0_m2,
+          element.l0_m};
 }
 
 void require_valid(const TpmParameters& p, std::string_view where) {
@@ -31,20 +60,6 @@ void require_valid(const TpmParameters& p, std::string_view where) {
   if (!(p.E1_Pa + p.E2_Pa > 0.0)) {
     throw bad_input(where, "E1 and E2 are both 0", "at least one spring above 0");
   }
-}
-
-double TensionLaw::slope(double e) const {
-  // d/de of 2 E' (e - x e / sqrt(x^2 + e^2)) = 2 E' (1 - cos^3), and 1 - c^3 = (1 - c)(1 + c +
-  // c^2).
-  const double m = one_minus_cosine(e, spacing_m);
-  const double c = 1.0 - m;
-  return 2.0 * Eprime_Pa * m * (1.0 + c + c * c);
-}
-
-double TensionLaw::d_spacing(double e) const {
-  // d(cos)/dx = e^2 / (x^2 + e^2)^(3/2)
-  const double r2 = spacing_m * spacing_m + e * e;
-  return -2.0 * Eprime_Pa * e * e * e / (r2 * std::sqrt(r2));
 }
 
 double step_relaxation_force_N(const TpmParameters& p, double lambda1, double depth_m,
@@ -63,30 +78,6 @@ double creep_depth_m(const TpmParameters& p, double lambda1, double load_N, doub
   const double stress_length = load_N / p.modulus_to_stiffness_m();
   const double grown = -std::expm1(-time_s / retardation);
   return stress_length * (1.0 / at_once + (1.0 / relaxed - 1.0 / at_once) * grown);
-}
-
-double equilibrium_depth_m(const TpmParameters& p, double modulus_Pa, double load_N) {
-  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
-  const double stress_length = load_N / p.modulus_to_stiffness_m();
-  if (stress_length == 0.0) return 0.0;
-  // The left side is odd and convex for e > 0 up to its linear asymptote, so Newton from the
-  // right of the root decreases monotonically; the smaller of two bounds is such a start.
-  const double target = std::abs(stress_length);
-  double e = std::numeric_limits<double>::infinity();
-  if (modulus_Pa > 0.0) e = target / modulus_Pa;
-  if (p.Eprime_Pa > 0.0) e = std::min(e, target / (2.0 * p.Eprime_Pa) + p.spacing_m);
-  if (!std::isfinite(e)) {
-    throw Error(ExitCode::numerical, "equilibrium depth", "no spring carries the load");
-  }
-  for (int iteration = 0; iteration < 200; ++iteration) {
-    const double residual = modulus_Pa * e + tension.value(e) - target;
-    const double step = residual / (modulus_Pa + tension.slope(e));
-    e -= step;
-    if (std::abs(step) <= 4.0 * std::numeric_limits<double>::epsilon() * e) {
-      return std::copysign(e, stress_length);
-    }
-  }
-  throw Error(ExitCode::numerical, "equilibrium depth", "Newton's method did not converge");
 }
 
 }  // namespace tpm

@@ -1,9 +1,9 @@
 #pragma once
 #include <array>
-#include <cmath>
 #include <string_view>
 
 #include "tpm/core/units.hpp"
+#include "tpm/material/bond_element.hpp"
 
 namespace tpm {
 
@@ -17,7 +17,8 @@ namespace tpm {
 ///
 /// The paper uses the displacement in mm as if it were a strain, that is a reference length
 /// l0 = 1 mm, and turns stress into force with the area A0 = 3.14 (2 mm)^2 = 12.56 mm^2. Both are
-/// parameters here. All values SI.
+/// parameters here. All values SI. The element is the bond element with Einf = P2 and one linear
+/// branch of modulus g and relaxation time tau.
 struct TpmParameters {
   double E1_Pa = 12e3;       ///< spring of the Kelvin-Voigt unit, >= 0
   double E2_Pa = 12e3;       ///< series spring, >= 0, E1 + E2 > 0
@@ -41,6 +42,10 @@ struct TpmParameters {
   [[nodiscard]] double relaxing_modulus_Pa() const { return E2_Pa * E2_Pa / (E1_Pa + E2_Pa); }
   /// A0 / l0, m: turns a modulus into a stiffness.
   [[nodiscard]] double modulus_to_stiffness_m() const { return A0_m2 / l0_m; }
+
+  [[nodiscard]] BondElement bonds(LateralBond lateral = LateralBond::elastic) const;
+  // NOLINTNEXTLINE(google-explicit-constructor): it is one, stated by other constants
+  operator BondElement() const { return bonds(); }
 };
 
 /// Name, dimension and order of the parameters wherever they stand in a vector.
@@ -67,36 +72,12 @@ using TpmVector = std::array<double, kTpmParameterCount>;
 [[nodiscard]] TpmVector to_vector(const TpmParameters& p);
 [[nodiscard]] TpmParameters from_vector(const TpmVector& v);
 
+/// The constants of a bond element with one linear branch, as to_vector(). Throws Error(bad_input)
+/// for another, and for one that does not relax but is elastic.
+[[nodiscard]] TpmVector element_constants(const BondElement& element);
+
 /// Throws Error(bad_input) naming the first parameter outside the range given at TpmParameters.
 void require_valid(const TpmParameters& p, std::string_view where);
-
-/// 1 - cos(arctan(e / x)), dimensionless, without cancellation for e << x.
-template <class T>
-[[nodiscard]] T one_minus_cosine(const T& elongation, const T& spacing) {
-  using std::sqrt;
-  const T ratio2 = (elongation / spacing) * (elongation / spacing);
-  const T root = sqrt(ratio2 + 1.0);
-  return ratio2 / (root * (root + 1.0));
-}
-
-/// lambda1(e) = 2 E' (1 - cos(arctan(e / x))), Pa (Eq. 2). Elongation and spacing in m.
-[[nodiscard]] inline double lambda1_Pa(double Eprime_Pa, double elongation_m, double spacing_m) {
-  return 2.0 * Eprime_Pa * one_minus_cosine(elongation_m, spacing_m);
-}
-
-/// Force of the bonds at an elongation, in units of stress times length (Pa m): multiply by
-/// A0 / l0 for newtons.
-struct TensionLaw {
-  double Eprime_Pa;
-  double spacing_m;
-
-  /// lambda1(e) e
-  [[nodiscard]] double value(double e) const { return lambda1_Pa(Eprime_Pa, e, spacing_m) * e; }
-  /// d(lambda1(e) e)/de
-  [[nodiscard]] double slope(double e) const;
-  /// d(lambda1(e) e)/dx
-  [[nodiscard]] double d_spacing(double e) const;
-};
 
 /// Eq. 11 at t = 0+ and t -> infinity, that is Eqs. 15 and 16, and the values between: the force
 /// after a step of depth e0, N.
@@ -107,11 +88,5 @@ struct TensionLaw {
 /// Eq. 14: the depth under a constant load with constant lambda1, m. time_s may be infinite.
 [[nodiscard]] double creep_depth_m(const TpmParameters& p, double lambda1, double load_N,
                                    double time_s);
-
-/// Depth at which the elastic part carries the load with the true lambda1(e):
-/// (modulus + lambda1(e)) e A0/l0 = load. With modulus = E2 the depth at once, with the relaxed
-/// modulus P2 the depth in the end. Converges for every load (the left side rises strictly).
-/// @param modulus_Pa >= 0; if 0, E' must be > 0
-[[nodiscard]] double equilibrium_depth_m(const TpmParameters& p, double modulus_Pa, double load_N);
 
 }  // namespace tpm

@@ -293,7 +293,7 @@ class IdaRule final : public AdaptiveRule {
     NewtonSystem& system = side_.system;
     BalanceSystem& balance = *side_.balance;
     const BalanceSystem::Place here = balance.place();
-    const double apart = 1e-4 * std::min(stop_s - time_s, system.relaxation_time_s());
+    const double apart = 1e-4 * std::min(stop_s - time_s, shortest_s());
     const Vector from = balance.placed();
     Vector there = state + apart * rate;
     Vector unused(state.size());
@@ -301,6 +301,11 @@ class IdaRule final : public AdaptiveRule {
     moving = (balance.placed() - from) / apart;
     balance.set_place(here);
     return end;
+  }
+
+  [[nodiscard]] double shortest_s() const {
+    const Vector& times_s = side_.system.relaxation_times_s();
+    return times_s.size() > 0 ? times_s.minCoeff() : std::numeric_limits<double>::infinity();
   }
 
   void mute() {
@@ -343,8 +348,8 @@ int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* us
     Vector elongation;
     auto imbalance = left.head(n);
     balance->imbalance(t, view(z).head(n), view(z).tail(m), imbalance, elongation);
-    left.tail(m) =
-        view(z_dot).tail(m) - (elongation - view(z).tail(m)) / system.relaxation_time_s();
+    left.tail(m) = view(z_dot).tail(m) -
+                   (elongation - view(z).tail(m)).cwiseQuotient(system.relaxation_times_s());
   }
   return side(user_data).answer(
       end == MethodEnd::completed && !left.allFinite() ? MethodEnd::diverged : end, t);

@@ -10,6 +10,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/method/implicit_balance.hpp"
+#include "tpm/method/viscous_elongations.hpp"
 #include "tpm/solve/sundials.hpp"
 
 namespace tpm {
@@ -33,26 +34,21 @@ class RememberingNetwork {
                      const BallTool& ball, std::span<const BallPlace> places)
       : network_(bonds, rest, freedom, ball),
         places_(places),
+        viscous_(bonds),
         balance_(network_.bonds, network_.freedom, work_),
         load_(Eigen::Matrix3Xd::Zero(3, network_.position.cols())) {
-    require_one_linear_branch(bonds, "a ball by CVODE");
-    for (std::size_t i = 0; i < bonds.size(); ++i) {
-      if (bonds.relaxing()[static_cast<Eigen::Index>(i)] > 0.0) relaxing_.push_back(i);
-    }
     memory_.offset = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(network_.bonds.size()));
   }
 
-  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(relaxing_.size()); }
+  [[nodiscard]] Eigen::Index size() const { return viscous_.size(); }
 
   /// @returns false where no balance is found
   [[nodiscard]] bool rate(double time_s, const Eigen::Ref<const Eigen::VectorXd>& y,
                           Eigen::Ref<Eigen::VectorXd> rate) {
     if (!balanced(time_s, y)) return false;
-    network_.bonds.elongations(network_.position, elongation_);
-    for (Eigen::Index i = 0; i < size(); ++i) {
-      const auto bond = static_cast<Eigen::Index>(relaxing_[static_cast<std::size_t>(i)]);
-      rate[i] = (elongation_[bond] - y[i]) / network_.bonds.relaxation_time_s();
-    }
+    network_.bonds.followed(network_.position, of_bond_);
+    viscous_.spread(of_bond_, followed_);
+    rate = (followed_ - y).cwiseQuotient(viscous_.times_s());
     return true;
   }
 
@@ -78,9 +74,8 @@ class RememberingNetwork {
   }
 
   [[nodiscard]] bool balanced(double time_s, const Eigen::Ref<const Eigen::VectorXd>& y) {
-    for (Eigen::Index i = 0; i < size(); ++i) {
-      memory_.offset[static_cast<Eigen::Index>(relaxing_[static_cast<std::size_t>(i)])] = y[i];
-    }
+    viscous_.set_mean(y, of_bond_);
+    memory_.offset.head(of_bond_.size()) = of_bond_;
     const Eigen::Vector3d to = ball_at(time_s), from = network_.position.rightCols<1>();
     constexpr int kMostParts = 64;
     for (int parts = 1; parts <= kMostParts; parts *= 4) {
@@ -99,12 +94,12 @@ class RememberingNetwork {
 
   NetworkUnderBall network_;
   std::span<const BallPlace> places_;
+  ViscousElongations viscous_;
   MethodWork work_;
   ImplicitBalance balance_;
   Eigen::Matrix3Xd load_, force_;
-  std::vector<std::size_t> relaxing_;  ///< bond of each y
   BondMemory memory_;
-  Eigen::VectorXd elongation_;
+  Eigen::VectorXd of_bond_, followed_;
 };
 
 extern "C" int ball_rate(sunrealtype t, N_Vector y, N_Vector y_dot, void* network) {

@@ -19,9 +19,15 @@ void BondProjection::sweep(Positions& position, const BondMemory& memory,
     const double l = length - bonds_.rest_length_m()[row];
     const bool slack = bonds_.is_rope(i) && l < 0.0;
     const double g = bonds_.relaxing()[row];
-    const double following = memory.following(bonds_.law_of(i));
-    const double slope = slack ? 0.0 : bonds_.stiffness()[row] - following * g;
-    const double pull = slack ? 0.0 : slope * l - g * memory.offset[row];
+    const ViscousLaw& law = bonds_.laws()[bonds_.law_of(i)];
+    const double follows = 1.0 - memory.following(bonds_.law_of(i));
+    double slope = 0.0;
+    double pull = 0.0;
+    if (!slack) {
+      const double k = bonds_.stiffness()[row] - g;
+      slope = k * law.equilibrium_slope(l) + g * follows * law.kernel.slope(l);
+      pull = k * law.equilibrium(l) + g * (follows * law.kernel.value(l) - memory.offset[row]);
+    }
     const Eigen::Vector3d move_a = give_m_per_N[a] * (freedom_.projector(a) * n);
     const Eigen::Vector3d move_b = give_m_per_N[b] * (freedom_.projector(b) * n);
     const double give = n.dot(move_a + move_b);

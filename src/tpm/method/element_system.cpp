@@ -15,11 +15,11 @@ constexpr double kDepthGrain = 4.0 * std::numeric_limits<double>::epsilon();
 /// following e.
 class ElementForce {
  public:
-  explicit ElementForce(const TpmParameters& p)
+  explicit ElementForce(const BondElement& p)
       : unit_(p.modulus_to_stiffness_m()),
-        stiffness_(p.E2_Pa * unit_),
-        relaxing_(p.relaxing_modulus_Pa() * unit_),
-        tension_{p.Eprime_Pa, p.spacing_m} {}
+        stiffness_(p.instantaneous_Pa() * unit_),
+        relaxing_(p.relaxing_Pa() * unit_),
+        tension_(p.tension()) {}
 
   [[nodiscard]] double relaxing() const { return relaxing_; }
   [[nodiscard]] double force(double e, double offset, double following) const {
@@ -45,10 +45,11 @@ class ElementSystem final : public StageSystem,
                             public NewtonSystem,
                             public BalanceSystem {
  public:
-  ElementSystem(const TpmParameters& p, const Protocol& protocol,
+  ElementSystem(const BondElement& p, const Protocol& protocol,
                 const std::optional<MethodMasses>& mass)
       : law_(p),
         tau_(p.relaxation_time_s()),
+        times_s_(Vector::Constant(1, tau_)),
         peak_(protocol.peak()),
         depth_driven_(protocol.drive() == Drive::displacement),
         mass_(mass ? mass->mass_kg[0] : 0.0),
@@ -60,7 +61,7 @@ class ElementSystem final : public StageSystem,
 
   [[nodiscard]] Eigen::Index coordinates() const override { return moves_ ? 1 : 0; }
   [[nodiscard]] Eigen::Index remembered() const override { return 1; }
-  [[nodiscard]] double relaxation_time_s() const override { return tau_; }
+  [[nodiscard]] const Vector& relaxation_times_s() const override { return times_s_; }
   [[nodiscard]] double drag_per_s() const override { return drag_; }
   [[nodiscard]] Vector scales() const override {
     Vector scales(size());
@@ -117,11 +118,11 @@ class ElementSystem final : public StageSystem,
       if (depth_driven_) {
         ++work().rates;
         e_ = imposed(t);
-      } else if (const auto end = balance(imposed(t), offset, stage.following, {}, e_);
+      } else if (const auto end = balance(imposed(t), offset, stage.following[0], {}, e_);
                  end != MethodEnd::completed) {
         return end;
       }
-      state[0] = offset + stage.following * e_;
+      state[0] = offset + stage.following[0] * e_;
       known_ = {imposed(t), state[0]};
       return MethodEnd::completed;
     }
@@ -129,11 +130,11 @@ class ElementSystem final : public StageSystem,
     const Drawn inertia{mass_ * held / (stage.c * stage.c),
                         stage.known[0] + stage.c * stage.known[1] / held};
     double e = state[0];
-    if (const auto end = balance(imposed(t), offset, stage.following, inertia, e);
+    if (const auto end = balance(imposed(t), offset, stage.following[0], inertia, e);
         end != MethodEnd::completed) {
       return end;
     }
-    state << e, (e - stage.known[0]) / stage.c, offset + stage.following * e;
+    state << e, (e - stage.known[0]) / stage.c, offset + stage.following[0] * e;
     return MethodEnd::completed;
   }
 
@@ -260,14 +261,15 @@ class ElementSystem final : public StageSystem,
 
  private:
   /// Depth that may be expected.
-  static double depth_scale(const TpmParameters& p, const Protocol& protocol) {
+  static double depth_scale(const BondElement& p, const Protocol& protocol) {
     const double peak = protocol.peak();
     if (protocol.drive() == Drive::displacement) return peak;
-    if (p.relaxed_modulus_Pa() > 0.0 || p.Eprime_Pa > 0.0) {
-      return std::abs(equilibrium_depth_m(p, p.relaxed_modulus_Pa(), peak));
+    if (p.equilibrium_Pa > 0.0 || p.lateral_Pa > 0.0) {
+      return std::abs(equilibrium_depth_m(p, p.equilibrium_Pa, peak));
     }
     // A Maxwell fluid flows for as long as it is pushed; with neither spring it is free.
-    const double modulus = p.E2_Pa > 0.0 ? p.E2_Pa : p.E1_Pa;
+    constexpr double kSoft_Pa = 12e3;
+    const double modulus = p.relaxing_Pa() > 0.0 ? p.relaxing_Pa() : kSoft_Pa;
     const double lasts = protocol.knots().back().time_s - protocol.start_s();
     return peak / (modulus * p.modulus_to_stiffness_m()) * (1.0 + lasts / p.relaxation_time_s());
   }
@@ -312,6 +314,7 @@ class ElementSystem final : public StageSystem,
 
   ElementForce law_;
   double tau_;
+  Vector times_s_;
   double peak_;  ///< of what is imposed
   bool depth_driven_;
   double mass_, drag_;
@@ -329,7 +332,7 @@ class ElementSystem final : public StageSystem,
 
 }  // namespace
 
-std::unique_ptr<StepSystem> element_system(const TpmParameters& material, const Protocol& protocol,
+std::unique_ptr<StepSystem> element_system(const BondElement& material, const Protocol& protocol,
                                            const std::optional<MethodMasses>& mass) {
   return std::make_unique<ElementSystem>(material, protocol, mass);
 }

@@ -324,9 +324,9 @@ void require_valid(const MethodMasses& mass, std::size_t spheres) {
 
 class ElementProblem final : public MethodProblem {
  public:
-  ElementProblem(const TpmParameters& material, Protocol protocol, std::optional<MethodMasses> mass)
-      : material_(material), protocol_(std::move(protocol)), mass_(std::move(mass)) {
-    tpm::require_valid(material_, "element");
+  ElementProblem(BondElement material, Protocol protocol, std::optional<MethodMasses> mass)
+      : material_(std::move(material)), protocol_(std::move(protocol)), mass_(std::move(mass)) {
+    require_one_branch(material_, "element");
     if (mass_) require_valid(*mass_, 1);
   }
 
@@ -342,7 +342,7 @@ class ElementProblem final : public MethodProblem {
   }
 
  private:
-  TpmParameters material_;
+  BondElement material_;
   Protocol protocol_;
   std::optional<MethodMasses> mass_;
 };
@@ -360,7 +360,7 @@ class NetworkProblem final : public MethodProblem {
 
   [[nodiscard]] const Protocol& protocol() const override { return protocol_; }
   [[nodiscard]] double relaxation_time_s() const override {
-    return network_.bonds.relaxation_time_s();
+    return network_.bonds.shortest_relaxation_time_s();
   }
   [[nodiscard]] bool has_masses() const override { return mass_.has_value(); }
   [[nodiscard]] MethodRun run(const MethodSettings& settings,
@@ -379,7 +379,7 @@ class NetworkProblem final : public MethodProblem {
 
 }  // namespace
 
-std::unique_ptr<MethodProblem> element_problem(const TpmParameters& material, Protocol protocol,
+std::unique_ptr<MethodProblem> element_problem(const BondElement& material, Protocol protocol,
                                                std::optional<MethodMasses> mass) {
   return std::make_unique<ElementProblem>(material, std::move(protocol), std::move(mass));
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "tpm/material/bond_element.hpp"
 #include "tpm/network/driven_network.hpp"
 #include "tpm/protocol/protocol.hpp"
 
@@ -113,7 +114,7 @@ class MethodProblem {
  public:
   virtual ~MethodProblem() = default;
   [[nodiscard]] virtual const Protocol& protocol() const = 0;
-  [[nodiscard]] virtual double relaxation_time_s() const = 0;
+  [[nodiscard]] virtual double relaxation_time_s() const = 0;  ///< the shortest
   [[nodiscard]] virtual bool has_masses() const = 0;
   /// @param times_s rising, within the protocol
   /// Throws Error(bad_input) for settings out of range; what a method cannot do is in the result.
@@ -121,9 +122,9 @@ class MethodProblem {
                                       std::span<const double> times_s) const = 0;
 };
 
-/// One sphere on the paper's element (Eqs. 1 to 9), moved along its normal.
+/// One sphere on an element with one branch, moved along its normal.
 /// @param mass its mass: under an imposed depth it is dragged along and has no part in the motion
-[[nodiscard]] std::unique_ptr<MethodProblem> element_problem(const TpmParameters& material,
+[[nodiscard]] std::unique_ptr<MethodProblem> element_problem(const BondElement& material,
                                                              Protocol protocol,
                                                              std::optional<MethodMasses> mass = {});
 

@@ -8,6 +8,7 @@
 #include "tpm/method/bond_projection.hpp"
 #include "tpm/method/implicit_balance.hpp"
 #include "tpm/method/step_system.hpp"
+#include "tpm/method/viscous_elongations.hpp"
 #include "tpm/network/inertial_equation.hpp"
 #include "tpm/network/lowest_mode.hpp"
 
@@ -28,28 +29,26 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
         projection_(bonds_, tissue_.freedom()),
         position_(rest_),
         memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0},
+        viscous_(bonds_),
         peak_(protocol.peak()) {
-    require_one_linear_branch(bonds_, "a step rule");
-    for (std::size_t i = 0; i < bonds_.size(); ++i) {
-      if (bonds_.relaxing()[static_cast<Eigen::Index>(i)] > 0.0) relaxing_.push_back(i);
-    }
     depth_scale_ = depth_scale(protocol);
   }
 
-  [[nodiscard]] Eigen::Index remembered() const override {
-    return static_cast<Eigen::Index>(relaxing_.size());
-  }
-  [[nodiscard]] double relaxation_time_s() const override { return bonds_.relaxation_time_s(); }
+  [[nodiscard]] Eigen::Index remembered() const override { return viscous_.size(); }
+  [[nodiscard]] const Vector& relaxation_times_s() const override { return viscous_.times_s(); }
 
  protected:
   [[nodiscard]] Eigen::Index columns() const { return rest_.cols(); }
 
-  /// y of the bonds that relax.
-  void set_memory(const ConstVector& y, double following = 0.0) {
-    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
-      memory_.offset[static_cast<Eigen::Index>(relaxing_[i])] = y[static_cast<Eigen::Index>(i)];
-    }
-    memory_.following = following;
+  /// What the bonds pull with where they have the y.
+  void set_memory(const ConstVector& y) {
+    viscous_.set_mean(y, memory_.offset);
+    memory_.following = 0.0;
+  }
+  /// The same where y = offset + following V(l).
+  void set_memory(const ConstVector& offset, const ConstVector& following) {
+    viscous_.set_mean(offset, memory_.offset);
+    memory_.following = viscous_.mean_following(following);
   }
 
   /// What is imposed at one time, found in two ways.
@@ -58,13 +57,10 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     return std::abs(a - b) <= kRounding * peak_;
   }
 
-  /// l of the bonds that relax.
+  /// V(l) of each y.
   void find_elongations(const Positions& position, Vector& elongation) {
-    bonds_.elongations(position, all_);
-    elongation.resize(remembered());
-    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
-      elongation[static_cast<Eigen::Index>(i)] = all_[static_cast<Eigen::Index>(relaxing_[i])];
-    }
+    bonds_.followed(position, all_);
+    viscous_.spread(all_, elongation);
   }
 
   /// Balances `position_`, in memory_, under an imposed value.
@@ -97,7 +93,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
 
   /// Positions with everything relaxed under an imposed value.
   MethodEnd relax_under(double imposed, Vector& y) {
-    set_memory(Vector::Zero(remembered()), 1.0);
+    set_memory(Vector::Zero(remembered()), Vector::Ones(remembered()));
     const MethodEnd end = follow(0.0, imposed);
     find_elongations(position_, y);
     return end;
@@ -116,8 +112,8 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
   BondProjection projection_;
   Positions position_;
   BondMemory memory_;
-  std::vector<std::size_t> relaxing_;  ///< bond of each y
-  double peak_;                        ///< of what is imposed
+  ViscousElongations viscous_;  ///< what the y are
+  double peak_;                 ///< of what is imposed
   double depth_scale_ = 0.0;
   Eigen::Matrix3Xd load_, force_;
   Eigen::VectorXd all_;
@@ -133,7 +129,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     if (!tissue_.equilibrium().factorise(rest.position, rest.memory())) return relaxed;
     const double at_once = std::abs(tissue_.unit_field(rest, rest.memory()).stiffness) * peak;
     const double lasts = protocol.knots().back().time_s - protocol.start_s();
-    const double most = at_once * (1.0 + lasts / bonds_.relaxation_time_s());
+    const double most = at_once * (1.0 + lasts / bonds_.shortest_relaxation_time_s());
     return relaxed > 0.0 ? std::min(relaxed, most) : most;
   }
 };
@@ -165,7 +161,7 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
 
   MethodEnd rate(double t, const ConstVector& state, Eigen::Ref<Vector> rate) override {
     const MethodEnd end = elongations(t, state, elongation_);
-    rate = (elongation_ - state) / relaxation_time_s();
+    rate = (elongation_ - state).cwiseQuotient(relaxation_times_s());
     return end;
   }
 
@@ -197,9 +193,9 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   /// as heavy as the bonds at them are stiff. Bonds begin with what they pull with, so that what
   /// balances stays.
   MethodEnd project(double t, double h, int sweeps, Vector& state) override {
-    const double ratio = h / relaxation_time_s();
-    const double following = ratio / (1.0 + ratio);
-    const Vector offset = state / (1.0 + ratio);
+    const Eigen::ArrayXd ratio = h / relaxation_times_s().array();
+    const Vector following = ratio / (1.0 + ratio);
+    const Vector offset = state.array() / (1.0 + ratio);
     if (give_.size() == 0) set_give();
     set_memory(offset, following);
     tissue_.impose(position_, imposed(t));
@@ -258,28 +254,28 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
 
   void solve_pair(Eigen::Ref<Vector> place, Eigen::Ref<Vector> y) override {
     // K dx + G dy = rx, per_y dy + (dy - B dx)/tau = ry, with dy eliminated.
-    const double sum = per_y_ + 1.0 / relaxation_time_s();
+    const Eigen::ArrayXd per_s = 1.0 / relaxation_times_s().array();
+    const Eigen::ArrayXd sum = per_y_ + per_s;
     Spheres x(place.data(), 3, columns());
     Eigen::Matrix3Xd right = x;
     Eigen::Matrix3Xd bound = x;
     tissue_.freedom().project(bound);
     bound = x - bound;
-    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
-      const std::uint32_t a = bonds_.end_a()[relaxing_[i]];
-      const std::uint32_t b = bonds_.end_b()[relaxing_[i]];
-      const double g = bonds_.relaxing()[static_cast<Eigen::Index>(relaxing_[i])];
-      const Eigen::Vector3d pull = g * y[static_cast<Eigen::Index>(i)] / sum *
+    viscous_.set_mean((y.array() / sum).matrix(), all_);
+    for (const std::size_t bond : viscous_.bonds()) {
+      const std::uint32_t a = bonds_.end_a()[bond];
+      const std::uint32_t b = bonds_.end_b()[bond];
+      const auto row = static_cast<Eigen::Index>(bond);
+      const Eigen::Vector3d pull = bonds_.relaxing()[row] * all_[row] *
                                    (factorised_at_.col(b) - factorised_at_.col(a)).normalized();
       right.col(a) -= pull;
       right.col(b) += pull;
     }
     balance_.displace(right);
     bonds_.elongation_changes(factorised_at_, right, all_);
-    for (std::size_t i = 0; i < relaxing_.size(); ++i) {
-      double& of_bond = y[static_cast<Eigen::Index>(i)];
-      const double l = all_[static_cast<Eigen::Index>(relaxing_[i])];
-      of_bond = (of_bond + l / relaxation_time_s()) / sum;
-    }
+    if (!bonds_.is_linear()) all_.array() *= kernel_slope_.array();
+    viscous_.spread(all_, elongation_);
+    y = (y.array() + elongation_.array() * per_s) / sum;
     x = right + bound;
   }
 
@@ -311,9 +307,10 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   }
 
   /// y at the end of a step, where the positions are.
-  void follow_memory(const ConstVector& offset, double following, double imposed, Vector& state) {
+  void follow_memory(const ConstVector& offset, const ConstVector& following, double imposed,
+                     Vector& state) {
     find_elongations(position_, elongation_);
-    state = offset + following * elongation_;
+    state = offset + following.cwiseProduct(elongation_);
     known_ = {imposed, state};
   }
 
@@ -329,9 +326,10 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   MethodEnd factorise_at(const Positions& position, const ConstVector& y, double per_y) {
     per_y_ = per_y;
     factorised_at_ = position;
-    const double following = 1.0 / (1.0 + per_y * relaxation_time_s());
+    const Vector following = 1.0 / (1.0 + per_y * relaxation_times_s().array());
     find_elongations(position, elongation_);
-    set_memory(y - following * elongation_, following);
+    set_memory(y - following.cwiseProduct(elongation_), following);
+    if (!bonds_.is_linear()) bonds_.kernel_slopes(position, kernel_slope_);
     return balance_.factorise(position, memory_);
   }
 
@@ -344,6 +342,7 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   Eigen::VectorXd give_;  ///< of XPBD, m/N
   double per_y_ = 0.0;
   Positions put_, factorised_at_;
+  Eigen::VectorXd kernel_slope_;  ///< V'(l) there
 };
 
 /// With masses.
@@ -413,7 +412,8 @@ class MovingNetwork final : public NetworkSystem {
     }
     take(stage.known, stage.c, state);
     find_elongations(position_, elongation_);
-    state.tail(remembered()) = stage.known.tail(remembered()) + stage.following * elongation_;
+    state.tail(remembered()) =
+        stage.known.tail(remembered()) + stage.following.cwiseProduct(elongation_);
     return MethodEnd::completed;
   }
 
@@ -428,9 +428,9 @@ class MovingNetwork final : public NetworkSystem {
     const Eigen::Index n = coordinates();
     const double held = 1.0 + h * drag_per_s();
     const Eigen::VectorXd give = h * h / held * equation_.inertia().mass_kg.cwiseInverse();
-    const double ratio = h / relaxation_time_s();
-    const double following = ratio / (1.0 + ratio);
-    const Vector offset = state.tail(remembered()) / (1.0 + ratio);
+    const Eigen::ArrayXd ratio = h / relaxation_times_s().array();
+    const Vector following = ratio / (1.0 + ratio);
+    const Vector offset = state.tail(remembered()).array() / (1.0 + ratio);
     const Vector ahead = state.head(n) + h / held * state.segment(n, n);
     put(t, ahead);
     tissue_.load(imposed(t), load_);
@@ -441,7 +441,7 @@ class MovingNetwork final : public NetworkSystem {
     for (int i = 0; i < sweeps; ++i) sweep(position_, give);
     take(Vector(state), h, state);
     find_elongations(position_, elongation_);
-    state.tail(remembered()) = offset + following * elongation_;
+    state.tail(remembered()) = offset + following.cwiseProduct(elongation_);
     return MethodEnd::completed;
   }
 

@@ -8,11 +8,11 @@
 
 namespace tpm {
 
-ImplicitStage ImplicitStage::of(Eigen::VectorXd known, double c, Eigen::Index remembered,
-                                double relaxation_time_s) {
-  const double ratio = c / relaxation_time_s;
+ImplicitStage ImplicitStage::of(Eigen::VectorXd known, double c,
+                                const Eigen::VectorXd& relaxation_times_s) {
+  const Eigen::ArrayXd ratio = c / relaxation_times_s.array();
   ImplicitStage stage{std::move(known), c, ratio / (1.0 + ratio)};
-  stage.known.tail(remembered) /= 1.0 + ratio;
+  stage.known.tail(ratio.size()).array() /= 1.0 + ratio;
   return stage;
 }
 
@@ -57,10 +57,8 @@ std::unique_ptr<FixedRule> rule_on(Roles*... roles) {
 
 /// z = known + c rate(t, z).
 MethodEnd solve_stage(StageSystem& system, double time_s, Vector known, double c, Vector& state) {
-  return system.stage(
-      time_s,
-      ImplicitStage::of(std::move(known), c, system.remembered(), system.relaxation_time_s()),
-      state);
+  return system.stage(time_s, ImplicitStage::of(std::move(known), c, system.relaxation_times_s()),
+                      state);
 }
 
 class ForwardEuler final : public RateRule {
@@ -101,9 +99,9 @@ class SemiImplicitEuler final : public RateRule {
         end != MethodEnd::completed) {
       return end;
     }
-    const double ratio = h / system.relaxation_time_s();
-    auto y = state.tail(system.remembered());
-    y = (y + ratio * elongation_) / (1.0 + ratio);
+    const Eigen::ArrayXd ratio = h / system.relaxation_times_s().array();
+    auto y = state.tail(system.remembered()).array();
+    y = (y + ratio * elongation_.array()) / (1.0 + ratio);
     return MethodEnd::completed;
   }
 
@@ -223,8 +221,8 @@ class Exponential final : public RateStageRule {
         end != MethodEnd::completed) {
       return end;
     }
-    const RelaxationWeights w = relaxation_weights(h / system.relaxation_time_s());
-    ImplicitStage stage{state, 0.5 * h, w.w1};
+    if (h != weighted_for_s_) set_weights(h, system.relaxation_times_s());
+    ImplicitStage stage{state, 0.5 * h, of_end_};
     if (n > 0) {
       rate_.resize(state.size());
       if (const MethodEnd end = system.rate(time_s, state, rate_); end != MethodEnd::completed)
@@ -232,12 +230,25 @@ class Exponential final : public RateStageRule {
       stage.known.head(2 * n) += 0.5 * h * rate_.head(2 * n);
     }
     const Eigen::Index m = system.remembered();
-    stage.known.tail(m) = w.r * state.tail(m) + w.w0 * elongation_;
+    stage.known.tail(m) = keep_.cwiseProduct(state.tail(m)) + of_start_.cwiseProduct(elongation_);
     return stages.stage(time_s + h, stage, state);
   }
 
  private:
+  void set_weights(double h, const Vector& times_s) {
+    for (Vector* weights : {&keep_, &of_start_, &of_end_}) weights->resize(times_s.size());
+    for (Eigen::Index i = 0; i < times_s.size(); ++i) {
+      const RelaxationWeights w = relaxation_weights(h / times_s[i]);
+      keep_[i] = w.r;
+      of_start_[i] = w.w0;
+      of_end_[i] = w.w1;
+    }
+    weighted_for_s_ = h;
+  }
+
   Vector rate_, elongation_;
+  double weighted_for_s_ = -1.0;
+  Vector keep_, of_start_, of_end_;  ///< of each y
 };
 
 class Xpbd final : public RuleOn<ProjectionSystem> {

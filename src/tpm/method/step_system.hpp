@@ -6,24 +6,26 @@ namespace tpm {
 
 /// An implicit stage of a step, the velocities and what bonds remember eliminated:
 ///
-///     x = x* + c v,   v = v* + c a(t, x, y),   y = y* + following l(x)
+///     x = x* + c v,   v = v* + c a(t, x, y),   y = y* + following V(l(x))
 ///
 /// Without masses there are no x and v in a state and c does not count: x is where the forces
 /// balance.
 struct ImplicitStage {
-  Eigen::VectorXd known;   ///< (x*, v*, y*), as a state
-  double c = 0.0;          ///< s, > 0
-  double following = 0.0;  ///< 0 to 1
+  Eigen::VectorXd known;      ///< (x*, v*, y*), as a state
+  double c = 0.0;             ///< s, > 0
+  Eigen::VectorXd following;  ///< of each y, 0 to 1
 
   /// z = known + c rate(t, z) in every part.
-  [[nodiscard]] static ImplicitStage of(Eigen::VectorXd known, double c, Eigen::Index remembered,
-                                        double relaxation_time_s);
+  /// @param relaxation_times_s of each y
+  [[nodiscard]] static ImplicitStage of(Eigen::VectorXd known, double c,
+                                        const Eigen::VectorXd& relaxation_times_s);
 };
 
 /// An element or a network as a system of first order for the rules of step_rules.hpp: what all of
 /// them need. What only some need stands in the roles below, which a system has as well. A state is
-/// (x, v, y) with masses, x and v of the free directions, and (y) without: there a system keeps the
-/// positions that belong to the last state it saw. Whatever can fail says how.
+/// (x, v, y) with masses, x and v of the free directions, and (y) without; y are the viscous
+/// elongations m_j of all branches, bond by bond, dy/dt = (V(l) - y)/tau. Without masses a system
+/// keeps the positions that belong to the last state it saw. Whatever can fail says how.
 class StepSystem {
  public:
   using Vector = Eigen::VectorXd;
@@ -46,7 +48,7 @@ class StepSystem {
   [[nodiscard]] virtual Eigen::Index coordinates() const = 0;  ///< of x in a state, 0 without mass
   [[nodiscard]] virtual Eigen::Index remembered() const = 0;   ///< of y
   [[nodiscard]] Eigen::Index size() const { return 2 * coordinates() + remembered(); }
-  [[nodiscard]] virtual double relaxation_time_s() const = 0;
+  [[nodiscard]] virtual const Vector& relaxation_times_s() const = 0;  ///< of each y
   [[nodiscard]] virtual double drag_per_s() const = 0;
   /// The size that each part of a state may be expected to have, for tolerances and divergence.
   [[nodiscard]] virtual Vector scales() const = 0;
@@ -70,7 +72,7 @@ class RateSystem : public virtual StepSystem {
  public:
   [[nodiscard]] virtual MethodEnd rate(double time_s, const ConstVector& state,
                                        Eigen::Ref<Vector> rate) = 0;
-  /// l of each y.
+  /// V(l), which it follows, of each y.
   [[nodiscard]] virtual MethodEnd elongations(double time_s, const ConstVector& state,
                                               Vector& elongation) = 0;
 };
@@ -108,10 +110,10 @@ class BalanceSystem : public virtual StepSystem {
   [[nodiscard]] virtual Eigen::Index places() const = 0;
   /// Displacements that belong to the last state seen.
   [[nodiscard]] virtual Vector placed() const = 0;
-  /// Minus the forces left, N, and l of each y.
+  /// Minus the forces left, N, and V(l) of each y.
   virtual void imbalance(double time_s, const ConstVector& place, const ConstVector& y,
                          Eigen::Ref<Vector> imbalance, Vector& elongation) = 0;
-  /// Factorises the derivative of (imbalance, rate_y - (l - y)/tau) by (places, y) where rate_y
+  /// Factorises the derivative of (imbalance, rate_y - (V(l) - y)/tau) by (places, y) where rate_y
   /// changes by `per_y` times y, 1/s.
   [[nodiscard]] virtual MethodEnd factorise_pair(double time_s, const ConstVector& place,
                                                  const ConstVector& y, double per_y) = 0;
@@ -138,7 +140,7 @@ template <>
   return system.coordinates() > 0 ? nullptr : dynamic_cast<BalanceSystem*>(&system);
 }
 
-[[nodiscard]] std::unique_ptr<StepSystem> element_system(const TpmParameters& material,
+[[nodiscard]] std::unique_ptr<StepSystem> element_system(const BondElement& material,
                                                          const Protocol& protocol,
                                                          const std::optional<MethodMasses>& mass);
 

@@ -28,7 +28,7 @@ std::unique_ptr<Model> make_model(std::string_view name, const ModelOptions& opt
       ->model(options);
 }
 
-std::vector<std::string> validity_flags(const TpmParameters& p, double peak_depth_m) {
+std::vector<std::string> validity_flags(double spacing_m, double peak_depth_m) {
   std::vector<std::string> flags;
   if (peak_depth_m > kDamageIndentation_m) {
     flags.push_back(fmt::format("indentation of {:.4g} mm is over 12 mm, where liver is damaged",
@@ -37,7 +37,7 @@ std::vector<std::string> validity_flags(const TpmParameters& p, double peak_dept
     flags.push_back(fmt::format("indentation of {:.4g} mm is over the paper's validity of 10 mm",
                                 peak_depth_m * 1e3));
   }
-  const double angle = std::atan(peak_depth_m / p.spacing_m);
+  const double angle = std::atan(peak_depth_m / spacing_m);
   if (angle > kValidTurning_rad) {
     flags.push_back(fmt::format("bonds turn by {:.4g} degrees, over the paper's 30",
                                 angle * 180.0 / std::numbers::pi));

@@ -105,7 +105,8 @@ class ModelMaker {
 
 /// Limits of the model in the paper that a run has passed (text, one line each): indentation over
 /// 10 mm (validity), over 12 mm (damage), a lateral bond turned by more than pi/6.
-[[nodiscard]] std::vector<std::string> validity_flags(const TpmParameters& p, double peak_depth_m);
+/// @param spacing_m of lateral neighbours, > 0
+[[nodiscard]] std::vector<std::string> validity_flags(double spacing_m, double peak_depth_m);
 
 /// Throws Error(bad_input) unless every time lies in the protocol.
 void require_times_within(const Protocol& protocol, std::span<const double> times_s);

@@ -15,10 +15,6 @@ namespace {
 constexpr std::size_t kPartsKept = 4;
 constexpr double kTouch_m = 1e-14;  // a gap that is none: above the rounding of positions
 
-/// The formulations that take every material.
-constexpr std::string_view kTakesAnyMaterial =
-    "a formulation that takes it: quasi_static, inertial, static";
-
 }  // namespace
 
 BondSystem::BondSystem(const Network& network, const MaterialField& materials)
@@ -36,8 +32,8 @@ BondSystem::BondSystem(const Network& network, const MaterialField& materials)
   set_materials(network, materials);
 }
 
-BondSystem::BondSystem(const Network& network, const TpmParameters& element, LateralBond lateral)
-    : BondSystem(network, BondMaterial::of(element, lateral)) {}
+BondSystem::BondSystem(const Network& network, const BondMaterial& material)
+    : BondSystem(network, MaterialField(material)) {}
 
 std::uint16_t BondSystem::number_of(const ViscousLaw& law) {
   for (std::size_t i = 0; i < laws_.size(); ++i) {
@@ -440,30 +436,8 @@ double BondSystem::dissipation_W(const Positions& position,
   return power;
 }
 
-void refuse_material(std::string_view formulation, std::string_view takes, std::string_view has) {
-  throw bad_input("material",
-                  fmt::format("{} takes {}, and this material has {}", formulation, takes, has),
-                  kTakesAnyMaterial);
-}
-
-void require_one_relaxation(const BondSystem& bonds, std::string_view formulation) {
-  constexpr std::string_view kTakes = "one relaxation time";
-  const std::size_t times = bonds.relaxation_times_s().size();
-  if (times > 1) refuse_material(formulation, kTakes, fmt::format("{} of them", times));
-  if (!bonds.relaxes_alike()) refuse_material(formulation, kTakes, "kernels of several kinds");
-  for (const ViscousLaw& law : bonds.laws()) {
-    if (!law.branches.empty() && !law.kernel.is_linear()) {
-      refuse_material(formulation, "branches that are linear in elongation",
-                      "branches on a kernel");
-    }
-  }
-}
-
-void require_one_linear_branch(const BondSystem& bonds, std::string_view formulation) {
-  require_one_relaxation(bonds, formulation);
-  if (!bonds.is_linear()) {
-    refuse_material(formulation, "linear bonds", "a potential that stiffens");
-  }
+void require_one_linear_branch(const BondSystem& bonds, std::string_view who) {
+  require_material(bonds, who, {});
 }
 
 }  // namespace tpm

@@ -63,9 +63,8 @@ class BondSystem {
  public:
   /// Throws Error(bad_input) as BondLaws does.
   BondSystem(const Network& network, const MaterialField& materials);
-  /// The paper's element everywhere.
-  BondSystem(const Network& network, const TpmParameters& element,
-             LateralBond lateral = LateralBond::elastic);
+  /// One material everywhere.
+  BondSystem(const Network& network, const BondMaterial& material);
 
   /// The same bonds with other materials of the same lateral rule; the graph is shared.
   [[nodiscard]] BondSystem with_materials(const Network& network,

@@ -17,9 +17,9 @@ HeldStiffness held_stiffness(const BondSystem& bonds, const Positions& rest, std
   return {stiffness(0.0), stiffness(1.0)};
 }
 
-HeldStiffness star_stiffness(const TpmParameters& material) {
+HeldStiffness star_stiffness(const BondMaterial& material) {
   const double length = material.modulus_to_stiffness_m();
-  return {material.E2_Pa * length, material.relaxed_modulus_Pa() * length};
+  return {material.instantaneous_Pa() * length, material.equilibrium_Pa * length};
 }
 
 }  // namespace tpm

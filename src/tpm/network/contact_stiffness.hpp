@@ -14,8 +14,8 @@ struct HeldStiffness {
 [[nodiscard]] HeldStiffness held_stiffness(const BondSystem& bonds, const Positions& rest,
                                            std::size_t sphere, const Eigen::Vector3d& direction);
 
-/// The same of the four-sphere star along its radial bond: E2 A0/l0 and P2 A0/l0 (its lateral bonds
-/// are square to the displacement).
-[[nodiscard]] HeldStiffness star_stiffness(const TpmParameters& material);
+/// The same of the four-sphere star along its radial bond: its moduli times A0/l0 (its lateral
+/// bonds are square to the displacement).
+[[nodiscard]] HeldStiffness star_stiffness(const BondMaterial& material);
 
 }  // namespace tpm

@@ -15,6 +15,7 @@ namespace {
 
 /// In spacings, of the repulsion: just above 1, so that it ends where all keep their distance.
 constexpr double kReach = 1.05;
+constexpr double kRounding = 1e-6;  // of a spacing, of a point on the surface
 constexpr std::size_t kMost = 1'000'000;
 const double kCell = std::sqrt(3.0) / 2.0;  // area of a point of a triangular lattice of spacing 1
 
@@ -23,23 +24,51 @@ int sweeps_for(std::size_t count) {
   return count <= 20'000 ? 120 : 30;
 }
 
+/// Pairs of points that move a little between one question and the next: a list that reaches a
+/// little farther serves until a point has moved through half of the difference (Verlet 1967).
+class NearPairs {
+ public:
+  explicit NearPairs(double reach) : reach_(reach) {}
+
+  /// As pairs_within(points, reach), and perhaps some that are farther apart.
+  const std::vector<NeighbourPair>& of(const Positions& points) {
+    const double margin = kMargin * reach_;
+    if (points_.cols() == 0 ||
+        (points - points_).colwise().squaredNorm().maxCoeff() > 0.25 * margin * margin) {
+      pairs_ = pairs_within(points, reach_ + margin);
+      points_ = points;
+    }
+    return pairs_;
+  }
+
+ private:
+  static constexpr double kMargin = 0.25;
+  double reach_;
+  Positions points_;  ///< when the list was made
+  std::vector<NeighbourPair> pairs_;
+};
+
 /// Each point is pushed away from those nearer than the reach, then put back on the surface.
-void repel(const Surface& surface, double spacing, double step, Positions& points) {
+/// @param near reaches as far
+void repel(const Surface& surface, double spacing, double step, NearPairs& near,
+           Positions& points) {
   const double reach = kReach * spacing;
   Positions push = Positions::Zero(3, points.cols());
-  for (const NeighbourPair& pair : pairs_within(points, reach)) {
+  for (const NeighbourPair& pair : near.of(points)) {
     const auto a = static_cast<Eigen::Index>(pair.first);
     const auto b = static_cast<Eigen::Index>(pair.second);
     const Eigen::Vector3d apart = points.col(b) - points.col(a);
     const double distance = apart.norm();
-    if (!(distance > 0.0)) continue;
+    if (!(distance > 0.0) || distance >= reach) continue;
     const double lacking = 1.0 - distance / reach;
     const Eigen::Vector3d share = (step * spacing * lacking / distance) * apart;
     push.col(a) -= share;
     push.col(b) += share;
   }
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    points.col(i) = surface.nearest(points.col(i) + push.col(i)).position;
+    // The point was on the surface, so that this is no farther away than it was pushed.
+    const double within = push.col(i).norm() + kRounding * spacing;
+    points.col(i) = surface.nearest_position(points.col(i) + push.col(i), within);
   }
 }
 
@@ -64,10 +93,11 @@ Positions even_points(const Surface& surface, std::size_t count, std::uint64_t s
   if (count < 2) return points;
   const double spacing = even_spacing(surface, count);
   const int sweeps = sweeps_for(count);
+  NearPairs near(kReach * spacing);
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     // Large steps first to even out the density, small ones at the end to settle.
     const double left = 1.0 - static_cast<double>(sweep) / sweeps;
-    repel(surface, spacing, 0.3 + 0.2 * left, points);
+    repel(surface, spacing, 0.3 + 0.2 * left, near, points);
   }
   return points;
 }

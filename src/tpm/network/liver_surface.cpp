@@ -16,6 +16,10 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kSubdivisions = 5;
+// Of the farthest reach: a bracket with one crossing, and the error of its estimate.
+constexpr double kNear = 1.0 / 256.0;
+constexpr double kClose = 1e-9;
+constexpr int kMostEstimates = 60;
 
 struct Ellipsoid {
   Vector3d centre;
@@ -148,15 +152,57 @@ TriangleMesh icosphere(int subdivisions) {
   return mesh;
 }
 
-/// Where a ray from the middle leaves the shape, by bisection.
-double reach_along(const LiverFunction& liver, const Vector3d& direction, double farthest) {
-  double inside = 0.0;
-  double outside = farthest;
-  while (outside - inside > 1e-12 * farthest) {
-    const double between = 0.5 * (inside + outside);
-    (liver(liver.middle() + between * direction) < 0.0 ? inside : outside) = between;
+/// Two places on a ray from the middle, one inside the shape and one outside, m from the middle.
+struct Bracket {
+  double inside = 0.0, outside = 0.0;
+  [[nodiscard]] double width() const { return outside - inside; }
+  [[nodiscard]] double middle() const { return 0.5 * (inside + outside); }
+};
+
+/// About where a ray leaves the shape between two places: false position (Illinois).
+/// @param value of the shape along the ray
+template <class Value>
+double estimated_reach(const Value& value, Bracket at, double precision) {
+  double below = value(at.inside), above = value(at.outside), last = at.outside;
+  bool was_inside = false, was_outside = false;
+  for (int i = 0; i < kMostEstimates; ++i) {
+    const double between = (at.inside * above - at.outside * below) / (above - below);
+    if (std::abs(between - last) < precision) return between;
+    last = between;
+    const double here = value(between);
+    if (here < 0.0) {
+      at.inside = between;
+      below = here;
+      if (was_inside) above *= 0.5;
+    } else {
+      at.outside = between;
+      above = here;
+      if (was_outside) below *= 0.5;
+    }
+    was_inside = here < 0.0;
+    was_outside = !was_inside;
   }
-  return inside;
+  return last;
+}
+
+/// Where a ray from the middle leaves the shape, by bisection. Where a narrow bracket is known the
+/// shape is asked within it alone, which changes no answer and saves half of them.
+double reach_along(const LiverFunction& liver, const Vector3d& direction, double farthest) {
+  const auto value = [&](double reach) { return liver(liver.middle() + reach * direction); };
+  Bracket at{0.0, farthest};
+  const auto halve = [&](const Bracket& known) {
+    const double between = at.middle();
+    const bool is_inside =
+        between <= known.inside || (between < known.outside && value(between) < 0.0);
+    (is_inside ? at.inside : at.outside) = between;
+  };
+  while (at.width() > kNear * farthest) halve(at);
+  const double about = estimated_reach(value, at, 0.1 * kClose * farthest);
+  Bracket known{about - kClose * farthest, about + kClose * farthest};
+  if (value(known.inside) >= 0.0) known.inside = at.inside;
+  if (value(known.outside) < 0.0) known.outside = at.outside;
+  while (at.width() > 1e-12 * farthest) halve(known);
+  return at.inside;
 }
 
 }  // namespace

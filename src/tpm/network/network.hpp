@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/neighbours.hpp"
 #include "tpm/network/organ.hpp"
 

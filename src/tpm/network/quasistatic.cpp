@@ -298,11 +298,11 @@ class Run {
           derivative_row(next_ + i) = rows.row(static_cast<Eigen::Index>(i));
         }
       }
-      const LaneVector responses = stages_.responses_within(state_, asked, h, rate);
       if (observer_) {
-        show_within(responses, asked, h, rate, spent);
+        show_within(asked, h, rate, spent);
         continue;
       }
+      const LaneVector responses = stages_.responses_within(state_, asked, h, rate);
       for (std::size_t i = 0; i < count; ++i) put(responses[static_cast<Eigen::Index>(i)]);
     }
   }
@@ -315,9 +315,8 @@ class Run {
 
   /// Responses within the step just found, with the states there.
   /// @param fractions rising
-  void show_within(const LaneVector& responses, std::span<const double> fractions, double h,
-                   double rate, Spent& spent) {
-    const std::vector<TissueState> states = stages_.states_within(state_, fractions, h, rate);
+  void show_within(std::span<const double> fractions, double h, double rate, Spent& spent) {
+    const auto [responses, states] = stages_.states_within(state_, fractions, h, rate);
     for (std::size_t i = 0; i < fractions.size(); ++i) {
       if (options_.energies && fractions[i] > spent.fraction) {
         const QuasiStaticEnergy part =

@@ -10,18 +10,6 @@
 namespace tpm {
 namespace {
 
-using Lists = std::vector<std::vector<std::uint32_t>>;
-
-Lists lateral_neighbours(const Network& network) {
-  Lists neighbours(network.organ.size());
-  for (const Bond& bond : network.bonds) {
-    if (network.organ.layer[bond.a] != network.organ.layer[bond.b]) continue;
-    neighbours[bond.a].push_back(bond.b);
-    neighbours[bond.b].push_back(bond.a);
-  }
-  return neighbours;
-}
-
 double unevenness(const Organ& organ, const Eigen::Matrix3Xd& displacement, Eigen::Index sphere,
                   const std::vector<std::uint32_t>& neighbours) {
   if (neighbours.empty()) return 0.0;
@@ -44,8 +32,18 @@ double unevenness(const Organ& organ, const Eigen::Matrix3Xd& displacement, Eige
 
 }  // namespace
 
+LateralNeighbours lateral_neighbours(const Network& network) {
+  LateralNeighbours neighbours(network.organ.size());
+  for (const Bond& bond : network.bonds) {
+    if (network.organ.layer[bond.a] != network.organ.layer[bond.b]) continue;
+    neighbours[bond.a].push_back(bond.b);
+    neighbours[bond.b].push_back(bond.a);
+  }
+  return neighbours;
+}
+
 Eigen::VectorXd normal_unevenness_m(const Network& network, const Eigen::Matrix3Xd& displacement) {
-  const Lists neighbours = lateral_neighbours(network);
+  const LateralNeighbours neighbours = lateral_neighbours(network);
   Eigen::VectorXd r(displacement.cols());
   for (Eigen::Index i = 0; i < r.size(); ++i) {
     r[i] = unevenness(network.organ, displacement, i, neighbours[static_cast<std::size_t>(i)]);
@@ -53,22 +51,27 @@ Eigen::VectorXd normal_unevenness_m(const Network& network, const Eigen::Matrix3
   return r;
 }
 
-double roughness(const Network& network, const Eigen::Matrix3Xd& displacement,
-                 std::span<const std::size_t> spheres) {
+double roughness(const Network& network, const LateralNeighbours& neighbours,
+                 const Eigen::Matrix3Xd& displacement, std::span<const std::size_t> spheres) {
   if (spheres.empty()) throw bad_input("roughness", "of no spheres", "at least one");
   const double peak = displacement.colwise().norm().maxCoeff();
   if (!(peak > 0.0)) throw bad_input("roughness", "nothing has moved", "a deformation");
-  const Eigen::VectorXd r = normal_unevenness_m(network, displacement);
   double sum = 0.0;
   for (const std::size_t i : spheres) {
-    const double value = r[static_cast<Eigen::Index>(i)];
+    const double value =
+        unevenness(network.organ, displacement, static_cast<Eigen::Index>(i), neighbours[i]);
     sum += value * value;
   }
   return std::sqrt(sum / static_cast<double>(spheres.size())) / peak;
 }
 
+double roughness(const Network& network, const Eigen::Matrix3Xd& displacement,
+                 std::span<const std::size_t> spheres) {
+  return roughness(network, lateral_neighbours(network), displacement, spheres);
+}
+
 std::vector<std::size_t> spheres_around(const Network& network, std::size_t sphere, int steps) {
-  const Lists neighbours = lateral_neighbours(network);
+  const LateralNeighbours neighbours = lateral_neighbours(network);
   std::vector<std::size_t> found{sphere};
   std::vector<bool> seen(network.organ.size(), false);
   seen.at(sphere) = true;
@@ -88,7 +91,7 @@ std::vector<std::size_t> spheres_around(const Network& network, std::size_t sphe
 }
 
 std::vector<std::size_t> spheres_at_rim(const Network& network, double angle_rad) {
-  const Lists neighbours = lateral_neighbours(network);
+  const LateralNeighbours neighbours = lateral_neighbours(network);
   const Eigen::Matrix3Xd& normal = network.organ.normal;
   std::vector<std::size_t> rim;
   for (std::size_t i = 0; i < neighbours.size(); ++i) {

@@ -5,6 +5,10 @@
 
 namespace tpm {
 
+/// For every sphere those that lateral bonds join to it.
+using LateralNeighbours = std::vector<std::vector<std::uint32_t>>;
+[[nodiscard]] LateralNeighbours lateral_neighbours(const Network& network);
+
 /// Distance, m, by which each sphere stands out of the smooth continuation of its neighbours'
 /// displacements:
 ///
@@ -28,6 +32,10 @@ namespace tpm {
 /// sphere; dimensionless. 0 for a smooth (linear) displacement.
 /// Throws Error(bad_input) for an empty list of spheres, or if nothing has moved.
 [[nodiscard]] double roughness(const Network& network, const Eigen::Matrix3Xd& displacement,
+                               std::span<const std::size_t> spheres);
+/// The same for many displacements of one network.
+[[nodiscard]] double roughness(const Network& network, const LateralNeighbours& neighbours,
+                               const Eigen::Matrix3Xd& displacement,
                                std::span<const std::size_t> spheres);
 
 /// The spheres of a layer that lateral bonds reach from one sphere in at most so many steps, that

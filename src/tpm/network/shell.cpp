@@ -35,15 +35,19 @@ struct ShellPlan {
   }
 };
 
-/// Radius of about the largest ball inside: the deepest point of a grid of 24^3.
-double inner_radius(const Surface& surface) {
+/// Radius of about the largest ball inside: the deepest point of a grid of 24^3, or the first one,
+/// from the middle outwards, that is deeper than `enough`.
+double inner_radius(const Surface& surface, double enough) {
   constexpr int kGrid = 24;
   const Eigen::AlignedBox3d box = surface.bounds();
   double deepest = 0.0;
-  for (int i = 0; i < kGrid * kGrid * kGrid; ++i) {
+  const auto from_middle = [](int i) {  // 12, 11, 13, 10, ...
+    return kGrid / 2 + (i % 2 == 0 ? i / 2 : -(i + 1) / 2);
+  };
+  for (int i = 0; i < kGrid * kGrid * kGrid && deepest < enough; ++i) {
     const int row = i / kGrid;
     const int plane = row / kGrid;
-    const Vector3d share(i % kGrid, row % kGrid, plane);
+    const Vector3d share(from_middle(i % kGrid), from_middle(row % kGrid), from_middle(plane));
     const Vector3d point =
         box.min() + ((share.array() + 0.5) / kGrid * box.sizes().array()).matrix();
     deepest = std::max(deepest, -surface.signed_distance(point));
@@ -89,7 +93,8 @@ ShellPlan planned(const Surface& surface, const ShellRequest& request) {
   }
   plan.step = plan.spacing;
   if (plan.layers > 1) {
-    plan.step = std::min(plan.step, kRoom * inner_radius(surface) / (plan.layers - 1));
+    const double room = plan.step * (plan.layers - 1) / kRoom;
+    plan.step = std::min(plan.step, kRoom * inner_radius(surface, room) / (plan.layers - 1));
   }
   return plan;
 }

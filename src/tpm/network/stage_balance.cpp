@@ -1,8 +1,6 @@
 #include "tpm/network/stage_balance.hpp"
 
 #include <algorithm>
-#include <boost/math/quadrature/gauss.hpp>
-#include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <limits>
 
@@ -23,21 +21,11 @@ constexpr Eigen::Index kMemoryDepth = 6;
 constexpr double kLongestMove = 0.25;    // of a bond
 constexpr double kSnap = 2.0;            // times what the stiffness says
 constexpr double kGrains = 8.0;          // roundings of a coordinate that no balance gets below
-constexpr double kLongPart = 0.25;       // of a step: its quadrature takes 16 points instead of 8
 constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the force
 
 std::vector<double> with_start(std::vector<double> nodes) {
   nodes.insert(nodes.begin(), 0.0);
   return nodes;
-}
-
-/// Where a function that is below 0 at `from` and above at `to` crosses it.
-template <class Function>
-double root_between(const Function& function, double from, double to) {
-  std::uintmax_t most = 100;
-  return boost::math::tools::toms748_solve(function, from, to,
-                                           boost::math::tools::eps_tolerance<double>(), most)
-      .first;
 }
 
 Eigen::Map<const Eigen::RowVectorXd> by_coordinate(const Eigen::Matrix3Xd& vectors) {
@@ -434,68 +422,6 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   return outcome;
 }
 
-double StageBalance::gap_m(const ToolContact& contact, double fraction) const {
-  const Eigen::RowVectorXd shape = full_.interpolation(fraction).tail(stages_).transpose();
-  const auto place = [&](std::uint32_t column) -> Eigen::RowVector3d {
-    const Eigen::Index first = 3 * static_cast<Eigen::Index>(column);
-    const Eigen::RowVector3d start = start_.segment<3>(first);
-    return start + shape * (x_.middleCols<3>(first).topRows(stages_).rowwise() - start);
-  };
-  return contact_gap_m(contact, place(contact.sphere).transpose(), place(contact.tool).transpose());
-}
-
-std::optional<ContactChange> StageBalance::contact_change(double tolerance) const {
-  const auto& contacts = tissue_.bonds().contacts();
-  // Errors of force and length that change the response by the tolerance.
-  const double of_response = tolerance * scale_;
-  const double of_imposed = of_response / unit_response_;
-  const double length = tissue_.depth_driven() ? of_imposed : of_response;
-  const double force = tissue_.depth_driven() ? of_response : of_imposed;
-  std::optional<ContactChange> first;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const bool closed = closed_[i] != 0;
-    // How far on the wrong side it is: a closed contact that pulls, an open one that overlaps.
-    const auto wrong = [&](double fraction) {
-      const double gap = gap_m(contacts[i], fraction);
-      return closed ? gap : -gap;
-    };
-    const double allowed = closed ? force / contacts[i].stiffness_N_per_m : length;
-    double before = 0.0;
-    for (int stage = 0; stage < stages_; ++stage) {
-      const double at = node(stage);
-      if (first && before >= first->fraction) break;
-      if (wrong(at) > allowed) {
-        const double crossing = wrong(before) < 0.0 ? root_between(wrong, before, at) : before;
-        if (!first || crossing < first->fraction) first = ContactChange{i, crossing};
-        break;
-      }
-      before = at;
-    }
-  }
-  return first;
-}
-
-void StageBalance::change_contact(TissueState& state, std::size_t contact) {
-  state.closed[contact] = state.closed[contact] != 0 ? 0 : 1;
-  ++work_.contact_changes;
-  factorised_ = false;
-  has_last_ = false;
-}
-
-StageBalance::Shapes StageBalance::shapes(std::span<const double> fractions, double h) const {
-  Shapes shapes;
-  Places places;
-  for (const double c : fractions) places.push_back(full_.place(c));
-  shapes.weights = weights_at(places, fractions, h);
-  shapes.interpolation.setZero();
-  for (int lane = 0; lane < kLanes; ++lane) {
-    const std::size_t place = std::min(static_cast<std::size_t>(lane), fractions.size() - 1);
-    shapes.interpolation.row(lane).head(stages_) =
-        places[place].interpolation().tail(stages_).transpose();
-  }
-  return shapes;
-}
-
 LaneMatrix StageBalance::aging(const Places& places, std::span<const double> fractions, double h,
                                std::size_t group, std::size_t branch) const {
   // m depends on z = h / tau by its weights and by what is left of the start, exp(-z c) m0.
@@ -516,150 +442,6 @@ LaneMatrix StageBalance::aging(const Places& places, std::span<const double> fra
   change.noalias() +=
       decay_slope * begin_.viscous.row(static_cast<Eigen::Index>(branch)).segment(first, count);
   return -z * change;
-}
-
-StageBalance::Within StageBalance::within(const TissueState& state,
-                                          std::span<const double> fractions, double h,
-                                          double rate) const {
-  Shapes at = shapes(fractions, h);
-  Within states;
-  for (int lane = 0; lane < kLanes; ++lane) {
-    const double c = fractions[std::min(static_cast<std::size_t>(lane), fractions.size() - 1)];
-    states.imposed[lane] = state.imposed + c * h * rate;
-  }
-  // Of displacements, not of coordinates, for the sake of rounding.
-  states.position.noalias() = at.interpolation * (x_.rowwise() - start_);
-  states.position.rowwise() += start_;
-  LaneMatrix known;
-  find_known(at.weights, begin_, known);
-  apply(at.weights, followed_, begin_, known, states.memory);
-  states.weights = std::move(at.weights);
-  return states;
-}
-
-LaneVector StageBalance::responses(const Within& states) {
-  force_.setZero();
-  tissue_.add_load(states.imposed, force_);
-  bonds_.add_forces(states.position, states.memory, force_);
-  const LaneVector plain = tissue_.response(states.position, force_);
-  tissue_.freedom().project(force_);
-  return plain + tissue_.adjoint_sign() * (force_ * lane_field_.transpose());
-}
-
-LaneVector StageBalance::responses_within(const TissueState& state,
-                                          std::span<const double> fractions, double h,
-                                          double rate) {
-  return responses(within(state, fractions, h, rate));
-}
-
-std::vector<TissueState> StageBalance::states_within(const TissueState& state,
-                                                     std::span<const double> fractions, double h,
-                                                     double rate) {
-  Within states = within(state, fractions, h, rate);
-  force_.setZero();
-  tissue_.add_load(states.imposed, force_);
-  bonds_.add_forces(states.position, states.memory, force_);
-  tissue_.freedom().project(force_);
-  d_ = force_;
-  factor_.solve(d_);
-  tissue_.freedom().project(d_);
-  std::vector<TissueState> all(fractions.size(), state);
-  Eigen::MatrixXd viscous;
-  for (std::size_t lane = 0; lane < fractions.size(); ++lane) {
-    const auto row = static_cast<Eigen::Index>(lane);
-    TissueState& at = all[lane];
-    ++work_.back_solves;
-    at.time_s += fractions[lane] * h;
-    at.imposed = states.imposed[row];
-    const Eigen::RowVectorXd place = states.position.row(row) + d_.row(row);
-    at.position = Eigen::Map<const Positions>(place.data(), 3, coordinates_ / 3);
-    tissue_.bonds().followed(at.position, at.followed);
-    viscous_in_lane(states.weights, followed_, begin_, row, viscous);
-    put_viscous(viscous, at);
-  }
-  return all;
-}
-
-LaneVector StageBalance::heat_W(const Within& states) const {
-  LaneVector heat = LaneVector::Zero();
-  LaneMatrix elongation;
-  bonds_.elongations(states.position, elongation);
-  const Eigen::VectorXd relaxing = bonds_.of_relaxing(tissue_.bonds().relaxing());
-  std::vector<LaneBonds::Group> general;
-  for (const LaneBonds::Group& group : bonds_.groups()) {
-    const ViscousLaw& law = tissue_.bonds().laws()[group.law];
-    if (!law.is_linear() || law.branches.size() != 1) {
-      general.push_back(group);
-      continue;
-    }
-    // V(l) = l, and the only branch is what the bond remembers: all lanes at once.
-    const auto apart = elongation.middleCols(group.first, group.count) -
-                       states.memory.middleCols(group.first, group.count);
-    heat += apart.cwiseAbs2() * relaxing.segment(group.first, group.count) /
-            law.branches.front().relaxation_time_s;
-  }
-  if (general.empty()) return heat;
-  Eigen::MatrixXd viscous;
-  for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
-    viscous_in_lane(states.weights, followed_, begin_, lane, viscous);
-    for (const LaneBonds::Group& group : general) {
-      const ViscousLaw& law = tissue_.bonds().laws()[group.law];
-      for (std::size_t b = 0; b < law.branches.size(); ++b) {
-        double sum = 0.0;
-        for (Eigen::Index i = group.first; i < group.first + group.count; ++i) {
-          const double l = elongation(lane, i);
-          const double m = viscous(static_cast<Eigen::Index>(b), i);
-          sum += relaxing[i] * (l - law.kernel.inverse(m)) * (law.kernel.value(l) - m);
-        }
-        heat[lane] += law.branches[b].share * sum / law.branches[b].relaxation_time_s;
-      }
-    }
-  }
-  return heat;
-}
-
-QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double h, double rate,
-                                               double from, double until) {
-  using Long = boost::math::quadrature::gauss<double, 2 * kLanes>;
-  using Short = boost::math::quadrature::gauss<double, kLanes>;
-  QuasiStaticEnergy energy;
-  double response_integral = 0.0;  // over the imposed value
-  const double half = 0.5 * (until - from);
-  std::array<double, kLanes> fractions{};
-  LaneVector weight;
-  const auto put = [&](std::size_t lane, double abscissa, double share) {
-    fractions[lane] = from + half * (1.0 + abscissa);
-    weight[static_cast<Eigen::Index>(lane)] = half * h * share;
-  };
-  const auto add = [&] {
-    const Within states = within(state, fractions, h, rate);
-    response_integral += rate * weight.dot(responses(states));
-    energy.dissipated_J += weight.dot(heat_W(states));
-  };
-  if (until - from > kLongPart) {
-    for (const double side : {-1.0, 1.0}) {
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        put(i, side * Long::abscissa()[i], Long::weights()[i]);
-      }
-      add();
-    }
-  } else {
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      const double side = i % 2 == 0 ? -1.0 : 1.0;
-      put(i, side * Short::abscissa()[i / 2], Short::weights()[i / 2]);
-    }
-    add();
-  }
-  if (tissue_.depth_driven()) {
-    energy.work_J = response_integral;
-  } else {
-    // The integral of F du, by parts.
-    const std::array<double, 2> ends{from, until};
-    const LaneVector depth = responses_within(state, ends, h, rate);
-    energy.work_J = (state.imposed + until * h * rate) * depth[1] -
-                    (state.imposed + from * h * rate) * depth[0] - response_integral;
-  }
-  return energy;
 }
 
 void StageBalance::accept(TissueState& state, double h, double rate) {

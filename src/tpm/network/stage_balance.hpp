@@ -28,6 +28,12 @@ struct ContactChange {
   double fraction = 0.0;  ///< of the step, 0 to 1
 };
 
+/// Responses and states at fractions of a step.
+struct StatesWithin {
+  LaneVector response;
+  std::vector<TissueState> states;
+};
+
 /// Balances the stages of a step together, side by side in lanes: a fixed-point iteration with one
 /// factorisation, with Anderson acceleration. Lanes beyond the last stage repeat it.
 class StageBalance {
@@ -65,9 +71,9 @@ class StageBalance {
   /// The tissue at fractions of the step just balanced; its forces are balanced once more there,
   /// for all fractions at once.
   /// @param fractions in [0, 1], at most kLanes of them
-  [[nodiscard]] std::vector<TissueState> states_within(const TissueState& state,
-                                                       std::span<const double> fractions, double h,
-                                                       double rate);
+  [[nodiscard]] StatesWithin states_within(const TissueState& state,
+                                           std::span<const double> fractions, double h,
+                                           double rate);
   /// Work done and heat made between two fractions of the step just balanced, by Gauss quadrature.
   [[nodiscard]] QuasiStaticEnergy energy_of_step(const TissueState& state, double h, double rate,
                                                  double from = 0.0, double until = 1.0);

@@ -59,7 +59,10 @@ TriangleTree::TriangleTree(TriangleMesh mesh) : mesh_(std::move(mesh)) {
   std::iota(order_.begin(), order_.end(), 0);
   nodes_.reserve(order_.size());
   nodes_.emplace_back();
-  split(0, 0, count);
+  std::vector<Eigen::AlignedBox3d> boxes;
+  boxes.reserve(order_.size());
+  for (const int t : order_) boxes.push_back(box_of(t));
+  split(0, 0, count, boxes);
   pack();
 }
 
@@ -77,12 +80,16 @@ Eigen::AlignedBox3d TriangleTree::box_of(int triangle) const {
   return box;
 }
 
-void TriangleTree::split(int node, int first, int count) {
+void TriangleTree::split(int node, int first, int count,
+                         const std::vector<Eigen::AlignedBox3d>& boxes) {
+  const auto own_box = [&](int t) -> const Eigen::AlignedBox3d& {
+    return boxes[static_cast<std::size_t>(t)];
+  };
   Eigen::AlignedBox3d box;
   Eigen::AlignedBox3d centres;
   const auto begin = order_.begin() + first;
   for (auto it = begin; it != begin + count; ++it) {
-    const Eigen::AlignedBox3d own = box_of(*it);
+    const Eigen::AlignedBox3d& own = own_box(*it);
     box.extend(own);
     centres.extend(own.center());
   }
@@ -95,21 +102,21 @@ void TriangleTree::split(int node, int first, int count) {
   centres.sizes().maxCoeff(&axis);
   const int half = count / 2;
   std::nth_element(begin, begin + half, begin + count, [&](int a, int b) {
-    const double left = box_of(a).center()[axis];
-    const double right = box_of(b).center()[axis];
+    const double left = own_box(a).center()[axis];
+    const double right = own_box(b).center()[axis];
     return left != right ? left < right : a < b;
   });
   const auto child = static_cast<int>(nodes_.size());
   filled.first = child;
   filled.count = 0;
   nodes_.resize(nodes_.size() + 2);  // `filled` is not valid from here on
-  split(child, first, half);
-  split(child + 1, first + half, count - half);
+  split(child, first, half, boxes);
+  split(child + 1, first + half, count - half, boxes);
 }
 
-TrianglePoint TriangleTree::nearest(const Vector3d& point) const {
+TrianglePoint TriangleTree::nearest(const Vector3d& point, double within) const {
   TrianglePoint best;
-  best.squared_distance = std::numeric_limits<double>::infinity();
+  best.squared_distance = within * within;
   // Halving leaves at most 31 levels below an int of triangles, each with one node set aside.
   std::array<std::pair<double, int>, 64> open;
   std::size_t depth = 0;
@@ -141,7 +148,7 @@ TrianglePoint TriangleTree::nearest(const Vector3d& point) const {
       }
     }
   }
-  return best;
+  return best.triangle >= 0 ? best : nearest(point);
 }
 
 std::vector<int> TriangleTree::meeting(const Eigen::AlignedBox3d& box) const {

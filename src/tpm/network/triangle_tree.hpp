@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <limits>
 #include <vector>
 
 #include "tpm/network/triangle_mesh.hpp"
@@ -17,12 +18,17 @@ struct TrianglePoint {
 /// A mesh in a hierarchy of bounding boxes, so that a query costs O(log n).
 class TriangleTree {
  public:
+  static constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+
   /// @param mesh at least one triangle
   explicit TriangleTree(TriangleMesh mesh);
 
   [[nodiscard]] const TriangleMesh& mesh() const { return mesh_; }
   [[nodiscard]] const Eigen::AlignedBox3d& bounds() const { return nodes_.front().box; }
-  [[nodiscard]] TrianglePoint nearest(const Eigen::Vector3d& point) const;
+  /// @param within the caller's promise that the mesh comes nearer than this, m; it saves most of
+  ///   the search and changes nothing. A promise that is not kept costs a second search.
+  [[nodiscard]] TrianglePoint nearest(const Eigen::Vector3d& point,
+                                      double within = kAnywhere) const;
   /// The triangles whose bounding boxes meet a box, in rising order.
   [[nodiscard]] std::vector<int> meeting(const Eigen::AlignedBox3d& box) const;
   [[nodiscard]] Eigen::AlignedBox3d box_of(int triangle) const;
@@ -38,7 +44,7 @@ class TriangleTree {
     Eigen::Vector3d a, b, c;
     Eigen::Vector3d normal;  ///< unit
   };
-  void split(int node, int first, int count);
+  void split(int node, int first, int count, const std::vector<Eigen::AlignedBox3d>& boxes);
   void pack();
 
   TriangleMesh mesh_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tpm/core/text.hpp"
+#include "tpm/material/bond_element.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/lane_bonds.hpp"
 #include "tpm/network/liver.hpp"
@@ -45,7 +46,7 @@ class Bench {
  public:
   Bench()
       : network_(build_network(paper_liver(), {}, "calibration")),
-        bonds_(network_, TpmParameters{}),
+        bonds_(network_, paper_element()),
         freedom_(network_.organ.size()),
         equilibrium_(bonds_, freedom_),
         factor_(equilibrium_.pattern()),

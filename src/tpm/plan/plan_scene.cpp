@@ -190,7 +190,6 @@ PlanScene PlanScene::all_relaxed() const {
 PlanScene PlanScene::with_materials(const std::function<void(BondMaterial&)>& change) const {
   ExperimentScene scene = scene_;
   for (BondMaterial& material : scene.tissue.materials.materials) change(material);
-  scene.tissue.paper_element.reset();
   return PlanScene(std::move(scene));
 }
 

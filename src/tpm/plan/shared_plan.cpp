@@ -36,7 +36,7 @@ std::optional<RampAndHold> as_ramp_and_hold(const Protocol& protocol) {
 }
 
 ExperimentScene with_unit_relaxation(ExperimentScene scene) {
-  scene.tissue.set_element(scene.tissue.paper_element.value().with_relaxation_time(1.0));
+  set_value(scene.tissue.materials.materials.front(), "tau1", 1.0, "shared plan");
   return scene;
 }
 
@@ -113,7 +113,7 @@ const std::vector<double>& SharedPlan::claims_at(Place place) {
   const OfDepth& here = of_depth(place.first);
   if (!here.models.empty()) try {
       const double depth = depth_of_place(place.first), ramp = std::exp2(place.second);
-      const double hold = kHoldOfLongest * spectrum_->longest;
+      const double hold = kHoldOfLongest * spectrum_->longest_s;
       const PlanScout scout(scene_.with_protocol(ramp_and_hold(depth, depth / ramp, hold)), {},
                             false, kMostIterations);
       for (std::size_t m = 0; m < claims.size(); ++m) {

@@ -9,6 +9,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
+#include "tpm/reduce/condensed_phi.hpp"
 
 namespace tpm {
 namespace {
@@ -25,14 +26,6 @@ constexpr double kSecondModeError = 0.35;
 /// aside (of u or w, over the range) adds.
 constexpr double kMisfitAlong = 0.3;
 
-/// (1 - exp(-y))/y, and the next one: (1 - that)/y.
-double first_phi(double y) {
-  return y == 0.0 ? 1.0 : -std::expm1(-y) / y;
-}
-double second_phi(double y) {
-  if (y > 0.05) return (1.0 - first_phi(y)) / y;
-  return 0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0 - y / 720.0)));
-}
 /// 1/(1 - exp(-y)) - 1/y: where a straight motion must rest for the exact end value.
 double rest_share(double y) {
   return second_phi(y) / first_phi(y);
@@ -59,38 +52,51 @@ double positive(double value, std::string_view name) {
 }  // namespace
 
 CondensedContact::CondensedContact(std::shared_ptr<const CondensedFit> fit,
-                                   double relaxation_time_s, double period_s)
+                                   std::vector<CondensedBranch> branches, double period_s)
     : fit_(std::move(fit)),
-      relaxation_time_s_(positive(relaxation_time_s, "relaxation time")),
+      branches_(std::move(branches)),
       period_s_(positive(period_s, "period")) {
-  set_rates();
+  double whole = 0.0;
+  for (const CondensedBranch& branch : branches_) {
+    (void)positive(branch.relaxation_time_s, "relaxation time");
+    whole += branch.share;
+    if (!(branch.share > 0.0) || !std::isfinite(whole)) {
+      throw Error(
+          ExitCode::bad_input, "condensed model",
+          fmt::format("the share of a branch is {}; expected a number above 0", branch.share));
+    }
+  }
+  if (branches_.empty()) {
+    throw Error(ExitCode::bad_input, "condensed model", "nothing relaxes; expected a branch");
+  }
+  for (CondensedBranch& branch : branches_) branch.share /= whole;
+  if (several()) {
+    of_branches_ = CondensedBranches(*fit_, branches_, period_s_);
+  } else {
+    set_rates(branches_.front().relaxation_time_s);
+  }
   settle_condensed(fit_->tables, state_);
 }
 
 CondensedContact CondensedContact::with_relaxation_time(double relaxation_time_s) const {
-  return {fit_, relaxation_time_s, period_s_};
+  return with_branches({{1.0, relaxation_time_s}});
+}
+
+CondensedContact CondensedContact::with_branches(std::vector<CondensedBranch> branches) const {
+  return {fit_, std::move(branches), period_s_};
 }
 
 CondensedContact CondensedContact::with_period(double period_s) const {
-  return {fit_, relaxation_time_s_, period_s};
+  return {fit_, branches_, period_s};
 }
 
-void CondensedContact::set_rates() {
-  const double x = period_s_ / relaxation_time_s_;
-  // A mode that hardly exists is kept from dividing by zero.
-  const Eigen::Matrix3d grain = 1e-9 * fit_->mean_metric.trace() * Eigen::Matrix3d::Identity();
-  Matrix6 metric = Matrix6::Zero();
-  metric.topLeftCorner<3, 3>() = fit_->mean_metric;
-  metric.bottomRightCorner<3, 3>() = fit_->mean_coupling + grain;
-  Matrix6 energy;
-  energy << fit_->mean_energy, fit_->mean_coupling, fit_->mean_coupling, fit_->mean_second + grain;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6> modes(energy, metric);
-  const Matrix6 right = modes.eigenvectors();
-  const Matrix6 left = right.transpose() * metric;
+void CondensedContact::set_rates(double relaxation_time_s) {
+  const double x = period_s_ / relaxation_time_s;
+  const CondensedModes modes = condensed_modes(*fit_);
   const auto of_rate = [&](const auto& f) {
     State6 values;
-    for (Eigen::Index k = 0; k < 6; ++k) values[k] = f(modes.eigenvalues()[k] * x);
-    return Matrix6(right * values.asDiagonal() * left);
+    for (Eigen::Index k = 0; k < 6; ++k) values[k] = f(modes.rate[k] * x);
+    return Matrix6(modes.right * values.asDiagonal() * modes.left);
   };
   const Matrix6 rate = of_rate([&](double y) { return y / x; });
   pack(rate, rates_.rate);
@@ -114,16 +120,18 @@ void CondensedContact::set_rates() {
 void CondensedContact::reset() noexcept {
   state_ = {};
   settle_condensed(fit_->tables, state_);
+  if (several()) of_branches_.reset();
   kept_ = 0;
 }
 
 CondensedMemory CondensedContact::memory() const noexcept {
-  return {Eigen::Vector3d::Map(&state_.memory[0]), Eigen::Vector3d::Map(&state_.memory[4])};
+  return {Eigen::Vector3d::Map(&state_.memory[0]), Eigen::Vector3d::Map(&state_.memory[4]),
+          several() ? of_branches_.spread_J() : 0.0};
 }
 
 double CondensedContact::stored_energy_J(const Eigen::Vector3d& displacement_m,
                                          const CondensedMemory& memory) const noexcept {
-  return value_of(displacement_m, memory).energy_J;
+  return value_of(displacement_m, memory).energy_J + memory.spread_J;
 }
 
 Eigen::Vector3d CondensedContact::force_N(const Eigen::Vector3d& displacement_m,
@@ -142,11 +150,16 @@ CondensedValue CondensedContact::value_of(const Eigen::Vector3d& displacement_m,
 
 ContactAnswer CondensedContact::step(const ToolPose& tool) noexcept {
   const Eigen::Vector3d u = fit_->frame.local(tool.displacement_m);
-  step_condensed(fit_->tables, rates_, state_, u.data());
+  if (several()) {
+    of_branches_.step(state_, u.data());
+  } else {
+    step_condensed(fit_->tables, rates_, state_, u.data());
+  }
   kept_ += state_.kept ? 1 : 0;
   ContactAnswer answer;
   answer.force_N = fit_->frame.axes * Eigen::Vector3d::Map(&state_.force[0]);
-  const Eigen::Vector3d q = Eigen::Vector3d::Map(&state_.memory[4]);
+  const Eigen::Vector3d q = several() ? of_branches_.second_m(state_)
+                                      : Eigen::Vector3d(Eigen::Vector3d::Map(&state_.memory[4]));
   const double place_aside_m = across(u[1], u[2]);
   const double aside_m = std::max(place_aside_m, across(state_.memory[1], state_.memory[2]));
   const double aside = aside_m / fit_->frame.tangential_m;

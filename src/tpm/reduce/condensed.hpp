@@ -4,12 +4,10 @@
 
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/freedom.hpp"
-#include "tpm/reduce/condensed_tables.hpp"
+#include "tpm/reduce/condensed_branches.hpp"
 #include "tpm/reduce/contact_model.hpp"
 
 namespace tpm {
-
-struct CondensedFit;
 
 /// What a condensed model is built for.
 struct CondensedOptions {
@@ -18,25 +16,29 @@ struct CondensedOptions {
   double period_s = 1e-3;      ///< of the servo loop, > 0
 };
 
-/// What a condensed model remembers, in the axes of its contact: into the tissue and two tangents.
+/// Viscous state of a condensed model, in the axes of its contact: into the tissue and two
+/// tangents. Of several branches the mean, weighted by their shares.
 struct CondensedMemory {
   Eigen::Vector3d w_m = Eigen::Vector3d::Zero();  ///< fictitious displacement
   Eigen::Vector3d q_m = Eigen::Vector3d::Zero();  ///< along the second mode
+  double spread_J = 0.0;  ///< energy stored in the differences of the branches from their mean
 };
 
-/// A network with one relaxation time seen from one contact sphere
-/// (docs/reduction.md): the memory of all bonds is held on that of the relaxed
-/// equilibrium under a fictitious displacement w of the contact, and one linear mode q more for
-/// each direction.
+/// A network whose bonds relax alike seen from one contact sphere (docs/reduction.md): the memory
+/// of all bonds is held on that of the relaxed equilibrium under a fictitious displacement w of
+/// the contact, and one linear mode q more for each direction. Each branch has a w and a q of its
+/// own (CondensedBranches).
 class CondensedContact final : public ContactModel {
  public:
   /// Of a fit found by build_condensed().
-  CondensedContact(std::shared_ptr<const CondensedFit> fit, double relaxation_time_s,
+  /// Throws Error(bad_input) unless relaxation times and shares are above 0.
+  CondensedContact(std::shared_ptr<const CondensedFit> fit, std::vector<CondensedBranch> branches,
                    double period_s);
 
-  /// The same tissue and range, at rest; nothing is balanced anew.
+  /// The same tissue and range with one branch or with others, at rest; nothing is balanced anew.
   /// Throws Error(bad_input) unless above 0.
   [[nodiscard]] CondensedContact with_relaxation_time(double relaxation_time_s) const;
+  [[nodiscard]] CondensedContact with_branches(std::vector<CondensedBranch> branches) const;
   [[nodiscard]] CondensedContact with_period(double period_s) const;
 
   void reset() noexcept override;
@@ -47,7 +49,7 @@ class CondensedContact final : public ContactModel {
   [[nodiscard]] Eigen::Index spheres() const noexcept override;
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
 
-  [[nodiscard]] double relaxation_time_s() const noexcept { return relaxation_time_s_; }
+  [[nodiscard]] const std::vector<CondensedBranch>& branches() const noexcept { return branches_; }
   [[nodiscard]] CondensedMemory memory() const noexcept;
   /// Energy stored with the contact at a displacement and a memory, J: the force of step() is minus
   /// its gradient by the displacement.
@@ -58,19 +60,24 @@ class CondensedContact final : public ContactModel {
                                         const CondensedMemory& memory) const noexcept;
   /// Within a step the contact moves straight, and the memory relaxes while it is at this share of
   /// the way (docs/reduction.md), 0.5 to 1.
-  [[nodiscard]] double resting_share() const noexcept { return rates_.resting_share; }
-  /// Steps since reset() in which the memory was left as it was, for to relax it as computed would
-  /// not have lowered the energy.
+  [[nodiscard]] double resting_share() const noexcept {
+    return several() ? of_branches_.resting_share() : rates_.resting_share;
+  }
+  /// Number of steps since reset() in which the viscous state was kept because the computed update
+  /// would have increased the energy.
   [[nodiscard]] long long kept_memories() const noexcept { return kept_; }
 
  private:
-  void set_rates();
+  void set_rates(double relaxation_time_s);
+  [[nodiscard]] bool several() const noexcept { return branches_.size() > 1; }
   [[nodiscard]] CondensedValue value_of(const Eigen::Vector3d& displacement_m,
                                         const CondensedMemory& memory) const noexcept;
 
   std::shared_ptr<const CondensedFit> fit_;
-  double relaxation_time_s_, period_s_;
-  CondensedRates rates_;
+  std::vector<CondensedBranch> branches_;
+  double period_s_;
+  CondensedRates rates_;           ///< of one branch
+  CondensedBranches of_branches_;  ///< of several
   CondensedState state_;
   long long kept_ = 0;
 };
@@ -79,7 +86,8 @@ class CondensedContact final : public ContactModel {
 /// @param bonds, rest, freedom of the network; tools are not supported
 /// @param contact from 0; it is held here, whatever `freedom` says of it
 /// @param into_tissue unit vector
-/// Throws Error(bad_input) for options out of range, a contact that does not exist or tools;
+/// Throws Error(bad_input) for options out of range, a contact that does not exist or tools, bonds
+/// that do not relax alike or do not relax, and branches on a kernel;
 /// Error(numerical) where the tissue buckles within the range.
 [[nodiscard]] CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
                                                const Freedom& freedom, std::size_t contact,

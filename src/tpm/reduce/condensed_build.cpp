@@ -65,8 +65,9 @@ void require_valid(const BondSystem& bonds, const Positions& rest, std::size_t c
   positive(options.depth_m, "depth");
   positive(options.tangential_m, "tangential range");
   positive(options.period_s, "period");
-  require_one_relaxation(bonds, "the condensed model");
-  positive(bonds.relaxation_time_s(), "relaxation time");
+  require_material(
+      bonds, "the condensed model",
+      {&Capabilities::branches, &Capabilities::stiffening, &Capabilities::any_potential});
   if (bonds.contact_count() > 0 || bonds.spheres() != static_cast<std::size_t>(rest.cols())) {
     refuse("the network has tools; expected spheres only, one of which is the contact");
   }
@@ -76,6 +77,14 @@ void require_valid(const BondSystem& bonds, const Positions& rest, std::size_t c
   if (std::abs(into_tissue.norm() - 1.0) > 1e-9) {
     refuse("the direction into the tissue is no unit vector; expected length 1");
   }
+}
+
+std::vector<CondensedBranch> condensed_branches(const BondSystem& bonds) {
+  std::vector<CondensedBranch> branches;
+  for (const ViscousLaw::Branch& branch : common_branches(bonds)) {
+    branches.push_back({branch.share, branch.relaxation_time_s});
+  }
+  return branches;
 }
 
 CondensedFrame frame_of(const Eigen::Vector3d& into_tissue, const CondensedOptions& options) {
@@ -104,6 +113,7 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   fit->most_tangential_m = (1.0 + kTangentialMargin) * options.tangential_m;
 
   CondensedSampler sampler(bonds, rest, held, contact, kStride * options.depth_m);
+  std::vector<CondensedBranch> branches = condensed_branches(bonds);
   SpreadPlaces memories(fit->frame, options, {2, 3, 5});
   SpreadPlaces places(fit->frame, options, {7, 11, 13});
   std::vector<CondensedMetric> metrics;
@@ -137,7 +147,7 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   fit->tables = condensed_tables(fit->frame, potential, CondensedMatrices(fit->frame, metrics));
   fit->fit_error_N = potential.worst_N();
   fit->field = CondensedField(fit->frame, rest, samples, metrics);
-  return {fit, bonds.relaxation_time_s(), options.period_s};
+  return {fit, std::move(branches), options.period_s};
 }
 
 }  // namespace tpm

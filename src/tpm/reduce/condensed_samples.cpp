@@ -13,9 +13,9 @@
 namespace tpm {
 namespace {
 
-constexpr double kBalance = 1e-9;      // of stiffness at the contact times the stride
-constexpr double kLeastStride = 1e-3;  // of the longest
-constexpr double kSlow = 0.3;          // of the force left before: a new factorisation pays
+constexpr double kSampleBalance = 1e-9;  // of stiffness at the contact times the stride
+constexpr double kLeastStride = 1e-3;    // of the longest
+constexpr double kSlow = 0.3;            // of the force left before: a new factorisation pays
 constexpr int kMostIterations = 40;
 
 }  // namespace
@@ -31,7 +31,7 @@ CondensedSampler::CondensedSampler(const BondSystem& bonds, Positions rest, cons
   relaxed_.position = rest_;
   memory_ = {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 1.0};
   find_moves(relaxed_, memory_);
-  tolerance_N_ = kBalance * relaxed_.stiffness.norm() * stride_m_;
+  tolerance_N_ = kSampleBalance * relaxed_.stiffness.norm() * stride_m_;
   latest_ = relaxed_;
 }
 
@@ -183,7 +183,9 @@ CondensedSample CondensedSampler::sample_at(const Eigen::Vector3d& u_m) {
   CondensedSample sample;
   sample.u_m = u_m;
   sample.w_m = relaxed_.contact;
-  sample.energy_J = bonds_.stored_energy_J(latest_.position, memory_.offset);
+  // All branches alike.
+  sample.energy_J = bonds_.stored_energy_J(latest_.position,
+                                           memory_.offset.replicate(1, bonds_.most_branches()));
   Eigen::Matrix3Xd force = no_load_;
   bonds_.add_forces(latest_.position, memory_, force);
   sample.by_u_N = -force.col(contact_);

@@ -44,6 +44,31 @@ void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
   plain::step(tables, rates, state, to);
 }
 
+void pull_condensed(const CondensedTables& tables, const CondensedRates& rates, const double* u,
+                    const double* memory, const double* matrices, CondensedPull& pull) noexcept {
+#ifdef TPM_CONDENSED_WIDE
+  if (is_wide()) return wide::pull_of(tables, rates, u, memory, matrices, pull);
+#endif
+  plain::pull_of(tables, rates, u, memory, matrices, pull);
+}
+
+void matrices_of_condensed(const CondensedTables& tables, const double* w,
+                           double* matrices) noexcept {
+#ifdef TPM_CONDENSED_WIDE
+  if (is_wide()) return wide::all_matrices(tables, w, matrices);
+#endif
+  plain::all_matrices(tables, w, matrices);
+}
+
+void advance_condensed(const CondensedModeTables& modes, const CondensedBranchArrays& branches,
+                       const double* velocity, const double* way, const double* frame,
+                       CondensedAdvance& result) noexcept {
+#ifdef TPM_CONDENSED_WIDE
+  if (is_wide()) return wide::advance(modes, branches, velocity, way, frame, result);
+#endif
+  plain::advance(modes, branches, velocity, way, frame, result);
+}
+
 CondensedValue value_of_condensed(const CondensedTables& tables, const double* u,
                                   const double* memory) noexcept {
   double result[4];

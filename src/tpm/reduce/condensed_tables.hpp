@@ -58,6 +58,58 @@ void settle_condensed(const CondensedTables& tables, CondensedState& state) noex
 void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
                     CondensedState& state, const double* to) noexcept;
 
+/// What a memory does with the contact at u.
+struct alignas(32) CondensedPull {
+  // NOLINTBEGIN(*-avoid-c-arrays)
+  double velocity[8] = {};  ///< of w (3), 0, q (3), 0 per relaxation time, m
+  double force[4] = {};     ///< on what is in contact, N
+  double energy_J = 0.0;    ///< stored, with all branches alike
+  // NOLINTEND(*-avoid-c-arrays)
+};
+/// @param rates those of q by q are used
+/// @param matrices matrices_of_condensed() at w
+void pull_condensed(const CondensedTables& tables, const CondensedRates& rates, const double* u,
+                    const double* memory, const double* matrices, CondensedPull& pull) noexcept;
+/// The matrices at w, CondensedTables::kMatrixEntries of them.
+void matrices_of_condensed(const CondensedTables& tables, const double* w,
+                           double* matrices) noexcept;
+
+/// Linear modes of the memory, and what the branches of a step need beside them. Vectors of modes
+/// and of memories have 8 numbers, 3 and a 0 twice.
+struct alignas(32) CondensedModeTables {
+  // NOLINTBEGIN(*-avoid-c-arrays)
+  double left[6][8] = {}, right[6][8] = {};  ///< columns: of w and q; of the modes
+  double second_metric[6] = {};              ///< N: 00, 11, 22, 01, 02, 12; N/m
+  // NOLINTEND(*-avoid-c-arrays)
+};
+/// Arrays of a step of several branches (condensed_branches.hpp), 8 numbers each.
+struct CondensedBranchArrays {
+  int count = 0;
+  const double* share = nullptr;    ///< one number each
+  const double* follow = nullptr;   ///< count x count, those that are followed inside
+  const double* drift = nullptr;    ///< per way of the contact
+  const double* pending = nullptr;  ///< modes
+  const double* spread = nullptr;   ///< a_j, p_j
+  double* lacks = nullptr;          ///< modes
+  double* moved = nullptr;          ///< modes
+  double* next = nullptr;           ///< spread at the end
+};
+/// What a step changes in the mean of the branches.
+struct alignas(32) CondensedAdvance {
+  // NOLINTBEGIN(*-avoid-c-arrays)
+  double speed[8] = {};  ///< modes of the velocity at the start
+  double mean[8] = {};   ///< modes of the change
+  double change[8] = {};
+  double spread_J = 0.0;  ///< at the end
+  // NOLINTEND(*-avoid-c-arrays)
+};
+/// @param velocity of the mean at the start
+/// @param way of the contact, m
+/// @param frame C: 00, 10, 11, 20, 21, 22
+void advance_condensed(const CondensedModeTables& modes, const CondensedBranchArrays& branches,
+                       const double* velocity, const double* way, const double* frame,
+                       CondensedAdvance& result) noexcept;
+
 /// Energy and force with the contact at u, whatever was remembered.
 struct CondensedValue {
   double energy_J = 0.0;

@@ -43,24 +43,8 @@ ServoWeights servo_weights(const BondSystem& bonds, double period_s) {
   return weights;
 }
 
-void require_servo_material(const BondSystem& bonds, std::string_view formulation) {
-  const auto refuse = [&](std::string_view takes, std::string_view has) {
-    refuse_material(formulation, takes, has);
-  };
-  if (!bonds.relaxes_alike()) {
-    refuse("bonds that relax by one function of time", "regions that relax differently");
-  }
-  for (std::size_t i = 0; i < bonds.first_contact(); ++i) {
-    const ViscousLaw& law = bonds.laws()[bonds.law_of(i)];
-    const bool relaxes = bonds.relaxing()[static_cast<Eigen::Index>(i)] > 0.0;
-    if (relaxes && !law.kernel.is_linear()) {
-      refuse("branches that are linear in elongation", "branches on a kernel");
-    }
-    for (const ViscousLaw::Spring& spring : law.springs) {
-      if (spring.function.shape != ElongationShape::sinh) continue;
-      refuse("linear and cubic potentials", "a potential of sinh");
-    }
-  }
+void require_servo_material(const BondSystem& bonds, std::string_view who) {
+  require_material(bonds, who, {&Capabilities::branches, &Capabilities::stiffening});
 }
 
 /// The cubic part of a bond's equilibrium force, N/m^3.

@@ -40,7 +40,7 @@ struct BalanceWork {
 /// Refuses what models at servo rate do not take. Throws Error(bad_input) that names the
 /// formulations that do, unless all bonds that relax do so by one function of time (any number of
 /// branches, linear in elongation) and potentials are linear or cubic.
-void require_servo_material(const BondSystem& bonds, std::string_view formulation);
+void require_servo_material(const BondSystem& bonds, std::string_view who);
 
 /// Bonds of a network in single precision, eight side by side, with their viscous elongations at
 /// the end of the next period if nothing moves apart from its own end. The vector from one end to

@@ -100,10 +100,6 @@ const ParameterResult& parameter_of(const FitResult& fit, const std::string& nam
   throw bad_input(fit.config.title, fmt::format("does not estimate '{}'", name));
 }
 
-TpmParameters fitted_element(const FitResult& fit) {
-  return element_parameters(fit.config, fit.best.natural, 0);
-}
-
 std::string estimate_words(const FitResult& fit) {
   std::vector<std::string> words;
   for (const ParameterResult& p : fit.parameters) {

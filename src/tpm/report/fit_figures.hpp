@@ -17,9 +17,6 @@ namespace tpm {
 /// "relative to datum"
 [[nodiscard]] std::string noise_words(NoiseKind noise);
 
-/// The model's parameters at the minimum of a fit.
-[[nodiscard]] TpmParameters fitted_element(const FitResult& fit);
-
 /// "E = 13.17 kPa, eta1 = 2.573e+05 Pa s, spacing = 1000 mm"
 [[nodiscard]] std::string estimate_words(const FitResult& fit);
 

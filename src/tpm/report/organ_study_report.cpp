@@ -22,11 +22,11 @@ std::string millimetres(double metres) {
   return fmt::format("{} mm", significant(1e3 * metres, 4));
 }
 
-std::string element_words(const TpmParameters& p) {
+std::string element_words(const TpmVector& p) {
   return fmt::format("E1 = {0} kPa, E2 = {1} kPa, E' = {2} kPa, eta1 = {3} kPa s, x = {4} mm",
-                     significant(1e-3 * p.E1_Pa, 4), significant(1e-3 * p.E2_Pa, 4),
-                     significant(1e-3 * p.Eprime_Pa, 4), significant(1e-3 * p.eta1_Pa_s, 4),
-                     significant(1e3 * p.spacing_m, 4));
+                     significant(1e-3 * p[kE1], 4), significant(1e-3 * p[kE2], 4),
+                     significant(1e-3 * p[kEprime], 4), significant(1e-3 * p[kEta1], 4),
+                     significant(1e3 * p[kSpacing], 4));
 }
 
 std::string percent(double share) {

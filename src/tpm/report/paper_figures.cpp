@@ -235,7 +235,7 @@ Figure spectrum_figure(const PaperFigureData& data) {
   Panel moduli{"(a) storage and loss modulus", x, {"modulus", "kPa", true, 1e-6, 100.0}, {}};
   Panel viscosity{"(b) complex viscosity", x, {"viscosity", "Pa s", true, 0.5, 5e6}, {}};
   const auto draw = [&](const TpmParameters& p, const std::string& label) {
-    const SpectrumResponse r = element_spectrum(p, frequency_Hz, Want::values);
+    const SpectrumResponse r = element_spectrum(to_vector(p), frequency_Hz, Want::values);
     moduli.series.push_back(line("storage, " + label, frequency_Hz, scaled(r.storage, 1e-3)));
     moduli.series.push_back(line("loss, " + label, frequency_Hz, scaled(r.loss, 1e-3)));
     viscosity.series.push_back(

@@ -36,7 +36,7 @@ std::vector<PrintedCreep> printed_creep(const ClaimSet& claims) {
 
 PaperFigureData figure_data(const FitResult& fit, const ClaimSet& claims) {
   PaperFigureData data;
-  data.fitted = fitted_element(fit);
+  data.fitted = from_vector(fitted_element(fit.config, fit.best.natural));
   data.fitted_as = estimate_words(fit);
   data.static_bands = load_points("evren_static");
   data.relaxation = load_points("evren_relaxation");

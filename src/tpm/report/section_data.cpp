@@ -51,25 +51,24 @@ Table readings(const PointSet& set) {
 
 struct ValidityCase {
   std::string name;
-  TpmParameters parameters;
-  double depth_m;
+  double spacing_m, depth_m;
 };
 
 /// Depths that the report's own computations reach.
 std::vector<ValidityCase> reached_depths(const PaperReport& report) {
-  const TpmParameters& paper = report.figure_data.paper;
+  const BondElement paper = report.figure_data.paper;
   double deepest = 0.0;
   for (const Datum& d : report.figure_data.relaxation.data) {
     deepest = std::max(deepest, d.depth_m.value_or(0.0));
   }
   std::vector<ValidityCase> cases{
-      {"relaxation, deepest, stated parameters", paper, deepest},
-      {"relaxation, deepest, fitted parameters", report.figure_data.fitted, deepest}};
+      {"relaxation, deepest, stated parameters", paper.spacing_m, deepest},
+      {"relaxation, deepest, fitted parameters", report.figure_data.fitted.spacing_m, deepest}};
   for (const PrintedCreep& creep : report.figure_data.printed_creep) {
-    cases.push_back({fmt::format("creep at {:.4g} N, λ₁(ε)", creep.load_N), paper,
-                     equilibrium_depth_m(paper, paper.relaxed_modulus_Pa(), creep.load_N)});
-    cases.push_back({fmt::format("creep at {:.4g} N, Eq. 18 as printed", creep.load_N), paper,
-                     creep.end_depth_m});
+    cases.push_back({fmt::format("creep at {:.4g} N, λ₁(ε)", creep.load_N), paper.spacing_m,
+                     equilibrium_depth_m(paper, paper.equilibrium_Pa, creep.load_N)});
+    cases.push_back({fmt::format("creep at {:.4g} N, Eq. 18 as printed", creep.load_N),
+                     paper.spacing_m, creep.end_depth_m});
   }
   return cases;
 }
@@ -98,7 +97,7 @@ void add_validity(Document& document, const PaperReport& report) {
       "its bonds turn by less than 30 degrees.");
   Table table{"", {{"case"}, {"depth", true}, {"limits passed"}}, {}};
   for (const ValidityCase& c : reached_depths(report)) {
-    const auto flags = validity_flags(c.parameters, c.depth_m);
+    const auto flags = validity_flags(c.spacing_m, c.depth_m);
     table.rows.push_back({{c.name},
                           {fmt::format("{:.2f} mm", c.depth_m * 1e3)},
                           {flags.empty() ? "none" : fmt::format("{}", fmt::join(flags, "; ")),
@@ -109,7 +108,7 @@ void add_validity(Document& document, const PaperReport& report) {
 
 void add_assumptions(Document& document, const PaperReport& report) {
   document.heading(2, "What is assumed");
-  const TpmParameters& p = report.figure_data.paper;
+  const BondElement p = report.figure_data.paper;
   std::vector<Cell> items{
       {fmt::format("The paper uses the displacement in mm as a strain and a force per area: the "
                    "reference length l0 = {:.4g} mm is implied, not stated, and A0 = {:.4g} mm² is "

@@ -54,13 +54,13 @@ Cell held_out_sentence(const FitStudy& study) {
 }
 
 std::vector<Cell> verdicts(const PaperReport& report) {
-  const TpmParameters& paper = report.figure_data.paper;
   std::vector<Cell> items{
       tables_sentence(report.tables),
       audit_sentence(report.audit),
       {fmt::format("The stated η₁ = {:.4g} Pa s gives a relaxation time of {:.3g} ms: no force "
                    "relaxes over 30 s, and no speed of 1 to 4 mm/s can matter.",
-                   paper.eta1_Pa_s, paper.relaxation_time_s() * 1e3),
+                   report.figure_data.paper.eta1_Pa_s,
+                   report.figure_data.paper.relaxation_time_s() * 1e3),
        Tone::bad}};
   for (const ParameterResult& p : report.fits.reference.parameters) {
     items.push_back({"Fit: " + p.words});

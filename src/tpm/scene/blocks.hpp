@@ -24,7 +24,7 @@ struct OrganBlock {
 /// What a block `material` leads to.
 struct MaterialBlock {
   MaterialField materials;
-  std::optional<TpmParameters> element;  ///< the paper's, where the block gives its constants
+  bool by_constants = false;  ///< the block gives those of the paper's element
 };
 [[nodiscard]] MaterialBlock parse_material(const Json& block, LateralBond lateral,
                                            const Organ& organ, const DocumentPlace& place);

@@ -6,6 +6,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpm/material/tpm_element.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/place_function.hpp"
 #include "tpm/solve/fractional_branches.hpp"
@@ -103,15 +104,16 @@ MaterialBlock parse_plain_material(const Json& block, LateralBond lateral, doubl
   MaterialBlock read;
   BondMaterial material;
   if (of_branches == nullptr) {
-    read.element = parse_element(block, spacing_m, place);
-    if (!block.contains("A0")) read.element->A0_m2 = usual.A0_m2;
-    if (!block.contains("l0")) read.element->l0_m = usual.l0_m;
-    material = BondMaterial::of(*read.element, lateral);
+    TpmParameters element = parse_element(block, spacing_m, place);
+    if (!block.contains("A0")) element.A0_m2 = usual.A0_m2;
+    if (!block.contains("l0")) element.l0_m = usual.l0_m;
+    material = element.bonds(lateral);
+    read.by_constants = true;
   } else {
     material.lateral = lateral;
     material.equilibrium_Pa = quantity_or(block, "Einf", Dimension::stress, 0.0, place);
     material.lateral_Pa =
-        quantity_or(block, "Eprime", Dimension::stress, TpmParameters{}.Eprime_Pa, place);
+        quantity_or(block, "Eprime", Dimension::stress, paper_element().lateral_Pa, place);
     material.A0_m2 = quantity_or(block, "A0", Dimension::area, usual.A0_m2, place);
     material.l0_m = quantity_or(block, "l0", Dimension::length, usual.l0_m, place);
     std::size_t index = 0;
@@ -126,10 +128,10 @@ MaterialBlock parse_plain_material(const Json& block, LateralBond lateral, doubl
   material.kernel = parse_function(block, "kernel", place);
   if (!material.potential.is_linear() || !material.kernel.is_linear() ||
       lateral == LateralBond::relaxing) {
-    read.element.reset();
+    read.by_constants = false;
   }
   require_valid(material, place.where);
-  if (!(material.instantaneous_Pa() > 0.0) && !read.element) {
+  if (!(material.instantaneous_Pa() > 0.0) && !read.by_constants) {
     throw bad_input(place.where, "has no modulus above 0", "Einf or a branch above 0");
   }
   read.materials = MaterialField(material);

@@ -217,7 +217,7 @@ Organ parse_block(const Json& block, const DocumentPlace& place) {
 }
 
 Organ parse_star(const Json& block, const DocumentPlace& place) {
-  const double spacing = length_at(block, "spacing", place).value_or(TpmParameters{}.spacing_m);
+  const double spacing = length_at(block, "spacing", place).value_or(BondElement{}.spacing_m);
   const double length = length_at(block, "length", place).value_or(0.020);
   return made(place, [&] { return star(spacing, length); });
 }
@@ -279,8 +279,7 @@ Eigen::Vector3d parse_point(const Json& list, const DocumentPlace& place) {
   Eigen::Vector3d point;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    point(i) = parse_quantity(list.at(at).get<std::string>(), Dimension::length,
-                              place.key(std::to_string(at)).where);
+    point(i) = quantity_of(list.at(at), Dimension::length, place.key(std::to_string(at)).where);
   }
   return point;
 }

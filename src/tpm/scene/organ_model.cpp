@@ -67,7 +67,8 @@ Derivatives derivatives_along(const Eigen::MatrixXd& change, const TpmParameters
 
 std::array<TangentDirection, kBasis> basis_directions(const Network& network,
                                                       const TpmParameters& p) {
-  const auto [E1, E2, Eprime] = material_directions(network, p);
+  const auto [E1, E2, Eprime] =
+      material_directions(network, p.E1_Pa, p.E2_Pa, p.modulus_to_stiffness_m());
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(E1.stiffness.size());
   // The relaxation time has a direction of its own.
   return {{{p.E2_Pa * E1.stiffness, p.E2_Pa * E1.relaxing, 0.0, 0.0},
@@ -94,7 +95,7 @@ Probe probe_of(const Tissue& tissue) {
 
 OrganModel::OrganModel(std::shared_ptr<const Tissue> tissue)
     : tissue_(std::move(tissue)),
-      element_(tissue_->paper_element && tissue_->materials.factor.size() == 0),
+      element_(tissue_->by_constants && tissue_->materials.factor.size() == 0),
       bonds_(tissue_->bonds()),
       freedom_(tissue_->freedom()),
       probe_(probe_of(*tissue_)) {
@@ -114,7 +115,7 @@ std::pair<double, double> OrganModel::range(std::size_t parameter) const {
 
 std::vector<double> OrganModel::own_values() const {
   if (element_) {
-    const TpmVector paper = to_vector(TpmParameters{});
+    const TpmVector paper = to_vector({});
     return {paper.begin(), paper.end()};
   }
   std::vector<double> values;
@@ -214,8 +215,7 @@ Response OrganModel::respond_by_element(const Protocol& protocol, std::span<cons
       options.directions.push_back(std::move(basis[static_cast<std::size_t>(i)]));
     }
   }
-  const BondSystem bonds =
-      bonds_.with_materials(network, BondMaterial::of(p, tissue_->materials.lateral()));
+  const BondSystem bonds = bonds_.with_materials(network, p.bonds(tissue_->materials.lateral()));
   const QuasiStaticRun run = QuasiStatic(bonds, network.organ.position, freedom_, probe_, options)
                                  .run(protocol.scaled(1.0 / similarity.of_imposed(drive)), times_s);
   const double factor = similarity.of_response(drive);

@@ -66,20 +66,20 @@ void read_guides(const Json& numbers, Tissue& tissue, const DocumentPlace& place
 
 }  // namespace
 
-const TpmParameters& Tissue::element(std::string_view user) const {
+bool Tissue::is_element() const {
+  return materials.materials.size() == 1 && materials.factor.size() == 0 &&
+         BondElement{materials.materials.front()}.has_one_branch();
+}
+
+BondElement Tissue::element(std::string_view user) const {
+  if (is_element()) return {materials.materials.front(), network.organ.spacing};
   const bool regions = materials.materials.size() > 1 || materials.factor.size() > 0;
-  if (paper_element && !regions) return *paper_element;
   throw bad_input(
       "material",
       fmt::format("{} takes the paper's element alone, and this material has {}", user,
                   regions ? "regions" : "laws of its own"),
       "E1, E2, Eprime and eta1, or a formulation that takes it: quasi_static, inertial, "
       "static");
-}
-
-void Tissue::set_element(const TpmParameters& element) {
-  paper_element = element;
-  materials.materials.front() = BondMaterial::of(element, materials.lateral());
 }
 
 Freedom Tissue::freedom() const {
@@ -108,7 +108,7 @@ Tissue parse_tissue(const Json& scene, std::string_view where,
   MaterialBlock read =
       parse_material(material, lateral, tissue.network.organ, place.key("material"));
   tissue.materials = std::move(read.materials);
-  tissue.paper_element = read.element;
+  tissue.by_constants = read.by_constants;
   read_anchors(anchors, tissue, place.key("anchors"));
   read_guides(guides, tissue, place.key("guides"));
   for (const char* key : kOtherBlocks) {

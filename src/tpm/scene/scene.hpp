@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/material/bond_element.hpp"
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/freedom.hpp"
 #include "tpm/network/network.hpp"
@@ -25,8 +26,9 @@ struct Tissue {
   bool star = false;   ///< the paper's element of four spheres
   Network network;
   MaterialField materials;
-  /// The paper's element, where the scene gives its constants; regions may vary it.
-  std::optional<TpmParameters> paper_element;
+  /// The first material is stated by the constants E1, E2 and eta1 of the paper's element: fits
+  /// address it by these names.
+  bool by_constants = false;
   std::vector<std::size_t> anchors;       ///< held spheres, rising, from 0
   std::vector<std::string> anchor_words;  ///< one entry per anchor block, for people
   std::vector<Guide> guides;
@@ -36,12 +38,11 @@ struct Tissue {
   [[nodiscard]] BondSystem bonds() const { return {network, materials}; }
   [[nodiscard]] Freedom freedom() const;
 
-  /// The paper's element everywhere, for what takes no other material. Throws Error(bad_input) for
-  /// a tissue of another material or with regions.
+  /// One material of one linear branch everywhere: the paper's element.
+  [[nodiscard]] bool is_element() const;
+  /// That element, for what takes no other material. Throws Error(bad_input) unless is_element().
   /// @param user in words, for the message: "the element"
-  [[nodiscard]] const TpmParameters& element(std::string_view user = "this formulation") const;
-  /// Puts the element in place of the first material; regions stay.
-  void set_element(const TpmParameters& element);
+  [[nodiscard]] BondElement element(std::string_view user = "this formulation") const;
 };
 
 /// Reads the blocks organ, bonds, material, anchors and guides of a scene

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tpm/network/material_refusal.hpp"
 #include "tpm/network/stiffness_blocks.hpp"
 
 namespace tpm {
@@ -114,6 +115,8 @@ void require_runnable(const ExperimentScene& scene) {
   const bool several =
       scene.contacts.size() > 1 || scene.contacts.front().kind == ContactKind::patch;
   needs(several, &Capabilities::several_contacts);
+  for (const MaterialNeed need : needs_of(scene.tissue.materials)) needs(true, need);
+  for (const MaterialNeed need : needs_of(scene.tissue.bonds())) needs(true, need);
 }
 
 Trajectory run_scene(const ExperimentScene& scene, const std::vector<double>& times_s,

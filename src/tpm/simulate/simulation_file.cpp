@@ -169,9 +169,10 @@ void write_validity(const Validity& validity, Hdf5Writer& file) {
 /// Of the outputs at which something has moved.
 void write_roughness(const ExperimentScene& scene, const SimulationRecord& record,
                      Hdf5Writer& file) {
+  const SmoothnessProbe probe(scene);
   std::vector<double> time, near, rim;
   for (const QuasiStaticState& state : record.outputs) {
-    const std::optional<Smoothness> found = smoothness_of(scene, state.position);
+    const std::optional<Smoothness> found = probe.at(state.position);
     if (!found) continue;
     time.push_back(state.time_s);
     near.push_back(found->near_contact);

@@ -2,22 +2,29 @@
 
 #include <algorithm>
 
-#include "tpm/network/roughness.hpp"
-
 namespace tpm {
 
-std::optional<Smoothness> smoothness_of(const ExperimentScene& scene, const Positions& position) {
-  const Network& network = scene.tissue.network;
-  const Eigen::Matrix3Xd moved =
-      position.leftCols(network.organ.position.cols()) - network.organ.position;
-  if (moved.isZero(0.0)) return std::nullopt;
-  const std::vector<std::size_t> near = spheres_around(network, scene.probe().sphere, kNearSteps);
+SmoothnessProbe::SmoothnessProbe(const ExperimentScene& scene)
+    : network_(scene.tissue.network),
+      neighbours_(lateral_neighbours(network_)),
+      near_(spheres_around(network_, scene.probe().sphere, kNearSteps)),
+      rim_(spheres_at_rim(network_, kRimAngle_rad)) {
   const Freedom freedom = scene.tissue.freedom();
-  std::vector<std::size_t> rim = spheres_at_rim(network, kRimAngle_rad);
-  std::erase_if(rim, [&](std::size_t i) { return !freedom.is_free(i); });
-  Smoothness found{roughness(network, moved, near), std::nullopt, near.size(), rim.size()};
-  if (!rim.empty()) found.at_rim = roughness(network, moved, rim);
+  std::erase_if(rim_, [&](std::size_t i) { return !freedom.is_free(i); });
+}
+
+std::optional<Smoothness> SmoothnessProbe::at(const Positions& position) const {
+  const Eigen::Matrix3Xd moved =
+      position.leftCols(network_.organ.position.cols()) - network_.organ.position;
+  if (moved.isZero(0.0)) return std::nullopt;
+  Smoothness found{roughness(network_, neighbours_, moved, near_), std::nullopt, near_.size(),
+                   rim_.size()};
+  if (!rim_.empty()) found.at_rim = roughness(network_, neighbours_, moved, rim_);
   return found;
+}
+
+std::optional<Smoothness> smoothness_of(const ExperimentScene& scene, const Positions& position) {
+  return SmoothnessProbe(scene).at(position);
 }
 
 }  // namespace tpm

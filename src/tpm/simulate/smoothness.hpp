@@ -1,6 +1,7 @@
 #pragma once
 #include <optional>
 
+#include "tpm/network/roughness.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 
 namespace tpm {
@@ -15,8 +16,22 @@ struct Smoothness {
 inline constexpr int kNearSteps = 2;
 inline constexpr double kRimAngle_rad = 0.43633231299858238;  ///< 25 degrees
 
-/// None if nothing has moved.
-/// @param position of the organ's spheres, m
+/// Finds the spheres to look at once, for the deformations of a run.
+class SmoothnessProbe {
+ public:
+  /// @param scene must live as long as this
+  explicit SmoothnessProbe(const ExperimentScene& scene);
+  /// None if nothing has moved.
+  /// @param position of the organ's spheres, m
+  [[nodiscard]] std::optional<Smoothness> at(const Positions& position) const;
+
+ private:
+  const Network& network_;
+  LateralNeighbours neighbours_;
+  std::vector<std::size_t> near_, rim_;
+};
+
+/// Of one deformation: SmoothnessProbe(scene).at(position).
 [[nodiscard]] std::optional<Smoothness> smoothness_of(const ExperimentScene& scene,
                                                       const Positions& position);
 

@@ -56,14 +56,14 @@ Expect of_theory(const LinearElement& linear, double step_s, double steps) {
   };
 }
 
-LinearElement under_depth(const TpmParameters& p) {
+LinearElement under_depth(const BondElement& p) {
   LinearElement e = linear_element(p, 0.0);
   e.depth_imposed = true;
   return e;
 }
 
-StabilityCorner depth_at_once(std::string name, const TpmParameters& p, double depth_m,
-                              double step_s, std::string expected) {
+StabilityCorner depth_at_once(std::string name, const BondElement& p, double depth_m, double step_s,
+                              std::string expected) {
   const Protocol protocol = step_and_hold(depth_m, kStudySteps * step_s);
   return tried(std::move(name),
                significant(1e3 * depth_m, 3) + " mm at once and held for 300 steps of " +
@@ -76,9 +76,10 @@ const char* const kByTheory =
     "forward Euler and RK4 diverge beyond 2 and 2.785 tau, midpoint and Newmark ring far above "
     "tau, all else holds";
 
+constexpr double kPaperSum_Pa = 24e3;  // E1 + E2
+
 void add_relaxation_times(std::vector<StabilityCorner>& corners) {
-  TpmParameters p;
-  p.eta1_Pa_s = 1e-9;
+  BondElement p = paper_element(1e-9 / kPaperSum_Pa);
   corners.push_back(
       depth_at_once("eta1 -> 0 (1e-9 Pa s)", p, kCornerDepth_m, kStep_s,
                     "explicit rules diverge, Adams too or is too much work, midpoint and Newmark "
@@ -90,13 +91,13 @@ void add_relaxation_times(std::vector<StabilityCorner>& corners) {
       cell.right = cell.verdict.found == cell.expected;
     }
   }
-  p.eta1_Pa_s = 1e15;
+  p = paper_element(1e15 / kPaperSum_Pa);
   corners.push_back(depth_at_once("eta1 -> infinity (1e15 Pa s)", p, kCornerDepth_m, kStep_s,
                                   "an elastic element: all hold"));
   for (const double ratio : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
-    StabilityCorner corner = depth_at_once("h/tau = " + significant(ratio, 2),
-                                           TpmParameters{}.with_relaxation_time(kStep_s / ratio),
-                                           kCornerDepth_m, kStep_s, kByTheory);
+    StabilityCorner corner =
+        depth_at_once("h/tau = " + significant(ratio, 2), paper_element(kStep_s / ratio),
+                      kCornerDepth_m, kStep_s, kByTheory);
     for (CornerCell& cell : corner.cells) {
       if (cell.rule != StepRule::cvode_adams || ratio < 1e4) continue;
       cell.expected = StabilityClass::too_much_work;
@@ -108,12 +109,12 @@ void add_relaxation_times(std::vector<StabilityCorner>& corners) {
 
 void add_moduli(std::vector<StabilityCorner>& corners) {
   constexpr double kTau_s = 0.02;
-  TpmParameters maxwell = TpmParameters{}.with_relaxation_time(kTau_s);
-  maxwell.E1_Pa = 0.0;
-  maxwell.eta1_Pa_s = kTau_s * maxwell.E2_Pa;
+  BondElement maxwell = paper_element(kTau_s);
+  maxwell.branches.front().modulus_Pa = maxwell.instantaneous_Pa();
+  maxwell.equilibrium_Pa = 0.0;
   corners.push_back(depth_at_once("E1 = 0, a depth", maxwell, kCornerDepth_m, kStep_s,
                                   "a Maxwell fluid: all hold, down to the tension"));
-  maxwell.Eprime_Pa = 0.0;
+  maxwell.lateral_Pa = 0.0;
   const double end = kStudySteps * kStep_s;
   JudgedProblem flow;
   constexpr double kLoad_N = 0.05;
@@ -123,7 +124,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
   for (int i = 0; i < kJudgedSteps; ++i) {
     const double t = flow.times_s[static_cast<std::size_t>(i)];
     flow.truth[i] =
-        kLoad_N / maxwell.modulus_to_stiffness_m() * (1.0 / maxwell.E2_Pa + t / maxwell.eta1_Pa_s);
+        kLoad_N / maxwell.modulus_to_stiffness_m() / maxwell.relaxing_Pa() * (1.0 + t / kTau_s);
   }
   flow.peak = flow.truth.maxCoeff();
   corners.push_back(tried("E1 = 0, a load", "0.05 N at once and held; no tension",
@@ -134,9 +135,8 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
                                        ? StabilityClass::wrong_steady_state
                                        : StabilityClass::holds;
                           }));
-  TpmParameters loose = TpmParameters{}.with_relaxation_time(kTau_s);
-  loose.E2_Pa = 0.0;
-  loose.eta1_Pa_s = kTau_s * loose.E1_Pa;
+  BondElement loose = paper_element(kTau_s);
+  loose.equilibrium_Pa = loose.branches.front().modulus_Pa = 0.0;
   corners.push_back(
       depth_at_once("E2 = 0, a depth", loose, kCornerDepth_m, kStep_s, "tension only: all hold"));
   corners.push_back(
@@ -146,7 +146,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
             judged_rest(loose, creep(0.05, end), kStep_s), kStep_s, [](StepRule rule) {
               return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::holds;
             }));
-  loose.Eprime_Pa = 0.0;
+  loose.lateral_Pa = 0.0;
   JudgedProblem nothing;
   nothing.times_s = last_steps(end, kStep_s, kJudgedSteps);
   nothing.truth.setZero(kJudgedSteps);
@@ -160,7 +160,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
 }
 
 void add_depths(std::vector<StabilityCorner>& corners) {
-  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
+  const BondElement p = paper_element(0.02);
   corners.push_back(depth_at_once(
       "beyond 12 mm", p, 0.015, kStep_s,
       "all hold: no rule fails at the depth where liver is damaged, results carry a flag"));
@@ -170,7 +170,7 @@ void add_depths(std::vector<StabilityCorner>& corners) {
 
 /// A star whose sphere B is guided onto its partner D, or free.
 struct CornerStar {
-  explicit CornerStar(const TpmParameters& p, bool guided)
+  explicit CornerStar(const BondElement& p, bool guided)
       : organ(star(p.spacing_m, 0.020)),
         network(join(organ, pairs(), {}, "star")),
         bonds(network, p),
@@ -198,7 +198,7 @@ struct CornerStar {
 
 /// The guided star under a rising depth: its bond to the partner is |L0 - depth| long, and its
 /// memory is the closed form in pieces of that, linear in time.
-double star_force_N(const TpmParameters& p, double rate, double time_s) {
+double star_force_N(const BondElement& p, double rate, double time_s) {
   constexpr double kLength_m = 0.020;
   const double tau = p.relaxation_time_s();
   const double depth = rate * time_s;
@@ -214,13 +214,12 @@ double star_force_N(const TpmParameters& p, double rate, double time_s) {
     y = b.r * y + b.w0 * before + b.w1 * l;
   }
   const double unit = p.modulus_to_stiffness_m();
-  const double pull = unit * (p.E2_Pa * l - p.relaxing_modulus_Pa() * y);
-  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
-  return unit * tension.value(depth) - (depth < kLength_m ? pull : -pull);
+  const double pull = unit * (p.instantaneous_Pa() * l - p.relaxing_Pa() * y);
+  return unit * p.tension().value(depth) - (depth < kLength_m ? pull : -pull);
 }
 
 /// What the straight path of a star answers in its last steps.
-void set_star_truth(const TpmParameters& p, double rate, double end_s, JudgedProblem& judged) {
+void set_star_truth(const BondElement& p, double rate, double end_s, JudgedProblem& judged) {
   judged.times_s = last_steps(end_s, kStep_s, kJudgedSteps);
   judged.truth.resize(kJudgedSteps);
   for (int i = 0; i < kJudgedSteps; ++i) {
@@ -231,7 +230,7 @@ void set_star_truth(const TpmParameters& p, double rate, double end_s, JudgedPro
 
 StabilityCorner pushed_star(std::string name, std::string setup, std::string expected,
                             double depth_m, const Expect& expect) {
-  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
+  const BondElement p = paper_element(0.02);
   const CornerStar star(p, true);
   const double end = kStudySteps * kStep_s;
   JudgedProblem judged;
@@ -257,7 +256,7 @@ void add_stars(std::vector<StabilityCorner>& corners) {
       "the law of the bond goes on with the other sign: fixed steps hold; a rule that controls its "
       "error sees the jump",
       0.02504, all_hold));
-  const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
+  const BondElement p = paper_element(0.02);
   const CornerStar star(p, false);
   const double end = kStudySteps * kStep_s;
   JudgedProblem judged;
@@ -274,8 +273,8 @@ void add_stars(std::vector<StabilityCorner>& corners) {
 }
 
 void add_masses(std::vector<StabilityCorner>& corners) {
-  TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
-  p.Eprime_Pa = 0.0;
+  BondElement p = paper_element(0.02);
+  p.lateral_Pa = 0.0;
   for (const double mass : {1e-9, 1e3}) {
     constexpr double kDrag_per_s = 20.0;
     LinearElement linear = linear_element(p, 0.0);

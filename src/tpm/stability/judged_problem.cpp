@@ -9,6 +9,13 @@
 
 namespace tpm {
 
+namespace {
+
+/// In place of the modulus of an element without springs, for the size of its forces.
+constexpr double kSoft_Pa = 12e3;
+
+}  // namespace
+
 StabilityVerdict JudgedProblem::judge(const MethodSettings& settings) const {
   return judge_run(problem->run(settings, times_s), truth, peak, moves);
 }
@@ -19,27 +26,26 @@ std::vector<double> last_steps(double end_s, double step_s, int count) {
   return times;
 }
 
-JudgedProblem judged_rest(const TpmParameters& p, const Protocol& protocol, double step_s) {
+JudgedProblem judged_rest(const BondElement& p, const Protocol& protocol, double step_s) {
   JudgedProblem judged;
   judged.times_s = last_steps(protocol.end_s(), step_s, kJudgedSteps);
   ModelOptions options;
-  if (p.Eprime_Pa == 0.0) options.tension = TensionRule::frozen(0.0);
+  if (p.lateral_Pa == 0.0) options.tension = TensionRule::frozen(0.0);
   const ClosedForm exact(options);
-  judged.truth = exact.respond(protocol, judged.times_s, to_vector(p), Want::values).value;
+  judged.truth = exact.respond(protocol, judged.times_s, element_constants(p), Want::values).value;
   // The peak of the whole protocol, not of the part that is judged.
   const double unit = p.modulus_to_stiffness_m();
-  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
   judged.peak = judged.truth.cwiseAbs().maxCoeff();
   if (protocol.drive() == Drive::displacement) {
-    judged.peak = unit * ((p.E2_Pa > 0.0 ? p.E2_Pa : p.E1_Pa) * protocol.peak() +
-                          tension.value(protocol.peak()));
+    const double at_once = p.instantaneous_Pa() > 0.0 ? p.instantaneous_Pa() : kSoft_Pa;
+    judged.peak = unit * (at_once * protocol.peak() + p.tension().value(protocol.peak()));
   }
   judged.problem = element_problem(p, protocol);
   return judged;
 }
 
-JudgedProblem judged_motion(const TpmParameters& p, double mass_kg, double drag_per_s,
-                            double load_N, double end_s, double step_s) {
+JudgedProblem judged_motion(const BondElement& p, double mass_kg, double drag_per_s, double load_N,
+                            double end_s, double step_s) {
   JudgedProblem judged;
   judged.moves = true;
   judged.times_s = last_steps(end_s, step_s, kJudgedSteps);
@@ -89,7 +95,7 @@ std::string study_organ_words() {
       shortest(kFarShare));
 }
 
-StudyOrgan::StudyOrgan(const TpmParameters& p, std::size_t spheres)
+StudyOrgan::StudyOrgan(const BondElement& p, std::size_t spheres)
     : network(small_liver(spheres)), bonds(network, p), driven(pushed(network, bonds)) {}
 
 }  // namespace tpm

@@ -29,11 +29,11 @@ inline constexpr int kJudgedSteps = 32;
 
 /// The element without mass; the closed form is the truth. With frozen tension (E' = 0) any
 /// history of loads, else constant ones.
-[[nodiscard]] JudgedProblem judged_rest(const TpmParameters& p, const Protocol& protocol,
+[[nodiscard]] JudgedProblem judged_rest(const BondElement& p, const Protocol& protocol,
                                         double step_s);
 
 /// The element with mass and E' = 0 under a constant load from rest.
-[[nodiscard]] JudgedProblem judged_motion(const TpmParameters& p, double mass_kg, double drag_per_s,
+[[nodiscard]] JudgedProblem judged_motion(const BondElement& p, double mass_kg, double drag_per_s,
                                           double load_N, double end_s, double step_s);
 
 /// kg, of a sphere of 10 mm radius and 1060 kg/m^3.
@@ -41,7 +41,7 @@ inline constexpr double kSphereMass_kg = 1060.0 * 4.0 / 3.0 * 3.14159265358979 *
 
 /// A liver of few spheres, two layers, its far side held.
 struct StudyOrgan {
-  StudyOrgan(const TpmParameters& p, std::size_t spheres);
+  StudyOrgan(const BondElement& p, std::size_t spheres);
   StudyOrgan(const StudyOrgan&) = delete;
   StudyOrgan& operator=(const StudyOrgan&) = delete;
 

@@ -52,10 +52,10 @@ constexpr double kRestSteps = 4000.0;
 constexpr double kMotionSteps = 400000.0;  // forward Euler's growth with drag is slow
 
 void add_rest_limits(std::vector<StabilityLimit>& limits) {
-  const TpmParameters paper;
-  const TpmParameters slow = TpmParameters{}.with_relaxation_time(0.1);
+  const BondElement paper = paper_element();
+  const BondElement slow = paper_element(0.1);
   constexpr double kLoad_N = 0.3;
-  const double depth = equilibrium_depth_m(slow, slow.relaxed_modulus_Pa(), kLoad_N);
+  const double depth = equilibrium_depth_m(slow, slow.equilibrium_Pa, kLoad_N);
   LinearElement imposed = linear_element(paper, 0.0);
   imposed.depth_imposed = true;
   for (const auto& [rule, factor] :
@@ -75,13 +75,13 @@ void add_rest_limits(std::vector<StabilityLimit>& limits) {
 }
 
 void add_motion_limits(std::vector<StabilityLimit>& limits) {
-  TpmParameters elastic = TpmParameters{}.with_relaxation_time(1e9);
-  elastic.Eprime_Pa = 0.0;
-  TpmParameters relaxing = TpmParameters{}.with_relaxation_time(0.01);
-  relaxing.Eprime_Pa = 0.0;
+  BondElement elastic = paper_element(1e9);
+  elastic.lateral_Pa = 0.0;
+  BondElement relaxing = paper_element(0.01);
+  relaxing.lateral_Pa = 0.0;
   struct Case {
     std::string problem;
-    const TpmParameters& p;
+    const BondElement& p;
     double drag;
     StepRule rule;
     std::string theory;
@@ -137,7 +137,7 @@ double highest_frequency(const DrivenNetwork& network, const Eigen::VectorXd& ma
 void add_organ_limits(std::vector<StabilityLimit>& limits) {
   constexpr std::size_t kSmall = 24;
   constexpr double kOrganSteps = 600.0;
-  const StudyOrgan rest(TpmParameters{}.with_relaxation_time(0.1), kSmall);
+  const StudyOrgan rest(paper_element(0.1), kSmall);
   for (const auto& [rule, factor, theory] :
        {std::tuple{StepRule::forward_euler, 2.0, "2 tau"},
         std::tuple{StepRule::rk4, 2.785293563405282, "2.785 tau"}}) {
@@ -150,7 +150,7 @@ void add_organ_limits(std::vector<StabilityLimit>& limits) {
               });
   }
   // So small a load that what grows is found before it is large enough to change its frequency.
-  const StudyOrgan elastic(TpmParameters{}.with_relaxation_time(1e9), 424);
+  const StudyOrgan elastic(paper_element(1e9), 424);
   const MethodMasses mass{sphere_masses_kg(elastic.network.organ), 0.0};
   const double omega = highest_frequency(elastic.driven, mass.mass_kg);
   for (const auto& [rule, factor, theory] :
@@ -217,14 +217,14 @@ std::vector<StabilityLimit> stability_limits() {
 }
 
 std::vector<ServoRow> stability_at_servo_rates() {
-  const TpmParameters paper;
+  const BondElement paper = paper_element();
   const Protocol protocol = ramp_and_hold(0.004, 0.004 / kServoRamp_s, kServoEnd_s - kServoRamp_s);
   std::vector<ServoRow> rows;
   const ClosedForm exact{ModelOptions{}};
   for (const double rate : servo_rates_Hz()) {
     const std::vector<double> times = ticks(rate);
     const Eigen::VectorXd truth =
-        exact.respond(protocol, times, to_vector(paper), Want::values).value;
+        exact.respond(protocol, times, element_constants(paper), Want::values).value;
     const auto element = element_problem(paper, as_sampled(protocol, times));
     rows.push_back(servo_row("element", *element, truth, times, rate));
   }

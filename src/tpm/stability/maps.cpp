@@ -38,19 +38,18 @@ MapPlan over_relaxation_time(int along) {
           decades(along, 1e-4, 1e2),
           decades(along, 1e-5, 1e3),
           [](double tau, double h) {
-            return judged_rest(TpmParameters{}.with_relaxation_time(tau),
-                               step_and_hold(kDepth_m, kStudySteps * h), h);
+            return judged_rest(paper_element(tau), step_and_hold(kDepth_m, kStudySteps * h), h);
           },
           [](double tau) {
-            LinearElement e = linear_element(TpmParameters{}.with_relaxation_time(tau), 0.0);
+            LinearElement e = linear_element(paper_element(tau), 0.0);
             e.depth_imposed = true;
             return e;
           }};
 }
 
-TpmParameters without_tension(double tau_s) {
-  TpmParameters p = TpmParameters{}.with_relaxation_time(tau_s);
-  p.Eprime_Pa = 0.0;
+BondElement without_tension(double tau_s) {
+  BondElement p = paper_element(tau_s);
+  p.lateral_Pa = 0.0;
   return p;
 }
 
@@ -74,9 +73,8 @@ MapPlan over_load_rate(int along) {
 
 MapPlan over_depth(int along) {
   const auto load = [](double depth) {
-    const TpmParameters p = TpmParameters{}.with_relaxation_time(kTau_s);
-    const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
-    return p.modulus_to_stiffness_m() * (p.relaxed_modulus_Pa() * depth + tension.value(depth));
+    const BondElement p = paper_element(kTau_s);
+    return p.modulus_to_stiffness_m() * (p.equilibrium_Pa * depth + p.tension().value(depth));
   };
   return {"depth",
           "depth in the end",
@@ -85,18 +83,15 @@ MapPlan over_depth(int along) {
           decades(along, 1e-3, 4e-2),
           decades(along, 1e-3, 1e3),
           [load](double depth, double h) {
-            return judged_rest(TpmParameters{}.with_relaxation_time(kTau_s),
-                               creep(load(depth), kStudySteps * h), h);
+            return judged_rest(paper_element(kTau_s), creep(load(depth), kStudySteps * h), h);
           },
-          [](double depth) {
-            return linear_element(TpmParameters{}.with_relaxation_time(kTau_s), depth);
-          }};
+          [](double depth) { return linear_element(paper_element(kTau_s), depth); }};
 }
 
 /// A sphere of an element without tension, under a load that leads to 4 mm.
 MapPlan in_motion(std::string id, std::string quantity, std::string unit, std::string problem,
                   std::vector<double> x, std::function<LinearElement(double)> linear,
-                  std::function<TpmParameters(double)> material) {
+                  std::function<BondElement(double)> material) {
   std::vector<double> steps = decades(static_cast<int>(x.size()), 1e-6, 1e2);
   MapPlan plan{std::move(id),
                std::move(quantity),
@@ -114,7 +109,7 @@ MapPlan in_motion(std::string id, std::string quantity, std::string unit, std::s
   return plan;
 }
 
-LinearElement sphere(const TpmParameters& p, double mass_kg, double drag_per_s) {
+LinearElement sphere(const BondElement& p, double mass_kg, double drag_per_s) {
   LinearElement e = linear_element(p, 0.0);
   e.mass_kg = mass_kg;
   e.drag_per_s = drag_per_s;
@@ -123,9 +118,8 @@ LinearElement sphere(const TpmParameters& p, double mass_kg, double drag_per_s) 
 
 MapPlan over_stiffness(int along) {
   const auto material = [](double modulus) {
-    TpmParameters p = without_tension(kTau_s);
-    p.E1_Pa = p.E2_Pa = modulus;
-    p.eta1_Pa_s = kTau_s * 2.0 * modulus;
+    BondElement p = without_tension(kTau_s);
+    p.equilibrium_Pa = p.branches.front().modulus_Pa = 0.5 * modulus;
     return p;
   };
   return in_motion(

@@ -52,12 +52,11 @@ bool is_stable(StepRule rule, const LinearElement& e, double h) {
 
 }  // namespace
 
-LinearElement linear_element(const TpmParameters& p, double depth_m) {
+LinearElement linear_element(const BondElement& p, double depth_m) {
   const double unit = p.modulus_to_stiffness_m();
-  const TensionLaw tension{p.Eprime_Pa, p.spacing_m};
   LinearElement e;
-  e.stiffness_N_per_m = unit * (p.E2_Pa + tension.slope(depth_m));
-  e.relaxing_N_per_m = unit * p.relaxing_modulus_Pa();
+  e.stiffness_N_per_m = unit * (p.instantaneous_Pa() + p.tension().slope(depth_m));
+  e.relaxing_N_per_m = unit * p.relaxing_Pa();
   e.relaxation_time_s = p.relaxation_time_s();
   return e;
 }

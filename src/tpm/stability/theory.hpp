@@ -3,7 +3,6 @@
 #include <optional>
 #include <span>
 
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/method/method.hpp"
 
 namespace tpm {
@@ -19,7 +18,7 @@ struct LinearElement {
 };
 
 /// @param depth_m at which the tension is taken linear
-[[nodiscard]] LinearElement linear_element(const TpmParameters& p, double depth_m);
+[[nodiscard]] LinearElement linear_element(const BondElement& p, double depth_m);
 
 /// The longest step at which no part of a step's amplification matrix is larger than 1 (explicit
 /// rules: of their stability polynomial at the eigenvalues of the motion), found by bisection on

@@ -14,10 +14,14 @@ DocumentPlace DocumentPlace::key(std::string_view name) const {
                                                     : fmt::format("{}/{}", where, name)};
 }
 
+double quantity_of(const Json& value, Dimension dimension, std::string_view where) {
+  return value.is_number() ? value.get<double>()
+                           : parse_quantity(value.get<std::string>(), dimension, where);
+}
+
 double quantity_at(const Json& object, std::string_view key, Dimension dimension,
                    const DocumentPlace& place) {
-  return parse_quantity(object.at(std::string(key)).get<std::string>(), dimension,
-                        place.key(key).where);
+  return quantity_of(object.at(std::string(key)), dimension, place.key(key).where);
 }
 
 double positive_at(const Json& object, std::string_view key, Dimension dimension,

@@ -14,8 +14,11 @@ struct DocumentPlace {
   [[nodiscard]] DocumentPlace key(std::string_view name) const;
 };
 
-/// The value with its unit that stands under a key, SI. Throws Error(bad_input) with the key.
-/// @param object of which the schema has said that the key stands for a text
+/// A text of a number and a unit, SI; or a number, which is SI already: schemas let files say texts
+/// alone, programs put numbers there. Throws Error(bad_input).
+[[nodiscard]] double quantity_of(const Json& value, Dimension dimension, std::string_view where);
+
+/// The same of what stands under a key. Throws Error(bad_input) with the key.
 [[nodiscard]] double quantity_at(const Json& object, std::string_view key, Dimension dimension,
                                  const DocumentPlace& place);
 /// The same; throws too unless it is above 0.

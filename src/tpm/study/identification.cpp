@@ -60,14 +60,20 @@ class HoldWatch {
   double first_ = 0.0, deepest_ = 0.0, held_ = 0.0, since_s_ = 0.0, now_s_ = 0.0;
 };
 
+/// Intervals hold only where contact and offset are off their bounds.
+bool any_at_bound(const SequentialEstimate& estimate) {
+  return std::any_of(estimate.parameters.begin(), estimate.parameters.end(),
+                     [](const SequentialParameter& p) { return p.at_bound; });
+}
+
 /// Watches the widths and says when to stop.
 class StoppingRule {
  public:
   explicit StoppingRule(const IdentifyOptions& options) : options_(options) {}
 
   bool stops_at(const IdentifiedSample& sample, const HoldWatch& hold) {
-    const bool narrow =
-        hold.holds() && sample.estimate.widest_relative_half_width() <= options_.target;
+    const bool narrow = hold.holds() && !any_at_bound(sample.estimate) &&
+                        sample.estimate.widest_relative_half_width() <= options_.target;
     const auto n = static_cast<double>(sample.estimate.samples);
     if (!was_narrow_ || law_ != sample.law) since_ = n;
     was_narrow_ = narrow;

@@ -17,7 +17,7 @@ struct IdentifyOptions {
   double target = 0.1;
   /// And stays so, with the same law, until there are this many times as many samples: a width that
   /// is small by chance comes together with an estimate that is off, and does not last.
-  double patience = 1.1;
+  double patience = 1.3;
   double margin = 3.0;              ///< of BIC, as in select_law
   std::optional<double> reference;  ///< planned depth; none: the recording's
   std::uint64_t seed = 0;
@@ -57,7 +57,8 @@ struct Identification {
 /// told from a relaxing one by nothing. It looks at widths, never at estimates or at how well they
 /// fit. A fixed-sample interval at the first time its own estimated width is small enough would
 /// hold the truth too rarely (Chow & Robbins, Ann. Math. Stat. 36 (1965) 457: only in the limit of
-/// narrow widths); `patience` takes most of that away, and how much remains is to be counted.
+/// narrow widths); `patience` takes most of that away (reports/chain/coverage.md counts the rest).
+/// While contact or offset stands on a bound the intervals hold only there, and it waits.
 /// Throws Error(bad_input) for options out of range or a recording without a ramp.
 [[nodiscard]] Identification identify(const PreparedRecording& recording,
                                       const IdentifyOptions& options);

@@ -76,10 +76,8 @@ void answer_creep(const Model& model, const StudyCondition& c, const TpmVector& 
   answer_in_time(model, creep(c.load_N, c.duration_s), parameters, "at once", 0, curve);
 }
 
-StudyCurve answer(const Model& model, const StudyCondition& condition,
-                  const TpmParameters& parameters) {
+StudyCurve answer(const Model& model, const StudyCondition& condition, const TpmVector& values) {
   StudyCurve curve;
-  const TpmVector values = to_vector(parameters);
   try {
     switch (condition.kind) {
       case Kind::ramp_hold:
@@ -135,7 +133,7 @@ std::vector<StudyFit> with_materials(const OrganStudyConfig& config) {
   return fits;
 }
 
-TpmParameters parameters_of(const OrganStudy& study, const StudyMaterial& material) {
+TpmVector parameters_of(const OrganStudy& study, const StudyMaterial& material) {
   const TissueFit& made = study.fit(material.fit, 0);
   if (!made.result) {
     throw Error(ExitCode::numerical, fmt::format("material '{}'", material.name),
@@ -148,7 +146,7 @@ TpmParameters parameters_of(const OrganStudy& study, const StudyMaterial& materi
       natural = h.minimum.natural;
     }
   }
-  return element_parameters(fit.config, natural, 0);
+  return fitted_element(fit.config, natural);
 }
 
 /// Of every experiment that is fitted alone.
@@ -172,7 +170,7 @@ StudyCurves own_curves(const OrganStudy& study) {
       } else if (const TissueFit& made = study.fit(*own, t); made.result) {
         const FitResult& fit = *made.result;
         set.curves.push_back(
-            study_curve(study.config, c, t, element_parameters(fit.config, fit.best.natural, 0)));
+            study_curve(study.config, c, t, fitted_element(fit.config, fit.best.natural)));
       } else {
         set.curves.push_back({t, c, {}, {}, {}, made.failure});
       }
@@ -197,7 +195,7 @@ const StudyCurve& StudyCurves::at(std::size_t condition, std::size_t tissue) con
 }
 
 StudyCurve study_curve(const OrganStudyConfig& config, std::size_t condition, std::size_t tissue,
-                       const TpmParameters& parameters) {
+                       const TpmVector& parameters) {
   const auto model = make_model(config.fits.front().configs.at(tissue));
   StudyCurve curve = answer(*model, config.conditions.at(condition), parameters);
   curve.condition = condition;
@@ -206,7 +204,7 @@ StudyCurve study_curve(const OrganStudyConfig& config, std::size_t condition, st
 }
 
 StudyCurves curves_at(const OrganStudyConfig& config, const std::string& name,
-                      const TpmParameters& parameters) {
+                      const TpmVector& parameters) {
   StudyCurves set{name, parameters, {}};
   for (std::size_t c = 0; c < config.conditions.size(); ++c) {
     const std::size_t first = set.curves.size();

@@ -79,7 +79,7 @@ struct StudyCurve {
 struct StudyCurves {
   std::string material;  ///< name of the StudyMaterial; "own fit"
   /// Of StudyMaterial; none where every tissue has its own.
-  std::optional<TpmParameters> parameters;
+  std::optional<TpmVector> parameters;
   std::vector<StudyCurve> curves;  ///< conditions outermost, tissues in their order
 
   /// Throws std::out_of_range if there is none.
@@ -117,11 +117,11 @@ struct OrganStudy {
 
 /// The answers of all tissues to all conditions at one material. No FitResult is needed.
 [[nodiscard]] StudyCurves curves_at(const OrganStudyConfig& config, const std::string& name,
-                                    const TpmParameters& parameters);
+                                    const TpmVector& parameters);
 
 /// One answer: the curve, and its readings without `against_first`.
 [[nodiscard]] StudyCurve study_curve(const OrganStudyConfig& config, std::size_t condition,
-                                     std::size_t tissue, const TpmParameters& parameters);
+                                     std::size_t tissue, const TpmVector& parameters);
 
 /// Machine-readable, keys in docs/organ_experiments.md; 5 significant digits, which is what the
 /// organ's runs and searches are good for.

@@ -15,14 +15,14 @@ double number(double value) {
   return rounded(value, kStudyDigits);
 }
 
-Json parameters_json(const TpmParameters& p) {
-  return {{"E1_Pa", number(p.E1_Pa)},
-          {"E2_Pa", number(p.E2_Pa)},
-          {"Eprime_Pa", number(p.Eprime_Pa)},
-          {"eta1_Pa_s", number(p.eta1_Pa_s)},
-          {"spacing_m", number(p.spacing_m)},
-          {"A0_m2", number(p.A0_m2)},
-          {"l0_m", number(p.l0_m)}};
+Json parameters_json(const TpmVector& p) {
+  return {{"E1_Pa", number(p[kE1])},
+          {"E2_Pa", number(p[kE2])},
+          {"Eprime_Pa", number(p[kEprime])},
+          {"eta1_Pa_s", number(p[kEta1])},
+          {"spacing_m", number(p[kSpacing])},
+          {"A0_m2", number(p[kA0])},
+          {"l0_m", number(p[kL0])}};
 }
 
 Json materials_json(const OrganStudy& study) {

@@ -128,6 +128,10 @@ struct SequentialFit::Linearisation {
   std::optional<AutoregressionEstimate> correlation;
   std::size_t samples_then = 0;  ///< when `correlation` was found
 
+  /// Where the linear model has its least squares as seen from the point, when the point was the
+  /// minimum; of `free`. 0 unless the deviance has a corner there: contact passes a sample.
+  Eigen::VectorXd away_then;
+
   // Of the whitened rows: residual = reading less answer, by theta.
   Eigen::MatrixXd gram;
   Eigen::VectorXd right;
@@ -196,6 +200,15 @@ struct SequentialFit::Linearisation {
     const Eigen::MatrixXd full = gram.selfadjointView<Eigen::Lower>();
     return full(free, free);
   }
+
+  /// Call when all samples have been taken that the point is the minimum of.
+  void keep_as_minimum() {
+    samples_then = samples;
+    away_then = Eigen::VectorXd::Zero(std::ssize(free));
+    const Eigen::MatrixXd gram_now = free_gram();
+    if (free.empty() || !tells_apart(gram_now)) return;
+    away_then = gram_now.llt().solve(right(free));
+  }
 };
 
 double SequentialParameter::relative_half_width() const {
@@ -237,6 +250,11 @@ std::optional<SequentialFit::Prefix> SequentialFit::prefix() const {
   setup.profiles = false;
   try {
     PreparedRecording prepared = prepare_recording("what was recorded so far", recording_);
+    // Where contact seems to be depends on the noise. To fix it there would take an estimate for
+    // known, with intervals of the stiffnesses that are too narrow.
+    if (spec_.drive != Quantity::strain && !prepared.phases.preloaded) {
+      setup.nuisance = Nuisance::offset_and_contact;
+    }
     FitConfig config = recording_config(spec_, std::span(&prepared, 1), setup);
     return Prefix{std::move(prepared), std::move(config)};
   } catch (const Error& error) {  // no ramp yet
@@ -393,7 +411,7 @@ void SequentialFit::pass_through_history() {
   for (std::size_t i = 0; i < n; ++i) {
     here->take(recording_.time_s[i], recording_.drive[i], recording_.response[i]);
   }
-  here->samples_then = here->samples;
+  here->keep_as_minimum();
   here_ = std::move(here);
   describe();
 }
@@ -402,12 +420,14 @@ namespace {
 
 void set_sequential_interval(SequentialParameter& s, double theta, double standard_error,
                              double degrees, double level) {
+  // In long double, which Boost would take, a quantile costs more than the rest of a sample.
+  using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+  const boost::math::students_t_distribution<double, InDouble> t(degrees);
   theta = std::clamp(theta, s.parameter.theta_lower(), s.parameter.theta_upper());
   s.estimate = s.parameter.natural(theta);
   s.standard_error = standard_error;
   s.degrees_of_freedom = degrees;
-  const double half =
-      standard_error * boost::math::quantile(boost::math::students_t(degrees), 0.5 + 0.5 * level);
+  const double half = standard_error * boost::math::quantile(t, 0.5 + 0.5 * level);
   s.lower = s.parameter.natural(theta - half);
   s.upper = s.parameter.natural(theta + half);
 }
@@ -431,9 +451,9 @@ void SequentialFit::describe() {
   if (told) {
     const Eigen::LLT<Eigen::MatrixXd> normal(gram);
     const Eigen::VectorXd right = l.right(l.free);
-    moved = normal.solve(right);
+    moved = normal.solve(right) - l.away_then;
     inverse = normal.solve(Eigen::MatrixXd::Identity(p, p));
-    squares = std::max(squares - right.dot(moved), 0.0);
+    squares = std::max(squares - 2.0 * right.dot(moved) + moved.dot(gram * moved), 0.0);
   }
   const double variance = squares / static_cast<double>(n - p);
   e.sigma = std::sqrt(variance);

@@ -92,7 +92,8 @@ class SweepModel {
                                                                      std::string_view where);
 
 /// The quasi-static network of a scene (block `scene`, which may not be a file's name any more, and
-/// outputs). Parameters are JSON pointers to numbers in the scene.
+/// outputs). Parameters are JSON pointers to numbers in the scene, and those of its
+/// first material by name: material.tau2.
 /// @param folder that a mesh in the scene is relative to
 [[nodiscard]] std::shared_ptr<const SweepModel> organ_sweep_model(
     const Json& document, std::string_view where, const std::filesystem::path& folder);

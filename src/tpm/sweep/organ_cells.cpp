@@ -12,9 +12,9 @@
 #include "tpm/model/model.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/shared_plan.hpp"
-#include "tpm/protocol/protocol_block.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
+#include "tpm/sweep/scene_field.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
 
 namespace tpm {
@@ -22,17 +22,10 @@ namespace {
 
 using Kind = SweepOutput::Kind;
 
-/// A key of a scene that a sweep changes.
-struct SceneKey {
-  Json::json_pointer pointer;
-  Dimension dimension = Dimension::dimensionless;
-  bool quantity = false;  ///< a text with a unit
-  bool whole = false;     ///< a whole number
-};
-
 /// What a sweep's document says of the organ.
 struct OrganSetup {
   Json scene;
+  BondMaterial material;   ///< the scene's first
   ProtocolBlock protocol;  ///< of the scene
   std::filesystem::path folder;
   bool by_depth = true;
@@ -45,56 +38,6 @@ constexpr double kLeastOfSweep = 1e-6, kMostOfSweep = 0.5;
 constexpr double kLeastTolerance = 1e-12;  // of QuasiStaticOptions
 
 enum OrganCount : std::size_t { kSteps, kIterations, kFactorisations, kBackSolves, kOrganCounts };
-
-SceneKey find_key(const Json& scene, const std::string& target, std::string_view where) {
-  const auto refused = [&](const char* what) {
-    return bad_input(where, fmt::format("'{}' {}", printable(target), what),
-                     "a JSON pointer to a number of the scene, such as /material/E1");
-  };
-  SceneKey key;
-  try {
-    key.pointer = Json::json_pointer(target);
-    const Json& value = scene.at(key.pointer);
-    key.quantity = value.is_string();
-    key.whole = value.is_number_integer();
-    if (!key.quantity && !value.is_number()) throw refused("is no number");
-    if (!key.quantity) return key;
-    const auto text = value.get<std::string>();
-    const std::size_t space = text.find(' ');
-    if (space == std::string::npos || !find_number(text.substr(0, space))) {
-      throw refused("is no number");
-    }
-    key.dimension = parse_unit(std::string_view(text).substr(space + 1), where).dimension;
-    return key;
-  } catch (const Json::exception&) {
-    throw refused("is not in the scene");
-  }
-}
-
-void put_value(Json& scene, const SceneKey& key, double value, const std::string& target) {
-  if (key.quantity) {
-    scene.at(key.pointer) = fmt::format("{} {}", shortest(value), si_symbol(key.dimension));
-  } else if (!key.whole) {
-    scene.at(key.pointer) = value;
-  } else if (value == std::round(value) && std::abs(value) < 1e15) {
-    scene.at(key.pointer) = static_cast<std::int64_t>(value);
-  } else {
-    throw bad_input(target, shortest(value), "a whole number");
-  }
-}
-
-/// Sets the number of a protocol that a JSON pointer into the scene names; leaves others alone.
-void set_number(ProtocolBlock& protocol, const std::string& target, double value) {
-  constexpr std::string_view kProtocol = "/protocol/", kKnots = "/protocol/knots/";
-  if (target.starts_with(kKnots)) {
-    const std::string rest = target.substr(kKnots.size());
-    const std::size_t slash = rest.find('/');
-    Knot& knot = protocol.knots.at(std::stoul(rest.substr(0, slash)));
-    (rest.substr(slash + 1) == "time" ? knot.time_s : knot.value) = value;
-  } else if (target.starts_with(kProtocol)) {
-    *protocol.find(target.substr(kProtocol.size())) = value;
-  }
-}
 
 /// Times, rising and each once, and where the outputs find theirs.
 class AskedTimes {
@@ -136,20 +79,6 @@ std::vector<std::string> names_of_models(double tolerance) {
   return names;
 }
 
-bool is_of_protocol(const std::string& target) {
-  return target.starts_with("/protocol/");
-}
-
-bool is_light(const std::string& target) {
-  return target.starts_with("/material/") || is_of_protocol(target) ||
-         target.starts_with("/integrator/") || target == "/tolerance";
-}
-
-/// What a shared plan answers to without being made anew.
-bool is_shared(const std::string& target) {
-  return is_of_protocol(target) || target == "/material/eta1";
-}
-
 /// Whether a grid of claims for the cells that share organ and moduli costs less than running them.
 struct SharedCost {
   double cells = 1.0;  ///< that share them
@@ -167,6 +96,7 @@ SceneRange range_in_scene(const Json& scene, const std::string& target,
   for (const SweptTarget& s : swept) {
     if (s.target == target) return {s.least, s.largest};
   }
+  if (!target.starts_with('/')) return {};
   const Json::json_pointer pointer(target);
   if (!scene.contains(pointer)) return {};
   const auto text = scene.at(pointer).get<std::string>();
@@ -175,8 +105,11 @@ SceneRange range_in_scene(const Json& scene, const std::string& target,
   return {value, value};
 }
 
-SharedCost cost_of_sharing(const Json& scene, const std::vector<SweptTarget>& swept) {
+SharedCost cost_of_sharing(const OrganSetup& setup, const std::vector<SweptTarget>& swept) {
   SharedCost cost;
+  const auto is_shared = [&](const std::string& target) {
+    return SceneField(setup.scene, setup.material, target, "sweep").is_shared();
+  };
   for (const SweptTarget& s : swept) {
     const bool counted = std::any_of(swept.begin(), swept.end(), [&](const SweptTarget& other) {
       return other.axis == s.axis && (!is_shared(other.target) || &other < &s);
@@ -184,12 +117,12 @@ SharedCost cost_of_sharing(const Json& scene, const std::vector<SweptTarget>& sw
     if (!counted) cost.cells *= static_cast<double>(s.places);
   }
   const auto ratio = [&](const char* target) {
-    const SceneRange r = range_in_scene(scene, target, swept);
+    const SceneRange r = range_in_scene(setup.scene, target, swept);
     return r.least > 0.0 ? r.largest / r.least : 1.0;
   };
   const double depths = ratio("/protocol/depth");
-  cost.runs =
-      SharedPlan::cost_in_runs(depths, depths * ratio("/protocol/rate") * ratio("/material/eta1"));
+  const double lengths = ratio("/protocol/rate") * ratio("/material/eta1") * ratio("material.tau1");
+  cost.runs = SharedPlan::cost_in_runs(depths, depths * lengths);
   return cost;
 }
 
@@ -229,18 +162,15 @@ class OrganCell final : public CellModel {
         throw bad_input("sweep", "sweeps /tolerance and states a tolerance of its own",
                         "one of the two");
       }
-      targets_.push_back(s.target);
-      keys_.push_back(find_key(setup.scene, s.target, "sweep"));
+      fields_.emplace_back(setup.scene, setup.material, s.target, "sweep");
     }
-    if (setup.tolerance && !cost_of_sharing(setup.scene, swept).pays()) plans_ = nullptr;
+    if (setup.tolerance && !cost_of_sharing(setup, swept).pays()) plans_ = nullptr;
   }
 
   CellAnswer run(std::span<const double> swept, std::span<double> values,
                  std::span<std::int64_t> counts) override {
     Json changed = setup_.scene;
-    for (std::size_t i = 0; i < swept.size(); ++i) {
-      if (!is_of_protocol(targets_[i])) put_value(changed, keys_[i], swept[i], targets_[i]);
-    }
+    for (std::size_t i = 0; i < swept.size(); ++i) fields_[i].set(changed, swept[i]);
     std::string structure;
     const ExperimentScene scene = scene_of(swept, changed, structure);
     const AskedTimes times(scene.protocol, setup_.outputs);
@@ -255,15 +185,10 @@ class OrganCell final : public CellModel {
   std::optional<CellAnswer> on_reduced(const ExperimentScene& scene, const std::string& structure,
                                        const AskedTimes& times, std::span<double> values,
                                        std::span<std::int64_t> counts) {
-    // Regions are no part of the key.
-    const MaterialField& field = scene.tissue.materials;
-    if (!scene.tissue.paper_element || field.materials.size() > 1 || field.factor.size() > 0) {
-      return {};
-    }
-    const TpmParameters& p = *scene.tissue.paper_element;
-    if (!(p.relaxation_time_s() > 0.0) || !std::isfinite(p.relaxation_time_s())) return {};
-    const std::string key =
-        fmt::format("{} {} {} {} {} {}", structure, p.E1_Pa, p.E2_Pa, p.Eprime_Pa, p.A0_m2, p.l0_m);
+    if (!scene.tissue.is_element()) return {};  // regions are no part of the key
+    const BondElement p = scene.tissue.element();
+    const std::string key = fmt::format("{} {} {} {} {} {}", structure, p.equilibrium_Pa,
+                                        p.relaxing_Pa(), p.lateral_Pa, p.A0_m2, p.l0_m);
     if (plan_ == nullptr || key != plan_key_) {
       plan_ = plans_->of(key, scene);
       plan_key_ = key;
@@ -341,7 +266,7 @@ class OrganCell final : public CellModel {
   ExperimentScene scene_of(std::span<const double> swept, const Json& changed, std::string& key) {
     Json structure = setup_.scene;
     for (std::size_t i = 0; i < swept.size(); ++i) {
-      if (!is_light(targets_[i])) put_value(structure, keys_[i], swept[i], targets_[i]);
+      if (!fields_[i].is_light()) fields_[i].set(structure, swept[i]);
     }
     structure.erase("integrator");
     key = structure.dump();
@@ -351,9 +276,12 @@ class OrganCell final : public CellModel {
         parse_material(changed.value("material", Json::object()), scene.tissue.materials.lateral(),
                        scene.tissue.network.organ, place.key("material"));
     scene.tissue.materials = std::move(material.materials);
-    scene.tissue.paper_element = material.element;
+    scene.tissue.by_constants = material.by_constants;
     ProtocolBlock protocol = setup_.protocol;
-    for (std::size_t i = 0; i < swept.size(); ++i) set_number(protocol, targets_[i], swept[i]);
+    for (std::size_t i = 0; i < swept.size(); ++i) {
+      fields_[i].set(scene.tissue.materials.materials.front(), swept[i]);
+      fields_[i].set(protocol, swept[i]);
+    }
     scene.protocol = protocol.protocol(place.key("protocol"));
     require_possible(scene.protocol, scene.contacts, scene.tissue, place.key("protocol"));
     return scene;
@@ -407,8 +335,7 @@ class OrganCell final : public CellModel {
   SharedPlans* plans_;
   std::shared_ptr<SharedPlan> plan_;
   std::string plan_key_;
-  std::vector<std::string> targets_;
-  std::vector<SceneKey> keys_;
+  std::vector<SceneField> fields_;
   /// By their structure, the last used first.
   std::vector<std::pair<std::string, ExperimentScene>> bases_;
 };
@@ -422,7 +349,7 @@ class OrganSweepModel final : public SweepModel {
 
   [[nodiscard]] Dimension dimension_of(const std::string& target,
                                        std::string_view where) const override {
-    return find_key(setup_.scene, target, where).dimension;
+    return SceneField(setup_.scene, setup_.material, target, where).dimension();
   }
   [[nodiscard]] const std::vector<SweepVariable>& variables() const override { return variables_; }
   [[nodiscard]] std::vector<std::string> counted() const override {
@@ -438,7 +365,7 @@ class OrganSweepModel final : public SweepModel {
   }
   [[nodiscard]] std::string choice_of_models(const std::vector<SweptTarget>& swept) const override {
     if (!setup_.tolerance) return {};
-    const SharedCost cost = cost_of_sharing(setup_.scene, swept);
+    const SharedCost cost = cost_of_sharing(setup_, swept);
     return fmt::format(
         "{} cells share organ and moduli; claims of reduced models for them cost {} "
         "runs of the network: {}",
@@ -504,6 +431,7 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::s
   }
   setup.protocol =
       parse_protocol_block(setup.scene.at("protocol"), DocumentPlace{"scene"}, Openness::complete);
+  setup.material = scene.tissue.materials.materials.front();
   setup.by_depth = scene.protocol.drive() == Drive::displacement;
   require_outputs(setup, place.key("outputs"));
   return std::make_shared<OrganSweepModel>(std::move(setup));

@@ -20,7 +20,7 @@ namespace {
 
 /// "/material/E1" becomes "E1".
 std::string usual_name(const std::string& target) {
-  return target.substr(target.rfind('/') + 1);
+  return target.substr(target.find_last_of("/.") + 1);
 }
 
 enum class PointKind { random, latin_hypercube, sobol, plain_sobol, sensitivity };

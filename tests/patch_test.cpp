@@ -1,4 +1,4 @@
-#include "tpm/network/patch_test.hpp"
+#include "patch_test.hpp"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,120 @@
+// tpm material: a fitted law on an organ.
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "command.hpp"
+#include "protocol_options.hpp"
+#include "recording_options.hpp"
+#include "tpm/core/error.hpp"
+#include "tpm/law/law_file.hpp"
+#include "tpm/report/organ_material_report.hpp"
+#include "tpm/scene/protocol_file.hpp"
+#include "tpm/store/json.hpp"
+#include "tpm/study/organ_material.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct MaterialCommand {
+  std::string law, scene;
+  RecordingOptions recordings;  ///< its file may also hold a protocol
+  RampOptions ramp;
+  bool fit_times = false;
+  std::string stiffening = "automatic";
+  std::string folder, output;
+};
+
+OrganMaterialOptions material_options(const MaterialCommand& command) {
+  OrganMaterialOptions options;
+  options.fit_times = command.fit_times;
+  if (command.stiffening != "automatic") options.stiffens = command.stiffening != "none";
+  options.branches_stiffen = command.stiffening == "all";
+  return options;
+}
+
+/// That of the recording or protocol named, else that of the scene.
+MaterialMotion chosen_motion(const MaterialCommand& command, const LawFile& law,
+                             const Json& scene) {
+  const RampOptions& ramp = command.ramp;
+  const bool none = ramp.depth.empty() && ramp.rate.empty() && ramp.hold.empty() &&
+                    command.recordings.files.empty();
+  if (none) {
+    if (!has_protocol(scene)) {
+      throw Error(ExitCode::usage, "RECORDING", "neither given nor a protocol in the scene",
+                  "the recording that was fitted, or --depth, --rate and --hold");
+    }
+    const ProtocolFile own = parse_protocol_file(scene, command.scene);
+    return motion_of_protocol(own.protocol, own.times_s);
+  }
+  if (const auto file = chosen_protocol(ramp, command.recordings.files)) {
+    return motion_of_protocol(file->protocol, file->times_s);
+  }
+  return motion_of_recording(law, read_recordings(command.recordings).front());
+}
+
+int run_material(const MaterialCommand& command, const Session& session) {
+  will_write_into(command.folder, {"scene.json", "session.json", "material.json", "material.csv",
+                                   "figures.json", "material.svg", "material.png"});
+  const LawFile law = read_law(command.law);
+  const Json scene = read_json(command.scene);
+  check_schema(scene, "scene", command.scene);
+  const OrganMaterial result =
+      put_on_organ(law, chosen_motion(command, law, scene), scene, command.scene,
+                   std::filesystem::path(command.scene).parent_path(), material_options(command));
+  if (!command.output.empty()) deliver(to_text(result.scene), command.output);
+  std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
+  if (!command.folder.empty()) {
+    const auto files = write_organ_material_report(command.folder, result);
+    if (!session.json()) {
+      text += fmt::format("\nwritten to {}: {}\n", command.folder, fmt::join(files, ", "));
+    }
+  }
+  write_output(text);
+  return 0;
+}
+
+}  // namespace
+
+void add_material_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "material", "Put a fitted law on an organ: the bonds' material that answers as the law does");
+  auto options = std::make_shared<MaterialCommand>();
+  command->add_option("LAW", options->law, "law.json that tpm fit has written")->required();
+  command
+      ->add_option("SCENE", options->scene,
+                   "An organ (JSON scene); its material is replaced, its regions stay")
+      ->required();
+  command
+      ->add_option("PROTOCOL|RECORDING", options->recordings.files,
+                   "The motion: the recording that was fitted, or a JSON file with a block "
+                   "protocol; default: the scene's")
+      ->expected(0, 1);
+  add_ramp_options(*command, options->ramp);
+  command->add_flag("--fit-times", options->fit_times,
+                    "Fit relaxation times, too, instead of keeping the law's");
+  command
+      ->add_option(
+          "--stiffening", options->stiffening,
+          "Which part of a bond stiffens with its elongation: equilibrium, all (the branches, too: "
+          "not for tpm hil), none, or automatic: equilibrium if the law stiffens with depth")
+      ->check(CLI::IsMember({"automatic", "equilibrium", "all", "none"}))
+      ->capture_default_str();
+  command->add_option("--folder", options->folder,
+                      "Write scene.json, session.json (for tpm hil run), material.json, "
+                      "material.csv and the figure into this folder");
+  command->add_option("-o,--output", options->output, "Write the scene here");
+  add_recording_options(*command, options->recordings);
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm fit recording.csv --folder fitted\n"
+      "  tpm material fitted/law.json configs/liver_scene.json recording.csv --folder on_liver\n"
+      "  tpm hil run on_liver/session.json -o on_liver.tpmrec && tpm hil verify on_liver.tpmrec "
+      "--window \"0 s\"");
+  command->callback([options, &session] {
+    session.run = [options, &session] { return run_material(*options, session); };
+  });
+}
+
+}  // namespace tpm::app

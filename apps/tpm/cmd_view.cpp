@@ -1,0 +1,98 @@
+// tpm view: a file as one page that is opened in a browser.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "command.hpp"
+#include "tpm/core/progress.hpp"
+#include "tpm/report/view_file.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/file_roles.hpp"
+
+namespace tpm::app {
+namespace {
+
+struct ViewChoice {
+  std::string file, output;
+  bool no_organ = false;
+};
+
+/// Pictures of a recording's organ, told on the terminal.
+class OrganProgress {
+ public:
+  void operator()(std::size_t done, std::size_t total) {
+    if (!progress_) progress_ = std::make_shared<Progress>("the organ of the recording", total);
+    progress_->advance(done - before_);
+    before_ = done;
+  }
+
+ private:
+  std::shared_ptr<Progress> progress_;
+  std::size_t before_ = 0;
+};
+
+int view(const ViewChoice& choice, const Session& session) {
+  const std::filesystem::path output =
+      choice.output.empty()
+          ? std::filesystem::path(choice.file).filename().replace_extension(".html")
+          : std::filesystem::path(choice.output);
+  will_write({output});
+  ViewOptions options;
+  options.organ = !choice.no_organ;
+  options.progress = OrganProgress();
+  const ViewPage page = view_file(choice.file, options);
+  const std::string html = page.html();
+  write_file(output, html);
+  const Json& shown = page.description;
+  if (session.json()) {
+    say("{}",
+        to_text(Json{{"file", output.string()},
+                     {"kind", shown.at("kind")},
+                     {"bytes", html.size()},
+                     {"plots", shown.at("plots").size()},
+                     {"samples", shown.value("samples", Json())},
+                     {"samples_per_value", shown.value("samples_per_value", Json())},
+                     {"spheres", shown.contains("organ") ? shown["organ"]["spheres"] : Json()},
+                     {"organ_shown", shown.contains("organ") ? shown["organ"]["shown"] : Json()},
+                     {"simulated", shown.value("simulated", Json())}}));
+    return 0;
+  }
+  say("{}: {}\n", shown.at("kind").get<std::string>(), shown.at("title").get<std::string>());
+  if (shown.contains("organ")) {
+    say("organ: {} spheres; {}\n", shown["organ"]["spheres"].get<std::size_t>(),
+        shown["organ"]["shown"].get<std::string>());
+  }
+  if (shown.contains("samples")) {
+    const auto part = shown["samples_per_value"].get<std::size_t>();
+    say("curves: {} samples{}\n", shown["samples"].get<std::size_t>(),
+        part == 1 ? "" : fmt::format(", the least and the largest value of each {}", part));
+  }
+  say("wrote {}: open it in a browser\n", output.string());
+  return 0;
+}
+
+}  // namespace
+
+void add_view_command(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand(
+      "view", "Show a result, a recorded session or a fit as one interactive HTML page");
+  auto choice = std::make_shared<ViewChoice>();
+  command
+      ->add_option("FILE", choice->file,
+                   "HDF5 of tpm simulate, a recording of tpm hil run, or law.json, figures.json or "
+                   "the JSON answer of tpm fit")
+      ->required();
+  command->add_option("-o,--output", choice->output,
+                      "HTML file (default: the name of FILE ending in .html, in this folder)");
+  command->add_flag("--no-organ", choice->no_organ,
+                    "Of a recording: curves only, without recomputing the organ from the motion");
+  add_format_option(*command, session);
+  command->footer(
+      "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5\n"
+      "  tpm view results.h5 -o results.html");
+  command->callback(
+      [choice, &session] { session.run = [choice, &session] { return view(*choice, session); }; });
+}
+
+}  // namespace tpm::app

@@ -1,0 +1,75 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "tpm/reduce/condensed_fit.hpp"
+
+namespace tpm {
+
+/// One of the branches by which all relaxing bonds of a condensed network relax.
+struct CondensedBranch {
+  double share = 1.0;              ///< gamma of the relaxing stiffness; all add up to 1
+  double relaxation_time_s = 0.0;  ///< > 0
+};
+
+/// Modes of the linear motion of a condensed memory (w, q) with the contact at rest, one relaxation
+/// time: d xi_k/dt = -rate_k xi_k/tau with xi = left (w, q), (w, q) = right xi.
+struct CondensedModes {
+  Eigen::Matrix<double, 6, 1> rate;
+  Eigen::Matrix<double, 6, 6> left, right;
+};
+[[nodiscard]] CondensedModes condensed_modes(const CondensedFit& fit);
+
+/// The memory of a condensed network with several branches. The mean memory of the bonds is y(w) +
+/// P q, w = sum gamma_j w_j and q alike, so that force and field are those of one branch. The
+/// memory of branch j differs from it by C a_j along y(w) and by p_j along P:
+///
+///     tau_j d(w_j)/dt = v_w(u, w, q) - C a_j,      tau_j dq_j/dt = v_q(u, w, q) - p_j
+///
+/// with v the motion of one branch of relaxation time 1 and C C' = M^-1, M = J' g J the metric of
+/// the memory at w (Cholesky). The stored energy is
+///
+///     S = Psi(u, w) - z' N q + q' G q/2 + sum gamma_j (|a_j|^2 + p_j' N p_j)/2
+///
+/// a_j keeps its value while w, and with it C, moves: so dS/dt = work - sum gamma_j |C^-1 (v_w -
+/// C a_j)|^2/tau_j - (terms of q), without derivatives of M (docs/reduction.md).
+///
+/// A step is linear in the difference from the motion's linear part, which is solved exactly for
+/// all branches together. No call allocates but the constructor.
+class CondensedBranches {
+ public:
+  CondensedBranches() = default;
+  /// @param fit must live as long as this
+  CondensedBranches(const CondensedFit& fit, const std::vector<CondensedBranch>& branches,
+                    double period_s);
+
+  void reset() noexcept;
+  /// Step of state.u -> to (m, in the axes of the contact), as step_condensed() for one branch.
+  void step(CondensedState& state, const double* to) noexcept;
+  /// Stored in the differences of the branches, J.
+  [[nodiscard]] double spread_J() const noexcept { return spread_J_; }
+  /// Where the contact is, of its way in a step, while the memory relaxes, 0.5 to 1.
+  [[nodiscard]] double resting_share() const noexcept { return resting_share_; }
+  /// Root of the mean square of q over the branches, m.
+  [[nodiscard]] Eigen::Vector3d second_m(const CondensedState& state) const noexcept;
+
+ private:
+  const CondensedTables* tables_ = nullptr;
+  CondensedRates rates_;  ///< those that do not depend on the relaxation times
+  CondensedModeTables modes_;
+  std::array<double, 8> mode_rate_{};
+  double resting_share_ = 1.0;
+  // 8 numbers for each branch (CondensedBranchArrays).
+  std::vector<double> share_;   ///< one number each
+  std::vector<double> follow_;  ///< h phi1(h B) D^-1
+  std::vector<double> drift_;
+  std::vector<double> later_;  ///< h phi2(h B) D^-1 1
+
+  std::array<double, 6> frame_{};  ///< C
+  std::vector<double> spread_, pending_;
+  double spread_J_ = 0.0;
+  std::vector<double> lacks_, moved_, next_;  ///< of the step
+};
+
+}  // namespace tpm

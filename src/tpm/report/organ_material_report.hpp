@@ -1,0 +1,20 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tpm/report/figure.hpp"
+#include "tpm/study/organ_material.hpp"
+
+namespace tpm {
+
+/// Forces of law, organ and recording over time, and what the organ misses over depth.
+[[nodiscard]] Figure organ_material_figure(const OrganMaterial& result);
+
+/// Writes scene.json, session.json, material.json, material.csv, figures.json and the figure into
+/// `folder`. Returns the names of the files. Throws Error(environment) if drawing is not possible;
+/// the other files are then already there.
+[[nodiscard]] std::vector<std::string> write_organ_material_report(
+    const std::filesystem::path& folder, const OrganMaterial& result);
+
+}  // namespace tpm

@@ -1,0 +1,104 @@
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpm/fit/parameter.hpp"
+#include "tpm/law/law_file.hpp"
+#include "tpm/material/bond_material.hpp"
+#include "tpm/protocol/protocol.hpp"
+#include "tpm/store/json.hpp"
+#include "tpm/study/recording_setup.hpp"
+
+namespace tpm {
+
+/// The motion under which an organ is to answer as a law does. Depths count from the surface.
+struct MaterialMotion {
+  Protocol protocol;
+  std::vector<double> time_s;
+  /// Of a recording: its readings less the law's offset, N, at `time_s`; else empty.
+  std::vector<double> measured_N;
+  std::string words;  ///< "along recording.csv"
+};
+
+/// The motion of a recording's ramp and hold, in as few straight pieces as keep it within 0.2 % of
+/// its depth; the law's contact is taken off.
+[[nodiscard]] MaterialMotion motion_of_recording(const LawFile& law,
+                                                 const PreparedRecording& recording);
+/// @param times_s rising, within the protocol
+[[nodiscard]] MaterialMotion motion_of_protocol(const Protocol& protocol,
+                                                std::vector<double> times_s);
+
+struct OrganMaterialOptions {
+  bool fit_times = false;  ///< relaxation times, too; else those of the law are kept
+  /// Whether bonds stiffen (W = l (1 + (l/s)^2)); none: if the law does.
+  std::optional<bool> stiffens;
+  /// The branches act on the stiffening W, too, not on l: servo models do not take that.
+  bool branches_stiffen = false;
+};
+
+/// One fitted parameter of the bonds, SI.
+struct OrganMaterialParameter {
+  FitParameter parameter;
+  double start = 0.0;  ///< by correspondence
+  double value = 0.0;
+  /// What the law's uncertainty leaves open; none if the law carries none, or at a bound.
+  std::optional<double> lower, upper;
+  bool at_bound = false;
+};
+
+/// How one force differs from another, in parts of the law's peak force.
+struct ForceMismatch {
+  double largest = 0.0, rms = 0.0;
+  double at_s = 0.0, depth_m = 0.0, rate_m_per_s = 0.0;  ///< where it is largest
+};
+
+/// A law put on an organ.
+struct OrganMaterial {
+  std::string law;
+  std::string motion;
+  BondMaterial material;
+  std::vector<OrganMaterialParameter> parameters;
+  /// Of the fitted parameters' theta, in their order; rows at bounds are 0; empty without.
+  Eigen::MatrixXd covariance;
+  double level = 0.95;
+  double quantile = 0.0;
+  std::vector<double> time_s, depth_m, law_N, correspondence_N, organ_N, measured_N;
+  double peak_N = 0.0;
+  ForceMismatch start;       ///< organ by correspondence, less law
+  ForceMismatch organ;       ///< fitted organ less law
+  ForceMismatch ramp, hold;  ///< the same while the depth changes and while it does not
+  std::optional<ForceMismatch> law_to_recording, organ_to_recording;
+  Json scene;    ///< with the fitted material
+  Json session;  ///< for tpm hil run: the network stepped in every period
+  std::vector<std::string> flags;
+};
+
+/// Fits the material of an organ's bonds until its contact answers as the law does.
+///
+/// Starts from correspondence: if every bond, lateral ones included, relaxes by the law's
+/// normalised function, the contact of a network of small displacements relaxes by it, too; one
+/// factor on all moduli is left, and is found by least squares. From there Einf, every g_j and (if
+/// asked for) tau_j and the stiffening length minimise the sum of squares of organ less law over
+/// the motion; the lateral modulus keeps its ratio to the radial instantaneous one. The covariance
+/// follows from that of the law, with J and L the derivatives of the organ's and of the law's
+/// force:
+///
+///     Cov = D C D',   D = (J'J)^-1 J' L.
+///
+/// @param scene an organ, with no contact or one of the kind sphere; its regions stay
+/// @param folder that a mesh path is relative to
+/// Throws Error(bad_input) for a law that is no depth with branches, a scene of other contacts, a
+/// motion that does not press; Error(numerical) if the organ cannot be run.
+[[nodiscard]] OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion,
+                                         const Json& scene, std::string_view where,
+                                         const std::filesystem::path& folder,
+                                         const OrganMaterialOptions& options);
+
+[[nodiscard]] Json to_json(const OrganMaterial& result);
+[[nodiscard]] std::string to_terminal_text(const OrganMaterial& result);
+/// time_s, depth_m and every force, SI.
+[[nodiscard]] std::string to_csv(const OrganMaterial& result);
+
+}  // namespace tpm

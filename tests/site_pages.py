@@ -1,0 +1,158 @@
+#!/usr/bin/env python3
+"""Checks the site that scripts/docs.sh has built.
+
+    site_pages.py links HTML_FOLDER             every link and picture leads to a file, every anchor to an element
+    site_pages.py TPM                           builds the site, then checks links, and in Chromium that no page is
+                                                wider than a window of 400 or 1400 pixels
+    site_pages.py sheet HTML_FOLDER SHEET.png   all pages, small, on one picture
+"""
+
+import importlib.util
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.parse
+from html.parser import HTMLParser
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+class Reader(HTMLParser):
+    def __init__(self, text):
+        super().__init__()
+        self.links, self.names = [], set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        a = dict(attributes)
+        self.names.update(a[k] for k in ("id", "name") if a.get(k))
+        for key in ("href", "src"):
+            if a.get(key):
+                self.links.append(a[key])
+
+
+def pages_of(folder):
+    return sorted(p for p in folder.rglob("*.html") if "_static" not in p.relative_to(folder).parts
+                  and "_downloads" not in p.relative_to(folder).parts)
+
+
+def broken_links(folder):
+    read = {page: Reader(page.read_text(encoding="utf-8")) for page in pages_of(folder)}
+    outside = set()
+    for page, reader in read.items():
+        for link in reader.links:
+            if re.match(r"(https?|mailto):", link):
+                outside.add(link)
+                continue
+            if link.startswith(("data:", "javascript:")):
+                continue
+            name, _, anchor = link.partition("#")
+            name = urllib.parse.unquote(name.partition("?")[0])
+            file = (page.parent / name).resolve() if name else page
+            if not file.is_file():
+                yield f"{page.relative_to(folder)}: {link}: no such file"
+            elif anchor and file in read and urllib.parse.unquote(anchor) not in read[file].names | {"top"}:
+                yield f"{page.relative_to(folder)}: {link}: no such place"
+    print(f"{len(read)} pages; {len(outside)} links to other hosts, which are not followed")
+
+
+def check_links(folder):
+    faults = list(broken_links(folder))
+    for fault in faults:
+        print(fault)
+    if faults:
+        sys.exit(f"{len(faults)} broken links")
+
+
+def chromium_or_skip(folder):
+    from page_in_chromium import CannotStart, Chromium
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if not program:
+        print("SKIPPED: there is no Chromium (Debian: chromium)")
+        sys.exit(77)
+    try:
+        return Chromium(program, folder)
+    except CannotStart as e:
+        print(f"SKIPPED: Chromium does not run on this machine: {e}")
+        sys.exit(77)
+
+
+def loaded(chromium, page):
+    chromium.call("Page.navigate", url=page.as_uri())
+    start = time.monotonic()
+    want = f"document.readyState === 'complete' && location.pathname === {urllib.parse.quote(str(page))!r}"
+    while not chromium.call("Runtime.evaluate", expression=want)["result"].get("value"):
+        assert time.monotonic() - start < 30, f"{page} does not load"
+        time.sleep(0.01)
+
+
+def check_widths(folder, chromium):
+    chromium.open("about:blank")
+    pages = pages_of(folder)
+    wide = []
+    for width in (400, 1400):
+        chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+        for page in pages:
+            if page == folder / "index.html":  # leads on to the first page
+                continue
+            loaded(chromium, page)
+            found = chromium.call("Runtime.evaluate", returnByValue=True,
+                                  expression="document.documentElement.scrollWidth")["result"]["value"]
+            if found > width:
+                wide.append(f"{page.relative_to(folder)}: {found} px wide in a window of {width} px")
+    strangers = {u for u in chromium.asked() if not u.startswith(("file:", "data:", "about:"))}
+    assert not strangers, strangers
+    assert not wide, "\n".join(wide)
+    print(f"{len(pages)} pages fit into windows of 400 and 1400 pixels")
+
+
+def make_sheet(folder, picture, chromium):
+    """Needs matplotlib's reader and writer of PNG only."""
+    import matplotlib.image
+    import numpy
+    chromium.open("about:blank")
+    chromium.call("Emulation.setDeviceMetricsOverride", width=1000, height=1250, deviceScaleFactor=0.12, mobile=False)
+    tiles = []
+    for page in pages_of(folder):
+        if page == folder / "index.html":
+            continue
+        loaded(chromium, page)
+        chromium.picture(picture)
+        tiles.append(matplotlib.image.imread(picture)[:150, :120, :3])
+    columns = 14
+    rows = (len(tiles) + columns - 1) // columns
+    sheet = numpy.full((rows * 154, columns * 124, 3), 0.75)
+    for i, tile in enumerate(tiles):
+        y, x = 154 * (i // columns) + 2, 124 * (i % columns) + 2
+        sheet[y : y + tile.shape[0], x : x + tile.shape[1]] = tile
+    matplotlib.image.imsave(picture, numpy.round(sheet * 7) / 7)
+    print(f"{len(tiles)} pages on {picture}")
+
+
+def main():
+    if sys.argv[1] == "links":
+        check_links(Path(sys.argv[2]).resolve())
+        return
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+        if sys.argv[1] == "sheet":
+            chromium = chromium_or_skip(name)
+            make_sheet(Path(sys.argv[2]).resolve(), sys.argv[3], chromium)
+            chromium.close()
+            return
+        missing = [m for m in ("sphinx", "furo", "breathe", "myst_parser") if not importlib.util.find_spec(m)]
+        if missing or not shutil.which("doxygen"):
+            print(f"SKIPPED: the site cannot be built: missing {', '.join(missing) or 'doxygen'} (scripts/packages.sh, packages_docs)")
+            sys.exit(77)
+        chromium = chromium_or_skip(name)
+        subprocess.run([ROOT / "scripts/docs.sh", sys.argv[1]], check=True)
+        folder = ROOT / "build/site/html"
+        check_widths(folder, chromium)
+        chromium.close()
+
+
+if __name__ == "__main__":
+    main()

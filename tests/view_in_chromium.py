@@ -1,0 +1,282 @@
+#!/usr/bin/env python3
+"""Opens pages of `tpm view` in headless Chromium: the organ is turned with mouse and keys, time is scrubbed,
+values are read and compared with the file, a recording of a million samples stays usable, nothing is asked of
+a network, and no page is wider than its window.
+
+    view_in_chromium.py TPM [PICTURE.png]
+"""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+import h5py
+from page_in_chromium import CannotStart, Chromium
+
+MATERIAL = {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e5 Pa s", "A0": "12.56 mm^2", "l0": "1 mm"}
+ORGAN = {"kind": "liver", "count": 424, "layers": 2, "spacing": "20 mm", "seed": 1}
+HELD = [{"kind": "far_side", "fraction": 0.3}]
+SCENE = {"title": "a <b>liver</b> </script> that is looked at", "organ": ORGAN, "material": MATERIAL, "anchors": HELD,
+         "protocol": {"kind": "ramp_hold", "depth": "8 mm", "rate": "4 mm/s", "hold": "10 s"}}
+SESSION = {"title": "a million cycles", "model": {"kind": "condensed",
+                                                  "scene": {"organ": ORGAN, "material": MATERIAL, "anchors": HELD}},
+           "rate": "4 kHz", "indentations": {"depths": ["2 mm", "8 mm"], "rates": ["4 mm/s"], "hold": "50 s", "rest": "75 s"}}
+
+
+class Page:
+    def __init__(self, chromium, file):
+        self.chromium, self.file = chromium, file
+        chromium.events.clear()
+        chromium.open(file.as_uri())
+        start = time.monotonic()
+        while self.js("document.body && document.body.dataset.ready") != "yes":
+            assert not chromium.complaints(), chromium.complaints()
+            assert time.monotonic() - start < 60, "the page does not get ready"
+            time.sleep(0.05)
+        self.seconds = time.monotonic() - start
+
+    def js(self, expression):
+        answer = self.chromium.call("Runtime.evaluate", expression=expression, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
+
+    def text(self, name):
+        return self.js(f"document.getElementById('{name}').textContent")
+
+    def box(self, name):
+        return self.js(f"(b => [b.left, b.top, b.width, b.height])(document.getElementById('{name}').getBoundingClientRect())")
+
+    def mouse(self, kind, x, y, buttons=0):
+        self.chromium.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left" if kind != "mouseMoved" else "none",
+                           buttons=buttons, clickCount=1)
+
+    def key(self, key):
+        for kind in ("keyDown", "keyUp"):
+            self.chromium.call("Input.dispatchKeyEvent", type=kind, key=key)
+        self.frame()
+
+    def frame(self):
+        self.chromium.call("Runtime.evaluate", awaitPromise=True,
+                           expression="new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))")
+
+    def ink(self, name):
+        return self.js(f"""(c => {{ const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let s = 0;
+            for (let i = 0; i < d.length; i += 4) s = (31 * s + d[i] + 3 * d[i + 1] + 7 * d[i + 2]) % 1000000007;
+            return s; }})(document.getElementById('{name}'))""")
+
+    def scrub(self, part):
+        self.js(f"(t => {{ t.value = String(Math.round({part} * Number(t.max))); t.dispatchEvent(new Event('input')); }})"
+                "(document.getElementById('time'))")
+        self.frame()
+
+    def check_whole(self):
+        """Fits into narrow and wide windows, asked nothing, complained of nothing."""
+        for width in (400, 1400):
+            self.chromium.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+            self.frame()
+            wide = self.js("document.documentElement.scrollWidth")
+            assert wide <= width, f"{self.file.name} is {wide} px wide in a window of {width} px"
+        assert not self.chromium.complaints(), self.chromium.complaints()
+        strangers = [u for u in self.chromium.asked() if not u.startswith((self.file.as_uri(), "data:", "about:"))]
+        assert not strangers, strangers
+
+
+def numbers(text):
+    return [float(n) for n in re.findall(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?", text.replace("\u2212", "-"))]
+
+
+def said_of_sphere(text):
+    found = re.search(r"Sphere (\d+).*?position (.*?) mm; displacement (\S+) mm \((.*?)\)(?:; force of the bonds on the sphere (\S+) N)?", text)
+    assert found, text
+    return int(found[1]), numbers(found[2]), numbers(found[3])[0], numbers(found[4]), found[5] and numbers(found[5])[0]
+
+
+def check_sphere(page, result):
+    """What the page reads of a sphere is what the file holds, to the digits that are shown."""
+    state = int(page.js("document.getElementById('scene').dataset.state"))
+    number, position, size, moved, force = said_of_sphere(page.text("sphere_said"))
+    with h5py.File(result) as file:
+        step = file[f"steps/{state:05}"]
+        want = step["position_m"][number - 1] * 1e3
+        shift = step["displacement_m"][number - 1] * 1e3
+        pull = np.linalg.norm(step["force_N"][number - 1])
+    np.testing.assert_allclose(position, want, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(moved, shift, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(size, np.linalg.norm(shift), rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(force, pull, rtol=1e-4, atol=1e-9)
+    return number, state
+
+
+def check_turning(page):
+    left, top, width, height = page.box("scene")
+    eye, ink = page.js("document.getElementById('scene').dataset.eye"), page.ink("scene")
+    x, y = left + 0.5 * width, top + 0.5 * height
+    page.mouse("mousePressed", x, y, 1)
+    for k in range(1, 6):
+        page.mouse("mouseMoved", x + 20 * k, y + 6 * k, 1)
+    page.mouse("mouseReleased", x + 100, y + 30)
+    page.frame()
+    turned = page.js("document.getElementById('scene').dataset.eye")
+    assert turned != eye and page.ink("scene") != ink, (eye, turned)
+    page.js("document.getElementById('scene').focus()")
+    for key in ("ArrowLeft", "ArrowUp", "+"):
+        before = page.ink("scene")
+        page.key(key)
+        assert page.ink("scene") != before, key
+    assert page.js("document.getElementById('scene').dataset.eye") != turned
+
+
+def look_at_result(chromium, tpm, folder, picture):
+    (folder / "scene.json").write_text(json.dumps(SCENE))
+    result = folder / "result.h5"
+    subprocess.run([tpm, "simulate", folder / "scene.json", "-o", result], check=True, capture_output=True)
+    subprocess.run([tpm, "view", result, "-o", folder / "result.html"], check=True, capture_output=True)
+    page = Page(chromium, folder / "result.html")
+    assert page.text("title") == SCENE["title"], page.text("title")
+    assert page.text("badge") == "SIMULATED", page.text("badge")
+    check_turning(page)
+    seen = set()
+    for part in (0.0, 0.1, 0.5, 1.0):
+        page.scrub(part)
+        number, state = check_sphere(page, result)
+        seen.add((state, page.ink("scene"), page.text("time_said")))
+    assert len(seen) == 4, seen
+    # Another sphere, by the mouse: the contact sphere is where it is drawn; then by key and by number.
+    page.js("document.getElementById('number').value = '5'; document.getElementById('number').dispatchEvent(new Event('input'))")
+    assert check_sphere(page, result)[0] == 5
+    left, top, width, height = page.box("scene")
+    for x in (0.45, 0.55, 0.6):
+        page.mouse("mouseMoved", left + x * width, top + 0.5 * height)
+    assert check_sphere(page, result)[0] != 5
+    chosen = check_sphere(page, result)[0]
+    page.js("document.getElementById('scene').focus()")
+    page.key("n")
+    assert check_sphere(page, result)[0] == chosen % 424 + 1
+    page.js("(c => { c.value = 'force'; c.dispatchEvent(new Event('change')); })(document.getElementById('colour'))")
+    assert check_sphere(page, result)[1] == state
+    check_cursor(page, result)
+    if picture:
+        page.scrub(0.3)
+        chromium.call("Emulation.setDeviceMetricsOverride", width=1300, height=980, deviceScaleFactor=1, mobile=False)
+        page.js("(c => { c.value = 'displacement'; c.dispatchEvent(new Event('change')); })(document.getElementById('colour'))")
+        page.frame()
+        chromium.picture(picture)
+    page.check_whole()
+
+
+def check_cursor(page, result):
+    """The curve of the force, read by key and mouse."""
+    with h5py.File(result) as file:
+        times, force = file["curve/time_s"][:], file["curve/force_N"][:]
+    index = page.js("[...document.querySelectorAll('.plot h2')].findIndex(h => h.textContent.startsWith('contact force'))")
+    page.js(f"document.getElementById('plot-{index}').focus()")
+    page.key("Home")
+    for k in range(1, 4):
+        page.key("ArrowRight")
+        said = numbers(page.text(f"reading-{index}"))
+        np.testing.assert_allclose([said[0], said[-1]], [times[k], force[k]], rtol=1e-4, atol=1e-9)
+    left, top, width, height = page.box(f"plot-{index}")
+    page.mouse("mouseMoved", left + 0.5 * width, top + 0.5 * height)
+    page.frame()
+    said = numbers(page.text(f"reading-{index}"))
+    k = int(np.argmin(np.abs(times - said[0])))
+    assert 0.3 * times[-1] < said[0] < 0.7 * times[-1], said
+    np.testing.assert_allclose(said[-1], force[k], rtol=1e-4)
+
+
+def look_at_recording(chromium, tpm, folder):
+    (folder / "session.json").write_text(json.dumps(SESSION))
+    recording, rows = folder / "s.tpmrec", folder / "rows.h5"
+    subprocess.run([tpm, "hil", "run", folder / "session.json", "--time", "virtual", "-o", recording], check=True, capture_output=True)
+    told = json.loads(subprocess.run([tpm, "view", recording, "-o", folder / "s.html", "--format", "json"], check=True,
+                                     capture_output=True).stdout)
+    assert told["samples"] >= 1_000_000 and told["samples_per_value"] == 1, told
+    subprocess.run([tpm, "hil", "export", recording, "-o", rows], check=True, capture_output=True)
+    recording.unlink()
+    with h5py.File(rows) as file:
+        force = -file["rows/commanded_N"][:] if "rows/commanded_N" in file else None
+        names = list(file["rows"])
+        depth = file["rows/tool_depth_m"][:]
+        times = file["rows/time_s"][:]
+    assert force is None or len(force), names
+    page = Page(chromium, folder / "s.html")
+    assert page.text("badge") == "SIMULATED DEVICE", page.text("badge")
+    pictures = set()
+    start = time.monotonic()
+    for part in np.linspace(0.0, 1.0, 9):
+        page.scrub(part)
+        pictures.add((page.ink("scene"), page.text("time_said")))
+        said = numbers(page.text("reading-0").split(";")[0])
+        k = int(said[1]) - 1
+        np.testing.assert_allclose(said[0], times[k], rtol=1e-6, atol=1e-9)
+        shown = numbers(page.text("reading-0").split(";")[1])[-1]
+        np.testing.assert_allclose(shown, 1e3 * depth[k], rtol=1e-4, atol=1e-5)
+    assert len({t for _, t in pictures}) == 9 and len({i for i, _ in pictures}) >= 4, pictures
+    scrubbed = time.monotonic() - start
+    # A peak of one sample is drawn: the largest depth stands in the pyramid and in the picture's heights.
+    most = page.js("plots[0].series[0].pyramid.range(0, plots[0].series[0].x.length)[1]")
+    np.testing.assert_allclose(most, 1e3 * depth.max(), rtol=1e-6)
+    for first, last in ((17, 1000), (123, 77_777), (5, len(depth) - 3)):
+        low, high = page.js(f"plots[0].series[0].pyramid.range({first}, {last})")
+        np.testing.assert_allclose([low, high], [1e3 * depth[first:last].min(), 1e3 * depth[first:last].max()], rtol=1e-6)
+    assert "no peak is left out" in page.js("plots[0].said.textContent")
+    page.js("for (let k = 0; k < 20; ++k) plots[0].zoom(0.5); plots[0].draw()")
+    assert "every value in view" in page.js("plots[0].said.textContent")
+    page.check_whole()
+    print(f"{told['samples']} samples, page of {told['bytes']} bytes: ready after {page.seconds:.1f} s, scrubbed 9 times in {scrubbed:.1f} s")
+
+
+def look_at_fit(chromium, tpm, folder):
+    times = np.linspace(0, 12, 241)
+    depth = np.minimum(2.0 * times, 4.0)
+    rise = np.minimum(times, 2.0)
+    force = 0.06 * depth + 0.045 * 4.0 * (np.exp(-(times - rise) / 2.0) - np.exp(-times / 2.0))
+    force += 2e-4 * np.random.default_rng(1).standard_normal(len(times))
+    lines = [f"{t:.4f},{d:.5f},{f:.6f}" for t, d, f in zip(times, depth, force)]
+    (folder / "synthetic.csv").write_text("time [s],depth [mm],force [N]\n" + "\n".join(lines) + "\n")
+    fit = [tpm, "fit", folder / "synthetic.csv", "--law", "linear-1"]
+    subprocess.run([*fit, "--folder", folder / "fitted"], check=True, capture_output=True)
+    (folder / "answer.json").write_bytes(subprocess.run([*fit, "--folder", folder / "fitted_again", "--format", "json"], check=True, capture_output=True).stdout)
+    law = json.loads((folder / "fitted/law.json").read_text())["parameters"]
+    for name, source in (("law", "fitted/law.json"), ("figures", "fitted/figures.json"), ("answer", "answer.json")):
+        subprocess.run([tpm, "view", folder / source, "-o", folder / f"{name}.html"], check=True, capture_output=True)
+        page = Page(chromium, folder / f"{name}.html")
+        assert page.js("plots.length") >= 2, name
+        assert page.js("plots[0].canvas.focus(), plots[0].reading.textContent") != ""
+        page.js("plots[0].move(5.0)")
+        assert abs(numbers(page.text("reading-0"))[0] - 5.0) < 0.1 or name == "answer", page.text("reading-0")
+        if name == "law":
+            assert f"{law['tau1_s']:.6g}" in page.text("table"), page.text("table")
+        page.check_whole()
+
+
+def main():
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if not program:
+        print("SKIPPED: there is no Chromium (Debian: chromium)")
+        sys.exit(77)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        try:
+            chromium = Chromium(program, folder / "profile")
+        except CannotStart as e:
+            print(f"SKIPPED: Chromium does not run on this machine: {e}")
+            sys.exit(77)
+        try:
+            look_at_result(chromium, sys.argv[1], folder, sys.argv[2] if len(sys.argv) > 2 else None)
+            look_at_recording(chromium, sys.argv[1], folder)
+            look_at_fit(chromium, sys.argv[1], folder)
+        finally:
+            chromium.close()
+    print("looked at a result, a recording and three files of a fit")
+
+
+if __name__ == "__main__":
+    main()
