@@ -330,9 +330,15 @@ void materials(const Formulation& f, Broken& broken) {
       } catch (const Error& refusal) {
         said = refusal.what();
       }
-      const bool names = said.find("is no formulation that " + name) != std::string::npos &&
-                         said.find("quasi_static") != std::string::npos &&
-                         said.find('\n') == std::string::npos;
+      const auto refused_for = [&](bool Capabilities::*lacking) {
+        const std::string words = "is no formulation that " + std::string(words_of(lacking));
+        return !(f.can().*lacking) && said.find(words) != std::string::npos;
+      };
+      // A region of another material is a region, too.
+      const bool names =
+          (refused_for(asking.capability) ||
+           (asking.capability == &Capabilities::mixed && refused_for(&Capabilities::regions))) &&
+          said.find("quasi_static") != std::string::npos && said.find('\n') == std::string::npos;
       check(broken, names, "materials",
             "says '" + said + "' where it is asked for one that " + name);
       continue;

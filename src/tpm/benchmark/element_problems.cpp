@@ -20,8 +20,7 @@ struct PosedBond {
 
 /// The paper's springs with a dashpot.
 BondElement material_of(double eta1_Pa_s) {
-  const BondElement paper = paper_element();
-  return paper.with_relaxation_time(paper.relaxation_time_s() * eta1_Pa_s / kPaperEta1_Pa_s);
+  return paper_element(eta1_Pa_s / kPaperSprings_Pa);
 }
 
 PosedBond posed_bond(double eta1_Pa_s, const Protocol& protocol, std::vector<double> times_s) {

@@ -4,7 +4,9 @@
 namespace tpm {
 
 /// eta1 of the README's first fit, `tpm fit configs/liver_relaxation.json`.
-inline constexpr double kPaperEta1_Pa_s = 5.0, kFittedEta1_Pa_s = 257.3e3;
+inline constexpr double kFittedEta1_Pa_s = 257.3e3;
+/// The paper's eta1, and its E1 + E2.
+inline constexpr double kPaperEta1_Pa_s = 5.0, kPaperSprings_Pa = 24e3;
 
 /// Ramp and hold of one bond at the paper's eta1.
 [[nodiscard]] BenchmarkProblem bond_paper_problem();

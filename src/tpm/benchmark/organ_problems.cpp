@@ -26,8 +26,7 @@ constexpr double kMovingPoke_s = 0.2;
 /// The paper's liver with another dashpot.
 Tissue liver(double eta1_Pa_s = kPaperEta1_Pa_s) {
   Tissue tissue = read_tissue(share_dir() / "configs" / "liver_scene.json");
-  BondMaterial::Branch& branch = tissue.materials.materials.front().branches.front();
-  branch.relaxation_time_s *= eta1_Pa_s / kPaperEta1_Pa_s;
+  set_value(tissue.materials.materials.front(), "tau1", eta1_Pa_s / kPaperSprings_Pa, "liver");
   return tissue;
 }
 
