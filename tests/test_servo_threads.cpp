@@ -108,7 +108,7 @@ TEST_CASE(
     const test::TempFolder folder;
     const std::string events = folder / "events";
     write_file(folder / "script",
-               hand_in_place(folder) + "events " + events + "\nfault hang 350 800\n");
+               hand_in_place(folder) + "events " + events + "\nfault hang 350 2000\n");
     (void)setenv("TPM_STAND_IN_SCRIPT", (folder / "script").c_str(), 1);
     HilSession session = patient_session();
     session.hang_limit_s = 0.006;
@@ -123,7 +123,7 @@ TEST_CASE(
     const HilRecording recording = read_recording(folder / "r");
     CHECK(recording.closed);
     CHECK(recording.closing.at("cause") == "hang");
-    CHECK(took.count() < 0.8);
+    CHECK(took.count() < 2.0);  // the call itself takes as long
     const long long hung = event_ns(events, "hang"), off = event_ns(events, "forces_off");
     if (hung > 0 && off > hung) {  // else the machine itself hung before
       best_ms = std::min(best_ms, 1e-6 * static_cast<double>(off - hung));
