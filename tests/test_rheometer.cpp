@@ -140,7 +140,8 @@ TEST_CASE("A length needs the length at rest, a force the cross section", "[rheo
   CHECK(file.recording.drive_quantity == Quantity::relative_length);
   CHECK_THAT(file.recording.drive.back(), WithinRel(1.05, 1e-9));
   CHECK_THAT(file.recording.response.back(), WithinRel(stress.tail(1)[0], 1e-9));
-  CHECK_THAT(columns_words(file.findings), Contains("mm to relative_length by a length at rest of 20 mm"));
+  CHECK_THAT(columns_words(file.findings),
+             Contains("mm to relative_length by a length at rest of 20 mm"));
 
   write_file(folder / "d.csv", tension_csv("time [s],extension [mm],stress [Pa]\n", 20.0, 1.0));
   CHECK_THROWS_WITH(read_recording_file(folder / "d.csv"),

@@ -23,7 +23,7 @@ namespace tpm {
 /// Nothing where the load does not press, for infinite times, and for laws with a dashpot or
 /// without tension.
 [[nodiscard]] std::optional<Response> creep_with_tension(const LawAtParameters& law, double load,
-                                                         std::span<const double> times_s,
-                                                         Want want, int* attempts = nullptr);
+                                                         std::span<const double> times_s, Want want,
+                                                         int* attempts = nullptr);
 
 }  // namespace tpm

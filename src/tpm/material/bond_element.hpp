@@ -47,7 +47,8 @@ struct BondElement : BondMaterial {
   [[nodiscard]] double relaxation_time_s() const;
   /// The same moduli with another relaxation time of the first branch, which there must be.
   [[nodiscard]] BondElement with_relaxation_time(double time_s) const;
-  /// One linear branch, and lateral bonds that do not relax (they are stretched alone: ropes will do).
+  /// One linear branch, and lateral bonds that do not relax (they are stretched alone: ropes will
+  /// do).
   [[nodiscard]] bool has_one_branch() const;
 };
 

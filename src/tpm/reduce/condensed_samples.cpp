@@ -184,8 +184,8 @@ CondensedSample CondensedSampler::sample_at(const Eigen::Vector3d& u_m) {
   sample.u_m = u_m;
   sample.w_m = relaxed_.contact;
   // All branches alike.
-  sample.energy_J = bonds_.stored_energy_J(latest_.position,
-                                           memory_.offset.replicate(1, bonds_.most_branches()));
+  sample.energy_J =
+      bonds_.stored_energy_J(latest_.position, memory_.offset.replicate(1, bonds_.most_branches()));
   Eigen::Matrix3Xd force = no_load_;
   bonds_.add_forces(latest_.position, memory_, force);
   sample.by_u_N = -force.col(contact_);
