@@ -137,6 +137,7 @@ std::vector<JpkSegment> read_jpk_segments(const ZipArchive& archive, const Prope
 
 std::vector<RecordedSegment> recorded(const std::vector<JpkSegment>& segments) {
   std::vector<RecordedSegment> words;
+  words.reserve(segments.size());
   for (const JpkSegment& segment : segments) words.push_back(segment.what);
   return words;
 }
