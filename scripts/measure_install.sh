@@ -65,7 +65,7 @@ inside "apt-get -qq -y --no-install-recommends --download-only install $wanted" 
   { tail -n 5 "$cache/apt.log" >&2; die "apt-get could not download"; }
 echo "download: $(seconds "$start") s"
 start=$(date +%s.%N)
-inside "apt-get -qq -y --no-install-recommends --no-download install $wanted" >"$cache/apt.log" 2>&1 ||
+inside "apt-get -qq -y --no-install-recommends install $wanted" >"$cache/apt.log" 2>&1 ||
   { tail -n 5 "$cache/apt.log" >&2; die "apt-get could not install"; }
 echo "installation: $(seconds "$start") s, $(($(inside "dpkg-query -f '.\n' -W | wc -l") - before)) packages"
 for compiler in cc gcc g++ c++ clang; do
