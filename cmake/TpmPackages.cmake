@@ -45,7 +45,7 @@ tpm_package(development libtpmkit-dev libdevel "soft-tissue models, files for de
   "Headers, static library and CMake package of tpmkit, and the header of its C interface for haptic loops."
   "libtpmkit-haptics1 (= ${PROJECT_VERSION})" libeigen3-dev nlohmann-json3-dev libfmt-dev libceres-dev
   libsundials-dev libhdf5-dev libcsv-dev libmuparser-dev libcpp-httplib-dev libassimp-dev libssl-dev libtbb-dev
-  zlib1g-dev)
+  libdeflate-dev libmetis-dev libminizip-dev zlib1g-dev)
 tpm_package(python python3-tpmkit python "soft-tissue models from Python"
   "The package tpmkit: fits as DataFrames, laws and protocols, contacts stepped, scenes and sweeps as xarray."
   "tpmkit (= ${PROJECT_VERSION})" "python3 (>= 3.11)" "python3 (<< 3.12)" python3-numpy python3-pandas python3-xarray)

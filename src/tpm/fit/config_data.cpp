@@ -113,6 +113,10 @@ ImportOptions parse_import(const Json& j, const DocumentPlace& place) {
   if (j.contains("rest_length")) {
     import.rest_length_m = quantity_at(j, "rest_length", Dimension::length, place);
   }
+  if (j.contains("spring_constant")) {
+    import.spring_constant_N_per_m = quantity_at(j, "spring_constant", Dimension::stiffness, place);
+  }
+  import.segments = j.value("segments", std::vector<std::string>());
   if (j.contains("area")) import.area_m2 = quantity_at(j, "area", Dimension::area, place);
   if (j.contains("units")) {
     for (const auto& [column, unit] : j.at("units").items()) {
