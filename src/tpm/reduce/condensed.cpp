@@ -9,6 +9,7 @@
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
+#include "tpm/reduce/condensed_lag.hpp"
 #include "tpm/reduce/condensed_phi.hpp"
 
 namespace tpm {
@@ -164,7 +165,9 @@ ContactAnswer CondensedContact::step(const ToolPose& tool) noexcept {
   const double aside = aside_m / fit_->frame.tangential_m;
   answer.error_N = (kMisfitAlong + aside * aside) * fit_->fit_error_N +
                    kSecondModeError * (fit_->coupling_along * std::abs(q[0]) +
-                                       fit_->coupling_across * across(q[1], q[2]));
+                                       fit_->coupling_across * across(q[1], q[2])) +
+                   fit_->lag_error_N * condensed_lag(u, Eigen::Vector3d::Map(&state_.memory[0]),
+                                                     2.0 * fit_->frame.half_depth_m);
   answer.trusted = u[0] >= fit_->least_depth_m && u[0] <= fit_->most_depth_m &&
                    place_aside_m <= fit_->most_tangential_m;
   return answer;

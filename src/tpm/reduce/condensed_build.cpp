@@ -8,6 +8,7 @@
 #include "tpm/network/material_refusal.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
+#include "tpm/reduce/condensed_lag.hpp"
 
 namespace tpm {
 namespace {
@@ -147,7 +148,9 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   fit->tables = condensed_tables(fit->frame, potential, CondensedMatrices(fit->frame, metrics));
   fit->fit_error_N = potential.worst_N();
   fit->field = CondensedField(fit->frame, rest, samples, metrics);
-  return {fit, std::move(branches), options.period_s};
+  CondensedContact model{fit, std::move(branches), options.period_s};
+  fit->lag_error_N = condensed_lag_error_N(model, *fit, bonds, rest, freedom, into_tissue);
+  return model;
 }
 
 }  // namespace tpm

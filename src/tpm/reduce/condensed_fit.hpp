@@ -46,6 +46,7 @@ struct CondensedFit {
   CondensedField field;
   Eigen::Index contact = 0;
   double fit_error_N = 0.0;  ///< largest difference of force from a sample
+  double lag_error_N = 0.0;  ///< per condensed_lag(), found by condensed_lag_error_N()
   /// Largest coupling to the second mode over the range, N/m: along the push and across.
   double coupling_along = 0.0, coupling_across = 0.0;
   Eigen::Matrix3d mean_metric = Eigen::Matrix3d::Zero();    ///< of w over the samples

@@ -8,6 +8,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/local_support.hpp"
+#include "tpm/network/material_refusal.hpp"
 #include "tpm/network/rigidity.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/store/file.hpp"
@@ -74,12 +75,18 @@ bool Tissue::is_element() const {
 BondElement Tissue::element(std::string_view user) const {
   if (is_element()) return {materials.materials.front(), network.organ.spacing};
   const bool regions = materials.materials.size() > 1 || materials.factor.size() > 0;
+  std::vector<MaterialNeed> needs = needs_of(bonds());
+  for (const MaterialNeed need : needs_of(materials)) needs.push_back(need);
   throw bad_input(
       "material",
       fmt::format("{} takes the paper's element alone, and this material has {}", user,
                   regions ? "regions" : "laws of its own"),
-      "E1, E2, Eprime and eta1, or a formulation that takes it: quasi_static, inertial, "
-      "static");
+      fmt::format("E1, E2, Eprime and eta1, or a formulation that takes it: {}",
+                  formulations_that([&](const Formulation& formulation) {
+                    return formulation.can().network &&
+                           std::all_of(needs.begin(), needs.end(),
+                                       [&](MaterialNeed need) { return formulation.can().*need; });
+                  })));
 }
 
 Freedom Tissue::freedom() const {
