@@ -47,6 +47,7 @@ PredictionOptions prediction_options(const PredictOptions& options) {
 
 int predict(const PredictOptions& options, const Session& session) {
   will_write_into(options.folder, {"prediction.csv", "prediction.json", "figures.json"});
+  const auto csv = csv_beside(options.output, session);
   const LawFile law = read_law(options.law);
   const PredictionOptions chosen = prediction_options(options);
   const auto file = chosen_protocol(options.ramp, options.recordings.files);
@@ -72,6 +73,7 @@ int predict(const PredictOptions& options, const Session& session) {
     }
   }
   deliver(text, options.output);
+  deliver_csv(to_csv(prediction), csv);
   return 0;
 }
 
@@ -103,7 +105,8 @@ void add_predict_command(CLI::App& app, Session& session) {
                     "Say whether the law predicts the recording, by the rule of tpm select");
   command->add_option("--folder", options->folder,
                       "Write prediction.csv, prediction.json and the figure into this folder");
-  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command->add_option("-o,--output", options->output,
+                      "Write here instead of to the terminal; beside JSON the table as .csv");
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);
   command->footer(

@@ -3,16 +3,17 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpm/fit/fit.hpp"
 #include "tpm/law/law_model.hpp"
 
 namespace tpm {
@@ -27,10 +28,9 @@ Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance) {
   // Scaled to correlations first: parameters differ by many orders of magnitude.
   const Eigen::VectorXd sd = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   const Eigen::VectorXd inverse = (sd.array() > 0.0).select(sd.cwiseInverse(), 0.0);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse.asDiagonal() * covariance *
-                                                             inverse.asDiagonal());
-  return sd.asDiagonal() * eigen.eigenvectors() *
-         eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const SymmetricModes modes =
+      symmetric_modes(inverse.asDiagonal() * covariance * inverse.asDiagonal());
+  return sd.asDiagonal() * modes.vectors * modes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 /// The uncertain coordinates of a prediction and the root of their covariance. Contact and offset

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/least_squares.hpp"
@@ -318,7 +318,7 @@ void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile
   const LawScatter scatter = scatter_of(law, motion);
   const Eigen::MatrixXd j = jacobian(Eigen::all, free);
   const Eigen::MatrixXd gram = j.transpose() * j;
-  const Eigen::MatrixXd d = gram.ldlt().solve(j.transpose() * scatter.slopes);
+  const Eigen::MatrixXd d = solve_symmetric(gram, j.transpose() * scatter.slopes);
   m.covariance = Eigen::MatrixXd::Zero(std::ssize(natural), std::ssize(natural));
   m.covariance(free, free) = d * scatter.covariance * d.transpose();
   m.level = law.uncertainty->level;
