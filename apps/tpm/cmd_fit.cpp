@@ -182,7 +182,8 @@ std::vector<std::string> recordings_in(const std::filesystem::path& folder) {
   }
   std::sort(files.begin(), files.end());
   if (files.empty()) {
-    throw bad_input(folder.string(), "no recording", "files that end in .csv, .txt, .tsv or .jpk-force");
+    throw bad_input(folder.string(), "no recording",
+                    "files that end in .csv, .txt, .tsv or .jpk-force");
   }
   return files;
 }
