@@ -41,8 +41,11 @@ std::vector<Tag> tags_of(const std::string& text) {
       at = end + 3;
       continue;
     }
-    const std::size_t end = text.find('>', at);
-    require(end != std::string::npos, "tag without an end");
+    std::size_t end = at;
+    for (bool quoted = false; end < text.size() && (quoted || text[end] != '>'); ++end) {
+      if (text[end] == '"') quoted = !quoted;
+    }
+    require(end < text.size(), "tag without an end");
     if (text[at + 1] == '/') {
       require(!open.empty() && text.substr(at + 2, end - at - 2) == open.back(), "closing tag");
       open.pop_back();
@@ -265,7 +268,7 @@ TEST_CASE("what an engine cannot say of an organ is said in the text and beside 
 
 TEST_CASE("ropes and guides reach the engines that know them") {
   Json scene = exported_scene();
-  scene["bonds"]["lateral"] = "tension_only";
+  scene["bonds"]["lateral"] = "rope";
   scene["material"].erase("branches");
   const std::size_t contact = *exported_tissue().network.organ.contact;
   scene["guides"] = Json::array({contact + 1});

@@ -43,14 +43,26 @@ Json prediction_liver() {
                          "anchors": [{"kind": "far_side"}], "contacts": [{"kind": "sphere"}]})");
 }
 
+/// The paper's star: four spheres, quick enough for many fits.
+Json prediction_star() {
+  return Json::parse(R"({"organ": {"kind": "star"}, "contacts": [{"kind": "sphere"}]})");
+}
+
 MaterialMotion fitted_ramp() {
   std::vector<double> times;
   for (int i = 0; i <= 24; ++i) times.push_back(0.25 * i);
   return motion_of_protocol(ramp_and_hold(2e-3, 2e-3, 5.0), times);
 }
 
-OrganMaterial fitted_organ(const LawFile& law) {
-  return put_on_organ(law, fitted_ramp(), prediction_liver(), "test", {}, {});
+OrganMaterial fitted_star(const LawFile& law) {
+  return put_on_organ(law, fitted_ramp(), prediction_star(), "test", {}, {});
+}
+
+/// A liver of 60 spheres, fitted once.
+const OrganMaterial& fitted_organ() {
+  static const OrganMaterial once =
+      put_on_organ(uncertain_law(), fitted_ramp(), prediction_liver(), "test", {}, {});
+  return once;
 }
 
 const std::vector<double> kAskedTimes{0.2, 0.5, 1.0, 2.0, 5.0};
@@ -65,7 +77,7 @@ LawPrediction predicted(const OrganOfLaw& organ, const PredictionOptions& option
 TEST_CASE("the band of an organ is what organs fitted to drawn laws scatter by") {
   const LawFile law = uncertain_law();
   const LawUncertainty& u = *law.uncertainty;
-  const LawPrediction p = predicted(organ_of_law(fitted_organ(law), "test"));
+  const LawPrediction p = predicted(organ_of_law(fitted_star(law), "test"));
   const Eigen::MatrixXd root = u.covariance.llt().matrixL();
   constexpr int kDraws = 60;
   Random random(7);
@@ -82,7 +94,7 @@ TEST_CASE("the band of an organ is what organs fitted to drawn laws scatter by")
                                                moved[static_cast<Eigen::Index>(k)]);
     }
     answers.col(draw) =
-        Eigen::VectorXd::Map(predicted(organ_of_law(fitted_organ(other), "test")).response.data(),
+        Eigen::VectorXd::Map(predicted(organ_of_law(fitted_star(other), "test")).response.data(),
                              std::ssize(kAskedTimes));
   }
   const Eigen::VectorXd mean = answers.rowwise().mean();
@@ -98,15 +110,15 @@ TEST_CASE("the band of an organ is what organs fitted to drawn laws scatter by")
 }
 
 TEST_CASE("samples and derivatives give an organ one band") {
-  const OrganOfLaw organ = organ_of_law(fitted_organ(uncertain_law()), "test");
+  const OrganOfLaw organ = organ_of_law(fitted_organ(), "test");
   const LawPrediction by_derivatives = predicted(organ);
   PredictionOptions options;
-  options.samples = 200;
+  options.samples = 100;
   options.seed = 3;
   const LawPrediction by_samples = predicted(organ, options);
   for (std::size_t i = 0; i < kAskedTimes.size(); ++i) {
     const double half = by_derivatives.mean_upper[i] - by_derivatives.response[i];
-    CHECK(by_samples.mean_upper[i] - by_samples.mean_lower[i] == Approx(2.0 * half).epsilon(0.25));
+    CHECK(by_samples.mean_upper[i] - by_samples.mean_lower[i] == Approx(2.0 * half).epsilon(0.35));
   }
   CHECK(by_derivatives.organ_spheres == 60);
   CHECK(by_derivatives.reading_upper[2] - by_derivatives.mean_upper[2] > 0.0);
@@ -132,7 +144,7 @@ TEST_CASE("a small depth on an organ has the law's band") {
 TEST_CASE("the written files carry the covariance, and only for their own tissue") {
   const auto folder = std::filesystem::temp_directory_path() / "tpm_organ_prediction";
   std::filesystem::remove_all(folder);
-  const OrganMaterial m = fitted_organ(uncertain_law());
+  const OrganMaterial m = fitted_organ();
   write_file(folder / "scene.json", to_text(m.scene));
   const auto scene = (folder / "scene.json").string();
   CHECK_THAT(test::refusal_of([&] { (void)read_organ_of_law(scene); }),
@@ -153,14 +165,14 @@ TEST_CASE("the written files carry the covariance, and only for their own tissue
              Contains("differs from the scene that was fitted"));
   LawFile certain = uncertain_law();
   certain.uncertainty.reset();
-  CHECK_THAT(test::refusal_of([&] { (void)organ_of_law(fitted_organ(certain), "test"); }),
+  CHECK_THAT(test::refusal_of([&] { (void)organ_of_law(fitted_star(certain), "test"); }),
              Contains("carries no uncertainty"));
   std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("an organ beside a recording finds its contact and offset") {
   const LawFile law = uncertain_law();
-  const OrganOfLaw organ = organ_of_law(fitted_organ(law), "test");
+  const OrganOfLaw organ = organ_of_law(fitted_organ(), "test");
   constexpr double kContact = 4.5e-4, kOffset = -0.013, kDepth = 3e-3;
   std::vector<double> own = law.values;
   own[5] = kContact;
@@ -186,7 +198,7 @@ TEST_CASE("an organ beside a recording finds its contact and offset") {
 }
 
 TEST_CASE("an organ under a load has no contact and offset") {
-  const OrganOfLaw organ = organ_of_law(fitted_organ(uncertain_law()), "test");
+  const OrganOfLaw organ = organ_of_law(fitted_organ(), "test");
   const Protocol load = creep(0.1, 5.0);
   const LawPrediction p = predict_organ(organ, load, kAskedTimes, {});
   CHECK(p.response.back() > p.response.front());

@@ -211,7 +211,8 @@ std::vector<std::string> organ_export_warnings(const Tissue& tissue,
   } else if (relaxing > 0.0) {
     warnings.push_back(fmt::format(
         "relaxation branches: bonds are a spring with a damper beside it, right for motions slow "
-        "against {} s; the instantaneous stiffness, {} times this one, is not bounded by it",
+        "against {} s; in faster ones its force grows without limit, but the tissue's stiffness to "
+        "{} times this one only",
         significant(system.shortest_relaxation_time_s(), 3),
         significant(whole / (whole - relaxing), 3)));
   }

@@ -252,12 +252,12 @@ namespace {
 OwnPlacement place_on_organ(const OrganOfLaw& organ, const PreparedRecording& recording,
                             const Protocol& motion) {
   constexpr int kMostSteps = 12;
-  constexpr std::size_t kMostTimes = 200;
+  constexpr std::size_t kMostPlacedTimes = 200;
   constexpr double kSmall = 1e-6;  // of the largest depth
   OwnPlacement own = place_recording(organ.law(), recording);
   const Recording& r = recording.recording;
   std::vector<double> times, observed;
-  const std::size_t stride = 1 + r.time_s.size() / kMostTimes;
+  const std::size_t stride = 1 + r.time_s.size() / kMostPlacedTimes;
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
     if (r.time_s[i] < recording.from_s || r.time_s[i] > motion.end_s()) continue;
     times.push_back(r.time_s[i]);
