@@ -9,6 +9,6 @@ FROM debian:12-slim
 COPY --from=build /src/dist /debs
 RUN apt-get update \
  && apt-get install -y --no-install-recommends /debs/tpmkit_*.deb /debs/libtpmkit-haptics1_*.deb \
-      /debs/python3-tpmkit_*.deb python3-numpy python3-matplotlib python3-h5py python3-h5netcdf \
+      /debs/python3-tpmkit_*.deb python3-numpy python3-munkres python3-matplotlib python3-h5py python3-h5netcdf \
  && rm -rf /debs /var/lib/apt/lists/*
 CMD ["tpm", "--help"]

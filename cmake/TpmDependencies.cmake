@@ -62,6 +62,9 @@ mark_as_advanced(TPM_CSV_INCLUDE TPM_CSV_LIBRARY)
 find_path(TPM_DEFLATE_INCLUDE libdeflate.h REQUIRED)
 find_library(TPM_DEFLATE_LIBRARY deflate REQUIRED)
 mark_as_advanced(TPM_DEFLATE_INCLUDE TPM_DEFLATE_LIBRARY)
+find_path(TPM_MINIZIP_INCLUDE minizip/unzip.h REQUIRED)  # comes with Assimp
+find_library(TPM_MINIZIP_LIBRARY minizip REQUIRED)
+mark_as_advanced(TPM_MINIZIP_INCLUDE TPM_MINIZIP_LIBRARY)
 
 # METIS 5 has no CMake package; its header says how wide its integers are.
 find_path(TPM_METIS_INCLUDE metis.h REQUIRED)
@@ -96,6 +99,9 @@ target_link_libraries(tpm_csv INTERFACE ${TPM_CSV_LIBRARY})
 add_library(tpm_deflate INTERFACE IMPORTED)
 target_include_directories(tpm_deflate INTERFACE ${TPM_DEFLATE_INCLUDE})
 target_link_libraries(tpm_deflate INTERFACE ${TPM_DEFLATE_LIBRARY})
+add_library(tpm_minizip INTERFACE IMPORTED)
+target_include_directories(tpm_minizip INTERFACE ${TPM_MINIZIP_INCLUDE})
+target_link_libraries(tpm_minizip INTERFACE ${TPM_MINIZIP_LIBRARY})
 
 add_library(tpm_metis INTERFACE IMPORTED)
 target_include_directories(tpm_metis INTERFACE ${TPM_METIS_INCLUDE})

@@ -2,9 +2,9 @@
 # comes from a library that is there (TPM_FUZZ_ARCHIVE). What is in both is taken from here, because it stands first.
 set(readers_core error text units)
 set(readers_store check_sum contained delimited document_place file file_roles hdf5_contents hdf5_driver hdf5_handle
-    hdf5_reader json row_log schema seal)
-set(readers_curve assemble description drive_pieces header_words import import_digitizer import_machine import_wpd_json
-    recording_file rows)
+    hdf5_reader json row_log schema seal zip_archive)
+set(readers_curve assemble contact description drive_pieces header_words import import_digitizer import_jpk import_machine import_wpd_json
+    jpk_channel jpk_properties recording_file rows)
 set(readers_law law_file)
 set(readers_network mesh_file mesh_surface triangle_mesh)
 set(readers_scene contact_blocks experiment_blocks experiment_scene material_block organ_block place_function protocol_file scene

@@ -1,6 +1,6 @@
 # Debian packages (cpack), with manual pages and completion made from what the commands say of themselves:
 #     cmake --preset release -DTPM_PACKAGES=ON -DTPM_PYTHON=ON -DCMAKE_INSTALL_LIBDIR=lib/x86_64-linux-gnu
-#                            -DTPM_PYTHON_INSTALL=lib/python3/dist-packages
+#                            -DTPM_PYTHON_INSTALL:STRING=lib/python3/dist-packages
 # scripts/packages_debian.sh does so.
 option(TPM_PACKAGES "Manual pages, shell completion and cpack" OFF)
 if(NOT TPM_PACKAGES)
@@ -24,7 +24,7 @@ find_program(TPM_GZIP gzip REQUIRED)
 set(TPM_CHANGELOG ${PROJECT_BINARY_DIR}/changelog.gz)
 execute_process(COMMAND ${TPM_GZIP} -9nc ${PROJECT_SOURCE_DIR}/packaging/changelog OUTPUT_FILE ${TPM_CHANGELOG}
                 COMMAND_ERROR_IS_FATAL ANY)
-# tpm_package(COMPONENT NAME SECTION SUMMARY DESCRIPTION DEPENDS...)
+# tpm_package(COMPONENT NAME SECTION SUMMARY DESCRIPTION DEPENDS...); lines of DESCRIPTION are kept
 function(tpm_package component name section summary description)
   string(TOUPPER ${component} upper)
   string(REPLACE ";" ", " depends "${ARGN}")
@@ -36,24 +36,30 @@ function(tpm_package component name section summary description)
   set(CPACK_COMPONENT_${upper}_DESCRIPTION "${summary}\n${description}" PARENT_SCOPE)
 endfunction()
 tpm_package(program tpmkit science "soft-tissue models: fitting, simulation, haptic loop"
-  "The program tpm: laws from recordings with intervals and verdicts, organs of spheres, sweeps, sessions with a haptic device."
+  "The program tpm: laws from recordings with intervals and verdicts, organs
+of spheres, sweeps, sessions with a haptic device."
   python3)
 tpm_package(library libtpmkit-haptics1 libs "soft tissue for haptic loops, C interface"
-  "The library that steps a contact of tpmkit within a servo loop, without allocation, lock or exception. Sessions are checked with the schemas of the package tpmkit."
+  "The library that steps a contact of tpmkit within a servo loop, without
+allocation, lock or exception. Sessions are checked with the schemas of the
+package tpmkit."
   "tpmkit (= ${PROJECT_VERSION})")
 tpm_package(development libtpmkit-dev libdevel "soft-tissue models, files for development"
-  "Headers, static library and CMake package of tpmkit, and the header of its C interface for haptic loops."
+  "Headers, static library and CMake package of tpmkit, and the header of its C
+interface for haptic loops."
   "libtpmkit-haptics1 (= ${PROJECT_VERSION})" libeigen3-dev nlohmann-json3-dev libfmt-dev libceres-dev
   libsundials-dev libhdf5-dev libcsv-dev libmuparser-dev libcpp-httplib-dev libassimp-dev libssl-dev libtbb-dev
-  zlib1g-dev)
+  libdeflate-dev libmetis-dev libminizip-dev zlib1g-dev)
 tpm_package(python python3-tpmkit python "soft-tissue models from Python"
-  "The package tpmkit: fits as DataFrames, laws and protocols, contacts stepped, scenes and sweeps as xarray."
+  "The package tpmkit: fits as DataFrames, laws and protocols, contacts stepped,
+scenes and sweeps as xarray."
   "tpmkit (= ${PROJECT_VERSION})" "python3 (>= 3.11)" "python3 (<< 3.12)" python3-numpy python3-pandas python3-xarray)
 
 # cpack packs what was built and builds nothing: the tests are none of its business.
 set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME tpmkit)
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each package has its own
 set(CPACK_PACKAGE_VENDOR "The tpmkit authors")
 set(CPACK_PACKAGE_CONTACT "The tpmkit authors <authors@tpmkit.invalid>")
 # The program, the library and the module find their data from where they are, wherever that is.
@@ -68,7 +74,11 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)  # with it the trigger of ldconfig
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+# CPack calls ldconfig in scripts of its own, which Debian wants as a trigger: both do no harm.
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/triggers)
+install(FILES ${PROJECT_SOURCE_DIR}/packaging/lintian-overrides RENAME libtpmkit-haptics1
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides COMPONENT library)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "python3-numpy, python3-matplotlib")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "python3-matplotlib, python3-h5py, python3-h5netcdf")

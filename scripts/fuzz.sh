@@ -61,6 +61,7 @@ reader_of() {
     delimited_text) echo store/delimited.cpp ;;
     curve_description) echo curve/description.cpp ;;
     digitizer_project) echo curve/import_wpd_json.cpp ;;
+    jpk) echo curve/import_jpk.cpp ;;
     scene) echo scene/scene.cpp ;;
     fit) echo fit/config.cpp ;;
     fit_tables) echo fit/tables.cpp ;;

@@ -104,8 +104,8 @@ def cell(text):
 
 def kind_of(schema, definitions):
     if "$ref" in schema:
-        name = schema["$ref"].rsplit("/", 1)[-1]
-        return name
+        file, name = schema["$ref"].split("#/definitions/")
+        return f"[{name}]({file.removesuffix('.schema.json')}.md)" if file else name
     if "enum" in schema:
         return "one of " + ", ".join(f"`{v}`" for v in schema["enum"])
     if "const" in schema:

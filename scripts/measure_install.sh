@@ -57,7 +57,10 @@ inside() {
 }
 seconds() { awk -v from="$1" -v to="$(date +%s.%N)" 'BEGIN {printf "%.1f", to - from}'; }
 
-wanted="/debs/tpmkit_*.deb /debs/libtpmkit-haptics1_*.deb /debs/python3-tpmkit_*.deb python3-numpy python3-matplotlib"
+# Debian's matplotlib wants scipy, and with it g++, or munkres instead.
+wanted="/debs/tpmkit_*.deb /debs/libtpmkit-haptics1_*.deb /debs/python3-tpmkit_*.deb
+        python3-numpy python3-munkres python3-matplotlib"
+wanted=${wanted//$'\n'/ }
 inside "apt-get -qq update" || die "apt-get update failed"
 before=$(inside "dpkg-query -f '.\n' -W | wc -l")
 start=$(date +%s.%N)
@@ -65,7 +68,7 @@ inside "apt-get -qq -y --no-install-recommends --download-only install $wanted" 
   { tail -n 5 "$cache/apt.log" >&2; die "apt-get could not download"; }
 echo "download: $(seconds "$start") s"
 start=$(date +%s.%N)
-inside "apt-get -qq -y --no-install-recommends --no-download install $wanted" >"$cache/apt.log" 2>&1 ||
+inside "apt-get -qq -y --no-install-recommends install $wanted" >"$cache/apt.log" 2>&1 ||
   { tail -n 5 "$cache/apt.log" >&2; die "apt-get could not install"; }
 echo "installation: $(seconds "$start") s, $(($(inside "dpkg-query -f '.\n' -W | wc -l") - before)) packages"
 for compiler in cc gcc g++ c++ clang; do

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the Debian packages of this release into dist/: tpmkit (program), libtpmkit-haptics1 (library for
 # haptic loops), libtpmkit-dev (development), python3-tpmkit (Python); has lintian look at them, and fails
-# on its errors. Builds in build/release.
+# on its errors and warnings. Builds in build/release.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/install_packages.sh
@@ -11,7 +11,7 @@ unpack_headers "${packages_unpacked[@]}"
 
 step "building (build/release); some minutes the first time"
 folder=build/release
-configure release -DTPM_PACKAGES=ON -DTPM_PYTHON=ON -DTPM_PYTHON_INSTALL=lib/python3/dist-packages \
+configure release -DTPM_PACKAGES=ON -DTPM_PYTHON=ON -DTPM_PYTHON_INSTALL:STRING=lib/python3/dist-packages \
   "-DCMAKE_INSTALL_LIBDIR=lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)"
 build release tpm tpmkit tpmkit_haptics tpmkit_python command_help
 
@@ -22,6 +22,6 @@ mkdir -p dist
 mv "$folder"/*.deb dist/
 
 step "lintian"
-lintian --fail-on error --no-tag-display-limit dist/*.deb | sed 's/^/   /'
+lintian --fail-on error,warning --tag-display-limit 0 --allow-root dist/*.deb | sed 's/^/   /'
 step "done. The packages:"
 ls -1 "$PWD"/dist/*.deb

@@ -16,6 +16,7 @@
 #include <regex>
 
 #include "error_case.hpp"
+#include "jpk_error_cases.hpp"
 #include "material_error_cases.hpp"
 #include "organ_law_error_cases.hpp"
 #include "simulation_error_cases.hpp"
@@ -696,6 +697,7 @@ std::vector<ErrorCase> all_cases() {
                             machine_cases(),
                             spectrum_cases(),
                             digitizer_cases(),
+                            test::jpk_error_cases(),
                             hdf5_cases(),
                             fit_config_cases(),
                             oscillation_cases(),

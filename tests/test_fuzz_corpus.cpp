@@ -35,6 +35,7 @@ constexpr std::pair<const char*, const char*> kTaken[] = {
     {"design", "configs/design_meat.json"},
     {"costs", "tests/fuzz/corpus/costs/equal.json"},
     {"delimited_text", "tests/fuzz/corpus/delimited_text/ramp.csv"},
+    {"jpk", "tests/fuzz/corpus/jpk/shared.jpk-force"},
     {"recording", "tests/fuzz/corpus/recording/cut.tpmrec"},
     {"stl", "tests/fuzz/corpus/stl/tetrahedron.stl"},
     {"obj", "tests/fuzz/corpus/obj/tetrahedron.obj"},

@@ -129,6 +129,46 @@ TEST_CASE("contact is estimated where it was found in noise") {
   }
 }
 
+TEST_CASE("intervals follow the profile along a contact between few samples") {
+  // Independent: tpm fit minimises over all other parameters at each value of one.
+  LawSpec law = parse_law_name("linear-1", "test");
+  law.reference = 4e-3;
+  const SimulatedTest test = test::even_test(10.0, 0.02);
+  const Recording clean = simulated_recording(law, visible_parameters(law), test);
+  const double peak = *std::max_element(clean.response.begin(), clean.response.end());
+  Random random(11);
+  int wider = 0;
+  for (int i = 0; i < 12; ++i) {
+    Recording noisy = clean;
+    noisy.header.sha256 = "simulated";
+    test::add_noise(noisy, 0.02 * peak, 0.0, random);
+    const PreparedRecording recording = prepare_recording("simulated", noisy);
+    SetupOptions setup;
+    setup.reference = law.reference;
+    const std::span<const PreparedRecording> one(&recording, 1);
+    const FitResult fit = run_fit(recording_config(law, one, setup), data_sets(one));
+    SequentialSettings settings;
+    settings.reference = law.reference;
+    SequentialFit sequential(law, noisy.drive_quantity, noisy.response_quantity, settings);
+    for (std::size_t k = 0; k < noisy.time_s.size(); ++k) {
+      sequential.add(noisy.time_s[k], noisy.drive[k], noisy.response[k]);
+    }
+    const SequentialEstimate& end = sequential.estimate().value();
+    for (std::size_t k = 0; k < fit.parameters.size(); ++k) {
+      const SequentialParameter& p = end.parameters[k];
+      if (p.parameter.name != "k1" || end.phi > 0.02 || !fit.parameters[k].upper) continue;
+      const double plain = 1.96 * p.standard_error;
+      const double at = p.parameter.theta(fit.parameters[k].estimate);
+      const double fitted = p.parameter.theta(*fit.parameters[k].upper) - at;
+      const double found = p.parameter.theta(p.upper) - p.parameter.theta(p.estimate);
+      CAPTURE(i, fitted / plain, found / plain);
+      CHECK(found == Approx(fitted).epsilon(0.03));
+      if (fitted > 1.1 * plain) ++wider;
+    }
+  }
+  CHECK(wider >= 1);  // else nothing was tried
+}
+
 TEST_CASE("a contact that stands on a sample is not gone through again at every sample") {
   LawSpec law = parse_law_name("linear-1", "test");
   law.reference = 4e-3;

@@ -12,6 +12,7 @@
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/simulate/smoothness.hpp"
+#include "tpm/store/file.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;
@@ -336,6 +337,61 @@ TEST_CASE("a load that nothing carries is refused where the tissue gives way", "
              Contains("at t = 0 s and a load of 0.93") && Contains("buckles"));
 }
 
+TEST_CASE("lists of a session and of a design's candidates are protocols of the one parser") {
+  const DocumentPlace place{"f.json"};
+  const auto parsed = [&](const std::string& text) {
+    return parse_protocol_lists(parse_json(text, "f.json"), place, ProtocolKind::ramp_hold,
+                                Openness::complete, {{"rate", "rates"}}, {"rest"});
+  };
+  const std::vector<ProtocolBlock> all = parsed(
+      R"({"depth": ["1 mm", "2 mm"], "rates": ["1 mm/s", "4 mm/s"], "hold": "3 s", "rest": "1 s"})");
+  REQUIRE(all.size() == 4);
+  for (std::size_t i = 0; i < 4; ++i) {
+    CHECK(*all[i].depth_m == Approx(i < 2 ? 1e-3 : 2e-3));
+    CHECK(*all[i].rate_m_per_s == Approx(i % 2 == 0 ? 1e-3 : 4e-3));
+    CHECK(all[i].protocol(place).end_s() == Approx(*all[i].depth_m / *all[i].rate_m_per_s + 3.0));
+  }
+  struct Case {
+    const char *text, *expected;
+  };
+  for (const Case& c :
+       {Case{R"({"depth": ["1 mm", "0 mm"], "rates": "1 mm/s", "hold": "3 s"})",
+             "f.json: key /depth/1: 0 m; expected a value above 0"},
+        Case{R"({"depth": "1 mm", "rates": ["1 mm"], "hold": "3 s"})",
+             "f.json: key /rates/0: 'mm' is a unit of length"},
+        Case{R"({"depth": "1 mm", "hold": "3 s"})",
+             "key /rates: is missing; expected 'ramp_hold' needs depth, rates, hold"},
+        Case{R"({"depth": "1 mm", "rate": "1 mm/s", "hold": "3 s"})",
+             "key /rate: is no key of the kind 'ramp_hold'; expected depth, rates, hold, rest"}}) {
+    CHECK_THAT(refusal_of([&] { (void)parsed(c.text); }), Contains(c.expected));
+  }
+}
+
+TEST_CASE("every file with a protocol takes it from the one schema") {
+  for (const char* name : {"scene", "sweep", "fit", "design", "hil"}) {
+    CAPTURE(name);
+    const std::string text =
+        read_json(share_dir() / "schemas" / (std::string(name) + ".schema.json")).dump();
+    CHECK(text.find("protocol.schema.json#/definitions/") != std::string::npos);
+    CHECK(text.find("\"knots\":") == std::string::npos);
+  }
+  const auto scene_with = [](const std::string& protocol) {
+    return refusal_of([&] {
+      check_schema(parse_json(R"({"organ": {"kind": "star"}, "protocol": )" + protocol + "}", "s"),
+                   "scene", "s.json");
+    });
+  };
+  CHECK_THAT(
+      scene_with(R"({"kind": "creep", "load": 1})"),
+      Contains("s.json: key /protocol/load: is of the wrong type; expected JSON type string"));
+  CHECK_THAT(scene_with(R"({"kind": "poke"})"),
+             Contains("expected one of ramp_hold, step_hold, creep, knots"));
+  CHECK_THAT(scene_with(R"({"kind": "knots", "knots": [{"depth": "1 mm"}, {"time": "1 s"}]})"),
+             Contains("key /protocol/knots/0/time: is missing"));
+  CHECK_THAT(scene_with(R"({"kind": "creep", "lode": "1 N"})"),
+             Contains("key /protocol/lode: unknown key; expected one of kind, depth, rate, hold"));
+}
+
 TEST_CASE("one table says what protocols need, for scenes and for what sets the open numbers") {
   const DocumentPlace place{"f.json"};
   const auto parsed = [&](const std::string& text, Openness openness) {
@@ -344,7 +400,7 @@ TEST_CASE("one table says what protocols need, for scenes and for what sets the 
   ProtocolBlock open = parsed(R"({"kind": "ramp_hold", "hold": "2 s"})", Openness::open);
   CHECK_FALSE(open.depth_m);
   CHECK_THAT(refusal_of([&] { (void)open.protocol(place); }),
-             Contains("key /depth: is missing; expected 'ramp_hold' needs depth, rate, hold"));
+             Contains("key /depth: is missing; expected a depth for 'ramp_hold'"));
   *open.find("depth") = 4e-3;
   *open.find("rate") = 2e-3;
   CHECK(open.find("load") == nullptr);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "counted_allocations.hpp"
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/surface_scene.hpp"

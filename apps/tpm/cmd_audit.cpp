@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "command.hpp"
+#include "tpm/report/json_table_csv.hpp"
 #include "tpm/report/study_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/audit.hpp"
@@ -20,10 +21,11 @@ struct AuditOptions {
 int run_command(const Session& session, const AuditOptions& options) {
   const auto path =
       options.claims.empty() ? paper_claims_path() : std::filesystem::path(options.claims);
+  const auto csv = csv_beside(options.output, session);
   const AuditReport report = run_audit(read_json(path), path.filename().string());
-  const std::string text =
-      session.json() ? to_text(to_json(report)) : audit_text(report, options.all);
-  deliver(text, options.output);
+  const Json json = to_json(report);
+  deliver(session.json() ? to_text(json) : audit_text(report, options.all), options.output);
+  deliver_csv(json_table_csv(json.at("findings"), "/details"), csv);
   return 0;
 }
 
@@ -35,7 +37,8 @@ void add_audit_command(CLI::App& app, Session& session) {
   const auto options = std::make_shared<AuditOptions>();
   command->add_option("claims", options->claims,
                       "Claims file (default: the paper's, data/paper_claims.json)");
-  command->add_option("-o,--output", options->output, "Write to this file instead of the terminal");
+  command->add_option("-o,--output", options->output,
+                      "Write here instead of to the terminal; beside JSON the table as .csv");
   command->add_flag("--all", options->all, "Also show the claims that hold");
   add_format_option(*command, session);
   command->footer(

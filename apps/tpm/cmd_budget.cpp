@@ -74,6 +74,7 @@ ErrorBudget budget_of_contact(const BudgetCommand& command, const LawFile& law) 
 
 int run_budget(const BudgetCommand& command, const Session& session) {
   will_write_into(command.folder, {"budget.json", "budget.csv", "figures.json"});
+  const auto csv = csv_beside(command.output, session);
   const LawFile law = read_law(command.law);
   const ErrorBudget budget =
       command.scene.empty() ? budget_of_contact(command, law) : budget_of_organ(command, law);
@@ -85,6 +86,7 @@ int run_budget(const BudgetCommand& command, const Session& session) {
     }
   }
   deliver(text, command.output);
+  deliver_csv(to_csv(budget), csv);
   return 0;
 }
 
@@ -123,7 +125,8 @@ void add_budget_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--folder", options->folder,
                       "Write budget.json, budget.csv and the waterfall into this folder");
-  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command->add_option("-o,--output", options->output,
+                      "Write here instead of to the terminal; beside JSON the table as .csv");
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);
   command->footer(

@@ -3,10 +3,12 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "command.hpp"
 #include "data_text.hpp"
 #include "tpm/core/error.hpp"
+#include "tpm/curve/description.hpp"
 #include "tpm/curve/load.hpp"
 #include "tpm/curve/pack.hpp"
 #include "tpm/store/json.hpp"
@@ -45,17 +47,28 @@ int list(const Session& session) {
   return 0;
 }
 
+/// The description beside a curve; none for an id or an HDF5 file.
+std::optional<CurveDescription> description_beside(const std::string& argument) {
+  const fs::path path = argument;
+  if (path.extension() != ".csv" && path.extension() != ".json") return std::nullopt;
+  return read_description(fs::path(path).replace_extension(".json"));
+}
+
 int show(const Session& session, const std::string& argument, bool all_rows) {
   const auto curves = load_all(argument);
+  const auto described = description_beside(argument);
+  const bool in_segments = described && !described->segments.empty();
   if (session.json()) {
     Json json = Json::array();
     for (const Curve& curve : curves) json.push_back(curve_json(curve));
+    if (in_segments) json.front()["segments"] = description_json(*described).at("segments");
     say("{}", to_text(is_packed(argument) ? json : json.front()));
     return 0;
   }
   for (std::size_t i = 0; i < curves.size(); ++i) {
     say("{}{}", i == 0 ? "" : "\n", curve_text(curves[i], all_rows));
   }
+  if (in_segments) say("\nsegments: {}\n", segments_words(described->segments));
   return 0;
 }
 
@@ -118,7 +131,9 @@ void add_show(CLI::App& data, Session& session) {
       "JSON, all numbers SI: id, kind, title, citation, doi, specimen, probe, note, sha256 and\n"
       "  points: observable, time_origin, time_provenance, data with label, depth_m, load_N,\n"
       "          time_s, force_N or depth_m (band: force_lower_N, force_upper_N), provenance\n"
-      "  recording: provenance, samples with time_s, depth_m, force_N, force_sd_N as lists\n"
+      "  recording: provenance, samples with time_s, depth_m, force_N, force_sd_N as lists; "
+      "segments\n"
+      "          with kind, control, samples if an instrument ran it in segments\n"
       "  spectrum: provenance, readings with frequency_Hz, storage_Pa, loss_Pa (or storage_N/m,\n"
       "          loss_N/m; storage_sd_Pa, loss_sd_Pa) as lists\n"
       "  values: values with name, quantity, unit_SI, value, lower, upper, provenance\n"

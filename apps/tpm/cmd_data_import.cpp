@@ -1,4 +1,5 @@
-// tpm data import: brings digitised figures and testing-machine exports into the project's form.
+// tpm data import: brings digitised figures, testing-machine exports and JPK force files into the
+// project's form.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -35,6 +36,8 @@ struct ImportArguments {
   std::string negate = "none";
   std::string contact_force;
   std::string contact_samples = "3";
+  std::string spring_constant;
+  std::vector<std::string> segments;
   std::string x, y, dataset, depth, load;
   std::string time_origin = "none";
   std::string provenance, title, citation, doi, specimen, probe_shape, probe_diameter, note;
@@ -111,6 +114,11 @@ ImportOptions options_of(const ImportArguments& arguments) {
         positive(arguments.contact_force, Dimension::force, "--contact-force");
   }
   options.contact_samples = parse_count(arguments.contact_samples, 1, "--contact-samples");
+  if (!arguments.spring_constant.empty()) {
+    options.spring_constant_N_per_m =
+        positive(arguments.spring_constant, Dimension::stiffness, "--spring-constant");
+  }
+  options.segments = arguments.segments;
   if (!arguments.x.empty()) options.x = parse_axis(arguments.x, "--x");
   if (!arguments.y.empty()) options.y = parse_axis(arguments.y, "--y");
   options.dataset = arguments.dataset;
@@ -254,8 +262,8 @@ int import_files(const Session& session, const ImportArguments& arguments) {
 }
 
 void add_text_options(CLI::App& command, ImportArguments& a) {
-  command.add_option("--from", a.from, "auto, machine, wpd-csv, wpd-json or engauge")
-      ->check(CLI::IsMember({"auto", "machine", "wpd-csv", "wpd-json", "engauge"}));
+  command.add_option("--from", a.from, "auto, machine, wpd-csv, wpd-json, engauge or jpk")
+      ->check(CLI::IsMember({"auto", "machine", "wpd-csv", "wpd-json", "engauge", "jpk"}));
   command.add_option("--separator", a.separator, "auto, comma, semicolon or tab")
       ->check(CLI::IsMember({"auto", "comma", "semicolon", "tab"}));
   command.add_option("--decimal", a.decimal, "Decimal sign: auto, point or comma")
@@ -289,6 +297,19 @@ void add_machine_options(CLI::App& command, ImportArguments& a) {
   add("--contact-samples", a.contact_samples, "Samples in a row that must reach it (3)");
 }
 
+void add_jpk_options(CLI::App& command, ImportArguments& a) {
+  const char* group = "JPK force files (--drive and --response name channels)";
+  command
+      .add_option("--spring-constant", a.spring_constant,
+                  "Of the cantilever instead of that of the file, such as \"0.05 N/m\"")
+      ->group(group);
+  command
+      .add_option("--segments", a.segments, "Kinds to read, such as extend,pause; all if left out")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->group(group);
+}
+
 void add_figure_options(CLI::App& command, ImportArguments& a) {
   const char* group = "Digitised figures";
   const auto add = [&](const char* name, std::string& target, const char* help) {
@@ -320,7 +341,8 @@ void add_description_options(CLI::App& command, ImportArguments& a) {
 }  // namespace
 
 void add_data_import_command(CLI::App& data, Session& session) {
-  CLI::App* command = data.add_subcommand("import", "Import digitised figures and machine exports");
+  CLI::App* command = data.add_subcommand(
+      "import", "Import digitised figures, machine exports and JPK force files");
   auto arguments = std::make_shared<ImportArguments>();
   command->add_option("files", arguments->files, "Files to import; sheets as several files")
       ->required();
@@ -330,6 +352,7 @@ void add_data_import_command(CLI::App& data, Session& session) {
   command->add_flag("--force", arguments->force, "Replace files that exist");
   add_text_options(*command, *arguments);
   add_machine_options(*command, *arguments);
+  add_jpk_options(*command, *arguments);
   add_figure_options(*command, *arguments);
   add_description_options(*command, *arguments);
   add_format_option(*command, session);
@@ -339,6 +362,9 @@ void add_data_import_command(CLI::App& data, Session& session) {
       "  tpm data import fig7.json -o mine/fig7 --x time:s --y contact_force:N --depth \"4 mm\" "
       "\\\n"
       "      --time-origin end_of_ramp\n"
+      "  tpm data import cell.jpk-force -o mine/cell --segments extend,pause "
+      "--probe-shape sphere \\\n"
+      "      --probe-diameter \"10 um\"\n"
       "JSON: a list of objects with source, csv (null if not written), id and understood\n"
       "(what was found in the file)");
   command->callback([&session, arguments] {

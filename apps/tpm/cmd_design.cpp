@@ -7,6 +7,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/report/design_figures.hpp"
 #include "tpm/report/draw.hpp"
+#include "tpm/report/json_table_csv.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/design.hpp"
 
@@ -33,6 +34,7 @@ int design(const DesignOptions& options, const Session& session) {
   const std::uint64_t seed = parse_whole_number(options.seed, "--seed", 0);
   const auto top = static_cast<std::size_t>(parse_whole_number(options.top, "--top", 1));
   will_write_into(options.folder, {"figures.json"});
+  const auto csv = csv_beside(options.output, session);
   const DesignResult result = plan(read_design(options.design));
   std::optional<DesignCheck> check;
   if (sets > 0) {
@@ -40,9 +42,9 @@ int design(const DesignOptions& options, const Session& session) {
   }
   const DesignCheck* checked = check ? &*check : nullptr;
   if (!options.folder.empty()) draw(result, options.folder);
-  deliver(session.json() ? to_text(to_json(result, checked, top))
-                         : to_terminal_text(result, checked, top),
-          options.output);
+  const Json json = to_json(result, checked, top);
+  deliver(session.json() ? to_text(json) : to_terminal_text(result, checked, top), options.output);
+  deliver_csv(json_table_csv(json.at("ranked"), "/expected/parameters"), csv);
   return 0;
 }
 
@@ -62,7 +64,8 @@ void add_design_command(CLI::App& app, Session& session) {
   command->add_option("--seed", options->seed, "Seed of the simulations")->capture_default_str();
   command->add_option("--top", options->top, "How many candidates to list")->capture_default_str();
   command->add_option("--draw", options->folder, "Write figures into this folder");
-  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command->add_option("-o,--output", options->output,
+                      "Write here instead of to the terminal; beside JSON the table as .csv");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm design configs/design_liver.json --draw out/design\n"

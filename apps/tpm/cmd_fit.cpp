@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <regex>
@@ -173,13 +174,15 @@ std::vector<std::string> recordings_in(const std::filesystem::path& folder) {
   std::vector<std::string> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string ending = entry.path().extension().string();
-    if (entry.is_regular_file() && (ending == ".csv" || ending == ".txt" || ending == ".tsv")) {
+    constexpr std::array kEndings{".csv", ".txt", ".tsv", ".jpk-force"};
+    const bool known = std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+    if (entry.is_regular_file() && known) {
       files.push_back(entry.path().string());
     }
   }
   std::sort(files.begin(), files.end());
   if (files.empty()) {
-    throw bad_input(folder.string(), "no recording", "files that end in .csv, .txt or .tsv");
+    throw bad_input(folder.string(), "no recording", "files that end in .csv, .txt, .tsv or .jpk-force");
   }
   return files;
 }

@@ -8,6 +8,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/report/hazard_report.hpp"
+#include "tpm/report/json_table_csv.hpp"
 
 namespace tpm::app {
 
@@ -19,12 +20,15 @@ struct HazardChoice {
 };
 
 int try_hazards(const HazardChoice& choice, const Session& session) {
+  const auto csv = csv_beside(choice.output, session);
   std::optional<Progress> progress;
   progress.emplace("hazards", choice.wall_clock ? clock_hazard_count() : hazard_count());
   const auto told = [&progress] { progress->advance(); };
   const auto answer = [&](const auto& study, const auto& as_json, const auto& as_text) {
     progress.reset();
-    deliver(session.json() ? to_text(as_json(study)) : as_text(study), choice.output);
+    const Json json = as_json(study);
+    deliver(session.json() ? to_text(json) : as_text(study), choice.output);
+    deliver_csv(json_table_csv(json.at("rows")), csv);
     return static_cast<int>(study.safe() ? ExitCode::success : ExitCode::answer_is_no);
   };
   if (choice.wall_clock) {
@@ -41,7 +45,8 @@ void add_hil_hazards_command(CLI::App& hil, Session& session) {
       "What can go wrong in a session, tried on the simulated device; exit code 1 if "
       "force, energy, travel or time leave their bounds");
   auto choice = std::make_shared<HazardChoice>();
-  command->add_option("-o,--output", choice->output, "File to write instead of the terminal");
+  command->add_option("-o,--output", choice->output,
+                      "Write here instead of to the terminal; beside JSON the table as .csv");
   command->add_flag("--wall-clock", choice->wall_clock,
                     "Those that take time of their own: hangs, stalls, interruptions; half a "
                     "minute, times differ from run to run");

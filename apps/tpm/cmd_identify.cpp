@@ -8,6 +8,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/units.hpp"
 #include "tpm/report/identification_report.hpp"
+#include "tpm/report/json_table_csv.hpp"
 #include "tpm/study/identification.hpp"
 #include "tpm/study/identified_loop.hpp"
 
@@ -46,6 +47,7 @@ IdentifyOptions identify_options(const IdentifyCommand& command, Quantity drive)
 
 int run_identify(const IdentifyCommand& command, const Session& session) {
   will_write_into(command.folder, {"identification.json", "law.json", "figures.json"});
+  const auto csv = csv_beside(command.output, session);
   const PreparedRecording recording = read_recordings(command.recordings).front();
   const Quantity drive = recording.recording.drive_quantity;
   const Identification id = identify(recording, identify_options(command, drive));
@@ -65,6 +67,7 @@ int run_identify(const IdentifyCommand& command, const Session& session) {
     }
   }
   deliver(text, command.output);
+  deliver_csv(json_table_csv(json.at("history"), "/parameters"), csv);
   return 0;
 }
 
@@ -96,7 +99,8 @@ void add_identify_command(CLI::App& app, Session& session) {
                     "Do not hand the laws over to a model in the loop");
   command->add_option("--folder", options->folder,
                       "Write identification.json, law.json and the figure into this folder");
-  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command->add_option("-o,--output", options->output,
+                      "Write here instead of to the terminal; beside JSON the table as .csv");
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);
   command->footer(

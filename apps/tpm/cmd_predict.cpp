@@ -64,6 +64,7 @@ LawPrediction answer_of(const std::string& subject, const std::optional<Protocol
 
 int predict(const PredictOptions& options, const Session& session) {
   will_write_into(options.folder, {"prediction.csv", "prediction.json", "figures.json"});
+  const auto csv = csv_beside(options.output, session);
   const PredictionOptions chosen = prediction_options(options);
   const auto file = chosen_protocol(options.ramp, options.recordings.files);
   std::optional<PreparedRecording> recording;
@@ -87,6 +88,7 @@ int predict(const PredictOptions& options, const Session& session) {
     }
   }
   deliver(text, options.output);
+  deliver_csv(to_csv(prediction), csv);
   return 0;
 }
 
@@ -122,7 +124,8 @@ void add_predict_command(CLI::App& app, Session& session) {
                     "Say whether the law predicts the recording, by the rule of tpm select");
   command->add_option("--folder", options->folder,
                       "Write prediction.csv, prediction.json and the figure into this folder");
-  command->add_option("-o,--output", options->output, "Write here instead of to the terminal");
+  command->add_option("-o,--output", options->output,
+                      "Write here instead of to the terminal; beside JSON the table as .csv");
   add_recording_options(*command, options->recordings);
   add_format_option(*command, session);
   command->footer(

@@ -44,6 +44,14 @@ void add_recording_options(CLI::App& command, RecordingOptions& options) {
   add("--rest-length", options.rest_length,
       "Unloaded length of a stretched specimen, for columns of its length or elongation");
   add("--area", options.area, "Cross section of that specimen, for a column of its force");
+  add("--spring-constant", options.spring_constant,
+      "JPK force files: of the cantilever, instead of that of the file");
+  command
+      .add_option("--segments", options.segments,
+                  "JPK force files: kinds to read, such as extend,pause; default: all")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->group("What the files do not say");
   command
       .add_flag("--negate-drive", options.negate_drive,
                 "The machine counts the imposed motion negative")
@@ -84,6 +92,9 @@ ImportOptions import_options(const RecordingOptions& options) {
   };
   import.rest_length_m = size(options.rest_length, Dimension::length, "--rest-length");
   import.area_m2 = size(options.area, Dimension::area, "--area");
+  import.spring_constant_N_per_m =
+      size(options.spring_constant, Dimension::stiffness, "--spring-constant");
+  import.segments = options.segments;
   return import;
 }
 

@@ -18,6 +18,8 @@ struct RecordingOptions {
   std::vector<std::string> units;
   std::string contact_response;
   std::string rest_length, area;
+  std::string spring_constant;
+  std::vector<std::string> segments;
   bool negate_drive = false, negate_response = false;
 };
 

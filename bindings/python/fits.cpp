@@ -37,8 +37,14 @@ ImportOptions import_of(const py::dict& said) {
       for (const auto& [column, unit] : import.units) (void)parse_unit(unit, "units: " + column);
       continue;
     }
+    if (name == "segments") {
+      import.segments = py::cast<std::vector<std::string>>(value);
+      continue;
+    }
     const auto text = py::cast<std::string>(value);
-    if (name == "time")
+    if (name == "spring_constant")
+      import.spring_constant_N_per_m = parse_quantity(text, Dimension::stiffness, name);
+    else if (name == "time")
       import.time_column = text;
     else if (name == "drive")
       import.drive_column = text;
@@ -61,7 +67,7 @@ ImportOptions import_of(const py::dict& said) {
     else
       throw Error(ExitCode::usage, "columns", "'" + printable(name) + "'",
                   "time, drive, response, sd, frequency, storage, loss, drive_quantity, "
-                  "response_quantity, provenance or units");
+                  "response_quantity, provenance, spring_constant, segments or units");
   }
   return import;
 }

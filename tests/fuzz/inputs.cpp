@@ -40,7 +40,7 @@ using Path = std::filesystem::path;
 
 void quiet(const std::string& /*note*/) {}
 
-void read_delimited_text(const Path& path) {
+void read_any_recording(const Path& path) {
   (void)read_measured_file(path);
 }
 
@@ -106,9 +106,10 @@ void read_hdf5(const Path& path) {
 }
 
 constexpr Input kInputs[] = {
-    {"delimited_text", ".csv", read_delimited_text},
+    {"delimited_text", ".csv", read_any_recording},
     {"curve_description", ".json", [](const Path& p) { (void)read_description(p); }},
     {"digitizer_project", ".json", read_digitizer_project},
+    {"jpk", ".jpk-force", read_any_recording},
     {"scene", ".json", read_scene},
     {"fit", ".json", [](const Path& p) { (void)read_fit_config(p); }},
     {"fit_tables", ".json", [](const Path& p) { (void)read_fit_problem(p); }},

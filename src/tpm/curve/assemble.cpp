@@ -273,6 +273,8 @@ ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
   ImportedCurve curve;
   curve.name = series.name;
   curve.description.header = options.header;
+  std::string& note = curve.description.header.note;
+  if (!series.note.empty()) note += (note.empty() ? "" : "; ") + series.note;
   if (!is_spectrum(series)) curve.description.observable = observed(series).quantity;
   if (becomes_points(series, options)) {
     curve.description.kind = "points";
@@ -286,6 +288,7 @@ ImportedCurve assemble_curve(ImportedSeries series, const std::string& file,
   } else {
     curve.description.kind = is_spectrum(series) ? "spectrum" : "recording";
     curve.description.provenance = provenance;
+    curve.description.segments = std::move(series.segments);
     curve.csv = csv_text(series, {});
   }
   for (const ImportedColumn& column : series.columns) {

@@ -23,6 +23,16 @@ std::string reading(const ImportedColumn& column, std::size_t row) {
                      significant(column.values[row], 4), column.unit.symbol);
 }
 
+/// Leaves out the first `count` samples.
+void drop_samples(std::vector<RecordedSegment>& segments, std::size_t count) {
+  while (!segments.empty() && count > 0) {
+    const std::size_t dropped = std::min(count, segments.front().samples);
+    count -= dropped;
+    segments.front().samples -= dropped;
+    if (segments.front().samples == 0) segments.erase(segments.begin());
+  }
+}
+
 }  // namespace
 
 void start_at_contact(ImportedSeries& series, const std::string& file,
@@ -44,7 +54,8 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
                     "a smaller contact force, or --negate response if compression counts negative");
   }
   const auto row = static_cast<std::size_t>(contact - force->values.begin());
-  std::string found = fmt::format("line {}, {}", series.lines[row], reading(*force, row));
+  std::string found = fmt::format("{} {}, {}", series.segments.empty() ? "line" : "sample",
+                                  series.lines[row], reading(*force, row));
   for (ImportedColumn& column : series.columns) {
     const double first = column.values[row];
     const bool zeroed =
@@ -56,6 +67,7 @@ void start_at_contact(ImportedSeries& series, const std::string& file,
     column.shifted = true;
     for (double& value : column.values) value -= first;
   }
+  drop_samples(series.segments, row);
   series.lines.erase(series.lines.begin(), series.lines.begin() + static_cast<std::ptrdiff_t>(row));
   series.findings.push_back(
       {"contact",

@@ -73,12 +73,24 @@ void require_keys_of_kind(const CurveDescription& description, const std::string
     throw bad_input(file + ": key /observable", observes ? "is missing" : in_file,
                     observes ? "the quantity that was observed" : "no observable");
   }
+  if (kind != "recording" && !description.segments.empty()) {
+    throw bad_input(file + ": key /segments", in_file, "segments of a recording only");
+  }
   const bool whole = kind == "recording" || kind == "spectrum";
   if (whole != description.provenance.has_value()) {
     throw bad_input(
         file + ": key /provenance", whole ? "is missing" : "stands at the top",
         whole ? fmt::format("where the {} comes from", kind) : "a provenance in each row");
   }
+}
+
+std::vector<RecordedSegment> read_segments(const Json& json) {
+  std::vector<RecordedSegment> segments;
+  for (const Json& segment : json) {
+    segments.push_back({text_of(segment, "kind"), text_of(segment, "control"),
+                        segment.at("samples").get<std::size_t>()});
+  }
+  return segments;
 }
 
 /// A key is written only where there is something to say.
@@ -105,10 +117,30 @@ Json column_json(const ColumnDescription& column) {
   return json;
 }
 
+Json segments_json(const std::vector<RecordedSegment>& segments) {
+  Json json = Json::array();
+  for (const RecordedSegment& segment : segments) {
+    Json item{{"kind", segment.kind}};
+    put(item, "control", segment.control);
+    item["samples"] = segment.samples;
+    json.push_back(std::move(item));
+  }
+  return json;
+}
+
 }  // namespace
 
 std::string_view bound_name(Bound bound) noexcept {
   return entry_of(kBounds, bound).text;
+}
+
+std::string segments_words(const std::vector<RecordedSegment>& segments) {
+  std::string words;
+  for (const RecordedSegment& segment : segments) {
+    words += fmt::format("{}{} ({} samples{}{})", words.empty() ? "" : ", ", segment.kind,
+                         segment.samples, segment.control.empty() ? "" : ", ", segment.control);
+  }
+  return words;
 }
 
 CurveDescription read_description(const std::filesystem::path& path) {
@@ -141,6 +173,7 @@ CurveDescription read_description(const std::filesystem::path& path) {
       description.columns.emplace(name, read_column(name, column, file));
     }
   }
+  if (json.contains("segments")) description.segments = read_segments(json.at("segments"));
   require_keys_of_kind(description, file);
   return description;
 }
@@ -164,6 +197,7 @@ Json description_json(const CurveDescription& description) {
       json["columns"][name] = column_json(column);
     }
   }
+  if (!description.segments.empty()) json["segments"] = segments_json(description.segments);
   put(json, "note", header.note);
   return json;
 }

@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "tpm/core/units.hpp"
 #include "tpm/curve/curve.hpp"
@@ -25,6 +26,16 @@ struct ColumnDescription {
   std::string note;
 };
 
+/// A part of a recording that the instrument ran as one, such as the approach or a pause.
+struct RecordedSegment {
+  std::string kind;     ///< the instrument's word: "extend", "pause", "retract"
+  std::string control;  ///< how it was run, "constant-height-pause"; empty if not known
+  std::size_t samples = 0;
+};
+
+/// "extend (1000 samples), pause (5000 samples, constant-height-pause)".
+[[nodiscard]] std::string segments_words(const std::vector<RecordedSegment>& segments);
+
 /// The JSON file beside a CSV file.
 struct CurveDescription {
   CurveHeader header;
@@ -33,6 +44,8 @@ struct CurveDescription {
   TimeOrigin time_origin = TimeOrigin::none;
   std::optional<Provenance> provenance;  ///< of a whole recording or spectrum
   std::map<std::string, ColumnDescription> columns;
+  /// Of a recording, in order; together they hold all of its samples. Empty if not known.
+  std::vector<RecordedSegment> segments;
 };
 
 /// Reads and checks a description; header.sha256 stays empty. Throws Error(bad_input) naming the

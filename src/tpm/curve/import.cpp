@@ -11,8 +11,10 @@
 #include "tpm/core/word_table.hpp"
 #include "tpm/curve/assemble.hpp"
 #include "tpm/curve/import_digitizer.hpp"
+#include "tpm/curve/import_jpk.hpp"
 #include "tpm/curve/import_machine.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/zip_archive.hpp"
 
 namespace tpm {
 namespace {
@@ -23,6 +25,7 @@ constexpr auto kFormats = std::to_array<Word<ImportFormat>>({
     {ImportFormat::wpd_csv, "wpd-csv"},
     {ImportFormat::wpd_json, "wpd-json"},
     {ImportFormat::engauge, "engauge"},
+    {ImportFormat::jpk, "jpk"},
 });
 
 bool looks_like_json(std::string_view bytes) {
@@ -121,6 +124,12 @@ ImportedFile import_table(const DelimitedTable& table, const std::string& file,
   return imported;
 }
 
+void require_no_jpk_options(const ImportOptions& options, const std::string& file) {
+  if (!options.spring_constant_N_per_m && options.segments.empty()) return;
+  throw bad_input(file, "is no JPK force file",
+                  "--spring-constant and --segments only for such a file (.jpk-force)");
+}
+
 }  // namespace
 
 std::string_view import_format_name(ImportFormat format) noexcept {
@@ -143,6 +152,16 @@ DigitizedAxis parse_axis(std::string_view text, std::string_view where) {
 ImportedFile import_series(const std::filesystem::path& path, const ImportOptions& options) {
   const std::string file = path.string();
   const std::string bytes = read_file(path);
+  if (options.format == ImportFormat::jpk ||
+      (options.format == ImportFormat::automatic && looks_like_zip(bytes))) {
+    ImportedFile imported;
+    imported.series.push_back(read_jpk(bytes, file, options));
+    imported.series.front().findings.insert(imported.series.front().findings.begin(),
+                                            {"format", "jpk"});
+    imported.sha256 = sha256_hex(bytes);
+    return imported;
+  }
+  require_no_jpk_options(options, file);
   const bool json = options.format == ImportFormat::wpd_json ||
                     (options.format == ImportFormat::automatic && looks_like_json(bytes));
   ImportedFile imported;

@@ -19,6 +19,7 @@ enum class ImportFormat {
   wpd_csv,    ///< WebPlotDigitizer: x and y without header, or dataset names over X,Y pairs
   wpd_json,   ///< WebPlotDigitizer project: version 4 (datasetColl) or version 3 (wpd)
   engauge,    ///< Engauge Digitizer: x,Curve1,Curve2 in one block or one block for each curve
+  jpk,        ///< force curve of a JPK atomic force microscope (.jpk-force)
 };
 
 /// "machine", "wpd-csv", ...
@@ -65,6 +66,10 @@ struct ImportOptions {
   std::optional<double> contact_force_N;  ///< above 0: samples before contact are left out
   int contact_samples = 3;                ///< how many samples in a row must reach it, from 1
 
+  // JPK force files, whose channels drive_column and response_column may name.
+  std::optional<double> spring_constant_N_per_m;  ///< above 0; else that of the file
+  std::vector<std::string> segments;              ///< kinds to read ("extend", "pause"); empty: all
+
   // Digitised figures.
   std::optional<DigitizedAxis> x;
   std::optional<DigitizedAxis> y;
@@ -95,6 +100,8 @@ struct ImportedSeries {
   std::vector<ImportedColumn> columns;  ///< all of one length
   std::vector<int> lines;               ///< of the samples in the file; empty if they have none
   std::vector<ImportFinding> findings;
+  std::vector<RecordedSegment> segments;  ///< empty if the file does not say
+  std::string note;                       ///< what becomes part of the description's note
 };
 
 /// A curve in the project's own form: `csv` and `description` are what the two files hold.

@@ -146,6 +146,16 @@ std::vector<double> optional_sd(const CurveRows& rows, Quantity quantity) {
   return rows.full_column(quantity, Bound::sd);
 }
 
+void require_whole_segments(const CurveDescription& description, std::size_t rows,
+                            const std::string& description_file) {
+  if (description.segments.empty()) return;
+  std::size_t samples = 0;
+  for (const RecordedSegment& segment : description.segments) samples += segment.samples;
+  if (samples == rows) return;
+  throw bad_input(description_file + ": key /segments", fmt::format("hold {} samples", samples),
+                  fmt::format("the {} rows of the recording", rows));
+}
+
 Recording read_recording(const CurveDescription& description, const CurveRows& rows,
                          const std::string& description_file) {
   Recording recording;
@@ -162,6 +172,7 @@ Recording read_recording(const CurveDescription& description, const CurveRows& r
     recording.drive = rows.full_column(*drive, Bound::value);
   }
   recording.response_sd = optional_sd(rows, recording.response_quantity);
+  require_whole_segments(description, rows.size(), description_file);
   if (recording.time_s.empty() && recording.drive.empty()) {
     throw bad_input(rows.file(), "holds neither time nor an imposed quantity", "one of the two");
   }

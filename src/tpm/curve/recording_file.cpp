@@ -35,8 +35,9 @@ bool says_something_about_columns(const ImportOptions& options) {
          !options.frequency_column.empty() || !options.storage_column.empty() ||
          !options.loss_column.empty() || options.drive_quantity || options.response_quantity ||
          !options.units.empty() || options.negate_drive || options.negate_response ||
-         options.contact_force_N || options.rest_length_m || options.area_m2 || options.x ||
-         options.y || !options.dataset.empty() || options.depth_m || options.load_N;
+         options.contact_force_N || options.spring_constant_N_per_m || !options.segments.empty() ||
+         options.rest_length_m || options.area_m2 || options.x || options.y ||
+         !options.dataset.empty() || options.depth_m || options.load_N;
 }
 
 /// The kind that a description names; an id is one of the shipped curves.
@@ -101,7 +102,8 @@ std::string described_label(const fs::path& path, std::string_view key) {
 std::string columns_words(const std::vector<ImportFinding>& findings) {
   std::string words;
   for (const ImportFinding& finding : findings) {
-    const bool column = finding.value.starts_with("column ");
+    const bool column =
+        finding.value.starts_with("column ") || finding.value.starts_with("channel ");
     if (!column && finding.what != "converted") continue;
     words +=
         fmt::format("{}{}: {}", words.empty() ? "read as " : "; ", finding.what, finding.value);

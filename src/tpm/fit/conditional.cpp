@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/law.hpp"
 
@@ -95,7 +95,7 @@ std::vector<bool> dependents(const FitResult& result, const ResidualFunction& fu
   const FitParameter& p = result.parameters[held].parameter;
   const double width = p.theta_upper() - p.theta_lower();
   const Eigen::VectorXd moved =
-      (j.colPivHouseholderQr().solve(column(held)).array() / length.array()).matrix() * width;
+      (least_squares(j, column(held)).col(0).array() / length.array()).matrix() * width;
   for (Eigen::Index k = 0; k < n; ++k) {
     const auto place = static_cast<std::size_t>(k);
     depend[free[place]] = !(std::abs(moved[k]) <= sd[place]);

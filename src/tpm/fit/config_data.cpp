@@ -7,17 +7,21 @@
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/fit/config_parts.hpp"
+#include "tpm/protocol/protocol_block.hpp"
 
 namespace tpm {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
-constexpr auto kProtocolKinds = std::to_array<Word<Kind>>({{Kind::ramp_hold, "ramp_hold"},
-                                                           {Kind::step_hold, "step_hold"},
-                                                           {Kind::static_, "static"},
-                                                           {Kind::creep, "creep"},
-                                                           {Kind::measured, "measured"},
-                                                           {Kind::oscillation, "oscillation"}});
+/// The common protocols, and what only data can say. A fit's file gives a common protocol without
+/// the numbers that its readings hold.
+constexpr auto kProtocolKinds = std::to_array<Word<Kind>>(
+    {{Kind::ramp_hold, entry_of(kProtocolKindWords, ProtocolKind::ramp_hold).text},
+     {Kind::step_hold, entry_of(kProtocolKindWords, ProtocolKind::step_hold).text},
+     {Kind::static_, "static"},
+     {Kind::creep, entry_of(kProtocolKindWords, ProtocolKind::creep).text},
+     {Kind::measured, "measured"},
+     {Kind::oscillation, "oscillation"}});
 
 /// What only oscillations have.
 void parse_oscillation(const Json& j, const std::optional<LawSpec>& law, ProtocolChoice& protocol,
@@ -47,11 +51,10 @@ ProtocolChoice parse_protocol(const Json& j, const std::optional<LawSpec>& law,
   const auto name = j.at("kind").get<std::string>();
   protocol.kind = parse_word(kProtocolKinds, "protocol", name, place.key("kind").where);
   if (protocol.kind == Kind::ramp_hold) {
-    if (!j.contains("rate")) throw bad_input(place.where, "no rate", "a rate such as \"4 mm/s\"");
-    protocol.rate_m_per_s = quantity_at(j, "rate", Dimension::speed, place);
-    if (!(protocol.rate_m_per_s > 0.0)) {
-      throw bad_input(place.key("rate").where, "not above 0", "a rate such as \"4 mm/s\"");
-    }
+    Json imposed = j;
+    for (const char* key : {"rate_provenance", "operating_depth"}) imposed.erase(key);
+    protocol.rate_m_per_s =
+        parse_protocol_block(imposed, place, Openness::open).number("rate", place);
     if (j.contains("rate_provenance")) {
       protocol.rate_provenance = parse_provenance(j.at("rate_provenance").get<std::string>(),
                                                   place.key("rate_provenance").where);
@@ -113,6 +116,10 @@ ImportOptions parse_import(const Json& j, const DocumentPlace& place) {
   if (j.contains("rest_length")) {
     import.rest_length_m = quantity_at(j, "rest_length", Dimension::length, place);
   }
+  if (j.contains("spring_constant")) {
+    import.spring_constant_N_per_m = quantity_at(j, "spring_constant", Dimension::stiffness, place);
+  }
+  import.segments = j.value("segments", std::vector<std::string>());
   if (j.contains("area")) import.area_m2 = quantity_at(j, "area", Dimension::area, place);
   if (j.contains("units")) {
     for (const auto& [column, unit] : j.at("units").items()) {

@@ -3,12 +3,12 @@
 #include <ceres/ceres.h>
 #include <glog/logging.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <mutex>
 #include <numeric>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/scouted_minimum.hpp"
 
@@ -176,9 +176,9 @@ void polish(const ResidualFunction& function, std::span<const FitParameter> para
       if (!(length[k] > 0.0)) return;
       j.col(k) /= length[k];
     }
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(j);
-    if (qr.rank() < n) return;
-    const Eigen::VectorXd scaled = -qr.solve(r);
+    const std::optional<Eigen::MatrixXd> best = unique_least_squares(j, r);
+    if (!best) return;
+    const Eigen::VectorXd scaled = -best->col(0);
     const double step = scaled.norm();
     if (!(step < 0.5 * last_step) || !(step > 0.0)) return;
     last_step = step;

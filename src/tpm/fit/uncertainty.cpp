@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <boost/math/distributions/chi_squared.hpp>
@@ -12,6 +11,7 @@
 #include <limits>
 #include <utility>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 
 namespace tpm {
@@ -78,9 +78,9 @@ Covariance linear_covariance(const ResidualFunction& function,
     if (length[k] > 0.0) j.col(k) /= length[k];
   }
   // Columns of length 1 make the rank decision independent of units.
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(j, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  c.singular_values = svd.singularValues();
-  const Eigen::MatrixXd& v = svd.matrixV();
+  const RightSingular singular = right_singular(j);
+  c.singular_values = singular.values;
+  const Eigen::MatrixXd& v = singular.vectors;
   Eigen::VectorXd weakest = v.col(n - 1);
   for (Eigen::Index k = 0; k < n; ++k) {
     if (length[k] > 0.0) weakest[k] /= length[k];

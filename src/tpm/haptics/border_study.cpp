@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
+#include "tpm/core/progress.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/servo/servo_step.hpp"
 
@@ -20,6 +22,7 @@ BorderPoint point_of(const RenderedContact& contact, double damping) {
 }
 
 void vary_rate_and_delay(BorderStudy& study) {
+  Progress progress("borders", std::size(kRates_Hz) * std::size(kDelays));
   for (const double rate : kRates_Hz) {
     for (const int delay : kDelays) {
       RenderedContact contact;
@@ -36,6 +39,7 @@ void vary_rate_and_delay(BorderStudy& study) {
       p.measured = largest_stable_stiffness(contact, study.plant, BorderBy::measurement);
       p.predicted = largest_stable_stiffness(contact, study.plant, BorderBy::prediction);
       study.stable.push_back(p);
+      progress.advance();
     }
   }
 }
@@ -122,7 +126,9 @@ void run_impact(const RenderedContact& contact, const PlantSettings& plant, Rise
 void vary_impact(BorderStudy& study) {
   constexpr double kSpeeds_m_per_s[] = {0.01, 0.03, 0.1, 0.3, 1.0};
   constexpr double kShares[] = {0.25, 0.5, 0.8, 0.95, 1.05, 1.25, 2.0, 4.0};
-  for (const int delay : {0, 1, 2, 5, 10}) {
+  constexpr int kImpactDelays[] = {0, 1, 2, 5, 10};
+  Progress progress("hands against contacts", std::size(kImpactDelays) * std::size(kShares));
+  for (const int delay : kImpactDelays) {
     RenderedContact contact;
     contact.delay_periods = delay;
     contact.relaxation_time_s = study.relaxation_time_s;
@@ -137,6 +143,7 @@ void vary_impact(BorderStudy& study) {
         for (const RiseLimit limit : kRiseLimits) run_impact(contact, study.plant, limit, point);
         study.impacts.push_back(point);
       }
+      progress.advance();
     }
   }
 }

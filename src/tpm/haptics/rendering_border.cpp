@@ -1,12 +1,13 @@
 #include "tpm/haptics/rendering_border.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <functional>
 #include <limits>
 #include <numbers>
+
+#include "tpm/core/dense_algebra.hpp"
 
 namespace tpm {
 namespace {
@@ -222,7 +223,7 @@ double loop_spectral_radius(const RenderedContact& contact, const PlantSettings&
   loop(3, 0) = 1.0;
   if (forces > 0) loop.row(4) = force;
   for (Eigen::Index i = 1; i < forces; ++i) loop(4 + i, 3 + i) = 1.0;
-  return Eigen::EigenSolver<Eigen::MatrixXd>(loop, false).eigenvalues().cwiseAbs().maxCoeff();
+  return spectral_radius(loop);
 }
 
 double largest_stable_stiffness(RenderedContact contact, const PlantSettings& plant, BorderBy by) {

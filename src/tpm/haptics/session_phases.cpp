@@ -8,7 +8,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/recording_file.hpp"
-#include "tpm/protocol/protocol.hpp"
+#include "tpm/protocol/protocol_block.hpp"
 
 namespace tpm {
 namespace {
@@ -42,17 +42,6 @@ class PhaseList {
   double time_s_ = 0.0;
 };
 
-std::vector<double> positive_list(const Json& block, const char* key, Dimension dimension,
-                                  const DocumentPlace& place) {
-  std::vector<double> values;
-  for (const Json& text : block.at(key)) {
-    const DocumentPlace at = place.key(key).key(std::to_string(values.size()));
-    values.push_back(parse_quantity(text.get<std::string>(), dimension, at.where));
-    if (!(values.back() > 0.0)) throw bad_input(at.where, text.get<std::string>(), "above 0");
-  }
-  return values;
-}
-
 double rest_of(const Json& block, const DocumentPlace& place) {
   return block.contains("rest") ? positive_at(block, "rest", Dimension::time, place) : kUsualRest_s;
 }
@@ -62,22 +51,26 @@ void add_approach(PhaseList& list) {
 }
 
 void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& place) {
-  const double hold = positive_at(block, "hold", Dimension::time, place);
   const double rest = rest_of(block, place);
-  for (const double depth : positive_list(block, "depths", Dimension::length, place)) {
-    for (const double rate : positive_list(block, "rates", Dimension::speed, place)) {
-      const std::string mm = significant(1e3 * depth, 4), speed = significant(1e3 * rate, 4);
-      list.depth_m = depth;
-      list.rate_m_per_s = rate;
-      add_approach(list);
-      list.add(SessionPhaseKind::indent, fmt::format("indent to {} mm at {} mm/s", mm, speed),
-               depth / rate, 0.0, depth);
-      list.add(SessionPhaseKind::hold, fmt::format("hold {} mm after {} mm/s", mm, speed), hold,
-               depth, depth);
-      list.add(SessionPhaseKind::release, fmt::format("release from {} mm at {} mm/s", mm, speed),
-               (depth + kClearance_m) / rate, depth, -kClearance_m);
-      list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+  for (const ProtocolBlock& one :
+       parse_protocol_lists(block, place, ProtocolKind::ramp_hold, Openness::complete,
+                            {{"depth", "depths"}, {"rate", "rates"}}, {"rest"})) {
+    const double depth = *one.depth_m, rate = *one.rate_m_per_s;
+    if (!(*one.hold_s > 0.0)) {
+      throw bad_input(place.key("hold").where, "0 s",
+                      "a value above 0: a session holds every depth before the release");
     }
+    const std::string mm = significant(1e3 * depth, 4), speed = significant(1e3 * rate, 4);
+    list.depth_m = depth;
+    list.rate_m_per_s = rate;
+    add_approach(list);
+    list.add(SessionPhaseKind::indent, fmt::format("indent to {} mm at {} mm/s", mm, speed),
+             depth / rate, 0.0, depth);
+    list.add(SessionPhaseKind::hold, fmt::format("hold {} mm after {} mm/s", mm, speed),
+             *one.hold_s, depth, depth);
+    list.add(SessionPhaseKind::release, fmt::format("release from {} mm at {} mm/s", mm, speed),
+             (depth + kClearance_m) / rate, depth, -kClearance_m);
+    list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
   }
   list.depth_m = list.rate_m_per_s = 0.0;
 }
@@ -87,11 +80,12 @@ void add_slides(PhaseList& list, const Json& block, const DocumentPlace& place) 
   const double rest = rest_of(block, place);
   const double distance = positive_at(block, "distance", Dimension::length, place);
   const double rate = positive_at(block, "rate", Dimension::speed, place);
-  const double press = block.contains("press")
-                           ? positive_at(block, "press", Dimension::speed, place)
-                           : kUsualPress_m_per_s;
   const std::string far = significant(1e3 * distance, 4), speed = significant(1e3 * rate, 4);
-  for (const double depth : positive_list(block, "depths", Dimension::length, place)) {
+  for (const ProtocolBlock& one : parse_protocol_lists(
+           block, place, ProtocolKind::ramp_hold, Openness::open,
+           {{"depth", "depths"}, {"rate", "press"}}, {"direction", "distance", "rate", "rest"})) {
+    const double depth = one.number("depth", place);
+    const double press = one.rate_m_per_s.value_or(kUsualPress_m_per_s);
     const std::string mm = significant(1e3 * depth, 4), pressed = significant(1e3 * press, 4);
     list.depth_m = depth;
     list.rate_m_per_s = press;
@@ -114,13 +108,16 @@ void add_slides(PhaseList& list, const Json& block, const DocumentPlace& place) 
 }
 
 void add_creep(PhaseList& list, const Json& block, const DocumentPlace& place) {
-  const double hold = positive_at(block, "hold", Dimension::time, place);
   const double rest = rest_of(block, place);
-  for (const double load : positive_list(block, "loads", Dimension::force, place)) {
+  for (const ProtocolBlock& one :
+       parse_protocol_lists(block, place, ProtocolKind::creep, Openness::complete,
+                            {{"load", "loads"}, {"duration", "hold"}}, {"rest"})) {
+    const double load = *one.load_N;
     const std::string newton = significant(load, 4);
     add_approach(list);
     list.add(SessionPhaseKind::load, fmt::format("load to {} N", newton), kLoading_s, 0.0, load);
-    list.add(SessionPhaseKind::creep, fmt::format("creep under {} N", newton), hold, load, load);
+    list.add(SessionPhaseKind::creep, fmt::format("creep under {} N", newton), *one.duration_s,
+             load, load);
     list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
   }
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/reduce/surface_network.hpp"
 
@@ -55,19 +56,6 @@ class SurfaceAlong {
 };
 
 }  // namespace
-
-Eigen::Matrix3d turn_onto(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-  constexpr double kOpposite = 1e-9;
-  const double cosine = from.dot(to);
-  if (cosine < -1.0 + kOpposite) {  // every half turn about an axis across is the smallest
-    const Eigen::Vector3d axis = from.unitOrthogonal();
-    return 2.0 * axis * axis.transpose() - Eigen::Matrix3d::Identity();
-  }
-  const Eigen::Vector3d axis = from.cross(to);
-  Eigen::Matrix3d cross;
-  cross << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
-  return Eigen::Matrix3d::Identity() + cross + cross * cross / (1.0 + cosine);
-}
 
 SurfaceScene::SurfaceScene(const HilSession& session)
     : scene(session),

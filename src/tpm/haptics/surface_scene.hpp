@@ -4,9 +4,6 @@
 
 namespace tpm {
 
-/// The smallest turn that takes one unit vector onto another.
-[[nodiscard]] Eigen::Matrix3d turn_onto(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
-
 /// The scene of a session with a ball on its surface.
 struct SurfaceScene {
   /// Throws Error(bad_input) as PushedScene.

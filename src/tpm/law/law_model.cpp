@@ -53,12 +53,11 @@ TimeWindow window_of(const Protocol& protocol, std::span<const double> times_s) 
 /// that is no straight line, creep under a load that jumps) the window begins earlier.
 FractionalMemory rates_for(const LawSpec& spec, const Protocol& protocol,
                            std::span<const double> times_s) {
-  constexpr double kTolerance = 1e-10;
   const TimeWindow window = window_of(protocol, times_s);
   double earlier = 1.0;
   if (spec.kernel != Kernel::linear || spec.tension == Tension::relaxing) earlier = 1e-2;
   if (protocol.drive() == Drive::force) earlier = 1e-4;
-  return {earlier * window.shortest_s, window.longest_s, kTolerance};
+  return {earlier * window.shortest_s, window.longest_s, kFractionalTolerance};
 }
 
 /// Steps a contact by what is imposed on it, a depth or a load.
@@ -361,10 +360,10 @@ std::optional<Response> respond_to_step(const LawSpec& spec, const std::vector<L
   response.value.resize(std::ssize(times_s));
   const bool want_slopes = want == Want::values_and_sensitivity;
   if (want_slopes) response.sensitivity.resize(std::ssize(times_s), n);
+  const StepResponse function(spec, parameters);
   for (Eigen::Index i = 0; i < response.value.size(); ++i) {
     const double since = times_s[static_cast<std::size_t>(i)] - start;
-    const SlopedNumber f =
-        depth ? law_relaxation(spec, parameters, since) : law_creep(spec, parameters, since);
+    const SlopedNumber f = depth ? function.relaxation(since) : function.creep(since);
     const double v = step * f.value;  // a force, or V(u)
     const double u = depth ? v : at.kernel.inverse(v);
     response.value[i] = (depth ? at.offset : at.contact) + u;

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/law/law_file.hpp"
@@ -61,8 +61,7 @@ void require_covariance(const Eigen::MatrixXd& matrix, std::string_view where) {
   if ((scaled - scaled.transpose()).cwiseAbs().maxCoeff() > kRounding) {
     throw bad_input(where, "is not symmetric", "a covariance");
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled, Eigen::EigenvaluesOnly);
-  if (eigen.eigenvalues().minCoeff() < -kRounding) {
+  if (symmetric_modes(scaled).values.minCoeff() < -kRounding) {
     throw bad_input(where, "has a negative eigenvalue", "a covariance, positive semidefinite");
   }
 }

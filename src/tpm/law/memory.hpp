@@ -8,6 +8,9 @@
 
 namespace tpm {
 
+/// The error that the rates of a fractional law are chosen for, FractionalMemory's tolerance.
+inline constexpr double kFractionalTolerance = 1e-10;
+
 /// The relaxation function of a law at given parameters, as the time stepper uses it:
 ///
 ///     G(t) = constant + sum_j stiffness_j exp(-rate_j t) + dashpot delta(t)

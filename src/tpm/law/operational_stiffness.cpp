@@ -12,7 +12,7 @@ using Complex = std::complex<double>;
 }  // namespace
 
 OperationalStiffness::OperationalStiffness(const LawSpec& spec, std::span<const double> values)
-    : spec_(spec), values_(values) {
+    : spec_(spec), values_(values), exponents_(exponents()) {
   if (spec.form != BranchForm::series) return;
   const auto n = static_cast<std::ptrdiff_t>(spec.branches);
   const auto k = values.begin() + 1;
@@ -25,7 +25,10 @@ OperationalStiffness::OperationalStiffness(const LawSpec& spec, std::span<const 
 }
 
 ComplexStiffness OperationalStiffness::at(Complex log_s) const {
-  return spec_.fractional != Fractional::none ? fractional(log_s) : branches(std::exp(log_s));
+  if (spec_.fractional == Fractional::none) return branches(std::exp(log_s));
+  ComplexStiffness g;
+  fractional(powers(log_s), g);
+  return g;
 }
 
 ComplexStiffness OperationalStiffness::branches(Complex s) const {
@@ -55,9 +58,38 @@ ComplexStiffness OperationalStiffness::branches(Complex s) const {
   return g;
 }
 
-ComplexStiffness OperationalStiffness::fractional(Complex log_s) const {
+OperationalStiffness::Exponents OperationalStiffness::exponents() const {
   const Fractional law = spec_.fractional;
-  ComplexStiffness g{0.0, Eigen::RowVectorXcd::Zero(std::ssize(values_))};
+  if (law == Fractional::none) return {};
+  const std::size_t at_k1 = has_lasting_spring(law) ? 1 : 0;
+  if (law == Fractional::kelvin_voigt_pair) {
+    return {values_[at_k1 + 2], values_[at_k1 + 3], 0.0};
+  }
+  if (!has_relaxation_time(law)) return {values_[at_k1 + 1], 0.0, 0.0};
+  // Two in series, the second one a spring (beta = 0) if there is only one.
+  const double beta = has_two_springpots(law) ? values_[at_k1 + 3] : 0.0;
+  return {values_[at_k1 + 2] - beta, beta, std::log(values_[at_k1 + 1])};
+}
+
+OperationalStiffness::Powers OperationalStiffness::powers(Complex log_s) const {
+  const Complex log = log_s + exponents_.log_tau;
+  return {log, std::exp(exponents_.first * log), std::exp(exponents_.second * log)};
+}
+
+OperationalStiffness::PowersOverTime::PowersOverTime(const OperationalStiffness& of, double log_t)
+    : log_t_(log_t),
+      first_(std::exp(-of.exponents_.first * log_t)),
+      second_(std::exp(-of.exponents_.second * log_t)) {}
+
+OperationalStiffness::Powers OperationalStiffness::PowersOverTime::operator()(
+    const Powers& at_s) const {
+  return {at_s.log - log_t_, first_ * at_s.first, second_ * at_s.second};
+}
+
+void OperationalStiffness::fractional(const Powers& powers, ComplexStiffness& g) const {
+  const Fractional law = spec_.fractional;
+  g.value = 0.0;
+  g.by.setZero(std::ssize(values_));
   Eigen::Index place = 0;
   const auto value = [&](Eigen::Index i) { return values_[static_cast<std::size_t>(i)]; };
   if (has_lasting_spring(law)) {
@@ -69,32 +101,28 @@ ComplexStiffness OperationalStiffness::fractional(Complex log_s) const {
     const bool pair = law == Fractional::kelvin_voigt_pair;
     const Eigen::Index springpots = pair ? 2 : 1;
     for (Eigen::Index i = place; i < place + springpots; ++i) {
-      const Complex power = std::exp(value(i + springpots) * log_s);
+      const Complex power = i == place ? powers.first : powers.second;
       g.value += value(i) * power;
       g.by[i] = power;
-      g.by[i + springpots] = value(i) * power * log_s;
+      g.by[i + springpots] = value(i) * power * powers.log;
     }
-    return g;
+    return;
   }
-  // Two in series, the second one a spring (beta = 0) if there is only one.
   const double tau = value(place + 1);
   const Eigen::Index at_alpha = place + 2;
   const bool pair = has_two_springpots(law);
   const double alpha = value(at_alpha);
   const double beta = pair ? value(at_alpha + 1) : 0.0;
-  const Complex log_s_tau = log_s + std::log(tau);
-  const Complex power = std::exp((alpha - beta) * log_s_tau);
-  const Complex of_alpha = 1.0 / (1.0 + power);  // part of the first in the compliance
-  const Complex of_beta = power * of_alpha;
-  const Complex share = of_beta * std::exp(beta * log_s_tau);
+  const Complex of_alpha = reciprocal(1.0 + powers.first);  // part of the first in the compliance
+  const Complex of_beta = powers.first * of_alpha;
+  const Complex share = of_beta * powers.second;
   const Complex by_alpha = k1 * share * of_alpha;  // d/d(alpha ln(s tau))
   const Complex by_beta = k1 * share * of_beta;
   g.value += k1 * share;
   g.by[place] = share;
   g.by[place + 1] = (alpha * by_alpha + beta * by_beta) / tau;
-  g.by[at_alpha] = by_alpha * log_s_tau;
-  if (pair) g.by[at_alpha + 1] = by_beta * log_s_tau;
-  return g;
+  g.by[at_alpha] = by_alpha * powers.log;
+  if (pair) g.by[at_alpha + 1] = by_beta * powers.log;
 }
 
 }  // namespace tpm

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <cmath>
 #include <complex>
 #include <span>
 #include <vector>
@@ -14,6 +15,21 @@ struct ComplexStiffness {
   Eigen::RowVectorXcd by;
 };
 
+/// 1/z by real divisions (Smith 1962). The complex division of the language looks after infinite
+/// parts, which costs several times as much.
+[[nodiscard]] inline std::complex<double> reciprocal(std::complex<double> z) {
+  const double x = z.real();
+  const double y = z.imag();
+  if (std::abs(x) >= std::abs(y)) {
+    const double ratio = y / x;
+    const double part = 1.0 / (x + y * ratio);
+    return {part, -ratio * part};
+  }
+  const double ratio = x / y;
+  const double part = 1.0 / (x * ratio + y);
+  return {ratio * part, -part};
+}
+
 /// The operational stiffness s L[G](s) of a law, without kernel and tension: at s = i omega the
 /// storage and loss of small oscillations, over s the Laplace transform of G, and 1/(s ...) that of
 /// the creep compliance J.
@@ -25,12 +41,38 @@ class OperationalStiffness {
   /// @param log_s ln s, with Im between -pi and pi
   [[nodiscard]] ComplexStiffness at(std::complex<double> log_s) const;
 
+  /// Powers of s that a fractional law consists of: s^alpha and s^beta of spring-pots side by side,
+  /// (s tau)^(alpha - beta) and (s tau)^beta of two in series.
+  struct Powers {
+    std::complex<double> log;  ///< ln s, or ln(s tau)
+    std::complex<double> first, second;
+  };
+  /// @param log_s ln s
+  [[nodiscard]] Powers powers(std::complex<double> log_s) const;
+  /// The powers at s/t from those at s, without another complex exponential.
+  class PowersOverTime {
+   public:
+    PowersOverTime(const OperationalStiffness& of, double log_t);
+    [[nodiscard]] Powers operator()(const Powers& at_s) const;
+
+   private:
+    double log_t_, first_, second_;
+  };
+  /// As at() of a fractional law. Allocates only if `out` has another size.
+  void fractional(const Powers& powers, ComplexStiffness& out) const;
+
  private:
   [[nodiscard]] ComplexStiffness branches(std::complex<double> s) const;
-  [[nodiscard]] ComplexStiffness fractional(std::complex<double> log_s) const;
+
+  /// Exponents of the two powers, and what is added to ln s.
+  struct Exponents {
+    double first = 0.0, second = 0.0, log_tau = 0.0;
+  };
+  [[nodiscard]] Exponents exponents() const;
 
   LawSpec spec_;
   std::span<const double> values_;
+  Exponents exponents_;
   std::vector<double> chain_;      ///< k_inf, k_i, tau_i of a Kelvin chain
   Eigen::MatrixXcd chain_slopes_;  ///< of these by k0, kc_i, T_i
 };

@@ -7,34 +7,47 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/law_model.hpp"
-#include "tpm/law/operational_stiffness.hpp"
 #include "tpm/solve/laplace_contour.hpp"
 
 namespace tpm {
-namespace {
 
-/// The inverse transform at t of (1/s) f(operational stiffness).
-/// @param f of the stiffness; returns its value and its derivative by the stiffness
+StepResponse::StepResponse(const LawSpec& spec, std::span<const double> values)
+    : spec_(spec), count_(std::ssize(values)), stiffness_(spec, values) {
+  const bool fractional = spec.fractional != Fractional::none;
+  nodes_.reserve(contour_nodes().size());
+  for (const ContourNode& node : contour_nodes()) {
+    nodes_.push_back({node.log_s, node.weight / node.s,
+                      fractional ? stiffness_.powers(node.log_s) : OperationalStiffness::Powers{}});
+  }
+}
+
 template <class Function>
-SlopedNumber inverse_over_s(const LawSpec& spec, std::span<const double> values, double t_s,
-                            const Function& f) {
-  LawModel(spec).require_in_range(values);
+SlopedNumber StepResponse::inverse_over_s(double t_s, const Function& f) const {
   if (!(t_s > 0.0 && std::isfinite(t_s))) {
-    throw bad_input(fmt::format("law {}", law_name(spec)), fmt::format("time {} s", shortest(t_s)),
+    throw bad_input(fmt::format("law {}", law_name(spec_)), fmt::format("time {} s", shortest(t_s)),
                     "a finite time above 0 s");
   }
-  const OperationalStiffness stiffness(spec, values);
   const double log_t = std::log(t_s);
-  SlopedNumber sum{0.0, Eigen::VectorXd::Zero(std::ssize(values))};
-  for (const ContourNode& node : contour_nodes()) {
-    const ComplexStiffness g = stiffness.at(node.log_s - log_t);
+  const OperationalStiffness::PowersOverTime over_time(stiffness_, log_t);
+  SlopedNumber sum{0.0, Eigen::VectorXd::Zero(count_)};
+  ComplexStiffness g;
+  for (const Node& node : nodes_) {
+    if (spec_.fractional != Fractional::none) {
+      stiffness_.fractional(over_time(node.powers), g);
+    } else {
+      g = stiffness_.at(node.log_s - log_t);
+    }
     const auto [value, slope] = f(g.value);
-    const std::complex<double> weight = node.weight / node.s;
-    sum.value += (weight * value).real();
-    sum.by += (weight * slope * g.by).real().transpose();
+    sum.value += (node.weight_over_s * value).real();
+    const std::complex<double> factor = node.weight_over_s * slope;
+    for (Eigen::Index i = 0; i < count_; ++i) {
+      sum.by[i] += factor.real() * g.by[i].real() - factor.imag() * g.by[i].imag();
+    }
   }
   return sum;
 }
+
+namespace {
 
 struct WithSlope {
   std::complex<double> value, slope;
@@ -42,19 +55,28 @@ struct WithSlope {
 
 }  // namespace
 
-SlopedNumber law_relaxation(const LawSpec& spec, std::span<const double> values, double t_s) {
-  return inverse_over_s(spec, values, t_s, [](std::complex<double> g) {
-    return WithSlope{g, 1.0};
+SlopedNumber StepResponse::relaxation(double t_s) const {
+  return inverse_over_s(t_s, [](std::complex<double> g) { return WithSlope{g, 1.0}; });
+}
+
+SlopedNumber StepResponse::creep(double t_s) const {
+  SlopedNumber j = inverse_over_s(t_s, [](std::complex<double> g) {
+    const std::complex<double> compliance = reciprocal(g);
+    return WithSlope{compliance, -compliance * compliance};
   });
+  if (std::isfinite(j.value)) return j;
+  throw bad_input(fmt::format("law {}", law_name(spec_)), "no stiffness, so no compliance",
+                  "a stiffness above 0");
+}
+
+SlopedNumber law_relaxation(const LawSpec& spec, std::span<const double> values, double t_s) {
+  LawModel(spec).require_in_range(values);
+  return StepResponse(spec, values).relaxation(t_s);
 }
 
 SlopedNumber law_creep(const LawSpec& spec, std::span<const double> values, double t_s) {
-  SlopedNumber j = inverse_over_s(spec, values, t_s, [](std::complex<double> g) {
-    return WithSlope{1.0 / g, -1.0 / (g * g)};
-  });
-  if (std::isfinite(j.value)) return j;
-  throw bad_input(fmt::format("law {}", law_name(spec)), "no stiffness, so no compliance",
-                  "a stiffness above 0");
+  LawModel(spec).require_in_range(values);
+  return StepResponse(spec, values).creep(t_s);
 }
 
 }  // namespace tpm

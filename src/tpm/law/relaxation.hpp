@@ -1,8 +1,11 @@
 #pragma once
 #include <Eigen/Core>
+#include <complex>
 #include <span>
+#include <vector>
 
 #include "tpm/law/law.hpp"
+#include "tpm/law/operational_stiffness.hpp"
 
 namespace tpm {
 
@@ -25,5 +28,33 @@ struct SlopedNumber {
 /// Throws Error(bad_input) also for a law without any stiffness.
 [[nodiscard]] SlopedNumber law_creep(const LawSpec& spec, std::span<const double> values,
                                      double t_s);
+
+/// law_relaxation and law_creep at many times: what does not depend on the time is computed once.
+class StepResponse {
+ public:
+  /// @param values all of law_parameters(spec), in range (LawModel::require_in_range); they must
+  /// outlive this
+  StepResponse(const LawSpec& spec, std::span<const double> values);
+
+  /// Throws Error(bad_input) as the functions above, for the time and for a law without stiffness.
+  [[nodiscard]] SlopedNumber relaxation(double t_s) const;
+  [[nodiscard]] SlopedNumber creep(double t_s) const;
+
+ private:
+  /// 1/s times the transform to be inverted, and its derivative by the operational stiffness.
+  template <class Function>
+  [[nodiscard]] SlopedNumber inverse_over_s(double t_s, const Function& f) const;
+
+  struct Node {
+    std::complex<double> log_s;
+    std::complex<double> weight_over_s;
+    OperationalStiffness::Powers powers;  ///< at s; of fractional laws
+  };
+
+  LawSpec spec_;
+  Eigen::Index count_;
+  OperationalStiffness stiffness_;
+  std::vector<Node> nodes_;
+};
 
 }  // namespace tpm

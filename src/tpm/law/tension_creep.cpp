@@ -8,44 +8,16 @@
 #include <numeric>
 #include <vector>
 
-#include "tpm/solve/exponential_collocation.hpp"
+#include "tpm/law/creep_weights.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr int kCreepNodes = 7;             // of Radau; the begin of the step is one more
 constexpr double kCreepTolerance = 3e-9;   // of V at the reference depth
-constexpr double kLeastCreepStep = 1e-14;  // of the time that is asked for
-constexpr std::array<std::size_t, 3> kLookedAfter{0, 3, 6};  // nodes; halfway to the next
+constexpr double kLeastCreepStep = 1e-20;  // of the time that is asked for
 
 using NodeVector = Eigen::Matrix<double, kCreepNodes, 1>;
 using NodeMatrix = Eigen::Matrix<double, kCreepNodes, kCreepNodes>;
-using Place = ExponentialCollocation::Place;
-
-std::vector<double> begin_and_radau_nodes() {
-  std::vector<double> nodes = radau_nodes(kCreepNodes);
-  nodes.insert(nodes.begin(), 0.0);
-  return nodes;
-}
-
-/// The same for all laws: the nodes, and places between them where the balance is looked at.
-struct CreepRule {
-  ExponentialCollocation collocation{begin_and_radau_nodes()};
-  std::vector<Place> node, between;
-
-  CreepRule() {
-    const std::vector<double>& c = collocation.nodes();
-    for (std::size_t i = 1; i < c.size(); ++i) node.push_back(collocation.place(c[i]));
-    for (const std::size_t i : kLookedAfter) {
-      between.push_back(collocation.place(0.5 * (c[i] + c[i + 1])));
-    }
-  }
-};
-
-const CreepRule& creep_rule() {
-  static const CreepRule rule;
-  return rule;
-}
 
 /// How much longer the next step is: the error grows with the power kCreepNodes + 1.
 double longer_creep_step(double off) {
@@ -56,12 +28,15 @@ double longer_creep_step(double off) {
   return std::clamp(kSafety * std::pow(off, -1.0 / (kCreepNodes + 1)), kLeast, kMost);
 }
 
+/// The states are y_j = V - w_j, what is left to relax: near V of fast branches w_j would cancel.
 class CreepSteps {
  public:
   CreepSteps(const LawAtParameters& law, double load, Want want);
 
   /// The load presses on a surface that gives way.
-  [[nodiscard]] bool begins() const { return u_ > 0.0; }
+  [[nodiscard]] bool begins() const { return load_ > 0.0 && (u_ > 0.0 || slow_start_); }
+  /// The first step to try, if `end` is the time that is asked for.
+  [[nodiscard]] double first_step(double end) const;
   /// Tries a step of h: how far the balance between the nodes is off, in parts of what is allowed;
   /// infinite if no depths were found. The state stays.
   [[nodiscard]] double attempt(double h);
@@ -74,46 +49,57 @@ class CreepSteps {
 
  private:
   void set_weights(double h);
+  void guess_depths();
   [[nodiscard]] bool find_depths();
   [[nodiscard]] double off_balance() const;
   [[nodiscard]] Slopes kernel_slopes(const KernelShape::Values& k) const;
 
   const LawAtParameters& law_;
   bool want_slopes_;
-  double load_, sum_;  ///< L and A
-  double h_ = 0.0;     ///< of the last attempt
+  bool slow_start_;  ///< a dashpot does not give way at once: the depth begins at 0
+  double load_;      ///< L
+  double h_ = 0.0;   ///< of the last attempt
   double v_ = 0.0, u_ = 0.0;
-  Eigen::ArrayXd w_;
-  Eigen::ArrayXXd w_by_;    ///< branches x parameters
-  Eigen::ArrayXXd weight_;  ///< of node i and branch j in column i + kCreepNodes * j: begin, nodes
-  Eigen::ArrayXXd decay_;   ///< nodes x branches
-  NodeMatrix carried_;      ///< sum of k_j times the weights
-  NodeVector right_;
+  Eigen::ArrayXd y_;
+  Eigen::ArrayXXd y_by_;  ///< branches x parameters
+  CreepWeights weights_;  ///< of each branch for the step
+  BranchWeights sum_;     ///< k_j times these, with spring and dashpot: the force by the course
+  CreepPlaces carried_;   ///< the force at each place that comes from the states at the begin
   NodeVector depth_, value_;
-  Eigen::Matrix<double, kCreepNodes + 1, 1> course_;  ///< V at the begin and at the nodes
+  CreepCourse course_;         ///< V at the begin and at the nodes
   Eigen::MatrixXd course_by_;  ///< its derivatives: (kCreepNodes + 1) x parameters
+  Eigen::Array<double, Eigen::Dynamic, kCreepNodes> y_at_nodes_;  ///< by branch
 };
 
 CreepSteps::CreepSteps(const LawAtParameters& law, double load, Want want)
     : law_(law),
       want_slopes_(want == Want::values_and_sensitivity),
+      slow_start_(law.memory.dashpot > 0.0),
       load_(load - law.offset),
-      sum_(law.memory.instant()) {
+      weights_(law.memory) {
   const Eigen::Index branches = law.memory.stiffness.size();
+  y_.setZero(branches);
+  if (want_slopes_) {
+    y_by_.setZero(branches, law.parameter_count);
+    course_by_.setZero(kCreepNodes + 1, law.parameter_count);
+  }
+  if (slow_start_ || !(load_ > 0.0)) return;
   ContactHistory at_once(law, law.tension.reference, want);
   at_once.jump_to_load(load);
-  u_ = load_ > 0.0 ? at_once.drive() - law.contact : 0.0;
-  const KernelShape::Values k = law.kernel.at(u_);
+  u_ = at_once.drive() - law.contact;
+  const KernelShape::Values k = law_.kernel.at(u_);
   v_ = k.value;
-  w_.setZero(branches);
-  weight_.resize(kCreepNodes + 1, kCreepNodes * branches);
-  decay_.resize(kCreepNodes, branches);
+  y_.setConstant(v_);
   if (!want_slopes_) return;
-  w_by_.setZero(branches, law.parameter_count);
   Slopes u_by = at_once.drive_slopes();
   u_by[law.place.contact] -= 1.0;
-  course_by_.setZero(kCreepNodes + 1, law.parameter_count);
   course_by_.row(0) = (kernel_slopes(k) + k.slope * u_by).matrix().transpose();
+  y_by_ = course_by_.row(0).array().replicate(branches, 1);
+}
+
+double CreepSteps::first_step(double end) const {
+  const Memory& m = law_.memory;
+  return slow_start_ ? std::min(end, 1.0 / m.rate_per_s.maxCoeff()) : end;
 }
 
 /// Derivatives of V at a kept depth.
@@ -131,18 +117,31 @@ Slopes CreepSteps::kernel_slopes(const KernelShape::Values& k) const {
 void CreepSteps::set_weights(double h) {
   h_ = h;
   const Memory& m = law_.memory;
+  weights_.set_step(h);
+  const CreepRule& rule = creep_rule();
+  sum_.lag = m.constant * rule.interpolation + m.dashpot / h * rule.derivative;
+  sum_.decay.setZero();
   carried_.setZero();
-  right_.setConstant(load_);
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const double z = h * m.rate_per_s[j];
-    for (Eigen::Index i = 0; i < kCreepNodes; ++i) {
-      const auto node = static_cast<std::size_t>(i);
-      auto weight = weight_.col(i + kCreepNodes * j);
-      weight = creep_rule().node[node].weights(z).array();
-      decay_(i, j) = std::exp(-z * creep_rule().collocation.nodes()[node + 1]);
-      carried_.row(i) += m.stiffness[j] * weight.tail<kCreepNodes>().matrix().transpose();
-      right_[i] += m.stiffness[j] * (decay_(i, j) * w_[j] + weight[0] * v_);
-    }
+  for (Eigen::Index j = 0; j < y_.size(); ++j) {
+    const BranchWeights& w = weights_[j];
+    sum_.lag += m.stiffness[j] * w.lag;
+    sum_.decay += m.stiffness[j] * w.decay;
+    carried_ += m.stiffness[j] * (y_[j] - v_) * w.decay;
+  }
+}
+
+/// Where the surface would lie without tension, for a surface that starts from nothing.
+void CreepSteps::guess_depths() {
+  if (u_ > 0.0) {
+    depth_.setConstant(u_);
+    return;
+  }
+  const NodeMatrix lag = sum_.lag.bottomLeftCorner<kCreepNodes, kCreepNodes>().transpose();
+  const NodeVector v =
+      lag.partialPivLu().solve(NodeVector::Constant(load_) - carried_.head<kCreepNodes>().matrix() -
+                               v_ * sum_.lag.topLeftCorner<1, kCreepNodes>().transpose());
+  for (Eigen::Index n = 0; n < kCreepNodes; ++n) {
+    depth_[n] = v[n] > 0.0 ? law_.kernel.inverse(v[n]) : 0.0;
   }
 }
 
@@ -150,8 +149,12 @@ void CreepSteps::set_weights(double h) {
 bool CreepSteps::find_depths() {
   constexpr int kMostIterations = 12;
   constexpr double kSettled = 1e-12;
-  depth_.setConstant(u_);
+  guess_depths();
+  const NodeMatrix lag = sum_.lag.bottomLeftCorner<kCreepNodes, kCreepNodes>().transpose();
+  const NodeVector carried = carried_.head<kCreepNodes>().matrix() +
+                             v_ * sum_.lag.topLeftCorner<1, kCreepNodes>().transpose();
   for (int i = 0; i < kMostIterations; ++i) {
+    if (!(depth_.array() > 0.0).all()) return false;
     NodeVector slope, pull, pull_slope;
     for (Eigen::Index n = 0; n < kCreepNodes; ++n) {
       const KernelShape::Values k = law_.kernel.at(depth_[n]);
@@ -161,9 +164,9 @@ bool CreepSteps::find_depths() {
       pull[n] = law_.k_tension * t.value;
       pull_slope[n] = law_.k_tension * t.slope;
     }
-    const NodeVector excess = sum_ * value_ + pull - right_ - carried_ * value_;
-    NodeMatrix by_depth = -carried_ * slope.asDiagonal();
-    by_depth.diagonal() += sum_ * slope + pull_slope;
+    const NodeVector excess = lag * value_ + carried + pull - NodeVector::Constant(load_);
+    NodeMatrix by_depth = lag * slope.asDiagonal();
+    by_depth.diagonal() += pull_slope;
     const NodeVector step = by_depth.partialPivLu().solve(excess);
     depth_ -= step;
     if (!(depth_.array() > 0.0).all()) return false;
@@ -175,24 +178,23 @@ bool CreepSteps::find_depths() {
   return false;
 }
 
-/// How far V between the nodes is from what balances there, at most.
+/// How far V between the nodes is from what balances there, at most. A force that is missing there
+/// moves V by it over the stiffness that a part of the step leaves: that at once would be far
+/// larger for a spring-pot.
 double CreepSteps::off_balance() const {
-  const Memory& m = law_.memory;
+  const CreepRule& rule = creep_rule();
   double most = 0.0;
-  const std::vector<double>& c = creep_rule().collocation.nodes();
-  for (std::size_t b = 0; b < kLookedAfter.size(); ++b) {
-    const Place& place = creep_rule().between[b];
-    const double at = 0.5 * (c[kLookedAfter[b]] + c[kLookedAfter[b] + 1]);
-    double right = load_;
-    for (Eigen::Index j = 0; j < w_.size(); ++j) {
-      const double z = h_ * m.rate_per_s[j];
-      right += m.stiffness[j] * (std::exp(-z * at) * w_[j] + place.weights(z).dot(course_));
-    }
-    const double v = place.interpolation().dot(course_);
+  const double soon = law_.memory.constant + sum_.decay[kCreepNodes] +
+                      law_.memory.dashpot / (h_ * rule.fraction[kCreepNodes]);
+  for (Eigen::Index b = kCreepNodes; b < kCreepPlaces; ++b) {
+    const double v = rule.interpolation.col(b).dot(course_);
+    if (!(v > 0.0)) return std::numeric_limits<double>::infinity();
     const double u = law_.kernel.inverse(v);
     const TensionShape::Values t = law_.tension.at(u);
-    const double slope = sum_ + law_.k_tension * t.slope / law_.kernel.at(u).slope;
-    most = std::max(most, std::abs(sum_ * v + law_.k_tension * t.value - right) / slope);
+    const double excess =
+        sum_.lag.col(b).dot(course_) + carried_[b] + law_.k_tension * t.value - load_;
+    const double slope = soon + law_.k_tension * t.slope / law_.kernel.at(u).slope;
+    most = std::max(most, std::abs(excess) / slope);
   }
   return most;
 }
@@ -205,77 +207,83 @@ double CreepSteps::attempt(double h) {
 
 /// The balance at all nodes, differentiated: one matrix for all parameters.
 void CreepSteps::differentiate() {
-  if (!want_slopes_) return;
   const Memory& m = law_.memory;
+  y_at_nodes_.resize(y_.size(), kCreepNodes);
+  for (Eigen::Index j = 0; j < y_.size(); ++j) {
+    const BranchWeights& w = weights_[j];
+    y_at_nodes_.row(j) = (w.lag.leftCols<kCreepNodes>().transpose() * course_).array().transpose() +
+                         (y_[j] - v_) * w.decay.head<kCreepNodes>().transpose();
+  }
+  if (!want_slopes_) return;
+  const CreepRule& rule = creep_rule();
   const KernelPlaces& p = law_.place;
-  NodeMatrix by_depth = -carried_;
-  Eigen::MatrixXd kernel_by(kCreepNodes, law_.parameter_count);
-  Eigen::MatrixXd excess_by(kCreepNodes, law_.parameter_count);
-  NodeVector slope;
+  NodeMatrix by_value = sum_.lag.bottomLeftCorner<kCreepNodes, kCreepNodes>().transpose();
+  // At kept V but for the begin of the step.
+  Eigen::MatrixXd excess_by =
+      sum_.lag.topLeftCorner<1, kCreepNodes>().transpose() * course_by_.row(0);
+  for (Eigen::Index j = 0; j < y_.size(); ++j) {
+    const CreepPlaces& decay = weights_[j].decay;
+    excess_by += (m.stiffness[j] * decay.head<kCreepNodes>()).matrix() *
+                 (y_by_.row(j).matrix() - course_by_.row(0));
+    const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
+    if (tau < 0) continue;
+    const double scale = m.stiffness[j] * h_ * m.rate_per_s[j] * m.rate_per_s[j];
+    for (Eigen::Index i = 0; i < kCreepNodes; ++i) {
+      excess_by(i, tau) -= scale * weights_.lag_by_z(j, i, course_, y_[j] - v_);
+    }
+  }
+  const NodeVector speed = rule.derivative.leftCols<kCreepNodes>().transpose() * course_ / h_;
+  for (std::size_t q = 0; q < m.by.size(); ++q) {
+    const auto column = static_cast<Eigen::Index>(q);
+    excess_by.col(m.by[q]) += y_at_nodes_.matrix().transpose() * m.d_stiffness.col(column) +
+                              m.d_constant[column] * value_ + m.d_dashpot[column] * speed;
+  }
   for (Eigen::Index i = 0; i < kCreepNodes; ++i) {
     const KernelShape::Values k = law_.kernel.at(depth_[i]);
     const TensionShape::Values t = law_.tension.at(depth_[i]);
-    slope[i] = k.slope;
-    by_depth(i, i) += sum_ + law_.k_tension * t.slope / k.slope;
-    kernel_by.row(i) = kernel_slopes(k).matrix().transpose();
-    // At kept depths: what stands at V is put back below.
-    excess_by.row(i) = -law_.k_tension * t.slope / k.slope * kernel_by.row(i);
+    const double by_v = law_.k_tension * t.slope / k.slope;
+    by_value(i, i) += by_v;
+    excess_by.row(i) -= by_v * kernel_slopes(k).matrix().transpose();
     excess_by(i, p.k_tension) += t.value;
     excess_by(i, p.spacing) += law_.k_tension * t.d_spacing;
     excess_by(i, p.offset) += 1.0;
-    for (Eigen::Index j = 0; j < w_.size(); ++j) {
-      const auto weight = weight_.col(i + kCreepNodes * j);
-      const double w = decay_(i, j) * w_[j] + (weight.matrix().dot(course_));
-      for (std::size_t q = 0; q < m.by.size(); ++q) {
-        excess_by(i, m.by[q]) += m.d_stiffness(j, static_cast<Eigen::Index>(q)) * (value_[i] - w);
-      }
-      excess_by.row(i) -=
-          m.stiffness[j] * (decay_(i, j) * w_by_.row(j).matrix() + weight[0] * course_by_.row(0));
-      const double z = h_ * m.rate_per_s[j];
-      const Place& place = creep_rule().node[static_cast<std::size_t>(i)];
-      const double c = creep_rule().collocation.nodes()[static_cast<std::size_t>(i) + 1];
-      const double by_z = place.weight_slopes(z).dot(course_) - c * decay_(i, j) * w_[j];
-      const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
-      excess_by(i, tau) += m.stiffness[j] * z * m.rate_per_s[j] * by_z;
-    }
-    for (std::size_t q = 0; q < m.by.size(); ++q) {
-      excess_by(i, m.by[q]) += m.d_constant[static_cast<Eigen::Index>(q)] * value_[i];
-    }
   }
-  course_by_.bottomRows<kCreepNodes>() = -by_depth.partialPivLu().solve(excess_by);
+  course_by_.bottomRows<kCreepNodes>() = -by_value.partialPivLu().solve(excess_by);
 }
 
 void CreepSteps::go_on() {
   const Memory& m = law_.memory;
   constexpr Eigen::Index kLast = kCreepNodes - 1;
   if (want_slopes_) {
-    for (Eigen::Index j = 0; j < w_.size(); ++j) {
-      const auto weight = weight_.col(kLast + kCreepNodes * j).matrix();
-      const double z = h_ * m.rate_per_s[j];
-      const double by_z =
-          creep_rule().node.back().weight_slopes(z).dot(course_) - decay_(kLast, j) * w_[j];
-      w_by_.row(j) = decay_(kLast, j) * w_by_.row(j) + (weight.transpose() * course_by_).array();
-      w_by_(j, m.rate_parameter[static_cast<std::size_t>(j)]) -= z * m.rate_per_s[j] * by_z;
+    for (Eigen::Index j = 0; j < y_.size(); ++j) {
+      const BranchWeights& w = weights_[j];
+      y_by_.row(j) = w.decay[kLast] * (y_by_.row(j) - course_by_.row(0).array()) +
+                     (w.lag.col(kLast).transpose() * course_by_).array();
+      const int tau = m.rate_parameter[static_cast<std::size_t>(j)];
+      if (tau < 0) continue;
+      y_by_(j, tau) -=
+          h_ * m.rate_per_s[j] * m.rate_per_s[j] * weights_.lag_by_z(j, kLast, course_, y_[j] - v_);
     }
     course_by_.row(0) = course_by_.row(kCreepNodes).eval();
   }
-  for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const auto weight = weight_.col(kLast + kCreepNodes * j).matrix();
-    w_[j] = decay_(kLast, j) * w_[j] + weight.dot(course_);
-  }
+  y_ = y_at_nodes_.col(kLast);
   u_ = depth_[kLast];
   v_ = value_[kLast];
 }
 
 void CreepSteps::answer(double c, Response& response, Eigen::Index row) const {
   const Eigen::VectorXd at = creep_rule().collocation.interpolation(c);
-  const double u = law_.kernel.inverse(at.dot(course_));
+  const double v = at.dot(course_);
+  const double u = v > 0.0 ? law_.kernel.inverse(v) : 0.0;
   response.value[row] = u + law_.contact;
   if (!want_slopes_) return;
   const KernelShape::Values k = law_.kernel.at(u);
-  Eigen::RowVectorXd by = at.transpose() * course_by_;
-  by -= kernel_slopes(k).matrix().transpose();
-  by /= k.slope;
+  Eigen::RowVectorXd by = Eigen::RowVectorXd::Zero(law_.parameter_count);
+  if (u > 0.0) {  // a dashpot that has not begun to give way stays at 0 whatever the parameters
+    by = at.transpose() * course_by_;
+    by -= kernel_slopes(k).matrix().transpose();
+    by /= k.slope;
+  }
   by[law_.place.contact] += 1.0;
   response.sensitivity.row(row) = by;
 }
@@ -285,13 +293,9 @@ void CreepSteps::answer(double c, Response& response, Eigen::Index row) const {
 std::optional<Response> creep_with_tension(const LawAtParameters& law, double load,
                                            std::span<const double> times_s, Want want,
                                            int* attempts) {
-  const auto& rates = law.memory.rate_parameter;
-  const bool fixed_rates = std::find(rates.begin(), rates.end(), -1) != rates.end();
   const bool finite =
       std::all_of(times_s.begin(), times_s.end(), [](double t) { return std::isfinite(t); });
-  if (law.place.k_tension < 0 || fixed_rates || law.memory.dashpot > 0.0 || !finite) {
-    return std::nullopt;
-  }
+  if (law.place.k_tension < 0 || !finite) return std::nullopt;
   CreepSteps steps(law, load, want);
   if (!steps.begins()) return std::nullopt;
   std::vector<std::size_t> order(times_s.size());
@@ -304,14 +308,16 @@ std::optional<Response> creep_with_tension(const LawAtParameters& law, double lo
     response.sensitivity.resize(response.value.size(), law.parameter_count);
   }
   const double end = order.empty() ? 0.0 : times_s[order.back()];
+  const double least = kLeastCreepStep * end;
   double at = 0.0;
-  double h = end;
+  double h = steps.first_step(end);
   for (std::size_t next = 0; next < order.size();) {
-    const double step = std::max(h, kLeastCreepStep * end);
+    // The load stays: a step may go beyond the end.
+    const double step = end > 0.0 ? on_creep_lattice(std::max(h, least)) : 0.0;
     const double off = steps.attempt(step);
     if (attempts != nullptr) ++*attempts;
-    if (off > 1.0) {
-      if (step <= kLeastCreepStep * end) return std::nullopt;
+    if (!(off <= 1.0)) {
+      if (step <= least) return std::nullopt;
       h = step * longer_creep_step(off);
       continue;
     }
@@ -323,7 +329,7 @@ std::optional<Response> creep_with_tension(const LawAtParameters& law, double lo
     }
     steps.go_on();
     at += step;
-    h = std::min(step * longer_creep_step(off), end - at > 0.0 ? end - at : step);
+    h = step * longer_creep_step(off);
   }
   return response;
 }

@@ -1,11 +1,11 @@
 #include "tpm/network/liver.hpp"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
 
@@ -55,9 +55,7 @@ Organ wrapped(const Organ& organ, std::size_t full, std::size_t shift) {
 Organ placed(const Organ& organ, std::size_t contact) {
   const auto column = static_cast<Eigen::Index>(contact);
   const Vector3d towards_probe = -Vector3d::UnitZ();
-  const Eigen::Matrix3d turn =
-      Eigen::Quaterniond::FromTwoVectors(organ.normal.col(column), towards_probe)
-          .toRotationMatrix();
+  const Eigen::Matrix3d turn = turn_onto(organ.normal.col(column), towards_probe);
   Organ result = moved(organ, turn, printed_place() - turn * organ.position.col(column));
   round_to_nanometres(result.position);
   result.normal.colwise().normalize();

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 
@@ -93,7 +93,7 @@ std::vector<double> local_support(const BondSystem& bonds, const Organ& organ,
     }
     Eigen::VectorXd motion = Eigen::VectorXd::Zero(matrix.rows());
     motion.head<3>() = along;
-    matrix.ldlt().solveInPlace(motion);
+    motion = solve_symmetric(matrix, motion);
     const double compliance = along.dot(motion.head<3>()) / std::pow(along.squaredNorm(), 2);
     support[i] = held > 0.0 ? 1.0 / (compliance * held) : 0.0;
   }

@@ -1,10 +1,10 @@
 #include "tpm/network/lowest_mode.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/network/rigidity.hpp"
@@ -68,10 +68,9 @@ class InverseIteration {
     // basis = K^-1 pushed, so that basis' K basis = basis' pushed.
     const Eigen::MatrixXd stiffness = basis_.transpose() * pushed;
     const Eigen::MatrixXd mass = basis_.transpose() * mass_.asDiagonal() * basis_;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(
-        0.5 * (stiffness + stiffness.transpose()), mass);
-    basis_ = (basis_ * ritz.eigenvectors()).eval();
-    return ritz.eigenvalues()[0];
+    const SymmetricModes ritz = symmetric_modes(0.5 * (stiffness + stiffness.transpose()), mass);
+    basis_ = (basis_ * ritz.vectors).eval();
+    return ritz.values[0];
   }
 
   const BondSystem& bonds_;

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <numeric>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/network/local_support.hpp"
@@ -52,8 +52,7 @@ Eigen::MatrixXd softest(const BlockPattern& pattern, const BlockMatrix& matrix,
       factor.solve(mode);
       freedom.project(mode);
     }
-    basis = Eigen::HouseholderQR<Eigen::MatrixXd>(basis).householderQ() *
-            Eigen::MatrixXd::Identity(3 * n, count);
+    basis = orthonormal_columns(basis);
   }
   return basis;
 }

@@ -1,10 +1,10 @@
 #include "tpm/network/roughness.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 
 namespace tpm {
@@ -27,7 +27,7 @@ double unevenness(const Organ& organ, const Eigen::Matrix3Xd& displacement, Eige
     place.row(k) << 1.0, apart.dot(first), apart.dot(second);
     value[k] = normal.dot(displacement.col(j) - displacement.col(sphere));
   }
-  return -place.completeOrthogonalDecomposition().solve(value)[0];
+  return -shortest_least_squares(place, value)(0, 0);
 }
 
 }  // namespace

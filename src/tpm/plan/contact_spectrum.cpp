@@ -1,11 +1,11 @@
 #include "tpm/plan/contact_spectrum.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/material_refusal.hpp"
@@ -102,7 +102,7 @@ BranchFit fit_shares(const ContactSpectrum& spectrum, const std::vector<double>&
   if (columns > 1) {
     const Eigen::VectorXd last = a.col(columns - 1);
     const Eigen::MatrixXd others = a.leftCols(columns - 1).colwise() - last;
-    shares.head(columns - 1) = others.colPivHouseholderQr().solve(b - last);
+    shares.head(columns - 1) = least_squares(others, b - last);
     shares[columns - 1] = 1.0 - shares.head(columns - 1).sum();
   }
   BranchFit fit;

@@ -1,11 +1,11 @@
 #include "tpm/plan/inertia_estimate.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/lowest_mode.hpp"
@@ -56,13 +56,13 @@ class Lanczos {
       q = next / beta;
     }
     beside.resize(diagonal.size() - 1);
-    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
-    ritz.computeFromTridiagonal(Eigen::Map<Eigen::VectorXd>(diagonal.data(), std::ssize(diagonal)),
-                                Eigen::Map<Eigen::VectorXd>(beside.data(), std::ssize(beside)));
+    const SymmetricModes ritz =
+        tridiagonal_modes(Eigen::Map<Eigen::VectorXd>(diagonal.data(), std::ssize(diagonal)),
+                          Eigen::Map<Eigen::VectorXd>(beside.data(), std::ssize(beside)));
     std::vector<SeenMode> modes;
-    for (Eigen::Index i = 0; i < ritz.eigenvalues().size(); ++i) {
-      const double first = size * ritz.eigenvectors()(0, i);
-      const double omega2 = std::max(ritz.eigenvalues()[i], 1e-12);
+    for (Eigen::Index i = 0; i < ritz.values.size(); ++i) {
+      const double first = size * ritz.vectors(0, i);
+      const double omega2 = std::max(ritz.values[i], 1e-12);
       modes.push_back({omega2, first * first * omega2});
     }
     return modes;

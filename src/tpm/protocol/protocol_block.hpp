@@ -1,10 +1,13 @@
 #pragma once
 // Protocols in files: one table of kinds and keys, one parser, one place where they are made.
+#include <array>
+#include <initializer_list>
 #include <optional>
 #include <string_view>
 #include <vector>
 
 #include "tpm/core/units.hpp"
+#include "tpm/core/word_table.hpp"
 #include "tpm/protocol/protocol.hpp"
 #include "tpm/store/document_place.hpp"
 
@@ -18,6 +21,12 @@ enum class ProtocolKind {
   knots,      ///< linear between corners
 };
 
+inline constexpr auto kProtocolKindWords =
+    std::to_array<Word<ProtocolKind>>({{ProtocolKind::ramp_hold, "ramp_hold"},
+                                       {ProtocolKind::step_hold, "step_hold"},
+                                       {ProtocolKind::creep, "creep"},
+                                       {ProtocolKind::knots, "knots"}});
+
 /// What a block says of a protocol. Numbers may be open as long as something else will set them: an
 /// axis of a sweep, the data of a fit.
 struct ProtocolBlock {
@@ -28,6 +37,9 @@ struct ProtocolBlock {
 
   /// The number under a key of the block's kind, such as "depth"; null for another key.
   [[nodiscard]] std::optional<double>* find(std::string_view key);
+  /// The number under a key of the block's kind. Throws Error(bad_input) at the key if it is open
+  /// or out of range, std::logic_error for another key.
+  [[nodiscard]] double number(std::string_view key, const DocumentPlace& place) const;
   /// Throws Error(bad_input) for a number that is open or out of range, at its key.
   [[nodiscard]] Protocol protocol(const DocumentPlace& place) const;
 };
@@ -52,5 +64,21 @@ enum class Openness {
 [[nodiscard]] ProtocolBlock parse_protocol_block(const Json& block, const DocumentPlace& place,
                                                  Openness openness,
                                                  std::optional<ProtocolKind> kind = std::nullopt);
+
+/// The name that a file uses for a key, such as "rates" for a list of the key "rate".
+struct ProtocolKeyName {
+  std::string_view key, in_file;
+};
+
+/// All combinations of the numbers in a block that has a list of quantities, or one quantity, under
+/// each key: several indentations of a session, the candidates of a design. The first key of the
+/// kind varies most slowly; every number is in range.
+/// @param renamed the keys that have another name in this block
+/// @param others keys of the block that say nothing of the protocol
+/// Throws Error(bad_input) as parse_protocol_block() does, for numbers out of range, and for more
+/// than 100,000 combinations.
+[[nodiscard]] std::vector<ProtocolBlock> parse_protocol_lists(
+    const Json& block, const DocumentPlace& place, ProtocolKind kind, Openness openness,
+    std::initializer_list<ProtocolKeyName> renamed, const std::vector<std::string_view>& others);
 
 }  // namespace tpm

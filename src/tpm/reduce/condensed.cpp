@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
 #include "tpm/reduce/condensed_phi.hpp"
@@ -105,9 +105,8 @@ void CondensedContact::set_rates(double relaxation_time_s) {
   for (Eigen::Index k = 0; k < 3; ++k) {
     for (Eigen::Index i = 0; i < 3; ++i) rates_.of_second[k][i] = rate(3 + i, 3 + k);
   }
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> of_w(fit_->mean_energy,
-                                                                       fit_->mean_metric);
-  const double share = rest_share(of_w.eigenvalues().mean() * x);
+  const SymmetricModes of_w = symmetric_modes(fit_->mean_energy, fit_->mean_metric);
+  const double share = rest_share(of_w.values.mean() * x);
   // Of a linear tissue that moves straight, resting for that share of the way leaves this out: with
   // r = exp(-y) the state relative to the contact ends at phi1, not at 1 + (r - 1) share, per step
   // of the contact.

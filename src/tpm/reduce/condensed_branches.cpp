@@ -1,9 +1,9 @@
 #include "tpm/reduce/condensed_branches.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/reduce/condensed_phi.hpp"
 
 namespace tpm {
@@ -32,22 +32,22 @@ class BranchMode {
     }
     Eigen::MatrixXd symmetric = (lambda - 1.0) * p * p.transpose();
     symmetric.diagonal() += rate;
-    solver_.compute(symmetric);
+    modes_ = symmetric_modes(symmetric);
   }
 
   /// f(h B)
   template <class Function>
   [[nodiscard]] Eigen::MatrixXd of(Function&& f) const {
-    Eigen::VectorXd values = solver_.eigenvalues();
+    Eigen::VectorXd values = modes_.values;
     for (double& value : values) value = f(std::max(value, 0.0));
     return scale_.cwiseInverse().asDiagonal() *
-           (solver_.eigenvectors() * values.asDiagonal() * solver_.eigenvectors().transpose()) *
+           (modes_.vectors * values.asDiagonal() * modes_.vectors.transpose()) *
            scale_.asDiagonal();
   }
 
  private:
   Eigen::VectorXd scale_;
-  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver_;
+  SymmetricModes modes_;
 };
 
 /// The Cholesky factor C (00, 10, 11, 20, 21, 22) of a symmetric matrix (00, 11, 22, 01, 02, 12);
@@ -83,8 +83,8 @@ CondensedModes condensed_modes(const CondensedFit& fit) {
   metric.bottomRightCorner<3, 3>() = fit.mean_coupling + grain;
   Matrix6 energy;
   energy << fit.mean_energy, fit.mean_coupling, fit.mean_coupling, fit.mean_second + grain;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6> modes(energy, metric);
-  return {modes.eigenvalues(), modes.eigenvectors().transpose() * metric, modes.eigenvectors()};
+  const SymmetricModes modes = symmetric_modes(energy, metric);
+  return {modes.values, modes.vectors.transpose() * metric, modes.vectors};
 }
 
 CondensedBranches::CondensedBranches(const CondensedFit& fit,
@@ -110,12 +110,11 @@ CondensedBranches::CondensedBranches(const CondensedFit& fit,
   for (Index k = 0; k < 3; ++k) {
     for (Index i = 0; i < 3; ++i) rates_.of_second[k][i] = rate(3 + i, 3 + k);
   }
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> of_w(fit.mean_energy,
-                                                                       fit.mean_metric);
+  const SymmetricModes of_w = symmetric_modes(fit.mean_energy, fit.mean_metric);
   const Eigen::VectorXd one = Eigen::VectorXd::Ones(n);
   const auto decay = [](double y) { return -std::expm1(-y); };
   // Of a linear tissue that moves straight the mean memory ends where it should (condensed.cpp).
-  const BranchMode middle(of_w.eigenvalues().mean(), branches, period_s);
+  const BranchMode middle(of_w.values.mean(), branches, period_s);
   resting_share_ =
       (1.0 - share.dot(middle.of(first_phi) * one)) / share.dot(middle.of(decay) * one);
 

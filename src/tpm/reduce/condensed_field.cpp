@@ -1,10 +1,10 @@
 #include "tpm/reduce/condensed_field.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/wide_vectors.hpp"
 
 namespace tpm {
@@ -93,9 +93,8 @@ CondensedField::CondensedField(const CondensedFrame& frame, const Eigen::Matrix3
     coefficients.middleRows(count + k * kOfW, kOfW) =
         second.middleCols(k * rest.size(), rest.size());
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> strengths(coefficients *
-                                                                 coefficients.transpose());
-  const Eigen::MatrixXd strongest = strengths.eigenvectors().rightCols(kModes);
+  const Eigen::MatrixXd strongest =
+      symmetric_modes(coefficients * coefficients.transpose()).vectors.rightCols(kModes);
   const Eigen::MatrixXd modes = coefficients.transpose() * strongest;  // 3n x modes
   const auto rows_of = [](const Eigen::MatrixXd& table) {
     std::vector<Amplitudes> all(static_cast<std::size_t>(table.rows()));

@@ -1,7 +1,8 @@
 #include "tpm/reduce/condensed_fit.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
+
+#include "tpm/core/dense_algebra.hpp"
 
 namespace tpm {
 namespace {
@@ -60,7 +61,7 @@ CondensedMatrices::CondensedMatrices(const CondensedFrame& frame,
     put(at.second_metric, frame, values.col(m).segment<6>(6));
     put(at.second_energy, frame, values.col(m).segment<6>(12));
   }
-  coefficients_ = rows.colPivHouseholderQr().solve(values.transpose()).transpose();
+  coefficients_ = least_squares(rows, values.transpose()).transpose();
 }
 
 CondensedMatrices::Values CondensedMatrices::at(const Eigen::Vector3d& w_m) const {

@@ -1,9 +1,9 @@
 #include "tpm/reduce/step_error.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <limits>
 #include <unsupported/Eigen/MatrixFunctions>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
 
 namespace tpm {
@@ -13,12 +13,12 @@ constexpr double kNoMode = 1e-9;  // of the contact's stiffness: a field that ad
 
 /// The inverse, without directions that have no stiffness to speak of.
 Eigen::Matrix3d inverse_where_stiff(const Eigen::Matrix3d& matrix, double scale) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> modes(matrix);
+  const SymmetricModes modes = symmetric_modes(matrix);
   Eigen::Vector3d inverse = Eigen::Vector3d::Zero();
   for (int i = 0; i < 3; ++i) {
-    if (modes.eigenvalues()[i] > kNoMode * scale) inverse[i] = 1.0 / modes.eigenvalues()[i];
+    if (modes.values[i] > kNoMode * scale) inverse[i] = 1.0 / modes.values[i];
   }
-  return modes.eigenvectors() * inverse.asDiagonal() * modes.eigenvectors().transpose();
+  return modes.vectors * inverse.asDiagonal() * modes.vectors.transpose();
 }
 
 /// The branches of the bonds that relax; one that never does if none relaxes.
@@ -103,10 +103,9 @@ StepError::StepError(PushedContact& tissue, const Positions& position, double re
   exact_.of_memory = over.topLeftCorner(6 * n, 6 * n);
   exact_.of_end = over.block(0, 6 * n + 3, 6 * n, 3);
   exact_.of_start = over.block(0, 6 * n, 6 * n, 3) - exact_.of_end;
-  const auto solved = left.partialPivLu();
-  stepped_.of_memory = solved.solve(right);
-  stepped_.of_start = solved.solve(of_start);
-  stepped_.of_end = solved.solve(of_end);
+  stepped_.of_memory = solve_square(left, right);
+  stepped_.of_start = solve_square(left, of_start);
+  stepped_.of_end = solve_square(left, of_end);
   exact_.memory = exact_.next = stepped_.memory = stepped_.next = Eigen::VectorXd::Zero(6 * n);
 }
 

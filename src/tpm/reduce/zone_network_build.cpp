@@ -1,9 +1,9 @@
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/reduce/zone_network.hpp"
 
@@ -27,11 +27,10 @@ Eigen::MatrixXd flat_columns(const Fields& fields) {
 
 /// The part of a symmetric matrix with eigenvalues of 0 and above.
 Eigen::MatrixXd not_negative(const Eigen::MatrixXd& matrix, double& softest) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(matrix);
-  const Eigen::VectorXd& values = modes.eigenvalues();
+  const SymmetricModes modes = symmetric_modes(matrix);
+  const Eigen::VectorXd& values = modes.values;
   softest = values[0] / values[values.size() - 1];
-  return modes.eigenvectors() * values.cwiseMax(0.0).asDiagonal() *
-         modes.eigenvectors().transpose();
+  return modes.vectors * values.cwiseMax(0.0).asDiagonal() * modes.vectors.transpose();
 }
 
 /// What some bonds of a tissue pull with, everything relaxed by a part, N.

@@ -14,11 +14,11 @@ std::string ten_digits(double value) {
   return significant(value, 10);
 }
 
-constexpr double kMilli = 1e3;
+constexpr double kMillimetres = 1e3;
 constexpr double kKilo = 1e-3;
 
 std::string millimetres(double metres) {
-  return significant(metres * kMilli, 6) + " mm";
+  return significant(metres * kMillimetres, 6) + " mm";
 }
 
 std::string with_unit(const std::string& number, const Unit& unit) {
@@ -139,12 +139,12 @@ std::vector<std::string> introduction(const TableRequest& request) {
     lines.emplace_back(
         "As printed: a step (Eqs. 15 and 16); the end force is the limit t -> infinity.");
   } else {
-    lines.push_back(
-        fmt::format("Consistent: ramp at {} mm/s (assumed: the tables state no rate), then {} s of "
-                    "hold counted "
-                    "from the end of the ramp (assumed); eta1 = {} Pa s, tau = {} s.",
-                    significant(request.rate_m_per_s * kMilli, 6), significant(request.hold_s, 6),
-                    significant(p.eta1_Pa_s, 6), significant(p.relaxation_time_s(), 4)));
+    lines.push_back(fmt::format(
+        "Consistent: ramp at {} mm/s (assumed: the tables state no rate), then {} s of "
+        "hold counted "
+        "from the end of the ramp (assumed); eta1 = {} Pa s, tau = {} s.",
+        significant(request.rate_m_per_s * kMillimetres, 6), significant(request.hold_s, 6),
+        significant(p.eta1_Pa_s, 6), significant(p.relaxation_time_s(), 4)));
   }
   return lines;
 }

@@ -1,7 +1,8 @@
 #pragma once
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <algorithm>
+
+#include "tpm/core/dense_algebra.hpp"
 
 namespace tpm {
 
@@ -27,8 +28,7 @@ class Anderson {
     if (used == 0) return;
     const auto differences = dd_.leftCols(used);
     const Eigen::MatrixXd gram = gram_.topLeftCorner(used, used);
-    const Eigen::VectorXd mix =
-        gram.completeOrthogonalDecomposition().solve(differences.transpose() * d);
+    const Eigen::VectorXd mix = shortest_least_squares(gram, differences.transpose() * d);
     x.noalias() -= dx_.leftCols(used) * mix;
     x.noalias() -= differences * mix;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/wide_vectors.hpp"
 
 namespace tpm {
@@ -55,9 +56,7 @@ std::size_t negative_eigenvalues(const Eigen::Matrix3d& matrix) {
         matrix(2, 2) - matrix(2, 0) * matrix(2, 0) / first - across * across / second;
     if (third > 0.0) return 0;
   }
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> signs;
-  signs.computeDirect(matrix, Eigen::EigenvaluesOnly);
-  return static_cast<std::size_t>((signs.eigenvalues().array() < 0.0).count());
+  return static_cast<std::size_t>((symmetric_eigenvalues(matrix).array() < 0.0).count());
 }
 
 }  // namespace

@@ -78,13 +78,24 @@ Eigen::VectorXd ExponentialCollocation::Place::weights(double z) const {
   if (z * c_ <= kForgotten) {
     return shape_ * (z * part_.array() * (-z * ago_.array()).exp()).matrix();
   }
-  // z integral of a^m exp(-z a) = m!/z^m.
+  return coefficient_ * asymptotic_powers(z);
+}
+
+/// z integral of a^m exp(-z a) = m!/z^m.
+Eigen::VectorXd ExponentialCollocation::Place::asymptotic_powers(double z) const {
   Eigen::VectorXd power(coefficient_.cols());
   power[0] = 1.0;
   for (Eigen::Index m = 1; m < power.size(); ++m) {
     power[m] = power[m - 1] * static_cast<double>(m) / z;
   }
-  return coefficient_ * power;
+  return power;
+}
+
+Eigen::VectorXd ExponentialCollocation::Place::lag(double z) const {
+  if (z * c_ <= kForgotten) return here_ - weights(z);
+  // The first of the asymptotic terms is L_k(c) itself.
+  const Eigen::Index rest = coefficient_.cols() - 1;
+  return -(coefficient_.rightCols(rest) * asymptotic_powers(z).tail(rest));
 }
 
 Eigen::VectorXd ExponentialCollocation::Place::weight_slopes(double z) const {

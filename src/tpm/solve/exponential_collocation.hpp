@@ -23,10 +23,17 @@ class ExponentialCollocation {
     [[nodiscard]] Eigen::VectorXd weights(double z) const;
     /// The derivatives of the weights by z.
     [[nodiscard]] Eigen::VectorXd weight_slopes(double z) const;
+    /// L_k(c) - weight_k: the weights of l(c) - y(c), to rounding also where y follows l closely.
+    [[nodiscard]] Eigen::VectorXd lag(double z) const;
     /// L_k(c) of all nodes: what interpolates at c.
     [[nodiscard]] const Eigen::VectorXd& interpolation() const { return here_; }
+    /// The derivatives of L_k at c, by the fraction of the step.
+    [[nodiscard]] Eigen::VectorXd derivative() const { return -coefficient_.col(1); }
+    [[nodiscard]] double fraction() const { return c_; }
 
    private:
+    [[nodiscard]] Eigen::VectorXd asymptotic_powers(double z) const;
+
     friend class ExponentialCollocation;
     double c_ = 0.0;
     Eigen::VectorXd here_;

@@ -130,10 +130,14 @@ SpectralValue sum_below(const CardinalWeight& weight, long first, long last,
 
 // The tolerance is spent by halves: one on the step (error exp(-pi^2/(2h)), reached at alpha = 1),
 // a quarter on each end of the grid.
+double FractionalMemory::log_step_for(double tolerance) {
+  return pi * pi / (2.0 * std::log(2.0 / tolerance));
+}
+
 FractionalMemory::FractionalMemory(double t_min_s, double t_max_s, double tolerance)
     : t_min_s_(t_min_s), t_max_s_(t_max_s) {
   check_window(t_min_s, t_max_s, tolerance);
-  step_ = pi * pi / (2.0 * std::log(2.0 / tolerance));
+  step_ = log_step_for(tolerance);
   // Slower rates as a constant and the first rate: (r t)^2/8 at most.
   const double slowest = std::sqrt(2.0 * tolerance) / t_max_s;
   // Faster rates are over within t_min; for the spring-pot exp(-r t) (r t)^alpha has to be small.

@@ -61,6 +61,8 @@ class FractionalMemory {
   /// Throws Error(bad_input).
   FractionalMemory(double t_min_s, double t_max_s, double tolerance = 1e-9);
 
+  /// log_step() of a tolerance: the rates of all windows lie on one lattice, exp(k log_step).
+  [[nodiscard]] static double log_step_for(double tolerance);
   /// Rising; neighbours differ by the factor exp(log_step()).
   [[nodiscard]] std::span<const double> rates_per_s() const { return rates_; }
   [[nodiscard]] double log_step() const { return step_; }

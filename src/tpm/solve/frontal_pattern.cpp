@@ -1,8 +1,9 @@
 #include "tpm/solve/frontal_pattern.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <numeric>
+
+#include "tpm/core/dense_algebra.hpp"
 
 namespace tpm {
 namespace {
@@ -18,8 +19,7 @@ void sort_along_extent(const Eigen::Matrix3Xd& places, Nodes& nodes) {
     const Eigen::Vector3d off = places.col(node) - mean;
     spread += off * off.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
-  const Eigen::Vector3d along = axes.eigenvectors().col(2);
+  const Eigen::Vector3d along = symmetric_modes(spread).vectors.col(2);
   std::vector<std::pair<double, std::uint32_t>> keyed;
   keyed.reserve(nodes.size());
   for (const auto node : nodes) keyed.emplace_back(along.dot(places.col(node)), node);

@@ -1,9 +1,9 @@
 #include "tpm/solve/nonnegative.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <vector>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 
 namespace tpm {
@@ -20,7 +20,7 @@ Eigen::VectorXd solve_used(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
   for (std::size_t j = 0; j < columns.size(); ++j) {
     part.col(static_cast<Eigen::Index>(j)) = a.col(columns[j]);
   }
-  const Eigen::VectorXd solution = part.colPivHouseholderQr().solve(b);
+  const Eigen::VectorXd solution = least_squares(part, b);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(a.cols());
   for (std::size_t j = 0; j < columns.size(); ++j) {
     x[columns[j]] = solution[static_cast<Eigen::Index>(j)];

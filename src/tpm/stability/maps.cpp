@@ -1,7 +1,9 @@
 // Maps of each rule over a property of the problem and the step.
+#include <array>
 #include <cmath>
 #include <functional>
 
+#include "tpm/core/progress.hpp"
 #include "tpm/stability/judged_problem.hpp"
 #include "tpm/stability/study.hpp"
 
@@ -156,7 +158,7 @@ void add_limits(StabilityMap& map, const MapPlan& plan) {
   }
 }
 
-void draw_plan(const MapPlan& plan, std::vector<StabilityMap>& maps) {
+void draw_plan(const MapPlan& plan, std::vector<StabilityMap>& maps, Progress& progress) {
   const std::size_t first = maps.size();
   for (const StepRuleEntry& entry : kStepRules) {
     if (entry.adaptive) continue;
@@ -173,6 +175,7 @@ void draw_plan(const MapPlan& plan, std::vector<StabilityMap>& maps) {
         settings.step_s = h;
         maps[i].points.push_back({x, h, judged.judge(settings)});
       }
+      progress.advance();
     }
   }
 }
@@ -180,12 +183,14 @@ void draw_plan(const MapPlan& plan, std::vector<StabilityMap>& maps) {
 }  // namespace
 
 std::vector<StabilityMap> stability_maps(int along) {
+  const std::array plans{over_relaxation_time(along), over_load_rate(along),
+                         over_stiffness(along),       over_mass(along),
+                         over_damping(along),         over_depth(along)};
+  std::size_t points = 0;
+  for (const MapPlan& plan : plans) points += plan.x.size() * plan.step_s.size();
+  Progress progress("points of maps", points);
   std::vector<StabilityMap> maps;
-  for (const MapPlan& plan :
-       {over_relaxation_time(along), over_load_rate(along), over_stiffness(along), over_mass(along),
-        over_damping(along), over_depth(along)}) {
-    draw_plan(plan, maps);
-  }
+  for (const MapPlan& plan : plans) draw_plan(plan, maps, progress);
   return maps;
 }
 

@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
@@ -41,11 +43,49 @@ std::string pointer(const Path& path) {
   return text.empty() ? "/" : text;
 }
 
-/// Follows "#/definitions/x"; other references do not occur in our schemas.
+/// Follows "#/definitions/x"; read_schema() leaves no other references.
 const Json& resolved(const Json& schema, const Json& root) {
-  if (!schema.is_object() || !schema.contains("$ref")) return schema;
-  const auto reference = schema.at("$ref").get<std::string>();
-  return root.at(Json::json_pointer(reference.substr(1)));
+  const Json* rules = &schema;
+  while (rules->is_object() && rules->contains("$ref")) {
+    rules = &root.at(Json::json_pointer(rules->at("$ref").get<std::string>().substr(1)));
+  }
+  return *rules;
+}
+
+constexpr std::string_view kOwnDefinition = "#/definitions/";
+
+/// Turns references of a part of the schema FILE into those of the root that takes FILE's
+/// definitions in under "FILE#x"; adds the files that are referred to.
+void redirect(Json& part, const std::string& file, std::set<std::string>& files) {
+  if (part.is_object() && part.contains("$ref") && part.at("$ref").is_string()) {
+    const auto reference = part.at("$ref").get<std::string>();
+    const std::size_t own = reference.find(kOwnDefinition);
+    const std::string name = reference.substr(own + kOwnDefinition.size());
+    const std::string of = own == 0 ? file : reference.substr(0, own);
+    if (!of.empty()) part["$ref"] = fmt::format("{}{}#{}", kOwnDefinition, of, name);
+    if (own != 0) files.insert(of);
+  }
+  if (!part.is_structured()) return;
+  for (Json& member : part) redirect(member, file, files);
+}
+
+/// A schema with the definitions of the files that it refers to ("protocol.schema.json#/...").
+Json read_schema(std::string_view name) {
+  const std::filesystem::path folder = share_dir() / "schemas";
+  Json root = read_json(folder / fmt::format("{}.schema.json", name));
+  std::set<std::string> wanted, taken;
+  redirect(root, "", wanted);
+  while (!wanted.empty()) {
+    const std::string file = *wanted.begin();
+    wanted.erase(wanted.begin());
+    if (!taken.insert(file).second) continue;
+    Json definitions = read_json(folder / file).at("definitions");
+    redirect(definitions, file, wanted);
+    for (auto& [word, definition] : definitions.items()) {
+      root["definitions"][fmt::format("{}#{}", file, word)] = std::move(definition);
+    }
+  }
+  return root;
 }
 
 /// The part of the schema that speaks of one member of an object or list; null if none does.
@@ -188,8 +228,7 @@ std::optional<Violation> innermost_violation(const nlohmann::json& rules,
 
 void check_schema(const Json& value, std::string_view schema_name, std::string_view where) {
   require_signed_range(value, "", where);
-  const auto path = share_dir() / "schemas" / fmt::format("{}.schema.json", schema_name);
-  const Json root = read_json(path);
+  const Json root = read_schema(schema_name);
   const nlohmann::json schema_document = root;
   const nlohmann::json document = value;
 

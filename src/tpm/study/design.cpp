@@ -9,6 +9,7 @@
 #include <cmath>
 #include <map>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
@@ -80,7 +81,7 @@ Eigen::MatrixXd without_nuisance(const Eigen::MatrixXd& jacobian, Eigen::Index m
   const Eigen::MatrixXd nuisance = jacobian.rightCols(jacobian.cols() - material);
   Eigen::MatrixXd columns = jacobian.leftCols(material);
   if (nuisance.cols() == 0) return columns;
-  return columns - nuisance * nuisance.completeOrthogonalDecomposition().solve(columns);
+  return columns - nuisance * shortest_least_squares(nuisance, columns);
 }
 
 /// d natural / d theta over |natural|: turns errors in theta into relative ones.
@@ -311,15 +312,15 @@ ThetaCovariance theta_covariance(const Eigen::MatrixXd& fisher) {
       fisher.diagonal().unaryExpr([](double d) { return d > 0.0 ? std::sqrt(d) : 1.0; });
   const Eigen::MatrixXd scaled =
       scale.cwiseInverse().asDiagonal() * fisher * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
+  const SymmetricModes modes = symmetric_modes(scaled);
   constexpr double kNothing = 1e-12;  // of the largest eigenvalue: below is rounding
-  const double least = kNothing * std::max(solver.eigenvalues()[k - 1], 1e-300);
+  const double least = kNothing * std::max(modes.values[k - 1], 1e-300);
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(k, k);
   Eigen::VectorXd unseen = Eigen::VectorXd::Zero(k);
   ThetaCovariance result;
   for (Eigen::Index i = 0; i < k; ++i) {
-    const double value = solver.eigenvalues()[i];
-    const Eigen::VectorXd direction = solver.eigenvectors().col(i);
+    const double value = modes.values[i];
+    const Eigen::VectorXd direction = modes.vectors.col(i);
     if (value > least) {
       covariance += direction * direction.transpose() / value;
       result.log_determinant += std::log(value) + 2.0 * std::log(scale[i]);

@@ -4,6 +4,7 @@
 
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/protocol/protocol_block.hpp"
 #include "tpm/study/design.hpp"
 
 namespace tpm {
@@ -29,16 +30,10 @@ double quantity(const Json& value, Dimension dimension, const std::string& where
                   zero_allowed ? "0 or more" : "more than 0");
 }
 
-std::vector<double> quantities(const Json& grid, std::string_view key, Dimension dimension,
-                               const std::string& where, bool zero_allowed = false) {
-  const std::string place = key_of(where, key);
-  if (!grid.contains(key)) {
-    throw bad_input(where, fmt::format("no '{}'", key), "a list of quantities under that key");
-  }
+std::vector<double> intervals_of(const Json& grid, const DocumentPlace& place) {
   std::vector<double> values;
-  for (const auto& value : grid.at(std::string(key))) {
-    values.push_back(quantity(value, dimension, place, zero_allowed));
-  }
+  for (const auto& value : grid.at("interval"))
+    values.push_back(quantity(value, Dimension::time, place.key("interval").where));
   return values;
 }
 
@@ -46,46 +41,34 @@ std::vector<int> repeats_of(const Json& grid) {
   return grid.value("repeats", std::vector<int>{1});
 }
 
-void refuse_keys(const Json& grid, std::initializer_list<const char*> keys,
-                 const std::string& where, std::string_view kind) {
-  for (const char* key : keys) {
-    if (!grid.contains(key)) continue;
-    throw bad_input(key_of(where, key), fmt::format("{} has none", kind),
-                    "only keys of that kind of experiment");
+PlannedExperiment planned(const ProtocolBlock& block) {
+  if (block.kind == ProtocolKind::creep) {
+    return {ExperimentKind::creep, 0.0, 0.0, *block.load_N, *block.duration_s};
   }
+  return {ExperimentKind::ramp_hold, *block.depth_m, *block.rate_m_per_s, 0.0, *block.hold_s};
 }
 
 /// All combinations; those that differ only in their repeats stand side by side.
-void add_grid(const Json& grid, const std::string& where, std::vector<PlannedExperiment>& list) {
-  const auto kind = grid.at("kind").get<std::string>();
-  const bool creep = kind == "creep";
-  if (creep) {
-    refuse_keys(grid, {"rate", "depth"}, where, kind);
-  } else {
-    refuse_keys(grid, {"load"}, where, kind);
-  }
-  const auto sizes = creep ? quantities(grid, "load", Dimension::force, where)
-                           : quantities(grid, "depth", Dimension::length, where);
-  const auto rates =
-      creep ? std::vector<double>{0.0} : quantities(grid, "rate", Dimension::speed, where);
-  const auto holds = quantities(grid, "hold", Dimension::time, where, !creep);
-  const auto intervals = quantities(grid, "interval", Dimension::time, where);
+void add_grid(const Json& grid, const DocumentPlace& place, std::vector<PlannedExperiment>& list) {
+  const bool creep = grid.at("kind") == "creep";
+  const std::vector<ProtocolBlock> protocols =
+      creep ? parse_protocol_lists(grid, place, ProtocolKind::creep, Openness::complete,
+                                   {{"duration", "hold"}}, {"interval", "repeats"})
+            : parse_protocol_lists(grid, place, ProtocolKind::ramp_hold, Openness::complete, {},
+                                   {"interval", "repeats"});
+  const auto intervals = intervals_of(grid, place);
   const auto repeats = repeats_of(grid);
-  const std::size_t count =
-      sizes.size() * rates.size() * holds.size() * intervals.size() * repeats.size();
+  const std::size_t count = protocols.size() * intervals.size() * repeats.size();
   if (list.size() + count > kMostCandidates) {
-    throw bad_input(where, fmt::format("{} experiments", list.size() + count),
+    throw bad_input(place.where, fmt::format("{} experiments", list.size() + count),
                     fmt::format("at most {}", kMostCandidates));
   }
-  for (const double size : sizes) {
-    for (const double rate : rates) {
-      for (const double hold : holds) {
-        for (const double interval : intervals) {
-          for (const int repeat : repeats) {
-            list.push_back({creep ? ExperimentKind::creep : ExperimentKind::ramp_hold,
-                            creep ? 0.0 : size, rate, creep ? size : 0.0, hold, interval, repeat});
-          }
-        }
+  for (const ProtocolBlock& protocol : protocols) {
+    for (const double interval : intervals) {
+      for (const int repeat : repeats) {
+        list.push_back(planned(protocol));
+        list.back().interval_s = interval;
+        list.back().repeats = repeat;
       }
     }
   }
@@ -97,7 +80,7 @@ std::vector<PlannedExperiment> parse_grids(const Json& document, const char* key
   if (!document.contains(key)) return list;
   std::size_t index = 0;
   for (const auto& grid : document.at(key)) {
-    add_grid(grid, key_of(key_of(where, key), std::to_string(index++)), list);
+    add_grid(grid, DocumentPlace{std::string(where)}.key(key).key(std::to_string(index++)), list);
   }
   return list;
 }

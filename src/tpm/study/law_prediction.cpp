@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
@@ -219,10 +218,9 @@ Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance) {
   // Scaled to correlations first: parameters differ by many orders of magnitude.
   const Eigen::VectorXd sd = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   const Eigen::VectorXd inverse = (sd.array() > 0.0).select(sd.cwiseInverse(), 0.0);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse.asDiagonal() * covariance *
-                                                             inverse.asDiagonal());
-  return sd.asDiagonal() * eigen.eigenvectors() *
-         eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const SymmetricModes modes =
+      symmetric_modes(inverse.asDiagonal() * covariance * inverse.asDiagonal());
+  return sd.asDiagonal() * modes.vectors * modes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {

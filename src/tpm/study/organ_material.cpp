@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/least_squares.hpp"
@@ -230,7 +230,7 @@ void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile
   const Eigen::MatrixXd gram = j.transpose() * j;
   const Eigen::MatrixXd slopes = law_slopes(law, motion);
   m.follows = Eigen::MatrixXd::Zero(std::ssize(natural), slopes.cols());
-  const Eigen::MatrixXd d = gram.ldlt().solve(j.transpose() * slopes);
+  const Eigen::MatrixXd d = solve_symmetric(gram, j.transpose() * slopes);
   m.follows(free, Eigen::all) = d;
   m.covariance = m.follows * law.uncertainty->covariance * m.follows.transpose();
   m.level = law.uncertainty->level;

@@ -359,6 +359,10 @@ Json import_json(const ImportOptions& import) {
   if (import.rest_length_m) {
     j["rest_length"] = fmt::format("{} mm", shortest(1e3 * *import.rest_length_m));
   }
+  if (import.spring_constant_N_per_m) {
+    j["spring_constant"] = fmt::format("{} N/m", shortest(*import.spring_constant_N_per_m));
+  }
+  if (!import.segments.empty()) j["segments"] = import.segments;
   if (import.area_m2) j["area"] = fmt::format("{} mm^2", shortest(1e6 * *import.area_m2));
   return j;
 }

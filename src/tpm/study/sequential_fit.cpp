@@ -9,8 +9,9 @@
 #include <limits>
 
 #include "tpm/core/error.hpp"
-#include "tpm/fit/least_squares.hpp"
 #include "tpm/fit/starts.hpp"
+#include "tpm/study/contact_profile.hpp"
+#include "tpm/study/whitened_prefix.hpp"
 
 namespace tpm {
 namespace {
@@ -18,78 +19,7 @@ namespace {
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 constexpr std::size_t kFirstPass = 12;
 constexpr std::size_t kKeptStarts = 4;
-constexpr double kFirstNoise = 1e-2;   // of the peak, until it is known
-constexpr double kLeastPivot = 1e-10;  // of a gram matrix with columns of length 1
-
-/// Whitened residuals of what has been recorded so far.
-class WhitenedPrefix final : public ResidualFunction {
- public:
-  WhitenedPrefix(const LawModel& model, const FitConfig& config, const PreparedRecording& recording,
-                 AutoregressiveNoise noise, double sigma)
-      : model_(model),
-        config_(config),
-        protocol_(measured_history(Drive::displacement, recording.recording.time_s,
-                                   recording.recording.drive)),
-        noise_(noise),
-        sigma_(sigma) {
-    protocol_.set_relaxed_at_start(true);
-    const Recording& r = recording.recording;
-    for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-      if (r.time_s[i] < recording.from_s || r.time_s[i] > recording.to_s) continue;
-      time_s_.push_back(r.time_s[i]);
-      observed_.push_back(r.response[i]);
-    }
-  }
-
-  [[nodiscard]] Eigen::Index residual_count() const override { return std::ssize(time_s_); }
-  [[nodiscard]] std::span<const double> time_s() const { return time_s_; }
-  void set_noise(AutoregressiveNoise noise) { noise_ = noise; }
-
-  /// Plain residuals (answer less reading) and their derivatives by the natural parameters.
-  [[nodiscard]] bool plain(std::span<const double> natural, Eigen::VectorXd& residual,
-                           RowMatrix* jacobian) const {
-    const std::vector<double> values = model_parameters(config_, natural, 0);
-    const Response response =
-        model_.respond(protocol_, time_s_, values,
-                       jacobian == nullptr ? Want::values : Want::values_and_sensitivity);
-    if (!response.value.allFinite()) return false;
-    residual = response.value - Eigen::VectorXd::Map(observed_.data(), std::ssize(observed_));
-    if (jacobian == nullptr) return true;
-    jacobian->setZero(residual.size(), std::ssize(config_.parameters));
-    for (std::size_t i = 0; i < config_.parameters.size(); ++i) {
-      for (const Target& target : config_.parameters[i].sets) {
-        jacobian->col(static_cast<Eigen::Index>(i)) +=
-            response.sensitivity.col(static_cast<Eigen::Index>(target.parameter));
-      }
-    }
-    return true;
-  }
-
-  [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
-                              RowMatrix* jacobian) const override {
-    if (!plain(natural, residual, jacobian)) return false;
-    residual /= sigma_;
-    noise_.whiten(time_s_, residual);
-    if (jacobian != nullptr) {
-      *jacobian /= sigma_;
-      noise_.whiten(time_s_, *jacobian);
-    }
-    return true;
-  }
-
-  [[nodiscard]] bool linear_in(std::size_t parameter) const override {
-    const EstimatedParameter& p = config_.parameters[parameter];
-    return p.fit.scale == Scale::linear && model_.linear_in(p.sets.front().parameter);
-  }
-
- private:
-  const LawModel& model_;
-  const FitConfig& config_;
-  Protocol protocol_;
-  AutoregressiveNoise noise_;
-  double sigma_;
-  std::vector<double> time_s_, observed_;
-};
+constexpr double kFirstNoise = 1e-2;  // of the peak, until it is known
 
 double typical_interval(std::span<const double> time_s) {
   std::vector<double> steps;
@@ -98,13 +28,11 @@ double typical_interval(std::span<const double> time_s) {
   return steps[steps.size() / 2];
 }
 
-/// Whether least squares over these columns have one answer.
-bool tells_apart(const Eigen::MatrixXd& gram) {
-  const Eigen::VectorXd length = gram.diagonal().cwiseSqrt();
-  if (!(length.minCoeff() > 0.0)) return false;
-  const Eigen::VectorXd inverse = length.cwiseInverse();
-  const Eigen::LDLT<Eigen::MatrixXd> scaled(inverse.asDiagonal() * gram * inverse.asDiagonal());
-  return scaled.vectorD().minCoeff() > kLeastPivot;
+double student_quantile(double degrees, double level) {
+  // In long double, which Boost would take, a quantile costs more than the rest of a sample.
+  using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+  const boost::math::students_t_distribution<double, InDouble> t(degrees);
+  return boost::math::quantile(t, 0.5 + 0.5 * level);
 }
 
 }  // namespace
@@ -120,6 +48,7 @@ struct SequentialFit::Linearisation {
   std::vector<FitParameter> parameters;
   std::vector<std::size_t> place;
   std::vector<bool> nuisance;
+  Eigen::Index contact = -1;       ///< place of the contact point in `parameters`, if estimated
   std::vector<Eigen::Index> free;  ///< parameters off their bounds
   std::vector<double> natural;     ///< of the point
   std::vector<double> values;      ///< of the whole law there
@@ -127,6 +56,7 @@ struct SequentialFit::Linearisation {
   AutoregressiveNoise noise{0.0, 1.0};
   std::optional<AutoregressionEstimate> correlation;
   std::size_t samples_then = 0;  ///< when `correlation` was found
+  IntervalFactors wider;         ///< by the profile along the contact point, at the point
 
   /// Where the linear model has its least squares as seen from the point, when the point was the
   /// minimum; of `free`. 0 unless the deviance has a corner there: contact passes a sample.
@@ -209,6 +139,26 @@ struct SequentialFit::Linearisation {
     if (free.empty() || !tells_apart(gram_now)) return;
     away_then = gram_now.llt().solve(right(free));
   }
+
+  /// Call after keep_as_minimum().
+  void profile(const WhitenedPrefix& function, double level) {
+    const auto count = std::ssize(parameters);
+    wider = {Eigen::VectorXd::Ones(count), Eigen::VectorXd::Ones(count)};
+    const auto found = std::find(free.begin(), free.end(), contact);
+    if (found == free.end() || !correlation || !tells_apart(free_gram())) return;
+    const auto n = static_cast<Eigen::Index>(samples);
+    std::vector<double> quantiles;
+    for (Eigen::Index k = 0; k < std::ssize(free); ++k) {
+      quantiles.push_back(
+          student_quantile(satterthwaite_degrees(*correlation, k, n, std::ssize(free)), level));
+    }
+    wider = profile_contact(function, {.parameters = parameters,
+                                       .natural = natural,
+                                       .free = free,
+                                       .contact = *found,
+                                       .quantiles = quantiles,
+                                       .residual_count = n});
+  }
 };
 
 double SequentialParameter::relative_half_width() const {
@@ -282,71 +232,6 @@ void SequentialFit::add(double time_s, double drive, double response) {
   if (due) pass_through_history();
 }
 
-namespace {
-
-/// The least of the ends of searches from some starts; not usable if there is none.
-Minimum least_of(const WhitenedPrefix& function, std::span<const FitParameter> parameters,
-                 const std::vector<std::vector<double>>& starts) {
-  Minimum best;
-  for (const auto& start : starts) {
-    Minimum end = minimise_near(function, parameters, start);
-    if (end.usable && (!best.usable || end.deviance < best.deviance)) best = std::move(end);
-  }
-  return best;
-}
-
-std::vector<Eigen::Index> off_bounds(std::span<const FitParameter> parameters,
-                                     std::span<const double> natural) {
-  std::vector<Eigen::Index> free;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (parameters[i].at_lower(natural[i]) || parameters[i].at_upper(natural[i])) continue;
-    free.push_back(static_cast<Eigen::Index>(i));
-  }
-  return free;
-}
-
-/// The correlation of the noise at a point; none where the data do not tell the parameters apart.
-std::optional<AutoregressionEstimate> correlation_near(const WhitenedPrefix& function,
-                                                       std::span<const FitParameter> parameters,
-                                                       std::span<const double> natural,
-                                                       double step_s) {
-  Eigen::VectorXd residual;
-  RowMatrix jacobian;
-  if (!function.plain(natural, residual, &jacobian)) return std::nullopt;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const FitParameter& p = parameters[i];
-    jacobian.col(static_cast<Eigen::Index>(i)) *= p.natural_slope(p.theta(natural[i]));
-  }
-  const Eigen::MatrixXd columns = jacobian(Eigen::all, off_bounds(parameters, natural));
-  const bool enough = columns.cols() > 0 && residual.size() > columns.cols() + 2;
-  if (!enough || !(residual.squaredNorm() > 0.0)) return std::nullopt;
-  if (!tells_apart(columns.transpose() * columns)) return std::nullopt;
-  return estimate_autoregression(function.time_s(), residual, columns, step_s);
-}
-
-/// Improves a point and the correlation of the noise in turn.
-std::optional<AutoregressionEstimate> improve_in_turn(WhitenedPrefix& function,
-                                                      std::span<const FitParameter> parameters,
-                                                      AutoregressiveNoise& noise, Minimum& best) {
-  constexpr int kRounds = 3;
-  constexpr double kSame = 0.02;  // of 1 - phi: changes widths by 2 %
-  std::optional<AutoregressionEstimate> correlation;
-  for (int round = 0; round < kRounds; ++round) {
-    correlation = correlation_near(function, parameters, best.natural, noise.step_s());
-    if (!correlation) return std::nullopt;
-    const double change = std::abs(correlation->phi - noise.phi());
-    noise = AutoregressiveNoise(correlation->phi, noise.step_s());
-    function.set_noise(noise);
-    if (change < kSame * (1.0 - noise.phi())) break;
-    Minimum again = minimise_near(function, parameters, best.natural);
-    if (!again.usable) break;
-    best = std::move(again);
-  }
-  return correlation;
-}
-
-}  // namespace
-
 std::vector<std::vector<double>> SequentialFit::next_starts(const ResidualFunction& function,
                                                             const FitConfig& config) {
   std::vector<std::vector<double>> starts;
@@ -398,7 +283,9 @@ void SequentialFit::pass_through_history() {
   auto here = std::make_unique<Linearisation>(model.at(values, nullptr));
   for (const EstimatedParameter& p : config.parameters) {
     here->place.push_back(p.sets.front().parameter);
-    here->nuisance.push_back(model.law_parameters()[here->place.back()].nuisance);
+    const LawParameter& known_as = model.law_parameters()[here->place.back()];
+    here->nuisance.push_back(known_as.nuisance);
+    if (known_as.name == "contact") here->contact = std::ssize(here->place) - 1;
   }
   here->parameters = parameters;
   here->free = off_bounds(parameters, best.natural);
@@ -412,6 +299,7 @@ void SequentialFit::pass_through_history() {
     here->take(recording_.time_s[i], recording_.drive[i], recording_.response[i]);
   }
   here->keep_as_minimum();
+  here->profile(function, settings_.level);
   here_ = std::move(here);
   describe();
 }
@@ -419,17 +307,14 @@ void SequentialFit::pass_through_history() {
 namespace {
 
 void set_sequential_interval(SequentialParameter& s, double theta, double standard_error,
-                             double degrees, double level) {
-  // In long double, which Boost would take, a quantile costs more than the rest of a sample.
-  using InDouble = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
-  const boost::math::students_t_distribution<double, InDouble> t(degrees);
+                             double degrees, double level, double lower, double upper) {
   theta = std::clamp(theta, s.parameter.theta_lower(), s.parameter.theta_upper());
   s.estimate = s.parameter.natural(theta);
   s.standard_error = standard_error;
   s.degrees_of_freedom = degrees;
-  const double half = standard_error * boost::math::quantile(t, 0.5 + 0.5 * level);
-  s.lower = s.parameter.natural(theta - half);
-  s.upper = s.parameter.natural(theta + half);
+  const double half = standard_error * student_quantile(degrees, level);
+  s.lower = s.parameter.natural(theta - half * lower);
+  s.upper = s.parameter.natural(theta + half * upper);
 }
 
 }  // namespace
@@ -472,7 +357,9 @@ void SequentialFit::describe() {
       now.phi_variance *= static_cast<double>(l.samples_then) / count;
       const double theta = s.parameter.theta(l.natural[i]) + moved[k];
       set_sequential_interval(s, theta, std::sqrt(variance * inverse(k, k)),
-                              satterthwaite_degrees(now, k, n, p), settings_.level);
+                              satterthwaite_degrees(now, k, n, p), settings_.level,
+                              l.wider.lower[l.free[static_cast<std::size_t>(k)]],
+                              l.wider.upper[l.free[static_cast<std::size_t>(k)]]);
       for (Eigen::Index c = 0; c < p; ++c) {
         e.covariance(static_cast<Eigen::Index>(i), l.free[static_cast<std::size_t>(c)]) =
             variance * inverse(k, c);
