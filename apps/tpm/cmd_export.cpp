@@ -1,10 +1,14 @@
-// tpm export: the relaxation of a law for finite element programs.
+// tpm export: the relaxation of a law for finite element programs, an organ for physics engines.
+#include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "command.hpp"
+#include "tpm/core/error.hpp"
 #include "tpm/core/units.hpp"
 #include "tpm/law/law_export.hpp"
+#include "tpm/scene/organ_export.hpp"
+#include "tpm/store/json.hpp"
 
 namespace tpm::app {
 namespace {
@@ -13,8 +17,9 @@ struct ExportTexts {
   std::string law;
   std::string to;
   std::optional<std::string> radius, cone, punch, area, length, poisson, from, until, terms;
+  std::optional<std::string> density;
   std::string output;
-  bool relaxation_only = false;
+  bool relaxation_only = false, instantaneous = false;
 };
 
 void set_quantity(std::optional<double>& target, const std::optional<std::string>& text,
@@ -25,6 +30,10 @@ void set_quantity(std::optional<double>& target, const std::optional<std::string
 ExportOptions options_of(const ExportTexts& texts) {
   ExportOptions options;
   options.target = parse_export_target(texts.to, "--to");
+  if (texts.density || texts.instantaneous) {
+    throw Error(ExitCode::usage, texts.density ? "--density" : "--instantaneous", "with a law",
+                "--to sofa or mjcf, and a scene");
+  }
   options.relaxation_only = texts.relaxation_only;
   ContactGeometry& geometry = options.geometry;
   set_quantity(geometry.sphere_radius_m, texts.radius, Dimension::length, "--radius");
@@ -40,14 +49,57 @@ ExportOptions options_of(const ExportTexts& texts) {
   return options;
 }
 
+int export_law_file(const ExportTexts& texts) {
+  const ExportOptions options = options_of(texts);
+  const LawFile law = read_law(texts.law);
+  const std::string text = export_law(law, options);
+  for (const std::string& warning : export_warnings(law, options)) {
+    tell_user("tpm: warning: {}\n", warning);
+  }
+  deliver(text, texts.output);
+  return 0;
+}
+
+int export_scene(const ExportTexts& texts, OrganTarget target) {
+  for (const auto* given : {&texts.radius, &texts.cone, &texts.punch, &texts.area, &texts.length,
+                            &texts.poisson, &texts.from, &texts.until, &texts.terms}) {
+    if (!*given && !texts.relaxation_only) continue;
+    throw Error(ExitCode::usage, "--to " + texts.to, "with an option of laws",
+                "--density and --instantaneous alone");
+  }
+  OrganExportOptions options;
+  options.target = target;
+  options.instantaneous = texts.instantaneous;
+  options.source = std::filesystem::path(texts.law).filename().string();
+  if (texts.density) {
+    options.density_kg_m3 = parse_number(*texts.density, "--density");
+  }
+  const Json scene = read_json(texts.law);
+  check_schema(scene, "scene", texts.law);
+  const Tissue tissue =
+      parse_tissue(scene, texts.law, std::filesystem::path(texts.law).parent_path());
+  const std::string text = export_organ(tissue, options);
+  for (const std::string& warning : organ_export_warnings(tissue, options)) {
+    tell_user("tpm: warning: {} does not express {}\n", texts.to, warning);
+  }
+  deliver(text, texts.output);
+  return 0;
+}
+
 }  // namespace
 
 void add_export_command(CLI::App& app, Session& session) {
   CLI::App* command =
-      app.add_subcommand("export", "Write the relaxation of a law for a finite element program");
+      app.add_subcommand("export",
+                         "Write a law for a finite element program, or an organ for a physics "
+                         "engine");
   const auto texts = std::make_shared<ExportTexts>();
-  command->add_option("law", texts->law, "Law file (docs/laws.md)")->required();
-  command->add_option("--to", texts->to, "abaqus, ansys, febio or json")->required();
+  command->add_option("LAW|SCENE", texts->law, "Law file (docs/laws.md), or an organ (JSON scene)")
+      ->required();
+  command
+      ->add_option("--to", texts->to,
+                   "Of a law: abaqus, ansys, febio or json; of an organ: sofa or mjcf")
+      ->required();
   command->add_option("--radius", texts->radius, "Sphere that was pressed in, for moduli in Pa");
   command->add_option("--cone-angle", texts->cone,
                       "Or cone: angle between its axis and its surface, such as \"45 deg\"");
@@ -60,20 +112,19 @@ void add_export_command(CLI::App& app, Session& session) {
   command->add_option("--terms", texts->terms, "Fractional laws: relaxation times to choose from");
   command->add_flag("--relaxation-only", texts->relaxation_only,
                     "Leave out a power kernel or tension, which the target cannot say");
+  command->add_option("--density", texts->density, "Organs: of the spheres, kg/m^3 (1060)");
+  command->add_flag("--instantaneous", texts->instantaneous,
+                    "Organs: springs of the instantaneous stiffness without dampers, for fast "
+                    "motions");
   command->add_option("-o,--output", texts->output, "Write here instead of to the terminal");
   command->footer(
       "Example:\n  tpm export law.json --to abaqus --radius \"2 mm\"\n"
-      "  tpm export fractional.json --to febio --from \"0.1 s\" --until \"30 s\"");
+      "  tpm export fractional.json --to febio --from \"0.1 s\" --until \"30 s\"\n"
+      "  tpm export on_liver/scene.json --to mjcf -o liver.xml");
   command->callback([texts, &session] {
     session.run = [texts] {
-      const LawFile law = read_law(texts->law);
-      const ExportOptions options = options_of(*texts);
-      const std::string text = export_law(law, options);
-      for (const std::string& warning : export_warnings(law, options)) {
-        tell_user("tpm: warning: {}\n", warning);
-      }
-      deliver(text, texts->output);
-      return 0;
+      const auto engine = organ_target(texts->to);
+      return engine ? export_scene(*texts, *engine) : export_law_file(*texts);
     };
   });
 }

@@ -1,4 +1,5 @@
-// tpm predict: the answer of a fitted law with the band of its uncertainty.
+// tpm predict: the answer of a fitted law, or of an organ with its material, with the band of its
+// uncertainty.
 #include <fmt/format.h>
 
 #include <memory>
@@ -11,7 +12,9 @@
 #include "tpm/core/units.hpp"
 #include "tpm/law/law_file.hpp"
 #include "tpm/report/prediction_report.hpp"
+#include "tpm/store/json.hpp"
 #include "tpm/study/law_prediction.hpp"
+#include "tpm/study/organ_prediction.hpp"
 
 namespace tpm::app {
 namespace {
@@ -45,16 +48,28 @@ PredictionOptions prediction_options(const PredictOptions& options) {
   return chosen;
 }
 
+/// That of a law, or of an organ that stands for it.
+LawPrediction answer_of(const std::string& subject, const std::optional<ProtocolFile>& file,
+                        const std::optional<PreparedRecording>& recording,
+                        const PredictionOptions& options) {
+  if (is_organ_document(read_json(subject))) {
+    const OrganOfLaw organ = read_organ_of_law(subject);
+    return file ? predict_organ(organ, file->protocol, file->times_s, options)
+                : predict_organ(organ, *recording, options);
+  }
+  const LawFile law = read_law(subject);
+  return file ? predict_law(law, file->protocol, file->times_s, options)
+              : predict_recording(law, *recording, options);
+}
+
 int predict(const PredictOptions& options, const Session& session) {
   will_write_into(options.folder, {"prediction.csv", "prediction.json", "figures.json"});
   const auto csv = csv_beside(options.output, session);
-  const LawFile law = read_law(options.law);
   const PredictionOptions chosen = prediction_options(options);
   const auto file = chosen_protocol(options.ramp, options.recordings.files);
   std::optional<PreparedRecording> recording;
   if (!file) recording = read_recordings(options.recordings).front();
-  const LawPrediction prediction = file ? predict_law(law, file->protocol, file->times_s, chosen)
-                                        : predict_recording(law, *recording, chosen);
+  const LawPrediction prediction = answer_of(options.law, file, recording, chosen);
   Json json = to_json(prediction);
   std::string text = session.json() ? "" : to_terminal_text(prediction);
   if (options.verdict) {
@@ -83,7 +98,11 @@ void add_predict_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand(
       "predict", "Answer a protocol or a recording's motion with the band of a fit's uncertainty");
   auto options = std::make_shared<PredictOptions>();
-  command->add_option("LAW", options->law, "law.json that tpm fit has written")->required();
+  command
+      ->add_option("LAW|SCENE", options->law,
+                   "law.json that tpm fit has written, or the organ (scene.json or material.json) "
+                   "on which tpm material has put it")
+      ->required();
   command
       ->add_option("PROTOCOL|RECORDING", options->recordings.files,
                    "A JSON file with a block protocol (a scene, or schemas/protocol.schema.json), "
@@ -112,7 +131,8 @@ void add_predict_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm fit recording.csv --folder fitted\n"
       "  tpm predict fitted/law.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"\n"
-      "  tpm predict fitted/law.json other.csv --verdict --folder predicted");
+      "  tpm predict fitted/law.json other.csv --verdict --folder predicted\n"
+      "  tpm predict on_liver/scene.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"");
   command->callback([options, &session] {
     session.run = [options, &session] { return predict(*options, session); };
   });

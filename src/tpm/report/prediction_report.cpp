@@ -64,10 +64,11 @@ Figure prediction_figure(const LawPrediction& p) {
   const Unit unit = shown_unit(p.response_dimension());
   Figure figure;
   figure.id = "prediction";
-  figure.title = fmt::format("{}: predicted {}", law_name(p.spec), spaced(answer));
+  figure.title = fmt::format("{}: predicted {}", p.subject(), spaced(answer));
   figure.caption = fmt::format(
-      "The law's answer with the {} % band of its mean and the {} % band for one new reading.",
-      significant(100.0 * p.level, 3), significant(100.0 * p.level, 3));
+      "The {} answer with the {} % band of its mean and the {} % band for one new reading.",
+      p.organ_spheres > 0 ? "organ's" : "law's", significant(100.0 * p.level, 3),
+      significant(100.0 * p.level, 3));
   Panel panel;
   panel.x = {"time", "s", false, {}, {}};
   panel.y = {spaced(answer), unit.symbol, false, {}, {}};

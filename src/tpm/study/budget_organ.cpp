@@ -39,6 +39,34 @@ ExperimentScene guided(ExperimentScene scene) {
   return scene;
 }
 
+/// By how much the bonds of a network are stiffer than at the paper's spacing.
+double stiffness_of_spacing(const Network& network) {
+  if (network.options.spacing_law == SpacingLaw::paper) return 1.0;
+  return network.organ.spacing / network.options.reference_spacing_m;
+}
+
+/// The finer organ is one material with the scene's: its bonds follow the law `continuum` from the
+/// scene's spacing on.
+void require_refinement(const Network& scene, const Network& finer) {
+  const double ratio = finer.organ.spacing / scene.organ.spacing;
+  const auto millimetres = [](double x_m) { return shortest(rounded(1e3 * x_m, 6)) + " mm"; };
+  if (!(ratio < 1.0)) {
+    throw bad_input("budget of an organ",
+                    fmt::format("the finer scene has the spacing {}, the scene {}",
+                                millimetres(finer.organ.spacing), millimetres(scene.organ.spacing)),
+                    "a smaller one");
+  }
+  constexpr double kEqual = 1e-9;
+  const double stiffness = stiffness_of_spacing(finer) / stiffness_of_spacing(scene);
+  if (std::abs(stiffness - ratio) <= kEqual) return;
+  throw bad_input(
+      "budget of an organ",
+      fmt::format("the bonds of the finer scene are {} times as stiff at {} times the spacing",
+                  significant(stiffness, 4), significant(ratio, 4)),
+      fmt::format("\"spacing_law\": \"continuum\", \"reference_spacing\": \"{}\" in its bonds",
+                  millimetres(scene.organ.spacing / stiffness_of_spacing(scene))));
+}
+
 std::vector<double> quasi_static_forces(const PlanScene& scene, double tolerance,
                                         const std::vector<double>& times_s) {
   QuasiStaticOptions options;
@@ -124,6 +152,7 @@ ErrorBudget organ_budget(const std::optional<LawFile>& law, const ExperimentScen
   std::optional<PlanScene> fine;
   if (finer) {
     ExperimentScene other = guided(*finer);
+    require_refinement(scene.tissue.network, other.tissue.network);
     other.protocol = scene.protocol;
     fine.emplace(std::move(other));
   }
@@ -139,6 +168,9 @@ ErrorBudget organ_budget(const std::optional<LawFile>& law, const ExperimentScen
   if (fine) {
     budget.flags.push_back(
         "what masses change is taken from the scene's spacing at the finer one, too");
+    budget.flags.push_back(
+        "the contact is one sphere, which is smaller at the finer spacing: the line spacing does "
+        "not vanish as the spacing does");
   }
   conclude(budget);
   return budget;

@@ -106,8 +106,10 @@ struct BudgetOptions {
 ///
 /// The organ is the scene's network with masses; with `finer` (the same organ at a finer spacing)
 /// it is that one, whose masses are taken to change the force by what they change at the scene's
-/// spacing, and a line `spacing` follows. Then: masses left out; the tolerance of the scene's runs
-/// instead of a hundredth of it; the model that tpm plan picks for the loop, a period at a time.
+/// spacing, and a line `spacing` follows. Its bonds follow the spacing law `continuum` from the
+/// scene's spacing on; Error(bad_input) for others. Then: masses left out; the tolerance of the
+/// scene's runs instead of a hundredth of it; the model that tpm plan picks for the loop, a period
+/// at a time.
 /// @param tolerance of the plan, as --tolerance
 [[nodiscard]] ErrorBudget organ_budget(const std::optional<LawFile>& law,
                                        const ExperimentScene& scene,

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
@@ -13,8 +12,8 @@
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
-#include "tpm/fit/fit.hpp"
 #include "tpm/law/law_model.hpp"
+#include "tpm/study/prediction_parts.hpp"
 
 namespace tpm {
 namespace {
@@ -23,82 +22,14 @@ constexpr auto kPlacementWords = std::to_array<Word<Placement>>(
     {{Placement::surface, "surface"}, {Placement::fitted, "fitted"}, {Placement::own, "own"}});
 constexpr int kFewestSamples = 100;
 
-/// A linear root of a covariance: covariance = root root'. Singular ones are allowed.
-Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance) {
-  // Scaled to correlations first: parameters differ by many orders of magnitude.
-  const Eigen::VectorXd sd = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::VectorXd inverse = (sd.array() > 0.0).select(sd.cwiseInverse(), 0.0);
-  const SymmetricModes modes =
-      symmetric_modes(inverse.asDiagonal() * covariance * inverse.asDiagonal());
-  return sd.asDiagonal() * modes.vectors * modes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
-}
-
-/// The uncertain coordinates of a prediction and the root of their covariance. Contact and offset
-/// of the recording itself stand among them where they matter.
-struct UncertainCoordinates {
-  std::vector<std::size_t> place;
-  std::vector<Coordinate> coordinate;
-  Eigen::MatrixXd root;  ///< coordinates x independent directions
-};
-
 bool is_nuisance(const std::vector<LawParameter>& parameters, std::size_t place) {
   return parameters[place].nuisance;
-}
-
-/// The slack length of a strip belongs to the specimen: it stays, as in select_law.
-bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {
-  if (!parameter.nuisance) return false;
-  return parameter.name == "offset" || spec.drive != Quantity::relative_length;
 }
 
 const LawUncertainty& uncertainty_of(const LawFile& law) {
   if (law.uncertainty) return *law.uncertainty;
   throw bad_input(fmt::format("law {}", law_name(law.spec)), "carries no uncertainty of a fit",
                   "a law.json that tpm fit has written; data that determine all parameters");
-}
-
-/// Those of the fit that apply: without the recording's own contact and offset unless they are
-/// the ones of the fit.
-UncertainCoordinates fitted_coordinates(const LawFile& law, Placement placement) {
-  const LawUncertainty& u = uncertainty_of(law);
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  std::vector<Eigen::Index> kept;
-  UncertainCoordinates result;
-  for (std::size_t i = 0; i < u.place.size(); ++i) {
-    const LawParameter& p = parameters[u.place[i]];
-    const bool leave_out = placement == Placement::surface
-                               ? is_nuisance(parameters, u.place[i])
-                               : placement == Placement::own && belongs_to_recording(law.spec, p);
-    if (leave_out) continue;
-    kept.push_back(static_cast<Eigen::Index>(i));
-    result.place.push_back(u.place[i]);
-    result.coordinate.push_back(u.coordinate[i]);
-  }
-  result.root = covariance_root(u.covariance(kept, kept));
-  return result;
-}
-
-/// d response / d coordinate of those places.
-Eigen::MatrixXd coordinate_slopes(const Response& response, const UncertainCoordinates& u,
-                                  std::span<const double> values) {
-  Eigen::MatrixXd slopes(response.value.size(), static_cast<Eigen::Index>(u.place.size()));
-  for (std::size_t i = 0; i < u.place.size(); ++i) {
-    slopes.col(static_cast<Eigen::Index>(i)) =
-        response.sensitivity.col(static_cast<Eigen::Index>(u.place[i])) *
-        coordinate_slope(u.coordinate[i], values[u.place[i]]);
-  }
-  return slopes;
-}
-
-/// Scatter of a new reading at an answer; none if it is not known there.
-std::optional<double> reading_sigma(const ReadingNoise& noise, double answer,
-                                    std::optional<double> own_sd) {
-  if (noise.kind == "per_row") {
-    if (!own_sd) return std::nullopt;
-    return noise.column * *own_sd;
-  }
-  if (noise.kind == "unknown") return std::nullopt;
-  return noise.absolute + noise.relative * std::abs(answer);
 }
 
 void set_mean_band(LawPrediction& p) {
@@ -159,7 +90,7 @@ class LawDraws {
                 "nearly no law drawn from the covariance is physical", "a better known law");
   }
   [[nodiscard]] int refused() const { return refused_; }
-  [[nodiscard]] const LawModel& model() const { return model_; }
+  void refuse() { ++refused_; }
 
  private:
   std::vector<double> draw() {
@@ -197,12 +128,28 @@ class LawDraws {
   int refused_ = 0;
 };
 
+/// The answer for a law that was drawn; draws under which an organ does not stand are refused.
+Eigen::VectorXd drawn_answer(const LawPrediction& p, const Model& model, const Protocol& protocol,
+                             LawDraws& draws) {
+  constexpr int kMost = 100;
+  for (int attempt = 0; attempt < kMost; ++attempt) {
+    try {
+      return model.respond(protocol, p.time_s, draws.next(), Want::values).value;
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::numerical || attempt + 1 == kMost) throw;
+      draws.refuse();
+    }
+  }
+  return {};
+}
+
 /// Replaces the band of the mean by quantiles over drawn laws.
-void set_sampled_mean_band(LawPrediction& p, const Protocol& protocol, LawDraws draws, int count) {
+void set_sampled_mean_band(LawPrediction& p, const Model& model, const Protocol& protocol,
+                           LawDraws draws, int count) {
   const auto n = static_cast<Eigen::Index>(p.time_s.size());
   Eigen::MatrixXd answers(n, count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    answers.col(k) = draws.model().respond(protocol, p.time_s, draws.next(), Want::values).value;
+    answers.col(k) = drawn_answer(p, model, protocol, draws);
   }
   std::vector<double> sorted(static_cast<std::size_t>(count));
   const auto at = [&](double share) {
@@ -253,9 +200,72 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
   const auto missing = std::count_if(p.response.begin(), p.response.end(),
                                      [](double f) { return !std::isfinite(f); });
   if (missing > 0) {
-    p.flags.push_back(fmt::format("the law predicts nothing at {} of {} times (docs/laws.md)",
+    p.flags.push_back(fmt::format("nothing is predicted at {} of {} times (docs/predict.md)",
                                   missing, p.response.size()));
   }
+}
+
+void require_known_drive(const LawFile& law, const Protocol& protocol) {
+  const bool load = protocol.drive() == Drive::force;
+  if (law.spec.drive == Quantity::indentation_depth || !load) return;
+  throw bad_input(fmt::format("law {}", law_name(law.spec)), "of a strip under a load",
+                  "an imposed relative length");
+}
+
+}  // namespace
+
+Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance) {
+  // Scaled to correlations first: parameters differ by many orders of magnitude.
+  const Eigen::VectorXd sd = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::VectorXd inverse = (sd.array() > 0.0).select(sd.cwiseInverse(), 0.0);
+  const SymmetricModes modes =
+      symmetric_modes(inverse.asDiagonal() * covariance * inverse.asDiagonal());
+  return sd.asDiagonal() * modes.vectors * modes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {
+  if (!parameter.nuisance) return false;
+  return parameter.name == "offset" || spec.drive != Quantity::relative_length;
+}
+
+UncertainCoordinates fitted_coordinates(const LawFile& law, Placement placement) {
+  const LawUncertainty& u = uncertainty_of(law);
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  std::vector<Eigen::Index> kept;
+  UncertainCoordinates result;
+  for (std::size_t i = 0; i < u.place.size(); ++i) {
+    const LawParameter& p = parameters[u.place[i]];
+    const bool leave_out = placement == Placement::surface
+                               ? is_nuisance(parameters, u.place[i])
+                               : placement == Placement::own && belongs_to_recording(law.spec, p);
+    if (leave_out) continue;
+    kept.push_back(static_cast<Eigen::Index>(i));
+    result.place.push_back(u.place[i]);
+    result.coordinate.push_back(u.coordinate[i]);
+  }
+  result.root = covariance_root(u.covariance(kept, kept));
+  return result;
+}
+
+Eigen::MatrixXd coordinate_slopes(const Response& response, const UncertainCoordinates& u,
+                                  std::span<const double> values) {
+  Eigen::MatrixXd slopes(response.value.size(), static_cast<Eigen::Index>(u.place.size()));
+  for (std::size_t i = 0; i < u.place.size(); ++i) {
+    slopes.col(static_cast<Eigen::Index>(i)) =
+        response.sensitivity.col(static_cast<Eigen::Index>(u.place[i])) *
+        coordinate_slope(u.coordinate[i], values[u.place[i]]);
+  }
+  return slopes;
+}
+
+std::optional<double> reading_sigma(const ReadingNoise& noise, double answer,
+                                    std::optional<double> own_sd) {
+  if (noise.kind == "per_row") {
+    if (!own_sd) return std::nullopt;
+    return noise.column * *own_sd;
+  }
+  if (noise.kind == "unknown") return std::nullopt;
+  return noise.absolute + noise.relative * std::abs(answer);
 }
 
 LawPrediction begin_prediction(const LawFile& law, const PredictionOptions& options) {
@@ -275,11 +285,11 @@ LawPrediction begin_prediction(const LawFile& law, const PredictionOptions& opti
   return p;
 }
 
-void fill_prediction(LawPrediction& p, const LawFile& law, const Protocol& protocol,
-                     const UncertainCoordinates& u, const std::vector<double>& values,
-                     std::span<const double> own_sd, const PredictionOptions& options) {
-  const Response response =
-      LawModel(law.spec).respond(protocol, p.time_s, values, Want::values_and_sensitivity);
+void fill_prediction(LawPrediction& p, const Model& model, const LawFile& law,
+                     const Protocol& protocol, const UncertainCoordinates& u,
+                     const std::vector<double>& values, std::span<const double> own_sd,
+                     const PredictionOptions& options) {
+  const Response response = model.respond(protocol, p.time_s, values, Want::values_and_sensitivity);
   const Eigen::VectorXd se = (coordinate_slopes(response, u, values) * u.root).rowwise().norm();
   p.response.assign(response.value.begin(), response.value.end());
   p.standard_error.assign(se.begin(), se.end());
@@ -288,138 +298,12 @@ void fill_prediction(LawPrediction& p, const LawFile& law, const Protocol& proto
   p.drive_kind = protocol.drive();
   set_mean_band(p);
   if (options.samples > 0) {
-    set_sampled_mean_band(p, protocol, LawDraws(law, u, values, options.seed), options.samples);
+    set_sampled_mean_band(p, model, protocol, LawDraws(law, u, values, options.seed),
+                          options.samples);
   }
   set_reading_band(p, *law.uncertainty, own_sd);
   add_range_flags(p, law);
 }
-
-/// Contact and offset of a recording for a held material, and what their values depend on.
-struct OwnPlacement {
-  std::vector<double> values;      ///< of the whole law
-  std::vector<std::size_t> place;  ///< of what was found
-};
-
-OwnPlacement place_recording(const LawFile& law, const PreparedRecording& recording) {
-  SetupOptions setup;
-  setup.reference = law.spec.reference;
-  setup.profiles = false;
-  FitConfig config = recording_config(law.spec, std::span(&recording, 1), setup);
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  std::erase_if(config.parameters, [&](const EstimatedParameter& p) {
-    const bool own =
-        p.sets.size() == 1 && belongs_to_recording(law.spec, parameters[p.sets.front().parameter]);
-    return !own;
-  });
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!belongs_to_recording(law.spec, parameters[i])) config.fixed[i] = law.values[i];
-  }
-  const FitResult fit = run_fit(config, data_sets(std::span(&recording, 1)));
-  OwnPlacement result{model_parameters(fit.config, fit.best.natural, 0), {}};
-  for (const std::size_t free : fit.covariance.free) {
-    result.place.push_back(fit.config.parameters[free].sets.front().parameter);
-  }
-  return result;
-}
-
-/// Adds the directions in which contact and offset of the recording move: with the material (they
-/// are found for it by least squares), and with the recording's own noise.
-void add_own_directions(UncertainCoordinates& u, const OwnPlacement& own, const LawFile& law,
-                        const PreparedRecording& recording, const Protocol& protocol) {
-  if (own.place.empty()) return;
-  const Recording& r = recording.recording;
-  std::vector<double> times;
-  std::vector<double> sd;
-  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-    if (r.time_s[i] < recording.from_s || r.time_s[i] > recording.to_s) continue;
-    times.push_back(r.time_s[i]);
-    if (!r.response_sd.empty()) sd.push_back(r.response_sd[i]);
-  }
-  const Response response =
-      LawModel(law.spec).respond(protocol, times, own.values, Want::values_and_sensitivity);
-  const Eigen::MatrixXd material = coordinate_slopes(response, u, own.values);
-  std::vector<Eigen::Index> columns(own.place.begin(), own.place.end());
-  Eigen::MatrixXd nuisance = response.sensitivity(Eigen::all, columns);
-  Eigen::VectorXd sigma = Eigen::VectorXd::Ones(response.value.size());
-  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const auto own_sd = k < sd.size() ? std::optional<double>(sd[k]) : std::nullopt;
-    const auto known = reading_sigma(law.uncertainty->noise, response.value[i], own_sd);
-    if (known && *known > 0.0) sigma[i] = *known;
-  }
-  nuisance = sigma.cwiseInverse().asDiagonal() * nuisance;
-  const Eigen::MatrixXd weighted = sigma.cwiseInverse().asDiagonal() * material;
-  const Eigen::LDLT<Eigen::MatrixXd> normal(nuisance.transpose() * nuisance);
-  const Eigen::MatrixXd follows = -normal.solve(nuisance.transpose() * weighted);
-  const auto found = static_cast<Eigen::Index>(own.place.size());
-  const Eigen::MatrixXd noise = law.uncertainty->readings_per_independent *
-                                normal.solve(Eigen::MatrixXd::Identity(found, found));
-  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(u.root.rows() + found, u.root.cols() + found);
-  root.topLeftCorner(u.root.rows(), u.root.cols()) = u.root;
-  root.bottomLeftCorner(found, u.root.cols()) = follows * u.root;
-  root.bottomRightCorner(found, found) = covariance_root(noise);
-  u.root = std::move(root);
-  for (const std::size_t place : own.place) {
-    u.place.push_back(place);
-    u.coordinate.push_back(Coordinate::linear);
-  }
-}
-
-bool has_read(const LawFile& law, const PreparedRecording& recording) {
-  const std::string& sha256 = recording.recording.header.sha256;
-  const auto& data = law.uncertainty->data;
-  return !sha256.empty() && std::any_of(data.begin(), data.end(), [&](const FittedFile& file) {
-    return file.sha256 == sha256;
-  });
-}
-
-void compare(LawPrediction& p, const LawFile& law, const PreparedRecording& recording) {
-  const Recording& r = recording.recording;
-  PredictedRecording own;
-  own.name = recording.name;
-  own.observed = r.response;
-  struct Sum {
-    double squares = 0.0;
-    int inside = 0;
-  };
-  Sum sums[3];
-  PredictionComparison* parts[3] = {&own.fitted, &own.held_out, &own.outside};
-  for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-    const bool window = r.time_s[i] >= recording.from_s && r.time_s[i] <= recording.to_s;
-    bool fitted = false;
-    for (const FittedFile& file : law.uncertainty->data) {
-      fitted = fitted ||
-               (!file.sha256.empty() && file.sha256 == r.header.sha256 && file.holds(r.time_s[i]));
-    }
-    own.in_window.push_back(window);
-    own.was_fitted.push_back(fitted);
-    if (window) own.peak = std::max(own.peak, std::abs(r.response[i]));
-    if (!std::isfinite(p.response[i])) continue;
-    const std::size_t part = fitted ? 0 : window ? 1 : 2;
-    const double off = p.response[i] - r.response[i];
-    ++parts[part]->samples;
-    parts[part]->largest = std::max(parts[part]->largest, std::abs(off));
-    sums[part].squares += off * off;
-    if (p.reading_lower.empty()) continue;
-    sums[part].inside += r.response[i] >= p.reading_lower[i] && r.response[i] <= p.reading_upper[i];
-  }
-  for (std::size_t part = 0; part < 3; ++part) {
-    const int n = parts[part]->samples;
-    if (n == 0) continue;
-    parts[part]->rms = std::sqrt(sums[part].squares / n);
-    if (!p.reading_lower.empty()) parts[part]->share_in_reading_band = 1.0 * sums[part].inside / n;
-  }
-  p.recording = std::move(own);
-}
-
-void require_known_drive(const LawFile& law, const Protocol& protocol) {
-  const bool load = protocol.drive() == Drive::force;
-  if (law.spec.drive == Quantity::indentation_depth || !load) return;
-  throw bad_input(fmt::format("law {}", law_name(law.spec)), "of a strip under a load",
-                  "an imposed relative length");
-}
-
-}  // namespace
 
 std::string_view placement_name(Placement placement) noexcept {
   return entry_of(kPlacementWords, placement).text;
@@ -433,8 +317,18 @@ Dimension LawPrediction::response_dimension() const {
   return quantity_dimension(drive_kind == Drive::force ? spec.drive : spec.response);
 }
 
+std::string LawPrediction::subject() const {
+  if (organ_spheres == 0) return law_name(spec);
+  return fmt::format("{} on an organ of {} spheres", law_name(spec), organ_spheres);
+}
+
 LawPrediction predict_law(const LawFile& law, const Protocol& protocol,
                           std::span<const double> times_s, const PredictionOptions& options) {
+  return predict_by(LawModel(law.spec), law, protocol, times_s, options);
+}
+
+LawPrediction predict_by(const Model& model, const LawFile& law, const Protocol& protocol,
+                         std::span<const double> times_s, const PredictionOptions& options) {
   LawPrediction p = begin_prediction(law, options);
   require_known_drive(law, protocol);
   p.placement = options.placement.value_or(Placement::surface);
@@ -451,47 +345,12 @@ LawPrediction predict_law(const LawFile& law, const Protocol& protocol,
   p.contact = values[values.size() - 2];
   p.offset = values.back();
   p.time_s.assign(times_s.begin(), times_s.end());
-  fill_prediction(p, law, protocol, u, values, {}, options);
+  fill_prediction(p, model, law, protocol, u, values, {}, options);
   if (protocol.drive() == Drive::force) {  // the noise of the fit is one of forces
     p.reading_lower.clear();
     p.reading_upper.clear();
     p.flags.push_back("no band for new readings: the fit knows the noise of forces, not of depths");
   }
-  return p;
-}
-
-LawPrediction predict_recording(const LawFile& law, const PreparedRecording& recording,
-                                const PredictionOptions& options) {
-  LawPrediction p = begin_prediction(law, options);
-  const Recording& r = recording.recording;
-  if (r.drive_quantity != law.spec.drive || r.response_quantity != law.spec.response) {
-    throw bad_input(fmt::format("recording '{}'", recording.name),
-                    fmt::format("{} over {}", quantity_name(r.response_quantity),
-                                quantity_name(r.drive_quantity)),
-                    fmt::format("{} over {}, as the law answers", quantity_name(law.spec.response),
-                                quantity_name(law.spec.drive)));
-  }
-  p.placement =
-      options.placement.value_or(has_read(law, recording) ? Placement::fitted : Placement::own);
-  UncertainCoordinates u = fitted_coordinates(law, p.placement);
-  Protocol protocol = measured_history(Drive::displacement, r.time_s, r.drive);
-  protocol.set_relaxed_at_start(true);
-  std::vector<double> values = law.values;
-  if (p.placement == Placement::own) {
-    const OwnPlacement own = place_recording(law, recording);
-    values = own.values;
-    add_own_directions(u, own, law, recording, protocol);
-  } else if (p.placement == Placement::surface) {
-    const std::vector<LawParameter> parameters = law_parameters(law.spec);
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      if (parameters[i].nuisance) values[i] = 0.0;
-    }
-  }
-  p.contact = values[values.size() - 2];
-  p.offset = values.back();
-  p.time_s = r.time_s;
-  fill_prediction(p, law, protocol, u, values, r.response_sd, options);
-  compare(p, law, recording);
   return p;
 }
 

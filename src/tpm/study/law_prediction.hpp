@@ -56,6 +56,7 @@ struct PredictedRecording {
 /// A law's answer to a history with two bands, SI.
 struct LawPrediction {
   LawSpec spec;
+  std::size_t organ_spheres = 0;  ///< of an organ that answers in place of the law; else 0
   Drive drive_kind = Drive::displacement;
   double level = 0.95;
   double quantile = 0.0;  ///< of the standard error: normal or Student's t
@@ -73,6 +74,8 @@ struct LawPrediction {
   std::vector<std::string> flags;  ///< what a reader must know
 
   [[nodiscard]] Dimension response_dimension() const;
+  /// "linear-2-relaxing", or "linear-2-relaxing on an organ of 142 spheres".
+  [[nodiscard]] std::string subject() const;
 };
 
 /// The response to a protocol with the uncertainty of the fit,

@@ -79,6 +79,7 @@ Json to_json(const LawPrediction& p) {
             {"quantile_of_the_standard_error", rounded(p.quantile, kStored)},
             {"bands_from", p.samples > 0 ? "samples" : "derivatives"},
             {"placement", placement_name(p.placement)}};
+  if (p.organ_spheres > 0) json["organ_spheres"] = p.organ_spheres;
   if (p.samples > 0) json["samples"] = p.samples;
   json["contact" + unit_suffix(quantity_dimension(p.spec.drive))] = rounded(p.contact, kStored);
   json["offset" + unit_suffix(quantity_dimension(p.spec.response))] = rounded(p.offset, kStored);
@@ -136,7 +137,7 @@ std::string to_terminal_text(const LawPrediction& p) {
   constexpr std::size_t kRows = 12;
   const Unit unit = shown_unit(p.response_dimension());
   std::string text = fmt::format(
-      "{}: {}\n{}{} % bands, {}\n\n", law_name(p.spec), law_words(p.spec), placement_words(p),
+      "{}: {}\n{}{} % bands, {}\n\n", p.subject(), law_words(p.spec), placement_words(p),
       significant(100.0 * p.level, 4),
       p.samples > 0 ? fmt::format("from {} laws drawn from the fit's covariance", p.samples)
                     : fmt::format("{} standard errors", significant(p.quantile, 4)));

@@ -10,10 +10,8 @@
 #include "tpm/core/text.hpp"
 #include "tpm/fit/least_squares.hpp"
 #include "tpm/law/law_model.hpp"
-#include "tpm/scene/experiment_scene.hpp"
-#include "tpm/scene/organ_model.hpp"
-#include "tpm/scene/protocol_file.hpp"
 #include "tpm/study/budget_parts.hpp"
+#include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 
 namespace tpm {
@@ -25,8 +23,7 @@ constexpr double kBoundFactor = 1e4;        // of moduli about their start
 constexpr double kTimeFactor = 100.0;       // of relaxation times
 constexpr double kStiffeningFactor = 20.0;  // of the deepest depth
 constexpr double kUnit_Pa = 1e3;
-constexpr double kLateralRatio = 1.0;  // E' over instantaneous radial modulus: the paper's
-constexpr double kAsked = 1e-3;        // of the peak: a unit of the residuals
+constexpr double kAsked = 1e-3;  // of the peak: a unit of the residuals
 
 /// The relaxation of a law in parallel form, and whether its kernel or tension bends.
 struct Relaxing {
@@ -89,14 +86,14 @@ class FittedOrgan {
   FittedOrgan(const Json& scene, std::string_view where, const std::filesystem::path& folder,
               const BondMaterial& unit);
 
-  [[nodiscard]] const OrganModel& model() const { return *model_; }
+  [[nodiscard]] const OrganModel& model() const { return *organ_.model; }
   /// The scene with another material.
   [[nodiscard]] Json scene_with(const BondMaterial& material) const;
 
  private:
   Json scene_;
   Json material_before_ = Json::object();
-  std::unique_ptr<OrganModel> model_;
+  SceneOrgan organ_;
 };
 
 FittedOrgan::FittedOrgan(const Json& scene, std::string_view where,
@@ -105,30 +102,7 @@ FittedOrgan::FittedOrgan(const Json& scene, std::string_view where,
   if (scene_.contains("material")) material_before_ = scene_.at("material");
   scene_["bonds"]["lateral"] = "relaxing";
   scene_["material"] = material_block(unit, material_before_);
-  Json bare = scene_;
-  std::optional<Probe> probe;
-  if (scene_.contains("contacts")) {
-    if (!has_protocol(scene_)) {
-      bare["protocol"] = {
-          {"kind", "ramp_hold"}, {"depth", "1 mm"}, {"rate", "1 mm/s"}, {"hold", "1 s"}};
-    }
-    const ExperimentScene experiment = parse_experiment(bare, where, folder);
-    if (experiment.contacts.size() != 1 ||
-        experiment.contacts.front().kind != ContactKind::sphere) {
-      throw bad_input(fmt::format("{}: /contacts", where), "more than one sphere that is driven",
-                      "one contact of the kind sphere, or none for the organ's contact sphere");
-    }
-    probe = experiment.probe();
-  }
-  for (const char* key : {"contacts", "protocol", "formulation", "outputs"}) bare.erase(key);
-  auto tissue = std::make_shared<Tissue>(parse_tissue(bare, where, folder));
-  require_standing(*tissue, where);
-  Organ& organ = tissue->network.organ;
-  if (probe) {
-    organ.contact = probe->sphere;
-    organ.normal.col(static_cast<Eigen::Index>(probe->sphere)) = -probe->direction;
-  }
-  model_ = std::make_unique<OrganModel>(std::move(tissue));
+  organ_ = organ_of_scene(scene_, where, folder);
 }
 
 Json FittedOrgan::scene_with(const BondMaterial& material) const {
@@ -137,35 +111,18 @@ Json FittedOrgan::scene_with(const BondMaterial& material) const {
   return scene;
 }
 
-/// Organ less law over the motion, in thousandths of the peak, by Einf, g_j, and what else is
-/// fitted.
+/// Organ less law over the motion, in thousandths of the peak, by the parameters of the bonds.
 class OrganLessLaw final : public ResidualFunction {
  public:
   OrganLessLaw(const OrganModel& model, const MaterialMotion& motion, const OrganMaterial& target,
-               BondMaterial form, bool fit_times)
-      : model_(model),
-        motion_(motion),
-        target_(target),
-        form_(std::move(form)),
-        fit_times_(fit_times) {}
+               FittedBonds bonds)
+      : model_(model), motion_(motion), target_(target), bonds_(std::move(bonds)) {}
 
-  [[nodiscard]] BondMaterial material(std::span<const double> natural) const {
-    BondMaterial m = form_;
-    std::size_t next = 0;
-    m.equilibrium_Pa = natural[next++];
-    for (auto& branch : m.branches) branch.modulus_Pa = natural[next++];
-    if (fit_times_) {
-      for (auto& branch : m.branches) branch.relaxation_time_s = natural[next++];
-    }
-    if (!m.potential.is_linear()) m.potential.length_m = natural[next++];
-    if (!m.kernel.is_linear()) m.kernel = m.potential;
-    m.lateral_Pa = kLateralRatio * m.instantaneous_Pa();
-    return m;
-  }
+  [[nodiscard]] const FittedBonds& bonds() const { return bonds_; }
 
   [[nodiscard]] std::vector<double> force(const BondMaterial& m) const {
-    const Response response =
-        model_.respond(motion_.protocol, motion_.time_s, values_of(m), Want::values);
+    const Response response = model_.respond(motion_.protocol, motion_.time_s,
+                                             FittedBonds::values(model_, m), Want::values);
     return {response.value.begin(), response.value.end()};
   }
 
@@ -173,11 +130,12 @@ class OrganLessLaw final : public ResidualFunction {
 
   [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                               RowMatrix* jacobian) const override {
-    const std::vector<double> values = values_of(material(natural));
-    const auto columns = jacobian == nullptr ? 0 : std::ssize(natural);
+    const std::vector<double> values = FittedBonds::values(model_, bonds_.material(natural));
+    Eigen::MatrixXd along = bonds_.along(model_);
+    if (jacobian == nullptr) along.resize(along.rows(), 0);
     Response response;
     try {
-      response = model_.respond_along(motion_.protocol, motion_.time_s, values, along(columns));
+      response = model_.respond_along(motion_.protocol, motion_.time_s, values, along);
     } catch (const Error& error) {  // an organ that buckles: the search turns away
       if (error.code() != ExitCode::numerical) throw;
       return false;
@@ -191,47 +149,10 @@ class OrganLessLaw final : public ResidualFunction {
   }
 
  private:
-  [[nodiscard]] std::vector<double> values_of(const BondMaterial& m) const {
-    std::vector<double> values;
-    for (const ParameterDescription& p : model_.parameters()) {
-      values.push_back(*value_of(m, p.name));
-    }
-    return values;
-  }
-
-  /// How the model's parameters change with each fitted one.
-  [[nodiscard]] Eigen::MatrixXd along(Eigen::Index columns) const {
-    const auto table = model_.parameters();
-    Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(std::ssize(table), columns);
-    if (columns == 0) return changes;
-    const auto row = [&](std::string_view name) {
-      const auto found =
-          std::find_if(table.begin(), table.end(), [&](const auto& p) { return p.name == name; });
-      return static_cast<Eigen::Index>(found - table.begin());
-    };
-    Eigen::Index next = 0;
-    const auto add = [&](const std::string& name, bool modulus) {
-      changes(row(name), next) = 1.0;
-      if (modulus) changes(row("Eprime"), next) = kLateralRatio;
-      ++next;
-    };
-    add("Einf", true);
-    for (std::size_t j = 1; j <= form_.branches.size(); ++j) add(fmt::format("g{}", j), true);
-    if (fit_times_) {
-      for (std::size_t j = 1; j <= form_.branches.size(); ++j) add(fmt::format("tau{}", j), false);
-    }
-    if (!form_.potential.is_linear()) {
-      add("stiffening", false);
-      if (!form_.kernel.is_linear()) changes(row("kernel_stiffening"), next - 1) = 1.0;
-    }
-    return changes;
-  }
-
   const OrganModel& model_;
   const MaterialMotion& motion_;
   const OrganMaterial& target_;
-  BondMaterial form_;
-  bool fit_times_;
+  FittedBonds bonds_;
 };
 
 FitParameter about(std::string name, Unit unit, double start, double factor) {
@@ -269,32 +190,22 @@ std::vector<FitParameter> fitted_parameters(const BondMaterial& start, bool fit_
   return parameters;
 }
 
-/// Derivatives of the law's force by the coordinates of its uncertainty that belong to the
-/// material, and their covariance.
-struct LawScatter {
-  Eigen::MatrixXd slopes, covariance;
-};
-
-LawScatter scatter_of(const LawFile& law, const MaterialMotion& motion) {
+/// Derivatives of the law's force by the coordinates of its uncertainty; those that belong to the
+/// recording and not to the material are 0.
+Eigen::MatrixXd law_slopes(const LawFile& law, const MaterialMotion& motion) {
   const LawModel model(law.spec);
   const LawUncertainty& u = *law.uncertainty;
   const LawFile plain = at_surface(law);
   const Response r =
       model.respond(motion.protocol, motion.time_s, plain.values, Want::values_and_sensitivity);
-  std::vector<Eigen::Index> kept;
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(r.value.size(), std::ssize(u.place));
   for (std::size_t i = 0; i < u.place.size(); ++i) {
-    if (!model.law_parameters()[u.place[i]].nuisance) kept.push_back(static_cast<Eigen::Index>(i));
-  }
-  LawScatter s;
-  s.covariance = u.covariance(kept, kept);
-  s.slopes.resize(r.value.size(), std::ssize(kept));
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    const auto i = static_cast<std::size_t>(kept[k]);
-    s.slopes.col(static_cast<Eigen::Index>(k)) =
+    if (model.law_parameters()[u.place[i]].nuisance) continue;
+    slopes.col(static_cast<Eigen::Index>(i)) =
         r.sensitivity.col(static_cast<Eigen::Index>(u.place[i])) *
         coordinate_slope(u.coordinate[i], law.values[u.place[i]]);
   }
-  return s;
+  return slopes;
 }
 
 void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile& law,
@@ -315,12 +226,13 @@ void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile
         kAsked * m.peak_N * p.natural_slope(p.theta(natural[i]));
     if (!m.parameters[i].at_bound) free.push_back(static_cast<Eigen::Index>(i));
   }
-  const LawScatter scatter = scatter_of(law, motion);
   const Eigen::MatrixXd j = jacobian(Eigen::all, free);
   const Eigen::MatrixXd gram = j.transpose() * j;
-  const Eigen::MatrixXd d = solve_symmetric(gram, j.transpose() * scatter.slopes);
-  m.covariance = Eigen::MatrixXd::Zero(std::ssize(natural), std::ssize(natural));
-  m.covariance(free, free) = d * scatter.covariance * d.transpose();
+  const Eigen::MatrixXd slopes = law_slopes(law, motion);
+  m.follows = Eigen::MatrixXd::Zero(std::ssize(natural), slopes.cols());
+  const Eigen::MatrixXd d = solve_symmetric(gram, j.transpose() * slopes);
+  m.follows(free, Eigen::all) = d;
+  m.covariance = m.follows * law.uncertainty->covariance * m.follows.transpose();
   m.level = law.uncertainty->level;
   m.quantile = law.uncertainty->quantile();
   for (const Eigen::Index i : free) {
@@ -333,6 +245,21 @@ void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile
 }
 
 }  // namespace
+
+Protocol in_few_pieces(const std::vector<double>& time_s, const std::vector<double>& depth_m,
+                       double contact_m) {
+  const double deepest = *std::max_element(depth_m.begin(), depth_m.end()) - contact_m;
+  std::vector<bool> kept(time_s.size(), false);
+  kept.front() = kept.back() = true;
+  keep_corners(time_s, depth_m, 0, time_s.size() - 1, kMotionWithin * deepest, kept);
+  std::vector<Knot> knots;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (kept[i]) knots.push_back({time_s[i], depth_m[i]});
+  }
+  Protocol motion(Drive::displacement, std::move(knots));
+  motion.set_relaxed_at_start(true);
+  return motion;
+}
 
 MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& recording) {
   const Recording& r = recording.recording;
@@ -349,23 +276,12 @@ MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& 
     depth_m.push_back(std::max(r.drive[i] - contact, 0.0));
     force_N.push_back(r.response[i] - offset);
   }
-  const double deepest = *std::max_element(depth_m.begin(), depth_m.end());
-  if (!(deepest > 0.0)) {
+  if (!(*std::max_element(depth_m.begin(), depth_m.end()) > 0.0)) {
     throw bad_input(fmt::format("recording '{}'", recording.name), "does not press the tissue",
                     "a depth beyond the law's contact");
   }
-  std::vector<bool> kept(time_s.size(), false);
-  kept.front() = kept.back() = true;
-  keep_corners(time_s, depth_m, 0, time_s.size() - 1, kMotionWithin * deepest, kept);
-  std::vector<Knot> knots;
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    if (kept[i]) knots.push_back({time_s[i], depth_m[i]});
-  }
-  MaterialMotion motion{Protocol(Drive::displacement, std::move(knots)),
-                        {},
-                        {},
-                        fmt::format("along {}", recording.name)};
-  motion.protocol.set_relaxed_at_start(true);
+  MaterialMotion motion{
+      in_few_pieces(time_s, depth_m, 0.0), {}, {}, fmt::format("along {}", recording.name)};
   const std::size_t stride = 1 + time_s.size() / kMostTimes;
   for (std::size_t i = 0; i < time_s.size(); i += stride) {
     motion.time_s.push_back(time_s[i]);
@@ -389,6 +305,7 @@ namespace {
 OrganMaterial law_along(const LawFile& law, const MaterialMotion& motion) {
   OrganMaterial m;
   m.law = law_name(law.spec);
+  m.fitted_law = law;
   m.motion = motion.words;
   m.time_s = motion.time_s;
   m.measured_N = motion.measured_N;
@@ -411,7 +328,7 @@ BondMaterial unit_material(const Relaxing& relaxing) {
     if (!(relaxing.prony.k[j] > 0.0)) continue;
     unit.branches.push_back({kUnit_Pa * relaxing.prony.k[j] / whole, relaxing.prony.tau_s[j]});
   }
-  unit.lateral_Pa = kLateralRatio * unit.instantaneous_Pa();
+  unit.lateral_Pa = unit.instantaneous_Pa();  // as FittedBonds keeps it
   return unit;
 }
 
@@ -446,7 +363,7 @@ void fit_material(OrganMaterial& m, const OrganLessLaw& function,
     throw Error(ExitCode::numerical, std::string(where), "the organ's material was not found",
                 "an organ that stands at the depths of the motion");
   }
-  m.material = function.material(best.natural);
+  m.material = function.bonds().material(best.natural);
   m.organ_N = function.force(m.material);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const FitParameter& p = parameters[i];
@@ -466,7 +383,7 @@ OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, con
   OrganMaterial m = law_along(law, motion);
   const BondMaterial unit = unit_material(relaxing);
   const FittedOrgan plain(scene, where, folder, unit);
-  const OrganLessLaw first(plain.model(), motion, m, unit, false);
+  const OrganLessLaw first(plain.model(), motion, m, FittedBonds(unit, false));
   BondMaterial start = by_correspondence(m, first, unit, where);
   const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
   if (options.stiffens.value_or(relaxing.bends)) {
@@ -475,7 +392,7 @@ OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, con
   }
 
   const FittedOrgan organ(scene, where, folder, start);
-  const OrganLessLaw function(organ.model(), motion, m, start, options.fit_times);
+  const OrganLessLaw function(organ.model(), motion, m, FittedBonds(start, options.fit_times));
   fit_material(m, function, fitted_parameters(start, options.fit_times, deepest), where);
   add_intervals(m, function, law, motion);
   compare(m, motion.protocol);

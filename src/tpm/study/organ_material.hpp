@@ -57,11 +57,15 @@ struct ForceMismatch {
 /// A law put on an organ.
 struct OrganMaterial {
   std::string law;
+  LawFile fitted_law;  ///< with what its fit knows of it
   std::string motion;
   BondMaterial material;
   std::vector<OrganMaterialParameter> parameters;
   /// Of the fitted parameters' theta, in their order; rows at bounds are 0; empty without.
   Eigen::MatrixXd covariance;
+  /// D: how theta follows the coordinates of the law's uncertainty, one column each; 0 for the
+  /// contact and offset of a recording.
+  Eigen::MatrixXd follows;
   double level = 0.95;
   double quantile = 0.0;
   std::vector<double> time_s, depth_m, law_N, correspondence_N, organ_N, measured_N;

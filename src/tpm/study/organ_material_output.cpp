@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 
 namespace tpm {
@@ -27,9 +28,14 @@ std::string mismatch_words(const char* what, const ForceMismatch& m) {
                      significant(1e3 * m.rate_m_per_s, 3));
 }
 
-std::string parameter_key(const FitParameter& p) {
-  if (p.name.starts_with("tau")) return p.name + "_s";
-  return p.name + (p.name == "stiffening" ? "_m" : "_Pa");
+Json matrix_json(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    Json row = Json::array();
+    for (Eigen::Index k = 0; k < matrix.cols(); ++k) row.push_back(matrix(i, k));
+    rows.push_back(std::move(row));
+  }
+  return rows;
 }
 
 std::string quantity(double value, const char* unit) {
@@ -169,20 +175,21 @@ Json to_json(const OrganMaterial& m) {
       entry["lower"] = rounded(*p.lower, kMaterialDigits);
       entry["upper"] = rounded(*p.upper, kMaterialDigits);
     }
-    parameters[parameter_key(p.parameter)] = std::move(entry);
-    order.push_back(parameter_key(p.parameter));
+    parameters[bond_parameter_key(p.parameter.name)] = std::move(entry);
+    order.push_back(bond_parameter_key(p.parameter.name));
   }
   json["parameters"] = std::move(parameters);
   if (m.covariance.size() > 0) {
-    Json rows = Json::array();
-    for (Eigen::Index i = 0; i < m.covariance.rows(); ++i) {
-      Json row = Json::array();
-      for (Eigen::Index k = 0; k < m.covariance.cols(); ++k) row.push_back(m.covariance(i, k));
-      rows.push_back(std::move(row));
+    Json of_law = Json::array();
+    const std::vector<LawParameter> table = law_parameters(m.fitted_law.spec);
+    for (const std::size_t place : m.fitted_law.uncertainty->place) {
+      of_law.push_back(law_key(table[place]));
     }
     json["uncertainty"] = {{"parameters", std::move(order)},
                            {"coordinate", "log"},
-                           {"covariance", std::move(rows)},
+                           {"covariance", matrix_json(m.covariance)},
+                           {"law_parameters", std::move(of_law)},
+                           {"follows_law", matrix_json(m.follows)},
                            {"level", m.level},
                            {"quantile", rounded(m.quantile, kMaterialDigits)}};
   }
@@ -195,6 +202,7 @@ Json to_json(const OrganMaterial& m) {
     json["organ_less_recording"] = mismatch_json(*m.organ_to_recording);
   }
   json["flags"] = m.flags;
+  json["fitted_law"] = to_json(m.fitted_law);
   json["scene"] = m.scene;
   return json;
 }

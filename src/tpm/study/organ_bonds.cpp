@@ -1,0 +1,110 @@
+#include "tpm/study/organ_bonds.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "tpm/core/error.hpp"
+#include "tpm/scene/experiment_scene.hpp"
+#include "tpm/scene/protocol_file.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr double kLateralRatio = 1.0;  // E' over instantaneous radial modulus: the paper's
+
+}  // namespace
+
+SceneOrgan organ_of_scene(const Json& scene, std::string_view where,
+                          const std::filesystem::path& folder) {
+  Json bare = scene;
+  std::optional<Probe> probe;
+  if (scene.contains("contacts")) {
+    if (!has_protocol(scene)) {
+      bare["protocol"] = {
+          {"kind", "ramp_hold"}, {"depth", "1 mm"}, {"rate", "1 mm/s"}, {"hold", "1 s"}};
+    }
+    const ExperimentScene experiment = parse_experiment(bare, where, folder);
+    if (experiment.contacts.size() != 1 ||
+        experiment.contacts.front().kind != ContactKind::sphere) {
+      throw bad_input(fmt::format("{}: /contacts", where), "more than one sphere that is driven",
+                      "one contact of the kind sphere, or none for the organ's contact sphere");
+    }
+    probe = experiment.probe();
+  }
+  for (const char* key : {"contacts", "protocol", "formulation", "outputs"}) bare.erase(key);
+  auto tissue = std::make_shared<Tissue>(parse_tissue(bare, where, folder));
+  require_standing(*tissue, where);
+  Organ& organ = tissue->network.organ;
+  if (probe) {
+    organ.contact = probe->sphere;
+    organ.normal.col(static_cast<Eigen::Index>(probe->sphere)) = -probe->direction;
+  }
+  SceneOrgan result;
+  result.model = std::make_shared<OrganModel>(tissue);
+  result.tissue = std::move(tissue);
+  return result;
+}
+
+std::vector<std::string> FittedBonds::names() const {
+  std::vector<std::string> all{"Einf"};
+  const auto add_each = [&](const char* name) {
+    for (std::size_t j = 1; j <= form_.branches.size(); ++j) {
+      all.push_back(fmt::format("{}{}", name, j));
+    }
+  };
+  add_each("g");
+  if (times_) add_each("tau");
+  if (!form_.potential.is_linear()) all.emplace_back("stiffening");
+  return all;
+}
+
+BondMaterial FittedBonds::material(std::span<const double> natural) const {
+  BondMaterial m = form_;
+  std::size_t next = 0;
+  m.equilibrium_Pa = natural[next++];
+  for (auto& branch : m.branches) branch.modulus_Pa = natural[next++];
+  if (times_) {
+    for (auto& branch : m.branches) branch.relaxation_time_s = natural[next++];
+  }
+  if (!m.potential.is_linear()) m.potential.length_m = natural[next++];
+  if (!m.kernel.is_linear()) m.kernel = m.potential;
+  m.lateral_Pa = kLateralRatio * m.instantaneous_Pa();
+  return m;
+}
+
+std::vector<double> FittedBonds::values(const OrganModel& model, const BondMaterial& material) {
+  std::vector<double> values;
+  for (const ParameterDescription& p : model.parameters()) {
+    values.push_back(*value_of(material, p.name));
+  }
+  return values;
+}
+
+Eigen::MatrixXd FittedBonds::along(const OrganModel& model) const {
+  const auto table = model.parameters();
+  const std::vector<std::string> all = names();
+  Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(std::ssize(table), std::ssize(all));
+  const auto row = [&](std::string_view name) {
+    const auto found =
+        std::find_if(table.begin(), table.end(), [&](const auto& p) { return p.name == name; });
+    return static_cast<Eigen::Index>(found - table.begin());
+  };
+  for (Eigen::Index k = 0; k < changes.cols(); ++k) {
+    const std::string& name = all[static_cast<std::size_t>(k)];
+    changes(row(name), k) = 1.0;
+    const bool modulus = name == "Einf" || name.starts_with('g');
+    if (modulus) changes(row("Eprime"), k) = kLateralRatio;
+    if (name == "stiffening" && !form_.kernel.is_linear()) {
+      changes(row("kernel_stiffening"), k) = 1.0;
+    }
+  }
+  return changes;
+}
+
+std::string bond_parameter_key(std::string_view name) {
+  const char* unit = name.starts_with("tau") ? "_s" : name == "stiffening" ? "_m" : "_Pa";
+  return std::string(name) + unit;
+}
+
+}  // namespace tpm
