@@ -1,4 +1,4 @@
-// Prints the measured numbers of reports/materials: measure_materials written|cost|servo
+// Prints the measured numbers of reports/materials: measure_materials written|cost|servo|lag
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -223,6 +223,66 @@ void print_servo() {
   }
 }
 
+/// The condensed model of livers of 60 spheres where its viscous state lags: a ramp to 8 mm, a
+/// hold, a release and a rest of the same length each, against the quasi-static network.
+void print_lag() {
+  constexpr double kDepth_m = 8e-3;
+  constexpr int kRamp = 100, kSteps = 4 * kRamp;
+  fmt::print("{:>4} {:>6} {:>9} {:>9} {:>12} {:>12} {:>12} {:>12}\n", "seed", "share", "branches",
+             "ramp/tau", "error/peak", "claim/peak", "over claim", "by at most");
+  for (const std::uint64_t seed : {1, 5}) {
+    LiverRequest request;
+    request.count = 60;
+    request.seed = seed;
+    const OrganScene scene(fill_liver(request));
+    const Positions& rest = scene.network.organ.position;
+    Freedom guided = scene.freedom;
+    guided.guide(scene.probe.sphere, scene.probe.direction);
+    for (const double share : {0.2, 0.5, 0.9}) {
+      for (const std::vector<double>& branches : {std::vector{1.0}, std::vector{0.2, 5.0}}) {
+        const BondSystem bonds(scene.network, MaterialField(material_of(branches, share)));
+        const CondensedContact built =
+            build_condensed(bonds, rest, scene.freedom, scene.probe.sphere, scene.probe.direction,
+                            {.depth_m = kDepth_m});
+        for (const double ramp_s : {0.05, 0.5, 2.5, 12.0}) {  // the mean relaxation time is 1 s
+          const double step_s = ramp_s / kRamp;
+          const Protocol protocol(Drive::displacement,
+                                  {{0.0, 0.0},
+                                   {ramp_s, kDepth_m},
+                                   {2.0 * ramp_s, kDepth_m},
+                                   {3.0 * ramp_s, 0.0},
+                                   {4.0 * ramp_s, 0.0}},
+                                  "there and back");
+          std::vector<double> times;
+          for (int i = 1; i < kSteps; ++i) times.push_back(step_s * i);
+          times.push_back(protocol.end_s());
+          const Eigen::VectorXd expected =
+              QuasiStatic(bonds, rest, guided, scene.probe, {.tolerance = 1e-7})
+                  .run(protocol, times)
+                  .response;
+          CondensedContact model = built.with_period(step_s);
+          double worst = 0.0, claim = 0.0, by = 0.0;
+          int over = 0;
+          for (int i = 1; i <= kSteps; ++i) {
+            const double depth = value_at(protocol, times[static_cast<std::size_t>(i - 1)]);
+            const ContactAnswer answer = model.step(depth * scene.probe.direction);
+            const double force = -answer.force_N.dot(scene.probe.direction);
+            const double error = std::abs(force - expected[i - 1]);
+            worst = std::max(worst, error);
+            claim = std::max(claim, answer.error_N);
+            by = std::max(by, error / answer.error_N);
+            over += error > answer.error_N ? 1 : 0;
+          }
+          const double peak = expected.maxCoeff();
+          fmt::print("{:>4} {:>6} {:>9} {:>9} {:>12.2e} {:>12.2e} {:>12} {:>12.2f}\n", seed, share,
+                     branches.size(), ramp_s, worst / peak, claim / peak,
+                     fmt::format("{} of {}", over, kSteps), by);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -230,5 +290,6 @@ int main(int argc, char** argv) {
   if (asked("written")) print_written();
   if (asked("cost")) print_cost();
   if (asked("servo")) print_servo();
+  if (asked("lag")) print_lag();
   return 0;
 }
