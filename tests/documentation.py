@@ -7,6 +7,8 @@
 - every docs/PAGE.md named in a source, a script or a page exists;
 - docs/README.md links every page of docs;
 - a folder of src/tpm includes only those below it in the list of docs/architecture.md;
+- paper/paper.md shows every figure of paper/figures, cites every entry of paper/paper.bib and nothing else, and names
+  only files that exist;
 - the groups of `tpm --help` and of the README hold the same commands, each once.
 """
 
@@ -89,6 +91,29 @@ def upward_includes(root):
                 yield f"{file.relative_to(root)}: includes {other}, which is above {here}"
 
 
+def faults_of_paper(root):
+    page = (root / "paper/paper.md").read_text(encoding="utf-8")
+    body = re.sub(r"\A---\n.*?\n---\n", "", page, flags=re.S)
+    shown = re.findall(r"\]\(figures/([^)\s]+)\)", body)  # that each exists: broken_links()
+    for file in sorted((root / "paper/figures").iterdir()):
+        if file.name not in shown:
+            yield f"paper/figures/{file.name}: not shown in paper.md"
+    for name in sorted(set(re.findall(r"`((?:configs|reports|scripts)/[\w./-]+)`", body))):
+        if not (root / name).exists():
+            yield f"paper/paper.md: names {name}: no such file"
+    labels = set(re.findall(r"\\label\{([^}]+)\}", body))
+    for label in sorted(labels ^ set(re.findall(r"\\autoref\{([^}]+)\}", body))):
+        yield f"paper/paper.md: {label} is not both a label and a reference"
+    cited = set(re.findall(r"(?<![\w.])@(\w+)", re.sub(r"`[^`]*`", "", body)))
+    entries = re.findall(r"^@\w+\{(\w+),", (root / "paper/paper.bib").read_text(encoding="utf-8"), re.M)
+    for key in sorted(cited - set(entries)):
+        yield f"paper/paper.md: cites {key}, which is not in paper.bib"
+    for key in sorted(set(entries) - cited):
+        yield f"paper/paper.bib: {key} is not cited in paper.md"
+    for key in sorted({key for key in entries if entries.count(key) > 1}):
+        yield f"paper/paper.bib: {key} is there twice"
+
+
 def differing_groups(root, program):
     text = subprocess.run([program, "--help"], capture_output=True, text=True, check=True).stdout
     shown = {}
@@ -107,7 +132,7 @@ def differing_groups(root, program):
 def main():
     root, program = Path(sys.argv[1]).resolve(), sys.argv[2]
     faults = [*broken_links(root), *lost_pages(root), *unlisted_pages(root), *upward_includes(root),
-              *differing_groups(root, program)]
+              *faults_of_paper(root), *differing_groups(root, program)]
     for fault in faults:
         print(fault)
     print(f"{len(faults)} faults")
