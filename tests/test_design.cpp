@@ -307,7 +307,8 @@ TEST_CASE("bad designs are named") {
              Contains("/candidates/0/rate/0: 0 m/s; expected a value above 0"));
   CHECK_THAT(changed("/candidates/0/load", Json::array({"1 N"})),
              Contains("/candidates/0/load: is no key of the kind 'ramp_hold'"));
-  CHECK_THAT(changed("/candidates/0/kind", "creep"), Contains("/candidates/0/rate: is no key of the kind 'creep'"));
+  CHECK_THAT(changed("/candidates/0/kind", "creep"),
+             Contains("/candidates/0/rate: is no key of the kind 'creep'"));
   CHECK_THAT(changed("/noise/force/absolute", "1 mm"), Contains("/noise/force/absolute"));
   CHECK_THAT(changed("/nuisance", Json::array({"k_inf", "offset"})),
              Contains("every parameter is a nuisance"));

@@ -129,7 +129,8 @@ std::optional<JpkConversion> find_jpk_conversion(const JpkProperties& properties
                                                  const std::string& channel,
                                                  std::string_view unit) {
   const std::string set = key_of(channel, "conversion-set.");
-  std::vector<std::string> slots = slot_words(properties.find(set + "conversions.list").value_or(""));
+  std::vector<std::string> slots =
+      slot_words(properties.find(set + "conversions.list").value_or(""));
   slots.insert(slots.begin(), properties.find(set + "conversions.default").value_or(""));
   for (const std::string& slot : slots) {
     const std::string block = fmt::format("{}conversion.{}.", set, slot);

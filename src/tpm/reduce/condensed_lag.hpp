@@ -20,8 +20,9 @@ namespace tpm {
 /// with the quasi-static network where it lags: loaded to the depth, held, released and left alone,
 /// each for 0.2, 1 and 5 relaxation times (of several branches the mean of their logarithms). The
 /// result is twice the largest excess of an error over the claim so far, per lag.
+/// A release during which the tissue buckles is left out: nothing is claimed of a buckled tissue.
 /// @param model with a claim that has no such part yet
-/// Throws Error(numerical) where the network cannot be balanced.
+/// Throws Error(numerical) where the network cannot be balanced before the release.
 [[nodiscard]] double condensed_lag_error_N(const CondensedContact& model, const CondensedFit& fit,
                                            const BondSystem& bonds, const Positions& rest,
                                            const Freedom& freedom,
