@@ -10,6 +10,7 @@
 #include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/report/json_table_csv.hpp"
 #include "tpm/report/plan_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/error_budget.hpp"
@@ -90,7 +91,7 @@ Plan planned(const ExperimentScene& scene, PlanRequest request) {
 namespace {
 
 struct PlanCommand {
-  std::string scene;
+  std::string scene, output;
   bool calibrate = false;
   bool brief = false;
   PlanChoice choice;
@@ -125,10 +126,13 @@ int run_plan(const PlanCommand& command, const Session& session) {
   if (command.scene.empty()) {
     throw Error(ExitCode::usage, "SCENE", "is missing", "a JSON scene, or --calibrate");
   }
+  const auto csv = csv_beside(command.output, session);
   PlanRequest request = plan_request(command.choice);
   request.relevance = request.changes = !command.brief;
   const Plan plan = planned(read_experiment(command.scene), std::move(request));
-  say("{}", session.json() ? to_text(plan_json(plan)) : plan_text(plan));
+  const Json json = plan_json(plan);
+  deliver(session.json() ? to_text(json) : plan_text(plan), command.output);
+  deliver_csv(json_table_csv(json.at("frontier")), csv);
   return plan.choice ? 0 : static_cast<int>(ExitCode::answer_is_no);
 }
 
@@ -143,6 +147,8 @@ void add_plan_command(CLI::App& app, Session& session) {
                     "Leave out what does not matter and what would break");
   command->add_flag("--calibrate", choice->calibrate,
                     "Measure what operations cost on this machine, and keep it");
+  command->add_option("-o,--output", choice->output,
+                      "Write here instead of to the terminal; beside JSON the candidates as .csv");
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm plan configs/plan/shallow.json --tolerance 1% --rate 1000\n"
