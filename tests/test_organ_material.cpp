@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "liver_of_60.hpp"
 #include "refusal.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/simulate/scene_runner.hpp"
@@ -28,19 +29,8 @@ LawFile two_branches(double k_inf) {
   return law;
 }
 
-Json small_liver() {
-  return Json::parse(R"({"organ": {"kind": "liver", "count": 60, "spacing": "20 mm"},
-                         "anchors": [{"kind": "far_side"}], "contacts": [{"kind": "sphere"}]})");
-}
-
-MaterialMotion ramp() {
-  std::vector<double> times;
-  for (int i = 0; i <= 24; ++i) times.push_back(0.25 * i);
-  return motion_of_protocol(ramp_and_hold(2e-3, 2e-3, 5.0), times);
-}
-
 OrganMaterial on_liver(const LawFile& law, const OrganMaterialOptions& options = {}) {
-  return put_on_organ(law, ramp(), small_liver(), "test", {}, options);
+  return put_on_organ(law, testing::ramp_to_2_mm(), testing::liver_of_60(), "test", {}, options);
 }
 
 }  // namespace
@@ -49,7 +39,8 @@ TEST_CASE("at small depths correspondence alone makes an organ answer as the law
   std::vector<double> times;
   for (int i = 0; i <= 24; ++i) times.push_back(0.25 * i);
   const MaterialMotion shallow = motion_of_protocol(ramp_and_hold(2e-6, 2e-6, 5.0), times);
-  const OrganMaterial m = put_on_organ(two_branches(100.0), shallow, small_liver(), "test", {}, {});
+  const OrganMaterial m =
+      put_on_organ(two_branches(100.0), shallow, testing::liver_of_60(), "test", {}, {});
   CHECK(m.start.largest < 1e-3);  // what is left grows with the depth over the spacing
   CHECK(m.organ.largest <= m.start.largest);
 }
@@ -92,10 +83,12 @@ TEST_CASE("laws, motions and scenes that no organ can take are refused") {
   fractional.spec = parse_law_name("linear-fzener", "test");
   CHECK_THAT(test::refusal_of([&] { (void)on_liver(fractional); }),
              Contains("cannot be put on an organ"));
-  Json patch = small_liver();
+  Json patch = testing::liver_of_60();
   patch["contacts"] = Json::parse(R"([{"kind": "patch", "radius": "30 mm"}])");
-  CHECK_THAT(test::refusal_of(
-                 [&] { (void)put_on_organ(two_branches(100.0), ramp(), patch, "test", {}, {}); }),
+  CHECK_THAT(test::refusal_of([&] {
+               (void)put_on_organ(two_branches(100.0), testing::ramp_to_2_mm(), patch, "test", {},
+                                  {});
+             }),
              Contains("more than one sphere"));
   CHECK_THAT(test::refusal_of([&] {
                (void)motion_of_protocol(creep(1.0, 5.0), {0.0, 1.0});

@@ -50,6 +50,13 @@ void add_approach(PhaseList& list) {
   list.add(SessionPhaseKind::approach, "approach", kApproach_s, -kClearance_m, 0.0);
 }
 
+/// Back into the air at the rate of the phases, and a rest there.
+void add_release(PhaseList& list, std::string name, double depth_m, double rest_s) {
+  list.add(SessionPhaseKind::release, std::move(name), (depth_m + kClearance_m) / list.rate_m_per_s,
+           depth_m, -kClearance_m);
+  list.add(SessionPhaseKind::rest, "rest", rest_s, -kClearance_m, -kClearance_m);
+}
+
 void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& place) {
   const double rest = rest_of(block, place);
   for (const ProtocolBlock& one :
@@ -68,9 +75,7 @@ void add_indentations(PhaseList& list, const Json& block, const DocumentPlace& p
              depth / rate, 0.0, depth);
     list.add(SessionPhaseKind::hold, fmt::format("hold {} mm after {} mm/s", mm, speed),
              *one.hold_s, depth, depth);
-    list.add(SessionPhaseKind::release, fmt::format("release from {} mm at {} mm/s", mm, speed),
-             (depth + kClearance_m) / rate, depth, -kClearance_m);
-    list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+    add_release(list, fmt::format("release from {} mm at {} mm/s", mm, speed), depth, rest);
   }
   list.depth_m = list.rate_m_per_s = 0.0;
 }
@@ -100,9 +105,7 @@ void add_slides(PhaseList& list, const Json& block, const DocumentPlace& place) 
                fmt::format("slide back {} mm at {} mm/s, {} mm deep", far, speed, mm),
                distance / rate, depth, depth, distance, 0.0);
     list.rate_m_per_s = press;
-    list.add(SessionPhaseKind::release, fmt::format("release from {} mm at {} mm/s", mm, pressed),
-             (depth + kClearance_m) / press, depth, -kClearance_m);
-    list.add(SessionPhaseKind::rest, "rest", rest, -kClearance_m, -kClearance_m);
+    add_release(list, fmt::format("release from {} mm at {} mm/s", mm, pressed), depth, rest);
   }
   list.depth_m = list.rate_m_per_s = 0.0;
 }

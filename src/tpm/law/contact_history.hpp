@@ -129,6 +129,7 @@ class ContactHistory {
     Eigen::ArrayXXd w_by;
     Point now;
   };
+  static constexpr int kMostHalvings = 60;
   static constexpr int kMostSteps = 6;  ///< one move is made in 1, 2, ..., 6 steps, then halved
   [[nodiscard]] std::array<double, kMostSteps> extrapolation(int n) const;
   void move_load_adaptive(double from, double to, double h, double time_scale, int level);

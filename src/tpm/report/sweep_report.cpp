@@ -17,12 +17,6 @@ constexpr std::size_t kMostPlaces = 200;   ///< of a map along one axis
 constexpr std::size_t kMostPoints = 2000;  ///< of a cloud
 constexpr std::size_t kLines = 5;          ///< of a family
 
-/// The unit in which people read numbers of an SI unit, and what to divide them by.
-Unit read_in(const std::string& si_unit) {
-  if (si_unit.empty()) return {"", Dimension::dimensionless, 1.0};
-  return shown_unit(parse_unit(si_unit, "unit").dimension);
-}
-
 std::vector<double> in_shown_unit(std::vector<double> values, const Unit& unit) {
   for (double& v : values) v /= unit.to_si;
   return values;
@@ -51,12 +45,12 @@ bool even_in_logarithm(const std::vector<double>& places) {
 }
 
 Axis axis_of(const ReadAxis& axis) {
-  return {axis.name, read_in(axis.unit).symbol, even_in_logarithm(axis.places), {}, {}};
+  return {axis.name, shown_unit_of(axis.unit).symbol, even_in_logarithm(axis.places), {}, {}};
 }
 
 /// Its own parameter's place, with the unit; else its number.
 std::string place_words(const ReadAxis& axis, std::uint64_t place) {
-  const Unit unit = read_in(axis.unit);
+  const Unit unit = shown_unit_of(axis.unit);
   return fmt::format("{} = {}{}{}", axis.name, significant(axis.places[place] / unit.to_si, 4),
                      unit.symbol.empty() ? "" : " ", unit.symbol);
 }
@@ -111,7 +105,8 @@ Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const std::stri
   const std::vector<double> all = sweep.slice(v.name, y, x, held);
   const auto columns = some_of(across.places.size(), kMostPlaces);
   const auto rows = some_of(up.places.size(), kMostPlaces);
-  const Unit unit = read_in(v.unit), unit_x = read_in(across.unit), unit_y = read_in(up.unit);
+  const Unit unit = shown_unit_of(v.unit), unit_x = shown_unit_of(across.unit),
+             unit_y = shown_unit_of(up.unit);
   Series heat;
   heat.kind = Series::Kind::heat;
   heat.label = v.name;
@@ -129,10 +124,10 @@ Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const std::stri
 Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const std::string& x,
                    const std::optional<std::string>& of, const HeldPlaces& held) {
   const ReadAxis& across = sweep.axes()[sweep.axis(x)];
-  const Unit unit = read_in(v.unit);
+  const Unit unit = shown_unit_of(v.unit);
   Panel panel{
       named_in_unit(v.name, unit), axis_of(across), {v.name, unit.symbol, false, {}, {}}, {}};
-  const std::vector<double> places = in_shown_unit(across.places, read_in(across.unit));
+  const std::vector<double> places = in_shown_unit(across.places, shown_unit_of(across.unit));
   if (!of) {
     add_lines(v.name, places, in_shown_unit(sweep.slice(v.name, {}, x, held), unit), panel.series);
     return panel;
@@ -150,7 +145,7 @@ Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const std::s
 Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const std::string& of,
                    const HeldPlaces& held) {
   const ReadAxis& axis = sweep.axes()[sweep.axis(of)];
-  const Unit unit = read_in(v.unit);
+  const Unit unit = shown_unit_of(v.unit);
   Panel panel{v.name,
               {"time", "s", even_in_logarithm(v.times_s), {}, {}},
               {v.name, unit.symbol, false, {}, {}},
@@ -176,13 +171,13 @@ bool sampled_in_logarithm(const SweepReader& sweep, const ReadAxis& axis, const 
 /// A number over each parameter of an axis of samples.
 std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
                                 const ReadAxis& axis, const HeldPlaces& held) {
-  const Unit unit = read_in(v.unit);
+  const Unit unit = shown_unit_of(v.unit);
   const auto found = in_shown_unit(sweep.slice(v.name, {}, axis.name, held), unit);
   const auto chosen = some_of(found.size(), kMostPoints);
   std::vector<Panel> panels;
   for (const std::string& name : axis.parameters) {
     const std::vector<double> values = sweep.parameter(name);
-    const Unit unit_x = read_in(sweep.parameter_unit(name));
+    const Unit unit_x = shown_unit_of(sweep.parameter_unit(name));
     Series cloud;
     cloud.kind = Series::Kind::points;
     cloud.label = v.name;
@@ -246,8 +241,8 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
   cloud.provenance = "model";
   const std::uint64_t stride = sweep.cells() / kMostPoints + 1;
   std::uint64_t cell = 0;
-  const Unit unit_x = read_in(sweep.variable(second).unit),
-             unit_y = read_in(sweep.variable(first).unit);
+  const Unit unit_x = shown_unit_of(sweep.variable(second).unit),
+             unit_y = shown_unit_of(sweep.variable(first).unit);
   sweep.each({second, first, "status"}, [&](const auto& found) {
     for (std::size_t i = 0; i < found[0].size(); ++i, ++cell) {
       if (found[2][i] != 0.0) continue;
@@ -278,50 +273,6 @@ Figure pareto_figure(const SweepReader& sweep, const std::string& first,
           {std::move(panel)}};
 }
 
-/// ", at depth = 4 mm, rate = 2 mm/s"; empty if there is no other axis.
-std::string held_values_words(const std::vector<HeldValue>& held) {
-  std::string words;
-  for (const HeldValue& h : held) {
-    const Unit unit = read_in(h.unit);
-    words += fmt::format("{}{} = {}{}{}", words.empty() ? ", at " : ", ", h.axis,
-                         significant(h.value / unit.to_si, 4), unit.symbol.empty() ? "" : " ",
-                         unit.symbol);
-  }
-  return words;
-}
-
-Json held_json(const std::vector<HeldValue>& held) {
-  Json list = Json::array();
-  for (const HeldValue& h : held) {
-    list.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
-  }
-  return list;
-}
-
-/// Indices beside each other, with their intervals; `of` picks one of the two kinds.
-Panel index_panel(const std::string& what, const SweepSensitivity& s,
-                  IndexEstimate InputSensitivity::*of) {
-  Series interval;
-  interval.kind = Series::Kind::bracket;
-  interval.label = "95 % interval";
-  interval.provenance = "model";
-  Series value;
-  value.kind = Series::Kind::points;
-  value.label = "index";
-  value.provenance = "model";
-  for (std::size_t i = 0; i < s.parameters.size(); ++i) {
-    const IndexEstimate& index = s.indices.inputs[i].*of;
-    interval.x.push_back(static_cast<double>(i + 1));
-    interval.lower.push_back(index.low);
-    interval.upper.push_back(index.high);
-    value.y.push_back(index.value);
-  }
-  value.x = interval.x;
-  const Axis parameters{"parameter", "", false, 0.5, static_cast<double>(value.x.size()) + 0.5,
-                        s.parameters};
-  return {what, parameters, {what, "", false, {}, {}}, {std::move(interval), std::move(value)}};
-}
-
 struct FoundRange {
   double least = std::numeric_limits<double>::infinity();
   double largest = -std::numeric_limits<double>::infinity();
@@ -340,6 +291,11 @@ FoundRange range_of(const SweepReader& sweep, const std::string& name) {
 }
 
 }  // namespace
+
+Unit shown_unit_of(const std::string& si_unit) {
+  if (si_unit.empty()) return {"", Dimension::dimensionless, 1.0};
+  return shown_unit(parse_unit(si_unit, "unit").dimension);
+}
 
 std::vector<std::pair<double, double>> pareto_front(std::vector<std::pair<double, double>> pairs) {
   std::sort(pairs.begin(), pairs.end());
@@ -376,7 +332,7 @@ std::string sweep_text(const SweepReader& sweep) {
     text += "\n";
   }
   for (const ReadVariable& v : sweep.variables()) {
-    const Unit unit = read_in(v.unit);
+    const Unit unit = shown_unit_of(v.unit);
     text += fmt::format("{}: ", named_in_unit(v.name, unit));
     if (!v.times_s.empty()) {
       text += fmt::format("curves at {} times", v.times_s.size());
@@ -419,75 +375,6 @@ Json sweep_json(const SweepReader& sweep) {
     json["variables"].push_back(std::move(entry));
   }
   return json;
-}
-
-std::string sensitivity_text(const std::vector<SweepSensitivity>& all) {
-  std::string text;
-  const auto words = [](const IndexEstimate& e) {
-    return fmt::format("{:7.4f} ({:.4f} to {:.4f})", e.value, e.low, e.high);
-  };
-  for (const SweepSensitivity& s : all) {
-    text += fmt::format("{}{}: mean {}, standard deviation {} (SI), {} replicates of {} points",
-                        text.empty() ? "" : "\n", s.variable, significant(s.indices.mean, 4),
-                        significant(s.indices.standard_deviation, 4), s.design.replicates,
-                        s.design.points);
-    if (s.indices.left_out > 0) text += fmt::format(", {} points left out", s.indices.left_out);
-    text += held_values_words(s.held);
-    text += "\n";
-    if (s.indices.inputs.empty()) {
-      text += "it does not vary\n";
-      continue;
-    }
-    text +=
-        fmt::format("{:<12} {:<28} {:<28}\n", "parameter", "first order (95 %)", "total (95 %)");
-    for (std::size_t i = 0; i < s.parameters.size(); ++i) {
-      text += fmt::format("{:<12} {:<28} {:<28}\n", s.parameters[i],
-                          words(s.indices.inputs[i].first_order), words(s.indices.inputs[i].total));
-    }
-  }
-  return text;
-}
-
-Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
-  const auto numbers = [](const IndexEstimate& e) {
-    return Json{
-        {"value", rounded(e.value, 6)}, {"low", rounded(e.low, 6)}, {"high", rounded(e.high, 6)}};
-  };
-  Json list = Json::array();
-  for (const SweepSensitivity& s : all) {
-    Json inputs = Json::array();
-    for (std::size_t i = 0; i < s.indices.inputs.size(); ++i) {
-      inputs.push_back({{"parameter", s.parameters[i]},
-                        {"first_order", numbers(s.indices.inputs[i].first_order)},
-                        {"total", numbers(s.indices.inputs[i].total)}});
-    }
-    list.push_back({{"variable", s.variable},
-                    {"mean", rounded(s.indices.mean, 6)},
-                    {"standard_deviation", rounded(s.indices.standard_deviation, 6)},
-                    {"level", s.indices.level},
-                    {"points", s.design.points},
-                    {"replicates", s.design.replicates},
-                    {"points_left_out", s.indices.left_out},
-                    {"held", held_json(s.held)},
-                    {"inputs", std::move(inputs)}});
-  }
-  return Json{{"sensitivity", std::move(list)}};
-}
-
-std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all,
-                                        const std::string& title) {
-  std::vector<Figure> figures;
-  for (const SweepSensitivity& s : all) {
-    if (s.indices.inputs.empty()) continue;  // it does not vary
-    figures.push_back(
-        {fmt::format("sensitivity_{}", s.variable),
-         s.variable,
-         fmt::format("{}: shares of the variance of {} with 95 % intervals.", title, s.variable),
-         {index_panel("first-order index", s, &InputSensitivity::first_order),
-          index_panel("total index", s, &InputSensitivity::total)},
-         s.held.empty() ? std::string() : held_values_words(s.held).substr(2)});
-  }
-  return figures;
 }
 
 std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& wished) {

@@ -3,10 +3,14 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/units.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/sweep/sweep_sensitivity.hpp"
 
 namespace tpm {
+
+/// The unit in which people read numbers of an SI unit; empty for plain numbers.
+[[nodiscard]] Unit shown_unit_of(const std::string& si_unit);
 
 /// What a file of results holds: axes, variables with their ranges, cells and reasons.
 [[nodiscard]] std::string sweep_text(const SweepReader& sweep);

@@ -1,0 +1,125 @@
+// Tables and figures of sensitivity indices; sweep_report.cpp has those of the sweeps themselves.
+#include <fmt/format.h>
+
+#include "tpm/core/text.hpp"
+#include "tpm/report/sweep_report.hpp"
+
+namespace tpm {
+namespace {
+
+/// ", at depth = 4 mm, rate = 2 mm/s"; empty if there is no other axis.
+std::string held_values_words(const std::vector<HeldValue>& held) {
+  std::string words;
+  for (const HeldValue& h : held) {
+    const Unit unit = shown_unit_of(h.unit);
+    words += fmt::format("{}{} = {}{}{}", words.empty() ? ", at " : ", ", h.axis,
+                         significant(h.value / unit.to_si, 4), unit.symbol.empty() ? "" : " ",
+                         unit.symbol);
+  }
+  return words;
+}
+
+Json held_json(const std::vector<HeldValue>& held) {
+  Json list = Json::array();
+  for (const HeldValue& h : held) {
+    list.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
+  }
+  return list;
+}
+
+/// Indices beside each other, with their intervals; `of` picks one of the two kinds.
+Panel index_panel(const std::string& what, const SweepSensitivity& s,
+                  IndexEstimate InputSensitivity::*of) {
+  Series interval;
+  interval.kind = Series::Kind::bracket;
+  interval.label = "95 % interval";
+  interval.provenance = "model";
+  Series value;
+  value.kind = Series::Kind::points;
+  value.label = "index";
+  value.provenance = "model";
+  for (std::size_t i = 0; i < s.parameters.size(); ++i) {
+    const IndexEstimate& index = s.indices.inputs[i].*of;
+    interval.x.push_back(static_cast<double>(i + 1));
+    interval.lower.push_back(index.low);
+    interval.upper.push_back(index.high);
+    value.y.push_back(index.value);
+  }
+  value.x = interval.x;
+  const Axis parameters{"parameter", "", false, 0.5, static_cast<double>(value.x.size()) + 0.5,
+                        s.parameters};
+  return {what, parameters, {what, "", false, {}, {}}, {std::move(interval), std::move(value)}};
+}
+
+}  // namespace
+
+std::string sensitivity_text(const std::vector<SweepSensitivity>& all) {
+  std::string text;
+  const auto words = [](const IndexEstimate& e) {
+    return fmt::format("{:7.4f} ({:.4f} to {:.4f})", e.value, e.low, e.high);
+  };
+  for (const SweepSensitivity& s : all) {
+    text += fmt::format("{}{}: mean {}, standard deviation {} (SI), {} replicates of {} points",
+                        text.empty() ? "" : "\n", s.variable, significant(s.indices.mean, 4),
+                        significant(s.indices.standard_deviation, 4), s.design.replicates,
+                        s.design.points);
+    if (s.indices.left_out > 0) text += fmt::format(", {} points left out", s.indices.left_out);
+    text += held_values_words(s.held);
+    text += "\n";
+    if (s.indices.inputs.empty()) {
+      text += "it does not vary\n";
+      continue;
+    }
+    text +=
+        fmt::format("{:<12} {:<28} {:<28}\n", "parameter", "first order (95 %)", "total (95 %)");
+    for (std::size_t i = 0; i < s.parameters.size(); ++i) {
+      text += fmt::format("{:<12} {:<28} {:<28}\n", s.parameters[i],
+                          words(s.indices.inputs[i].first_order), words(s.indices.inputs[i].total));
+    }
+  }
+  return text;
+}
+
+Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
+  const auto numbers = [](const IndexEstimate& e) {
+    return Json{
+        {"value", rounded(e.value, 6)}, {"low", rounded(e.low, 6)}, {"high", rounded(e.high, 6)}};
+  };
+  Json list = Json::array();
+  for (const SweepSensitivity& s : all) {
+    Json inputs = Json::array();
+    for (std::size_t i = 0; i < s.indices.inputs.size(); ++i) {
+      inputs.push_back({{"parameter", s.parameters[i]},
+                        {"first_order", numbers(s.indices.inputs[i].first_order)},
+                        {"total", numbers(s.indices.inputs[i].total)}});
+    }
+    list.push_back({{"variable", s.variable},
+                    {"mean", rounded(s.indices.mean, 6)},
+                    {"standard_deviation", rounded(s.indices.standard_deviation, 6)},
+                    {"level", s.indices.level},
+                    {"points", s.design.points},
+                    {"replicates", s.design.replicates},
+                    {"points_left_out", s.indices.left_out},
+                    {"held", held_json(s.held)},
+                    {"inputs", std::move(inputs)}});
+  }
+  return Json{{"sensitivity", std::move(list)}};
+}
+
+std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all,
+                                        const std::string& title) {
+  std::vector<Figure> figures;
+  for (const SweepSensitivity& s : all) {
+    if (s.indices.inputs.empty()) continue;  // it does not vary
+    figures.push_back(
+        {fmt::format("sensitivity_{}", s.variable),
+         s.variable,
+         fmt::format("{}: shares of the variance of {} with 95 % intervals.", title, s.variable),
+         {index_panel("first-order index", s, &InputSensitivity::first_order),
+          index_panel("total index", s, &InputSensitivity::total)},
+         s.held.empty() ? std::string() : held_values_words(s.held).substr(2)});
+  }
+  return figures;
+}
+
+}  // namespace tpm
