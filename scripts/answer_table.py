@@ -500,18 +500,25 @@ def answer(case: Case, tpm: Path) -> str:
         return "; ".join(parts)
 
 
+def kept_answers(table: Path) -> dict:
+    """The earlier answers of a table that this program wrote, by item and input."""
+    rows = [line.strip("|").split(" | ") for line in table.read_text().splitlines() if line.startswith("| ")]
+    return {(row[0].strip(), row[1].strip()): row[2].strip() for row in rows[2:]}
+
+
 def main() -> int:
     global TPM_FOR_INPUTS, TPM_FOR_INPUTS_PATH
     description = __doc__.split("\n\n")
     parser = argparse.ArgumentParser(description=description[0], formatter_class=argparse.RawDescriptionHelpFormatter,
                                      epilog="\n\n".join(description[1:]))
     parser.add_argument("cases", choices=["inputs", "sessions", "fits"])
-    parser.add_argument("old", type=Path)
+    parser.add_argument("old", type=Path, help="the earlier program, or a table of its answers (.md), which are kept")
     parser.add_argument("new", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--only", help="cases whose text contains this")
     options = parser.parse_args()
     old, new = options.old.resolve(), options.new.resolve()
+    kept = kept_answers(old) if old.suffix == ".md" else None
     os.environ["STRICT_STAND_IN"] = str(new.parent / STAND_IN)
     TPM_FOR_INPUTS = str(new)
     TPM_FOR_INPUTS_PATH = new
@@ -527,7 +534,8 @@ def main() -> int:
     for case in {"inputs": CASES, "sessions": SESSIONS, "fits": answer_fits.cases(Case)}[options.cases]:
         if options.only and options.only not in case.what:
             continue
-        row = f"| {case.item} | {case.what} | {answer(case, old)} | {answer(case, new)} | {case.test} |"
+        before = answer(case, old) if kept is None else kept.get((str(case.item), case.what), "not asked")
+        row = f"| {case.item} | {case.what} | {before} | {answer(case, new)} | {case.test} |"
         print(row, file=sys.stderr, flush=True)
         lines.append(row)
     if options.cases == "fits":

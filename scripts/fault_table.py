@@ -47,6 +47,15 @@ DESIGN = {"title": "t", "law": {"name": "linear-1", "reference": "1 mm"},
           "noise": {"force": {"absolute": "0.01 N"}},
           "candidates": [{"kind": "ramp_hold", "rate": ["4 mm/s"], "depth": ["8 mm"], "hold": ["9 s"],
                           "interval": ["1 s"]}]}
+EXPERIMENTS = {"title": "t", "tissues": [{"name": "star"}],
+               "parameters": {"E": {"start": "12 kPa", "lower": "1 kPa", "upper": "100 kPa", "scale": "log",
+                                    "sets": ["E1", "E2", "Eprime"]}},
+               "fixed": {"A0": "12.56 mm^2", "l0": "1 mm", "eta1": "1e5 Pa s", "spacing": "30 mm"},
+               "data": {"static": {"dataset": "evren_static", "protocol": {"kind": "static"},
+                                   "noise": {"kind": "relative_to_datum", "relative": 0.1}}},
+               "fits": {"static": ["static"]}, "starts": {"count": 2, "seed": 0}, "profile": {"level": 0.95},
+               "materials": [{"name": "E free", "fit": "static"}],
+               "conditions": {"static": {"depth": "8 mm", "readings": ["4 mm", "8 mm"]}}}
 
 
 def recording() -> str:
@@ -94,7 +103,21 @@ COMMANDS = [
     Command("export", "export in/law.json --to febio -o law.feb", ["law.feb"]),
     Command("design", "design in/design.json --check 0 -o design.txt", ["design.txt"]),
     Command("recovery", "recovery --laws linear-1 --trials 1 -o recovery.txt", ["recovery.txt"]),
+    Command("predict", "predict in/fitted/law.json in/indented.json -o predict.txt", ["predict.txt"]),
+    Command("predict FOLDER", "predict in/fitted/law.json in/folder/a2.csv --folder predicted", [], weight=20),
+    Command("identify", "identify in/folder/a1.csv --laws linear-1 --format json -o identify.json",
+            ["identify.json", "identify.csv"]),
+    Command("material", "material in/fitted/law.json in/indented.json -o material.json", ["material.json"], weight=4),
+    Command("budget", "budget in/fitted/law.json in/folder/a1.csv --samples 100 --format json -o budget.json",
+            ["budget.json", "budget.csv"]),
+    Command("view", "view in/s.tpmrec -o view.html", ["view.html"], weight=4),
+    Command("coverage", "coverage in/fit.json --sets 10 --format json -o coverage.json", ["coverage.json", "coverage.csv"]),
+    Command("hil hazards", "hil hazards --format json -o hazards.json", ["hazards.json", "hazards.csv"], weight=20),
+    Command("experiments", "experiments in/experiments.json -o experiments", [],
+            varies=["experiments/report.run.json"], weight=50),
     Command("plan", "plan in/indented.json --costs nominal --brief", [], weight=20),
+    Command("plan, to a file", "plan in/indented.json --costs nominal --format json -o plan.json",
+            ["plan.json", "plan.csv"], weight=20),
     Command("benchmark", "benchmark bond_paper --no-timing -o bench", [], varies=["bench/report.run.json"],
             kept=["bench/benchmark.part.json"], weight=50),
     Command("hil run", "hil run in/session.json -o s.tpmrec --force", ["s.tpmrec"], varies=["s.tpmrec"],  # ends early where the disk is full
@@ -109,7 +132,7 @@ COMMANDS = [
 def write_inputs(tpm: Path, folder: Path) -> None:
     (folder / "folder").mkdir(parents=True)
     for name, content in [("liver", LIVER), ("indented", INDENTED), ("sweep", SWEEP), ("session", SESSION),
-                          ("law", LAW), ("design", DESIGN)]:
+                          ("law", LAW), ("design", DESIGN), ("experiments", EXPERIMENTS)]:
         (folder / f"{name}.json").write_text(json.dumps(content))
     (folder / "fit.json").write_text(json.dumps({
         "title": "t", "parameters": {"E": {"start": "12 kPa", "lower": "1 kPa", "upper": "100 kPa",
@@ -126,6 +149,8 @@ def write_inputs(tpm: Path, folder: Path) -> None:
         (folder / "folder" / name).write_text(recording())
     subprocess.run([tpm, "hil", "run", folder / "session.json", "-o", folder / "s.tpmrec"], check=True,
                    capture_output=True)
+    subprocess.run([tpm, "fit", folder / "folder" / "a1.csv", "--law", "linear-1", "--starts", "2",
+                    "--folder", folder / "fitted"], check=True, capture_output=True)
 
 
 def files_in(folder: Path) -> dict:
