@@ -177,7 +177,7 @@ RELATIVES = """## Relatives found and mended
 | found | mended |
 | --- | --- |
 | a contact of 1,500 kN/m and more was passed through by the tool without a word (-0.0096 N; reports/scenes/contacts.md) | the root of the gap is found, and the tool strikes the sphere |
-| the inertia that `tpm plan` estimates for scenes with tools held the ringing of spheres on their contacts, and a drag of the tool | left out (src/tpm/plan/inertia_estimate.cpp; test_plan_small_slow): the reference of a ball at 4 mm/s rang, and `timeout 60 tpm plan` of it was stopped, which now ends in 3 s |
+| the inertia that `tpm plan` estimates for scenes with tools held the ringing of spheres on their contacts, and a drag of the tool | left out (src/tpm/plan/inertia_estimate.cpp; test_plan): the reference of a ball at 4 mm/s rang, and `timeout 60 tpm plan` of it was stopped, which now ends in 3 s |
 | a time at which an impact falls was answered with the force of the dashpot before the impact | answered after it (`InertialEquation::meets`) |
 | forces of tools in files came from overlaps alone | from springs and dashpots (`contact_pushes_N`) |
 | tolerance, damping ratio and lowest frequency stood as text in results | numbers in `/settings` |

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "random_plan_scene.hpp"
+#include "simulated_scene.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/plan/plan.hpp"
 
@@ -26,6 +27,26 @@ TEST_CASE("a shallow push of the paper's liver at 1 kHz") {
   CHECK(*plan.chosen().verified_error <= request.tolerance);
   REQUIRE(plan.changes.size() == 3);
   CHECK(plan.changes[0].factor);  // deeper is not linear
+}
+
+TEST_CASE("a tool needs the full nonlinear network") {
+  PlanRequest request;
+  request.tolerance = 0.01;
+  request.relevance = request.changes = false;
+  const Plan plan =
+      make_plan(test::experiment(
+                    R"({"organ": {"kind": "liver", "count": 50}, "material": {"eta1": "16800 Pa s"},
+        "contacts": [{"kind": "ball", "radius": "4 mm"}],
+        "protocol": {"kind": "knots", "knots": [{"time": "0 s", "depth": "0 mm"},
+        {"time": "1 s", "depth": "2 mm"}, {"time": "1.5 s", "depth": "-2 mm"}]}})"),
+                request);
+  REQUIRE(plan.choice);
+  CHECK(plan.needs_full);
+  CHECK(plan.chosen().reach == ModelReach::full);
+  const auto linear = std::find_if(plan.candidates.begin(), plan.candidates.end(),
+                                   [](const auto& c) { return c.name == "linear_1"; });
+  REQUIRE(linear != plan.candidates.end());
+  CHECK_THAT(linear->reason, Catch::Matchers::Contains("a tool"));
 }
 
 TEST_CASE("ten random scenes keep their claims") {

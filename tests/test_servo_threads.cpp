@@ -301,7 +301,19 @@ TEST_CASE("The jitter check counts and judges") {
   CHECK(check.watchdog_s == session.preparation.watchdog_s);
   CHECK(check.outcome.woke_late.count() > 0);
   CHECK_FALSE(check.verdict.empty());
-  CHECK(check.outcome.woke_late.quantile_s(0.5) <= check.outcome.woke_late.quantile_s(0.99));
+}
+
+TEST_CASE("Quantiles of times are the upper edges of their bins, and beyond the bins the largest") {
+  TimeHistogram times;
+  for (int i = 0; i < 50; ++i) times.note(500);
+  for (int i = 0; i < 49; ++i) times.note(10'500);
+  times.note(60'000'000);
+  CHECK(times.count() == 100);
+  CHECK_THAT(times.quantile_s(0.5), Catch::Matchers::WithinRel(1e-6, 1e-12));
+  CHECK_THAT(times.quantile_s(0.51), Catch::Matchers::WithinRel(11e-6, 1e-12));
+  CHECK_THAT(times.quantile_s(0.99), Catch::Matchers::WithinRel(11e-6, 1e-12));
+  CHECK_THAT(times.quantile_s(1.0), Catch::Matchers::WithinRel(0.06, 1e-12));
+  CHECK_THAT(times.max_s(), Catch::Matchers::WithinRel(0.06, 1e-12));
 }
 
 TEST_CASE("The jitter check says no where a session with the same limits would have been stopped") {

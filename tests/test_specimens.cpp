@@ -334,4 +334,6 @@ TEST_CASE("A folder's repeats are grouped by name, column or key", "[specimens]"
   CHECK(run_on(folder, "fit by_name --group-by force").code == 3);
   CHECK(run_on(folder, "fit by_name --reference '0 mm'").code == 2);
   CHECK(run_on(folder, "fit by_name/pig1_3mm.csv --group-by animal").code == 2);
+  // A folder that would not be written is no silent wish.
+  CHECK(run_on(folder, "fit by_name/pig1_3mm.csv --no-draw --folder f").code == 2);
 }

@@ -104,7 +104,7 @@ TEST_CASE("the star needs no more than its element, which is exact") {
   CHECK_FALSE(plan.needs_full);
 }
 
-TEST_CASE("a shallow push of an organ is linear, a deep one is not") {
+TEST_CASE("a shallow push of an organ is linear, a deep one is not", "[heavy]") {
   const Plan shallow = make_plan(liver(ramp("0.05 mm", "0.05 mm/s")), request(0.02));
   REQUIRE(shallow.choice);
   CHECK(shallow.chosen().formulation == "linear");
@@ -114,7 +114,7 @@ TEST_CASE("a shallow push of an organ is linear, a deep one is not") {
   CHECK(*named(deep, "linear_3").verified_error > 0.02);
 }
 
-TEST_CASE("a looser tolerance never costs more") {
+TEST_CASE("a looser tolerance never costs more", "[heavy]") {
   const ExperimentScene scene = liver(ramp("3 mm"));
   double cost = 0.0;
   for (const double tolerance : {0.2, 0.03, 1e-3, 1e-4}) {
@@ -126,7 +126,7 @@ TEST_CASE("a looser tolerance never costs more") {
   }
 }
 
-TEST_CASE("a budget that nothing meets has no pick, and the plan says what would do") {
+TEST_CASE("a budget that nothing meets has no pick, and the plan says what would do", "[heavy]") {
   PlanRequest narrow = request(1e-4);
   narrow.budget.wall_s_per_s = 1e-9;
   const Plan plan = make_plan(liver(ramp("3 mm")), narrow);
@@ -136,18 +136,8 @@ TEST_CASE("a budget that nothing meets has no pick, and the plan says what would
   CHECK(plan_json(plan)["choice"].is_null());
 }
 
-TEST_CASE("a tool needs the full nonlinear network") {
-  const std::string poke = R"("contacts": [{"kind": "ball", "radius": "4 mm"}],
-    "protocol": {"kind": "knots", "knots": [{"time": "0 s", "depth": "0 mm"},
-    {"time": "1 s", "depth": "2 mm"}, {"time": "1.5 s", "depth": "-2 mm"}]})";
-  const Plan plan = make_plan(liver(poke), request(0.01));
-  REQUIRE(plan.choice);
-  CHECK(plan.needs_full);
-  CHECK(plan.chosen().reach == ModelReach::full);
-  CHECK_THAT(named(plan, "linear_1").reason, Contains("a tool"));
-}
-
-TEST_CASE("a zone around the contact is a candidate between linear models and the network") {
+TEST_CASE("a zone around the contact is a candidate between linear models and the network",
+          "[heavy]") {
   const Plan plan = make_plan(liver(ramp("4 mm", "8 mm/s")), request(0.02, 1000.0));
   for (const char* name : {"zone_1", "zone_2", "zone_3"}) {
     CAPTURE(name);
@@ -165,7 +155,7 @@ TEST_CASE("a zone around the contact is a candidate between linear models and th
   CHECK_THAT(named(slow, "zone_2").reason, Contains("period"));
 }
 
-TEST_CASE("where masses are felt the reference has them") {
+TEST_CASE("where masses are felt the reference has them", "[heavy]") {
   const std::string poke = R"("protocol": {"kind": "knots", "knots": [
     {"time": "0 s", "depth": "0 mm"}, {"time": "0.02 s", "depth": "3 mm"},
     {"time": "0.05 s", "depth": "3 mm"}]})";
@@ -176,7 +166,7 @@ TEST_CASE("where masses are felt the reference has them") {
   CHECK(*named(plan, "collocation_0.001").verified_error > 0.01);
 }
 
-TEST_CASE("the estimate of what masses do is that of a run with masses") {
+TEST_CASE("the estimate of what masses do is that of a run with masses", "[heavy]") {
   const std::string poke = R"("protocol": {"kind": "knots", "knots": [
     {"time": "0 s", "depth": "0 mm"}, {"time": "0.02 s", "depth": "0.1 mm"},
     {"time": "0.1 s", "depth": "0.1 mm"}]})";
@@ -187,7 +177,7 @@ TEST_CASE("the estimate of what masses do is that of a run with masses") {
   CHECK(scout.inertia_share() < 1.5 * truth);
 }
 
-TEST_CASE("fields are planned for by models that know them") {
+TEST_CASE("fields are planned for by models that know them", "[heavy]") {
   PlanRequest field = request(0.02);
   field.measure.output = PlanOutput::field;
   const Plan plan = make_plan(liver(ramp("0.05 mm", "0.05 mm/s")), field);
@@ -197,7 +187,7 @@ TEST_CASE("fields are planned for by models that know them") {
   CHECK(*plan.chosen().verified_error <= 0.02);
 }
 
-TEST_CASE("the same plan twice, byte for byte, with every key") {
+TEST_CASE("the same plan twice, byte for byte, with every key", "[heavy]") {
   PlanRequest whole = request(1e-4, 1000.0);
   whole.relevance = whole.changes = true;
   const ExperimentScene scene = star(ramp("2 mm"));
@@ -230,7 +220,7 @@ TEST_CASE("what a hand can feel is a tolerance") {
   CHECK_THAT(felt.tolerance, WithinRel(0.025, 1e-12));
 }
 
-TEST_CASE("what is asked for in other words is refused") {
+TEST_CASE("what is asked for in other words is refused", "[heavy]") {
   PlanRequest any;
   CHECK_THAT(refusal_of([&] { set_tolerance(any, "tight"); }), Contains("--tolerance"));
   CHECK_THAT(refusal_of([&] { set_tolerance(any, "90%"); }), Contains("0.5"));
@@ -260,7 +250,7 @@ TEST_CASE("a contact that a hand moves is planned for") {
   CHECK(plan.chosen().name == "element");
 }
 
-TEST_CASE("a claim names its quantity, and what is not claimed stands beside it") {
+TEST_CASE("a claim names its quantity, and what is not claimed stands beside it", "[heavy]") {
   PlanRequest wanted = request(0.02);
   wanted.measure = {PlanOutput::field, 0.0};
   const ExperimentScene scene = liver(ramp("3 mm"));
@@ -286,7 +276,8 @@ TEST_CASE("a claim names its quantity, and what is not claimed stands beside it"
   CHECK(file.numbers("/steps/time_s") == times);
 }
 
-TEST_CASE("of masses that scene and reference leave out there is one number and one sentence") {
+TEST_CASE("of masses that scene and reference leave out there is one number and one sentence",
+          "[heavy]") {
   PlanRequest wanted = request(1e-4);
   wanted.relevance = true;
   const Plan plan = make_plan(liver(ramp("3 mm", "10 mm/s")), wanted);
@@ -304,7 +295,7 @@ TEST_CASE("of masses that scene and reference leave out there is one number and 
   CHECK_THAT(text, !Contains("inertia: matters"));
 }
 
-TEST_CASE("finer networks are tried where no coarser one meets the tolerance") {
+TEST_CASE("finer networks are tried where no coarser one meets the tolerance", "[heavy]") {
   const ExperimentScene scene = liver(ramp("3 mm"));
   const Plan usual = make_plan(scene, request(1e-3));
   CHECK_THAT(named(usual, "collocation_1e-06").reason, Contains("a coarser one meets"));
@@ -323,7 +314,8 @@ TEST_CASE("a load is called a load, and depth and rate grow together") {
   CHECK(loaded.changes.front().change == "the load, put on as much faster");
 }
 
-TEST_CASE("what stiff contacts of a tool would ring is not taken for what masses change") {
+TEST_CASE("what stiff contacts of a tool would ring is not taken for what masses change",
+          "[heavy]") {
   PlanRequest wanted = request(0.01);
   wanted.relevance = true;
   const Plan plan = make_plan(

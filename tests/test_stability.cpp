@@ -1,0 +1,28 @@
+// Step rules on the paper's element against their limits of stability in theory.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "tpm/stability/study.hpp"
+
+using namespace tpm;
+
+TEST_CASE("what is above the limit of a step rule fails, and what is below does not", "[heavy]") {
+  std::size_t cells = 0;
+  for (const StabilityMap& map : stability_maps()) {
+    if (map.id != "relaxation_time") continue;
+    INFO(kStepRules[static_cast<std::size_t>(map.rule)].text);
+    for (const StabilityPoint& point : map.points) {
+      const double ratio = point.step_s / point.x;
+      const bool failed = point.verdict.found == StabilityClass::diverged;
+      ++cells;
+      if (map.rule == StepRule::forward_euler && std::abs(ratio / 2.0 - 1.0) > 0.1) {
+        CHECK(failed == (ratio > 2.0));
+      } else if (map.rule == StepRule::rk4 && std::abs(ratio / 2.785 - 1.0) > 0.1) {
+        CHECK(failed == (ratio > 2.785));
+      } else if (map.limit_x.empty()) {
+        CHECK_FALSE(failed);
+      }
+    }
+  }
+  CHECK(cells == 9 * 21 * 21);
+}
