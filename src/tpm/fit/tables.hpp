@@ -13,7 +13,7 @@ struct FitProblem {
 };
 
 /// Reads a configuration (schemas/fit.schema.json), or a problem file with tables after PEtab
-/// (schemas/fit_tables.schema.json, docs/fitting.md). What a table holds of PEtab and this reader
+/// (schemas/fit_tables.schema.json, docs/fit_files.md). What a table holds of PEtab and this reader
 /// does not support is refused by name. Throws Error(bad_input) with the file and the key, or the
 /// line and the column.
 [[nodiscard]] FitProblem read_fit_problem(const std::filesystem::path& path);

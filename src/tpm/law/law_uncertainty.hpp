@@ -39,7 +39,7 @@ struct FittedFile {
 
 /// Scatter of one reading about the law, after the fit.
 struct ReadingNoise {
-  /// Words of the fit's noise model (docs/fitting.md): absolute, combined, relative_to_datum,
+  /// Words of the fit's noise model (docs/fit_files.md): absolute, combined, relative_to_datum,
   /// relative_to_model, log, per_row; "unknown" where the fit's noise is not normal.
   std::string kind = "absolute";
   double absolute = 0.0;  ///< a of sigma = a + b |model|, SI unit of the response
