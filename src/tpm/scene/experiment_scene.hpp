@@ -86,7 +86,7 @@ struct ExperimentScene {
 /// pulls away from the outermost sphere.
 [[nodiscard]] double tissue_behind_m(const Organ& organ, const Probe& probe);
 
-/// Reads all blocks of a scene (docs/simulate.md). Without a block `protocol` there is nothing to
+/// Reads all blocks of a scene (docs/simulation_files.md). Without a block `protocol` there is nothing to
 /// do, which is an error.
 /// @param where for messages, usually the file
 /// @param folder that a mesh path is relative to
