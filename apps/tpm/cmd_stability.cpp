@@ -1,9 +1,11 @@
 // tpm stability: where each step rule fails.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "command.hpp"
 #include "tpm/core/error.hpp"
@@ -14,11 +16,31 @@
 namespace tpm::app {
 namespace {
 
-int stability(const std::string& folder, int along, const Session& session) {
+/// What is written besides the report.
+std::string tables_of(const StabilityParts& parts) {
+  std::vector<std::string> names;
+  if (parts.limits) names.emplace_back("limits.csv");
+  if (parts.corners) names.emplace_back("corners.csv");
+  if (parts.servo) names.emplace_back("servo.csv");
+  if (parts.maps) names.emplace_back("map_*.csv, figures");
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+/// All of them if none is named.
+StabilityParts parts_of(const std::vector<std::string>& names) {
+  if (names.empty()) return {};
+  const auto named = [&](const char* name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  return {named("maps"), named("limits"), named("corners"), named("servo")};
+}
+
+int stability(const std::string& folder, int along, const StabilityParts& parts,
+              const Session& session) {
   const std::string python = find_drawing_python();  // before the work, not after
   require_writable_folder(folder);
   const auto start = std::chrono::steady_clock::now();
-  const StabilityStudy study = run_stability_study(along);
+  const StabilityStudy study = run_stability_study(along, parts);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   write_stability(study, folder, python, took.count());
   if (session.json()) {
@@ -26,9 +48,7 @@ int stability(const std::string& folder, int along, const Session& session) {
     return 0;
   }
   for (const std::string& sentence : stability_sentences(study)) say("- {}\n", sentence);
-  say("written to {}: report.html, report.md, stability.json, limits.csv, corners.csv, servo.csv, "
-      "map_*.csv, figures\n",
-      folder);
+  say("written to {}: report.html, report.md, stability.json, {}\n", folder, tables_of(parts));
   return 0;
 }
 
@@ -42,18 +62,22 @@ void add_stability_command(CLI::App& app, Session& session) {
   auto along = std::make_shared<std::string>(std::to_string(kPointsAlongMaps));
   command->add_option("--points", *along, "Points along each axis of the maps, 2 to 200")
       ->capture_default_str();
+  auto only = std::make_shared<std::vector<std::string>>();
+  command->add_option("--only", *only, "Parts to run: maps, limits, corners, servo (default: all)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"maps", "limits", "corners", "servo"}));
   add_format_option(*command, session);
   command->footer(
       "Examples:\n  tpm stability --output out/stability\n  tpm stability --points 5  (a quick "
-      "look)");
-  command->callback([folder, along, &session] {
-    session.run = [folder, along, &session] {
+      "look)\n  tpm stability --only corners,servo");
+  command->callback([folder, along, only, &session] {
+    session.run = [folder, along, only, &session] {
       constexpr std::uint64_t kMost = 200;
       const std::uint64_t points = parse_whole_number(*along, "--points", 2);
       if (points > kMost) {
         throw Error(ExitCode::usage, "--points", *along, fmt::format("2 to {}", kMost));
       }
-      return stability(*folder, static_cast<int>(points), session);
+      return stability(*folder, static_cast<int>(points), parts_of(*only), session);
     };
   });
 }

@@ -153,6 +153,22 @@ Table maps_table(const StabilityStudy& study) {
   return table;
 }
 
+void add_maps(Document& document, const StabilityStudy& study, const std::vector<Figure>& figures) {
+  document.heading(2, "Maps");
+  document.paragraph(fmt::format(
+      "A run holds if it is within {} of the truth at its end, in parts of the peak; the truth is "
+      "a "
+      "closed form, or the modes of the linear motion. It diverged if a value is not finite or "
+      "beyond 1000 times its scale, or if its distance from the truth still grows; with masses "
+      "that "
+      "is called growing energy.",
+      percent(kHoldsWithin)));
+  document.table(maps_table(study));
+  for (const Figure& figure : figures) {
+    document.picture({figure.id, figure.title, figure.caption});
+  }
+}
+
 Json verdict_json(StepRule rule, const StabilityVerdict& v) {
   Json json{{"rule", step_rule_name(rule)}, {"class", stability_class_name(v.found)}};
   if (std::isfinite(v.error)) json["error_of_peak"] = v.error;
@@ -170,9 +186,11 @@ std::vector<std::string> stability_sentences(const StabilityStudy& study) {
     all = all && std::isfinite(l.found_s);
     if (std::isfinite(l.found_s)) furthest = std::max(furthest, std::abs(l.ratio() - 1.0));
   }
-  sentences.push_back(fmt::format("{} limits bisected{}: at most {} from theory.",
-                                  study.limits.size(), all ? "" : ", not all found",
-                                  percent(furthest)));
+  if (!study.limits.empty()) {
+    sentences.push_back(fmt::format("{} limits bisected{}: at most {} from theory.",
+                                    study.limits.size(), all ? "" : ", not all found",
+                                    percent(furthest)));
+  }
   for (const StabilityLimit& l : study.limits) {
     if (l.problem.find("paper") == std::string::npos) continue;
     sentences.push_back(fmt::format("At the paper's eta1 {} holds above {} Hz (theory {} Hz).",
@@ -195,8 +213,15 @@ std::vector<std::string> stability_sentences(const StabilityStudy& study) {
       wrong += cell.right ? 0 : 1;
     }
   }
-  sentences.push_back(fmt::format("{} corners, {} runs: {} came out otherwise than expected.",
-                                  study.corners.size(), cells, wrong));
+  if (!study.corners.empty()) {
+    sentences.push_back(fmt::format("{} corners, {} runs: {} came out otherwise than expected.",
+                                    study.corners.size(), cells, wrong));
+  }
+  if (sentences.empty()) {  // maps alone
+    std::size_t runs = 0;
+    for (const StabilityMap& map : study.maps) runs += map.points.size();
+    sentences.push_back(fmt::format("{} maps, {} runs.", study.maps.size(), runs));
+  }
   return sentences;
 }
 
@@ -210,10 +235,12 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
   std::vector<Cell> items;
   for (const std::string& s : stability_sentences(study)) items.push_back({s});
   document.bullets(std::move(items));
-  document.heading(2, "Limits");
-  document.paragraph(study_organ_words());
-  document.table(limits_table(study));
-  document.heading(2, "At servo rate");
+  if (!study.limits.empty()) {
+    document.heading(2, "Limits");
+    document.paragraph(study_organ_words());
+    document.table(limits_table(study));
+  }
+  if (!study.servo.empty()) document.heading(2, "At servo rate");
   std::vector<std::string> problems;
   for (const ServoRow& row : study.servo) {
     if (std::find(problems.begin(), problems.end(), row.problem) == problems.end()) {
@@ -221,21 +248,11 @@ Document stability_document(const StabilityStudy& study, const std::vector<Figur
     }
   }
   for (const std::string& problem : problems) document.table(servo_table(study, problem));
-  document.heading(2, "Degenerate corners");
-  document.table(corners_table(study));
-  document.heading(2, "Maps");
-  document.paragraph(fmt::format(
-      "A run holds if it is within {} of the truth at its end, in parts of the peak; the truth is "
-      "a "
-      "closed form, or the modes of the linear motion. It diverged if a value is not finite or "
-      "beyond 1000 times its scale, or if its distance from the truth still grows; with masses "
-      "that "
-      "is called growing energy.",
-      percent(kHoldsWithin)));
-  document.table(maps_table(study));
-  for (const Figure& figure : figures) {
-    document.picture({figure.id, figure.title, figure.caption});
+  if (!study.corners.empty()) {
+    document.heading(2, "Degenerate corners");
+    document.table(corners_table(study));
   }
+  if (!study.maps.empty()) add_maps(document, study, figures);
   typeset(document);
   return document;
 }
@@ -347,9 +364,9 @@ void write_stability(const StabilityStudy& study, const std::filesystem::path& f
   write_file(folder / "report.md", to_markdown(document));
   write_file(folder / "report.html", to_html(document, drawings));
   write_file(folder / "stability.json", to_text(to_json(study)));
-  write_file(folder / "limits.csv", stability_limits_csv(study));
-  write_file(folder / "corners.csv", stability_corners_csv(study));
-  write_file(folder / "servo.csv", stability_servo_csv(study));
+  if (!study.limits.empty()) write_file(folder / "limits.csv", stability_limits_csv(study));
+  if (!study.corners.empty()) write_file(folder / "corners.csv", stability_corners_csv(study));
+  if (!study.servo.empty()) write_file(folder / "servo.csv", stability_servo_csv(study));
   for (const std::string& id : map_ids(study)) {
     write_file(folder / fmt::format("map_{}.csv", id), stability_map_csv(study, id));
   }

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
@@ -301,11 +302,11 @@ void add_masses(std::vector<StabilityCorner>& corners) {
 
 std::vector<StabilityCorner> stability_corners() {
   std::vector<StabilityCorner> corners;
-  add_relaxation_times(corners);
-  add_moduli(corners);
-  add_depths(corners);
-  add_stars(corners);
-  add_masses(corners);
+  Progress progress("degenerate corners", 5);
+  for (const auto& add : {add_relaxation_times, add_moduli, add_depths, add_stars, add_masses}) {
+    add(corners);
+    progress.advance();
+  }
   return corners;
 }
 

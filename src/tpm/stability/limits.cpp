@@ -1,10 +1,12 @@
 // Limits found by bisection, and the servo rates at the paper's own eta1.
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <random>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/network/lowest_mode.hpp"
 #include "tpm/stability/judged_problem.hpp"
@@ -210,9 +212,11 @@ ServoRow servo_row(std::string name, const MethodProblem& problem, const Eigen::
 
 std::vector<StabilityLimit> stability_limits() {
   std::vector<StabilityLimit> limits;
-  add_rest_limits(limits);
-  add_motion_limits(limits);
-  add_organ_limits(limits);
+  Progress progress("limits", 3);
+  for (const auto& add : {add_rest_limits, add_motion_limits, add_organ_limits}) {
+    add(limits);
+    progress.advance();
+  }
   return limits;
 }
 
@@ -221,16 +225,19 @@ std::vector<ServoRow> stability_at_servo_rates() {
   const Protocol protocol = ramp_and_hold(0.004, 0.004 / kServoRamp_s, kServoEnd_s - kServoRamp_s);
   std::vector<ServoRow> rows;
   const ClosedForm exact{ModelOptions{}};
+  constexpr std::array kNetworkRates_Hz{1000.0, 2500.0, 4000.0};
+  Progress progress("servo rates", servo_rates_Hz().size() + kNetworkRates_Hz.size());
   for (const double rate : servo_rates_Hz()) {
     const std::vector<double> times = ticks(rate);
     const Eigen::VectorXd truth =
         exact.respond(protocol, times, element_constants(paper), Want::values).value;
     const auto element = element_problem(paper, as_sampled(protocol, times));
     rows.push_back(servo_row("element", *element, truth, times, rate));
+    progress.advance();
   }
   constexpr std::size_t kSmall = 24;
   const StudyOrgan organ(paper, kSmall);
-  for (const double rate : {1000.0, 2500.0, 4000.0}) {
+  for (const double rate : kNetworkRates_Hz) {
     const std::vector<double> times = ticks(rate);
     QuasiStaticOptions options;
     options.tolerance = 1e-9;
@@ -240,13 +247,18 @@ std::vector<ServoRow> stability_at_servo_rates() {
                                       .response;
     const auto network = network_problem(organ.driven, as_sampled(protocol, times));
     rows.push_back(servo_row("24 spheres", *network, truth, times, rate));
+    progress.advance();
   }
   return rows;
 }
 
-StabilityStudy run_stability_study(int along) {
-  return {stability_maps(along), stability_limits(), stability_corners(),
-          stability_at_servo_rates()};
+StabilityStudy run_stability_study(int along, const StabilityParts& parts) {
+  StabilityStudy study;
+  if (parts.maps) study.maps = stability_maps(along);
+  if (parts.limits) study.limits = stability_limits();
+  if (parts.corners) study.corners = stability_corners();
+  if (parts.servo) study.servo = stability_at_servo_rates();
+  return study;
 }
 
 }  // namespace tpm

@@ -81,8 +81,13 @@ inline constexpr int kPointsAlongMaps = 21;
 [[nodiscard]] std::vector<ServoRow> stability_at_servo_rates();
 /// How the networks of the study are held, in a sentence.
 [[nodiscard]] std::string study_organ_words();
-/// All of it; deterministic.
+/// Which parts of the study are run.
+struct StabilityParts {
+  bool maps = true, limits = true, corners = true, servo = true;
+};
+/// Deterministic. Parts that are not run stay empty.
 /// @param along points along each axis of the maps, >= 2
-[[nodiscard]] StabilityStudy run_stability_study(int along = kPointsAlongMaps);
+[[nodiscard]] StabilityStudy run_stability_study(int along = kPointsAlongMaps,
+                                                 const StabilityParts& parts = {});
 
 }  // namespace tpm
