@@ -391,10 +391,10 @@ void add_fit_command(CLI::App& app, Session& session) {
   command->add_option(
       "--law", options->law,
       "Recordings: fit this law, e.g. power-2 (default: the least that they support)");
-  CLI::Option* folder = command->add_option(
-      "--folder", options->folder,
-      "Where figures and files go (default: NAME_fit for recordings, none are "
-      "written for a configuration)");
+  CLI::Option* folder =
+      command->add_option("--folder", options->folder,
+                          "Where figures and files go (default: NAME_fit for recordings, none are "
+                          "written for a configuration)");
   command->add_flag("--no-draw", options->no_draw, "Write no figures and files")->excludes(folder);
   add_recording_options(*command, options->recordings);
   command->add_option("-o,--output", options->output, "Write here instead of to the terminal");

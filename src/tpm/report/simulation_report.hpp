@@ -6,7 +6,8 @@
 
 namespace tpm {
 
-/// What a run has shown, as docs/simulation_files.md describes the keys. Spheres are numbered from 1.
+/// What a run has shown, as docs/simulation_files.md describes the keys. Spheres are numbered
+/// from 1.
 [[nodiscard]] Json simulation_json(const ExperimentScene& scene, const RunNetwork& network,
                                    const SimulationRun& run);
 [[nodiscard]] std::string simulation_text(const ExperimentScene& scene, const RunNetwork& network,

@@ -86,8 +86,8 @@ struct ExperimentScene {
 /// pulls away from the outermost sphere.
 [[nodiscard]] double tissue_behind_m(const Organ& organ, const Probe& probe);
 
-/// Reads all blocks of a scene (docs/simulation_files.md). Without a block `protocol` there is nothing to
-/// do, which is an error.
+/// Reads all blocks of a scene (docs/simulation_files.md). Without a block `protocol` there is
+/// nothing to do, which is an error.
 /// @param where for messages, usually the file
 /// @param folder that a mesh path is relative to
 /// Throws Error(bad_input) with the key, also for a network that does not stand.
