@@ -1,4 +1,5 @@
-// Prints the measured numbers of docs/network.md: build/release/tests/measure_quasistatic
+// Prints the measured numbers of reports/network/2026-11-21.md:
+// build/release/tests/measure_quasistatic
 #include <fmt/format.h>
 
 #include <algorithm>

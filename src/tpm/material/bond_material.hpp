@@ -23,8 +23,8 @@ enum class LateralBond {
 ///     f = w (A0/l0) [Einf W(l) + sum_j g_j (V(l) - m_j)],     dm_j/dt = (V(l) - m_j)/tau_j
 ///
 /// W is the shape of the equilibrium potential, V(l) = l or the kernel that the branches act on. A
-/// lateral bond has the same shapes and the modulus E' (LateralBond). docs/network.md tells which
-/// formulations take which materials.
+/// lateral bond has the same shapes and the modulus E' (LateralBond). docs/network_method.md tells
+/// which formulations take which materials.
 ///
 /// The paper's element is the instance with W(l) = V(l) = l, Einf = P2, one branch of modulus
 /// E2^2/(E1 + E2) and tau = eta1/(E1 + E2).
