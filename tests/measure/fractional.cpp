@@ -1,5 +1,5 @@
-// Prints the measured numbers of docs/fractional.md (errors, rates and times of the exponential
-// sums) and of docs/laws.md (time of a response): build/release/tests/measure_fractional
+// Prints the numbers of reports/fits/exponential_sums.md: errors, rates and times of the
+// exponential sums, and the time of a response: build/release/tests/measure_fractional
 #include <fmt/format.h>
 
 #include <algorithm>

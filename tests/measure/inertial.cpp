@@ -1,4 +1,5 @@
-// Prints the measured numbers of docs/inertial.md: build/release/tests/measure_inertial
+// Prints the measured numbers of reports/network/2026-11-21-mass.md:
+// build/release/tests/measure_inertial
 #include <fmt/format.h>
 
 #include <ctime>
