@@ -68,31 +68,38 @@ function(tpm_floors suffix flags)
   set(TPM_FLOOR_OBJECTS ${objects} PARENT_SCOPE)
 endfunction()
 
-# tpm_formulation_list(LIST FILE...): writes a source that lists the formulations of files. A file NAME.cpp
-# defines the function NAME_formulations().
-function(tpm_formulation_list list)
+# tpm_list(LIST HEADER TYPE NOUN FILE...): writes a source that lists the objects of files. A file NAME.cpp
+# defines the function NAME_NOUN(), which returns TYPEs, a span of pointers to const TYPE.
+function(tpm_list list header type noun)
   set(declared "")
   set(called "")
   foreach(source IN LISTS ARGN)
     get_filename_component(name ${source} NAME_WE)
-    string(APPEND declared "Formulations ${name}_formulations();\n")
-    list(APPEND called "${name}_formulations()")
+    string(APPEND declared "${type}s ${name}_${noun}();\n")
+    list(APPEND called "${name}_${noun}()")
   endforeach()
   list(JOIN called ", " called)
   file(CONFIGURE OUTPUT ${list} @ONLY CONTENT [[
-// Written by the build from the files of formulations.
-#include "tpm/formulation/formulation.hpp"
+// Written by the build.
+#include "@header@"
 
 namespace tpm {
 
 @declared@
-Formulations formulations() {
-  static const std::vector<const Formulation*> all = joined({@called@});
+@type@s @noun@() {
+  static const std::vector<const @type@*> all = joined({@called@});
   return all;
 }
 
 }  // namespace tpm
 ]])
+endfunction()
+# Of formulations: NAME_formulations(); of the shapes of materials: NAME_elongation_shapes().
+function(tpm_formulation_list list)
+  tpm_list(${list} tpm/formulation/formulation.hpp Formulation formulations ${ARGN})
+endfunction()
+function(tpm_shape_list list)
+  tpm_list(${list} tpm/material/elongation_shape.hpp ElongationShape elongation_shapes ${ARGN})
 endfunction()
 
 set(TPM_SANITIZED_FLOORS core store protocol material solve model law network curve scene simulate method
@@ -115,7 +122,7 @@ function(tpm_sanitized_twin twin sanitize)
       list(APPEND TPM_FLOOR_OBJECTS $<TARGET_OBJECTS:tpm_floor_${floor}>)
     endif()
   endforeach()
-  add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS} $<TARGET_OBJECTS:tpm_formulation_list>)
+  add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS} $<TARGET_OBJECTS:tpm_lists>)
   set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX OUTPUT_NAME tpmkit_${twin})
   target_link_options(${twin} PUBLIC -fsanitize=${sanitize} PRIVATE -Wl,-Bsymbolic-functions)
   target_link_libraries(${twin} PRIVATE fmt::fmt ${TPM_PRIVATE_LIBRARIES})

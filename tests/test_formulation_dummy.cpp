@@ -1,39 +1,18 @@
 // A formulation added in one file (formulations/dummy.cpp) is in every list and at every user's
 // hand; one that does not keep its word is found. This program is linked with a list of its own.
-#include <algorithm>
-#include <array>
 #include <catch2/catch.hpp>
-#include <cstdio>
-#include <memory>
 
+#include "dummy_program.hpp"
 #include "formulation_suite.hpp"
 #include "temp_folder.hpp"
 #include "tpm/store/file.hpp"
-#include "tpm/store/json.hpp"
 
 using namespace tpm;
+using test::answer_of;
+using test::names;
 using test::TempFolder;
 
 namespace {
-
-/// What a command of the program with the dummy prints.
-Json answer_of(const std::string& arguments) {
-  const std::string line = std::string(TPM_DUMMY_PROGRAM) + " " + arguments + " --format json";
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(line.c_str(), "r"), pclose);
-  REQUIRE(pipe);
-  std::string text;
-  std::array<char, 4096> part{};
-  while (const std::size_t size = fread(part.data(), 1, part.size(), pipe.get())) {
-    text.append(part.data(), size);
-  }
-  CAPTURE(line, text);
-  return parse_json(text, "answer");
-}
-
-bool names(const Json& list, const std::string& name) {
-  return std::any_of(list.begin(), list.end(),
-                     [&](const Json& entry) { return entry.at("name") == name; });
-}
 
 const std::string kScene = R"({"organ": {"kind": "liver", "count": 40},
   "protocol": {"kind": "ramp_hold", "depth": "1 mm", "rate": "4 mm/s", "hold": "1 s"},

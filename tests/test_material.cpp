@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "organ_scene.hpp"
+#include "shape_suite.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/material/tpm_element.hpp"
@@ -133,28 +134,35 @@ std::string block_scene(const std::string& material) {
 
 }  // namespace
 
-TEST_CASE("functions of elongation: slope, integral, inverse and gap belong together") {
-  for (const ElongationShape shape :
-       {ElongationShape::linear, ElongationShape::cubic, ElongationShape::sinh}) {
-    const ElongationFunction w{shape, 4e-3};
-    for (const double l : {-9e-3, -1e-3, 0.0, 2e-4, 5e-3, 1.1e-2}) {
-      CAPTURE(static_cast<int>(shape), l);
-      const double h = 1e-7;
-      CHECK_THAT((w.value(l + h) - w.value(l - h)) / (2 * h), WithinRel(w.slope(l), 1e-6));
-      CHECK_THAT((w.integral(l + h) - w.integral(l - h)) / (2 * h), WithinAbs(w.value(l), 1e-9));
-      CHECK_THAT(w.inverse(w.value(l)), WithinAbs(l, 1e-15));
-      CHECK_THAT(w.gap(l, w.value(l)), WithinAbs(0.0, 1e-18));
-      CHECK(w.slope(l) >= 1.0);
-      for (const double m : {-6e-3, 0.0, 1e-3, 8e-3}) {
-        CHECK(w.gap(l, m) >= 0.0);
-        // d gap/dl = W(l) - m.
-        CHECK_THAT((w.gap(l + h, m) - w.gap(l - h, m)) / (2 * h), WithinAbs(w.value(l) - m, 1e-9));
-      }
-      if (shape == ElongationShape::linear) continue;
-      const ElongationFunction longer{shape, 4e-3 * std::exp(1e-5)};
-      const ElongationFunction shorter{shape, 4e-3 * std::exp(-1e-5)};
-      CHECK_THAT((longer.value(l) - shorter.value(l)) / 2e-5, WithinAbs(w.d_log_length(l), 1e-9));
-    }
+TEST_CASE("the shapes of materials keep their promises") {
+  for (const ElongationShape* shape : elongation_shapes()) {
+    CAPTURE(shape->name());
+    CHECK(test::broken_promises(*shape) == std::vector<std::string>{});
+  }
+  CHECK_THROWS_WITH(
+      elongation_function("quintic", {1e-3}),
+      Catch::Contains("unknown shape 'quintic'; expected one of linear, cubic, sinh"));
+  CHECK_THROWS_WITH(elongation_function("cubic", {0.0}), Catch::Contains("above 0"));
+  CHECK_THROWS_WITH(elongation_function("cubic"), Catch::Contains("0 values"));
+}
+
+TEST_CASE("every formulation runs the shapes that it takes and refuses the others", "[heavy]") {
+  for (const ElongationShape* shape : elongation_shapes()) {
+    CAPTURE(shape->name());
+    CHECK(test::broken_in_scenes(*shape) == std::vector<std::string>{});
+  }
+}
+
+TEST_CASE("the linear function is the shape linear") {
+  const ElongationShape& linear = elongation_shape("linear", "test");
+  const ElongationFunction w = elongation_function("linear");
+  CHECK(w == ElongationFunction{});
+  CHECK(w.shape_name() == "linear");
+  for (const double l : {-3e-3, 0.0, 5e-3}) {
+    CHECK(w.value(l) == linear.value(l, {}));
+    CHECK(w.slope(l) == linear.slope(l, {}));
+    CHECK(w.integral(l) == linear.integral(l, {}));
+    CHECK(w.inverse(l) == linear.inverse(l, {}));
   }
 }
 
@@ -176,18 +184,18 @@ TEST_CASE("the series of two linear laws has the harmonic mean of their moduli")
     }
   }
   BondLaw stiffening = a;
-  stiffening.springs[0].function = {ElongationShape::cubic, 1e-3};
+  stiffening.springs[0].function = elongation_function("cubic", {1e-3});
   CHECK_THROWS_WITH(blended(a, stiffening, BlendRule::series, "s"), Catch::Contains("mean"));
   CHECK_NOTHROW(blended(stiffening, stiffening.scaled(3.0), BlendRule::series, "s"));
   CHECK(blended(a, stiffening, BlendRule::mean, "s").springs.size() == 2);
   BondLaw kernel = a;
-  kernel.kernel = {ElongationShape::sinh, 1e-3};
+  kernel.kernel = elongation_function("sinh", {1e-3});
   CHECK_THROWS_WITH(blended(a, kernel, BlendRule::mean, "s"), Catch::Contains("kernels"));
 }
 
 TEST_CASE("one table names the parameters of a material") {
   BondMaterial m = material_of({0.1, 5.0}, 0.5);
-  m.potential = {ElongationShape::cubic, 5e-3};
+  m.potential = elongation_function("cubic", {5e-3});
   std::vector<std::string> names;
   for (const MaterialParameter& parameter : parameters_of(m)) names.push_back(parameter.name);
   CHECK(names == std::vector<std::string>{"Einf", "Eprime", "stiffening", "g1", "tau1", "g2",
@@ -268,13 +276,13 @@ TEST_CASE("a quasi-static network is its branches written out") {
   }
   SECTION("a stiffening potential with linear branches") {
     BondMaterial m = material_of({0.2, 3.0}, 0.6);
-    m.potential = {ElongationShape::cubic, 3e-3};
+    m.potential = elongation_function("cubic", {3e-3});
     check_pair(both(m, written_bonds(network, m)));
   }
   SECTION("branches on a stiffening kernel") {
     BondMaterial m = material_of({0.2, 3.0}, 0.6);
-    m.potential = {ElongationShape::cubic, 3e-3};
-    m.kernel = {ElongationShape::cubic, 2e-3};
+    m.potential = elongation_function("cubic", {3e-3});
+    m.kernel = elongation_function("cubic", {2e-3});
     check_pair(both(m, written_bonds(network, m)));
   }
 }
@@ -283,7 +291,7 @@ TEST_CASE("a bond between two materials is both at half strength") {
   const Network& network = small_scene().network;
   const BondMaterial soft = material_of({0.1, 4.0}, 0.8);
   BondMaterial hard = material_of({0.6}, 0.3);
-  hard.potential = {ElongationShape::cubic, 4e-3};
+  hard.potential = elongation_function("cubic", {4e-3});
   hard.equilibrium_Pa *= 5.0;
   MaterialField field(soft);
   field.materials.push_back(hard);
@@ -339,8 +347,8 @@ TEST_CASE("a run with several branches goes on from its state as if it had not s
 TEST_CASE("stored energy and heat of several branches close along any motion") {
   const OrganScene& scene = small_scene();
   BondMaterial m = material_of({0.05, 0.5, 9.0}, 0.85);
-  m.kernel = {ElongationShape::sinh, 3e-3};
-  m.potential = {ElongationShape::cubic, 5e-3};
+  m.kernel = elongation_function("sinh", {3e-3});
+  m.potential = elongation_function("cubic", {5e-3});
   const BondSystem bonds(scene.network, m);
   const Positions rest = scene.network.organ.position;
   Random random(7);
@@ -399,7 +407,7 @@ TEST_CASE("an inertial network is its equations with the branches written out") 
   const OrganScene& scene = small_scene();
   BondMaterial m = material_of({0.02, 0.3}, 0.7);
   const bool kernel = GENERATE(false, true);
-  if (kernel) m.kernel = {ElongationShape::cubic, 3e-3};
+  if (kernel) m.kernel = elongation_function("cubic", {3e-3});
   const BondSystem bonds(scene.network, m);
   const Eigen::VectorXd mass = sphere_masses_kg(scene.network.organ);
   InertialOptions options{.tolerance = 1e-9, .highest_order = 5};
@@ -447,7 +455,7 @@ TEST_CASE("an inertial network is its equations with the branches written out") 
 TEST_CASE("both solvers of the inertial network take several branches") {
   const OrganScene& scene = small_scene();
   BondMaterial m = material_of({0.02, 0.3, 8.0}, 0.7);
-  m.kernel = {ElongationShape::cubic, 3e-3};
+  m.kernel = elongation_function("cubic", {3e-3});
   const BondSystem bonds(scene.network, m);
   const Eigen::VectorXd mass = sphere_masses_kg(scene.network.organ);
   const Protocol protocol(Drive::displacement, {{0.0, 0.0}, {0.2, 4e-3}, {0.5, 4e-3}}, "ramp");
@@ -487,7 +495,7 @@ TEST_CASE("a scene says materials, branches and regions") {
   const BondMaterial& m = tissue.materials.materials.front();
   CHECK(m.branches.size() == 2);
   CHECK(m.branches[1].relaxation_time_s == 51.3);
-  CHECK(m.potential.length_m == 5e-3);
+  CHECK(m.potential.values()[0] == 5e-3);
   const auto& at = tissue.network.organ.position;
   for (Eigen::Index i = 0; i < at.cols(); ++i) {
     CHECK(tissue.materials.factor[i] == (at(0, i) > 0.005 ? 4.0 : 2.0));
@@ -574,8 +582,8 @@ TEST_CASE("a derivative across two materials that are one by chance is refused")
   const auto with = [&](double stiffening_m) {
     MaterialField field(material_of({0.3}, 0.5));
     field.materials.push_back(field.materials.front());
-    field.materials[0].potential = {ElongationShape::cubic, stiffening_m};
-    field.materials[1].potential = {ElongationShape::cubic, 4e-3};
+    field.materials[0].potential = elongation_function("cubic", {stiffening_m});
+    field.materials[1].potential = elongation_function("cubic", {4e-3});
     field.of_sphere.assign(scene.network.organ.size(), 0);
     field.of_sphere[3] = 1;
     return BondSystem(scene.network, field);
@@ -589,7 +597,7 @@ TEST_CASE("a million random steps of bonds with branches never make energy") {
   // l is linear within a step, m_j exact: tau dm/dt = l - m makes the work of branch j over a step
   // g_j [tau_j dl (m1 - m0)/h], without quadrature.
   Random random(11);
-  const ElongationFunction potential{ElongationShape::cubic, 3e-3};
+  const ElongationFunction potential = elongation_function("cubic", {3e-3});
   double least = 0.0, heat = 0.0, work = 0.0;
   for (int bond = 0; bond < 100; ++bond) {
     const std::size_t n = 1 + static_cast<std::size_t>(bond) % 6;

@@ -115,8 +115,8 @@ TEST_CASE("every step rule follows two branches with its order", "[method]") {
 
 TEST_CASE("step rules take a stiffening potential, a kernel and factors of place", "[method]") {
   BondMaterial m = two_branches();
-  m.potential = {ElongationShape::cubic, 8e-3};
-  m.kernel = {ElongationShape::cubic, 6e-3};
+  m.potential = elongation_function("cubic", {8e-3});
+  m.kernel = elongation_function("cubic", {6e-3});
   std::vector<double> factors(small_scene().network.organ.size(), 1.0);
   factors[*small_scene().network.organ.contact] = 3.0;
   check_rules(Written(m, factors));

@@ -55,8 +55,8 @@ inline std::vector<WrittenBond> written_bonds(const tpm::Network& network,
     bond.rest = joined.rest_length_m;
     bond.rope = !radial && m.lateral == tpm::LateralBond::tension_only;
     bond.k = per_Pa * (relaxes ? share * m.equilibrium_Pa : m.lateral_Pa);
-    if (!m.potential.is_linear()) bond.stiffening = m.potential.length_m;
-    if (!m.kernel.is_linear()) bond.kernel_stiffening = m.kernel.length_m;
+    if (!m.potential.is_linear()) bond.stiffening = m.potential.values()[0];
+    if (!m.kernel.is_linear()) bond.kernel_stiffening = m.kernel.values()[0];
     if (relaxes) {
       for (const auto& branch : m.branches) {
         bond.branches.push_back({per_Pa * share * branch.modulus_Pa, branch.relaxation_time_s});

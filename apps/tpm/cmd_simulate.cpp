@@ -35,6 +35,7 @@ struct SimulateChoice {
   std::string checkpoint_every = "5 s";
   bool planned = false;
   bool list = false;
+  bool list_materials = false;
   PlanChoice plan;
 };
 
@@ -205,6 +206,11 @@ int list_formulations(const Session& session) {
   return 0;
 }
 
+int list_materials(const Session& session) {
+  say("{}", session.json() ? to_text(Json{{"shapes", shapes_json()}}) : shapes_text());
+  return 0;
+}
+
 int simulate_and_report(const SimulateChoice& choice, const Session& session) {
   ExperimentScene scene = read_experiment(choice.scene);
   require_runnable(scene);
@@ -258,6 +264,7 @@ int simulate_planned(const SimulateChoice& choice, const Session& session) {
 int run_command(const SimulateChoice& choice, const Session& session) {
   try {
     if (choice.list) return list_formulations(session);
+    if (choice.list_materials) return list_materials(session);
     if (choice.scene.empty()) {
       throw Error(ExitCode::usage, "SCENE", "is missing", "a JSON scene, or --list-formulations");
     }
@@ -292,6 +299,8 @@ void add_simulate_command(CLI::App& app, Session& session) {
                     "Run the least model that tpm plan finds, instead of the scene's formulation");
   command->add_flag("--list-formulations", choice->list,
                     "List what a scene's key 'formulation' can name, with what each can do");
+  command->add_flag("--list-materials", choice->list_materials,
+                    "List the shapes that a scene's keys 'potential' and 'kernel' can name");
   add_plan_options(*command, choice->plan);
   add_format_option(*command, session);
   command->footer(

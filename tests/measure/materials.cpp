@@ -50,9 +50,9 @@ std::vector<Named> materials(const Network& network) {
     fractional.branches.push_back({9e3 * share, time_s});
   }
   BondMaterial stiffening = material_of({1.0}, 0.5);
-  stiffening.potential = {ElongationShape::cubic, 5e-3};
+  stiffening.potential = elongation_function("cubic", {5e-3});
   BondMaterial kernel = material_of({0.2, 5.0}, 0.5);
-  kernel.kernel = kernel.potential = {ElongationShape::cubic, 5e-3};
+  kernel.kernel = kernel.potential = elongation_function("cubic", {5e-3});
   std::vector<Named> all{
       {"1 branch, 50 %", material_of({1.0}, 0.5)},
       {"1 branch, 90 %", material_of({1.0}, 0.9)},

@@ -20,16 +20,40 @@ std::size_t branch_number(std::string_view name, std::string_view letter) {
   return error == std::errc{} && end == digits.data() + digits.size() ? number : 0;
 }
 
-/// Where a parameter is kept in a material; null if it has none of that name.
+constexpr std::string_view kOfKernel = "kernel_";
+
+/// The number of a parameter of a function by its name; none if it has none of that name.
+std::optional<std::size_t> parameter_number(const ElongationFunction& function,
+                                            std::string_view name) {
+  const auto parameters = function.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    if (parameters[k].name == name) return k;
+  }
+  return std::nullopt;
+}
+
+/// A parameter of the shape of W or V, by its name in the table.
+struct ShapePlace {
+  ElongationFunction* function;
+  std::size_t number;
+};
+std::optional<ShapePlace> shape_place_of(BondMaterial& material, std::string_view name) {
+  if (const auto k = parameter_number(material.potential, name)) {
+    return ShapePlace{&material.potential, *k};
+  }
+  if (!name.starts_with(kOfKernel)) return std::nullopt;
+  if (const auto k = parameter_number(material.kernel, name.substr(kOfKernel.size()))) {
+    return ShapePlace{&material.kernel, *k};
+  }
+  return std::nullopt;
+}
+
+/// Where another parameter is kept in a material; null if it has none of that name.
 double* place_of(BondMaterial& material, std::string_view name) {
   if (name == "Einf") return &material.equilibrium_Pa;
   if (name == "Eprime") return &material.lateral_Pa;
   if (name == "A0") return &material.A0_m2;
   if (name == "l0") return &material.l0_m;
-  if (name == "stiffening" && !material.potential.is_linear()) return &material.potential.length_m;
-  if (name == "kernel_stiffening" && !material.kernel.is_linear()) {
-    return &material.kernel.length_m;
-  }
   if (const std::size_t j = branch_number(name, "tau"); j > 0 && j <= material.branches.size()) {
     return &material.branches[j - 1].relaxation_time_s;
   }
@@ -71,18 +95,23 @@ BondLaw BondMaterial::lateral_law() const {
   return law;
 }
 
+std::string kernel_parameter(std::string_view name) {
+  return fmt::format("{}{}", kOfKernel, name);
+}
+
 std::vector<MaterialParameter> parameters_of(const BondMaterial& material) {
   std::vector<MaterialParameter> table{
       {"Einf", Dimension::stress, 0.0, false, "modulus of the radial bonds at equilibrium"},
       {"Eprime", Dimension::stress, 0.0, false, "instantaneous modulus of the lateral bonds"},
   };
-  if (!material.potential.is_linear()) {
-    table.push_back({"stiffening", Dimension::length, 0.0, true,
-                     "stiffening length of the equilibrium potential"});
+  for (const MaterialParameter& parameter : material.potential.parameters()) {
+    table.push_back(parameter);
+    table.back().meaning += " of the equilibrium potential";
   }
-  if (!material.kernel.is_linear()) {
-    table.push_back({"kernel_stiffening", Dimension::length, 0.0, true,
-                     "stiffening length of the kernel that the branches act on"});
+  for (const MaterialParameter& parameter : material.kernel.parameters()) {
+    table.push_back(parameter);
+    table.back().name = kernel_parameter(parameter.name);
+    table.back().meaning += " of the kernel that the branches act on";
   }
   for (std::size_t j = 1; j <= material.branches.size(); ++j) {
     table.push_back({fmt::format("g{}", j), Dimension::stress, 0.0, false,
@@ -98,6 +127,9 @@ std::vector<MaterialParameter> parameters_of(const BondMaterial& material) {
 
 std::optional<double> value_of(const BondMaterial& material, std::string_view name) {
   BondMaterial copy = material;
+  if (const auto shape = shape_place_of(copy, name)) {
+    return shape->function->values()[shape->number];
+  }
   const double* place = place_of(copy, name);
   if (place == nullptr) return std::nullopt;
   return *place;
@@ -112,9 +144,13 @@ void set_value(BondMaterial& material, std::string_view name, double value,
     if (!std::isfinite(value) || !parameter.allows(value)) {
       throw bad_input(
           where, fmt::format("{} = {} {}", name, shortest(value), si_symbol(parameter.dimension)),
-          parameter.least_excluded ? "above 0" : "0 or above");
+          range_of(parameter));
     }
-    *place_of(material, name) = value;
+    if (const auto shape = shape_place_of(material, name)) {
+      shape->function->set_value(shape->number, value);
+    } else {
+      *place_of(material, name) = value;
+    }
     return;
   }
   throw bad_input(where, fmt::format("the material has no parameter '{}'", printable(name)),

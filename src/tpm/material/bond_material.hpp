@@ -53,22 +53,13 @@ struct BondMaterial {
   [[nodiscard]] BondLaw lateral_law() const;
 };
 
-/// A parameter of a material: what files, fits, sweeps and reports address by its name.
-struct MaterialParameter {
-  std::string name;
-  Dimension dimension;
-  double least;         ///< SI
-  bool least_excluded;  ///< the value is above `least`, not at it
-  std::string meaning;
-  [[nodiscard]] bool allows(double value) const {
-    return least_excluded ? value > least : value >= least;
-  }
-};
-
-/// The table of a material's parameters: Einf, Eprime, stiffening and kernel_stiffening (the
-/// lengths s of W and V, where these are not linear), g1, tau1, ... g40, tau40, A0, l0. The one
-/// place where their names, units and ranges stand.
+/// The table of a material's parameters: Einf, Eprime, those of the shape of W, those of the shape
+/// of V with `kernel_` before their names, g1, tau1, ... g40, tau40, A0, l0. The one place where
+/// their names, units and ranges come from.
 [[nodiscard]] std::vector<MaterialParameter> parameters_of(const BondMaterial& material);
+
+/// The name in the table of a parameter of the shape of V.
+[[nodiscard]] std::string kernel_parameter(std::string_view name);
 
 /// The value of a parameter by its name, SI; none if the material has no such parameter.
 [[nodiscard]] std::optional<double> value_of(const BondMaterial& material, std::string_view name);

@@ -1,71 +1,70 @@
 #pragma once
-#include <cmath>
+#include "tpm/material/elongation_shape.hpp"
 
 namespace tpm {
 
-enum class ElongationShape {
-  linear,  ///< W(l) = l
-  cubic,   ///< W(l) = l (1 + (l/s)^2)
-  sinh,    ///< W(l) = s sinh(l/s)
-};
+/// An odd, strictly increasing function W of a bond's elongation with slope 1 at rest, in m: a
+/// shape with values of its parameters. Times a stiffness it is an elastic force: U'(l) = k W(l) of
+/// an equilibrium potential, or the kernel that branches act on. W(l) = l unless another shape is
+/// set.
+class ElongationFunction {
+ public:
+  ElongationFunction() = default;
+  /// @param values in the order of the shape's parameters
+  ElongationFunction(const ElongationShape& shape, std::initializer_list<double> values);
 
-/// An odd, strictly increasing function W of a bond's elongation with slope 1 at rest, in m. Times
-/// a stiffness it is an elastic force: U'(l) = k W(l) of an equilibrium potential, or the kernel
-/// that branches act on.
-struct ElongationFunction {
-  ElongationShape shape = ElongationShape::linear;
-  /// The stiffening length s, m, > 0: at l = s the slope is 4 times (cubic) or 1.54 times (sinh)
-  /// that at rest. Without meaning for a linear function.
-  double length_m = 0.0;
+  [[nodiscard]] bool is_linear() const { return shape_ == nullptr; }
+  /// The linear function is one of the shape `linear`.
+  [[nodiscard]] std::string_view shape_name() const;
+  /// Of the shape; the linear function has none.
+  [[nodiscard]] std::span<const MaterialParameter> parameters() const {
+    if (shape_ == nullptr) return {};
+    return shape_->parameters();
+  }
+  /// The values of the parameters, SI. Without meaning beyond parameters().size().
+  [[nodiscard]] const ShapeValues& values() const { return values_; }
+  /// Sets a value; `k` below parameters().size().
+  void set_value(std::size_t k, double value) { values_[k] = value; }
 
-  [[nodiscard]] bool is_linear() const { return shape == ElongationShape::linear; }
   [[nodiscard]] bool operator==(const ElongationFunction& other) const {
-    return shape == other.shape && (is_linear() || length_m == other.length_m);
+    return shape_ == other.shape_ && values_ == other.values_;
   }
 
   /// W(l), m.
   [[nodiscard]] double value(double l) const {
-    if (shape == ElongationShape::linear) return l;
-    const double q = l / length_m;
-    return shape == ElongationShape::cubic ? l * (1.0 + q * q) : length_m * std::sinh(q);
+    return shape_ == nullptr ? l : shape_->value(l, values_);
   }
-  /// W'(l) >= 1.
+  /// W'(l) > 0.
   [[nodiscard]] double slope(double l) const {
-    if (shape == ElongationShape::linear) return 1.0;
-    const double q = l / length_m;
-    return shape == ElongationShape::cubic ? 1.0 + 3.0 * q * q : std::cosh(q);
+    return shape_ == nullptr ? 1.0 : shape_->slope(l, values_);
   }
-  /// The derivative of W(l) by ln s, m.
-  [[nodiscard]] double d_log_length(double l) const {
-    if (shape == ElongationShape::linear) return 0.0;
-    const double q = l / length_m;
-    return shape == ElongationShape::cubic ? -2.0 * l * q * q
-                                           : length_m * (std::sinh(q) - q * std::cosh(q));
-  }
-  /// The integral of W from 0 to l, m^2.
+  /// Change of W(l) with small changes of the parameters, m.
+  [[nodiscard]] double change(double l, const ShapeValues& of_values) const;
+  /// P(l), the integral of W from 0 to l, m^2.
   [[nodiscard]] double integral(double l) const {
-    if (shape == ElongationShape::linear) return 0.5 * l * l;
-    const double q = l / length_m;
-    if (shape == ElongationShape::cubic) return l * l * (0.5 + 0.25 * q * q);
-    const double half = std::sinh(0.5 * q);
-    return 2.0 * length_m * length_m * half * half;
+    return shape_ == nullptr ? 0.5 * l * l : shape_->integral(l, values_);
   }
   /// The elongation l at which W(l) = w, m.
   [[nodiscard]] double inverse(double w) const {
-    if (shape == ElongationShape::linear) return w;
-    if (shape == ElongationShape::sinh) return length_m * std::asinh(w / length_m);
-    // q + q^3 = w/s by hyperbolic functions (the one real root of a depressed cubic).
-    const double root3 = std::sqrt(3.0);
-    return length_m * (2.0 / root3) * std::sinh(std::asinh(1.5 * root3 * w / length_m) / 3.0);
+    return shape_ == nullptr ? w : shape_->inverse(w, values_);
   }
   /// Energy of a spring W that was stretched to l while its reference follows at w, m^2 (times a
-  /// stiffness: J): P(l) + P*(w) - l w with P the integral of W and P* its Legendre transform.
-  /// Non-negative, and 0 where w = W(l) (Fenchel-Young). For a linear function (l - w)^2/2.
-  [[nodiscard]] double gap(double l, double w) const {
-    if (shape == ElongationShape::linear) return 0.5 * (l - w) * (l - w);
-    const double u = inverse(w);
-    return integral(l) - integral(u) - (l - u) * w;
+  /// stiffness: J): P(l) + P*(w) - l w with P* the Legendre transform of P. Non-negative, and 0
+  /// where w = W(l) (Fenchel-Young). For a linear function (l - w)^2/2.
+  [[nodiscard]] double gap(double l, double w) const;
+  /// c where W(l) = l + c l^3, 1/m^2: what runs at servo rate.
+  [[nodiscard]] std::optional<double> cubic_per_m2() const {
+    return shape_ == nullptr ? 0.0 : shape_->cubic_per_m2(values_);
   }
+
+ private:
+  const ElongationShape* shape_ = nullptr;  ///< null where W(l) = l
+  ShapeValues values_{};
 };
+
+/// A function by the name of its shape. Throws Error(bad_input) that names the shapes, for another
+/// number of values, and for a value out of its range.
+[[nodiscard]] ElongationFunction elongation_function(std::string_view shape,
+                                                     std::initializer_list<double> values = {});
 
 }  // namespace tpm

@@ -66,7 +66,7 @@ double equilibrium_change(const ViscousLaw& law, const LawChange& change, double
   for (std::size_t i = 0; i < change.spring_share.size(); ++i) {
     const auto& [share, function] = law.springs[i];
     sum += change.spring_share[i] * function.value(l) +
-           share * change.spring_log_length[i] * function.d_log_length(l);
+           share * function.change(l, change.spring_values[i]);
   }
   return sum;
 }
@@ -255,8 +255,8 @@ void LaneBonds::followed_changes(const LaneMatrix& position, const LaneMatrix& d
     measure(x + kSphere * bond_[i].a, x + kSphere * bond_[i].b, span);
     for (std::size_t s = 0; s < kLanes; ++s) {
       const double l = span.length[s] - bond_[i].rest_length_m;
-      dl[kLanes * i + s] = kernel.slope(l) * dl[kLanes * i + s] +
-                           laws[bond_[i].law].kernel_log_length * kernel.d_log_length(l);
+      dl[kLanes * i + s] =
+          kernel.slope(l) * dl[kLanes * i + s] + kernel.change(l, laws[bond_[i].law].kernel_values);
     }
   }
 }
@@ -306,10 +306,9 @@ void LaneBonds::add_bond_force_changes(const LaneMatrix& position, const LaneMat
               (bond.k - bond.g) * law.equilibrium_slope(l) + bond.g * law.kernel.slope(l);
           const double share = taut * span.inverse[s] * ((bond.k - bond.g) * shape + bond.g * v);
           const double dl = span.inverse[s] * along(span, ua, ub, s);
-          const double dn =
-              slope * dl - bond.g * aged[s] + dk * shape + dg * (v - shape) +
-              (bond.k - bond.g) * equilibrium_change(law, changes.laws[bond.law], l) +
-              bond.g * changes.laws[bond.law].kernel_log_length * law.kernel.d_log_length(l);
+          const double dn = slope * dl - bond.g * aged[s] + dk * shape + dg * (v - shape) +
+                            (bond.k - bond.g) * equilibrium_change(law, changes.laws[bond.law], l) +
+                            bond.g * law.kernel.change(l, changes.laws[bond.law].kernel_values);
           with_span[s] = span.inverse[s] * (taut * dn - share * dl);
           with_change[s] = share;
         }

@@ -29,8 +29,12 @@ namespace {
 
 /// Changes of one law.
 LawChange change_between(const ViscousLaw& minus, const ViscousLaw& plus, double step) {
-  const auto log_of = [](const ElongationFunction& f) {
-    return f.is_linear() ? 0.0 : std::log(f.length_m);
+  const auto values_change = [step](const ElongationFunction& a, const ElongationFunction& b) {
+    ShapeValues change{};
+    for (std::size_t k = 0; k < change.size(); ++k) {
+      change[k] = (b.values()[k] - a.values()[k]) / step;
+    }
+    return change;
   };
   LawChange change;
   for (std::size_t j = 0; j < minus.branches.size(); ++j) {
@@ -43,9 +47,9 @@ LawChange change_between(const ViscousLaw& minus, const ViscousLaw& plus, double
     const ViscousLaw::Spring& a = minus.springs[i];
     const ViscousLaw::Spring& b = plus.springs[i];
     change.spring_share.push_back((b.share - a.share) / step);
-    change.spring_log_length.push_back((log_of(b.function) - log_of(a.function)) / step);
+    change.spring_values.push_back(values_change(a.function, b.function));
   }
-  change.kernel_log_length = (log_of(plus.kernel) - log_of(minus.kernel)) / step;
+  change.kernel_values = values_change(minus.kernel, plus.kernel);
   return change;
 }
 

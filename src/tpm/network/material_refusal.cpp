@@ -17,13 +17,13 @@ bool relaxes_on_kernel(const BondSystem& bonds) {
   return false;
 }
 
-/// The bonds have a spring of such a shape.
+/// The bonds have a spring of such a function.
 template <class Predicate>
 bool has_spring(const BondSystem& bonds, Predicate&& is) {
   const auto laws = bonds.laws();
   return std::any_of(laws.begin(), laws.end(), [&](const ViscousLaw& law) {
     return std::any_of(law.springs.begin(), law.springs.end(),
-                       [&](const ViscousLaw::Spring& spring) { return is(spring.function.shape); });
+                       [&](const ViscousLaw::Spring& spring) { return is(spring.function); });
   });
 }
 
@@ -44,10 +44,12 @@ std::vector<MaterialNeed> needs_of(const BondSystem& bonds) {
   if (!alike) needs.push_back(&Capabilities::mixed);
   if (relaxes_on_kernel(bonds)) needs.push_back(&Capabilities::kernels);
   if (alike && bonds.relaxation_times_s().size() > 1) needs.push_back(&Capabilities::branches);
-  if (has_spring(bonds, [](ElongationShape shape) { return shape == ElongationShape::sinh; })) {
+  if (has_spring(bonds, [](const ElongationFunction& f) { return !f.cubic_per_m2(); })) {
     needs.push_back(&Capabilities::any_potential);
   }
-  if (has_spring(bonds, [](ElongationShape shape) { return shape == ElongationShape::cubic; })) {
+  if (has_spring(bonds, [](const ElongationFunction& f) {
+        return !f.is_linear() && f.cubic_per_m2().has_value();
+      })) {
     needs.push_back(&Capabilities::stiffening);
   }
   return needs;

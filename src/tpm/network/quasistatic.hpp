@@ -45,10 +45,11 @@ void require_valid(const Probes& probes, const Freedom& freedom);
 
 /// Changes of one law of a BondSystem (viscous_law.hpp).
 struct LawChange {
-  std::vector<double> share;                            ///< of each gamma_j; they add up to 0
-  std::vector<double> log_time;                         ///< of each ln tau_j
-  std::vector<double> spring_share, spring_log_length;  ///< of each part of u
-  double kernel_log_length = 0.0;
+  std::vector<double> share;               ///< of each gamma_j; they add up to 0
+  std::vector<double> log_time;            ///< of each ln tau_j
+  std::vector<double> spring_share;        ///< of each part of u
+  std::vector<ShapeValues> spring_values;  ///< of the parameters of each part's function
+  ShapeValues kernel_values{};             ///< of the parameters of V
 };
 
 /// A direction in which material and imposed history may change: a run can answer derivatives. They

@@ -52,8 +52,7 @@ double cubic_of(const BondSystem& bonds, std::size_t bond) {
   const auto row = static_cast<Eigen::Index>(bond);
   double sum = 0.0;
   for (const ViscousLaw::Spring& spring : bonds.laws()[bonds.law_of(bond)].springs) {
-    const ElongationFunction& f = spring.function;
-    if (!f.is_linear()) sum += spring.share / (f.length_m * f.length_m);
+    sum += spring.share * spring.function.cubic_per_m2().value();
   }
   return (bonds.stiffness()[row] - bonds.relaxing()[row]) * sum;
 }

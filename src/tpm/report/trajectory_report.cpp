@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "tpm/core/text.hpp"
+#include "tpm/core/units.hpp"
 #include "tpm/core/version.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/model/model.hpp"
@@ -135,6 +136,50 @@ Json formulations_json() {
                     {"keys", f->keys()}});
   }
   return list;
+}
+
+namespace {
+
+/// A servo's kernels step the shape, whatever the values of its parameters: tried at 1 of each.
+bool runs_at_servo_rate(const ElongationShape& shape) {
+  ShapeValues ones;
+  ones.fill(1.0);
+  return shape.cubic_per_m2(ones).has_value();
+}
+
+}  // namespace
+
+Json shapes_json() {
+  Json list = Json::array();
+  for (const ElongationShape* shape : elongation_shapes()) {
+    Json parameters = Json::array();
+    for (const MaterialParameter& p : shape->parameters()) {
+      parameters.push_back({{"name", p.name},
+                            {"unit", si_symbol(p.dimension)},
+                            {"range", range_of(p)},
+                            {"meaning", p.meaning}});
+    }
+    list.push_back({{"name", shape->name()},
+                    {"meaning", shape->meaning()},
+                    {"parameters", std::move(parameters)},
+                    {"servo", runs_at_servo_rate(*shape)}});
+  }
+  return list;
+}
+
+std::string shapes_text() {
+  std::string text;
+  for (const ElongationShape* shape : elongation_shapes()) {
+    text += fmt::format("{:<12} {}\n", shape->name(), shape->meaning());
+    for (const MaterialParameter& p : shape->parameters()) {
+      const std::string_view symbol = si_symbol(p.dimension);
+      text += fmt::format("{:<12} {}: {}{}{}, {}\n", "", p.name, p.meaning,
+                          symbol.empty() ? "" : ", ", symbol, range_of(p));
+    }
+    text +=
+        fmt::format("{:<12} at servo rate: {}\n", "", runs_at_servo_rate(*shape) ? "yes" : "no");
+  }
+  return text;
 }
 
 std::string formulations_text() {

@@ -33,4 +33,8 @@ void write_scene_run(const ExperimentScene& scene, const std::vector<double>& ti
 [[nodiscard]] Json formulations_json();
 [[nodiscard]] std::string formulations_text();
 
+/// The shapes of materials with their parameters, and whether they run at servo rate.
+[[nodiscard]] Json shapes_json();
+[[nodiscard]] std::string shapes_text();
+
 }  // namespace tpm

@@ -14,9 +14,6 @@
 namespace tpm {
 namespace {
 
-constexpr std::array<Word<ElongationShape>, 3> kShapeWords{{{ElongationShape::linear, "linear"},
-                                                            {ElongationShape::cubic, "cubic"},
-                                                            {ElongationShape::sinh, "sinh"}}};
 constexpr std::array<Word<BlendRule>, 2> kBlendWords{
     {{BlendRule::mean, "mean"}, {BlendRule::series, "series"}}};
 constexpr std::array<const char*, 3> kElementKeys{"E1", "E2", "eta1"};
@@ -28,23 +25,38 @@ double quantity_or(const Json& block, const char* key, Dimension dimension, doub
 }
 
 ElongationFunction parse_function(const Json& block, const char* key, const DocumentPlace& place) {
-  ElongationFunction function;
-  if (!block.contains(key)) return function;
+  if (!block.contains(key)) return {};
   const Json& entry = block.at(key);
   const DocumentPlace here = place.key(key);
-  function.shape = parse_word(kShapeWords, "shape", entry.at("shape").get<std::string>(),
-                              here.key("shape").where);
-  if (function.is_linear()) {
-    if (entry.contains("stiffening")) {
-      throw bad_input(here.key("stiffening").where, "of a linear function", "no such key");
+  const ElongationShape& shape =
+      elongation_shape(entry.at("shape").get<std::string>(), here.key("shape").where);
+  const std::vector<MaterialParameter>& parameters = shape.parameters();
+  for (const auto& [name, value] : entry.items()) {
+    const bool known =
+        name == "shape" || std::any_of(parameters.begin(), parameters.end(),
+                                       [&](const MaterialParameter& p) { return p.name == name; });
+    if (known) continue;
+    std::string names = "shape";
+    for (const MaterialParameter& p : parameters) names += ", " + p.name;
+    throw bad_input(here.key(name).where, fmt::format("is no key of the shape '{}'", shape.name()),
+                    names);
+  }
+  ElongationFunction function(shape, {});
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    const MaterialParameter& p = parameters[k];
+    const std::string_view symbol = si_symbol(p.dimension);
+    if (!entry.contains(p.name)) {
+      throw bad_input(here.key(p.name).where, "is missing",
+                      fmt::format("{} of the shape '{}'{}{}", p.meaning, shape.name(),
+                                  symbol.empty() ? "" : ", in ", symbol));
     }
-    return function;
+    const double value = quantity_at(entry, p.name, p.dimension, here);
+    if (!std::isfinite(value) || !p.allows(value)) {
+      throw bad_input(here.key(p.name).where, fmt::format("{} {}", shortest(value), symbol),
+                      fmt::format("a value {}", range_of(p)));
+    }
+    function.set_value(k, value);
   }
-  if (!entry.contains("stiffening")) {
-    throw bad_input(here.key("stiffening").where, "is missing",
-                    "the elongation at which the bond is clearly stiffer, such as \"5 mm\"");
-  }
-  function.length_m = positive_at(entry, "stiffening", Dimension::length, here);
   return function;
 }
 

@@ -55,7 +55,7 @@ std::vector<std::string> FittedBonds::names() const {
   };
   add_each("g");
   if (times_) add_each("tau");
-  if (!form_.potential.is_linear()) all.emplace_back("stiffening");
+  for (const MaterialParameter& p : form_.potential.parameters()) all.push_back(p.name);
   return all;
 }
 
@@ -67,7 +67,9 @@ BondMaterial FittedBonds::material(std::span<const double> natural) const {
   if (times_) {
     for (auto& branch : m.branches) branch.relaxation_time_s = natural[next++];
   }
-  if (!m.potential.is_linear()) m.potential.length_m = natural[next++];
+  for (std::size_t k = 0; k < m.potential.parameters().size(); ++k) {
+    m.potential.set_value(k, natural[next++]);
+  }
   if (!m.kernel.is_linear()) m.kernel = m.potential;
   m.lateral_Pa = kLateralRatio * m.instantaneous_Pa();
   return m;
@@ -90,21 +92,17 @@ Eigen::MatrixXd FittedBonds::along(const OrganModel& model) const {
         std::find_if(table.begin(), table.end(), [&](const auto& p) { return p.name == name; });
     return static_cast<Eigen::Index>(found - table.begin());
   };
+  // Einf and every g_j, then the times, then the parameters of the potential.
+  const auto moduli = static_cast<Eigen::Index>(1 + form_.branches.size());
+  const Eigen::Index of_potential = changes.cols() - std::ssize(form_.potential.parameters());
   for (Eigen::Index k = 0; k < changes.cols(); ++k) {
     const std::string& name = all[static_cast<std::size_t>(k)];
     changes(row(name), k) = 1.0;
-    const bool modulus = name == "Einf" || name.starts_with('g');
-    if (modulus) changes(row("Eprime"), k) = kLateralRatio;
-    if (name == "stiffening" && !form_.kernel.is_linear()) {
-      changes(row("kernel_stiffening"), k) = 1.0;
-    }
+    if (k < moduli) changes(row("Eprime"), k) = kLateralRatio;
+    if (k >= of_potential && !form_.kernel.is_linear())
+      changes(row(kernel_parameter(name)), k) = 1.0;
   }
   return changes;
-}
-
-std::string bond_parameter_key(std::string_view name) {
-  const char* unit = name.starts_with("tau") ? "_s" : name == "stiffening" ? "_m" : "_Pa";
-  return std::string(name) + unit;
 }
 
 }  // namespace tpm

@@ -26,9 +26,9 @@ struct SceneOrgan {
                                         const std::filesystem::path& folder);
 
 /// The parameters of a material that are fitted together, in this order: Einf, every g_j, with
-/// `times` every tau_j, and the stiffening length s if the bonds stiffen. The others follow: the
-/// lateral modulus is the instantaneous radial one, and a kernel that stiffens has the length of
-/// the potential.
+/// `times` every tau_j, and those of the potential's shape (the stiffening length s). The others
+/// follow: the lateral modulus is the instantaneous radial one, and a kernel that stiffens is the
+/// function of the potential.
 class FittedBonds {
  public:
   /// @param form material with the branches and the shapes; the values of what is fitted are not
@@ -54,8 +54,5 @@ class FittedBonds {
   BondMaterial form_;
   bool times_;
 };
-
-/// The key of such a parameter in files: its name and SI unit, "Einf_Pa".
-[[nodiscard]] std::string bond_parameter_key(std::string_view name);
 
 }  // namespace tpm

@@ -166,8 +166,7 @@ FitParameter about(std::string name, Unit unit, double start, double factor) {
   return p;
 }
 
-std::vector<FitParameter> fitted_parameters(const BondMaterial& start, bool fit_times,
-                                            double deepest_m) {
+std::vector<FitParameter> fitted_parameters(const BondMaterial& start, bool fit_times) {
   const Unit modulus = shown_unit(Dimension::stress);
   const double whole = start.instantaneous_Pa();
   std::vector<FitParameter> parameters{
@@ -183,9 +182,10 @@ std::vector<FitParameter> fitted_parameters(const BondMaterial& start, bool fit_
     parameters.push_back(about(fmt::format("tau{}", ++number), shown_unit(Dimension::time),
                                branch.relaxation_time_s, kTimeFactor));
   }
-  if (!start.potential.is_linear()) {
+  for (std::size_t k = 0; k < start.potential.parameters().size(); ++k) {
+    const MaterialParameter& p = start.potential.parameters()[k];
     parameters.push_back(
-        about("stiffening", shown_unit(Dimension::length), deepest_m, kStiffeningFactor));
+        about(p.name, shown_unit(p.dimension), start.potential.values()[k], kStiffeningFactor));
   }
   return parameters;
 }
@@ -387,13 +387,13 @@ OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, con
   BondMaterial start = by_correspondence(m, first, unit, where);
   const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
   if (options.stiffens.value_or(relaxing.bends)) {
-    start.potential = {ElongationShape::cubic, deepest};
+    start.potential = elongation_function("cubic", {deepest});
     if (options.branches_stiffen) start.kernel = start.potential;
   }
 
   const FittedOrgan organ(scene, where, folder, start);
   const OrganLessLaw function(organ.model(), motion, m, FittedBonds(start, options.fit_times));
-  fit_material(m, function, fitted_parameters(start, options.fit_times, deepest), where);
+  fit_material(m, function, fitted_parameters(start, options.fit_times), where);
   add_intervals(m, function, law, motion);
   compare(m, motion.protocol);
   m.scene = organ.scene_with(m.material);

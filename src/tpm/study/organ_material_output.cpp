@@ -38,9 +38,15 @@ Json matrix_json(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
-std::string quantity(double value, const char* unit) {
+std::string quantity(double value, std::string_view unit) {
   constexpr int kDigits = 10;
   return fmt::format("{} {}", shortest(rounded(value, kDigits)), unit);
+}
+
+/// Its name and SI unit: "Einf_Pa".
+std::string parameter_key(const FitParameter& parameter) {
+  const std::string_view symbol = si_symbol(parameter.unit.dimension);
+  return fmt::format("{}{}{}", parameter.name, symbol.empty() ? "" : "_", symbol);
 }
 
 ForceMismatch mismatch(const OrganMaterial& m, const std::vector<double>& force,
@@ -108,7 +114,17 @@ Json material_block(const BondMaterial& m, const Json& before) {
   if (!branches.empty()) block["branches"] = std::move(branches);
   const auto add_function = [&](const char* key, const ElongationFunction& function) {
     if (function.is_linear()) return;
-    block[key] = {{"shape", "cubic"}, {"stiffening", quantity(1e3 * function.length_m, "mm")}};
+    block[key] = {{"shape", function.shape_name()}};
+    for (std::size_t k = 0; k < function.parameters().size(); ++k) {
+      const MaterialParameter& p = function.parameters()[k];
+      const double value = function.values()[k];
+      if (p.dimension == Dimension::dimensionless) {
+        block[key][p.name] = value;
+        continue;
+      }
+      const Unit unit = shown_unit(p.dimension);
+      block[key][p.name] = quantity(value / unit.to_si, unit.symbol);
+    }
   };
   add_function("potential", m.potential);
   add_function("kernel", m.kernel);
@@ -175,8 +191,9 @@ Json to_json(const OrganMaterial& m) {
       entry["lower"] = rounded(*p.lower, kMaterialDigits);
       entry["upper"] = rounded(*p.upper, kMaterialDigits);
     }
-    parameters[bond_parameter_key(p.parameter.name)] = std::move(entry);
-    order.push_back(bond_parameter_key(p.parameter.name));
+    const std::string key = parameter_key(p.parameter);
+    parameters[key] = std::move(entry);
+    order.push_back(key);
   }
   json["parameters"] = std::move(parameters);
   if (m.covariance.size() > 0) {
