@@ -28,6 +28,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 # Lengths in inches, so that text keeps its size whatever the number of panels.
 PAGE_WIDTH, SINGLE_PAGE_WIDTH, PANEL_HEIGHT = 8.9, 6.1, 2.75
 LEFT, RIGHT, TOP, GAP, BELOW_AXIS = 0.62, 0.12, 0.32, 0.66, 0.50
+EDGE = 0.06  # between the title of an axis and what stands left of it
 LEGEND_ROW, NOTE_ROW = 0.172, 0.16
 MOST_ACROSS = 4  # panels; more go on below
 
@@ -290,6 +291,22 @@ def wrap(parts, per_row):
     return ["    ".join(parts[i:i + per_row]) for i in range(0, len(parts), per_row)]
 
 
+def keep_inside(page, axes, least):
+    """Narrows a panel whose tick labels are so wide that the title of its axis would stand left of `least` (inches)."""
+    box = axes.yaxis.get_tightbbox(page.canvas.get_renderer())
+    missing = least - box.x0 / page.dpi
+    if missing <= 0:
+        return
+    place, share = axes.get_position(), missing / page.get_figwidth()
+    axes.set_position([place.x0 + share, place.y0, place.width - share, place.height])
+
+
+def below_names(panels):
+    """More room below panels whose places have long names, which stand aslant."""
+    longest = max((len(name) for panel in panels for name in panel["x"].get("names", [])), default=0)
+    return max(0.0, 0.045 * longest + 0.10 - BELOW_AXIS)
+
+
 def draw_figure(figure):
     """The figure, laid out from the bottom: provenance, legend, panels."""
     if any(s["kind"] == "trail" for panel in figure["panels"] for s in panel["series"]):
@@ -303,10 +320,11 @@ def draw_figure(figure):
     if figure.get("note"):
         notes = textwrap.wrap(figure["note"], 70 if len(panels) == 1 else 120) + notes
     rows = -(-len(labels) // columns)
-    below = BELOW_AXIS + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08
+    below_axis = BELOW_AXIS + below_names(panels)
+    below = below_axis + rows * LEGEND_ROW + 0.10 + len(notes) * NOTE_ROW + 0.08
     across = min(len(panels), MOST_ACROSS)
     stacked = -(-len(panels) // across)
-    row_height = TOP + PANEL_HEIGHT + BELOW_AXIS
+    row_height = TOP + PANEL_HEIGHT + below_axis
     height = TOP + PANEL_HEIGHT + below + (stacked - 1) * row_height
     page = plt.figure(figsize=(width, height))
     panel_width = (width - LEFT - RIGHT - (across - 1) * GAP) / across
@@ -316,8 +334,9 @@ def draw_figure(figure):
         bottom = below + (stacked - 1 - i // across) * row_height
         axes = page.add_axes([left / width, bottom / height, panel_width / width, PANEL_HEIGHT / height])
         draw_panel(axes, panel, look, handles, narrow=across > 3)
+        keep_inside(page, axes, left - (GAP if i % across else LEFT) + EDGE)
     page.legend(handles.values(), handles.keys(), loc="upper left", ncol=columns, frameon=False, borderaxespad=0,
-                bbox_to_anchor=(LEFT / width, (below - BELOW_AXIS) / height), handlelength=2.2, labelspacing=0.45)
+                bbox_to_anchor=(LEFT / width, (below - below_axis) / height), handlelength=2.2, labelspacing=0.45)
     for i, note in enumerate(notes):
         page.text(LEFT / width, (0.08 + (len(notes) - 1 - i) * NOTE_ROW) / height, note, fontsize=7, color="#555555", va="bottom")
     return page

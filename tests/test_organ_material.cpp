@@ -30,7 +30,7 @@ LawFile two_branches(double k_inf) {
 }
 
 OrganMaterial on_liver(const LawFile& law, const OrganMaterialOptions& options = {}) {
-  return put_on_organ(law, testing::ramp_to_2_mm(), testing::liver_of_60(), "test", {}, options);
+  return put_on_organ(law, {testing::ramp_to_2_mm()}, testing::liver_of_60(), "test", {}, options);
 }
 
 }  // namespace
@@ -40,7 +40,7 @@ TEST_CASE("at small depths correspondence alone makes an organ answer as the law
   for (int i = 0; i <= 24; ++i) times.push_back(0.25 * i);
   const MaterialMotion shallow = motion_of_protocol(ramp_and_hold(2e-6, 2e-6, 5.0), times);
   const OrganMaterial m =
-      put_on_organ(two_branches(100.0), shallow, testing::liver_of_60(), "test", {}, {});
+      put_on_organ(two_branches(100.0), {shallow}, testing::liver_of_60(), "test", {}, {});
   CHECK(m.start.largest < 1e-3);  // what is left grows with the depth over the spacing
   CHECK(m.organ.largest <= m.start.largest);
 }
@@ -52,10 +52,11 @@ TEST_CASE("the written scene answers in a run as the fit says") {
   Json scene = m.scene;
   scene["protocol"] = {
       {"kind", "ramp_hold"}, {"depth", "2 mm"}, {"rate", "2 mm/s"}, {"hold", "5 s"}};
-  const Trajectory run = run_scene(parse_experiment(scene, "test", {}), m.time_s, false);
-  for (std::size_t i = 0; i < m.time_s.size(); ++i) {
+  const Trajectory run =
+      run_scene(parse_experiment(scene, "test", {}), m.courses.front().time_s, false);
+  for (std::size_t i = 0; i < m.courses.front().time_s.size(); ++i) {
     CHECK(run.response[static_cast<Eigen::Index>(i)] ==
-          Approx(m.organ_N[i]).margin(1e-5 * m.peak_N));
+          Approx(m.courses.front().organ_N[i]).margin(1e-5 * m.peak_N));
   }
 }
 
@@ -86,7 +87,7 @@ TEST_CASE("laws, motions and scenes that no organ can take are refused") {
   Json patch = testing::liver_of_60();
   patch["contacts"] = Json::parse(R"([{"kind": "patch", "radius": "30 mm"}])");
   CHECK_THAT(test::refusal_of([&] {
-               (void)put_on_organ(two_branches(100.0), testing::ramp_to_2_mm(), patch, "test", {},
+               (void)put_on_organ(two_branches(100.0), {testing::ramp_to_2_mm()}, patch, "test", {},
                                   {});
              }),
              Contains("more than one sphere"));

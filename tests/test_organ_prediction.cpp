@@ -45,12 +45,12 @@ Json prediction_star() {
 }
 
 OrganMaterial fitted_star(const LawFile& law) {
-  return put_on_organ(law, testing::ramp_to_2_mm(), prediction_star(), "test", {}, {});
+  return put_on_organ(law, {testing::ramp_to_2_mm()}, prediction_star(), "test", {}, {});
 }
 
 /// A liver of 60 spheres, fitted once.
 const OrganMaterial& fitted_organ() {
-  static const OrganMaterial once = put_on_organ(uncertain_law(), testing::ramp_to_2_mm(),
+  static const OrganMaterial once = put_on_organ(uncertain_law(), {testing::ramp_to_2_mm()},
                                                  testing::liver_of_60(), "test", {}, {});
   return once;
 }
@@ -121,7 +121,7 @@ TEST_CASE("a small depth on an organ has the law's band") {
   for (int i = 0; i <= 24; ++i) times.push_back(0.25 * i);
   const MaterialMotion shallow = motion_of_protocol(ramp_and_hold(2e-6, 2e-6, 5.0), times);
   const OrganOfLaw organ =
-      organ_of_law(put_on_organ(law, shallow, testing::liver_of_60(), "test", {}, {}), "test");
+      organ_of_law(put_on_organ(law, {shallow}, testing::liver_of_60(), "test", {}, {}), "test");
   const Protocol other = ramp_and_hold(1e-6, 4e-6, 5.0);
   const LawPrediction of_organ = predict_organ(organ, other, kAskedTimes, {});
   const LawPrediction of_law = predict_law(law, other, kAskedTimes, {});

@@ -23,6 +23,7 @@ struct MaterialCommand {
   RampOptions ramp;
   bool fit_times = false;
   std::string stiffening = "automatic";
+  std::string intervals = "law";
   std::string folder, output;
 };
 
@@ -31,12 +32,13 @@ OrganMaterialOptions material_options(const MaterialCommand& command) {
   options.fit_times = command.fit_times;
   if (command.stiffening != "automatic") options.stiffens = command.stiffening != "none";
   options.branches_stiffen = command.stiffening == "all";
+  options.intervals = parse_intervals(command.intervals, "--intervals");
   return options;
 }
 
-/// That of the recording or protocol named, else that of the scene.
-MaterialMotion chosen_motion(const MaterialCommand& command, const LawFile& law,
-                             const Json& scene) {
+/// Those of the recordings or the protocol named, else that of the scene.
+std::vector<MaterialMotion> chosen_motions(const MaterialCommand& command, const LawFile& law,
+                                           const Json& scene) {
   const RampOptions& ramp = command.ramp;
   const bool none = ramp.depth.empty() && ramp.rate.empty() && ramp.hold.empty() &&
                     command.recordings.files.empty();
@@ -46,22 +48,29 @@ MaterialMotion chosen_motion(const MaterialCommand& command, const LawFile& law,
                   "the recording that was fitted, or --depth, --rate and --hold");
     }
     const ProtocolFile own = parse_protocol_file(scene, command.scene);
-    return motion_of_protocol(own.protocol, own.times_s);
+    return {motion_of_protocol(own.protocol, own.times_s)};
   }
   if (const auto file = chosen_protocol(ramp, command.recordings.files)) {
-    return motion_of_protocol(file->protocol, file->times_s);
+    return {motion_of_protocol(file->protocol, file->times_s)};
   }
-  return motion_of_recording(law, read_recordings(command.recordings).front());
+  std::vector<MaterialMotion> motions;
+  for (const PreparedRecording& recording : read_recordings(command.recordings)) {
+    motions.push_back(motion_of_recording(law, recording));
+  }
+  return motions;
 }
 
 int run_material(const MaterialCommand& command, const Session& session) {
   will_write_into(command.folder, {"scene.json", "session.json", "material.json", "material.csv",
                                    "figures.json", "material.svg", "material.png"});
+  if (command.intervals == "profiles") {
+    will_write_into(command.folder, {"material_profiles.svg", "material_profiles.png"});
+  }
   const LawFile law = read_law(command.law);
   const Json scene = read_json(command.scene);
   check_schema(scene, "scene", command.scene);
   const OrganMaterial result =
-      put_on_organ(law, chosen_motion(command, law, scene), scene, command.scene,
+      put_on_organ(law, chosen_motions(command, law, scene), scene, command.scene,
                    std::filesystem::path(command.scene).parent_path(), material_options(command));
   if (!command.output.empty()) deliver(to_text(result.scene), command.output);
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
@@ -86,11 +95,10 @@ void add_material_command(CLI::App& app, Session& session) {
       ->add_option("SCENE", options->scene,
                    "An organ (JSON scene); its material is replaced, its regions stay")
       ->required();
-  command
-      ->add_option("PROTOCOL|RECORDING", options->recordings.files,
-                   "The motion: the recording that was fitted, or a JSON file with a block "
-                   "protocol; default: the scene's")
-      ->expected(0, 1);
+  command->add_option(
+      "PROTOCOL|RECORDING", options->recordings.files,
+      "The motion: recordings, each with a contact and an offset of its own, or a JSON "
+      "file with a block protocol; default: the scene's");
   add_ramp_options(*command, options->ramp);
   command->add_flag("--fit-times", options->fit_times,
                     "Fit relaxation times, too, instead of keeping the law's");
@@ -101,6 +109,14 @@ void add_material_command(CLI::App& app, Session& session) {
           "not for tpm hil), none, or automatic: equilibrium if the law stiffens with depth")
       ->check(CLI::IsMember({"automatic", "equilibrium", "all", "none"}))
       ->capture_default_str();
+  command
+      ->add_option(
+          "--intervals", options->intervals,
+          "law: fit to the law's force, intervals from its covariance; readings: fit to "
+          "the recordings, intervals from their scatter by derivatives; profiles: the same "
+          "by likelihood profiles (minutes)")
+      ->check(CLI::IsMember({"law", "readings", "profiles"}))
+      ->capture_default_str();
   command->add_option("--folder", options->folder,
                       "Write scene.json, session.json (for tpm hil run), material.json, "
                       "material.csv and the figure into this folder");
@@ -110,8 +126,7 @@ void add_material_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm fit recording.csv --folder fitted\n"
       "  tpm material fitted/law.json configs/liver_scene.json recording.csv --folder on_liver\n"
-      "  tpm hil run on_liver/session.json -o on_liver.tpmrec && tpm hil verify on_liver.tpmrec "
-      "--window \"0 s\"");
+      "  tpm hil run on_liver/session.json -o on_liver.tpmrec && tpm hil verify on_liver.tpmrec");
   command->callback([options, &session] {
     session.run = [options, &session] { return run_material(*options, session); };
   });

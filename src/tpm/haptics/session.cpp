@@ -418,7 +418,8 @@ HilSession read_session(const std::filesystem::path& file, const SessionChanges&
                   "--law FILE beside it: the law knows the depth at which contact began");
     }
     for (const char* key : {"indentations", "slides", "creep"}) json.erase(key);
-    json["motion"] = {{"recording", changes.motion.string()}};
+    // Named on a command line: beside the caller, not beside the session.
+    json["motion"] = {{"recording", std::filesystem::absolute(changes.motion).string()}};
   }
   HilSession session = parse_session(json, file.string(), file.parent_path());
   follow_surface(session);

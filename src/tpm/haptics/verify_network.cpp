@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "tpm/core/error.hpp"
+#include "tpm/core/progress.hpp"
 #include "tpm/curve/load.hpp"
 #include "tpm/haptics/verify_parts.hpp"
 #include "tpm/method/method.hpp"
@@ -45,6 +46,7 @@ void ask_cvode(Verification& v, const HilRecording& recording, const DrivenNetwo
   MethodSettings settings;
   settings.rule = StepRule::cvode_bdf;
   settings.tolerance = options.window_tolerance;
+  const Progress progress("second opinion by CVODE over the window", 1);
   const MethodRun run = network_problem(network, motion)->run(settings, times);
   if (run.end != MethodEnd::completed) {
     throw Error(ExitCode::numerical, recording.name,
@@ -161,8 +163,10 @@ Protocol cut_across(const Protocol& motion, double from_s, double from, double t
 /// The reference at the instants compared. Where it has no equilibrium it goes on from the last
 /// instant that has one, straight to the next at which the tissue is no deeper than there.
 void run_reference(Verification& v, const QuasiStatic& network, const Protocol& motion) {
+  Progress progress("the full network at the instants compared", v.time_s.size());
   try {
-    const QuasiStaticRun run = network.run(motion, v.time_s);
+    const QuasiStaticRun run =
+        network.run(motion, v.time_s, [&](const QuasiStaticState&) { progress.advance(); });
     v.reference_N.assign(run.response.begin(), run.response.end());
     v.reference_error_N = run.error_estimate;
     return;

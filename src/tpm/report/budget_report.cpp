@@ -31,7 +31,7 @@ Panel waterfall_panel(const ErrorBudget& b) {
   Panel panel;
   panel.title = fmt::format("adding up at {} s", significant(b.time_s[at], 4));
   panel.x = {"", "", false, 0.5, 1.5 + static_cast<double>(b.lines.size())};
-  panel.y = {"sum of the lines so far, of the peak", "%", false, {}, {}};
+  panel.y = {"sum so far, of the peak", "%", false, {}, {}};
   Series steps;
   steps.kind = Series::Kind::bracket;
   steps.label = "line";

@@ -15,27 +15,44 @@ namespace {
 
 constexpr double kWidestDrawn = 3.0;  // of the estimate; wider says nothing
 
+/// A parameter's line in pieces: where another law was the least it has a gap.
+struct BrokenLine {
+  std::vector<Series> pieces;
+  std::size_t last = 0;  ///< sample of its last point
+
+  void add(const std::string& name, std::size_t sample, double x, double y) {
+    if (pieces.empty() || sample != last + 1) {
+      pieces.push_back(line(name, {}, {}));
+      pieces.back().provenance = "derived";
+    }
+    pieces.back().x.push_back(x);
+    pieces.back().y.push_back(y);
+    last = sample;
+  }
+};
+
 /// Over the samples at which a law was the least.
 Panel width_panel(const Identification& id) {
   Panel panel;
   panel.x = {"time", "s", false, {}, {}};
   panel.y = {"half width of the interval", "% of the estimate", true, {}, {}};
   const std::size_t law = id.result().law;
-  std::map<std::string, Series> lines;
+  std::map<std::string, BrokenLine> lines;
   std::vector<std::string> order;
-  for (const IdentifiedSample& sample : id.history) {
+  for (std::size_t i = 0; i < id.history.size(); ++i) {
+    const IdentifiedSample& sample = id.history[i];
     if (sample.law != law) continue;
     for (const SequentialParameter& p : sample.estimate.parameters) {
       const double width = p.relative_half_width();
       if (p.nuisance || !(width < kWidestDrawn) || !(width > 0.0)) continue;
-      const auto [at, added] = lines.try_emplace(p.parameter.name, line(p.parameter.name, {}, {}));
+      const auto [at, added] = lines.try_emplace(p.parameter.name);
       if (added) order.push_back(p.parameter.name);
-      at->second.provenance = "derived";
-      at->second.x.push_back(sample.time_s);
-      at->second.y.push_back(100.0 * width);
+      at->second.add(p.parameter.name, i, sample.time_s, 100.0 * width);
     }
   }
-  for (const std::string& name : order) panel.series.push_back(std::move(lines.at(name)));
+  for (const std::string& name : order) {
+    for (Series& piece : lines.at(name).pieces) panel.series.push_back(std::move(piece));
+  }
   if (panel.series.empty()) return panel;
   double least = 100.0 * id.options.target, most = least, from = id.end_s, to = id.begin_s;
   for (const Series& drawn : panel.series) {

@@ -9,17 +9,84 @@
 namespace tpm {
 namespace {
 
-Series less(const OrganMaterial& m, const char* label, const std::vector<double>& force,
-            const std::vector<double>& target) {
+Series less(const OrganMaterial& m, const char* label, std::vector<double> MaterialCourse::*force) {
   Series s;
   s.kind = Series::Kind::points;
   s.label = label;
   s.provenance = "derived";
-  for (std::size_t i = 0; i < force.size(); ++i) {
-    s.x.push_back(1e3 * m.depth_m[i]);
-    s.y.push_back(100.0 * (force[i] - target[i]) / m.peak_N);
+  for (const MaterialCourse& c : m.courses) {
+    for (std::size_t i = 0; i < c.time_s.size(); ++i) {
+      s.x.push_back(1e3 * c.depth_m[i]);
+      s.y.push_back(100.0 * ((c.*force)[i] - c.law_N[i]) / m.peak_N);
+    }
   }
   return s;
+}
+
+Panel force_panel(const MaterialCourse& c, bool titled) {
+  Panel forces;
+  if (titled) forces.title = c.name;
+  forces.x = {"time", "s", false, {}, {}};
+  forces.y = {"contact force", "N", false, {}, {}};
+  if (!c.measured_N.empty()) {
+    Series readings = line("recording", c.time_s, c.measured_N);
+    readings.kind = Series::Kind::points;
+    readings.provenance = "measured";
+    forces.series.push_back(std::move(readings));
+  }
+  const auto add = [&](const char* label, const std::vector<double>& force) {
+    Series s = line(label, c.time_s, force);
+    s.provenance = "model";
+    forces.series.push_back(std::move(s));
+  };
+  add("law", c.law_N);
+  add("organ, by correspondence", c.correspondence_N);
+  add("organ, fitted", c.organ_N);
+  return forces;
+}
+
+Panel material_profile_panel(const ReadingsFit& readings, const ParameterResult& result) {
+  const FitParameter& p = result.parameter;
+  Series profile = line("profile", {}, {});
+  const double ceiling = 2.0 * readings.rise;  // above it a profile only squeezes what matters
+  for (const ProfilePoint& point : result.profile.points) {
+    const double risen = point.deviance - readings.fit.best.deviance;
+    if (risen > ceiling) continue;
+    profile.x.push_back(point.natural / p.unit.to_si);
+    profile.y.push_back(risen / readings.rise);
+  }
+  Series limit = line(fmt::format("limit of the {:.4g} % interval", 100.0 * readings.level),
+                      {profile.x.front(), profile.x.back()}, {1.0, 1.0});
+  Series best;
+  best.kind = Series::Kind::points;
+  best.label = "best fit";
+  best.provenance = "derived";
+  best.x = {result.estimate / p.unit.to_si};
+  best.y = {0.0};
+  Panel panel{"",
+              {p.name, p.unit.symbol, p.scale == Scale::log, {}, {}},
+              {"rise of the deviance over its limit", "", false, 0.0, 1.6},
+              {}};
+  panel.series = {std::move(profile), std::move(limit), std::move(best)};
+  return panel;
+}
+
+/// Nothing if no profiles were walked.
+std::vector<Figure> material_figures(const OrganMaterial& m) {
+  std::vector<Figure> figures{organ_material_figure(m)};
+  if (m.intervals != MaterialIntervals::profiles) return figures;
+  Figure figure;
+  figure.id = "material_profiles";
+  figure.title = fmt::format("Profiles of {} on an organ", m.law);
+  figure.caption =
+      "Each parameter of the bonds is held, and the others, contacts and offsets among them, are "
+      "fitted again to the readings.";
+  for (std::size_t i = 0; i < m.parameters.size(); ++i) {
+    const ParameterResult& p = m.readings->fit.parameters[i];
+    if (!p.profile.points.empty()) figure.panels.push_back(material_profile_panel(*m.readings, p));
+  }
+  figures.push_back(std::move(figure));
+  return figures;
 }
 
 }  // namespace
@@ -33,29 +100,15 @@ Figure organ_material_figure(const OrganMaterial& m) {
       "rms); the start by correspondence within {} %.",
       significant(100.0 * m.organ.largest, 3), significant(100.0 * m.organ.rms, 3),
       significant(100.0 * m.start.largest, 3));
-  Panel forces;
-  forces.x = {"time", "s", false, {}, {}};
-  forces.y = {"contact force", "N", false, {}, {}};
-  if (!m.measured_N.empty()) {
-    Series readings = line("recording", m.time_s, m.measured_N);
-    readings.kind = Series::Kind::points;
-    readings.provenance = "measured";
-    forces.series.push_back(std::move(readings));
+  for (const MaterialCourse& c : m.courses) {
+    figure.panels.push_back(force_panel(c, m.courses.size() > 1));
   }
-  const auto add = [&](const char* label, const std::vector<double>& force) {
-    Series s = line(label, m.time_s, force);
-    s.provenance = "model";
-    forces.series.push_back(std::move(s));
-  };
-  add("law", m.law_N);
-  add("organ, by correspondence", m.correspondence_N);
-  add("organ, fitted", m.organ_N);
   Panel misses;
   misses.x = {"depth", "mm", false, {}, {}};
   misses.y = {"organ less law, of the peak", "%", false, {}, {}};
-  misses.series = {less(m, "by correspondence less law", m.correspondence_N, m.law_N),
-                   less(m, "fitted less law", m.organ_N, m.law_N)};
-  figure.panels = {std::move(forces), std::move(misses)};
+  misses.series = {less(m, "by correspondence less law", &MaterialCourse::correspondence_N),
+                   less(m, "fitted less law", &MaterialCourse::organ_N)};
+  figure.panels.push_back(std::move(misses));
   return figure;
 }
 
@@ -66,7 +119,7 @@ std::vector<std::string> write_organ_material_report(const std::filesystem::path
   write_file(folder / files[1], to_text(result.session));
   write_file(folder / files[2], to_text(to_json(result)));
   write_file(folder / files[3], to_csv(result));
-  const auto drawn = write_figures(folder, {organ_material_figure(result)});
+  const auto drawn = write_figures(folder, material_figures(result));
   files.insert(files.end(), drawn.begin(), drawn.end());
   return files;
 }

@@ -8,22 +8,29 @@
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/core/word_table.hpp"
 #include "tpm/fit/least_squares.hpp"
 #include "tpm/law/law_model.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
+#include "tpm/study/prediction_parts.hpp"
 
 namespace tpm {
 namespace {
 
 constexpr double kMotionWithin = 2e-3;      // of the depth
-constexpr std::size_t kMostTimes = 200;     // that the forces are compared at
+constexpr std::size_t kMostTimes = 200;     // of a motion, that the forces are compared at
 constexpr double kBoundFactor = 1e4;        // of moduli about their start
 constexpr double kTimeFactor = 100.0;       // of relaxation times
 constexpr double kStiffeningFactor = 20.0;  // of the deepest depth
 constexpr double kUnit_Pa = 1e3;
 constexpr double kAsked = 1e-3;  // of the peak: a unit of the residuals
+
+constexpr auto kIntervalsWords =
+    std::to_array<Word<MaterialIntervals>>({{MaterialIntervals::law, "law"},
+                                            {MaterialIntervals::readings, "readings"},
+                                            {MaterialIntervals::profiles, "profiles"}});
 
 /// The relaxation of a law in parallel form, and whether its kernel or tension bends.
 struct Relaxing {
@@ -111,46 +118,63 @@ Json FittedOrgan::scene_with(const BondMaterial& material) const {
   return scene;
 }
 
-/// Organ less law over the motion, in thousandths of the peak, by the parameters of the bonds.
+/// Organ less law over the motions, in thousandths of the peak, by the parameters of the bonds.
 class OrganLessLaw final : public ResidualFunction {
  public:
-  OrganLessLaw(const OrganModel& model, const MaterialMotion& motion, const OrganMaterial& target,
-               FittedBonds bonds)
-      : model_(model), motion_(motion), target_(target), bonds_(std::move(bonds)) {}
+  OrganLessLaw(const OrganModel& model, const std::vector<MaterialMotion>& motions,
+               const OrganMaterial& target, FittedBonds bonds)
+      : model_(model), motions_(motions), target_(target), bonds_(std::move(bonds)) {}
 
   [[nodiscard]] const FittedBonds& bonds() const { return bonds_; }
 
-  [[nodiscard]] std::vector<double> force(const BondMaterial& m) const {
-    const Response response = model_.respond(motion_.protocol, motion_.time_s,
-                                             FittedBonds::values(model_, m), Want::values);
+  /// Along every motion.
+  [[nodiscard]] std::vector<std::vector<double>> forces(const BondMaterial& m) const {
+    std::vector<std::vector<double>> all;
+    for (const MaterialMotion& motion : motions_) all.push_back(force(m, motion.protocol, motion));
+    return all;
+  }
+  [[nodiscard]] std::vector<double> force(const BondMaterial& m, const Protocol& protocol,
+                                          const MaterialMotion& motion) const {
+    const Response response =
+        model_.respond(protocol, motion.time_s, FittedBonds::values(model_, m), Want::values);
     return {response.value.begin(), response.value.end()};
   }
 
-  [[nodiscard]] Eigen::Index residual_count() const override { return std::ssize(motion_.time_s); }
+  [[nodiscard]] Eigen::Index residual_count() const override {
+    Eigen::Index rows = 0;
+    for (const MaterialMotion& motion : motions_) rows += std::ssize(motion.time_s);
+    return rows;
+  }
 
   [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                               RowMatrix* jacobian) const override {
     const std::vector<double> values = FittedBonds::values(model_, bonds_.material(natural));
     Eigen::MatrixXd along = bonds_.along(model_);
     if (jacobian == nullptr) along.resize(along.rows(), 0);
-    Response response;
+    const double unit = kAsked * target_.peak_N;
+    residual.resize(residual_count());
+    if (jacobian != nullptr) jacobian->resize(residual_count(), along.cols());
+    Eigen::Index row = 0;
     try {
-      response = model_.respond_along(motion_.protocol, motion_.time_s, values, along);
+      for (std::size_t i = 0; i < motions_.size(); ++i) {
+        const Response response =
+            model_.respond_along(motions_[i].protocol, motions_[i].time_s, values, along);
+        const std::vector<double>& law = target_.courses[i].law_N;
+        const auto n = std::ssize(law);
+        residual.segment(row, n) = (response.value - Eigen::VectorXd::Map(law.data(), n)) / unit;
+        if (jacobian != nullptr) jacobian->middleRows(row, n) = response.sensitivity / unit;
+        row += n;
+      }
     } catch (const Error& error) {  // an organ that buckles: the search turns away
       if (error.code() != ExitCode::numerical) throw;
       return false;
     }
-    const double unit = kAsked * target_.peak_N;
-    residual =
-        (response.value - Eigen::VectorXd::Map(target_.law_N.data(), std::ssize(target_.law_N))) /
-        unit;
-    if (jacobian != nullptr) *jacobian = response.sensitivity / unit;
     return residual.allFinite();
   }
 
  private:
   const OrganModel& model_;
-  const MaterialMotion& motion_;
+  const std::vector<MaterialMotion>& motions_;
   const OrganMaterial& target_;
   FittedBonds bonds_;
 };
@@ -190,30 +214,37 @@ std::vector<FitParameter> fitted_parameters(const BondMaterial& start, bool fit_
   return parameters;
 }
 
-/// Derivatives of the law's force by the coordinates of its uncertainty; those that belong to the
-/// recording and not to the material are 0.
-Eigen::MatrixXd law_slopes(const LawFile& law, const MaterialMotion& motion) {
+/// Derivatives of the law's force by the coordinates of its uncertainty, along all motions; those
+/// that belong to the recording and not to the material are 0.
+Eigen::MatrixXd law_slopes(const LawFile& law, const std::vector<MaterialMotion>& motions,
+                           Eigen::Index rows) {
   const LawModel model(law.spec);
   const LawUncertainty& u = *law.uncertainty;
   const LawFile plain = at_surface(law);
-  const Response r =
-      model.respond(motion.protocol, motion.time_s, plain.values, Want::values_and_sensitivity);
-  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(r.value.size(), std::ssize(u.place));
-  for (std::size_t i = 0; i < u.place.size(); ++i) {
-    if (model.law_parameters()[u.place[i]].nuisance) continue;
-    slopes.col(static_cast<Eigen::Index>(i)) =
-        r.sensitivity.col(static_cast<Eigen::Index>(u.place[i])) *
-        coordinate_slope(u.coordinate[i], law.values[u.place[i]]);
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(rows, std::ssize(u.place));
+  Eigen::Index row = 0;
+  for (const MaterialMotion& motion : motions) {
+    const Response r =
+        model.respond(motion.protocol, motion.time_s, plain.values, Want::values_and_sensitivity);
+    for (std::size_t i = 0; i < u.place.size(); ++i) {
+      if (model.law_parameters()[u.place[i]].nuisance) continue;
+      slopes.block(row, static_cast<Eigen::Index>(i), r.value.size(), 1) =
+          r.sensitivity.col(static_cast<Eigen::Index>(u.place[i])) *
+          coordinate_slope(u.coordinate[i], law.values[u.place[i]]);
+    }
+    row += r.value.size();
   }
   return slopes;
 }
 
-void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile& law,
-                   const MaterialMotion& motion) {
+/// How the bonds follow the law's parameters, and the intervals that follow from its covariance
+/// where the readings give none.
+void carry_uncertainty(OrganMaterial& m, const OrganLessLaw& function, const LawFile& law,
+                       const std::vector<MaterialMotion>& motions) {
   std::vector<double> natural;
   for (const OrganMaterialParameter& p : m.parameters) natural.push_back(p.value);
   if (!law.uncertainty) {
-    m.flags.emplace_back("the law carries no uncertainty: no intervals");
+    if (!m.readings) m.flags.emplace_back("the law carries no uncertainty: no intervals");
     return;
   }
   Eigen::VectorXd residual;
@@ -228,13 +259,14 @@ void add_intervals(OrganMaterial& m, const OrganLessLaw& function, const LawFile
   }
   const Eigen::MatrixXd j = jacobian(Eigen::all, free);
   const Eigen::MatrixXd gram = j.transpose() * j;
-  const Eigen::MatrixXd slopes = law_slopes(law, motion);
+  const Eigen::MatrixXd slopes = law_slopes(law, motions, jacobian.rows());
   m.follows = Eigen::MatrixXd::Zero(std::ssize(natural), slopes.cols());
   const Eigen::MatrixXd d = solve_symmetric(gram, j.transpose() * slopes);
   m.follows(free, Eigen::all) = d;
   m.covariance = m.follows * law.uncertainty->covariance * m.follows.transpose();
-  m.level = law.uncertainty->level;
   m.quantile = law.uncertainty->quantile();
+  if (m.readings) return;
+  m.level = law.uncertainty->level;
   for (const Eigen::Index i : free) {
     OrganMaterialParameter& p = m.parameters[static_cast<std::size_t>(i)];
     const double theta = p.parameter.theta(p.value);
@@ -261,32 +293,58 @@ Protocol in_few_pieces(const std::vector<double>& time_s, const std::vector<doub
   return motion;
 }
 
+std::string_view intervals_name(MaterialIntervals intervals) noexcept {
+  return entry_of(kIntervalsWords, intervals).text;
+}
+
+MaterialIntervals parse_intervals(std::string_view text, std::string_view where) {
+  return parse_word(kIntervalsWords, "kind of intervals", text, where);
+}
+
+namespace {
+
+/// The law's own contact and offset if it was fitted to this recording alone; else those that suit
+/// the recording best.
+RecordingPlacement placement_of(const LawFile& law, const PreparedRecording& recording) {
+  const std::string& sha256 = recording.recording.header.sha256;
+  const bool own = law.uncertainty && law.uncertainty->data.size() == 1 && !sha256.empty() &&
+                   law.uncertainty->data.front().sha256 == sha256;
+  const std::vector<double> values = own ? law.values : place_recording(law, recording).values;
+  return {values[values.size() - 2], values.back()};
+}
+
+}  // namespace
+
 MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& recording) {
   const Recording& r = recording.recording;
-  const std::vector<LawParameter> table = law_parameters(law.spec);
-  double contact = 0.0, offset = 0.0;
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    if (table[i].name == "contact") contact = law.values[i];
-    if (table[i].name == "offset") offset = law.values[i];
+  if (r.drive_quantity != law.spec.drive || r.response_quantity != law.spec.response) {
+    throw bad_input(fmt::format("recording '{}'", recording.name),
+                    fmt::format("{} over {}", quantity_name(r.response_quantity),
+                                quantity_name(r.drive_quantity)),
+                    fmt::format("{} over {}, as the law answers", quantity_name(law.spec.response),
+                                quantity_name(law.spec.drive)));
   }
-  std::vector<double> time_s, depth_m, force_N;
+  const RecordingPlacement placement = placement_of(law, recording);
+  std::vector<double> time_s, drive_m, force_N;
   for (std::size_t i = 0; i < r.time_s.size() && r.time_s[i] <= recording.to_s; ++i) {
     if (r.time_s[i] < recording.from_s) continue;
     time_s.push_back(r.time_s[i]);
-    depth_m.push_back(std::max(r.drive[i] - contact, 0.0));
-    force_N.push_back(r.response[i] - offset);
+    drive_m.push_back(r.drive[i]);
+    force_N.push_back(r.response[i] - placement.offset_N);
   }
-  if (!(*std::max_element(depth_m.begin(), depth_m.end()) > 0.0)) {
+  if (!(*std::max_element(drive_m.begin(), drive_m.end()) > placement.contact_m)) {
     throw bad_input(fmt::format("recording '{}'", recording.name), "does not press the tissue",
                     "a depth beyond the law's contact");
   }
-  MaterialMotion motion{
-      in_few_pieces(time_s, depth_m, 0.0), {}, {}, fmt::format("along {}", recording.name)};
+  const Protocol drive = in_few_pieces(time_s, drive_m, placement.contact_m);
+  MaterialMotion motion{recording.name, beyond_contact(drive, placement.contact_m), {}};
   const std::size_t stride = 1 + time_s.size() / kMostTimes;
   for (std::size_t i = 0; i < time_s.size(); i += stride) {
     motion.time_s.push_back(time_s[i]);
     motion.measured_N.push_back(force_N[i]);
   }
+  motion.drive = drive;
+  motion.placement = placement;
   return motion;
 }
 
@@ -297,21 +355,29 @@ MaterialMotion motion_of_protocol(const Protocol& protocol, std::vector<double> 
   std::vector<double> times;
   const std::size_t stride = 1 + times_s.size() / kMostTimes;
   for (std::size_t i = 0; i < times_s.size(); i += stride) times.push_back(times_s[i]);
-  return {protocol, std::move(times), {}, "along the protocol"};
+  return {{}, protocol, std::move(times)};
 }
 
 namespace {
 
-OrganMaterial law_along(const LawFile& law, const MaterialMotion& motion) {
+OrganMaterial law_along(const LawFile& law, const std::vector<MaterialMotion>& motions) {
   OrganMaterial m;
   m.law = law_name(law.spec);
   m.fitted_law = law;
-  m.motion = motion.words;
-  m.time_s = motion.time_s;
-  m.measured_N = motion.measured_N;
-  for (const double t : m.time_s) m.depth_m.push_back(value_at(motion.protocol, t));
-  m.law_N = law_stage(at_surface(law), motion.protocol, m.time_s).force_N;
-  m.peak_N = *std::max_element(m.law_N.begin(), m.law_N.end());
+  const LawFile plain = at_surface(law);
+  std::vector<std::string> names;
+  for (const MaterialMotion& motion : motions) {
+    names.push_back(motion.name.empty() ? "the protocol" : motion.name);
+    MaterialCourse& course = m.courses.emplace_back();
+    course.name = motion.name;
+    course.time_s = motion.time_s;
+    course.measured_N = motion.measured_N;
+    course.by_law = course.by_organ = motion.placement;
+    for (const double t : course.time_s) course.depth_m.push_back(value_at(motion.protocol, t));
+    course.law_N = law_stage(plain, motion.protocol, course.time_s).force_N;
+    m.peak_N = std::max(m.peak_N, *std::max_element(course.law_N.begin(), course.law_N.end()));
+  }
+  m.motion = fmt::format("along {}", fmt::join(names, ", "));
   if (m.peak_N > 0.0) return m;
   throw bad_input(fmt::format("law {}", m.law), "answers the motion without a force",
                   "a motion that presses");
@@ -335,27 +401,32 @@ BondMaterial unit_material(const Relaxing& relaxing) {
 /// The factor on all moduli, and with it on the force, that comes nearest to the law.
 BondMaterial by_correspondence(OrganMaterial& m, const OrganLessLaw& organ, BondMaterial unit,
                                std::string_view where) {
-  m.correspondence_N = organ.force(unit);
+  const std::vector<std::vector<double>> forces = organ.forces(unit);
   double product = 0.0, squares = 0.0;
-  for (std::size_t i = 0; i < m.law_N.size(); ++i) {
-    product += m.correspondence_N[i] * m.law_N[i];
-    squares += m.correspondence_N[i] * m.correspondence_N[i];
+  for (std::size_t k = 0; k < forces.size(); ++k) {
+    m.courses[k].correspondence_N = forces[k];
+    for (std::size_t i = 0; i < forces[k].size(); ++i) {
+      product += forces[k][i] * m.courses[k].law_N[i];
+      squares += forces[k][i] * forces[k][i];
+    }
   }
   const double factor = product / squares;
   if (!(factor > 0.0) || !std::isfinite(factor)) {
     throw Error(ExitCode::numerical, std::string(where), "the organ does not answer the motion",
                 "a contact sphere that is not held");
   }
-  for (double& f : m.correspondence_N) f *= factor;
+  for (MaterialCourse& course : m.courses) {
+    for (double& f : course.correspondence_N) f *= factor;
+  }
   unit.equilibrium_Pa *= factor;
   for (auto& branch : unit.branches) branch.modulus_Pa *= factor;
   unit.lateral_Pa *= factor;
   return unit;
 }
 
-/// Finds the material near a start, and how it answers.
-void fit_material(OrganMaterial& m, const OrganLessLaw& function,
-                  const std::vector<FitParameter>& parameters, std::string_view where) {
+/// Finds the material near a start whose force is the law's.
+void fit_to_law(OrganMaterial& m, const OrganLessLaw& function,
+                const std::vector<FitParameter>& parameters, std::string_view where) {
   std::vector<double> begin;
   for (const FitParameter& p : parameters) begin.push_back(p.start);
   const Minimum best = minimise_near(function, parameters, begin);
@@ -363,39 +434,109 @@ void fit_material(OrganMaterial& m, const OrganLessLaw& function,
     throw Error(ExitCode::numerical, std::string(where), "the organ's material was not found",
                 "an organ that stands at the depths of the motion");
   }
-  m.material = function.bonds().material(best.natural);
-  m.organ_N = function.force(m.material);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const FitParameter& p = parameters[i];
-    const bool bound = p.at_lower(best.natural[i]) || p.at_upper(best.natural[i]);
-    m.parameters.push_back({p, p.start, best.natural[i], {}, {}, bound});
-    if (bound) m.flags.push_back(fmt::format("{} stands on a bound of its search", p.name));
+    m.parameters.push_back(
+        {parameters[i], parameters[i].start, best.natural[i], best.natural[i], {}, {}, false});
   }
   if (!best.converged) m.flags.emplace_back("the fit ended before it converged");
 }
 
+/// Goes on from there to the readings themselves.
+void go_on_to_readings(OrganMaterial& m, const OrganLessLaw& function, const OrganModel& model,
+                       const std::vector<MaterialMotion>& motions, bool profiles) {
+  std::vector<FitParameter> parameters;
+  for (const OrganMaterialParameter& p : m.parameters) {
+    parameters.push_back(p.parameter);
+    parameters.back().start = p.by_law;
+  }
+  std::vector<OrganReadings> recordings;
+  for (const MaterialMotion& motion : motions) {
+    const auto [contact, offset] = motion.placement;
+    OrganReadings r{*motion.drive, motion.time_s, motion.measured_N, contact, offset};
+    for (double& f : r.force_N) f += offset;
+    recordings.push_back(std::move(r));
+  }
+  ReadingsFit readings = fit_to_readings(model, function.bonds(), parameters, recordings, profiles);
+  const std::vector<ParameterResult>& found = readings.fit.parameters;
+  for (std::size_t i = 0; i < m.parameters.size(); ++i) {
+    m.parameters[i].value = found[i].estimate;
+    m.parameters[i].lower = found[i].lower;
+    m.parameters[i].upper = found[i].upper;
+  }
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const std::size_t place = m.parameters.size() + 2 * i;
+    m.courses[i].by_organ = {found[place].estimate, found[place + 1].estimate};
+    for (const std::size_t k : {place, place + 1}) {
+      if (!found[k].at_lower_bound && !found[k].at_upper_bound) continue;
+      m.flags.push_back(fmt::format("{} stands on a bound of its search", found[k].parameter.name));
+    }
+  }
+  m.level = readings.level;
+  m.readings = std::move(readings);
+}
+
+/// How the organ answers with the material that was found.
+void answer(OrganMaterial& m, const OrganLessLaw& function,
+            const std::vector<MaterialMotion>& motions) {
+  std::vector<double> natural;
+  for (OrganMaterialParameter& p : m.parameters) {
+    natural.push_back(p.value);
+    p.at_bound = p.parameter.at_lower(p.value) || p.parameter.at_upper(p.value);
+    if (!p.at_bound) continue;
+    m.flags.push_back(fmt::format("{} stands on a bound of its search", p.parameter.name));
+  }
+  m.material = function.bonds().material(natural);
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    MaterialCourse& course = m.courses[i];
+    const MaterialMotion& motion = motions[i];
+    const Protocol pressed =
+        m.readings ? beyond_contact(*motion.drive, course.by_organ.contact_m) : motion.protocol;
+    course.organ_N = function.force(m.material, pressed, motion);
+    for (double& f : course.organ_N) f += course.by_organ.offset_N - course.by_law.offset_N;
+  }
+}
+
+void require_recordings(const std::vector<MaterialMotion>& motions) {
+  for (const MaterialMotion& motion : motions) {
+    if (motion.drive) continue;
+    throw bad_input("material", "intervals of readings along a protocol",
+                    "the recording that was fitted, or intervals of the law");
+  }
+}
+
 }  // namespace
 
-OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion, const Json& scene,
-                           std::string_view where, const std::filesystem::path& folder,
+OrganMaterial put_on_organ(const LawFile& law, const std::vector<MaterialMotion>& motions,
+                           const Json& scene, std::string_view where,
+                           const std::filesystem::path& folder,
                            const OrganMaterialOptions& options) {
   const Relaxing relaxing = relaxing_of(law);
-  OrganMaterial m = law_along(law, motion);
+  if (options.intervals != MaterialIntervals::law) require_recordings(motions);
+  OrganMaterial m = law_along(law, motions);
+  m.intervals = options.intervals;
   const BondMaterial unit = unit_material(relaxing);
   const FittedOrgan plain(scene, where, folder, unit);
-  const OrganLessLaw first(plain.model(), motion, m, FittedBonds(unit, false));
+  const OrganLessLaw first(plain.model(), motions, m, FittedBonds(unit, false));
   BondMaterial start = by_correspondence(m, first, unit, where);
-  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
+  double deepest = 0.0;
+  for (const MaterialMotion& motion : motions) {
+    deepest = std::max(deepest, motion.protocol.peak());
+  }
   if (options.stiffens.value_or(relaxing.bends)) {
     start.potential = elongation_function("cubic", {deepest});
     if (options.branches_stiffen) start.kernel = start.potential;
   }
 
   const FittedOrgan organ(scene, where, folder, start);
-  const OrganLessLaw function(organ.model(), motion, m, FittedBonds(start, options.fit_times));
-  fit_material(m, function, fitted_parameters(start, options.fit_times), where);
-  add_intervals(m, function, law, motion);
-  compare(m, motion.protocol);
+  const OrganLessLaw function(organ.model(), motions, m, FittedBonds(start, options.fit_times));
+  fit_to_law(m, function, fitted_parameters(start, options.fit_times), where);
+  if (options.intervals != MaterialIntervals::law) {
+    go_on_to_readings(m, function, organ.model(), motions,
+                      options.intervals == MaterialIntervals::profiles);
+  }
+  answer(m, function, motions);
+  carry_uncertainty(m, function, law, motions);
+  compare(m, motions);
   m.scene = organ.scene_with(m.material);
   add_protocol_and_session(m);
   return m;

@@ -9,26 +9,47 @@
 #include "tpm/material/bond_material.hpp"
 #include "tpm/protocol/protocol.hpp"
 #include "tpm/store/json.hpp"
+#include "tpm/study/organ_readings.hpp"
 #include "tpm/study/recording_setup.hpp"
 
 namespace tpm {
 
-/// The motion under which an organ is to answer as a law does. Depths count from the surface.
+/// Contact point and zero error of a recording.
+struct RecordingPlacement {
+  double contact_m = 0.0, offset_N = 0.0;
+};
+
+/// The motion under which an organ is to answer as a law does.
 struct MaterialMotion {
-  Protocol protocol;
+  std::string name;   ///< of the recording; empty: a protocol
+  Protocol protocol;  ///< depths from the surface
   std::vector<double> time_s;
   /// Of a recording: its readings less the law's offset, N, at `time_s`; else empty.
-  std::vector<double> measured_N;
-  std::string words;  ///< "along recording.csv"
+  std::vector<double> measured_N = {};
+  /// Of a recording: its drive as recorded. `protocol` is what lies beyond the law's contact.
+  std::optional<Protocol> drive = std::nullopt;
+  RecordingPlacement placement = {};  ///< of the recording, by the law
 };
 
 /// The motion of a recording's ramp and hold, in as few straight pieces as keep it within 0.2 % of
-/// its depth; the law's contact is taken off.
+/// its depth. Contact and offset are those of the law if it was fitted to this recording alone;
+/// else they are found for it, the law held.
 [[nodiscard]] MaterialMotion motion_of_recording(const LawFile& law,
                                                  const PreparedRecording& recording);
 /// @param times_s rising, within the protocol
 [[nodiscard]] MaterialMotion motion_of_protocol(const Protocol& protocol,
                                                 std::vector<double> times_s);
+
+/// What the bonds are fitted to, and where their intervals come from.
+enum class MaterialIntervals {
+  law,       ///< fitted to the law's force; the law's covariance, carried over to the bonds
+  readings,  ///< fitted to the readings; their scatter, from derivatives at the estimate
+  profiles,  ///< fitted to the readings; likelihood profiles
+};
+
+/// "law", "readings", "profiles".
+[[nodiscard]] std::string_view intervals_name(MaterialIntervals intervals) noexcept;
+[[nodiscard]] MaterialIntervals parse_intervals(std::string_view text, std::string_view where);
 
 struct OrganMaterialOptions {
   bool fit_times = false;  ///< relaxation times, too; else those of the law are kept
@@ -36,14 +57,17 @@ struct OrganMaterialOptions {
   std::optional<bool> stiffens;
   /// The branches act on the stiffening W, too, not on l: servo models do not take that.
   bool branches_stiffen = false;
+  MaterialIntervals intervals = MaterialIntervals::law;
 };
 
 /// One fitted parameter of the bonds, SI.
 struct OrganMaterialParameter {
   FitParameter parameter;
-  double start = 0.0;  ///< by correspondence
-  double value = 0.0;
-  /// What the law's uncertainty leaves open; none if the law carries none, or at a bound.
+  double start = 0.0;   ///< by correspondence
+  double by_law = 0.0;  ///< fitted to the law's force
+  double value = 0.0;   ///< the same, unless the readings were fitted
+  /// Of the interval. None: the law carries no uncertainty, the value stands on a bound, or the
+  /// readings do not limit it on that side.
   std::optional<double> lower, upper;
   bool at_bound = false;
 };
@@ -52,24 +76,38 @@ struct OrganMaterialParameter {
 struct ForceMismatch {
   double largest = 0.0, rms = 0.0;
   double at_s = 0.0, depth_m = 0.0, rate_m_per_s = 0.0;  ///< where it is largest
+  std::string recording{};                               ///< and in which
+};
+
+/// The forces along one motion. Those of a recording are less the law's offset.
+struct MaterialCourse {
+  std::string name;  ///< of the recording; empty: a protocol
+  std::vector<double> time_s, depth_m, law_N, correspondence_N, organ_N, measured_N;
+  RecordingPlacement by_law;    ///< that of the law
+  RecordingPlacement by_organ;  ///< that of the organ: another one if the readings were fitted
+  ForceMismatch organ;          ///< fitted organ less law
+  std::optional<ForceMismatch> law_to_recording, organ_to_recording;
 };
 
 /// A law put on an organ.
 struct OrganMaterial {
   std::string law;
   LawFile fitted_law;  ///< with what its fit knows of it
-  std::string motion;
+  std::string motion;  ///< "along recording.csv"
   BondMaterial material;
   std::vector<OrganMaterialParameter> parameters;
-  /// Of the fitted parameters' theta, in their order; rows at bounds are 0; empty without.
+  MaterialIntervals intervals = MaterialIntervals::law;
+  std::optional<ReadingsFit> readings;  ///< if they were fitted
+  /// Of the fitted parameters' theta, from the law's covariance, in their order; rows at bounds are
+  /// 0; empty without.
   Eigen::MatrixXd covariance;
   /// D: how theta follows the coordinates of the law's uncertainty, one column each; 0 for the
   /// contact and offset of a recording.
   Eigen::MatrixXd follows;
   double level = 0.95;
-  double quantile = 0.0;
-  std::vector<double> time_s, depth_m, law_N, correspondence_N, organ_N, measured_N;
-  double peak_N = 0.0;
+  double quantile = 0.0;  ///< of the law's uncertainty
+  std::vector<MaterialCourse> courses;
+  double peak_N = 0.0;       ///< of the law along all of them
   ForceMismatch start;       ///< organ by correspondence, less law
   ForceMismatch organ;       ///< fitted organ less law
   ForceMismatch ramp, hold;  ///< the same while the depth changes and while it does not
@@ -91,18 +129,25 @@ struct OrganMaterial {
 ///
 ///     Cov = D C D',   D = (J'J)^-1 J' L.
 ///
+/// If readings are asked for, the search goes on from there with organ less readings, every
+/// recording with a contact and an offset of its own (fit_to_readings). Several motions are rows of
+/// one sum of squares.
+///
+/// @param motions one or more
 /// @param scene an organ, with no contact or one of the kind sphere; its regions stay
 /// @param folder that a mesh path is relative to
 /// Throws Error(bad_input) for a law that is no depth with branches, a scene of other contacts, a
-/// motion that does not press; Error(numerical) if the organ cannot be run.
-[[nodiscard]] OrganMaterial put_on_organ(const LawFile& law, const MaterialMotion& motion,
+/// motion that does not press, readings asked for without a recording; Error(numerical) if the
+/// organ cannot be run.
+[[nodiscard]] OrganMaterial put_on_organ(const LawFile& law,
+                                         const std::vector<MaterialMotion>& motions,
                                          const Json& scene, std::string_view where,
                                          const std::filesystem::path& folder,
                                          const OrganMaterialOptions& options);
 
 [[nodiscard]] Json to_json(const OrganMaterial& result);
 [[nodiscard]] std::string to_terminal_text(const OrganMaterial& result);
-/// time_s, depth_m and every force, SI.
+/// recording (1, 2, ...), time_s, depth_m and every force, SI.
 [[nodiscard]] std::string to_csv(const OrganMaterial& result);
 
 }  // namespace tpm

@@ -21,7 +21,7 @@ Json mismatch_json(const ForceMismatch& m) {
           {"largest_at_rate_m_per_s", rounded(m.rate_m_per_s, kMaterialDigits)}};
 }
 
-std::string mismatch_words(const char* what, const ForceMismatch& m) {
+std::string mismatch_words(std::string_view what, const ForceMismatch& m) {
   return fmt::format("  {:<26} {:>9} {:>9}   at {} s, {} mm, {} mm/s\n", what,
                      significant(100.0 * m.largest, 3), significant(100.0 * m.rms, 3),
                      significant(m.at_s, 4), significant(1e3 * m.depth_m, 3),
@@ -49,34 +49,63 @@ std::string parameter_key(const FitParameter& parameter) {
   return fmt::format("{}{}{}", parameter.name, symbol.empty() ? "" : "_", symbol);
 }
 
-ForceMismatch mismatch(const OrganMaterial& m, const std::vector<double>& force,
-                       const std::vector<double>& target, const Protocol& motion,
-                       const std::vector<bool>& asked = {}) {
-  ForceMismatch r;
-  double squares = 0.0;
-  int count = 0;
-  for (std::size_t i = 0; i < force.size(); ++i) {
-    if (!asked.empty() && !asked[i]) continue;
-    const double part = (force[i] - target[i]) / m.peak_N;
-    squares += part * part;
-    ++count;
-    if (std::abs(part) <= r.largest) continue;
-    r.largest = std::abs(part);
-    r.at_s = m.time_s[i];
-    r.depth_m = m.depth_m[i];
-    const double h = 1e-6 * (motion.end_s() - motion.start_s());
-    const double before = std::max(r.at_s - h, motion.start_s());
-    r.rate_m_per_s = (m.depth_m[i] - value_at(motion, before)) / std::max(r.at_s - before, h);
+/// One of the forces of a course.
+using CourseForce = std::vector<double> MaterialCourse::*;
+
+/// Adds up how one force differs from another over parts of several courses.
+class MismatchSum {
+ public:
+  explicit MismatchSum(double peak_N) : peak_N_(peak_N) {}
+
+  /// @param asked which samples; all if it is empty
+  void add(const MaterialCourse& c, CourseForce force, CourseForce target, const Protocol& motion,
+           const std::vector<bool>& asked = {}) {
+    for (std::size_t i = 0; i < (c.*force).size(); ++i) {
+      if (!asked.empty() && !asked[i]) continue;
+      const double part = ((c.*force)[i] - (c.*target)[i]) / peak_N_;
+      squares_ += part * part;
+      ++count_;
+      if (std::abs(part) <= sum_.largest) continue;
+      sum_.largest = std::abs(part);
+      sum_.recording = c.name;
+      sum_.at_s = c.time_s[i];
+      sum_.depth_m = c.depth_m[i];
+      const double h = 1e-6 * (motion.end_s() - motion.start_s());
+      const double before = std::max(sum_.at_s - h, motion.start_s());
+      sum_.rate_m_per_s =
+          (c.depth_m[i] - value_at(motion, before)) / std::max(sum_.at_s - before, h);
+    }
   }
-  r.rms = count > 0 ? std::sqrt(squares / count) : 0.0;
-  return r;
+  [[nodiscard]] ForceMismatch result() const {
+    ForceMismatch r = sum_;
+    r.rms = count_ > 0 ? std::sqrt(squares_ / count_) : 0.0;
+    return r;
+  }
+
+ private:
+  double peak_N_;
+  ForceMismatch sum_;
+  double squares_ = 0.0;
+  int count_ = 0;
+};
+
+double deepest_of(const MaterialCourse& c) {
+  return *std::max_element(c.depth_m.begin(), c.depth_m.end());
+}
+
+/// The one that reaches deepest.
+const MaterialCourse& deepest_course(const OrganMaterial& m) {
+  return *std::max_element(m.courses.begin(), m.courses.end(),
+                           [](const MaterialCourse& a, const MaterialCourse& b) {
+                             return deepest_of(a) < deepest_of(b);
+                           });
 }
 
 /// The motion as a block of a scene, where the scene says nothing: a ramp and a hold.
-Json ramp_block(const OrganMaterial& m, double rate_m_per_s) {
-  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
+Json ramp_block(const MaterialCourse& c, double rate_m_per_s) {
+  const double deepest = deepest_of(c);
   const double ramp_s = deepest / rate_m_per_s;
-  const double hold_s = std::max(m.time_s.back() - m.time_s.front() - ramp_s, 1.0);
+  const double hold_s = std::max(c.time_s.back() - c.time_s.front() - ramp_s, 1.0);
   constexpr int kDigits = 4;
   const auto text = [](double value, const char* unit) {
     return fmt::format("{} {}", significant(value, kDigits), unit);
@@ -88,19 +117,124 @@ Json ramp_block(const OrganMaterial& m, double rate_m_per_s) {
 }
 
 /// Depth over time of the ramp: of the way from 10 to 90 % of the depth.
-double ramp_rate(const OrganMaterial& m) {
-  const double first = m.depth_m.front();
-  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
+double ramp_rate(const MaterialCourse& c) {
+  const double first = c.depth_m.front();
+  const double deepest = deepest_of(c);
   const auto when = [&](double share) {
     const double level = first + share * (deepest - first);
     std::size_t i = 0;
-    while (m.depth_m[i] < level) ++i;
-    return std::pair{m.time_s[i], m.depth_m[i]};
+    while (c.depth_m[i] < level) ++i;
+    return std::pair{c.time_s[i], c.depth_m[i]};
   };
   const auto [t1, u1] = when(0.1);
   const auto [t2, u2] = when(0.9);
   if (t2 > t1) return (u2 - u1) / (t2 - t1);
-  return deepest / std::max(m.time_s.back() - m.time_s.front(), 1e-3);
+  return deepest / std::max(c.time_s.back() - c.time_s.front(), 1e-3);
+}
+
+/// Which samples lie before the deepest depth is reached.
+std::vector<bool> on_the_way_in(const MaterialCourse& c) {
+  constexpr double kHeld = 0.02;  // of the deepest depth from there on
+  const double deepest = deepest_of(c);
+  std::vector<bool> ramp(c.time_s.size());
+  bool reached = false;
+  for (std::size_t i = 0; i < ramp.size(); ++i) {
+    reached = reached || c.depth_m[i] >= (1.0 - kHeld) * deepest;
+    ramp[i] = !reached;
+  }
+  return ramp;
+}
+
+Json limit_json(const std::optional<double>& limit) {
+  return limit ? Json(rounded(*limit, kMaterialDigits)) : Json(nullptr);
+}
+
+/// "contact_1_m" of the parameters of a recording.
+std::string placement_key(const FitParameter& p) {
+  return p.name + (p.unit.dimension == Dimension::force ? "_N" : "_m");
+}
+
+Json course_json(const OrganMaterial& m, const MaterialCourse& c) {
+  Json entry{{"name", c.name},
+             {"law_contact_m", rounded(c.by_law.contact_m, kMaterialDigits)},
+             {"law_offset_N", rounded(c.by_law.offset_N, kMaterialDigits)},
+             {"organ_less_law", mismatch_json(c.organ)}};
+  if (m.readings) {
+    entry["contact_m"] = rounded(c.by_organ.contact_m, kMaterialDigits);
+    entry["offset_N"] = rounded(c.by_organ.offset_N, kMaterialDigits);
+  }
+  if (c.law_to_recording) {
+    entry["law_less_recording"] = mismatch_json(*c.law_to_recording);
+    entry["organ_less_recording"] = mismatch_json(*c.organ_to_recording);
+  }
+  return entry;
+}
+
+/// What the fit to the readings says: intervals and profiles of all its parameters.
+Json readings_json(const OrganMaterial& m) {
+  const ReadingsFit& r = *m.readings;
+  Json parameters = Json::object();
+  for (std::size_t i = 0; i < r.fit.parameters.size(); ++i) {
+    const ParameterResult& p = r.fit.parameters[i];
+    const std::string key =
+        i < m.parameters.size() ? bond_parameter_key(p.parameter.name) : placement_key(p.parameter);
+    Json entry{{"value", rounded(p.estimate, kMaterialDigits)},
+               {"lower", limit_json(p.lower)},
+               {"upper", limit_json(p.upper)},
+               {"verdict", verdict_name(p.verdict)}};
+    Json values = Json::array(), rises = Json::array();
+    for (const ProfilePoint& point : p.profile.points) {
+      values.push_back(rounded(point.natural, kMaterialDigits));
+      rises.push_back(rounded(point.deviance - r.fit.best.deviance, kMaterialDigits));
+    }
+    if (!values.empty()) {
+      entry["profile"] = {{"value", std::move(values)}, {"deviance_rise", std::move(rises)}};
+    }
+    parameters[key] = std::move(entry);
+  }
+  return {{"readings", r.readings},
+          {"independent_readings", rounded(r.independent, kMaterialDigits)},
+          {"level", r.level},
+          {"limit_deviance_rise", rounded(r.rise, kMaterialDigits)},
+          {"parameters", std::move(parameters)}};
+}
+
+std::string interval_words(const OrganMaterial& m) {
+  const std::string level = significant(100.0 * m.level, 3);
+  if (m.intervals == MaterialIntervals::profiles)
+    return fmt::format("{} % profile interval", level);
+  if (m.intervals == MaterialIntervals::law && !(m.quantile > 0.0)) return "no interval";
+  return fmt::format("{} % interval", level);
+}
+
+std::string limits_text(const std::optional<double>& lower, const std::optional<double>& upper,
+                        const Unit& unit) {
+  if (!lower && !upper) return "";
+  const auto shown = [&](const std::optional<double>& v) {
+    return v ? significant(*v / unit.to_si, 4) : std::string("open");
+  };
+  return fmt::format("{} .. {} ", shown(lower), shown(upper));
+}
+
+/// Contact and offset of every recording, by the law and by the organ.
+std::string placement_text(const OrganMaterial& m) {
+  std::string text = fmt::format("\n  {:<12} {:>12} {:>12}\n", "recordings", "law", "organ");
+  const std::vector<ParameterResult>& found = m.readings->fit.parameters;
+  for (std::size_t i = 0; i < m.courses.size(); ++i) {
+    const MaterialCourse& c = m.courses[i];
+    const double by_law[] = {c.by_law.contact_m, c.by_law.offset_N};
+    for (std::size_t k = 0; k < 2; ++k) {
+      const ParameterResult& p = found[m.parameters.size() + 2 * i + k];
+      const Unit& unit = p.parameter.unit;
+      text += fmt::format("  {:<12} {:>12} {:>12}   {}{}   {}\n", p.parameter.name,
+                          significant(by_law[k] / unit.to_si, 4),
+                          significant(p.estimate / unit.to_si, 4),
+                          limits_text(p.lower, p.upper, unit), unit.symbol, k == 0 ? c.name : "");
+    }
+  }
+  text += fmt::format("  {} readings count as {} independent ones\n", m.readings->readings,
+                      significant(m.readings->independent, 3));
+  return text;
 }
 
 }  // namespace
@@ -135,8 +269,8 @@ Json material_block(const BondMaterial& m, const Json& before) {
 }
 
 void add_protocol_and_session(OrganMaterial& m) {
-  const double rate = ramp_rate(m);
-  const Json ramp = ramp_block(m, rate);
+  const MaterialCourse& deepest = deepest_course(m);
+  const Json ramp = ramp_block(deepest, ramp_rate(deepest));
   m.scene["description"] = fmt::format("material: law {} put on the organ {}", m.law, m.motion);
   if (!m.scene.contains("protocol")) {
     m.scene["protocol"] = ramp;
@@ -161,22 +295,39 @@ void add_protocol_and_session(OrganMaterial& m) {
          fmt::format("{} s", significant(std::max(kRests * longest_s, kLeastRest_s), 3))}}}};
 }
 
-void compare(OrganMaterial& m, const Protocol& motion) {
-  m.start = mismatch(m, m.correspondence_N, m.law_N, motion);
-  m.organ = mismatch(m, m.organ_N, m.law_N, motion);
-  const double deepest = *std::max_element(m.depth_m.begin(), m.depth_m.end());
-  std::vector<bool> ramp(m.time_s.size()), hold(m.time_s.size());
-  constexpr double kHeld = 0.02;  // of the deepest depth from there on
-  bool reached = false;
-  for (std::size_t i = 0; i < m.time_s.size(); ++i) {
-    reached = reached || m.depth_m[i] >= (1.0 - kHeld) * deepest;
-    (reached ? hold : ramp)[i] = true;
+void compare(OrganMaterial& m, const std::vector<MaterialMotion>& motions) {
+  using C = MaterialCourse;
+  MismatchSum start(m.peak_N), organ(m.peak_N), ramp(m.peak_N), hold(m.peak_N);
+  MismatchSum law_to_recording(m.peak_N), organ_to_recording(m.peak_N);
+  const auto alone = [&](const C& c, CourseForce force, CourseForce target,
+                         const Protocol& motion) {
+    MismatchSum sum(m.peak_N);
+    sum.add(c, force, target, motion);
+    return sum.result();
+  };
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    C& c = m.courses[i];
+    const Protocol& motion = motions[i].protocol;
+    std::vector<bool> part = on_the_way_in(c);
+    start.add(c, &C::correspondence_N, &C::law_N, motion);
+    organ.add(c, &C::organ_N, &C::law_N, motion);
+    ramp.add(c, &C::organ_N, &C::law_N, motion, part);
+    part.flip();
+    hold.add(c, &C::organ_N, &C::law_N, motion, part);
+    c.organ = alone(c, &C::organ_N, &C::law_N, motion);
+    if (c.measured_N.empty()) continue;
+    law_to_recording.add(c, &C::law_N, &C::measured_N, motion);
+    organ_to_recording.add(c, &C::organ_N, &C::measured_N, motion);
+    c.law_to_recording = alone(c, &C::law_N, &C::measured_N, motion);
+    c.organ_to_recording = alone(c, &C::organ_N, &C::measured_N, motion);
   }
-  m.ramp = mismatch(m, m.organ_N, m.law_N, motion, ramp);
-  m.hold = mismatch(m, m.organ_N, m.law_N, motion, hold);
-  if (m.measured_N.empty()) return;
-  m.law_to_recording = mismatch(m, m.law_N, m.measured_N, motion);
-  m.organ_to_recording = mismatch(m, m.organ_N, m.measured_N, motion);
+  m.start = start.result();
+  m.organ = organ.result();
+  m.ramp = ramp.result();
+  m.hold = hold.result();
+  if (m.courses.front().measured_N.empty()) return;
+  m.law_to_recording = law_to_recording.result();
+  m.organ_to_recording = organ_to_recording.result();
 }
 
 Json to_json(const OrganMaterial& m) {
@@ -186,16 +337,19 @@ Json to_json(const OrganMaterial& m) {
   for (const OrganMaterialParameter& p : m.parameters) {
     Json entry{{"value", rounded(p.value, kMaterialDigits)},
                {"start", rounded(p.start, kMaterialDigits)},
+               {"by_law", rounded(p.by_law, kMaterialDigits)},
                {"at_bound", p.at_bound}};
-    if (p.lower) {
-      entry["lower"] = rounded(*p.lower, kMaterialDigits);
-      entry["upper"] = rounded(*p.upper, kMaterialDigits);
-    }
+    if (p.lower) entry["lower"] = rounded(*p.lower, kMaterialDigits);
+    if (p.upper) entry["upper"] = rounded(*p.upper, kMaterialDigits);
     const std::string key = parameter_key(p.parameter);
     parameters[key] = std::move(entry);
     order.push_back(key);
   }
   json["parameters"] = std::move(parameters);
+  json["intervals"] = intervals_name(m.intervals);
+  if (m.readings) json["readings"] = readings_json(m);
+  json["courses"] = Json::array();
+  for (const MaterialCourse& c : m.courses) json["courses"].push_back(course_json(m, c));
   if (m.covariance.size() > 0) {
     Json of_law = Json::array();
     const std::vector<LawParameter> table = law_parameters(m.fitted_law.spec);
@@ -207,7 +361,7 @@ Json to_json(const OrganMaterial& m) {
                            {"covariance", matrix_json(m.covariance)},
                            {"law_parameters", std::move(of_law)},
                            {"follows_law", matrix_json(m.follows)},
-                           {"level", m.level},
+                           {"level", m.fitted_law.uncertainty->level},
                            {"quantile", rounded(m.quantile, kMaterialDigits)}};
   }
   json["correspondence_less_law"] = mismatch_json(m.start);
@@ -227,19 +381,19 @@ Json to_json(const OrganMaterial& m) {
 std::string to_terminal_text(const OrganMaterial& m) {
   std::string text = fmt::format("{} put on an organ {}, peak {} N\n\n", m.law, m.motion,
                                  significant(m.peak_N, 4));
-  text +=
-      fmt::format("  {:<12} {:>12} {:>12}   {}\n", "bonds", "start", "fitted",
-                  m.quantile > 0.0 ? fmt::format("{} % interval", significant(100.0 * m.level, 3))
-                                   : std::string("no interval"));
+  text += fmt::format("  {:<12} {:>12} {:>12} ", "bonds", "start", m.readings ? "law" : "fitted");
+  if (m.readings) text += fmt::format("{:>12} ", "readings");
+  text += fmt::format("  {}\n", interval_words(m));
   for (const OrganMaterialParameter& p : m.parameters) {
     const Unit& unit = p.parameter.unit;
     const auto shown = [&](double v) { return significant(v / unit.to_si, 4); };
     text +=
-        fmt::format("  {:<12} {:>12} {:>12}   ", p.parameter.name, shown(p.start), shown(p.value));
-    if (p.lower) text += fmt::format("{} .. {} ", shown(*p.lower), shown(*p.upper));
-    text += unit.symbol;
+        fmt::format("  {:<12} {:>12} {:>12} ", p.parameter.name, shown(p.start), shown(p.by_law));
+    if (m.readings) text += fmt::format("{:>12} ", shown(p.value));
+    text += "  " + limits_text(p.lower, p.upper, unit) + unit.symbol;
     text += p.at_bound ? " (at a bound)\n" : "\n";
   }
+  if (m.readings) text += placement_text(m);
   text += fmt::format("\n  {:<26} {:>9} {:>9}\n", "in % of the peak", "largest", "rms");
   text += mismatch_words("correspondence less law", m.start);
   text += mismatch_words("fitted organ less law", m.organ);
@@ -248,6 +402,10 @@ std::string to_terminal_text(const OrganMaterial& m) {
   if (m.law_to_recording) {
     text += mismatch_words("law less recording", *m.law_to_recording);
     text += mismatch_words("organ less recording", *m.organ_to_recording);
+  }
+  for (const MaterialCourse& c : m.courses) {
+    if (m.courses.size() == 1 || !c.organ_to_recording) continue;
+    text += mismatch_words(fmt::format("  {}", c.name), *c.organ_to_recording);
   }
   text += fmt::format(
       "\nthe organ cannot reproduce {} % of the law's peak ({} % rms); it is worst at {} mm and {} "
@@ -259,17 +417,21 @@ std::string to_terminal_text(const OrganMaterial& m) {
 }
 
 std::string to_csv(const OrganMaterial& m) {
-  std::string text = "time_s,depth_m,law_N,correspondence_N,organ_N";
-  if (!m.measured_N.empty()) text += ",measured_N";
+  std::string text = "recording,time_s,depth_m,law_N,correspondence_N,organ_N";
+  const bool measured = !m.courses.front().measured_N.empty();
+  if (measured) text += ",measured_N";
   text += "\n";
   constexpr int kDigits = 9;
-  for (std::size_t i = 0; i < m.time_s.size(); ++i) {
-    text += significant(m.time_s[i], kDigits);
-    for (const auto* column : {&m.depth_m, &m.law_N, &m.correspondence_N, &m.organ_N}) {
-      text += "," + significant((*column)[i], kDigits);
+  for (std::size_t k = 0; k < m.courses.size(); ++k) {
+    const MaterialCourse& c = m.courses[k];
+    for (std::size_t i = 0; i < c.time_s.size(); ++i) {
+      text += fmt::format("{},{}", k + 1, significant(c.time_s[i], kDigits));
+      for (const auto* column : {&c.depth_m, &c.law_N, &c.correspondence_N, &c.organ_N}) {
+        text += "," + significant((*column)[i], kDigits);
+      }
+      if (measured) text += "," + significant(c.measured_N[i], kDigits);
+      text += "\n";
     }
-    if (!m.measured_N.empty()) text += "," + significant(m.measured_N[i], kDigits);
-    text += "\n";
   }
   return text;
 }

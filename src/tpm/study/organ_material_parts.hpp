@@ -17,6 +17,7 @@ void add_protocol_and_session(OrganMaterial& m);
                                      const std::vector<double>& depth_m, double contact_m);
 
 /// Fills what the forces differ by.
-void compare(OrganMaterial& m, const Protocol& motion);
+/// @param motions of the courses, in their order
+void compare(OrganMaterial& m, const std::vector<MaterialMotion>& motions);
 
 }  // namespace tpm

@@ -17,29 +17,6 @@ namespace {
 
 constexpr double kContactStep = 1e-3;  // of the largest depth, for the derivative by the contact
 
-/// The depth beyond a contact, with the instants at which it is met.
-Protocol beyond_contact(const Protocol& protocol, double contact_m) {
-  std::vector<Knot> knots;
-  for (const Knot& knot : protocol.knots()) {
-    const double depth = knot.value - contact_m;
-    if (!knots.empty()) {
-      const Knot& before =
-          protocol.knots()[static_cast<std::size_t>(&knot - &protocol.knots()[0]) - 1];
-      const double earlier = before.value - contact_m;
-      const bool met = (earlier < 0.0) != (depth < 0.0) && knot.time_s > before.time_s;
-      if (met && earlier != 0.0 && depth != 0.0) {
-        const double share = earlier / (earlier - depth);
-        knots.push_back({before.time_s + share * (knot.time_s - before.time_s), 0.0});
-      }
-    }
-    knots.push_back({knot.time_s, std::max(depth, 0.0)});
-  }
-  Protocol result(protocol.drive(), std::move(knots), protocol.name(),
-                  std::isinf(protocol.end_s()));
-  result.set_relaxed_at_start(protocol.relaxed_at_start());
-  return result;
-}
-
 /// Places of the times within a protocol.
 std::vector<Eigen::Index> answered(const Protocol& protocol, std::span<const double> times_s) {
   std::vector<Eigen::Index> places;
