@@ -47,30 +47,45 @@ function(tpm_floors suffix flags)
          (NOT floor IN_LIST TPM_ARRANGING_FLOORS AND way STREQUAL arranging))
         continue()
       endif()
-      set(target tpm_floor_${floor}${suffix})
       file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/*.cpp)
-      if(NOT sources)
-        continue()
-      endif()
-      add_library(${target} OBJECT ${sources})
-      tpm_floor_options(${target} ${own_flags})
-      tpm_compile_together(${target})
-      if(TPM_MPI AND floor STREQUAL sweep)  # only this floor speaks to other processes
-        target_compile_definitions(${target} PRIVATE TPM_MPI OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
-        target_link_libraries(${target} PRIVATE MPI::MPI_C)
-      endif()
-      if(TPM_COMMON_HEADERS)
-        target_precompile_headers(${target} REUSE_FROM ${carrier})
-      endif()
-      list(APPEND objects $<TARGET_OBJECTS:${target}>)
+      foreach(component "" ${TPM_COMPONENTS})  # sources of another component than their floor's
+        set(target tpm_floor_${floor}${suffix})
+        set(own ${sources})
+        if(component)
+          string(APPEND target _of_${component})
+          set(own ${TPM_${component}_OF_${floor}})
+          list(TRANSFORM own PREPEND ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/)
+          list(TRANSFORM own APPEND .cpp)
+        else()
+          foreach(other IN LISTS TPM_COMPONENTS)
+            foreach(source IN LISTS TPM_${other}_OF_${floor})
+              list(REMOVE_ITEM own ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/${source}.cpp)
+            endforeach()
+          endforeach()
+        endif()
+        if(NOT own)
+          continue()
+        endif()
+        add_library(${target} OBJECT ${own})
+        tpm_floor_options(${target} ${own_flags})
+        tpm_compile_together(${target})
+        if(TPM_MPI AND floor STREQUAL sweep)  # only this floor speaks to other processes
+          target_compile_definitions(${target} PRIVATE TPM_MPI OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
+          target_link_libraries(${target} PRIVATE MPI::MPI_C)
+        endif()
+        if(TPM_COMMON_HEADERS)
+          target_precompile_headers(${target} REUSE_FROM ${carrier})
+        endif()
+        list(APPEND objects $<TARGET_OBJECTS:${target}>)
+      endforeach()
     endforeach()
   endforeach()
   set(TPM_FLOOR_OBJECTS ${objects} PARENT_SCOPE)
 endfunction()
 
-# tpm_formulation_list(LIST FILE...): writes a source that lists the formulations of files. A file NAME.cpp
-# defines the function NAME_formulations().
-function(tpm_formulation_list list)
+# tpm_formulation_list(LIST FUNCTION FILE...): writes a source in which FUNCTION lists the formulations of files. A file
+# NAME.cpp defines the function NAME_formulations().
+function(tpm_formulation_list list function)
   set(declared "")
   set(called "")
   foreach(source IN LISTS ARGN)
@@ -81,12 +96,12 @@ function(tpm_formulation_list list)
   list(JOIN called ", " called)
   file(CONFIGURE OUTPUT ${list} @ONLY CONTENT [[
 // Written by the build from the files of formulations.
-#include "tpm/formulation/formulation.hpp"
+#include "tpmkit/formulation.hpp"
 
 namespace tpm {
 
 @declared@
-Formulations formulations() {
+Formulations @function@() {
   static const std::vector<const Formulation*> all = joined({@called@});
   return all;
 }
@@ -111,9 +126,12 @@ function(tpm_sanitized_twin twin sanitize)
   set(rest ${TPM_FLOORS})
   list(REMOVE_ITEM rest ${ARGN})
   foreach(floor IN LISTS rest)
-    if(TARGET tpm_floor_${floor})
-      list(APPEND TPM_FLOOR_OBJECTS $<TARGET_OBJECTS:tpm_floor_${floor}>)
-    endif()
+    foreach(target tpm_floor_${floor} tpm_floor_${floor}_of_core tpm_floor_${floor}_of_organ tpm_floor_${floor}_of_fit
+            tpm_floor_${floor}_of_haptics)
+      if(TARGET ${target})
+        list(APPEND TPM_FLOOR_OBJECTS $<TARGET_OBJECTS:${target}>)
+      endif()
+    endforeach()
   endforeach()
   add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS} $<TARGET_OBJECTS:tpm_formulation_list>)
   set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX OUTPUT_NAME tpmkit_${twin})

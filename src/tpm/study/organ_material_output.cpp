@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 
