@@ -1,5 +1,5 @@
 # Finds every dependency. Read twice: by the build, and by the installed package (then with
-# TPM_CONSUMER set), so that nothing installed holds the path of a dependency. Packages whose names
+# TPM_CONSUMER set, and TPM_WANTED listing the components), so that nothing installed holds the path of a dependency. Packages whose names
 # or targets differ between releases are wrapped in one imported tpm_* target each, so that the
 # difference stays in this file.
 
@@ -14,22 +14,42 @@ endmacro()
 
 # --- in the public headers ----------------------------------------------------------------------
 tpm_find(Eigen3 3.4 NO_MODULE)
-tpm_find(nlohmann_json 3.11)
 tpm_find(fmt 9)
 
-# --- linked by the library ----------------------------------------------------------------------
-tpm_find(Ceres 2.1)
+# --- linked by the component fit ----------------------------------------------------------------
+if(NOT TPM_CONSUMER OR "fit" IN_LIST TPM_WANTED)
+  tpm_find(Ceres 2.1)
+endif()
+if((NOT TPM_CONSUMER OR "fit" IN_LIST TPM_WANTED) AND NOT TARGET tpm_ceres)
+  add_library(tpm_ceres INTERFACE IMPORTED)
+  target_link_libraries(tpm_ceres INTERFACE Ceres::ceres)
+endif()
+
+# --- linked by the component haptics --------------------------------------------------------------
+if((NOT TPM_CONSUMER OR "haptics" IN_LIST TPM_WANTED) AND NOT TARGET tpm_httplib)
+  # Debian's library of httplib; what it was compiled with changes the layout of its types, so the
+  # sources that include its header take the flags of its pkg-config file.
+  find_library(TPM_HTTPLIB_LIBRARY cpp-httplib REQUIRED)
+  mark_as_advanced(TPM_HTTPLIB_LIBRARY)
+  if(NOT TPM_CONSUMER)
+    find_package(PkgConfig REQUIRED)
+    pkg_check_modules(TPM_HTTPLIB REQUIRED cpp-httplib>=0.11.4)
+  endif()
+  add_library(tpm_httplib INTERFACE IMPORTED)
+  target_link_libraries(tpm_httplib INTERFACE ${TPM_HTTPLIB_LIBRARY})
+endif()
+
+# --- linked by the component organ, on which fit and haptics stand ------------------------------------
+if(TPM_CONSUMER AND NOT "organ" IN_LIST TPM_WANTED)
+  return()
+endif()
 tpm_find(SUNDIALS 6.4 COMPONENTS cvodes ida sunmatrixdense sunlinsoldense sunmatrixsparse sunlinsolklu
          nvecserial)
 tpm_find(muparser 2.3)
 tpm_find(OpenSSL 3 COMPONENTS Crypto)
 tpm_find(assimp 5.2)
 tpm_find(Threads)
-tpm_find(TBB 2021)
 tpm_find(ZLIB 1.2)
-if(TPM_MPI)
-  tpm_find(MPI 3 COMPONENTS C)
-endif()
 
 # libsundials-dev brings the MPI build of HDF5 along, which is not thread safe: the serial one is
 # asked for by name, and an MPI one is refused rather than linked silently.
@@ -71,17 +91,9 @@ find_path(TPM_METIS_INCLUDE metis.h REQUIRED)
 find_library(TPM_METIS_LIBRARY metis REQUIRED)
 mark_as_advanced(TPM_METIS_INCLUDE TPM_METIS_LIBRARY)
 
-# Debian's library of httplib; what it was compiled with changes the layout of its types, so the
-# sources that include its header take the flags of its pkg-config file.
-find_library(TPM_HTTPLIB_LIBRARY cpp-httplib REQUIRED)
-mark_as_advanced(TPM_HTTPLIB_LIBRARY)
-if(NOT TPM_CONSUMER)
-  find_package(PkgConfig REQUIRED)
-  pkg_check_modules(TPM_HTTPLIB REQUIRED cpp-httplib>=0.11.4)
+if(TARGET tpm_sundials)
+  return()  # the package was asked for twice
 endif()
-
-add_library(tpm_ceres INTERFACE IMPORTED)
-target_link_libraries(tpm_ceres INTERFACE Ceres::ceres)
 add_library(tpm_sundials INTERFACE IMPORTED)
 target_link_libraries(tpm_sundials INTERFACE SUNDIALS::cvodes SUNDIALS::ida SUNDIALS::nvecserial
   SUNDIALS::sunmatrixdense SUNDIALS::sunlinsoldense SUNDIALS::sunmatrixsparse
@@ -107,11 +119,13 @@ add_library(tpm_metis INTERFACE IMPORTED)
 target_include_directories(tpm_metis INTERFACE ${TPM_METIS_INCLUDE})
 target_link_libraries(tpm_metis INTERFACE ${TPM_METIS_LIBRARY})
 
-add_library(tpm_httplib INTERFACE IMPORTED)
-target_link_libraries(tpm_httplib INTERFACE ${TPM_HTTPLIB_LIBRARY})
-
 # --- headers that only our own sources read, and the program's ----------------------------------
 if(NOT TPM_CONSUMER)
+  find_package(TBB 2021 REQUIRED)
+  if(TPM_MPI)
+    find_package(MPI 3 REQUIRED COMPONENTS C)
+  endif()
+  find_package(nlohmann_json 3.11 REQUIRED)
   find_package(Boost 1.74 REQUIRED)  # quadrature and quantiles of Boost.Math
   find_package(utf8cpp 3.2 REQUIRED)
   # scripts/install_packages.sh unpacks its headers there; an installed package does as well.

@@ -47,30 +47,45 @@ function(tpm_floors suffix flags)
          (NOT floor IN_LIST TPM_ARRANGING_FLOORS AND way STREQUAL arranging))
         continue()
       endif()
-      set(target tpm_floor_${floor}${suffix})
       file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/*.cpp)
-      if(NOT sources)
-        continue()
-      endif()
-      add_library(${target} OBJECT ${sources})
-      tpm_floor_options(${target} ${own_flags})
-      tpm_compile_together(${target})
-      if(TPM_MPI AND floor STREQUAL sweep)  # only this floor speaks to other processes
-        target_compile_definitions(${target} PRIVATE TPM_MPI OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
-        target_link_libraries(${target} PRIVATE MPI::MPI_C)
-      endif()
-      if(TPM_COMMON_HEADERS)
-        target_precompile_headers(${target} REUSE_FROM ${carrier})
-      endif()
-      list(APPEND objects $<TARGET_OBJECTS:${target}>)
+      foreach(component "" ${TPM_COMPONENTS})  # sources of another component than their floor's
+        set(target tpm_floor_${floor}${suffix})
+        set(own ${sources})
+        if(component)
+          string(APPEND target _of_${component})
+          set(own ${TPM_${component}_OF_${floor}})
+          list(TRANSFORM own PREPEND ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/)
+          list(TRANSFORM own APPEND .cpp)
+        else()
+          foreach(other IN LISTS TPM_COMPONENTS)
+            foreach(source IN LISTS TPM_${other}_OF_${floor})
+              list(REMOVE_ITEM own ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/${source}.cpp)
+            endforeach()
+          endforeach()
+        endif()
+        if(NOT own)
+          continue()
+        endif()
+        add_library(${target} OBJECT ${own})
+        tpm_floor_options(${target} ${own_flags})
+        tpm_compile_together(${target})
+        if(TPM_MPI AND floor STREQUAL sweep)  # only this floor speaks to other processes
+          target_compile_definitions(${target} PRIVATE TPM_MPI OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
+          target_link_libraries(${target} PRIVATE MPI::MPI_C)
+        endif()
+        if(TPM_COMMON_HEADERS)
+          target_precompile_headers(${target} REUSE_FROM ${carrier})
+        endif()
+        list(APPEND objects $<TARGET_OBJECTS:${target}>)
+      endforeach()
     endforeach()
   endforeach()
   set(TPM_FLOOR_OBJECTS ${objects} PARENT_SCOPE)
 endfunction()
 
-# tpm_list(LIST HEADER TYPE NOUN FILE...): writes a source that lists the objects of files. A file NAME.cpp
-# defines the function NAME_NOUN(), which returns TYPEs, a span of pointers to const TYPE.
-function(tpm_list list header type noun)
+# tpm_list(LIST FUNCTION HEADER TYPE NOUN FILE...): writes a source in which FUNCTION lists the objects of files. A file
+# NAME.cpp defines the function NAME_NOUN(), which returns TYPEs, a span of pointers to const TYPE.
+function(tpm_list list function header type noun)
   set(declared "")
   set(called "")
   foreach(source IN LISTS ARGN)
@@ -86,7 +101,7 @@ function(tpm_list list header type noun)
 namespace tpm {
 
 @declared@
-@type@s @noun@() {
+@type@s @function@() {
   static const std::vector<const @type@*> all = joined({@called@});
   return all;
 }
@@ -95,11 +110,27 @@ namespace tpm {
 ]])
 endfunction()
 # Of formulations: NAME_formulations(); of the shapes of materials: NAME_elongation_shapes().
-function(tpm_formulation_list list)
-  tpm_list(${list} tpm/formulation/formulation.hpp Formulation formulations ${ARGN})
+function(tpm_formulation_list list function)
+  tpm_list(${list} ${function} tpmkit/formulation.hpp Formulation formulations ${ARGN})
 endfunction()
-function(tpm_shape_list list)
-  tpm_list(${list} tpm/material/elongation_shape.hpp ElongationShape elongation_shapes ${ARGN})
+function(tpm_shape_list list function)
+  tpm_list(${list} ${function} tpmkit/elongation_function.hpp ElongationShape elongation_shapes ${ARGN})
+endfunction()
+
+# tpm_shipped(SOURCE HEADER TYPE NOUN): writes a source in which NOUN() answers what is shipped.
+function(tpm_shipped source header type noun)
+  file(CONFIGURE OUTPUT ${source} @ONLY CONTENT [[
+// Written by the build: a program that defines this function itself has others.
+#include "@header@"
+
+namespace tpm {
+
+@type@ @noun@() {
+  return shipped_@noun@();
+}
+
+}  // namespace tpm
+]])
 endfunction()
 
 set(TPM_SANITIZED_FLOORS core store protocol material solve model law network curve scene simulate method
@@ -118,11 +149,14 @@ function(tpm_sanitized_twin twin sanitize)
   set(rest ${TPM_FLOORS})
   list(REMOVE_ITEM rest ${ARGN})
   foreach(floor IN LISTS rest)
-    if(TARGET tpm_floor_${floor})
-      list(APPEND TPM_FLOOR_OBJECTS $<TARGET_OBJECTS:tpm_floor_${floor}>)
-    endif()
+    foreach(target tpm_floor_${floor} tpm_floor_${floor}_of_core tpm_floor_${floor}_of_organ tpm_floor_${floor}_of_fit
+            tpm_floor_${floor}_of_haptics)
+      if(TARGET ${target})
+        list(APPEND TPM_FLOOR_OBJECTS $<TARGET_OBJECTS:${target}>)
+      endif()
+    endforeach()
   endforeach()
-  add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS} $<TARGET_OBJECTS:tpm_lists>)
+  add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS} ${TPM_LISTS})
   set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX OUTPUT_NAME tpmkit_${twin})
   target_link_options(${twin} PUBLIC -fsanitize=${sanitize} PRIVATE -Wl,-Bsymbolic-functions)
   target_link_libraries(${twin} PRIVATE fmt::fmt ${TPM_PRIVATE_LIBRARIES})

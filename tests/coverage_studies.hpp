@@ -9,10 +9,10 @@
 #include "tpm/core/random.hpp"
 #include "tpm/fit/coverage.hpp"
 #include "tpm/fit/fitted_law.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/identification.hpp"
 #include "tpm/study/law_prediction.hpp"
 #include "tpm/study/recovery.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm::test {
 

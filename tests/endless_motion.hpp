@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "tpm/device/haptic_device.hpp"
-#include "tpm/servo/servo_loop.hpp"
+#include "tpm/servo/servo_step.hpp"
+#include "tpmkit/device.hpp"
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm::test {
 

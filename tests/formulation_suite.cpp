@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "loaded_oscillator.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/method/method.hpp"
@@ -14,6 +13,7 @@
 #include "tpm/network/lowest_mode.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/simulate/scene_runner.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::test {
 namespace {

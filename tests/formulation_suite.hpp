@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/formulation/formulation.hpp"
+#include "tpmkit/formulation.hpp"
 
 namespace tpm::test {
 

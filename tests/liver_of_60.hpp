@@ -1,8 +1,8 @@
 #pragma once
 // What the tests of materials on organs share.
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/organ_material.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm::testing {
 

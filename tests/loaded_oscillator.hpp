@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "tpm/material/tpm_element.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm_test {
 

@@ -2,10 +2,10 @@
 // An organ with its far side held, pushed at its contact sphere: for tests and measurements.
 #include <utility>
 
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/freedom.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm::testing {
 

@@ -7,8 +7,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/equilibrium.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

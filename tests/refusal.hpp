@@ -2,7 +2,7 @@
 #include <string>
 #include <utility>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::test {
 

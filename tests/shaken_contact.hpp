@@ -1,9 +1,9 @@
 #pragma once
 #include <algorithm>
 
-#include "tpm/device/haptic_device.hpp"
 #include "tpm/haptics/element_contact.hpp"
-#include "tpm/material/tpm_element.hpp"
+#include "tpmkit/device.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm::test {
 

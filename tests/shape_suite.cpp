@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/bond_material.hpp"
 #include "tpm/simulate/scene_runner.hpp"
+#include "tpmkit/bond_material.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::test {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/material/elongation_shape.hpp"
+#include "tpmkit/elongation_function.hpp"
 
 namespace tpm::test {
 

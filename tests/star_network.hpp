@@ -1,8 +1,8 @@
 #pragma once
 // The four-sphere star of docs/notation.md as a network.
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm_test {
 

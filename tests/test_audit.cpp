@@ -3,10 +3,10 @@
 
 #include <catch2/catch.hpp>
 
-#include "tpm/core/error.hpp"
 #include "tpm/report/study_report.hpp"
 #include "tpm/study/audit.hpp"
 #include "tpm/study/expression.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

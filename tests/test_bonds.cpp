@@ -6,14 +6,14 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/contact_stiffness.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/local_support.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/network/rigidity.hpp"
 #include "tpm/network/simple_organs.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

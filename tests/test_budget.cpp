@@ -5,12 +5,12 @@
 
 #include "refusal.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/plan/perception.hpp"
 #include "tpm/scene/protocol_file.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/error_budget.hpp"
 #include "tpm/study/law_prediction.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

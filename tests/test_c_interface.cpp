@@ -14,9 +14,9 @@
 #include "temp_folder.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/session_run.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/haptics.h"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "condensed_passivity.hpp"
 #include "contact_path.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/scene/scene.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::testing;

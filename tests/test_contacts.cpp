@@ -5,12 +5,12 @@
 #include <cmath>
 
 #include "star_network.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/network/driven_network.hpp"
 #include "tpm/network/material_directions.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/simulate/static_path.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

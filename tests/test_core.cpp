@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "sanitizer.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/memory_reserve.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

@@ -2,8 +2,8 @@
 // exact binomial test at the 0.1 % level, no bound near.
 #include <catch2/catch.hpp>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/coverage.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

@@ -2,12 +2,12 @@
 #include <cmath>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/curve/pack.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

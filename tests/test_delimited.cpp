@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/delimited.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

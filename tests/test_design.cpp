@@ -3,10 +3,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/report/design_figures.hpp"
 #include "tpm/study/design.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

@@ -2,9 +2,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/device/replay_device.hpp"
 #include "tpm/device/virtual_omega7.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,12 +4,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/tpm_element.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/solve/creep_exact.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -22,9 +22,9 @@
 #include "simulation_error_cases.hpp"
 #include "sweep_error_cases.hpp"
 #include "temp_folder.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/curve/pack.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/curve_file.hpp"
 
 using namespace tpm;
 using test::ErrorCase;

@@ -10,11 +10,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "tpm/core/random.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/report/recording_report.hpp"
 #include "tpm/study/selection.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

@@ -9,12 +9,12 @@
 #include <sstream>
 
 #include "fractional_reference.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/solve/cardinal_weight.hpp"
 #include "tpm/solve/exponential_sum.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -15,10 +15,10 @@
 #include "refusal.hpp"
 #include "sanitizer.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/store/contained.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

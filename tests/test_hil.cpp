@@ -4,7 +4,6 @@
 
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/recording_export.hpp"
 #include "tpm/haptics/rendering_border.hpp"
 #include "tpm/haptics/session_run.hpp"
@@ -13,6 +12,7 @@
 #include "tpm/report/hil_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

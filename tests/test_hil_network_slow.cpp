@@ -5,7 +5,6 @@
 #include "endless_motion.hpp"
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/surface_scene.hpp"
@@ -14,6 +13,7 @@
 #include "tpm/report/hil_report.hpp"
 #include "tpm/servo/servo_step.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -9,16 +9,16 @@
 
 #include "jpk_archive.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/curve/description.hpp"
 #include "tpm/curve/import.hpp"
 #include "tpm/curve/jpk_properties.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/store/zip_archive.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using test::TempFolder;

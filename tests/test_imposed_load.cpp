@@ -6,8 +6,8 @@
 
 #include "tpm/core/random.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/law/tension_creep.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

@@ -11,12 +11,12 @@
 
 #include "loaded_oscillator.hpp"
 #include "star_network.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/inertial_equation.hpp"
 #include "tpm/network/simple_organs.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using namespace tpm_test;

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "star_network.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/driven_network.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/tool_impact.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -4,9 +4,9 @@
 
 #include "python_judge.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/network_file.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

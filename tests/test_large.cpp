@@ -3,13 +3,13 @@
 #include <cmath>
 
 #include "indented_scene.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/solve/preconditioners.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

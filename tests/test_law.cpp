@@ -5,12 +5,12 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/law/imposed_depth.hpp"
 #include "tpm/law/kelvin_chain.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/model/closed_form.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

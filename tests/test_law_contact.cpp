@@ -12,8 +12,9 @@
 #include "tpm/haptics/law_reference.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

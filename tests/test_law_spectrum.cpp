@@ -5,13 +5,14 @@
 #include <sstream>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/law/frequency_response.hpp"
 #include "tpm/law/law_export.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/law/law_model.hpp"
-#include "tpm/material/tpm_element.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/frequency_response.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/law_model.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

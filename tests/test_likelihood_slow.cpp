@@ -8,14 +8,14 @@
 #include <numbers>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/gradient_check.hpp"
 #include "tpm/fit/tables.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Contains;

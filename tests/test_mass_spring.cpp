@@ -9,11 +9,11 @@
 
 #include "star_network.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/network/roughness.hpp"
 #include "tpm/network/simple_organs.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using namespace tpm_test;

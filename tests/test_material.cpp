@@ -6,9 +6,7 @@
 
 #include "organ_scene.hpp"
 #include "shape_suite.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/lowest_mode.hpp"
@@ -18,6 +16,8 @@
 #include "tpm/solve/fractional_branches.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 #include "written_out_network.hpp"
 
 using namespace tpm;

@@ -6,13 +6,13 @@
 #include "condensed_passivity.hpp"
 #include "counted_allocations.hpp"
 #include "organ_scene.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/reduce/zone_network.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using tpm::testing::OrganScene;

@@ -2,9 +2,9 @@
 #include <catch2/catch.hpp>
 
 #include "method_problems.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/model/cvodes_element.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using namespace tpm_test;

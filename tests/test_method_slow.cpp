@@ -3,9 +3,9 @@
 #include <map>
 
 #include "method_problems.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/stability/study.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using namespace tpm_test;

@@ -3,10 +3,10 @@
 #include <cmath>
 
 #include "star_network.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/network/rigidity.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 using namespace tpm;
 using namespace tpm_test;

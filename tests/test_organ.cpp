@@ -6,13 +6,13 @@
 
 #include "organ_meshes.hpp"
 #include "refusal.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/landing_site.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/mesh_surface.hpp"
 #include "tpm/network/neighbours.hpp"
 #include "tpm/network/simple_organs.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::test;

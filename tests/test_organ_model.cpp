@@ -5,8 +5,8 @@
 
 #include "tpm/fit/config.hpp"
 #include "tpm/fit/scouted_minimum.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/scene/organ_model.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

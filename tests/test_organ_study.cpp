@@ -5,10 +5,10 @@
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/report/organ_study_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/organ_study.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using namespace tpm::test;

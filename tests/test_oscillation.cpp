@@ -5,14 +5,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/coverage.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/gradient_check.hpp"
-#include "tpm/law/frequency_response.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/report/fit_report.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/frequency_response.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Contains;

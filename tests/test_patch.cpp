@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "patch_test.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/simple_organs.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -4,8 +4,8 @@
 
 #include "random_plan_scene.hpp"
 #include "simulated_scene.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/plan/plan.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

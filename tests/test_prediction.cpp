@@ -8,10 +8,11 @@
 #include "temp_folder.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/prediction.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/scene/protocol_file.hpp"
 #include "tpm/study/law_prediction.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,9 @@
 
 #include "organ_scene.hpp"
 #include "star_network.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

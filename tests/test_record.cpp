@@ -8,10 +8,10 @@
 #include <filesystem>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/row_log.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,10 +5,10 @@
 #include <random>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/curve/phases.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -3,7 +3,7 @@
 
 #include "patch_test.hpp"
 #include "punch_on_block.hpp"
-#include "tpm/material/tpm_element.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -1,10 +1,10 @@
 // The document model, its two renderings, and figures as data.
 #include <catch2/catch.hpp>
 
-#include "tpm/core/error.hpp"
 #include "tpm/report/document.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/report/run_record.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

@@ -7,9 +7,9 @@
 #include "refusal.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/law/contact_retreat.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/report/recording_report.hpp"
 #include "tpm/study/selection.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

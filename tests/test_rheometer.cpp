@@ -8,15 +8,15 @@
 #include <numbers>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/exchange_order.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/report/fit_csv.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/material_function.hpp"
 #include "tpm/study/young_moduli.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

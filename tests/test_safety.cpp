@@ -8,11 +8,11 @@
 #include "hil_scenes.hpp"
 #include "shaken_contact.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/live_view.hpp"
 #include "tpm/haptics/session_run.hpp"
-#include "tpm/servo/servo_loop.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm {
 namespace {

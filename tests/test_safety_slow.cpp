@@ -6,8 +6,9 @@
 #include "shaken_contact.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/device/virtual_omega7.hpp"
-#include "tpm/material/tpm_element.hpp"
-#include "tpm/servo/servo_loop.hpp"
+#include "tpm/servo/servo_step.hpp"
+#include "tpmkit/servo_loop.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 namespace {

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "sensitivity_problems.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/sample/grid_convergence.hpp"
 #include "tpm/sample/point_set.hpp"
 #include "tpm/sample/sensitivity.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,14 +5,14 @@
 #include <set>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/scene/inspection.hpp"
 #include "tpm/scene/network_file.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

@@ -5,9 +5,9 @@
 
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/simulate/simulation_file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

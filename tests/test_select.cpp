@@ -6,11 +6,11 @@
 
 #include "temp_folder.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/report/fit_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/selection.hpp"
 #include "tpm/study/specimens.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

@@ -6,15 +6,15 @@
 #include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/element_contact.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
-#include "tpm/material/tpm_element.hpp"
-#include "tpm/servo/servo_loop.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/servo_loop.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 namespace {

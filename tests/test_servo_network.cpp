@@ -6,12 +6,12 @@
 #include "organ_scene.hpp"
 #include "star_network.hpp"
 #include "tpm/benchmark/contact_reference.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using tpm::testing::OrganScene;

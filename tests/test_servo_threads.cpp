@@ -12,13 +12,13 @@
 
 #include "hil_scenes.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/jitter_check.hpp"
 #include "tpm/haptics/network_beside.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -8,11 +8,11 @@
 #include "refusal.hpp"
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/simulate/smoothness.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

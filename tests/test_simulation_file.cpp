@@ -10,11 +10,11 @@
 
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/report/simulation_report.hpp"
 #include "tpm/simulate/simulation_file.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/version.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

@@ -8,13 +8,13 @@
 #include <cstdlib>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/report/fit_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/specimens.hpp"
 #include "tpm/study/young_moduli.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

@@ -7,8 +7,8 @@
 
 #include "tpm/core/random.hpp"
 #include "tpm/fit/coverage.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/specimens.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 

@@ -3,14 +3,14 @@
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/curve/header_words.hpp"
 #include "tpm/curve/import.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/curve/pack.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/law/law_model.hpp"
 #include "tpm/law/relaxation.hpp"
 #include "tpm/law/tension_creep.hpp"
 #include "tpm/solve/exponential_sum.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 

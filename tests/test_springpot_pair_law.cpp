@@ -9,16 +9,17 @@
 #include <numbers>
 #include <sstream>
 
-#include "tpm/core/error.hpp"
-#include "tpm/law/frequency_response.hpp"
 #include "tpm/law/law_export.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/law/prony_table.hpp"
 #include "tpm/law/relaxation.hpp"
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/frequency_response.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/law_model.hpp"
+#include "tpmkit/protocol.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

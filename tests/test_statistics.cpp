@@ -12,7 +12,6 @@
 #include <numbers>
 
 #include "statistics_problems.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/fit/correlation.hpp"
 #include "tpm/fit/estimated_sigma.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
@@ -22,6 +21,7 @@
 #include "tpm/fit/verdict.hpp"
 #include "tpm/fit/waterfall.hpp"
 #include "tpm/study/random_effects.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::test;

@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -9,10 +9,10 @@
 #include "organ_meshes.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/mesh_file.hpp"
 #include "tpm/network/mesh_surface.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::test;

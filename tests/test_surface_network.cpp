@@ -6,14 +6,14 @@
 
 #include "counted_allocations.hpp"
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/surface_scene.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/method/ball_by_cvode.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/reduce/surface_network.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 namespace {

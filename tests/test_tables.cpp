@@ -3,9 +3,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/report/study_report.hpp"
 #include "tpm/study/tables.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

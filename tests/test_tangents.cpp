@@ -4,9 +4,9 @@
 
 #include "organ_scene.hpp"
 #include "star_network.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/material_directions.hpp"
+#include "tpmkit/model.hpp"
 
 using namespace tpm;
 using tpm::testing::OrganScene;

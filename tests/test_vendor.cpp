@@ -12,13 +12,13 @@
 #include "hil_scenes.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/device/force_dimension.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/recording_export.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

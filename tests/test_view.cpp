@@ -7,12 +7,12 @@
 #include "refusal.hpp"
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/report/view_file.hpp"
 #include "tpm/simulate/simulation_file.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::Contains;

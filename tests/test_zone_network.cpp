@@ -4,11 +4,11 @@
 
 #include "organ_scene.hpp"
 #include "tpm/benchmark/contact_reference.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/reduce/zone_network.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using tpm::testing::OrganScene;

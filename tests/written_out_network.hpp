@@ -11,11 +11,11 @@
 #include <stdexcept>
 #include <vector>
 
-#include "tpm/material/bond_material.hpp"
 #include "tpm/network/freedom.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/solve/sundials.hpp"
+#include "tpmkit/bond_material.hpp"
 
 namespace tpm_test {
 

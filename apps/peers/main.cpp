@@ -12,10 +12,10 @@
 
 #include "peers.hpp"
 #include "tpm/benchmark/organ_problems.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/report/benchmark_report.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "peers.hpp"
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::peers {
 namespace {

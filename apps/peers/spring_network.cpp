@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "peers.hpp"
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::peers {
 

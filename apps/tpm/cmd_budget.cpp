@@ -6,12 +6,12 @@
 #include "command.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/report/budget_report.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/study/error_budget.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/fit/gradient_check.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

@@ -4,9 +4,9 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/fit/coverage.hpp"
 #include "tpm/report/fit_csv.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

@@ -7,11 +7,11 @@
 
 #include "command.hpp"
 #include "data_text.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/curve/description.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/curve/pack.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;

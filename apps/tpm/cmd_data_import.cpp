@@ -8,12 +8,12 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/curve/import.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;

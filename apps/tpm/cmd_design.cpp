@@ -4,12 +4,12 @@
 #include <optional>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/report/design_figures.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/json_table_csv.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/design.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

@@ -4,11 +4,11 @@
 #include <optional>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/law/law_export.hpp"
 #include "tpm/scene/organ_export.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -8,7 +8,6 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/experiment_refit.hpp"
@@ -23,6 +22,7 @@
 #include "tpm/store/json.hpp"
 #include "tpm/study/specimens.hpp"
 #include "tpm/study/young_moduli.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

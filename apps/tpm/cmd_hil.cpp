@@ -17,11 +17,11 @@
 #include "hil_page.hpp"
 #include "interrupt_watch.hpp"
 #include "out_of_memory.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/device/force_dimension.hpp"
 #include "tpm/device/plugin_device.hpp"
 #include "tpm/report/hil_report.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

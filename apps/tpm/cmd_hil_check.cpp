@@ -7,10 +7,10 @@
 #include "hil_options.hpp"
 #include "interrupt_watch.hpp"
 #include "out_of_memory.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/report/hil_report.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -5,9 +5,9 @@
 
 #include "command.hpp"
 #include "hil_options.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/recording_export.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

@@ -5,10 +5,10 @@
 #include <optional>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/report/hazard_report.hpp"
 #include "tpm/report/json_table_csv.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 

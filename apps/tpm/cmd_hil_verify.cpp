@@ -4,11 +4,11 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/hil_report.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

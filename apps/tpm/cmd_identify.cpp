@@ -5,12 +5,12 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/report/identification_report.hpp"
 #include "tpm/report/json_table_csv.hpp"
 #include "tpm/study/identification.hpp"
 #include "tpm/study/identified_loop.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "command.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm::app {
 namespace {

@@ -7,12 +7,12 @@
 #include "command.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/report/organ_material_report.hpp"
 #include "tpm/scene/protocol_file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/organ_material.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm::app {
 namespace {

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/local_support.hpp"
 #include "tpm/report/draw.hpp"
@@ -14,6 +13,7 @@
 #include "tpm/scene/network_file.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;

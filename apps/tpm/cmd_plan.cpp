@@ -7,13 +7,13 @@
 
 #include "command.hpp"
 #include "plan_options.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/json_table_csv.hpp"
 #include "tpm/report/plan_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/error_budget.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;

@@ -8,13 +8,13 @@
 #include "command.hpp"
 #include "protocol_options.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/report/prediction_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/law_prediction.hpp"
 #include "tpm/study/organ_prediction.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -5,9 +5,9 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/report/fit_csv.hpp"
 #include "tpm/study/recovery.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

@@ -4,9 +4,9 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/report/fit_csv.hpp"
 #include "tpm/study/selection.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

@@ -7,10 +7,8 @@
 #include "command.hpp"
 #include "interrupt_watch.hpp"
 #include "plan_options.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/plan/operations.hpp"
 #include "tpm/report/plan_report.hpp"
 #include "tpm/report/simulation_figures.hpp"
@@ -21,6 +19,8 @@
 #include "tpm/simulate/vtkhdf.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;

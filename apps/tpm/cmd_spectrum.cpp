@@ -5,11 +5,12 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/law/frequency_response.hpp"
-#include "tpm/law/law_file.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/report/table_document.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/frequency_response.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm::app {
 namespace {

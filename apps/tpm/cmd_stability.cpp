@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/stability_report.hpp"
 #include "tpm/store/writable.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

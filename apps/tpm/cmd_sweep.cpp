@@ -8,7 +8,6 @@
 
 #include "command.hpp"
 #include "interrupt_watch.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/run_record.hpp"
@@ -16,6 +15,7 @@
 #include "tpm/store/file_roles.hpp"
 #include "tpm/sweep/sweep_ranks.hpp"
 #include "tpm/sweep/sweep_result.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;

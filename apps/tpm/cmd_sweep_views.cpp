@@ -7,9 +7,7 @@
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/sweep_convergence_report.hpp"
 #include "tpm/report/sweep_report.hpp"
@@ -17,6 +15,8 @@
 #include "tpm/store/file_roles.hpp"
 #include "tpm/sweep/best_cells.hpp"
 #include "tpm/sweep/sweep_result.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace fs = std::filesystem;

@@ -6,10 +6,10 @@
 #include <optional>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/report/study_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/tables.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
 #include "command.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm::app {
 

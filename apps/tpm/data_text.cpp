@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -2,8 +2,8 @@
 #include <string>
 #include <vector>
 
-#include "tpm/curve/load.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/curve_file.hpp"
 
 namespace tpm::app {
 

@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "command.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -18,10 +18,10 @@
 
 #include "command.hpp"
 #include "out_of_memory.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 

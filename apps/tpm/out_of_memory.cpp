@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {

@@ -1,7 +1,7 @@
 #include "protocol_options.hpp"
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/study/selection.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <utility>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/haptics/loop_contact.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
 
 struct tpm_haptics_contact {
   tpm_haptics_contact(const char* file, const tpm::LoopContactOptions& options)

@@ -1,10 +1,10 @@
 // Contacts stepped from Python, and recordings of haptic sessions.
 #include "binding.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/loop_contact.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::python {
 namespace {

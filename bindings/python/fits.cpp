@@ -2,7 +2,6 @@
 #include <filesystem>
 
 #include "binding.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/prediction.hpp"
@@ -14,6 +13,7 @@
 #include "tpm/store/json.hpp"
 #include "tpm/study/material_function.hpp"
 #include "tpm/study/selection.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::python {
 namespace {

@@ -1,11 +1,12 @@
 // Protocols, laws, and the paper's element.
 #include "binding.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/law/frequency_response.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/law/law_model.hpp"
-#include "tpm/model/model.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/frequency_response.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/law_model.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm::python {
 namespace {

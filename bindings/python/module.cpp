@@ -1,10 +1,10 @@
 // tpmkit._core: the library for Python. The package around it (tpmkit/*.py) makes DataFrames,
 // Datasets and figures of what it answers.
 #include "binding.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm::python {
 namespace {

@@ -1,6 +1,5 @@
 // Scenes run and sweeps computed.
 #include "binding.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/report/plan_report.hpp"
 #include "tpm/scene/experiment_scene.hpp"
@@ -12,6 +11,7 @@
 #include "tpm/sweep/run_sweep.hpp"
 #include "tpm/sweep/sweep.hpp"
 #include "tpm/sweep/sweep_result.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::python {
 namespace {

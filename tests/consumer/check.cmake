@@ -1,5 +1,5 @@
 # Run by ctest: installs the build into a folder of its own, moves that folder (an installation must
-# not depend on where it was made), builds the consumer against it and runs it.
+# not depend on where it was made), builds a consumer of each component against it and runs it.
 #   -D BUILD=...   the build folder of tpmkit     -D SOURCE=... this folder
 #   -D WORK=...    a folder to use up             -D CXX=... the compiler
 function(run)
@@ -13,11 +13,20 @@ endfunction()
 file(REMOVE_RECURSE ${WORK})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/first)
 file(RENAME ${WORK}/first ${WORK}/moved)
-run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE} -B ${WORK}/build -D CMAKE_PREFIX_PATH=${WORK}/moved
-    -D CMAKE_CXX_COMPILER=${CXX} -D CMAKE_BUILD_TYPE=Release)
-run(${CMAKE_COMMAND} --build ${WORK}/build)
-run(${WORK}/build/consumer)
+foreach(component "" core organ fit haptics)
+  set(build ${WORK}/build_${component})
+  run(${CMAKE_COMMAND} -G Ninja -S ${SOURCE} -B ${build} -D CMAKE_PREFIX_PATH=${WORK}/moved -D COMPONENT=${component}
+      -D CMAKE_CXX_COMPILER=${CXX} -D CMAKE_BUILD_TYPE=Release)
+  run(${CMAKE_COMMAND} --build ${build})
+  run(${CMAKE_COMMAND} -E chdir ${build} env TPMKIT_SHARE=${WORK}/moved/share/tpmkit ./consumer)
+endforeach()
 run(${WORK}/moved/bin/tpm version)
+file(GLOB_RECURSE headers RELATIVE ${WORK}/moved/include ${WORK}/moved/include/*)
+list(LENGTH headers count)
+list(FILTER headers EXCLUDE REGEX "^tpmkit/[a-z_]+\\.hp?p?$")
+if(count GREATER 30 OR headers)
+  message(FATAL_ERROR "${count} headers are installed, at most 30 may be; not public: ${headers}")
+endif()
 file(GLOB_RECURSE exported ${WORK}/moved/lib/*.cmake)
 foreach(file IN LISTS exported)
   file(STRINGS ${file} absolute REGEX "[\";=]/[A-Za-z]")

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include <tpm/core/version.hpp>
-#include <tpm/material/tpm_element.hpp>
-#include <tpm/model/model.hpp>
+#include <tpmkit/model.hpp>
+#include <tpmkit/tpm_element.hpp>
+#include <tpmkit/version.hpp>
 
 int main() {
   const auto model = tpm::make_model("closed_form");

@@ -7,8 +7,6 @@
 #include <fstream>
 #include <string>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/curve/description.hpp"
 #include "tpm/curve/import.hpp"
 #include "tpm/curve/recording_file.hpp"
@@ -16,7 +14,6 @@
 #include "tpm/fit/tables.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/session.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/network/mesh_file.hpp"
 #include "tpm/plan/operations.hpp"
 #include "tpm/scene/experiment_scene.hpp"
@@ -32,6 +29,9 @@
 #include "tpm/study/organ_study.hpp"
 #include "tpm/sweep/block_log.hpp"
 #include "tpm/sweep/sweep.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::fuzz {
 namespace {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "tpm/benchmark/contact_reference.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/network_beside.hpp"
 #include "tpm/scene/scene.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

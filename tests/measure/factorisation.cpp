@@ -16,15 +16,15 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/freedom.hpp"
 #include "tpm/network/indentation.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/liver_surface.hpp"
 #include "tpm/solve/lane_factor.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 #if __has_include("tpm/network/stiffness_blocks.hpp")
 #include "tpm/network/stiffness_blocks.hpp"
 #else

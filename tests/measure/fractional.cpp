@@ -11,7 +11,7 @@
 
 #include "fractional_reference.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpmkit/law_model.hpp"
 
 using namespace tpm;
 

@@ -18,8 +18,6 @@
 #include <optional>
 #include <string>
 
-#include "tpm/core/error.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/indentation.hpp"
@@ -27,6 +25,8 @@
 #include "tpm/network/liver.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 

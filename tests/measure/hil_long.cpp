@@ -11,11 +11,11 @@
 #include <string>
 
 #include "endless_motion.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/session.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/row_log.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/session.hpp"
 #include "tpm/servo/real_time.hpp"
 #include "tpm/servo/servo_step.hpp"
 #include "tpm/store/row_log.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

@@ -7,9 +7,9 @@
 #include <limits>
 
 #include "far_side.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/liver.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 

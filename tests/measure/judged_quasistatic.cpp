@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "python_judge.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/network_file.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 

@@ -9,12 +9,12 @@
 #include <string>
 
 #include "far_side.hpp"
-#include "tpm/core/error.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/network/roughness.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 

@@ -17,9 +17,10 @@
 #include <vector>
 
 #include "raw_client.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/page_server.hpp"
 #include "tpm/haptics/session_run.hpp"
+#include "tpm/servo/real_time.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace std::chrono_literals;

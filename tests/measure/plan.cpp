@@ -14,8 +14,8 @@
 #include <sstream>
 
 #include "../random_plan_scene.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/plan/plan.hpp"
+#include "tpmkit/error.hpp"
 
 namespace {
 

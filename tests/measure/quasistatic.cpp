@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "organ_scene.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/liver.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 using tpm::testing::OrganScene;

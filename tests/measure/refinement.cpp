@@ -6,9 +6,9 @@
 
 #include "patch_test.hpp"
 #include "punch_on_block.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/liver.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
 

@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "tpm/benchmark/contact_reference.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/reduce/zone_network.hpp"
 #include "tpm/scene/scene.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

@@ -10,9 +10,9 @@
 #include <cmath>
 #include <string>
 
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/surface_scene.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

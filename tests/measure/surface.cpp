@@ -12,11 +12,11 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/surface_scene.hpp"
 #include "tpm/reduce/surface_network.hpp"
 #include "tpm/servo/real_time.hpp"
+#include "tpmkit/error.hpp"
 
 using namespace tpm;
 

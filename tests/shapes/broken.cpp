@@ -1,5 +1,5 @@
 // A shape that breaks every promise of ElongationShape: the suite has to find each.
-#include "tpm/material/elongation_shape.hpp"
+#include "tpmkit/elongation_function.hpp"
 
 namespace tpm {
 namespace {

@@ -1,7 +1,7 @@
 // The worked example of docs/architecture.md, "Adding a material": one file, and nothing else.
 #include <cmath>
 
-#include "tpm/material/elongation_shape.hpp"
+#include "tpmkit/elongation_function.hpp"
 
 namespace tpm {
 namespace {

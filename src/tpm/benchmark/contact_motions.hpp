@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/protocol/protocol.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "tpm/benchmark/element_problems.hpp"
 #include "tpm/benchmark/posed.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/network/lowest_mode.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/simple_organs.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

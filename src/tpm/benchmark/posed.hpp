@@ -3,7 +3,7 @@
 #include <initializer_list>
 
 #include "tpm/benchmark/problem.hpp"
-#include "tpm/network/organ.hpp"
+#include "tpmkit/organ.hpp"
 
 namespace tpm {
 

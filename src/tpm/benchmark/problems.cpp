@@ -6,7 +6,7 @@
 #include "tpm/benchmark/element_problems.hpp"
 #include "tpm/benchmark/organ_problems.hpp"
 #include "tpm/benchmark/servo_problems.hpp"
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

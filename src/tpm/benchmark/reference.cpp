@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "tpm/benchmark/problem.hpp"
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -8,12 +8,12 @@
 #include <cmath>
 
 #include "tpm/benchmark/contact_reference.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/reduce/zone_network.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -8,7 +8,7 @@
 #include <ctime>
 
 #include "tpm/benchmark/runner.hpp"
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

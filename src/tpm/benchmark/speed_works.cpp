@@ -3,9 +3,7 @@
 #include <memory>
 
 #include "tpm/benchmark/speed.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/material/bond_element.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/large_equilibrium.hpp"
 #include "tpm/network/liver.hpp"
@@ -15,6 +13,8 @@
 #include "tpm/network/rigidity.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/solve/lane_factor.hpp"
+#include "tpmkit/bond_element.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,4 +1,4 @@
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 #include <utf8.h>
 

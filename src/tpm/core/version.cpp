@@ -1,4 +1,4 @@
-#include "tpm/core/version.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 

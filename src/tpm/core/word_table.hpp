@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

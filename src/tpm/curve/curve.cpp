@@ -1,4 +1,4 @@
-#include "tpm/curve/curve.hpp"
+#include "tpmkit/curve.hpp"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <set>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <array>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/units.hpp"
-#include "tpm/curve/curve.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/curve.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

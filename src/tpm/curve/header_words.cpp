@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "tpm/core/units.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "tpm/curve/curve.hpp"
+#include "tpmkit/curve.hpp"
 
 namespace tpm {
 

@@ -6,7 +6,6 @@
 #include <array>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/curve/assemble.hpp"
@@ -15,6 +14,7 @@
 #include "tpm/curve/import_machine.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/zip_archive.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/curve/curve.hpp"
 #include "tpm/curve/description.hpp"
 #include "tpm/store/delimited.hpp"
+#include "tpmkit/curve.hpp"
 
 namespace tpm {
 

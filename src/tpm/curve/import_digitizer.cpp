@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

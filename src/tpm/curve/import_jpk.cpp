@@ -8,12 +8,12 @@
 #include <numeric>
 #include <tuple>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/contact.hpp"
 #include "tpm/curve/jpk_channel.hpp"
 #include "tpm/curve/jpk_properties.hpp"
 #include "tpm/store/zip_archive.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

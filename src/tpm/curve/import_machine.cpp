@@ -7,11 +7,11 @@
 #include <cmath>
 #include <tuple>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/contact.hpp"
 #include "tpm/curve/machine_header.hpp"
 #include "tpm/curve/specimen_size.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

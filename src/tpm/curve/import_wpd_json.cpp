@@ -3,10 +3,10 @@
 #include <array>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/curve/import_digitizer.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 namespace {

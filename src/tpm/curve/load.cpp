@@ -1,4 +1,4 @@
-#include "tpm/curve/load.hpp"
+#include "tpmkit/curve_file.hpp"
 
 #include <fmt/format.h>
 
@@ -6,11 +6,11 @@
 #include <set>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/curve/description.hpp"
 #include "tpm/curve/rows.hpp"
 #include "tpm/store/delimited.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

@@ -9,9 +9,9 @@
 #include <set>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

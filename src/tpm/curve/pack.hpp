@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "tpm/curve/load.hpp"
+#include "tpmkit/curve_file.hpp"
 
 namespace tpm {
 

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/curve/drive_pieces.hpp"
 #include "tpm/curve/touch.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 namespace {

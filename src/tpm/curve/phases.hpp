@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/curve/curve.hpp"
+#include "tpmkit/curve.hpp"
 
 namespace tpm {
 

@@ -6,12 +6,12 @@
 #include <optional>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/assemble.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/store/delimited.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

@@ -6,7 +6,7 @@
 #include <array>
 #include <set>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/curve/curve.hpp"
 #include "tpm/curve/description.hpp"
 #include "tpm/store/delimited.hpp"
+#include "tpmkit/curve.hpp"
 
 namespace tpm {
 

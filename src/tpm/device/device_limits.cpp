@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,4 +1,4 @@
-#include "tpm/device/haptic_device.hpp"
+#include "tpmkit/device.hpp"
 
 namespace tpm {
 

@@ -6,7 +6,7 @@
 
 #include <cstdlib>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

@@ -10,7 +10,7 @@
 #include <limits>
 #include <thread>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/device/device_limits.hpp"
 #include "tpm/device/dhd_library.hpp"
-#include "tpm/device/haptic_device.hpp"
+#include "tpmkit/device.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

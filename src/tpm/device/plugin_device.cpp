@@ -9,8 +9,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

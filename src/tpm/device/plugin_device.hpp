@@ -7,7 +7,7 @@
 
 #include "tpm/device/device_limits.hpp"
 #include "tpm/device/force_dimension.hpp"
-#include "tpm/device/haptic_device.hpp"
+#include "tpmkit/device.hpp"
 #include "tpmkit/haptic_device.h"
 
 namespace tpm {

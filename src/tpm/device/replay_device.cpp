@@ -1,6 +1,6 @@
 #include "tpm/device/replay_device.hpp"
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/device/haptic_device.hpp"
+#include "tpmkit/device.hpp"
 
 namespace tpm {
 

@@ -1,8 +1,8 @@
 #pragma once
 #include <atomic>
 
-#include "tpm/device/haptic_device.hpp"
 #include "tpm/device/virtual_plant.hpp"
+#include "tpmkit/device.hpp"
 
 namespace tpm {
 

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/correlation.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/law/law.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 

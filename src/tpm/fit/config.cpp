@@ -4,13 +4,13 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/fit/experiment_refit.hpp"
-#include "tpm/formulation/formulation.hpp"
-#include "tpm/law/law_model.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/scene/organ_model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/formulation.hpp"
+#include "tpmkit/law_model.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 

@@ -9,15 +9,15 @@
 #include <string>
 #include <vector>
 
-#include "tpm/curve/curve.hpp"
 #include "tpm/curve/import.hpp"
 #include "tpm/fit/bootstrap.hpp"
 #include "tpm/fit/noise.hpp"
 #include "tpm/fit/parameter.hpp"
-#include "tpm/law/law.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/curve.hpp"
+#include "tpmkit/law.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/protocol/protocol_block.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

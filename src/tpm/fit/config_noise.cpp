@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/config_parts.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/config_parts.hpp"
-#include "tpm/law/law_model.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/scene/organ_model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 namespace {

@@ -9,8 +9,8 @@
 #include <complex>
 #include <unsupported/Eigen/FFT>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

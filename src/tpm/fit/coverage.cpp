@@ -6,12 +6,12 @@
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/starts.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

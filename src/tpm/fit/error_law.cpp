@@ -9,9 +9,9 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,10 +7,10 @@
 #include <limits>
 #include <map>
 
-#include "tpm/core/error.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/estimated_sigma.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

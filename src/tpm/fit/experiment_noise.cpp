@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

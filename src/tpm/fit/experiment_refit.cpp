@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

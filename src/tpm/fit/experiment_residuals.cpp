@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/interrupted.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -14,20 +14,9 @@
 #include "tpm/fit/uncertainty.hpp"
 #include "tpm/fit/waterfall.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/fit.hpp"
 
 namespace tpm {
-
-/// What the data say about one parameter.
-enum class Verdict {
-  identified,   ///< the interval is closed on both sides
-  lower_only,   ///< only a lower limit: larger values up to the bound cannot be told apart
-  upper_only,   ///< only an upper limit
-  flat,         ///< no limit within the bounds
-  failed,       ///< a walk along the profile ended in neither a limit nor a bound
-  not_profiled  ///< profiles were switched off
-};
-
-[[nodiscard]] std::string_view verdict_name(Verdict verdict) noexcept;
 
 /// Symmetric limits, SI.
 struct Limits {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
-#include "tpm/material/tpm_element.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 namespace {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/verdict.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

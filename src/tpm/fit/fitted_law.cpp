@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

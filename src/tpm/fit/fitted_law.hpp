@@ -3,7 +3,7 @@
 #include <string>
 
 #include "tpm/fit/fit.hpp"
-#include "tpm/law/law_file.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 

@@ -8,8 +8,8 @@
 #include <limits>
 #include <optional>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

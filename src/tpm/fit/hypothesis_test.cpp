@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/verdict.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -7,7 +7,7 @@
 
 #include "tpm/fit/exchange_order.hpp"
 #include "tpm/fit/parameter.hpp"
-#include "tpm/model/model.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 

@@ -6,9 +6,9 @@
 #include <array>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "tpm/core/error.hpp"
-#include "tpm/law/frequency_response.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/frequency_response.hpp"
 
 namespace tpm {
 namespace {

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "tpm/curve/curve.hpp"
 #include "tpm/fit/config.hpp"
-#include "tpm/law/law.hpp"
-#include "tpm/model/model.hpp"
+#include "tpmkit/curve.hpp"
+#include "tpmkit/law.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 

@@ -2,7 +2,7 @@
 #include <string>
 #include <string_view>
 
-#include "tpm/core/units.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

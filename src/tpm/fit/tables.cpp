@@ -7,9 +7,9 @@
 #include <map>
 #include <string_view>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/delimited.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

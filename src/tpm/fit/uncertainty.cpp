@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "tpm/core/text.hpp"
-#include "tpm/law/law.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 namespace {

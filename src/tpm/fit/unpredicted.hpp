@@ -2,8 +2,8 @@
 #include <optional>
 #include <span>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

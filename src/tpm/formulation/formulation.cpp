@@ -1,12 +1,12 @@
-#include "tpm/formulation/formulation.hpp"
+#include "tpmkit/formulation.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <stdexcept>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,10 +1,10 @@
 // The paper's element: its closed form, and its differential equation under CVODES.
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/model/cvodes_element.hpp"
 #include "tpm/simulate/scene_runner.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,13 +1,13 @@
 // What only sessions step: a network beside the loop, a ball on a surface, a law.
 #include <fmt/format.h>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/law_contact.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/network_beside.hpp"
 #include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/haptics/surface_scene.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

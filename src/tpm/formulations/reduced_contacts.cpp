@@ -1,13 +1,13 @@
 // The contact seen by itself: reductions of a network that a servo can step.
 #include <fmt/format.h>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/element_contact.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/reduce/condensed.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

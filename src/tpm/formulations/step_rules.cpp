@@ -4,10 +4,10 @@
 #include <array>
 #include <memory>
 
-#include "tpm/core/error.hpp"
 #include "tpm/method/method.hpp"
 #include "tpm/network/lowest_mode.hpp"
 #include "tpm/simulate/scene_runner.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

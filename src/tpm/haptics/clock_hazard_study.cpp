@@ -10,10 +10,11 @@
 #include <thread>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/session_run.hpp"
-#include "tpm/servo/servo_loop.hpp"
+#include "tpm/servo/real_time.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm {
 namespace {

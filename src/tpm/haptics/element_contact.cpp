@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/model/validity_limits.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,7 +1,7 @@
 #pragma once
-#include "tpm/material/bond_element.hpp"
-#include "tpm/reduce/contact_model.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
+#include "tpmkit/bond_element.hpp"
+#include "tpmkit/contact_model.hpp"
 
 namespace tpm {
 

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/session_run.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

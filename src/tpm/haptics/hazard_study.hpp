@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/servo/servo_record.hpp"
+#include "tpmkit/servo_record.hpp"
 
 namespace tpm {
 

@@ -2,8 +2,8 @@
 #include <Eigen/Core>
 
 #include "tpm/law/contact_history.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/reduce/contact_model.hpp"
+#include "tpmkit/contact_model.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 

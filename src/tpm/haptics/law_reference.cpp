@@ -3,9 +3,9 @@
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/law/contact_history.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 

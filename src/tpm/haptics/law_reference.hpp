@@ -2,7 +2,7 @@
 #include <span>
 #include <vector>
 
-#include "tpm/law/law_file.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 

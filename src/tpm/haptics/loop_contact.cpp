@@ -6,12 +6,13 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/device/device_limits.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/surface_scene.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/servo/triple_buffer.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,6 +1,6 @@
 #pragma once
-#include "tpm/formulation/formulation.hpp"
 #include "tpm/haptics/session.hpp"
+#include "tpmkit/formulation.hpp"
 
 namespace tpm {
 

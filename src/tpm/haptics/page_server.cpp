@@ -12,8 +12,8 @@
 #include <csignal>
 #include <thread>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

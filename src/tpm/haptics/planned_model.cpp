@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <array>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/plan_model.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,11 @@
 
 #include <cstring>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/version.hpp"
+#include "tpm/law/law_json.hpp"
+#include "tpm/servo/real_time.hpp"
 #include "tpm/store/row_log.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "tpm/haptics/session.hpp"
-#include "tpm/servo/servo_loop.hpp"
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm {
 

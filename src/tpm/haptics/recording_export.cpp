@@ -4,8 +4,8 @@
 
 #include <functional>
 
-#include "tpm/core/version.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

@@ -6,15 +6,16 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/device/device_limits.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/session_phases.hpp"
 #include "tpm/haptics/surface_scene.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "tpm/device/device_limits.hpp"
-#include "tpm/device/haptic_device.hpp"
 #include "tpm/device/virtual_plant.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/reduce/contact_model.hpp"
 #include "tpm/servo/servo_step.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/contact_model.hpp"
+#include "tpmkit/device.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/protocol/protocol_block.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

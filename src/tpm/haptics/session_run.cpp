@@ -2,13 +2,14 @@
 
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/device/device_limits.hpp"
 #include "tpm/device/force_dimension.hpp"
 #include "tpm/device/plugin_device.hpp"
 #include "tpm/device/replay_device.hpp"
 #include "tpm/device/virtual_omega7.hpp"
+#include "tpm/servo/real_time.hpp"
 #include "tpm/store/row_log.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {
@@ -80,6 +81,43 @@ std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {
   return std::make_shared<PluginDevice>(choice.plugin, choice.which);
 }
 
+/// A session from its model to the end of its recording.
+/// @param make gives the device, once the rendering is known to be acceptable
+template <class MakeDevice>
+SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const DeviceLimits& limits,
+                  const SessionRunOptions& options, const MakeDevice& make) {
+  require_within(session, limits);
+  SessionRun run;
+  run.model = make_loop_model(session, options.real_time, options.planning);
+  const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
+  run.rendering = check_rendering(session, *stepped, run.model, limits);
+  require_acceptable(run.rendering, choice, options);
+  const std::shared_ptr<HapticDevice> device = make();
+  DevicePreparation preparation = session.preparation;
+  preparation.period_s = session.servo.period_s;
+  preparation.may_move = choice.may_move;
+  preparation.take_as_ready = choice.take_as_ready;
+  preparation.interrupted = options.interrupted;
+  try {
+    run.device = device->open();
+    if (options.opened) options.opened(run.device, run.model);
+    RowLogWriter log(options.recording,
+                     to_text(recording_header(session, run.device, run.model, options.real_time,
+                                              options.notes, to_json(run.rendering))),
+                     sizeof(ServoRecord), RowLogWriter::Name::later);
+    device->prepare(preparation);
+    log.appear();
+    const ServoSettings servo =
+        loop_settings(session, run.model, run.rendering, choice.kind != "replay");
+    run.outcome = run_loop(session, device, stepped, servo, options, log);
+    log.close(to_text(recording_closing(run.outcome)));
+  } catch (...) {
+    device->stop();
+    throw;
+  }
+  return run;
+}
+
 }  // namespace
 
 DeviceLimits limits_of(const DeviceChoice& choice) {
@@ -123,37 +161,18 @@ ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
 
 SessionRun run_session(const HilSession& session, const DeviceChoice& choice,
                        const SessionRunOptions& options) {
-  const DeviceLimits limits = limits_of(choice);
-  require_within(session, limits);
-  SessionRun run;
-  run.model = make_loop_model(session, options.real_time, options.planning);
-  const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
-  run.rendering = check_rendering(session, *stepped, run.model, limits);
-  require_acceptable(run.rendering, choice, options);
-  const std::shared_ptr<HapticDevice> device = make_device(choice, session);
-  DevicePreparation preparation = session.preparation;
-  preparation.period_s = session.servo.period_s;
-  preparation.may_move = choice.may_move;
-  preparation.take_as_ready = choice.take_as_ready;
-  preparation.interrupted = options.interrupted;
-  try {
-    run.device = device->open();
-    if (options.opened) options.opened(run.device, run.model);
-    RowLogWriter log(options.recording,
-                     to_text(recording_header(session, run.device, run.model, options.real_time,
-                                              options.notes, to_json(run.rendering))),
-                     sizeof(ServoRecord), RowLogWriter::Name::later);
-    device->prepare(preparation);
-    log.appear();
-    const ServoSettings servo =
-        loop_settings(session, run.model, run.rendering, choice.kind != "replay");
-    run.outcome = run_loop(session, device, stepped, servo, options, log);
-    log.close(to_text(recording_closing(run.outcome)));
-  } catch (...) {
-    device->stop();
-    throw;
-  }
-  return run;
+  return run_on(session, choice, limits_of(choice), options,
+                [&] { return make_device(choice, session); });
+}
+
+SessionRun run_session_on(const HilSession& session, const std::shared_ptr<HapticDevice>& device,
+                          const DeviceLimits& limits, const DevicePermissions& permissions,
+                          const SessionRunOptions& options) {
+  DeviceChoice choice;
+  choice.kind = "the caller's own";
+  choice.may_move = permissions.may_move;
+  choice.take_as_ready = permissions.take_as_ready;
+  return run_on(session, choice, limits, options, [&] { return device; });
 }
 
 }  // namespace tpm

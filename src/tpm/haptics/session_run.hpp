@@ -54,6 +54,19 @@ struct SessionRun {
 [[nodiscard]] ServoSettings loop_settings(const HilSession& session, const LoopModel& model,
                                           const RenderingCheck& rendering, bool guided);
 
+/// What a device may do beside rendering forces.
+struct DevicePermissions {
+  bool may_move = false;       ///< to initialise itself
+  bool take_as_ready = false;  ///< it is initialised, where nobody can tell
+};
+
+/// run_session() on a device that the caller has made; a hand holds it.
+[[nodiscard]] SessionRun run_session_on(const HilSession& session,
+                                        const std::shared_ptr<HapticDevice>& device,
+                                        const DeviceLimits& limits,
+                                        const DevicePermissions& permissions,
+                                        const SessionRunOptions& options);
+
 /// Runs a session and records it. A rendering that would be unstable is refused, forces and phases
 /// begin when the tool is in place (StartGate; rows until then are shown and not recorded).
 /// In real time the rows written by now are passed to the system

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/verify_parts.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

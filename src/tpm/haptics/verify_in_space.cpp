@@ -4,10 +4,10 @@
 #include <optional>
 #include <span>
 
-#include "tpm/core/error.hpp"
 #include "tpm/haptics/surface_scene.hpp"
 #include "tpm/haptics/verify_parts.hpp"
 #include "tpm/method/ball_by_cvode.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "tpm/haptics/law_reference.hpp"
 #include "tpm/haptics/verify_parts.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

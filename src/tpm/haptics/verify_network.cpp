@@ -2,15 +2,15 @@
 #include <cmath>
 #include <optional>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/haptics/verify_parts.hpp"
 #include "tpm/method/method.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/scene/scene.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/law/law.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

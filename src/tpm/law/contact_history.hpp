@@ -6,8 +6,8 @@
 
 #include "tpm/law/kernel.hpp"
 #include "tpm/law/memory.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/solve/exponential_quadrature.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 

@@ -5,8 +5,8 @@
 #include <limits>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
 #include "tpm/law/contact_history.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tpm/law/contact_history.hpp"
-#include "tpm/protocol/protocol.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

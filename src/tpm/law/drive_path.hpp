@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "tpm/protocol/protocol.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

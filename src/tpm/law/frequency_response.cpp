@@ -1,4 +1,4 @@
-#include "tpm/law/frequency_response.hpp"
+#include "tpmkit/frequency_response.hpp"
 
 #include <fmt/format.h>
 
@@ -7,11 +7,11 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/kernel.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/law/operational_stiffness.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

@@ -9,8 +9,8 @@
 #include <numeric>
 #include <type_traits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "tpm/law/law.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/law/relaxation.hpp"
 #include "tpm/law/tension_creep.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -2,7 +2,7 @@
 #include <array>
 #include <optional>
 
-#include "tpm/law/law.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 

@@ -5,9 +5,10 @@
 #include <array>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpm/law/law_json.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "tpm/law/contact_geometry.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/law/prony_table.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 

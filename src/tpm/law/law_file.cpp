@@ -1,13 +1,14 @@
-#include "tpm/law/law_file.hpp"
+#include "tpmkit/law_file.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

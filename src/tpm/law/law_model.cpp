@@ -1,4 +1,4 @@
-#include "tpm/law/law_model.hpp"
+#include "tpmkit/law_model.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,6 @@
 #include <cmath>
 #include <optional>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/contact_history.hpp"
 #include "tpm/law/contact_retreat.hpp"
@@ -17,6 +16,7 @@
 #include "tpm/law/relaxation.hpp"
 #include "tpm/law/tension_creep.hpp"
 #include "tpm/solve/exponential_sum.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,4 +1,4 @@
-#include "tpm/law/law_uncertainty.hpp"
+#include "tpmkit/law_uncertainty.hpp"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,10 @@
 #include <cmath>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/word_table.hpp"
-#include "tpm/law/law_file.hpp"
+#include "tpm/law/law_json.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 namespace {

@@ -4,7 +4,7 @@
 #include <initializer_list>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

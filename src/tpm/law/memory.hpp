@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "tpm/law/law.hpp"
 #include "tpm/solve/exponential_sum.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "tpm/law/law.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 

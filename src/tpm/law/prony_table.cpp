@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
 #include "tpm/solve/nonnegative.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

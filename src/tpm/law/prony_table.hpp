@@ -2,7 +2,7 @@
 #include <span>
 #include <vector>
 
-#include "tpm/law/law.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 

@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/solve/laplace_contour.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "tpm/law/law.hpp"
 #include "tpm/law/operational_stiffness.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 

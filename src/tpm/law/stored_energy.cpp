@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 #include "tpm/law/kernel.hpp"
-#include "tpm/law/law_file.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 

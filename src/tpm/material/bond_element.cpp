@@ -1,12 +1,12 @@
-#include "tpm/material/bond_element.hpp"
+#include "tpmkit/bond_element.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

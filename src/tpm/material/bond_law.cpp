@@ -1,11 +1,11 @@
-#include "tpm/material/bond_law.hpp"
+#include "tpmkit/bond_law.hpp"
 
 #include <algorithm>
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
 #include <set>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

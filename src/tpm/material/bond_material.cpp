@@ -1,12 +1,12 @@
-#include "tpm/material/bond_material.hpp"
+#include "tpmkit/bond_material.hpp"
 
 #include <fmt/format.h>
 
 #include <charconv>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,12 +1,12 @@
-#include "tpm/material/elongation_function.hpp"
+#include "tpmkit/elongation_function.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,4 +1,4 @@
-#include "tpm/material/elongation_shape.hpp"
+#include "tpmkit/elongation_function.hpp"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

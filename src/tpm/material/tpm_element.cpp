@@ -1,11 +1,11 @@
-#include "tpm/material/tpm_element.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -7,11 +7,11 @@
 #include <limits>
 #include <optional>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/method/implicit_balance.hpp"
 #include "tpm/method/viscous_elongations.hpp"
 #include "tpm/solve/sundials.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

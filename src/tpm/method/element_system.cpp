@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/method/step_system.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

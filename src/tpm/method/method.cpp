@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/method/adaptive_rules.hpp"
 #include "tpm/method/step_rules.hpp"
-#include "tpm/model/model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

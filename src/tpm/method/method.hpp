@@ -8,9 +8,9 @@
 #include <string>
 #include <string_view>
 
-#include "tpm/material/bond_element.hpp"
 #include "tpm/network/driven_network.hpp"
-#include "tpm/protocol/protocol.hpp"
+#include "tpmkit/bond_element.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/method/bond_projection.hpp"
 #include "tpm/method/implicit_balance.hpp"
 #include "tpm/method/step_system.hpp"
 #include "tpm/method/viscous_elongations.hpp"
 #include "tpm/network/inertial_equation.hpp"
 #include "tpm/network/lowest_mode.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/solve/creep_exact.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {
@@ -193,6 +193,12 @@ Response ClosedForm::respond(const Protocol& protocol, std::span<const double> t
       break;
   }
   return force_driven_exact(protocol, times_s, p, want);
+}
+
+std::unique_ptr<Model> make_closed_form(const TensionRule& tension) {
+  ModelOptions options;
+  options.tension = tension;
+  return std::make_unique<ClosedForm>(options);
 }
 
 }  // namespace tpm

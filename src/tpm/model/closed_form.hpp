@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/model/model.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/solve/sundials.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,4 +1,4 @@
-#include "tpm/model/model.hpp"
+#include "tpmkit/model.hpp"
 
 #include <fmt/format.h>
 
@@ -7,10 +7,9 @@
 #include <numbers>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/formulation/formulation.hpp"
 #include "tpm/model/validity_limits.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 
@@ -20,12 +19,6 @@ Response Model::respond_along(const Protocol& protocol, std::span<const double> 
   Response response = respond(protocol, times_s, parameters, Want::values_and_sensitivity);
   response.sensitivity = response.sensitivity * along;
   return response;
-}
-
-std::unique_ptr<Model> make_model(std::string_view name, const ModelOptions& options) {
-  return formulation_with<ModelMaker>(name, "formulation", "model")
-      .as<ModelMaker>()
-      ->model(options);
 }
 
 std::vector<std::string> validity_flags(double spacing_m, double peak_depth_m) {

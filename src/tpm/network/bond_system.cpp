@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/material_refusal.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <set>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

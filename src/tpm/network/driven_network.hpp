@@ -3,7 +3,7 @@
 
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/network/tool.hpp"
-#include "tpm/protocol/protocol.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

@@ -1,6 +1,6 @@
 #include "tpm/network/driven_tissue.hpp"
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

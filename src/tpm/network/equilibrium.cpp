@@ -1,7 +1,7 @@
 #include "tpm/network/equilibrium.hpp"
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/large_equilibrium.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

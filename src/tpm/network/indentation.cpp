@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/large_equilibrium.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/network/inertial_integration.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

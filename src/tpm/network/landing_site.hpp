@@ -1,8 +1,8 @@
 #pragma once
 #include <cstddef>
 
-#include "tpm/network/organ.hpp"
 #include "tpm/network/surface.hpp"
+#include "tpmkit/organ.hpp"
 
 namespace tpm {
 

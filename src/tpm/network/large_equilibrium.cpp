@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/solve/preconditioners.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

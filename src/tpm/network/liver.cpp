@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <utility>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

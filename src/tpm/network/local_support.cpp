@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

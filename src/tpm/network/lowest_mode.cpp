@@ -5,9 +5,9 @@
 #include <numbers>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/network/rigidity.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/rigidity.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

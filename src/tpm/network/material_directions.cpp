@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "tpm/material/bond_material.hpp"
 #include "tpm/network/network.hpp"
+#include "tpmkit/bond_material.hpp"
 
 namespace tpm {
 

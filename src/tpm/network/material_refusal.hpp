@@ -3,8 +3,8 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/formulation/formulation.hpp"
 #include "tpm/network/bond_system.hpp"
+#include "tpmkit/formulation.hpp"
 
 namespace tpm {
 

@@ -9,8 +9,8 @@
 #include <assimp/Importer.hpp>
 #include <string>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,8 +1,8 @@
 #pragma once
 #include <filesystem>
 
-#include "tpm/core/units.hpp"
 #include "tpm/network/triangle_mesh.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

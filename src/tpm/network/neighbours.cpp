@@ -8,7 +8,7 @@
 #include <nanoflann.hpp>
 #include <utility>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

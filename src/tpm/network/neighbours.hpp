@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "tpm/network/organ.hpp"
+#include "tpmkit/organ.hpp"
 
 namespace tpm {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tpm/network/neighbours.hpp"
-#include "tpm/network/organ.hpp"
+#include "tpmkit/organ.hpp"
 
 namespace tpm {
 

@@ -1,4 +1,4 @@
-#include "tpm/network/organ.hpp"
+#include "tpmkit/organ.hpp"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/neighbours.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -8,10 +8,10 @@
 #include <limits>
 #include <set>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/network/stage_tangents.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

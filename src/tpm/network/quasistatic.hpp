@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "tpm/network/equilibrium.hpp"
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/solve/lanes.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

@@ -6,10 +6,10 @@
 #include <numeric>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/network/local_support.hpp"
 #include "tpm/network/stiffness_blocks.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,10 +5,10 @@
 #include <numeric>
 #include <tuple>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/landing_site.hpp"
 #include "tpm/network/neighbours.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,6 +1,6 @@
 #pragma once
 #include "tpm/network/lattice.hpp"
-#include "tpm/network/organ.hpp"
+#include "tpmkit/organ.hpp"
 
 namespace tpm {
 

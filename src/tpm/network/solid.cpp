@@ -5,8 +5,8 @@
 #include <numeric>
 #include <tuple>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/filling.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

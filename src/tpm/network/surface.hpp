@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "tpm/network/organ.hpp"
+#include "tpmkit/organ.hpp"
 
 namespace tpm {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/network/organ.hpp"
+#include "tpmkit/organ.hpp"
 
 namespace tpm {
 

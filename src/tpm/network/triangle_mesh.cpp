@@ -9,8 +9,8 @@
 #include <tuple>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/neighbours.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "tpm/material/bond_law.hpp"
+#include "tpmkit/bond_law.hpp"
 
 namespace tpm {
 

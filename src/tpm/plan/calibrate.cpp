@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "tpm/core/text.hpp"
-#include "tpm/material/bond_element.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/lane_bonds.hpp"
 #include "tpm/network/liver.hpp"
@@ -18,6 +17,7 @@
 #include "tpm/reduce/step_error.hpp"
 #include "tpm/solve/frontal_factor.hpp"
 #include "tpm/solve/lane_factor.hpp"
+#include "tpmkit/bond_element.hpp"
 
 namespace tpm {
 namespace {

@@ -7,12 +7,12 @@
 #include <functional>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/reduce/zone_network.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

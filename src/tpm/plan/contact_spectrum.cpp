@@ -6,9 +6,9 @@
 #include <numbers>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/material_refusal.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,9 +6,9 @@
 #include <numbers>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/lowest_mode.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_model.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

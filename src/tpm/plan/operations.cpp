@@ -3,12 +3,12 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/store/document_place.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

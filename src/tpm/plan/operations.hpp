@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "tpm/simulate/operation_count.hpp"
+#include "tpmkit/operation_count.hpp"
 
 namespace tpm {
 

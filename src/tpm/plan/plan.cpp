@@ -6,12 +6,12 @@
 #include <cmath>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/plan/perception.hpp"
 #include "tpm/plan/plan_reference.hpp"
 #include "tpm/plan/plan_relevance.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 namespace {

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_relevance.hpp"
 #include "tpm/simulate/validity.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tpm/plan/plan_scout.hpp"
-#include "tpm/reduce/contact_model.hpp"
+#include "tpmkit/contact_model.hpp"
 
 namespace tpm {
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,8 +1,8 @@
 // Candidates of plans and runs of scenes, each as the other.
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/plan/plan_model.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

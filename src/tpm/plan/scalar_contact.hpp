@@ -1,6 +1,6 @@
 #pragma once
 #include "tpm/plan/scalar_model.hpp"
-#include "tpm/reduce/contact_model.hpp"
+#include "tpmkit/contact_model.hpp"
 
 namespace tpm {
 

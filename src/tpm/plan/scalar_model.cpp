@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/material/tpm_element.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 

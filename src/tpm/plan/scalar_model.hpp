@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "tpm/protocol/protocol.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/plan/scalar_run.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,8 +6,8 @@
 #include <array>
 #include <stdexcept>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/units.hpp"
 #include "tpm/core/word_table.hpp"
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/store/document_place.hpp"
+#include "tpmkit/protocol.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

@@ -7,10 +7,10 @@
 #include <cmath>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
 #include "tpm/reduce/condensed_lag.hpp"
 #include "tpm/reduce/condensed_phi.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

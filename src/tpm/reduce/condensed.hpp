@@ -5,7 +5,7 @@
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/freedom.hpp"
 #include "tpm/reduce/condensed_branches.hpp"
-#include "tpm/reduce/contact_model.hpp"
+#include "tpmkit/contact_model.hpp"
 
 namespace tpm {
 

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/material_refusal.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
 #include "tpm/reduce/condensed_lag.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/quasistatic.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -14,9 +14,7 @@ namespace plain {
 #define TPM_CONDENSED_WIDE
 #pragma GCC push_options
 #pragma GCC target("avx2")
-namespace wide {
-#include "tpm/reduce/condensed_kernel.inc"
-}  // namespace wide
+namespace wide {}  // namespace wide
 #pragma GCC pop_options
 #endif
 #pragma GCC diagnostic pop

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstring>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/wide_vectors.hpp"
 #include "tpm/reduce/flush_denormals.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

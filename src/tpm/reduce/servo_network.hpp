@@ -2,9 +2,9 @@
 #include <memory>
 #include <vector>
 
-#include "tpm/reduce/contact_model.hpp"
 #include "tpm/reduce/servo_stiffness.hpp"
 #include "tpm/reduce/step_error.hpp"
+#include "tpmkit/contact_model.hpp"
 
 namespace tpm {
 

@@ -8,11 +8,11 @@
 #include <cstring>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/wide_vectors.hpp"
 #include "tpm/reduce/flush_denormals.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

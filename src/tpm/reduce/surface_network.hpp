@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "tpm/network/ball_on_network.hpp"
-#include "tpm/reduce/contact_model.hpp"
 #include "tpm/reduce/servo_stiffness.hpp"
+#include "tpmkit/contact_model.hpp"
 
 namespace tpm {
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/reduce/flush_denormals.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -2,12 +2,12 @@
 #include <memory>
 #include <vector>
 
-#include "tpm/reduce/contact_model.hpp"
 #include "tpm/reduce/servo_bonds.hpp"
 #include "tpm/reduce/step_error.hpp"
 #include "tpm/reduce/zone_surroundings.hpp"
 #include "tpm/solve/aligned_floats.hpp"
 #include "tpm/solve/panel_kernels.hpp"
+#include "tpmkit/contact_model.hpp"
 
 namespace tpm {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/reduce/zone_network.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

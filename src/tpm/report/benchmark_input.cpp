@@ -5,9 +5,9 @@
 #include <array>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/report/benchmark_report.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

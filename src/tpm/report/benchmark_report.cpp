@@ -7,10 +7,10 @@
 #include <functional>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 namespace {

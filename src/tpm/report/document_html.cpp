@@ -3,8 +3,8 @@
 #include <cctype>
 #include <string_view>
 
-#include "tpm/core/error.hpp"
 #include "tpm/report/document.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -14,8 +14,8 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/uncertainty.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

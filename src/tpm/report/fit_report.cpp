@@ -7,13 +7,13 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/oscillation.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_csv.hpp"
 #include "tpm/report/recording_report.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,13 +7,13 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fitted_law.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_csv.hpp"
 #include "tpm/report/fit_report.hpp"
 #include "tpm/report/recording_report.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

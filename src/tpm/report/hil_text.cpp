@@ -5,6 +5,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/hil_report.hpp"
+#include "tpm/servo/real_time.hpp"
 #include "tpm/study/printed_number.hpp"
 
 namespace tpm {

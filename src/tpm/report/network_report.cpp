@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

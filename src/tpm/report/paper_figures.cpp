@@ -7,9 +7,9 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
-#include "tpm/law/frequency_response.hpp"
-#include "tpm/model/model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/frequency_response.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

@@ -2,9 +2,9 @@
 #include <string>
 #include <vector>
 
-#include "tpm/curve/curve.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/report/figure.hpp"
+#include "tpmkit/curve.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 

@@ -4,9 +4,7 @@
 
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/curve/load.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_figures.hpp"
 #include "tpm/report/run_record.hpp"
@@ -14,6 +12,8 @@
 #include "tpm/report/study_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/claims.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "tpm/curve/curve.hpp"
 #include "tpm/report/document.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/report/paper_figures.hpp"
 #include "tpm/study/audit.hpp"
 #include "tpm/study/fit_variations.hpp"
 #include "tpm/study/tables.hpp"
+#include "tpmkit/curve.hpp"
 
 namespace tpm {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/report/plan_report.hpp"
 #include "tpm/report/trajectory_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

@@ -7,10 +7,10 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fitted_law.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/fit_csv.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 namespace {

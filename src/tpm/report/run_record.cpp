@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

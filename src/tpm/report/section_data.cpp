@@ -5,9 +5,9 @@
 #include <set>
 
 #include "tpm/core/text.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/report/fit_figures.hpp"
 #include "tpm/report/sections.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

@@ -4,14 +4,14 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/network_report.hpp"
 #include "tpm/simulate/smoothness.hpp"
 #include "tpm/simulate/step_fields.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

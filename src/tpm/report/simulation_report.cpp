@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/simulate/smoothness.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

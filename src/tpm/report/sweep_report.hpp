@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "tpm/core/units.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/sweep/sweep_sensitivity.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/units.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/haptics/loop_maker.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/model.hpp"
+#include "tpmkit/units.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/report/view_parts.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 

@@ -2,11 +2,11 @@
 
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/report/view_parts.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/view_parts.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

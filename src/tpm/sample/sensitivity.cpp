@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

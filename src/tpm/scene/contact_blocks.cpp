@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "tpm/formulation/formulation.hpp"
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/network/mass_spring.hpp"
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/scene/scene.hpp"
+#include "tpmkit/formulation.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

@@ -3,13 +3,13 @@
 
 #include <array>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/place_function.hpp"
 #include "tpm/solve/fractional_branches.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 namespace {

@@ -5,9 +5,9 @@
 #include <numeric>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/scene/xdmf.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

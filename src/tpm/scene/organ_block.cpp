@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/network/filling.hpp"
@@ -12,6 +11,7 @@
 #include "tpm/network/mesh_surface.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/scene/blocks.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

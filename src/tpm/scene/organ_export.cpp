@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/lowest_mode.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/material_directions.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -2,9 +2,9 @@
 #include <memory>
 #include <vector>
 
-#include "tpm/model/model.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/scene.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 

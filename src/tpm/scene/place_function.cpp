@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

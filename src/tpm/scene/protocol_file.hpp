@@ -2,8 +2,8 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <array>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/local_support.hpp"
 #include "tpm/network/material_refusal.hpp"
 #include "tpm/network/rigidity.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,11 +5,11 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/material/bond_element.hpp"
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/freedom.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/bond_element.hpp"
 
 namespace tpm {
 

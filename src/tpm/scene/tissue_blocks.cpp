@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/scene/blocks.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

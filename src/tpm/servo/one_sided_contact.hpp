@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/reduce/contact_model.hpp"
+#include "tpmkit/contact_model.hpp"
 
 namespace tpm {
 

@@ -6,8 +6,10 @@
 #include <exception>
 #include <thread>
 
-#include "tpm/core/error.hpp"
-#include "tpm/servo/servo_loop.hpp"
+#include "tpm/servo/real_time.hpp"
+#include "tpm/servo/servo_step.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm {
 namespace {

@@ -14,7 +14,7 @@
 #include <fstream>
 #include <thread>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,15 +1,10 @@
 #pragma once
 #include <cstdint>
 #include <string>
-#include <vector>
+
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm {
-
-/// What to do where the system refuses real-time scheduling.
-enum class RealTimeWish {
-  enforce,  ///< an error
-  ignore,   ///< go on, and say so
-};
 
 /// CLOCK_MONOTONIC, ns.
 [[nodiscard]] std::int64_t now_ns() noexcept;
@@ -38,23 +33,5 @@ class AboveRealTime {
 
 /// Kernel, processor and number of cores, one line.
 [[nodiscard]] std::string host_line();
-
-/// Counts times in bins of 1 us up to 50 ms. note() neither allocates nor throws.
-class TimeHistogram {
- public:
-  TimeHistogram();
-  void note(std::int64_t ns) noexcept;
-  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
-  [[nodiscard]] double max_s() const noexcept { return static_cast<double>(max_ns_) * 1e-9; }
-  /// Upper edge of the bin in which that share of the times ends, s; max_s() beyond the bins.
-  [[nodiscard]] double quantile_s(double share) const;
-  /// Counts of the bins.
-  [[nodiscard]] const std::vector<std::uint32_t>& bins() const { return bins_; }
-
- private:
-  std::vector<std::uint32_t> bins_;
-  std::uint64_t count_ = 0;
-  std::int64_t max_ns_ = 0;
-};
 
 }  // namespace tpm

@@ -3,60 +3,14 @@
 #include <optional>
 #include <vector>
 
-#include "tpm/device/haptic_device.hpp"
 #include "tpm/servo/energy_watch.hpp"
 #include "tpm/servo/one_sided_contact.hpp"
 #include "tpm/servo/oscillation_watch.hpp"
 #include "tpm/servo/passivity.hpp"
-#include "tpm/servo/servo_record.hpp"
 #include "tpm/servo/start_gate.hpp"
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm {
-
-/// What a session states of its servo loop.
-struct SessionServo {
-  double period_s = 1e-3;
-  std::vector<std::uint64_t> phase_ends;  ///< cycles, rising; the last one ends the session
-  Eigen::Vector3d push = -Eigen::Vector3d::UnitZ();     ///< device coordinates, unit vector
-  Eigen::Vector3d surface_m = Eigen::Vector3d::Zero();  ///< where the tissue begins, device
-  double force_limit_N = 8.0;
-  /// A force that rises faster makes the model's tool slip back; falls are never limited.
-  double slew_limit_N_per_s = 400.0;
-  double ramp_in_s = 0.5;               ///< over which the limit of the force grows to its value
-  double most_damping_N_s_per_m = 2.0;  ///< of the passivity controller; 0: it only observes
-  /// What has to be before the session begins; none: it begins with the first cycle.
-  std::optional<StartGateSettings> gate = std::nullopt;
-  /// If given, the surface is put so far before the tool, along the push, when the session begins.
-  std::optional<double> surface_before_hand_m = std::nullopt;
-  double untrusted_limit_s = 0.5;  ///< of a model that does not trust its forces; then it stops
-  /// Stop if so many of the last 1000 cycles were late, or so many periods were missed at once.
-  int most_late = 100;
-  int most_missed = 50;
-};
-
-/// What a servo loop has to do and what it must not exceed: what its session states, and what
-/// follows from its model and device (loop_settings() in haptics/session_run.hpp).
-struct ServoSettings : SessionServo {
-  Eigen::Vector3d model_push = Eigen::Vector3d::UnitZ();  ///< the push in coordinates of the model
-  /// If given, the tool moves in space and the model answers for it as it stands, contact on and
-  /// off included: it gets the tool's displacement from `surface_m`, turned by this. Otherwise only
-  /// motion along the push reaches the model, one-sided.
-  std::optional<Eigen::Matrix3d> to_model = std::nullopt;
-  double friction_N_s_per_m = 0.1;   ///< of the device, see EnergyWatchSettings
-  int delay_periods = 0;             ///< of the device, as far as it is known
-  double energy_allowance_J = 2e-3;  ///< see EnergyWatchSettings; infinite: it only counts
-  bool watch_oscillation = true;
-  double most_speed_m_per_s = 5.0;  ///< of a hand; a position that needs more is not believed
-  double fade_s = 0.1;              ///< time constant in which a force fades that is not trusted
-  int status_every = 2;             ///< cycles
-};
-
-struct ServoCounts {
-  std::uint64_t time_guards = 0, saturations = 0, force_limited = 0, slipped = 0, ramping_in = 0,
-                damped = 0, beyond_model = 0, late = 0, missed = 0;
-  int most_missed_at_once = 0;  ///< periods between two cycles
-  int most_late = 0;            ///< of any 1000 cycles behind each other
-};
 
 /// One cycle of the loop: read, model, limits, passivity, write. Neither allocates nor locks nor
 /// throws.

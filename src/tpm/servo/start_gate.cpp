@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "tpm/servo/servo_record.hpp"
+#include "tpmkit/servo_record.hpp"
 
 namespace tpm {
 namespace {

@@ -1,23 +1,10 @@
 #pragma once
 #include <Eigen/Core>
-#include <atomic>
 #include <cstdint>
-#include <memory>
+
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm {
-
-/// Where the tool has to be before a session begins, and for how long.
-struct StartGateSettings {
-  double clearance_m = 0.5e-3;                         ///< least distance above the surface
-  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< of the workspace, device coordinates
-  double reach_m = 0.075;                              ///< from there
-  double still_m = 0.5e-3;                             ///< how far a tool at rest may move
-  double still_s = 0.25;                               ///< for how long it has to be at rest
-  double limit_s = 60.0;                               ///< after which the session is given up
-  /// The operator has to say when: by a button of the device, or where `confirmed` becomes true.
-  bool confirm = false;
-  std::shared_ptr<const std::atomic<bool>> confirmed = nullptr;  ///< a key, say; may be null
-};
 
 /// Watches the tool before a session: forces stay at zero until it is in free air, inside the
 /// workspace and at rest. Neither allocates nor throws.

@@ -1,6 +1,7 @@
 #include <exception>
 
-#include "tpm/servo/servo_loop.hpp"
+#include "tpm/servo/servo_step.hpp"
+#include "tpmkit/servo_loop.hpp"
 
 namespace tpm {
 namespace {

@@ -2,7 +2,7 @@
 // stretched.
 #include <cmath>
 
-#include "tpm/material/elongation_shape.hpp"
+#include "tpmkit/elongation_function.hpp"
 
 namespace tpm {
 namespace {

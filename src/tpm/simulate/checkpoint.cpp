@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

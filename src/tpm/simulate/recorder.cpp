@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/simulate/checkpoint.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -1,38 +1,9 @@
 #pragma once
 // What a formulation does for scenes: two of its roles (formulation/formulation.hpp).
-#include "tpm/simulate/operation_count.hpp"
 #include "tpm/simulate/simulation.hpp"
+#include "tpmkit/simulation.hpp"
 
 namespace tpm {
-
-/// How a scene answers over its protocol.
-struct Trajectory {
-  Eigen::VectorXd response;                    ///< N or m, at each time
-  std::vector<Eigen::Matrix3Xd> displacement;  ///< of all spheres, m, at each time; if asked for
-  Validity validity;  ///< of networks without masses: limits passed at the times asked for
-  OperationCount work;
-  double steps = 0.0;
-  double error_estimate = 0.0;  ///< the formulation's own, N or m; 0 where it has none
-};
-
-/// Answers scenes at given times.
-class SceneRunner {
- public:
-  SceneRunner() = default;
-  SceneRunner(const SceneRunner&) = delete;
-  SceneRunner& operator=(const SceneRunner&) = delete;
-  virtual ~SceneRunner() = default;
-
-  /// @param scene one that the formulation can run (require_runnable)
-  /// @param network network_to_run(scene)
-  /// @param times_s rising, within the protocol
-  /// @param with_field fill Trajectory::displacement; only of formulations with that capability
-  /// Throws Error(numerical) where the formulation fails, Error(bad_input) for what its
-  /// capabilities do not say.
-  [[nodiscard]] virtual Trajectory run(const ExperimentScene& scene, const RunNetwork& network,
-                                       const std::vector<double>& times_s,
-                                       bool with_field) const = 0;
-};
 
 /// Shows whole states of the network, and goes on from checkpoints.
 class StateRunner {

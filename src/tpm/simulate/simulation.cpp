@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/network/lowest_mode.hpp"
 #include "tpm/simulate/scene_runner.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

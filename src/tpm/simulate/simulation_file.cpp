@@ -6,12 +6,12 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/scene/network_file.hpp"
 #include "tpm/scene/xdmf.hpp"
 #include "tpm/simulate/smoothness.hpp"
 #include "tpm/simulate/step_fields.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

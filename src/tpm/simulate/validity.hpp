@@ -1,45 +1,14 @@
 #pragma once
-#include <array>
 #include <cstdint>
-#include <optional>
-#include <string_view>
 #include <vector>
 
 #include "tpm/model/validity_limits.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/scene.hpp"
+#include "tpmkit/simulation.hpp"
 
 namespace tpm {
-
-/// The limits of model/validity_limits.hpp.
-enum class ValidityLimit : std::size_t {
-  indentation,  ///< beyond kValidIndentation_m: the paper vouches for no more
-  damage,       ///< beyond kDamageIndentation_m: liver is damaged
-  turning,      ///< a lateral bond has turned by more than kValidTurning_rad from rest
-};
-inline constexpr std::size_t kValidityLimits = 3;
-
-[[nodiscard]] std::string_view key_of(ValidityLimit limit);
-[[nodiscard]] std::string_view words_of(ValidityLimit limit);
-
-/// What a run has passed of one limit.
-struct ValidityBreach {
-  std::optional<double> first_time_s;  ///< none: never
-  std::vector<std::size_t> spheres;    ///< that were ever beyond it, rising, from 0
-};
-
-/// What a run has passed so far.
-struct Validity {
-  std::array<ValidityBreach, kValidityLimits> breach;
-  double deepest_m = 0.0;        ///< largest indentation of any sphere
-  double most_turned_rad = 0.0;  ///< largest turn of any lateral bond
-
-  [[nodiscard]] const ValidityBreach& of(ValidityLimit limit) const {
-    return breach[static_cast<std::size_t>(limit)];
-  }
-  [[nodiscard]] bool whole() const;
-};
 
 /// True for the paper's element and for a liver of a size like the paper's: 10 and 12 mm are depths
 /// of such a liver. They say nothing about an organ of another shape or size.

@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/material/tpm_element.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 

@@ -10,7 +10,7 @@
 #include <mutex>
 #include <new>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/solve/cardinal_weight.hpp"
 #include "tpm/solve/springpot_pair.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

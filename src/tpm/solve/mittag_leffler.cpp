@@ -7,10 +7,10 @@
 #include <complex>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/solve/laplace_contour.hpp"
 #include "tpm/solve/relaxation_spectrum.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

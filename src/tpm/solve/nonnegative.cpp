@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -2,7 +2,7 @@
 #include <functional>
 #include <span>
 
-#include "tpm/protocol/protocol.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

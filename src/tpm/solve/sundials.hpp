@@ -12,7 +12,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm::sundials {
 

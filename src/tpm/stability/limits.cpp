@@ -5,12 +5,12 @@
 #include <limits>
 #include <random>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/network/lowest_mode.hpp"
 #include "tpm/stability/judged_problem.hpp"
 #include "tpm/stability/study.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

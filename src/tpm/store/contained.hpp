@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -9,9 +9,9 @@
 #include <iterator>
 #include <utility>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 namespace {

@@ -3,8 +3,8 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/units.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

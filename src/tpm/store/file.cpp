@@ -13,9 +13,9 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/replacement.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

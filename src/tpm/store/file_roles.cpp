@@ -9,8 +9,8 @@
 #include <set>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,9 +6,9 @@
 #include <bit>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5_parts.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/hdf5_parts.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/contained.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
@@ -13,6 +12,7 @@
 #include "tpm/store/hdf5_contents.hpp"
 #include "tpm/store/packed.hpp"
 #include "tpm/store/seal.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

@@ -7,13 +7,13 @@
 #include <new>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/contained.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/hdf5_assembly.hpp"
 #include "tpm/store/packed.hpp"
 #include "tpm/store/seal.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace fs = std::filesystem;

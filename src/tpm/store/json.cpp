@@ -6,8 +6,8 @@
 #include <set>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

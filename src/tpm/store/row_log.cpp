@@ -8,10 +8,10 @@
 #include <cerrno>
 #include <cstring>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/check_sum.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/replacement.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

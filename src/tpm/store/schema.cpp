@@ -13,10 +13,10 @@
 #include <valijson/validator.hpp>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/memory_reserve.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

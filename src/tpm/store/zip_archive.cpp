@@ -8,7 +8,7 @@
 #include <cstring>
 #include <memory>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <map>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/audit_kinds.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

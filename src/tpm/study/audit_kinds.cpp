@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/cause_search.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

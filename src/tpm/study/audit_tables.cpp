@@ -4,9 +4,9 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/study/audit_kinds.hpp"
 #include "tpm/study/printed_number.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

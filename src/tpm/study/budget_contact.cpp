@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/law_contact.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/law_prediction.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

@@ -5,11 +5,11 @@
 #include <array>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/study/budget_parts.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -9,8 +9,8 @@
 #include <optional>
 #include <tuple>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

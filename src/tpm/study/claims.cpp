@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <set>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/printed_number.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,9 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/units.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/expression.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

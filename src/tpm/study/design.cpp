@@ -10,10 +10,10 @@
 #include <map>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/design_words.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/study/design.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/study/design.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

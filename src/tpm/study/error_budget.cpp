@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/plan/perception.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <set>
 
-#include "tpm/core/error.hpp"
 #include "tpm/study/model_functions.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

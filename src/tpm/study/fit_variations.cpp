@@ -5,10 +5,10 @@
 #include <set>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/curve/load.hpp"
+#include "tpmkit/curve_file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "tpm/law/law_file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/sequential_fit.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
-#include "tpm/law/law_file.hpp"
 #include "tpm/study/identification.hpp"
+#include "tpmkit/law_file.hpp"
 
 namespace tpm {
 namespace {

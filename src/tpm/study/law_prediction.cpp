@@ -8,12 +8,12 @@
 #include <limits>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/prediction_parts.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "tpm/law/law_file.hpp"
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/recording_setup.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

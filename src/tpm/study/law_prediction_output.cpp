@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "tpm/core/text.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/store/delimited.hpp"
 #include "tpm/study/law_prediction.hpp"
 #include "tpm/study/selection.hpp"

@@ -7,11 +7,11 @@
 #include <limits>
 #include <numbers>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/recording_file.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <array>
 
-#include "tpm/core/error.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/solve/creep_exact.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "tpm/core/error.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/scene/protocol_file.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,15 +6,15 @@
 #include <cmath>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/fit/least_squares.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 #include "tpm/study/prediction_parts.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "tpm/fit/parameter.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/material/bond_material.hpp"
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/organ_readings.hpp"
 #include "tpm/study/recording_setup.hpp"
+#include "tpmkit/bond_material.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

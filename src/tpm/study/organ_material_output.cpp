@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 
@@ -177,7 +178,7 @@ Json readings_json(const OrganMaterial& m) {
   for (std::size_t i = 0; i < r.fit.parameters.size(); ++i) {
     const ParameterResult& p = r.fit.parameters[i];
     const std::string key =
-        i < m.parameters.size() ? bond_parameter_key(p.parameter.name) : placement_key(p.parameter);
+        i < m.parameters.size() ? parameter_key(p.parameter) : placement_key(p.parameter);
     Json entry{{"value", rounded(p.estimate, kMaterialDigits)},
                {"lower", limit_json(p.lower)},
                {"upper", limit_json(p.upper)},

@@ -8,9 +8,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 #include "tpm/study/prediction_parts.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -4,10 +4,10 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/law_prediction.hpp"
 #include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 

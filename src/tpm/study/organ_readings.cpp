@@ -6,10 +6,10 @@
 #include <cmath>
 #include <span>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/fit/verdict.hpp"
 #include "tpm/study/organ_profile.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

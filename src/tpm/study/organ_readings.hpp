@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "tpm/fit/fit.hpp"
-#include "tpm/protocol/protocol.hpp"
 #include "tpm/study/organ_bonds.hpp"
+#include "tpmkit/protocol.hpp"
 
 namespace tpm {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <set>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/document_place.hpp"
 #include "tpm/study/organ_study.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

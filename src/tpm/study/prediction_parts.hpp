@@ -1,7 +1,7 @@
 #pragma once
 // Parts that predictions of a law, of an organ and of a recording share.
-#include "tpm/model/model.hpp"
 #include "tpm/study/law_prediction.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 

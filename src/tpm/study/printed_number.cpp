@@ -5,8 +5,8 @@
 #include <charconv>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
-#include "tpm/core/units.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 namespace {

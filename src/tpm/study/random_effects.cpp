@@ -11,8 +11,8 @@
 #include <cmath>
 #include <vector>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/prediction_parts.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

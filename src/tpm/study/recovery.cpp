@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/law/law_model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {

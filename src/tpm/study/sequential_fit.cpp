@@ -8,10 +8,10 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/fit/starts.hpp"
 #include "tpm/study/contact_profile.hpp"
 #include "tpm/study/whitened_prefix.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -8,9 +8,9 @@
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/parameter.hpp"
 #include "tpm/law/contact_history.hpp"
-#include "tpm/law/law_file.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/recording_setup.hpp"
+#include "tpmkit/law_file.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 

@@ -8,8 +8,8 @@
 #include <numeric>
 #include <tuple>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -8,9 +8,9 @@
 #include <limits>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/model/model.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

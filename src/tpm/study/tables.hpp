@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "tpm/material/tpm_element.hpp"
 #include "tpm/study/claims.hpp"
 #include "tpm/study/printed_number.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 

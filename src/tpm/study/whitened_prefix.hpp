@@ -7,8 +7,8 @@
 #include "tpm/fit/autoregressive.hpp"
 #include "tpm/fit/config.hpp"
 #include "tpm/fit/least_squares.hpp"
-#include "tpm/law/law_model.hpp"
 #include "tpm/study/recording_setup.hpp"
+#include "tpmkit/law_model.hpp"
 
 namespace tpm {
 

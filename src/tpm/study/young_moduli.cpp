@@ -6,9 +6,9 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/verdict.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/document_place.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -12,9 +12,9 @@
 #include <cstring>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/store/check_sum.hpp"
 #include "tpm/store/file_roles.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "tpm/core/error.hpp"
 #include "tpm/study/expression.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/core/units.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

@@ -7,12 +7,12 @@
 #include <limits>
 #include <optional>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/solve/creep_exact.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

@@ -7,15 +7,15 @@
 #include <mutex>
 #include <optional>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/model/model.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/shared_plan.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/sweep/scene_field.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 namespace {

@@ -2,9 +2,9 @@
 #include <string>
 #include <string_view>
 
-#include "tpm/material/bond_material.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/store/json.hpp"
+#include "tpmkit/bond_material.hpp"
 
 namespace tpm {
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "tpm/core/error.hpp"
 #include "tpm/study/expression.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

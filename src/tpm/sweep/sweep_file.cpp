@@ -5,15 +5,15 @@
 #include <array>
 #include <set>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/version.hpp"
 #include "tpm/core/word_table.hpp"
 #include "tpm/sample/sensitivity.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/expression.hpp"
 #include "tpm/sweep/sweep.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
+#include "tpmkit/error.hpp"
+#include "tpmkit/version.hpp"
 
 namespace tpm {
 namespace {

@@ -8,8 +8,8 @@
 #include <functional>
 #include <utility>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/word_table.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

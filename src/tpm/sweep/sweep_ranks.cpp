@@ -10,8 +10,8 @@
 #include <cstring>
 #include <ctime>
 
-#include "tpm/core/error.hpp"
 #include "tpm/sweep/block_log.hpp"
+#include "tpmkit/error.hpp"
 #endif
 
 namespace tpm {

@@ -9,12 +9,12 @@
 #include <iterator>
 #include <map>
 
-#include "tpm/core/error.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/delimited.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/sweep/workers.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 namespace {

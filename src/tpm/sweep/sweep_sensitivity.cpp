@@ -1,6 +1,6 @@
 #include "tpm/sweep/sweep_sensitivity.hpp"
 
-#include "tpm/core/error.hpp"
+#include "tpmkit/error.hpp"
 
 namespace tpm {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <cmath>
 
-#include "tpm/material/bond_material.hpp"
+#include "tpmkit/bond_material.hpp"
 
 namespace tpm {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/units.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/units.hpp"
-#include "tpm/material/bond_law.hpp"
+#include "tpmkit/bond_law.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

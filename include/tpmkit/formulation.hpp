@@ -71,16 +71,14 @@ inline constexpr std::array<CapabilityEntry, 19> kCapabilities{{
 /// it is and what it can do; what it does for whom stands in its roles, interfaces that it
 /// implements besides this one:
 ///
-/// | role | asked by |
-/// | --- | --- |
-/// | ModelMaker (model/model.hpp) | fits, tables, designs: response and derivatives of the element
-/// | | SceneRunner (simulate/scene_runner.hpp) | scenes, sweeps; plans, if `planned` | |
-/// StateRunner (simulate/scene_runner.hpp) | scenes: all states, with checkpoints | | PlanOffer
-/// (plan/plan_model.hpp) | plans: candidates that claim an error and a cost | | LoopMaker
-/// (haptics/loop_maker.hpp) | sessions: what the servo loop steps |
+/// - ModelMaker (tpmkit/model.hpp), asked by fits, tables, designs: response and derivatives of the
+///   element;
+/// - SceneRunner (tpmkit/simulation.hpp), asked by scenes and sweeps; by plans, if `planned`;
+/// - StateRunner (simulate/scene_runner.hpp), asked by scenes: all states, with checkpoints;
+/// - PlanOffer (plan/plan_model.hpp), asked by plans: candidates that claim an error and a cost;
+/// - LoopMaker (haptics/loop_maker.hpp), asked by sessions: what the servo loop steps.
 ///
-/// Formulations are objects that never change, one or several in a file of formulations/, which the
-/// build lists (docs/architecture.md, "Adding a formulation").
+/// Formulations are objects that never change (docs/architecture.md, "Adding a formulation").
 class Formulation {
  public:
   /// What stands in a list.
@@ -119,8 +117,17 @@ class Formulation {
 
 using Formulations = std::span<const Formulation* const>;
 
-/// All formulations by rank. Defined in a source that the build writes from the files of
-/// formulations/: a program that is linked with another list has other formulations.
+/// The formulations of this library by rank, from the files of formulations/, which the build
+/// lists.
+[[nodiscard]] Formulations shipped_formulations();
+
+/// All formulations by rank: those of the library. A program adds its own by defining this function
+/// itself,
+///
+///     tpm::Formulations tpm::formulations() {
+///       static const auto all = joined({shipped_formulations(), own_formulations()});
+///       return all;
+///     }
 [[nodiscard]] Formulations formulations();
 
 /// Those of several lists, by rank and name. Throws std::logic_error if two share a name.

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/material/elongation_function.hpp"
+#include "tpmkit/elongation_function.hpp"
 
 namespace tpm {
 

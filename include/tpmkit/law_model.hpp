@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "tpm/law/law.hpp"
-#include "tpm/model/model.hpp"
+#include "tpmkit/law.hpp"
+#include "tpmkit/model.hpp"
 
 namespace tpm {
 

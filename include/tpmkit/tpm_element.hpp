@@ -2,8 +2,8 @@
 #include <array>
 #include <string_view>
 
-#include "tpm/core/units.hpp"
-#include "tpm/material/bond_element.hpp"
+#include "tpmkit/bond_element.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

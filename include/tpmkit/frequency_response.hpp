@@ -3,9 +3,9 @@
 #include <optional>
 #include <span>
 
-#include "tpm/law/law.hpp"
-#include "tpm/material/tpm_element.hpp"
-#include "tpm/model/model.hpp"
+#include "tpmkit/law.hpp"
+#include "tpmkit/model.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 

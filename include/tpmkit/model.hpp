@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/material/tpm_element.hpp"
-#include "tpm/protocol/protocol.hpp"
+#include "tpmkit/protocol.hpp"
+#include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
 
@@ -102,6 +102,10 @@ class ModelMaker {
 /// The model of a formulation of the element. Throws Error(bad_input) naming those there are.
 [[nodiscard]] std::unique_ptr<Model> make_model(std::string_view name,
                                                 const ModelOptions& options = {});
+
+/// The element in closed form, the formulation "closed_form": exact for histories that are linear
+/// between knots and for a constant load. The component `core` is enough for it.
+[[nodiscard]] std::unique_ptr<Model> make_closed_form(const TensionRule& tension = {});
 
 /// Limits of the model in the paper that a run has passed (text, one line each): indentation over
 /// 10 mm (validity), over 12 mm (damage), a lateral bond turned by more than pi/6.

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/units.hpp"
-#include "tpm/curve/curve.hpp"
+#include "tpmkit/curve.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 

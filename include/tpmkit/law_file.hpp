@@ -4,10 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "tpm/curve/curve.hpp"
-#include "tpm/law/law.hpp"
-#include "tpm/law/law_uncertainty.hpp"
-#include "tpm/store/json.hpp"
+#include "tpmkit/curve.hpp"
+#include "tpmkit/law.hpp"
+#include "tpmkit/law_uncertainty.hpp"
 
 namespace tpm {
 
@@ -26,12 +25,9 @@ struct LawFile {
 /// The key of a parameter in files: name and SI unit, "k_inf_N_per_m", "tau1_s", "alpha".
 [[nodiscard]] std::string law_key(const LawParameter& parameter);
 
-/// Throws Error(bad_input) for anything that schemas/law.schema.json or the law does not allow: an
-/// unknown law or key, a missing parameter without a preset, a value out of range.
-[[nodiscard]] LawFile law_from_json(const Json& json, std::string_view where);
-/// An infinite spacing, which is its preset, is left out: JSON has no infinity.
-[[nodiscard]] Json to_json(const LawFile& law);
-
+/// Reads a law file. Throws Error(bad_input) for anything that schemas/law.schema.json or the law
+/// does not allow: an unknown law or key, a missing parameter without a preset, a value out of
+/// range.
 [[nodiscard]] LawFile read_law(const std::filesystem::path& path);
 /// Throws Error(environment) if the file cannot be written.
 void write_law(const std::filesystem::path& path, const LawFile& law);

@@ -6,8 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/law/law.hpp"
-#include "tpm/store/json.hpp"
+#include "tpmkit/law.hpp"
 
 namespace tpm {
 
@@ -69,14 +68,5 @@ struct LawUncertainty {
   [[nodiscard]] double quantile(double at_level) const;
   [[nodiscard]] double quantile() const { return quantile(level); }
 };
-
-/// The block "fit" of a law file. Keys of `parameters` and `covariance` are law_key() names.
-[[nodiscard]] Json to_json(const LawUncertainty& uncertainty, const LawSpec& spec);
-
-/// Throws Error(bad_input) for names that the law has not, a matrix of another size, one that is
-/// not symmetric or not positive semidefinite.
-[[nodiscard]] LawUncertainty uncertainty_from_json(const Json& block, const LawSpec& spec,
-                                                   std::span<const double> values,
-                                                   std::string_view where);
 
 }  // namespace tpm

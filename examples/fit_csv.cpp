@@ -1,0 +1,29 @@
+// Which law explains a recording of an indentation, and how well does the recording determine its
+// parameters? Fits a CSV file with a time, a depth and a force in each row; units are read from the
+// head of the file.
+//
+//     fit_csv configs/oscillation_example/hold.csv
+//
+// Prints:
+//     ...
+#include <cstdio>
+#include <tpmkit/error.hpp>
+#include <tpmkit/fit.hpp>
+
+int main(int argc, char** argv) try {
+  tpm::FitRequest request;
+  request.law =
+      "linear-1";  // a spring beside a spring with a dashpot; leave it empty to have the law chosen
+  const tpm::FitSummary fit = tpm::fit_recordings({argv + 1, argv + argc}, request);
+  std::printf("%d of %d starts agree\n", fit.starts_agreeing, fit.starts_run);
+  for (const tpm::FittedParameter& p : fit.parameters) {
+    if (p.nuisance) continue;
+    std::printf("%-5s = %.4g %s", p.name.c_str(), p.estimate, p.unit.c_str());
+    if (p.lower && p.upper) std::printf(", 95 %% interval %.4g to %.4g", *p.lower, *p.upper);
+    std::printf(", %s\n", std::string(tpm::verdict_name(p.verdict)).c_str());
+  }
+  if (fit.law) tpm::write_law("fitted_law.json", *fit.law);
+} catch (const tpm::Error& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return static_cast<int>(error.code());
+}

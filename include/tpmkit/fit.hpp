@@ -1,0 +1,73 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tpmkit/law_file.hpp"
+
+namespace tpm {
+
+/// What the data say about one parameter.
+enum class Verdict {
+  identified,   ///< the interval is closed on both sides
+  lower_only,   ///< only a lower limit: larger values up to the bound cannot be told apart
+  upper_only,   ///< only an upper limit
+  flat,         ///< no limit within the bounds
+  failed,       ///< a walk along the profile ended in neither a limit nor a bound
+  not_profiled  ///< profiles were switched off
+};
+
+[[nodiscard]] std::string_view verdict_name(Verdict verdict) noexcept;
+
+/// One estimated parameter, SI.
+struct FittedParameter {
+  std::string name;
+  std::string unit;  ///< SI symbol
+  double estimate = 0.0;
+  std::optional<double> standard_error;  ///< linearised
+  std::optional<double> lower, upper;    ///< confidence limits by profile likelihood
+  Verdict verdict = Verdict::not_profiled;
+  bool nuisance = false;  ///< belongs to the recording or its noise, not to the material
+  std::string words;      ///< the verdict as a sentence
+};
+
+/// What a fit found.
+struct FitSummary {
+  std::optional<LawFile> law;  ///< the fitted law with its uncertainty; none: no law was fitted
+  double chi_square = 0.0;     ///< sum of squared standardised residuals
+  int degrees_of_freedom = 0;  ///< values less estimated parameters
+  int starts_run = 0, starts_failed = 0;
+  int starts_agreeing = 0;  ///< that ended in the best minimum
+  std::vector<FittedParameter> parameters;
+  std::vector<std::string> flags;  ///< what a reader must know, one sentence each
+  std::string text;                ///< for a terminal
+  std::string json;                ///< everything, keys in docs/fit_files.md
+};
+
+/// What a caller may say about a fit.
+struct FitRequest {
+  /// Of fit_recordings(): the law, as law_name() writes it ("linear-2"). Empty: the least law of
+  /// the family that the data do not contradict is chosen.
+  std::string law;
+  std::optional<std::size_t> starts;  ///< of the search; else what the configuration says, or 40
+  std::optional<std::uint64_t> seed;  ///< of the starts; else what the configuration says, or 0
+  /// Asked before each evaluation; true ends the fit with an exception.
+  std::function<bool()> interrupted;
+};
+
+/// Runs the fit that a configuration states (schemas/fit.schema.json, docs/fit_files.md). The
+/// result is the same on every run. Throws Error(bad_input) with the file and the key,
+/// Error(numerical) if no start ends in a usable point.
+[[nodiscard]] FitSummary fit_configuration(const std::filesystem::path& file,
+                                           const FitRequest& request = {});
+
+/// Fits a law to recordings together. Columns and units are read from the head of each CSV file, or
+/// from a description beside it (docs/data_formats.md). Throws as fit_configuration() does.
+[[nodiscard]] FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
+                                        const FitRequest& request = {});
+
+}  // namespace tpm

@@ -1,0 +1,143 @@
+#pragma once
+#include <Eigen/Core>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tpmkit/contact_model.hpp"
+#include "tpmkit/device.hpp"
+#include "tpmkit/servo_record.hpp"
+
+namespace tpm {
+
+/// Where the tool has to be before a session begins, and for how long.
+struct StartGateSettings {
+  double clearance_m = 0.5e-3;                         ///< least distance above the surface
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< of the workspace, device coordinates
+  double reach_m = 0.075;                              ///< from there
+  double still_m = 0.5e-3;                             ///< how far a tool at rest may move
+  double still_s = 0.25;                               ///< for how long it has to be at rest
+  double limit_s = 60.0;                               ///< after which the session is given up
+  /// The operator has to say when: by a button of the device, or where `confirmed` becomes true.
+  bool confirm = false;
+  std::shared_ptr<const std::atomic<bool>> confirmed = nullptr;  ///< a key, say; may be null
+};
+
+/// What a session states of its servo loop.
+struct SessionServo {
+  double period_s = 1e-3;
+  std::vector<std::uint64_t> phase_ends;  ///< cycles, rising; the last one ends the session
+  Eigen::Vector3d push = -Eigen::Vector3d::UnitZ();     ///< device coordinates, unit vector
+  Eigen::Vector3d surface_m = Eigen::Vector3d::Zero();  ///< where the tissue begins, device
+  double force_limit_N = 8.0;
+  /// A force that rises faster makes the model's tool slip back; falls are never limited.
+  double slew_limit_N_per_s = 400.0;
+  double ramp_in_s = 0.5;               ///< over which the limit of the force grows to its value
+  double most_damping_N_s_per_m = 2.0;  ///< of the passivity controller; 0: it only observes
+  /// What has to be before the session begins; none: it begins with the first cycle.
+  std::optional<StartGateSettings> gate = std::nullopt;
+  /// If given, the surface is put so far before the tool, along the push, when the session begins.
+  std::optional<double> surface_before_hand_m = std::nullopt;
+  double untrusted_limit_s = 0.5;  ///< of a model that does not trust its forces; then it stops
+  /// Stop if so many of the last 1000 cycles were late, or so many periods were missed at once.
+  int most_late = 100;
+  int most_missed = 50;
+};
+
+/// What a servo loop has to do and what it must not exceed: what its session states, and what
+/// follows from its model and device (loop_settings() in haptics/session_run.hpp).
+struct ServoSettings : SessionServo {
+  Eigen::Vector3d model_push = Eigen::Vector3d::UnitZ();  ///< the push in coordinates of the model
+  /// If given, the tool moves in space and the model answers for it as it stands, contact on and
+  /// off included: it gets the tool's displacement from `surface_m`, turned by this. Otherwise only
+  /// motion along the push reaches the model, one-sided.
+  std::optional<Eigen::Matrix3d> to_model = std::nullopt;
+  double friction_N_s_per_m = 0.1;   ///< of the device, see EnergyWatchSettings
+  int delay_periods = 0;             ///< of the device, as far as it is known
+  double energy_allowance_J = 2e-3;  ///< see EnergyWatchSettings; infinite: it only counts
+  bool watch_oscillation = true;
+  double most_speed_m_per_s = 5.0;  ///< of a hand; a position that needs more is not believed
+  double fade_s = 0.1;              ///< time constant in which a force fades that is not trusted
+  int status_every = 2;             ///< cycles
+};
+
+struct ServoCounts {
+  std::uint64_t time_guards = 0, saturations = 0, force_limited = 0, slipped = 0, ramping_in = 0,
+                damped = 0, beyond_model = 0, late = 0, missed = 0;
+  int most_missed_at_once = 0;  ///< periods between two cycles
+  int most_late = 0;            ///< of any 1000 cycles behind each other
+};
+
+/// Counts times in bins of 1 us up to 50 ms. note() neither allocates nor throws.
+class TimeHistogram {
+ public:
+  TimeHistogram();
+  void note(std::int64_t ns) noexcept;
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  [[nodiscard]] double max_s() const noexcept { return static_cast<double>(max_ns_) * 1e-9; }
+  /// Upper edge of the bin in which that share of the times ends, s; max_s() beyond the bins.
+  [[nodiscard]] double quantile_s(double share) const;
+  /// Counts of the bins.
+  [[nodiscard]] const std::vector<std::uint32_t>& bins() const { return bins_; }
+
+ private:
+  std::vector<std::uint32_t> bins_;
+  std::uint64_t count_ = 0;
+  std::int64_t max_ns_ = 0;
+};
+
+/// How a loop went.
+struct ServoOutcome {
+  StopCause cause = StopCause::none;
+  std::string detail;  ///< in words, where there is more to say
+  std::uint64_t cycles = 0;
+  ServoCounts counts;
+  DeviceStatus device;
+  std::uint64_t dropped_records = 0;
+  std::uint64_t last_beat_cycle = 0;
+  // Of a run on the clock only.
+  bool real_time = false;
+  std::string scheduling;
+  TimeHistogram woke_late, busy;
+  double stop_took_s = 0.0;  ///< from the fault, or the last sign of life, to forces off
+};
+
+/// Gets every record, in order, on a thread of its own in real time. May throw: that stops the
+/// loop with the cause `exception`.
+using RecordSink = std::function<void(const ServoRecord&)>;
+
+/// Runs a session in virtual time: as fast as it goes, the same bits each time.
+/// @param interrupted asked now and then; true ends the session with the cause `signal`
+[[nodiscard]] ServoOutcome run_in_virtual_time(HapticDevice& device, ContactModel& model,
+                                               const ServoSettings& settings,
+                                               const RecordSink& sink,
+                                               const std::function<bool()>& interrupted = {});
+
+/// What to do where the system refuses real-time scheduling.
+enum class RealTimeWish {
+  enforce,  ///< an error
+  ignore,   ///< go on, and say so
+};
+
+struct RealTimeOptions {
+  RealTimeWish wish = RealTimeWish::ignore;
+  double hang_limit_s = 0.008;  ///< a cycle that takes longer is given up
+  std::function<bool()> interrupted;
+  std::function<void()> idle;  ///< called now and then on the thread of the records
+};
+
+/// Runs a session on the clock: deadlines are absolute, a missed one is counted and never made up
+/// by slower time. A second thread watches for a cycle that does not end; then the forces are cut
+/// from there and the stuck thread is left behind with what it holds, which is why device and
+/// model are shared.
+/// Throws Error(environment) if real-time scheduling is enforced and refused.
+[[nodiscard]] ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
+                                            const std::shared_ptr<ContactModel>& model,
+                                            const ServoSettings& settings, const RecordSink& sink,
+                                            const RealTimeOptions& options);
+
+}  // namespace tpm

@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+"""Draws the rooms of the library, the includes between them and the three flows of docs/architecture.md, as SVG.
+
+    python3 scripts/draw_rooms.py > docs/figures/rooms.svg
+
+Everything comes from the tables of the page and from the includes; tests/rooms.py checks both.
+"""
+import re
+import sys
+from html import escape
+from pathlib import Path
+
+WIDTH, BOX_WIDTH, BOX_HEIGHT, GAP, TOP = 960, 320, 50, 20, 30
+LEFT = 150
+COLOURS = ("#b3541e", "#1f6f8b", "#5b7f2b")
+
+
+def rows_after(text: str, heading: str) -> list:
+    """Cells of the first table whose heading line begins so."""
+    lines = text.split("\n")
+    start = next(i for i, line in enumerate(lines) if line.startswith(heading))
+    rows = []
+    for line in lines[start + 2:]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return rows
+
+
+def rooms_of(page: str) -> dict:
+    return {row[0]: row[1].split(", ") for row in rows_after(page, "| room |")}
+
+
+def flows_of(page: str) -> dict:
+    """Of each flow its steps: function, header, source that calls it."""
+    flows: dict = {}
+    name = ""
+    for row in rows_after(page, "| flow |"):
+        name = row[0] or name
+        flows.setdefault(name, []).append((row[1].strip("`"), row[2], row[3]))
+    return flows
+
+
+def public_headers(root: Path) -> dict:
+    """The folder of src/tpm that implements each public header, from docs/library.md."""
+    rows = rows_after((root / "docs/library.md").read_text(encoding="utf-8"), "| header |")
+    return {row[0].strip("`"): row[3] for row in rows}
+
+
+def includes(root: Path):
+    """Pairs of folders, the one that includes first, with the file."""
+    public = public_headers(root)
+    for file in sorted((root / "src/tpm").glob("*/*.[ch]pp")):
+        here = file.parent.name
+        for place, name in re.findall(r'#include "(tpm|tpmkit)/([\w/.]+)"', file.read_text(encoding="utf-8")):
+            there = name.split("/")[0] if place == "tpm" else public.get(name)
+            if there and there != here:
+                yield here, there, file
+
+
+def arrows(root: Path, rooms: dict) -> list:
+    room_of = {folder: room for room, folders in rooms.items() for folder in folders}
+    return sorted({(room_of[a], room_of[b]) for a, b, _ in includes(root) if room_of[a] != room_of[b]})
+
+
+def nearest(pairs: list) -> list:
+    """Arrows that no chain of others says already."""
+    direct = set(pairs)
+
+    def reaches(a, b, without):
+        todo, seen = [a], set()
+        while todo:
+            at = todo.pop()
+            for x, y in direct:
+                if x == at and (x, y) != without and y not in seen:
+                    if y == b:
+                        return True
+                    seen.add(y)
+                    todo.append(y)
+        return False
+
+    return [(a, b) for a, b in pairs if not reaches(a, b, (a, b))]
+
+
+def drawing(root: Path) -> str:
+    page = (root / "docs/architecture.md").read_text(encoding="utf-8")
+    rooms = rooms_of(page)
+    room_of = {folder: room for room, folders in rooms.items() for folder in folders}
+    names = list(reversed(rooms))  # the ground at the bottom
+    y_of = {name: TOP + i * (BOX_HEIGHT + GAP) for i, name in enumerate(names)}
+    height = TOP + len(names) * (BOX_HEIGHT + GAP) + 20
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" font-size="13">',
+           f'<rect width="{WIDTH}" height="{height}" fill="white"/>',
+           '<defs><marker id="tip" markerWidth="8" markerHeight="8" refX="7" refY="4" orient="auto">'
+           '<path d="M0,0 L8,4 L0,8 z" fill="#888"/></marker></defs>']
+    # Includes: a curve at the left of the boxes, further out the further it reaches.
+    for i, (a, b) in enumerate(nearest(arrows(root, rooms))):
+        span = names.index(b) - names.index(a)
+        start, end = y_of[a] + BOX_HEIGHT - 12, y_of[b] + 12 + 3 * (i % 4)
+        if span == 1:
+            x = LEFT + BOX_WIDTH / 2
+            out.append(f'<path d="M{x},{y_of[a] + BOX_HEIGHT} L{x},{y_of[b] - 1}" fill="none" stroke="#888" '
+                       'marker-end="url(#tip)"/>')
+            continue
+        out_by = 26 * span
+        out.append(f'<path d="M{LEFT},{start} C{LEFT - out_by},{start} {LEFT - out_by},{end} {LEFT - 1},{end}" '
+                   'fill="none" stroke="#888" marker-end="url(#tip)"/>')
+    for name in names:
+        y = y_of[name]
+        out.append(f'<rect x="{LEFT}" y="{y}" width="{BOX_WIDTH}" height="{BOX_HEIGHT}" rx="6" fill="#f3f1ec" stroke="#555"/>')
+        out.append(f'<text x="{LEFT + 12}" y="{y + 20}" font-weight="bold">{escape(name)}</text>')
+        out.append(f'<text x="{LEFT + 12}" y="{y + 38}" fill="#333">{escape(", ".join(rooms[name]))}</text>')
+    # Flows: a line at the right through the rooms of its steps.
+    for i, (flow, steps) in enumerate(flows_of(page).items()):
+        x = LEFT + BOX_WIDTH + 70 + 150 * i
+        headers = public_headers(root)
+        at = [room_of[headers[h.split("/")[1]] if h.startswith("tpmkit/") else h.split("/")[0]] for _, h, _ in steps]
+        visited = [at[0]] + [b for a, b in zip(at, at[1:]) if a != b]
+        colour = COLOURS[i]
+        path, drop = [], {}
+        for k, room in enumerate(visited):
+            drop[room] = drop.get(room, 0) + 1
+            path.append((x + 16 * (drop[room] - 1), y_of[room] + BOX_HEIGHT / 2))
+        out.append(f'<polyline points="{" ".join(f"{px:g},{py:g}" for px, py in path)}" fill="none" stroke="{colour}" '
+                   'stroke-width="2.5"/>')
+        for k, (px, py) in enumerate(path):
+            out.append(f'<circle cx="{px:g}" cy="{py:g}" r="9" fill="{colour}"/>')
+            out.append(f'<text x="{px:g}" y="{py + 4:g}" fill="white" font-size="11" text-anchor="middle">{k + 1}</text>')
+        out.append(f'<text x="{x}" y="18" fill="{colour}" font-size="12" text-anchor="middle">{escape(flow)}</text>')
+    out.append(f'<text x="12" y="{height - 8}" fill="#555" font-size="12">grey: includes that no chain of others implies; '
+               'coloured: the rooms that a flow passes, in order</text>')
+    out.append("</svg>")
+    return "\n".join(out) + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(drawing(Path(__file__).resolve().parent.parent))

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""Checks the rooms and flows of docs/architecture.md against the sources:
+
+- every folder of src/tpm stands in one room, and a room includes only rooms above it in the table;
+- every function of a flow is declared in its header, and the source named includes that header and calls it;
+- docs/library.md lists every public header, with a folder that includes it or one that another public header includes;
+- docs/figures/rooms.svg is what scripts/draw_rooms.py draws of all that.
+
+    python3 tests/rooms.py ROOT
+"""
+import re
+import sys
+from pathlib import Path
+
+root = Path(sys.argv[1]).resolve()
+sys.path.insert(0, str(root / "scripts"))
+import draw_rooms as rooms  # noqa: E402  (the place is an argument)
+
+
+def faults_of_rooms(page):
+    table = rooms.rooms_of(page)
+    order = list(table)
+    listed = [folder for folders in table.values() for folder in folders]
+    folders = sorted(d.name for d in (root / "src/tpm").iterdir() if d.is_dir())
+    for folder in sorted(set(folders) ^ set(listed)):
+        yield f"docs/architecture.md: folder {folder} is in src/tpm or in a room, not in both"
+    for folder in sorted({f for f in listed if listed.count(f) > 1}):
+        yield f"docs/architecture.md: folder {folder} is in two rooms"
+    room_of = {folder: room for room, inside in table.items() for folder in inside}
+    for here, there, file in rooms.includes(root):
+        a, b = room_of.get(here), room_of.get(there)
+        if a and b and order.index(b) > order.index(a):
+            yield f"{file.relative_to(root)}: includes {there}, of the room {b}, from the room {a}"
+
+
+def faults_of_flows(page):
+    flows = rooms.flows_of(page)
+    if len(flows) != 3:
+        yield f"docs/architecture.md: {len(flows)} flows; expected 3"
+    for flow, steps in flows.items():
+        for function, header, source in steps:
+            name = header if header.startswith("tpmkit/") else f"tpm/{header}"
+            place = root / ("include" if header.startswith("tpmkit/") else "src") / name
+            if not place.exists() or not re.search(rf"\b{function}\(", place.read_text(encoding="utf-8")):
+                yield f"{flow}: {name} does not declare {function}()"
+            caller = root / source
+            text = caller.read_text(encoding="utf-8") if caller.exists() else ""
+            if not re.search(rf"\b{function}\(", text):
+                yield f"{flow}: {source} does not call {function}()"
+            if name not in reached(caller):
+                yield f"{flow}: {source} does not include {name}"
+
+
+def reached(file, seen=None):
+    """Names of the headers that a file includes, directly or not."""
+    seen = set() if seen is None else seen
+    for name in re.findall(r'#include "([\w/.]+)"', file.read_text(encoding="utf-8")) if file.exists() else []:
+        if name in seen:
+            continue
+        seen.add(name)
+        for place in (root / "src" / name, root / "include" / name, file.parent / name):
+            if place.exists():
+                reached(place, seen)
+                break
+    return seen
+
+
+def faults_of_headers():
+    listed = rooms.public_headers(root)
+    there = {h.name for h in (root / "include/tpmkit").iterdir()}
+    for name in sorted(there ^ set(listed)):
+        yield f"docs/library.md: header {name} is in include/tpmkit or in the table, not in both"
+    for name, folder in listed.items():
+        place = root / folder if "/" in folder else root / "src/tpm" / folder
+        files = [*sorted(place.glob("*.[ch]pp")), *sorted((root / "include/tpmkit").glob("*.hpp"))]
+        if not place.is_dir() or not any(f'"tpmkit/{name}"' in f.read_text(encoding="utf-8") for f in files):
+            yield f"docs/library.md: nothing in {folder} includes {name}"
+
+
+def main():
+    page = (root / "docs/architecture.md").read_text(encoding="utf-8")
+    faults = [*faults_of_rooms(page), *faults_of_flows(page), *faults_of_headers()]
+    drawn = root / "docs/figures/rooms.svg"
+    if not faults and (not drawn.exists() or drawn.read_text(encoding="utf-8") != rooms.drawing(root)):
+        faults.append("docs/figures/rooms.svg: not what is drawn now; python3 scripts/draw_rooms.py > docs/figures/rooms.svg")
+    for fault in faults:
+        print(fault)
+    print(f"{len(faults)} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
