@@ -10,7 +10,7 @@
 
 namespace tpm {
 
-/// The programs that a relaxation can be written for; docs/laws.md has their conventions.
+/// The programs that a relaxation can be written for; docs/law_files.md has their conventions.
 enum class ExportTarget { abaqus, ansys, febio, json };
 
 /// Throws Error(bad_input) naming the known words.
