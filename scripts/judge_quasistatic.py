@@ -9,8 +9,9 @@ every step of the other halved, give the fourth by Richardson's extrapolation an
 finer. Shares no code with tpm.
 
 usage: judge_quasistatic.py NETWORK.h5 --tau 10 [--depth 8 --rate 4 --end 31 --steps 12]
-Prints JSON: force_at_peak_N, force_at_end_N, each extrapolated, and *_finer_N, *_error_N;
-steps, cpu_s and finer_cpu_s.
+Prints JSON: time_s, the ends of the coarser mesh's steps; force_N there, extrapolated; error_N, the change by
+the extrapolation; force_at_peak_N, force_at_end_N and *_finer_N, *_error_N of the two corners; steps, cpu_s and
+finer_cpu_s.
 """
 import argparse
 import json
@@ -108,7 +109,7 @@ def mesh(length, tau, steps):
 
 def run(tissue, tau, depth, rate, end, steps, halved):
     x, y = tissue.rest.copy(), np.zeros_like(tissue.length)
-    l, at, answers, count = np.zeros_like(y), 0.0, [], 0
+    l, at, now_s, answers, corners = np.zeros_like(y), 0.0, 0.0, [], []
     for length, speed in ((depth / rate, rate), (end - depth / rate, 0.0)):
         for h in np.repeat(mesh(length, tau, steps) / (2 if halved else 1), 2 if halved else 1):
             z = h / tau
@@ -116,13 +117,14 @@ def run(tissue, tau, depth, rate, end, steps, halved):
             now = 1.0 + np.expm1(-z) / z  # weight of l at the end of the step
             offset = decay * y + (1.0 - decay - now) * l
             at += speed * h
+            now_s += h
             guess = x + (at - np.sum((x - tissue.rest) * tissue.push)) * tissue.push
             x, force = tissue.balance(guess, offset, now)
             l = tissue.elongation(x)[0]
             y = offset + now * l
-            count += 1
-        answers.append(force)
-    return np.array(answers), count
+            answers.append((now_s, force))
+        corners.append(len(answers) - 1)
+    return np.array(answers), np.array(corners)
 
 
 def main():
@@ -136,21 +138,23 @@ def main():
     parser.add_argument("--steps", type=int, default=12, help="of the coarser mesh in one tau")
     options = parser.parse_args()
     tissue = Tissue(options.network, 1e3 * options.modulus)
-    answers, count, seconds = [], [], []
+    answers, corners, seconds = [], [], []
     for halved in (False, True):
         begin = time.process_time()
-        force, steps = run(tissue, options.tau, 1e-3 * options.depth, 1e-3 * options.rate,
+        answer, ends = run(tissue, options.tau, 1e-3 * options.depth, 1e-3 * options.rate,
                            options.end, options.steps, halved)
         seconds.append(time.process_time() - begin)
-        answers.append(force)
-        count.append(steps)
-    best = (4.0 * answers[1] - answers[0]) / 3.0
-    result = {}
-    for name, i in (("peak", 0), ("end", 1)):
+        answers.append(answer)
+        corners.append(ends)
+    coarser, finer = answers[0], answers[1][1::2]  # at the same times
+    best = (4.0 * finer[:, 1] - coarser[:, 1]) / 3.0
+    error = np.abs(best - finer[:, 1])
+    result = {"time_s": coarser[:, 0].tolist(), "force_N": best.tolist(), "error_N": error.tolist()}
+    for name, i in zip(("peak", "end"), corners[0]):
         result[f"force_at_{name}_N"] = best[i]
-        result[f"force_at_{name}_finer_N"] = answers[1][i]
-        result[f"force_at_{name}_error_N"] = abs(best[i] - answers[1][i])
-    result.update(steps=count[1], cpu_s=sum(seconds), finer_cpu_s=seconds[1])
+        result[f"force_at_{name}_finer_N"] = finer[i, 1]
+        result[f"force_at_{name}_error_N"] = error[i]
+    result.update(steps=len(answers[1]), cpu_s=sum(seconds), finer_cpu_s=seconds[1])
     print(json.dumps(result, indent=1))
 
 
