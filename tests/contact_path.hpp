@@ -12,22 +12,22 @@ namespace tpm::testing {
 class ContactPath {
  public:
   /// @param freedom by value: the contact is held
-  ContactPath(const BondSystem& bonds, Positions rest, Freedom freedom, std::size_t contact)
+  ContactPath(const BondSystem& bonds, Positions rest, Constraints constraints, std::size_t contact)
       : bonds_(bonds),
-        freedom_((freedom.hold(contact), std::move(freedom))),
-        equilibrium_(bonds_, freedom_),
+        constraints_((constraints.hold(contact), std::move(constraints))),
+        equilibrium_(bonds_, constraints_),
         rest_(std::move(rest)),
         position_(rest_),
         before_(rest_),
         contact_(static_cast<Eigen::Index>(contact)),
-        remembered_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size()))),
-        elongation_(remembered_),
+        viscous_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size()))),
+        elongation_(viscous_),
         no_load_(Eigen::Matrix3Xd::Zero(3, rest_.cols())) {}
 
   /// @param displacement_m of the contact at the end of the step
   void advance(const Eigen::Vector3d& displacement_m, double step_s) {
     const RelaxationWeights k = relaxation_weights(step_s / bonds_.relaxation_time_s());
-    memory_ = {k.r * remembered_ + k.w0 * elongation_, k.w1};
+    memory_ = {k.r * viscous_ + k.w0 * elongation_, k.w1};
     Positions next = 2.0 * position_ - before_;  // what moves goes on
     next.col(contact_) = rest_.col(contact_) + displacement_m;
     EquilibriumSearch search = equilibrium_.find(next, memory_, no_load_, 1e-9);
@@ -40,24 +40,24 @@ class ContactPath {
     before_ = position_;
     position_ = next;
     bonds_.elongations(position_, elongation_);
-    remembered_ = memory_.offset + memory_.following(0) * elongation_;
+    viscous_ = memory_.offset + memory_.relaxation_factor(0) * elongation_;
   }
 
   /// Of the tissue on the contact, N.
   [[nodiscard]] Eigen::Vector3d force_N() const {
     Eigen::Matrix3Xd force;
-    equilibrium_.forces(position_, {remembered_, 0.0}, no_load_, force);
+    equilibrium_.forces(position_, {viscous_, 0.0}, no_load_, force);
     return force.col(contact_);
   }
   [[nodiscard]] Eigen::Matrix3Xd displacements_m() const { return position_ - rest_; }
 
  private:
   const BondSystem& bonds_;
-  Freedom freedom_;
+  Constraints constraints_;
   Equilibrium equilibrium_;
   Positions rest_, position_, before_;
   Eigen::Index contact_;
-  Eigen::VectorXd remembered_, elongation_;
+  Eigen::VectorXd viscous_, elongation_;
   Eigen::Matrix3Xd no_load_;
   BondMemory memory_;
 };

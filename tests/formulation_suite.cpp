@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "loaded_oscillator.hpp"
-#include "tpm/core/word_table.hpp"
+#include "tpm/core/enum_names.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/method/method.hpp"
 #include "tpm/model/closed_form.hpp"
@@ -153,7 +153,7 @@ void oscillator(const Formulation& f, Broken& broken) {
   const RunNetwork network = network_to_run(scene);
   const Eigen::VectorXd mass = masses_kg(scene, network);
   const LowestMode lowest =
-      lowest_mode(network.driven.bonds, network.driven.rest, network.driven.freedom, mass);
+      lowest_mode(network.driven.bonds, network.driven.rest, network.driven.constraints, mass);
   const double drag = 2.0 * scene.formulation.damping_ratio * lowest.angular_frequency();
   const std::vector<double> times = even_times(scene.protocol, 10);
   const Eigen::VectorXd truth = tpm_test::loaded_oscillator(
@@ -408,29 +408,29 @@ void claims(const Formulation& f, Broken& broken) {
       R"("protocol": {"kind": "ramp_hold", "depth": "3 mm", "rate": "30 mm/s", "hold": "0.2 s"})",
       f);
   scene.formulation.masses = moving;
-  const PlanScout scout(PlanScene(scene), {}, moving);
+  const PlanSurrogate surrogate(PlanScene(scene), {}, moving);
   PlanBudget budget;
   budget.rate_Hz = 1000.0;
   Trajectory truth;
   const std::vector<double> times = even_times(scene.protocol, 40);
   if (moving) {
-    truth = scout.scene().inertial(inertial_options(scout.scene(), 1e-8), times, false);
+    truth = surrogate.scene().inertial(inertial_options(surrogate.scene(), 1e-8), times, false);
   } else {
     QuasiStaticOptions options;
     options.tolerance = 1e-9;
-    truth = scout.scene().quasi_static(options, times, false);
+    truth = surrogate.scene().quasi_static(options, times, false);
   }
   PlanModels all;
   if (const auto* offer = f.as<PlanOffer>()) {
-    all = offer->candidates(scout.scene());
+    all = offer->candidates(surrogate.scene());
   } else {
     all.push_back(run_candidate(f));
   }
   check(broken, !all.empty(), "claims", "no candidate");
   for (const auto& candidate : all) {
-    if (candidate->why_not(scout, budget)) continue;
-    const double claimed = candidate->claim(scout, budget).error;
-    const double found = trajectory_error(candidate->run(scout, budget, times), truth, {});
+    if (candidate->why_not(surrogate, budget)) continue;
+    const double claimed = candidate->claim(surrogate, budget).error;
+    const double found = trajectory_error(candidate->run(surrogate, budget, times), truth, {});
     check(broken, found <= claimed, "claims",
           fmt::format("{} claims {} and is {} off", candidate->name(), claimed, found));
   }

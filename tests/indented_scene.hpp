@@ -17,19 +17,19 @@ struct IndentedScene {
                 const Eigen::Vector3d& direction = Eigen::Vector3d::UnitZ())
       : network(build_network(std::move(organ), {}, "scene")),
         bonds(network, TpmParameters{}),
-        freedom(network.organ.size()) {
+        constraints(network.organ.size()) {
     const Organ& body = network.organ;
     Eigen::Index front = 0;
     (body.position.transpose() * direction).minCoeff(&front);
     if (body.contact) front = static_cast<Eigen::Index>(*body.contact);
     push.direction = direction;
     push.patch = surface_patch(body, body.position.col(front), patch_radius);
-    for (const std::size_t i : push.patch) freedom.hold(i);
-    for (const std::size_t i : far_side(body, direction, far_thickness)) freedom.hold(i);
+    for (const std::size_t i : push.patch) constraints.hold(i);
+    for (const std::size_t i : far_side(body, direction, far_thickness)) constraints.hold(i);
   }
   Network network;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
   PatchIndentation push;
   [[nodiscard]] const Positions& rest() const { return network.organ.position; }
 };
@@ -44,10 +44,11 @@ inline Organ solid_liver(std::size_t count) {
 inline void compare_solvers(IndentedScene scene) {
   scene.push.strides = 2;
   scene.push.tolerance_N = 1e-12;  // both are looked at to 1e-8 of the depth
-  Equilibrium direct(scene.bonds, scene.freedom);
-  LargeEquilibrium large(scene.bonds, scene.freedom, scene.rest());
-  const auto a = indent(scene.bonds, scene.freedom, scene.rest(), scene.push, finder_of(direct));
-  const auto b = indent(scene.bonds, scene.freedom, scene.rest(), scene.push, finder_of(large));
+  Equilibrium direct(scene.bonds, scene.constraints);
+  LargeEquilibrium large(scene.bonds, scene.constraints, scene.rest());
+  const auto a =
+      indent(scene.bonds, scene.constraints, scene.rest(), scene.push, finder_of(direct));
+  const auto b = indent(scene.bonds, scene.constraints, scene.rest(), scene.push, finder_of(large));
   CAPTURE(scene.network.organ.name, a.newton_steps, b.newton_steps, large.work().iterations);
   CHECK(a.force_N > 0.0);
   CHECK_THAT(b.force_N, Catch::Matchers::WithinRel(a.force_N, 1e-8));

@@ -64,7 +64,7 @@ struct SmallOrgan {
   explicit SmallOrgan(const TpmParameters& p, std::size_t spheres = 24)
       : scene(fill_liver(request(spheres))),
         bonds(scene.network, p),
-        driven{bonds, scene.network.organ.position, scene.freedom, Probes(scene.probe), {}},
+        driven{bonds, scene.network.organ.position, scene.constraints, Probes(scene.probe), {}},
         mass{sphere_masses_kg(scene.network.organ), 0.0} {}
   SmallOrgan(const SmallOrgan&) = delete;
   SmallOrgan& operator=(const SmallOrgan&) = delete;
@@ -73,9 +73,10 @@ struct SmallOrgan {
                                std::vector<double> times) const {
     QuasiStaticOptions options;
     options.tolerance = 1e-11;
-    Eigen::VectorXd truth = QuasiStatic(bonds, driven.rest, driven.freedom, driven.probes, options)
-                                .run(protocol, times)
-                                .response;
+    Eigen::VectorXd truth =
+        QuasiStatic(bonds, driven.rest, driven.constraints, driven.probes, options)
+            .run(protocol, times)
+            .response;
     return {std::move(name), network_problem(driven, protocol), std::move(times), std::move(truth)};
   }
 
@@ -85,7 +86,7 @@ struct SmallOrgan {
     options.tolerance = 1e-11;
     options.highest_order = 5;
     options.damping_ratio = damping_ratio;
-    const Inertial inertial(bonds, driven.rest, driven.freedom, driven.probes, mass.mass_kg,
+    const Inertial inertial(bonds, driven.rest, driven.constraints, driven.probes, mass.mass_kg,
                             options);
     MethodMasses damped = mass;
     damped.drag_per_s = 2.0 * damping_ratio * inertial.lowest().angular_frequency();

@@ -2,7 +2,7 @@
 // An organ with its far side held, pushed at its contact sphere: for tests and measurements.
 #include <utility>
 
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpmkit/tpm_element.hpp"
@@ -13,14 +13,15 @@ struct OrganScene {
   /// @param far_share spheres of the outer layer further than this share of the organ's extent
   ///   from the contact, along the push, are held
   explicit OrganScene(const Organ& organ, double far_share = 0.6)
-      : network(build_network(organ, {}, "scene")), freedom(organ.size()) {
+      : network(build_network(organ, {}, "scene")), constraints(organ.size()) {
     probe.sphere = organ.contact.value_or(0);
     probe.direction = -organ.normal.col(static_cast<Eigen::Index>(probe.sphere));
     const Eigen::VectorXd along = organ.position.transpose() * probe.direction;
     const double near = along[static_cast<Eigen::Index>(probe.sphere)];
     for (std::size_t i = 0; i < organ.size(); ++i) {
       const double further = along[static_cast<Eigen::Index>(i)] - near;
-      if (organ.layer[i] == 0 && further > far_share * (along.maxCoeff() - near)) freedom.hold(i);
+      if (organ.layer[i] == 0 && further > far_share * (along.maxCoeff() - near))
+        constraints.hold(i);
     }
   }
 
@@ -28,12 +29,12 @@ struct OrganScene {
                                    std::span<const double> times_s,
                                    QuasiStaticOptions options) const {
     const BondSystem bonds(network, material);
-    return QuasiStatic(bonds, network.organ.position, freedom, probe, std::move(options))
+    return QuasiStatic(bonds, network.organ.position, constraints, probe, std::move(options))
         .run(protocol, times_s);
   }
 
   Network network;
-  Freedom freedom;
+  Constraints constraints;
   Probe probe;
 };
 

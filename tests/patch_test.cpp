@@ -47,19 +47,20 @@ std::vector<int> counted(std::span<const std::size_t> spheres, std::size_t size)
   return is_in;
 }
 
-BondMemory at_rest(const BondSystem& bonds, double following) {
-  return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), following};
+BondMemory at_rest(const BondSystem& bonds, double relaxation_factor) {
+  return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxation_factor};
 }
 
 /// The first-order displacements of a network at rest, some imposed and the rest in balance.
 class LinearBlock {
  public:
-  LinearBlock(const Network& network, const BondSystem& bonds, double following, Freedom freedom)
+  LinearBlock(const Network& network, const BondSystem& bonds, double relaxation_factor,
+              Constraints constraints)
       : rest_(network.organ.position),
-        memory_(at_rest(bonds, following)),
+        memory_(at_rest(bonds, relaxation_factor)),
         bonds_(bonds),
-        freedom_(std::move(freedom)),
-        equilibrium_(bonds_, freedom_) {
+        constraints_(std::move(constraints)),
+        equilibrium_(bonds_, constraints_) {
     if (!equilibrium_.factorise(rest_, memory_) || !equilibrium_.is_stable()) {
       throw Error(ExitCode::numerical, "patch test", "the block has loose spheres");
     }
@@ -82,18 +83,18 @@ class LinearBlock {
   const Positions& rest_;
   BondMemory memory_;
   const BondSystem& bonds_;
-  Freedom freedom_;
+  Constraints constraints_;
   Equilibrium equilibrium_;
 };
 
 /// Stress of some spheres, half of each of their bonds, under first-order displacements.
-Voigt virial_stress(const Network& network, const BondSystem& bonds, double following,
+Voigt virial_stress(const Network& network, const BondSystem& bonds, double relaxation_factor,
                     std::span<const int> is_in, double volume,
                     const Eigen::Matrix3Xd& displacement) {
   Eigen::VectorXd change;
   bonds.elongation_changes(network.organ.position, displacement, change);
   const Eigen::VectorXd pull =
-      (bonds.stiffness() - following * bonds.relaxing()).cwiseProduct(change);
+      (bonds.stiffness() - relaxation_factor * bonds.relaxing()).cwiseProduct(change);
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < network.bonds.size(); ++i) {
     const Bond& bond = network.bonds[i];
@@ -136,8 +137,9 @@ Moduli moduli_of(const Elasticity& c) {
   return m;
 }
 
-Elasticity affine_elasticity(const Network& network, const BondSystem& bonds, double following,
-                             std::span<const std::size_t> spheres, double volume_m3) {
+Elasticity affine_elasticity(const Network& network, const BondSystem& bonds,
+                             double relaxation_factor, std::span<const std::size_t> spheres,
+                             double volume_m3) {
   const std::vector<int> is_in = counted(spheres, network.organ.size());
   Elasticity sum = Elasticity::Zero();
   for (std::size_t i = 0; i < network.bonds.size(); ++i) {
@@ -148,8 +150,8 @@ Elasticity affine_elasticity(const Network& network, const BondSystem& bonds, do
         network.organ.position.col(bond.b) - network.organ.position.col(bond.a);
     const Voigt nn = stress_like(along * along.transpose() / (bond.rest_length_m));
     const auto row = static_cast<Eigen::Index>(i);
-    sum +=
-        share * (bonds.stiffness()[row] - following * bonds.relaxing()[row]) * nn * nn.transpose();
+    sum += share * (bonds.stiffness()[row] - relaxation_factor * bonds.relaxing()[row]) * nn *
+           nn.transpose();
   }
   return sum / volume_m3;
 }
@@ -165,7 +167,7 @@ std::vector<std::size_t> interior_spheres(const Organ& organ, double margin_m) {
   return found;
 }
 
-PatchTest affine_patch_test(const Network& block, const BondSystem& bonds, double following,
+PatchTest affine_patch_test(const Network& block, const BondSystem& bonds, double relaxation_factor,
                             double margin_m, double volume_per_sphere_m3) {
   const std::vector<std::size_t> interior = interior_spheres(block.organ, margin_m);
   if (interior.empty()) {
@@ -175,11 +177,11 @@ PatchTest affine_patch_test(const Network& block, const BondSystem& bonds, doubl
         "a larger block");
   }
   const std::vector<int> is_in = counted(interior, block.organ.size());
-  Freedom freedom(block.organ.size());
+  Constraints constraints(block.organ.size());
   for (std::size_t i = 0; i < is_in.size(); ++i) {
-    if (is_in[i] == 0) freedom.hold(i);
+    if (is_in[i] == 0) constraints.hold(i);
   }
-  const LinearBlock linear(block, bonds, following, freedom);
+  const LinearBlock linear(block, bonds, relaxation_factor, constraints);
   const double volume = volume_per_sphere_m3 * static_cast<double>(interior.size());
   const Positions from = block.organ.position.colwise() - box_of(block.organ).center();
 
@@ -188,21 +190,21 @@ PatchTest affine_patch_test(const Network& block, const BondSystem& bonds, doubl
   for (Eigen::Index component = 0; component < 6; ++component) {
     const Eigen::Matrix3Xd affine = unit_strain(component) * from;
     Eigen::Matrix3Xd displacement = affine;
-    freedom.project(displacement);
+    constraints.project(displacement);
     displacement = affine - displacement;  // only the boundary moves yet
     linear.balance(displacement);
     result.elasticity.col(component) =
-        virial_stress(block, bonds, following, is_in, volume, displacement);
+        virial_stress(block, bonds, relaxation_factor, is_in, volume, displacement);
     const double off = (displacement - affine).colwise().norm().maxCoeff();
     result.deviation = std::max(result.deviation, off / affine.colwise().norm().maxCoeff());
   }
   return result;
 }
 
-PlateTest plate_test(const Network& block, const BondSystem& bonds, double following) {
+PlateTest plate_test(const Network& block, const BondSystem& bonds, double relaxation_factor) {
   const Eigen::AlignedBox3d box = box_of(block.organ);
   const double grain = 1e-6 * block.organ.spacing;
-  Freedom freedom(block.organ.size());
+  Constraints constraints(block.organ.size());
   std::vector<Eigen::Index> top;
   Eigen::Matrix3Xd displacement = Eigen::Matrix3Xd::Zero(3, block.organ.position.cols());
   for (std::size_t i = 0; i < block.organ.size(); ++i) {
@@ -210,18 +212,18 @@ PlateTest plate_test(const Network& block, const BondSystem& bonds, double follo
     const Eigen::Vector3d p = block.organ.position.col(column);
     const bool is_top = p.z() > box.max().z() - grain;
     const bool is_bottom = p.z() < box.min().z() + grain;
-    if (is_top || is_bottom) freedom.impose(i, Eigen::Vector3d::UnitZ());
+    if (is_top || is_bottom) constraints.impose(i, Eigen::Vector3d::UnitZ());
     // The rigid motions that smooth plates leave: one corner stands, another may only slide along
     // x.
     if (is_bottom && p.y() < box.min().y() + grain) {
-      if (p.x() < box.min().x() + grain) freedom.hold(i);
-      if (p.x() > box.max().x() - grain) freedom.impose(i, Eigen::Vector3d::UnitY());
+      if (p.x() < box.min().x() + grain) constraints.hold(i);
+      if (p.x() > box.max().x() - grain) constraints.impose(i, Eigen::Vector3d::UnitY());
     }
     if (!is_top) continue;
     displacement(2, column) = -box.sizes().z();  // a compression of 1
     top.push_back(column);
   }
-  const LinearBlock linear(block, bonds, following, freedom);
+  const LinearBlock linear(block, bonds, relaxation_factor, constraints);
   linear.balance(displacement);
   const Eigen::Matrix3Xd force = linear.forces(displacement);
   PlateTest result;

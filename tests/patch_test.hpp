@@ -39,8 +39,8 @@ struct Moduli {
 /// @param spheres from 0, each once
 /// @param volume_m3 that they fill up together, above 0
 [[nodiscard]] Elasticity affine_elasticity(const Network& network, const BondSystem& bonds,
-                                           double following, std::span<const std::size_t> spheres,
-                                           double volume_m3);
+                                           double relaxation_factor,
+                                           std::span<const std::size_t> spheres, double volume_m3);
 
 /// The spheres that lie deeper than `margin_m` below every face of the organ's bounding box.
 [[nodiscard]] std::vector<std::size_t> interior_spheres(const Organ& organ, double margin_m);
@@ -60,7 +60,7 @@ struct PatchTest {
 /// @param volume_per_sphere_m3 see volume_per_sphere()
 /// Throws Error(bad_input) if the margin leaves no sphere free, Error(numerical) if they are loose.
 [[nodiscard]] PatchTest affine_patch_test(const Network& block, const BondSystem& bonds,
-                                          double following, double margin_m,
+                                          double relaxation_factor, double margin_m,
                                           double volume_per_sphere_m3);
 
 /// A block between two smooth rigid plates across z, its sides free, to first order.
@@ -73,6 +73,7 @@ struct PlateTest {
 /// Unlike affine_patch_test() it sees the faces of the block, whose spheres have fewer bonds: its
 /// results approach the bulk's as the number of cells grows.
 /// Throws Error(numerical) if spheres are loose.
-[[nodiscard]] PlateTest plate_test(const Network& block, const BondSystem& bonds, double following);
+[[nodiscard]] PlateTest plate_test(const Network& block, const BondSystem& bonds,
+                                   double relaxation_factor);
 
 }  // namespace tpm

@@ -34,17 +34,17 @@ inline double punch_stiffness(const PunchOnBlock& scene, int cells) {
   const Network network =
       build_network(block(cells, cells, cells, x, Lattice::cubic), options, "punch on a block");
   const BondSystem bonds(network, TpmParameters{});
-  Freedom freedom(network.organ.size());
+  Constraints constraints(network.organ.size());
   std::vector<std::size_t> patch;
-  for (std::size_t i = 0; i < freedom.size(); ++i) {
+  for (std::size_t i = 0; i < constraints.size(); ++i) {
     const Eigen::Vector3d p = network.organ.position.col(static_cast<Eigen::Index>(i));
     const bool on_top = p.z() > scene.side_m - 0.5 * x;
     const Eigen::Vector2d from_axis = p.head<2>().array() - 0.5 * scene.side_m;
     const bool below_punch = on_top && is_below(scene, from_axis);
     if (below_punch) patch.push_back(i);
-    if (below_punch || p.z() < 0.5 * x) freedom.hold(i);
+    if (below_punch || p.z() < 0.5 * x) constraints.hold(i);
   }
-  LargeEquilibrium solver(bonds, freedom, network.organ.position);
+  LargeEquilibrium solver(bonds, constraints, network.organ.position);
   return punch_stiffness(solver, network.organ.position, patch, -Eigen::Vector3d::UnitZ(), 0.0,
                          1e-7);
 }

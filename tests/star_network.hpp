@@ -26,9 +26,9 @@ struct Star {
   explicit Star(const tpm::TpmParameters& p)
       : network(tpm::join(star_organ(p.spacing_m), pairs(), {}, "star")),
         bonds(network, p),
-        freedom(4) {
-    freedom.guide(0, Eigen::Vector3d::UnitZ());
-    for (const std::size_t i : {1, 2, 3}) freedom.hold(i);
+        constraints(4) {
+    constraints.guide(0, Eigen::Vector3d::UnitZ());
+    for (const std::size_t i : {1, 2, 3}) constraints.hold(i);
   }
   static const std::vector<tpm::NeighbourPair>& pairs() {
     static const std::vector<tpm::NeighbourPair> list{{0, 1}, {0, 2}, {0, 3}};
@@ -37,13 +37,13 @@ struct Star {
   [[nodiscard]] tpm::QuasiStaticRun run(const tpm::Protocol& protocol,
                                         std::span<const double> times,
                                         tpm::QuasiStaticOptions options) const {
-    return tpm::QuasiStatic(bonds, network.organ.position, freedom, probe(), std::move(options))
+    return tpm::QuasiStatic(bonds, network.organ.position, constraints, probe(), std::move(options))
         .run(protocol, times);
   }
   [[nodiscard]] static tpm::Probe probe() { return {0, Eigen::Vector3d::UnitZ()}; }
   tpm::Network network;
   tpm::BondSystem bonds;
-  tpm::Freedom freedom;
+  tpm::Constraints constraints;
 };
 
 inline std::vector<double> even_times(double end, int n) {

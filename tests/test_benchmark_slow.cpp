@@ -36,7 +36,7 @@ struct Element {
     return time_s < kHoldFrom_s ? kRate_m_per_s * time_s : kDepth_m;
   }
   /// w in closed form (docs/notation.md).
-  [[nodiscard]] double remembered(double time_s) const {
+  [[nodiscard]] double viscous(double time_s) const {
     const auto ramp = [&](double t) {
       return kRate_m_per_s * (t + tau_s * std::expm1(-t / tau_s));
     };
@@ -62,7 +62,7 @@ double euler_error(const Element& element, double step_s, bool implicit) {
     if (i > 0 && implicit) w = (w + ratio * e) / (1.0 + ratio);
     if (i > 0 && !implicit) w += ratio * (Element::depth(t - step_s) - w);
     if (i % every != 0) continue;
-    const double exact = Element::force(e, element.remembered(t));
+    const double exact = Element::force(e, element.viscous(t));
     error = std::max(error, std::abs(Element::force(e, w) - exact));
     peak = std::max(peak, std::abs(exact));
   }
@@ -120,7 +120,7 @@ TEST_CASE("errors of a benchmark are those that the test computes for itself") {
                WithinRel(euler_error(element, step_s, true), 1e-5));
   }
   CHECK_THAT(result.reference.peak,
-             WithinRel(Element::force(kDepth_m, element.remembered(kHoldFrom_s)), 1e-12));
+             WithinRel(Element::force(kDepth_m, element.viscous(kHoldFrom_s)), 1e-12));
 }
 
 TEST_CASE("every rule stands in the CSV, and what failed with its reason") {

@@ -40,22 +40,22 @@ NetworkOptions with_rule(StiffnessRule rule) {
 }
 
 /// Everything but the contact is held.
-Freedom only_contact_guided(const Network& network) {
-  Freedom freedom(network.organ.size());
+Constraints only_contact_guided(const Network& network) {
+  Constraints constraints(network.organ.size());
   for (std::size_t i = 0; i < network.organ.size(); ++i) {
-    if (i != kContact) freedom.hold(i);
+    if (i != kContact) constraints.hold(i);
   }
-  freedom.guide(kContact, Vector3d::UnitZ());
-  return freedom;
+  constraints.guide(kContact, Vector3d::UnitZ());
+  return constraints;
 }
 
 /// The lower layer is held.
-Freedom inner_layer_held(const Organ& organ) {
-  Freedom freedom(organ.size());
+Constraints inner_layer_held(const Organ& organ) {
+  Constraints constraints(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
-    if (organ.layer[i] == 1) freedom.hold(i);
+    if (organ.layer[i] == 1) constraints.hold(i);
   }
-  return freedom;
+  return constraints;
 }
 
 struct MeanCounts {
@@ -87,9 +87,9 @@ TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rul
   const HeldStiffness star = star_stiffness(p);
   const HeldStiffness liver =
       held_stiffness(bonds, network.organ.position, kContact, Vector3d::UnitZ());
-  CHECK_THAT(star.at_once, WithinRel(19e3 * 12.56e-3, 1e-12));
+  CHECK_THAT(star.instantaneous, WithinRel(19e3 * 12.56e-3, 1e-12));
   CHECK_THAT(star.relaxed, WithinRel(7e3 * 19e3 / 26e3 * 12.56e-3, 1e-12));
-  CHECK_THAT(liver.at_once, WithinRel(star.at_once, 1e-6));
+  CHECK_THAT(liver.instantaneous, WithinRel(star.instantaneous, 1e-6));
   CHECK_THAT(liver.relaxed, WithinRel(star.relaxed, 1e-6));
 
   // The same as a force, after an indentation by 10 nm in ten picoseconds and in a second.
@@ -100,7 +100,7 @@ TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rul
     const Protocol protocol = ramp_and_hold(depth, rate, hold);
     return tissue.run(protocol, std::vector<double>{depth / rate + hold}).response(0);
   };
-  CHECK_THAT(force(1e3, 0.0) / depth, WithinRel(star.at_once, 1e-6));
+  CHECK_THAT(force(1e3, 0.0) / depth, WithinRel(star.instantaneous, 1e-6));
   CHECK_THAT(force(1e-8, 1.0) / depth, WithinRel(star.relaxed, 1e-6));
 }
 
@@ -113,7 +113,7 @@ TEST_CASE("under per_bond sphere 71 is stiffer by the sum of its bonds' squared 
   const BondSystem bonds(network, p);
   const HeldStiffness liver =
       held_stiffness(bonds, network.organ.position, kContact, Vector3d::UnitZ());
-  const double factor = liver.at_once / star_stiffness(p).at_once;
+  const double factor = liver.instantaneous / star_stiffness(p).instantaneous;
   CHECK_THAT(factor, WithinRel(sums.radial, 1e-6));
   CHECK_THAT(liver.relaxed / star_stiffness(p).relaxed, WithinRel(factor, 1e-6));
   CHECK(factor > 3.5);
@@ -132,7 +132,7 @@ TEST_CASE("a crowded layer has first neighbours only, as the others have") {
     CHECK(s.lateral_count <= 12);
     CHECK(s.radial_count >= 4);
   }
-  Freedom held = inner_layer_held(network.organ);
+  Constraints held = inner_layer_held(network.organ);
   CHECK(zero_energy_modes(BondSystem(network, TpmParameters{}), network.organ.position, held)
             .is_rigid());
 }
@@ -150,45 +150,45 @@ TEST_CASE("one radial bond per sphere and a free inner layer is refused, loose s
   options.diagonals = false;
   const Network network = build_network(paper_liver(), options, "liver");
   const std::vector<BondSums> sums = bond_sums(network);
-  Freedom freedom(network.organ.size());
+  Constraints constraints(network.organ.size());
   for (std::size_t i = 0; i < network.organ.size(); ++i) {
     if (network.organ.layer[i] == 0) CHECK(sums[i].radial_count == 1);
-    if (network.organ.position(2, static_cast<Eigen::Index>(i)) > 0.135) freedom.hold(i);
+    if (network.organ.position(2, static_cast<Eigen::Index>(i)) > 0.135) constraints.hold(i);
   }
   // Its curvature alone resists, a little: no mode is exactly free, but the contact is loose.
   const BondSystem bonds(network, TpmParameters{});
-  const std::vector<double> support = local_support(bonds, network.organ, freedom);
+  const std::vector<double> support = local_support(bonds, network.organ, constraints);
   CHECK(support[kContact] < 0.01);
   const std::vector<std::size_t> loose = loose_spheres(support);
   CHECK(std::find(loose.begin(), loose.end(), kContact) != loose.end());
-  CHECK_THROWS_WITH(require_supported(bonds, network.organ, freedom, "scene.json"),
+  CHECK_THROWS_WITH(require_supported(bonds, network.organ, constraints, "scene.json"),
                     Catch::StartsWith("scene.json: nearly a mechanism") &&
                         Catch::Contains(fmt::format("sphere{} {}", "s", loose.front() + 1)));
 
   const Network braced = build_network(paper_liver(), {}, "liver");
   const BondSystem stiff(braced, TpmParameters{});
-  CHECK(zero_energy_modes(stiff, braced.organ.position, freedom).is_rigid());
-  const std::vector<double> well = local_support(stiff, braced.organ, freedom);
+  CHECK(zero_energy_modes(stiff, braced.organ.position, constraints).is_rigid());
+  const std::vector<double> well = local_support(stiff, braced.organ, constraints);
   CHECK(*std::min_element(well.begin(), well.end()) > 0.5);
-  CHECK_NOTHROW(require_supported(stiff, braced.organ, freedom, "scene.json"));
+  CHECK_NOTHROW(require_supported(stiff, braced.organ, constraints, "scene.json"));
 }
 
 TEST_CASE("a flat plate without diagonals is an exact mechanism") {
   NetworkOptions options;
   options.diagonals = false;
   const Network plate = build_network(block(4, 4, 1, 0.02, Lattice::cubic), options, "plate");
-  Freedom freedom(plate.organ.size());
-  for (std::size_t i = 0; i < 5; ++i) freedom.hold(i);  // an edge of the top
+  Constraints constraints(plate.organ.size());
+  for (std::size_t i = 0; i < 5; ++i) constraints.hold(i);  // an edge of the top
   const BondSystem bonds(plate, TpmParameters{});
-  CHECK(zero_energy_modes(bonds, plate.organ.position, freedom).count > 20);
-  CHECK(loose_spheres(local_support(bonds, plate.organ, freedom)).size() > 10);
+  CHECK(zero_energy_modes(bonds, plate.organ.position, constraints).count > 20);
+  CHECK(loose_spheres(local_support(bonds, plate.organ, constraints)).size() > 10);
 }
 
 TEST_CASE("the local support of the star is that of its held neighbours") {
   const Network network = build_network(star(0.02, 0.02), {}, "star");
-  Freedom freedom(4);
-  freedom.guide(1, Vector3d::UnitZ());
-  for (const std::size_t i : {0, 2, 3}) freedom.hold(i);
-  CHECK_THAT(local_support(BondSystem(network, TpmParameters{}), network.organ, freedom)[1],
+  Constraints constraints(4);
+  constraints.guide(1, Vector3d::UnitZ());
+  for (const std::size_t i : {0, 2, 3}) constraints.hold(i);
+  CHECK_THAT(local_support(BondSystem(network, TpmParameters{}), network.organ, constraints)[1],
              WithinRel(1.0, 1e-8));
 }

@@ -25,7 +25,7 @@ struct SmallOrgan {
   }
   [[nodiscard]] CondensedContact build(double relaxation_time_s) const {
     return build_condensed(bonds(relaxation_time_s), tissue.network.organ.position,
-                           tissue.freedom(), contact, into, options);
+                           tissue.constraints(), contact, into, options);
   }
 };
 
@@ -55,7 +55,7 @@ TEST_CASE("a condensed contact follows the full network, force and field", "[con
   const double tau = GENERATE(2e-4, 0.02, 0.2, 50.0);
   CAPTURE(tau);
   const BondSystem bonds = organ().bonds(tau);
-  ContactPath full(bonds, organ().tissue.network.organ.position, organ().tissue.freedom(),
+  ContactPath full(bonds, organ().tissue.network.organ.position, organ().tissue.constraints(),
                    organ().contact);
   CondensedContact contact = built().with_relaxation_time(tau);
   double force_peak = 0.0, force_error = 0.0, field_peak = 0.0, field_error = 0.0;
@@ -138,8 +138,8 @@ TEST_CASE("what cannot be condensed is refused", "[condensed]") {
   const BondSystem bonds = organ().bonds(0.1);
   const auto build = [&](const CondensedOptions& options, const Eigen::Vector3d& into,
                          std::size_t contact) {
-    return build_condensed(bonds, organ().tissue.network.organ.position, organ().tissue.freedom(),
-                           contact, into, options);
+    return build_condensed(bonds, organ().tissue.network.organ.position,
+                           organ().tissue.constraints(), contact, into, options);
   };
   CHECK_THROWS_AS(build({0.0, 1e-3, 1e-3}, organ().into, organ().contact), Error);
   CHECK_THROWS_AS(build({4e-3, -1.0, 1e-3}, organ().into, organ().contact), Error);

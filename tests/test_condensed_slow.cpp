@@ -15,7 +15,7 @@ struct Liver {
       : tissue(read_tissue(std::string(TPM_TEST_SOURCE_DIR) + "/configs/" + file)),
         contact(tissue.network.organ.contact.value()),
         into(-tissue.network.organ.normal.col(static_cast<Eigen::Index>(contact))),
-        built(build_condensed(tissue.bonds(), tissue.network.organ.position, tissue.freedom(),
+        built(build_condensed(tissue.bonds(), tissue.network.organ.position, tissue.constraints(),
                               contact, into)) {}
   Tissue tissue;
   std::size_t contact;
@@ -27,8 +27,8 @@ struct Liver {
 double error_of_ramp(const Liver& liver, double relaxation_time_s, double ramp_s, double hold_s) {
   const BondSystem bonds(liver.tissue.network,
                          liver.tissue.element().with_relaxation_time(relaxation_time_s));
-  Freedom freedom = liver.tissue.freedom();
-  freedom.guide(liver.contact, liver.into);
+  Constraints constraints = liver.tissue.constraints();
+  constraints.guide(liver.contact, liver.into);
   CondensedContact contact = liver.built.with_relaxation_time(relaxation_time_s);
   std::vector<double> times;
   std::vector<double> forces;
@@ -44,7 +44,7 @@ double error_of_ramp(const Liver& liver, double relaxation_time_s, double ramp_s
   QuasiStaticOptions options;
   options.tolerance = 1e-9;
   options.step_s = 0.5 * relaxation_time_s;
-  const QuasiStaticRun run = QuasiStatic(bonds, liver.tissue.network.organ.position, freedom,
+  const QuasiStaticRun run = QuasiStatic(bonds, liver.tissue.network.organ.position, constraints,
                                          Probe{liver.contact, liver.into}, options)
                                  .run(ramp_and_hold(8e-3, 8e-3 / ramp_s, hold_s), times);
   double error = 0.0;

@@ -36,14 +36,14 @@ struct Columns {
           ToolShape shape = {ToolKind::punch, 1.0})
       : network(join(organ(count, step), pairs(count), {.rule = StiffnessRule::per_bond}, "test")),
         bonds(network, p),
-        freedom(network.organ.size()),
+        constraints(network.organ.size()),
         stiffness_N_per_m(stiffness) {
     for (int i = 0; i < count; ++i) {
-      freedom.guide(top(i), Eigen::Vector3d::UnitZ());
-      freedom.hold(top(i) + 1);
+      constraints.guide(top(i), Eigen::Vector3d::UnitZ());
+      constraints.hold(top(i) + 1);
     }
     const Tool tool = tool_at(network.organ, 0, Eigen::Vector3d::UnitZ(), shape);
-    driven.emplace(driven_network(bonds, network.organ, freedom, {}, {{tool, 1.0, stiffness}}));
+    driven.emplace(driven_network(bonds, network.organ, constraints, {}, {{tool, 1.0, stiffness}}));
   }
   static std::size_t top(int column) { return 2 * static_cast<std::size_t>(column); }
   static Organ organ(int count, double step) {
@@ -71,13 +71,13 @@ struct Columns {
   [[nodiscard]] QuasiStaticRun run(const Protocol& protocol, std::span<const double> times,
                                    QuasiStaticOptions options,
                                    const QuasiStaticObserver& observer = {}) const {
-    return QuasiStatic(driven->bonds, driven->rest, driven->freedom, driven->probes,
+    return QuasiStatic(driven->bonds, driven->rest, driven->constraints, driven->probes,
                        std::move(options))
         .run(protocol, times, observer);
   }
   Network network;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
   double stiffness_N_per_m;
   std::optional<DrivenNetwork> driven;
 };
@@ -207,7 +207,7 @@ TEST_CASE("a punch meets one column after another at the depth of their steps") 
     CHECK_THAT(jump.response[0], WithinRel(run.response[40], 1e-7));
   }
   SECTION("in equilibria as in time") {
-    StaticPath path(columns.driven->bonds, columns.driven->rest, 0.02, columns.driven->freedom,
+    StaticPath path(columns.driven->bonds, columns.driven->rest, 0.02, columns.driven->constraints,
                     columns.driven->probes, Drive::displacement, 0.004, 1e-8);
     const double relaxed = 1.0 - columns.bonds.relaxing()[0] / k;
     const double soft = relaxed * k * 1e5 / (relaxed * k + 1e5);
@@ -227,11 +227,11 @@ TEST_CASE("a stiff tool on one sphere is that sphere driven") {
   std::vector<double> difference;
   for (const double stiffness : {1e4, 1e5, 1e6}) {
     const Tool tool = tool_at(star.network.organ, 0, Eigen::Vector3d::UnitZ());
-    const DrivenNetwork driven =
-        driven_network(star.bonds, star.network.organ, star.freedom, {}, {{tool, 1.0, stiffness}});
-    const QuasiStaticRun run =
-        QuasiStatic(driven.bonds, driven.rest, driven.freedom, driven.probes, {.tolerance = 1e-9})
-            .run(protocol, times);
+    const DrivenNetwork driven = driven_network(star.bonds, star.network.organ, star.constraints,
+                                                {}, {{tool, 1.0, stiffness}});
+    const QuasiStaticRun run = QuasiStatic(driven.bonds, driven.rest, driven.constraints,
+                                           driven.probes, {.tolerance = 1e-9})
+                                   .run(protocol, times);
     CHECK(run.work.contact_changes == 0);
     difference.push_back((run.response - direct).cwiseAbs().maxCoeff() / direct.maxCoeff());
     const ToolState state = tool_states(driven, run.position).front();
@@ -250,15 +250,15 @@ struct Slab {
   Slab()
       : network(build_network(block(5, 5, 2, 0.02, Lattice::cubic), {}, "slab")),
         bonds(network, material(3.0)),
-        freedom(network.organ.size()) {
+        constraints(network.organ.size()) {
     for (std::size_t i = 0; i < network.organ.size(); ++i) {
-      if (network.organ.layer[i] == 2) freedom.hold(i);
+      if (network.organ.layer[i] == 2) constraints.hold(i);
     }
   }
   static constexpr std::size_t kMiddle = 14;  // of the top plane
   [[nodiscard]] Eigen::Vector3d down() const { return -Eigen::Vector3d::UnitZ(); }
   [[nodiscard]] DrivenNetwork pressed(std::vector<PressedTool> tools) const {
-    return driven_network(bonds, network.organ, freedom, {}, std::move(tools));
+    return driven_network(bonds, network.organ, constraints, {}, std::move(tools));
   }
   [[nodiscard]] PressedTool punch(std::size_t sphere, double radius, double share = 1.0) const {
     return {tool_at(network.organ, sphere, down(), {ToolKind::punch, radius}), share,
@@ -266,12 +266,13 @@ struct Slab {
   }
   Network network;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
 };
 
 QuasiStaticRun run_of(const DrivenNetwork& driven, const Protocol& protocol,
                       std::span<const double> times, QuasiStaticOptions options) {
-  return QuasiStatic(driven.bonds, driven.rest, driven.freedom, driven.probes, std::move(options))
+  return QuasiStatic(driven.bonds, driven.rest, driven.constraints, driven.probes,
+                     std::move(options))
       .run(protocol, times);
 }
 
@@ -292,7 +293,7 @@ TEST_CASE("a punch on a flat face is its spheres driven together") {
   }
   REQUIRE(patch.size() == 5);
   const QuasiStaticRun bonded =
-      QuasiStatic(slab.bonds, slab.network.organ.position, slab.freedom, Probes(patch), {})
+      QuasiStatic(slab.bonds, slab.network.organ.position, slab.constraints, Probes(patch), {})
           .run(protocol, times);
   const DrivenNetwork driven = slab.pressed({slab.punch(Slab::kMiddle, 0.021)});
   const QuasiStaticRun pressed = run_of(driven, protocol, times, {});
@@ -319,7 +320,7 @@ TEST_CASE("several tools at once balance, and energy is accounted for") {
   Eigen::Vector3d on_tissue = Eigen::Vector3d::Zero();
   std::size_t shown = 0;
   std::vector<double> response;
-  const QuasiStatic equations(driven.bonds, driven.rest, driven.freedom, driven.probes,
+  const QuasiStatic equations(driven.bonds, driven.rest, driven.constraints, driven.probes,
                               {.tolerance = 1e-9, .energies = true});
   const QuasiStaticRun run = equations.run(protocol, times, [&](const QuasiStaticState& state) {
     const auto tools = tool_states(driven, state.position);
@@ -372,15 +373,15 @@ TEST_CASE("derivatives go on through contacts") {
 TEST_CASE("what cannot be driven is refused") {
   const Columns columns(2, 0.0, material(1.0), 1e5);
   const DrivenNetwork& driven = *columns.driven;
-  CHECK_THROWS_AS(driven_network(columns.bonds, columns.network.organ, columns.freedom, {}, {}),
+  CHECK_THROWS_AS(driven_network(columns.bonds, columns.network.organ, columns.constraints, {}, {}),
                   Error);
   const Probe twice = driven.probes.front();
-  CHECK_THROWS_AS(QuasiStatic(driven.bonds, driven.rest, driven.freedom,
+  CHECK_THROWS_AS(QuasiStatic(driven.bonds, driven.rest, driven.constraints,
                               Probes(std::vector<Probe>{twice, twice}), {}),
                   Error);
   Positions away = driven.rest;
   away.col(driven.column_of_tool(0)).z() -= 0.001;
-  const QuasiStatic equations(driven.bonds, away, driven.freedom, driven.probes, {});
+  const QuasiStatic equations(driven.bonds, away, driven.constraints, driven.probes, {});
   const std::vector<double> times{1.0};
   CHECK_THROWS_WITH(equations.run(ramp_and_hold(0.001, 0.001, 1.0), times),
                     Catch::Matchers::Contains("touches nothing at rest"));

@@ -155,8 +155,8 @@ TEST_CASE("a decay of unknown size and rate: D-optimal are readings at 0 and tau
 TEST_CASE("a hold long compared with tau goes before one that is too short") {
   Json document = decay();
   document["candidates"][0]["hold"] = {"1 s", "40 s"};
-  for (const char* goal : {"all", "worst", "tau1"}) {
-    document["goal"] = goal;
+  for (const char* criterion : {"all", "worst", "tau1"}) {
+    document["goal"] = criterion;
     const DesignResult result = plan(parsed(document));
     CHECK(result.ranked.front().experiment.hold_s == 40.0);
     CHECK_THAT(result.words[1],

@@ -28,7 +28,7 @@ namespace {
 constexpr double kMass = 0.05;
 
 Inertial inertial_star(const Star& star, const InertialOptions& options) {
-  return {star.bonds,    star.network.organ.position,         star.freedom,
+  return {star.bonds,    star.network.organ.position,         star.constraints,
           Star::probe(), Eigen::VectorXd::Constant(4, kMass), options};
 }
 
@@ -40,13 +40,13 @@ struct Block {
                  const std::vector<std::size_t>& order = {})
       : network(build_network(renumbered(moved(organ(), rotation, shift), order), {}, "block")),
         bonds(network, p),
-        freedom(network.organ.size()),
+        constraints(network.organ.size()),
         probe{*network.organ.contact, -rotation.col(2)} {
     for (std::size_t i = 0; i < network.organ.size(); ++i) {
       const auto column = static_cast<Eigen::Index>(i);
       const Eigen::Vector3d at =
           rotation.transpose() * (network.organ.position.col(column) - shift);
-      if (network.organ.layer[i] == 1 && at.x() < 0.03) freedom.hold(i);
+      if (network.organ.layer[i] == 1 && at.x() < 0.03) constraints.hold(i);
     }
   }
 
@@ -72,13 +72,13 @@ struct Block {
     return o;
   }
   [[nodiscard]] Inertial inertial(const InertialOptions& options) const {
-    return {bonds, network.organ.position,          freedom,
+    return {bonds, network.organ.position,          constraints,
             probe, sphere_masses_kg(network.organ), options};
   }
 
   Network network;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
   Probe probe;
 };
 
@@ -173,22 +173,22 @@ TEST_CASE("the lowest mode of a block agrees with the dense eigenvalue problem")
   const Block block(p);
   const Eigen::VectorXd mass = sphere_masses_kg(block.network.organ);
   const LowestMode mode =
-      lowest_mode(block.bonds, block.network.organ.position, block.freedom, mass);
+      lowest_mode(block.bonds, block.network.organ.position, block.constraints, mass);
   const Eigen::Index n = block.network.organ.position.cols();
   Eigen::MatrixXd stiffness(3 * n, 3 * n);
   const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(block.bonds.size())), 0.0};
   for (Eigen::Index i = 0; i < 3 * n; ++i) {
     Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, n);
     unit.reshaped()[i] = 1.0;
-    block.freedom.project(unit);
+    block.constraints.project(unit);
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, n);
     block.bonds.add_stiffness_times(block.network.organ.position, none, unit, force);
-    block.freedom.project(force);
+    block.constraints.project(force);
     stiffness.col(i) = force.reshaped() / mass[0];
   }
   const Eigen::VectorXd squares =
       Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(stiffness).eigenvalues();
-  const auto held = 3 * n - static_cast<Eigen::Index>(block.freedom.count());
+  const auto held = 3 * n - static_cast<Eigen::Index>(block.constraints.count());
   CHECK(squares[held - 1] < 1e-6 * squares[held]);
   CHECK_THAT(mode.angular_frequency(), WithinRel(std::sqrt(squares[held]), 1e-8));
 }
@@ -196,7 +196,7 @@ TEST_CASE("the lowest mode of a block agrees with the dense eigenvalue problem")
 TEST_CASE("the Jacobian is the derivative of the equations of motion") {
   const Block block(slow_tissue());
   for (const Drive drive : {Drive::displacement, Drive::force}) {
-    DrivenTissue tissue(block.bonds, block.network.organ.position, block.freedom, block.probe,
+    DrivenTissue tissue(block.bonds, block.network.organ.position, block.constraints, block.probe,
                         drive);
     Inertia inertia{sphere_masses_kg(block.network.organ), 3.0,
                     Eigen::VectorXd::Constant(static_cast<Eigen::Index>(block.bonds.size()), 0.1)};
@@ -211,7 +211,7 @@ TEST_CASE("the Jacobian is the derivative of the equations of motion") {
     const auto project = [&](Eigen::VectorXd& s) {
       for (const Eigen::Index begin : {Eigen::Index{0}, coordinates}) {
         Eigen::Map<Eigen::Matrix3Xd> spheres(s.data() + begin, 3, coordinates / 3);
-        tissue.freedom().project(spheres);
+        tissue.constraints().project(spheres);
       }
     };
     project(state);
@@ -327,9 +327,9 @@ TEST_CASE("driven slowly, the inertial network is the quasi-static one", "[heavy
     InertialOptions options;
     options.tolerance = 1e-9;
     const InertialRun run = block.inertial(options).run(ramp, times);
-    const QuasiStaticRun exact =
-        QuasiStatic(block.bonds, block.network.organ.position, block.freedom, block.probe, {1e-9})
-            .run(ramp, times);
+    const QuasiStaticRun exact = QuasiStatic(block.bonds, block.network.organ.position,
+                                             block.constraints, block.probe, {1e-9})
+                                     .run(ramp, times);
     const Eigen::VectorXd error = (run.response - exact.response) / exact.response[1];
     CAPTURE(slowness, error.transpose());
     // On the ramp the difference is the drag on the moving spheres, in proportion to the speed.
@@ -406,7 +406,7 @@ TEST_CASE("what an inertial run cannot do is refused in one line") {
   options = {};
   options.damping_ratio = -0.1;
   CHECK_THROWS_WITH(inertial_star(star, options), Catch::StartsWith("damping ratio: -0.1"));
-  CHECK_THROWS_WITH(Inertial(star.bonds, star.network.organ.position, star.freedom, Star::probe(),
-                             Eigen::Vector4d(1, 0, 1, 1)),
+  CHECK_THROWS_WITH(Inertial(star.bonds, star.network.organ.position, star.constraints,
+                             Star::probe(), Eigen::Vector4d(1, 0, 1, 1)),
                     Catch::StartsWith("mass: of sphere 2 is not above 0"));
 }

@@ -28,14 +28,14 @@ struct Springs {
       : network(
             join(organ(count, step_m), pairs(count), {.rule = StiffnessRule::per_bond}, "test")),
         bonds(network, TpmParameters{}.with_relaxation_time(relaxation_time_s)),
-        freedom(network.organ.size()) {
+        constraints(network.organ.size()) {
     for (std::size_t i = 0; i < network.organ.size(); i += 2) {
-      freedom.guide(i, Eigen::Vector3d::UnitZ());
-      freedom.hold(i + 1);
+      constraints.guide(i, Eigen::Vector3d::UnitZ());
+      constraints.hold(i + 1);
     }
     const Tool tool =
         touching_tool({ToolKind::punch, 1.0}, network.organ, 0, Eigen::Vector3d::UnitZ());
-    driven.emplace(driven_network(bonds, network.organ, freedom, {},
+    driven.emplace(driven_network(bonds, network.organ, constraints, {},
                                   {{tool, 1.0, times_stiffer * bond_N_per_m()}}));
     mass_kg = Eigen::VectorXd::Constant(driven->rest.cols(), kSphere_kg);
     mass_kg.tail(1).setConstant(tool_kg);
@@ -64,12 +64,12 @@ struct Springs {
   }
   [[nodiscard]] double bond_N_per_m() const { return bonds.stiffness()[0]; }
   [[nodiscard]] Inertial inertial(InertialOptions options = {}) const {
-    return {driven->bonds, driven->rest, driven->freedom, driven->probes, mass_kg, options};
+    return {driven->bonds, driven->rest, driven->constraints, driven->probes, mass_kg, options};
   }
 
   Network network;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
   std::optional<DrivenNetwork> driven;
   Eigen::VectorXd mass_kg;
 };
@@ -99,28 +99,28 @@ Protocol in_and_out(double depth_m, double speed_m_s, double out_m) {
 TEST_CASE("an inelastic impact leaves a common speed, or that of a tool that is imposed") {
   const Eigen::VectorXd mass = Eigen::Vector2d(2.0, 3.0);
   const TouchingPair pair{0, 1, -Eigen::Vector3d::UnitZ()};  // the tool lies above, moving down +z
-  Freedom freedom(2);
+  Constraints constraints(2);
   Eigen::Matrix3Xd velocity = Eigen::Matrix3Xd::Zero(3, 2);
   velocity.col(1) = Eigen::Vector3d(0.5, 0.0, 4.0);
-  const Eigen::VectorXd impulse = inelastic_impact({&pair, 1}, freedom, mass, velocity);
+  const Eigen::VectorXd impulse = inelastic_impact({&pair, 1}, constraints, mass, velocity);
   CHECK_THAT(velocity(2, 0), WithinRel(2.4, 1e-12));  // 3 * 4/(2 + 3)
   CHECK_THAT(velocity(2, 1), WithinRel(2.4, 1e-12));
   CHECK(velocity(0, 1) == 0.5);  // no friction
   CHECK_THAT(impulse[0], WithinRel(4.8, 1e-12));
-  freedom.hold(1);
+  constraints.hold(1);
   velocity.setZero();
   velocity(2, 1) = 4.0;
-  CHECK_THAT(inelastic_impact({&pair, 1}, freedom, mass, velocity)[0], WithinRel(8.0, 1e-12));
+  CHECK_THAT(inelastic_impact({&pair, 1}, constraints, mass, velocity)[0], WithinRel(8.0, 1e-12));
   CHECK_THAT(velocity(2, 0), WithinRel(4.0, 1e-12));
   CHECK(velocity(2, 1) == 4.0);
   velocity(2, 0) = 5.0;  // it goes off by itself
-  CHECK(inelastic_impact({&pair, 1}, freedom, mass, velocity)[0] == 0.0);
+  CHECK(inelastic_impact({&pair, 1}, constraints, mass, velocity)[0] == 0.0);
 }
 
 TEST_CASE("an impact on several spheres keeps momentum, pulls none, and takes energy") {
   // Spheres around a light ball, one of them already leaving.
   const Eigen::VectorXd mass = (Eigen::VectorXd(5) << 1.0, 2.0, 4.0, 8.0, 0.1).finished();
-  const Freedom freedom(5);
+  const Constraints constraints(5);
   std::vector<TouchingPair> pairs;
   for (int i = 0; i < 4; ++i) {
     pairs.push_back({i, 4, -Eigen::Vector3d(std::cos(i), std::sin(i), 1.0 + i).normalized()});
@@ -129,7 +129,7 @@ TEST_CASE("an impact on several spheres keeps momentum, pulls none, and takes en
   velocity.col(4) = Eigen::Vector3d(0.1, -0.2, 3.0);
   velocity.col(3) = Eigen::Vector3d(0.0, 0.0, 9.0);
   const Eigen::Matrix3Xd before = velocity;
-  const Eigen::VectorXd impulse = inelastic_impact(pairs, freedom, mass, velocity);
+  const Eigen::VectorXd impulse = inelastic_impact(pairs, constraints, mass, velocity);
   CHECK((velocity * mass - before * mass).norm() < 1e-12 * (before * mass).norm());
   const auto kinetic = [&](const Eigen::Matrix3Xd& v) {
     return 0.5 * v.colwise().squaredNorm().dot(mass.transpose());

@@ -51,7 +51,7 @@ TEST_CASE(
     const double peak_N = judge.at("force_at_peak_N").get<double>();
     REQUIRE(times_s.size() >= 19);
     const Eigen::VectorXd force =
-        QuasiStatic(bonds, organ.position, tissue.freedom(), probe, {.tolerance = 1e-8})
+        QuasiStatic(bonds, organ.position, tissue.constraints(), probe, {.tolerance = 1e-8})
             .run(ramp_and_hold(8e-3, 4e-3, 29.0), times_s)
             .response;
     for (std::size_t i = 0; i < times_s.size(); ++i) {

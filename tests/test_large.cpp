@@ -17,11 +17,11 @@ using Catch::Matchers::WithinRel;
 
 namespace {
 
-Eigen::Matrix3Xd random_forces(const Freedom& freedom) {
-  Eigen::Matrix3Xd forces(3, static_cast<Eigen::Index>(freedom.size()));
+Eigen::Matrix3Xd random_forces(const Constraints& constraints) {
+  Eigen::Matrix3Xd forces(3, static_cast<Eigen::Index>(constraints.size()));
   Random random(3);
   for (double& value : forces.reshaped()) value = random.normal();
-  freedom.project(forces);
+  constraints.project(forces);
   return forces;
 }
 
@@ -33,17 +33,17 @@ BondMemory no_memory(const BondSystem& bonds) {
 
 TEST_CASE("conjugate gradients solve what the factorisation solves") {
   IndentedScene scene(solid_liver(1500), 0.02, 0.03);
-  scene.freedom.guide(700, Eigen::Vector3d(1, 2, 2) / 3.0);  // one that is partly free
+  scene.constraints.guide(700, Eigen::Vector3d(1, 2, 2) / 3.0);  // one that is partly free
   const BondMemory memory = no_memory(scene.bonds);
-  Equilibrium direct(scene.bonds, scene.freedom);
+  Equilibrium direct(scene.bonds, scene.constraints);
   REQUIRE(direct.factorise(scene.rest(), memory));
-  const Eigen::Matrix3Xd forces = random_forces(scene.freedom);
+  const Eigen::Matrix3Xd forces = random_forces(scene.constraints);
   Eigen::Matrix3Xd exact = forces;
   direct.displace(exact);
   for (const auto& entry : kPreconditionerWords) {
     LargeEquilibriumOptions options;
     options.preconditioner = entry.meaning;
-    LargeEquilibrium large(scene.bonds, scene.freedom, scene.rest(), options);
+    LargeEquilibrium large(scene.bonds, scene.constraints, scene.rest(), options);
     Eigen::Matrix3Xd x = forces;
     CAPTURE(entry.text);
     REQUIRE(large.solve(scene.rest(), memory, x, 1e-12) == TangentAnswer::solved);
@@ -54,17 +54,17 @@ TEST_CASE("conjugate gradients solve what the factorisation solves") {
 
 TEST_CASE("the preconditioners are symmetric") {
   const IndentedScene scene(solid_liver(1500), 0.02, 0.03);
-  StiffnessRows stiffness(scene.bonds, scene.freedom);
+  StiffnessRows stiffness(scene.bonds, scene.constraints);
   const auto& matrix = stiffness.assemble(scene.rest(), no_memory(scene.bonds));
-  RigidModes<3> modes(scene.freedom.size());
+  RigidModes<3> modes(scene.constraints.size());
   for (std::size_t i = 0; i < modes.size(); ++i) {
     modes[i].setZero();
-    modes[i].leftCols<3>() = scene.freedom.projector(i);
+    modes[i].leftCols<3>() = scene.constraints.projector(i);
   }
   const BlockJacobi jacobi(matrix);
   const IncompleteCholesky cholesky(matrix);
   const Multigrid multigrid(matrix, modes);
-  const Eigen::Matrix3Xd a = random_forces(scene.freedom);
+  const Eigen::Matrix3Xd a = random_forces(scene.constraints);
   const Eigen::Matrix3Xd b = a.rowwise().reverse();
   for (const Preconditioner* p :
        {static_cast<const Preconditioner*>(&jacobi), static_cast<const Preconditioner*>(&cholesky),
@@ -91,8 +91,8 @@ TEST_CASE("multigrid needs about as many iterations for more spheres, block Jaco
                               -Eigen::Vector3d::UnitZ());
     LargeEquilibriumOptions options;
     options.preconditioner = kind;
-    LargeEquilibrium large(scene.bonds, scene.freedom, scene.rest(), options);
-    Eigen::Matrix3Xd x = random_forces(scene.freedom);
+    LargeEquilibrium large(scene.bonds, scene.constraints, scene.rest(), options);
+    Eigen::Matrix3Xd x = random_forces(scene.constraints);
     REQUIRE(large.solve(scene.rest(), no_memory(scene.bonds), x, 1e-8) == TangentAnswer::solved);
     return large.work().iterations;
   };
@@ -111,11 +111,11 @@ TEST_CASE("a column pressed beyond its buckling load is found unstable by both s
   const Organ column = block(2, 2, 24, 0.01, Lattice::cubic);
   const Network network = build_network(column, {}, "column");
   const BondSystem bonds(network, TpmParameters{});
-  Freedom freedom(column.size());
+  Constraints constraints(column.size());
   const double top = column.position.row(2).maxCoeff();
   for (std::size_t i = 0; i < column.size(); ++i) {
     const double z = column.position(2, static_cast<Eigen::Index>(i));
-    if (z < 1e-9 || z > top - 1e-9) freedom.hold(i);
+    if (z < 1e-9 || z > top - 1e-9) constraints.hold(i);
   }
   const BondMemory memory = no_memory(bonds);
   const Eigen::Matrix3Xd no_load = Eigen::Matrix3Xd::Zero(3, column.position.cols());
@@ -125,8 +125,8 @@ TEST_CASE("a column pressed beyond its buckling load is found unstable by both s
     Positions pressed = column.position;
     pressed.row(2) *= 1.0 - compression;
     Positions again = pressed;
-    Equilibrium direct(bonds, freedom);
-    LargeEquilibrium large(bonds, freedom, column.position);
+    Equilibrium direct(bonds, constraints);
+    LargeEquilibrium large(bonds, constraints, column.position);
     const EquilibriumSearch a = direct.find(pressed, memory, no_load, 1e-9);
     const EquilibriumSearch b = large.find(again, memory, no_load, 1e-9);
     CAPTURE(compression, a.stable, b.stable, a.converged, b.converged);
@@ -145,9 +145,9 @@ TEST_CASE("a probe with random forces finds loose spheres that the load does not
   const Organ organ = block(3, 3, 3, 0.01, Lattice::cubic);
   const Network network = build_network(organ, narrow, "lattice");
   const BondSystem bonds(network, TpmParameters{});
-  Freedom freedom(organ.size());
-  for (std::size_t i = 0; i < 16; ++i) freedom.hold(i);
-  LargeEquilibrium large(bonds, freedom, organ.position);
+  Constraints constraints(organ.size());
+  for (std::size_t i = 0; i < 16; ++i) constraints.hold(i);
+  LargeEquilibrium large(bonds, constraints, organ.position);
   Positions position = organ.position;
   const EquilibriumSearch search = large.find(
       position, no_memory(bonds), Eigen::Matrix3Xd::Zero(3, organ.position.cols()), 1e-9);
@@ -158,9 +158,9 @@ TEST_CASE("a probe with random forces finds loose spheres that the load does not
 TEST_CASE("an indentation refuses what it cannot do") {
   const IndentedScene scene(block(4, 4, 4, 0.01, Lattice::fcc), 0.015, 0.005,
                             -Eigen::Vector3d::UnitZ());
-  Equilibrium direct(scene.bonds, scene.freedom);
+  Equilibrium direct(scene.bonds, scene.constraints);
   const auto run = [&](const PatchIndentation& push) {
-    return indent(scene.bonds, scene.freedom, scene.rest(), push, finder_of(direct));
+    return indent(scene.bonds, scene.constraints, scene.rest(), push, finder_of(direct));
   };
   PatchIndentation none = scene.push;
   none.patch.clear();
@@ -176,12 +176,12 @@ TEST_CASE("an indentation refuses what it cannot do") {
 TEST_CASE("a solver is chosen by what the factor takes, counted before it is made") {
   const IndentedScene scene(solid_liver(700), 0.02, 0.03);
   const SolverChoice usual =
-      choose_solver(scene.bonds, scene.freedom, {.solver = StiffnessSolver::automatic});
+      choose_solver(scene.bonds, scene.constraints, {.solver = StiffnessSolver::automatic});
   CHECK(usual.direct);
   CHECK(usual.operations > 1e6);
   CHECK(usual.bytes > 1e6);
   const auto chosen = [&](double operations, double bytes) {
-    return choose_solver(scene.bonds, scene.freedom,
+    return choose_solver(scene.bonds, scene.constraints,
                          {.solver = StiffnessSolver::automatic,
                           .most_operations = operations,
                           .most_bytes = bytes})
@@ -191,19 +191,19 @@ TEST_CASE("a solver is chosen by what the factor takes, counted before it is mad
   CHECK_FALSE(chosen(0.99 * usual.operations, usual.bytes));
   CHECK_FALSE(chosen(usual.operations, 0.99 * usual.bytes));
   CHECK(
-      choose_solver(scene.bonds, scene.freedom,
+      choose_solver(scene.bonds, scene.constraints,
                     {.solver = StiffnessSolver::direct, .most_operations = 0.0, .most_bytes = 0.0})
           .direct);
   CHECK_FALSE(
-      choose_solver(scene.bonds, scene.freedom, {.solver = StiffnessSolver::iterative}).direct);
+      choose_solver(scene.bonds, scene.constraints, {.solver = StiffnessSolver::iterative}).direct);
 }
 
 TEST_CASE("a quasi-static run is the same with either solver, within its tolerance", "[heavy]") {
   const Organ organ = solid_liver(700);
   const Network network = build_network(organ, {}, "liver");
   const BondSystem bonds(network, TpmParameters{}.with_relaxation_time(0.7));
-  Freedom freedom(organ.size());
-  for (const std::size_t i : far_side(organ, Eigen::Vector3d::UnitZ(), 0.02)) freedom.hold(i);
+  Constraints constraints(organ.size());
+  for (const std::size_t i : far_side(organ, Eigen::Vector3d::UnitZ(), 0.02)) constraints.hold(i);
   Eigen::Index front = 0;
   organ.position.row(2).minCoeff(&front);
   const Probe probe{static_cast<std::size_t>(front), Eigen::Vector3d::UnitZ()};
@@ -214,7 +214,7 @@ TEST_CASE("a quasi-static run is the same with either solver, within its toleran
   const std::vector<double> times{0.0, 0.3, 1.0, 1.5, 2.0};
   for (const Protocol& protocol : {push, load}) {
     const auto run = [&](StiffnessSolver solver) {
-      return QuasiStatic(bonds, organ.position, freedom, probe,
+      return QuasiStatic(bonds, organ.position, constraints, probe,
                          {.tolerance = 1e-6, .equilibrium = {.solver = solver}})
           .run(protocol, times);
     };

@@ -232,7 +232,7 @@ TEST_CASE("The motion of a recording is repeated, and the recording stands besid
         folder / "session.json", {.law = folder / "law.json", .motion = folder / "r.csv"});
     const Verification v = verified(session, folder, "replay");
     CHECK(v.all.max_N < 1e-5 * v.all.peak_N);
-    const OtherOpinion& beside = v.others.back();
+    const CrossCheck& beside = v.others.back();
     CHECK_THAT(beside.name, Contains("MEASURED: the recording r.csv"));
     CHECK(beside.commanded.instants == 4000);
     // The offset is not rendered; what is left is a straight line between samples, most at the

@@ -26,8 +26,8 @@ constexpr double kForever = std::numeric_limits<double>::infinity();
 
 /// 4 x 4 x 2 spheres, not quite on a lattice, the lower layer held.
 struct Plate {
-  Plate() : network(build_network(organ(), {}, "plate")), freedom(network.organ.size()) {
-    for (std::size_t i = 16; i < 32; ++i) freedom.hold(i);
+  Plate() : network(build_network(organ(), {}, "plate")), constraints(network.organ.size()) {
+    for (std::size_t i = 16; i < 32; ++i) constraints.hold(i);
   }
   static Organ organ() {
     Organ o = block(3, 3, 1, 0.02, Lattice::cubic);
@@ -41,12 +41,12 @@ struct Plate {
   [[nodiscard]] Eigen::Matrix3Xd displacement(const Network& of, const BondMaterial& material,
                                               double load) const {
     const BondSystem bonds(of, material);
-    const QuasiStaticRun run = QuasiStatic(bonds, of.organ.position, freedom, probe(), {1e-6})
+    const QuasiStaticRun run = QuasiStatic(bonds, of.organ.position, constraints, probe(), {1e-6})
                                    .run(creep(load, kForever), std::span(&kForever, 1));
     return run.position - of.organ.position;
   }
   Network network;
-  Freedom freedom;
+  Constraints constraints;
 };
 
 Eigen::Matrix3Xd random_displacement(Eigen::Index n, std::uint64_t seed) {
@@ -61,9 +61,9 @@ Eigen::Matrix3Xd random_displacement(Eigen::Index n, std::uint64_t seed) {
 TEST_CASE("the contact stiffness of the star is that of its radial bond") {
   const TpmParameters p;
   const Star star(p);
-  const auto stiffness = [&](double following) {
-    return contact_stiffness_N_per_m(star.bonds, star.network.organ.position, star.freedom,
-                                     Star::probe(), following);
+  const auto stiffness = [&](double relaxation_factor) {
+    return contact_stiffness_N_per_m(star.bonds, star.network.organ.position, star.constraints,
+                                     Star::probe(), relaxation_factor);
   };
   CHECK_THAT(stiffness(1.0), WithinRel(p.relaxed_modulus_Pa() * p.modulus_to_stiffness_m(), 1e-12));
   CHECK_THAT(stiffness(0.0), WithinRel(p.E2_Pa * p.modulus_to_stiffness_m(), 1e-12));
@@ -75,10 +75,10 @@ TEST_CASE(
   const TpmParameters p;
   const double relaxed =
       contact_stiffness_N_per_m(BondSystem(plate.network, p), plate.network.organ.position,
-                                plate.freedom, plate.probe(), 1.0);
+                                plate.constraints, plate.probe(), 1.0);
   for (const SpringRule rule : {SpringRule::like_the_bonds, SpringRule::equal}) {
     const Network msm = msm_network(plate.network, rule);
-    const BondMaterial material = msm_material(msm, plate.freedom, plate.probe(), relaxed);
+    const BondMaterial material = msm_material(msm, plate.constraints, plate.probe(), relaxed);
     const BondSystem springs(msm, material);
     CHECK(springs.relaxing().isZero(0.0));
     const double load = 1e-4;
@@ -86,7 +86,7 @@ TEST_CASE(
     CHECK_THAT(u.col(5).dot(plate.probe().direction), WithinRel(load / relaxed, 1e-4));
     const std::vector<double> times{0.5, 20.0};
     const Eigen::VectorXd force =
-        QuasiStatic(springs, msm.organ.position, plate.freedom, plate.probe())
+        QuasiStatic(springs, msm.organ.position, plate.constraints, plate.probe())
             .run(ramp_and_hold(1e-3, 4e-3, 30.0), times)
             .response;
     CHECK_THAT(force[1], WithinRel(force[0], 1e-9));

@@ -80,10 +80,10 @@ Pair both(const MaterialField& field, std::vector<WrittenBond> bonds, double tol
   const OrganScene& scene = small_scene();
   const BondSystem system(scene.network, field);
   Pair pair;
-  pair.run = QuasiStatic(system, scene.network.organ.position, scene.freedom, scene.probe,
+  pair.run = QuasiStatic(system, scene.network.organ.position, scene.constraints, scene.probe,
                          {.tolerance = tolerance, .energies = true})
                  .run(ramp(), kTimes);
-  WrittenNetwork written(scene.network, std::move(bonds), scene.freedom, scene.probe);
+  WrittenNetwork written(scene.network, std::move(bonds), scene.constraints, scene.probe);
   pair.reference = written_ramp(written, kDepth, kRamp, kTimes);
   return pair;
 }
@@ -329,7 +329,7 @@ TEST_CASE("a bond between two materials is both at half strength") {
 TEST_CASE("a run with several branches goes on from its state as if it had not stopped") {
   const OrganScene& scene = small_scene();
   const BondSystem bonds(scene.network, material_of({0.1, 4.0}, 0.8));
-  const QuasiStatic network(bonds, scene.network.organ.position, scene.freedom, scene.probe,
+  const QuasiStatic network(bonds, scene.network.organ.position, scene.constraints, scene.probe,
                             {.tolerance = 1e-8, .energies = true});
   std::vector<QuasiStaticState> states;
   const std::vector<double> times{1.0, 2.0, 4.0};
@@ -412,7 +412,7 @@ TEST_CASE("an inertial network is its equations with the branches written out") 
   const Eigen::VectorXd mass = sphere_masses_kg(scene.network.organ);
   InertialOptions options{.tolerance = 1e-9, .highest_order = 5};
   options.energy = true;
-  const Inertial inertial(bonds, scene.network.organ.position, scene.freedom, scene.probe, mass,
+  const Inertial inertial(bonds, scene.network.organ.position, scene.constraints, scene.probe, mass,
                           options);
   const double drag = 2.0 * options.damping_ratio * inertial.lowest().angular_frequency();
   const double speed = 4e-3 / 0.1;
@@ -420,7 +420,7 @@ TEST_CASE("an inertial network is its equations with the branches written out") 
   const std::vector<double> times{0.02, 0.05, 0.1};
   const InertialRun run = inertial.run(protocol, times);
 
-  WrittenNetwork written(scene.network, written_bonds(scene.network, m), scene.freedom,
+  WrittenNetwork written(scene.network, written_bonds(scene.network, m), scene.constraints,
                          scene.probe);
   const Eigen::Index n = written.freedoms();
   Eigen::VectorXd state = Eigen::VectorXd::Zero(2 * n + written.states());
@@ -463,7 +463,8 @@ TEST_CASE("both solvers of the inertial network take several branches") {
   InertialOptions options{.tolerance = 1e-7};
   const auto run = [&](NewtonSolver solver) {
     options.newton = solver;
-    return Inertial(bonds, scene.network.organ.position, scene.freedom, scene.probe, mass, options)
+    return Inertial(bonds, scene.network.organ.position, scene.constraints, scene.probe, mass,
+                    options)
         .run(protocol, times);
   };
   const InertialRun a = run(NewtonSolver::eliminated);
@@ -543,7 +544,7 @@ TEST_CASE("an organ is differentiated by every parameter of its material's table
                                                                   "s.json", {}));
   const OrganModel organ(tissue);
   CHECK_FALSE(organ.has_element());
-  CHECK(organ.scout() == nullptr);
+  CHECK(organ.surrogate() == nullptr);
   const std::vector<double> p = organ.own_values();
   REQUIRE(organ.parameters().size() == 10);
   CHECK(organ.parameters()[4].name == "g1");

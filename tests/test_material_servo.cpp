@@ -71,7 +71,7 @@ Eigen::VectorXd reference(const BondSystem& bonds) {
       Drive::displacement,
       {{0.0, 0.0}, {kRamp * kPeriod_s, kDepth_m}, {kSteps * kPeriod_s, kDepth_m}}, "ramp");
   // Models at servo rate move the contact in space: it does not yield to the side.
-  Freedom guided = scene.freedom;
+  Constraints guided = scene.constraints;
   guided.guide(scene.probe.sphere, scene.probe.direction);
   return QuasiStatic(bonds, scene.network.organ.position, guided, scene.probe, {.tolerance = 1e-7})
       .run(protocol, times)
@@ -98,7 +98,7 @@ ServoNetwork servo_network(const BondSystem& bonds, bool portable = false) {
   options.portable = portable;
   return {bonds,
           scene.network.organ.position,
-          scene.freedom,
+          scene.constraints,
           scene.probe.sphere,
           scene.probe.direction,
           options};
@@ -205,7 +205,7 @@ TEST_CASE("models at servo rate keep their claims with several branches and stif
     const Eigen::VectorXd expected = reference(bonds);
     ServoNetwork full = servo_network(bonds);
     CHECK(worst_error(full, expected) < c.full);
-    ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, scene.probe.direction,
+    ZoneNetwork zone(bonds, rest, scene.constraints, scene.probe.sphere, scene.probe.direction,
                      {.period_s = kPeriod_s, .rings = 2});
     CHECK(worst_error(zone, expected, c.zone_claimed) < c.zone);
   }
@@ -253,7 +253,7 @@ namespace {
 
 CondensedContact condensed(const BondSystem& bonds) {
   const OrganScene& scene = small_liver();
-  return build_condensed(bonds, scene.network.organ.position, scene.freedom, scene.probe.sphere,
+  return build_condensed(bonds, scene.network.organ.position, scene.constraints, scene.probe.sphere,
                          scene.probe.direction, {.depth_m = kDepth_m, .period_s = kPeriod_s});
 }
 
@@ -308,7 +308,7 @@ TEST_CASE("a condensed contact of several branches creates no energy and allocat
   CondensedOptions range{.depth_m = 4e-3, .tangential_m = 1e-3, .period_s = kPeriod_s};
   const OrganScene& scene = small_liver();
   CondensedContact contact =
-      build_condensed(bonds, scene.network.organ.position, scene.freedom, scene.probe.sphere,
+      build_condensed(bonds, scene.network.organ.position, scene.constraints, scene.probe.sphere,
                       scene.probe.direction, range)
           .with_branches({{0.2, 5e-4}, {0.3, 0.02}, {0.3, 0.5}, {0.2, 20.0}});
   const tpm::testing::EnergyAccount account =

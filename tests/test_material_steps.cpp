@@ -47,7 +47,7 @@ class Written {
       : bonds_(small_scene().network, field(material, factors)),
         driven_{bonds_,
                 small_scene().network.organ.position,
-                small_scene().freedom,
+                small_scene().constraints,
                 Probes(small_scene().probe),
                 {}} {
     std::vector<WrittenBond> written = written_bonds(small_scene().network, material);
@@ -57,7 +57,7 @@ class Written {
       written[i].k *= mean;
       for (WrittenBond::Branch& branch : written[i].branches) branch.g *= mean;
     }
-    WrittenNetwork network(small_scene().network, std::move(written), small_scene().freedom,
+    WrittenNetwork network(small_scene().network, std::move(written), small_scene().constraints,
                            small_scene().probe);
     const std::vector<double> forces = written_ramp(network, kDepth_m, kRamp_s, kTimes);
     truth_ = Eigen::VectorXd::Map(forces.data(), std::ssize(forces));
@@ -137,8 +137,8 @@ TEST_CASE("a ball by CVODE takes several branches: one written as two is the sam
   }
   const auto forces = [&](const BondMaterial& material) {
     const BondSystem bonds(scene.network, material);
-    return ball_forces_by_cvode(bonds, scene.network.organ.position, scene.freedom, ball, places,
-                                1e-9);
+    return ball_forces_by_cvode(bonds, scene.network.organ.position, scene.constraints, ball,
+                                places, 1e-9);
   };
   const auto a = forces(one), b = forces(two);
   REQUIRE(a.back().norm() > 1e-2);

@@ -98,7 +98,7 @@ TEST_CASE("method: orders on the star") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const Star star(p);
   const DrivenNetwork network{
-      star.bonds, star.network.organ.position, star.freedom, Probes(Star::probe()), {}};
+      star.bonds, star.network.organ.position, star.constraints, Probes(Star::probe()), {}};
   const Protocol protocol(Drive::force, {{0.0, 0.0}, {0.2, 0.2}, {0.4, 0.2}});
   QuasiStaticOptions options;
   options.tolerance = 1e-12;
@@ -112,7 +112,7 @@ TEST_CASE("method: the element and the star answer alike under every rule") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const Star star(p);
   const DrivenNetwork network{
-      star.bonds, star.network.organ.position, star.freedom, Probes(Star::probe()), {}};
+      star.bonds, star.network.organ.position, star.constraints, Probes(Star::probe()), {}};
   const std::vector<double> times = tenths(0.4);
   for (const bool moves : {false, true}) {
     const double load = 0.2;

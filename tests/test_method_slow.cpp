@@ -83,7 +83,7 @@ TEST_CASE("method on an organ: XPBD lags without masses, and less the more it sw
 TEST_CASE("method on an organ: a tissue that buckles says so") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   const Star star(p);
-  Freedom unguided(4);
+  Constraints unguided(4);
   for (const std::size_t i : {1, 2, 3}) unguided.hold(i);
   const DrivenNetwork network{
       star.bonds, star.network.organ.position, unguided, Probes(Star::probe()), {}};

@@ -115,8 +115,8 @@ TEST_CASE("the load and the reactions of the anchors balance, in force and in mo
   const auto pushed = static_cast<Eigen::Index>(scene.probe.sphere);
   Eigen::Vector3d force = 0.1 * scene.probe.direction;
   Eigen::Vector3d moment = Eigen::Vector3d(run.position.col(pushed)).cross(force);
-  for (std::size_t i = 0; i < scene.freedom.size(); ++i) {
-    if (scene.freedom.projector(i).trace() > 0.5) continue;
+  for (std::size_t i = 0; i < scene.constraints.size(); ++i) {
+    if (scene.constraints.projector(i).trace() > 0.5) continue;
     const auto column = static_cast<Eigen::Index>(i);
     const Eigen::Vector3d reaction = -pull.col(column);
     force += reaction;

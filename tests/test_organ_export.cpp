@@ -240,7 +240,7 @@ TEST_CASE("an engine builds the organ's contact from the exported text") {
             Approx(instantaneous ? 0.0 : 0.5 * whole * (0.75 * 0.5 + 0.25 * 8.0)).epsilon(1e-12));
       // Loads leave the sphere free across the push, and so does this.
       const double rebuilt = stiffness_of(built, probe.sphere, probe.direction);
-      CHECK(rebuilt == Approx(contact_stiffness_N_per_m(bonds, organ.position, tissue.freedom(),
+      CHECK(rebuilt == Approx(contact_stiffness_N_per_m(bonds, organ.position, tissue.constraints(),
                                                         probe, instantaneous ? 0.0 : 1.0))
                            .epsilon(1e-9));
     }

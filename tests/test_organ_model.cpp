@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "tpm/fit/config.hpp"
-#include "tpm/fit/scouted_minimum.hpp"
+#include "tpm/fit/surrogate_minimum.hpp"
 #include "tpm/scene/organ_model.hpp"
 #include "tpmkit/tpm_element.hpp"
 
@@ -109,10 +109,10 @@ TEST_CASE("derivatives along tied changes are those of each, added") {
 
 namespace {
 
-/// A few observations of a decay with a bend, and what a scout takes them for.
+/// A few observations of a decay with a bend, and what a surrogate takes them for.
 class Decay final : public ResidualFunction {
  public:
-  Decay(double bend, const ResidualFunction* scout) : bend_(bend), scout_(scout) {}
+  Decay(double bend, const ResidualFunction* surrogate) : bend_(bend), surrogate_(surrogate) {}
   [[nodiscard]] Eigen::Index residual_count() const override { return 12; }
   [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                               RowMatrix* jacobian) const override {
@@ -131,13 +131,13 @@ class Decay final : public ResidualFunction {
     }
     return true;
   }
-  [[nodiscard]] const ResidualFunction* scout() const override { return scout_; }
+  [[nodiscard]] const ResidualFunction* surrogate() const override { return surrogate_; }
 
   mutable int asked = 0;
 
  private:
   double bend_;
-  const ResidualFunction* scout_;
+  const ResidualFunction* surrogate_;
 };
 
 }  // namespace

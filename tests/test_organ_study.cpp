@@ -100,9 +100,9 @@ TEST_CASE("readings stand where their experiment has them") {
     } else {
       // At once the dashpot has not moved: (E2 + lambda1(e)) e A0/l0 is the load.
       const double e = curve.readings[0].response;
-      const double at_once =
+      const double instantaneous =
           (p.E2_Pa + lambda1_Pa(p.Eprime_Pa, e, p.spacing_m)) * e * p.A0_m2 / p.l0_m;
-      CHECK_THAT(at_once, WithinRel(condition.load_N, 1e-9));
+      CHECK_THAT(instantaneous, WithinRel(condition.load_N, 1e-9));
       CHECK(curve.readings[1].x == 300.0);
     }
   }

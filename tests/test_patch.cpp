@@ -22,8 +22,8 @@ struct Block {
         bonds(network, material),
         margin(2.0 * options.support * spacing),
         volume(volume_per_sphere(lattice, spacing)) {}
-  [[nodiscard]] PatchTest test(double following) const {
-    return affine_patch_test(network, bonds, following, margin, volume);
+  [[nodiscard]] PatchTest test(double relaxation_factor) const {
+    return affine_patch_test(network, bonds, relaxation_factor, margin, volume);
   }
   Network network;
   BondSystem bonds;
@@ -94,9 +94,9 @@ TEST_CASE(
     const Block b(entry.lattice, cells_for(entry.lattice), kCoarseSpacing,
                   options_of(StiffnessRule::normalised));
     const auto interior = interior_spheres(b.network.organ, b.margin);
-    for (const double following : {0.0, 0.3, 1.0}) {
-      const Elasticity solved = b.test(following).elasticity;
-      const Elasticity summed = affine_elasticity(b.network, b.bonds, following, interior,
+    for (const double relaxation_factor : {0.0, 0.3, 1.0}) {
+      const Elasticity solved = b.test(relaxation_factor).elasticity;
+      const Elasticity summed = affine_elasticity(b.network, b.bonds, relaxation_factor, interior,
                                                   b.volume * static_cast<double>(interior.size()));
       const double size = summed.cwiseAbs().maxCoeff();
       CHECK((solved - summed).cwiseAbs().maxCoeff() < 1e-12 * size);
@@ -109,13 +109,13 @@ TEST_CASE(
 
 TEST_CASE("what relaxes halves with equal springs, and lateral bonds keep their stiffness") {
   const Block b(Lattice::cubic, 8, kCoarseSpacing, options_of(StiffnessRule::normalised));
-  const Elasticity at_once = b.test(0.0).elasticity;
+  const Elasticity instantaneous = b.test(0.0).elasticity;
   const Elasticity relaxed = b.test(1.0).elasticity;
   // Across z only inter-layer bonds carry; along xy both kinds.
-  CHECK_THAT(relaxed(2, 2), WithinRel(0.5 * at_once(2, 2), 1e-12));
-  CHECK_THAT(relaxed(5, 5), WithinRel(at_once(5, 5), 1e-12));
-  CHECK(relaxed(0, 0) > 0.5 * at_once(0, 0));
-  CHECK(relaxed(0, 0) < at_once(0, 0));
+  CHECK_THAT(relaxed(2, 2), WithinRel(0.5 * instantaneous(2, 2), 1e-12));
+  CHECK_THAT(relaxed(5, 5), WithinRel(instantaneous(5, 5), 1e-12));
+  CHECK(relaxed(0, 0) > 0.5 * instantaneous(0, 0));
+  CHECK(relaxed(0, 0) < instantaneous(0, 0));
 }
 
 TEST_CASE("the continuum law keeps the modulus of a block, the paper's law does not", "[heavy]") {

@@ -88,7 +88,7 @@ TEST_CASE("the spectrum of the star is its two stiffnesses and one time") {
   const PlanScene scene(star(ramp("1 mm")));
   const ContactSpectrum spectrum = contact_spectrum(scene);
   const HeldStiffness exact = star_stiffness(scene.scene().tissue.element());
-  CHECK_THAT(spectrum.at_once(), WithinRel(exact.at_once, 1e-12));
+  CHECK_THAT(spectrum.instantaneous(), WithinRel(exact.instantaneous, 1e-12));
   CHECK_THAT(spectrum.relaxed(), WithinRel(exact.relaxed, 1e-12));
   const auto branches = fitted_branches(spectrum, 1);
   REQUIRE(branches.size() == 1);
@@ -170,11 +170,11 @@ TEST_CASE("the estimate of what masses do is that of a run with masses", "[heavy
   const std::string poke = R"("protocol": {"kind": "knots", "knots": [
     {"time": "0 s", "depth": "0 mm"}, {"time": "0.02 s", "depth": "0.1 mm"},
     {"time": "0.1 s", "depth": "0.1 mm"}]})";
-  const PlanScout scout(PlanScene(liver(poke)), {}, true);
-  const double truth = trajectory_error(scout.coarse(), scout.with_masses(1e-5), {});
+  const PlanSurrogate surrogate(PlanScene(liver(poke)), {}, true);
+  const double reference = trajectory_error(surrogate.coarse(), surrogate.with_masses(1e-5), {});
   // The linear network leaves out what dashpots take of the ringing.
-  CHECK(scout.inertia_share() > 0.9 * truth);
-  CHECK(scout.inertia_share() < 1.5 * truth);
+  CHECK(surrogate.inertia_share() > 0.9 * reference);
+  CHECK(surrogate.inertia_share() < 1.5 * reference);
 }
 
 TEST_CASE("fields are planned for by models that know them", "[heavy]") {
@@ -210,12 +210,12 @@ TEST_CASE("what a hand can feel is a tolerance") {
   set_tolerance(felt, "jnd");
   CHECK(felt.tolerance == 0.07);
   CHECK(felt.measure.relative_weight > 0.0);
-  Trajectory truth, model;
-  truth.response = Eigen::Vector3d(0.5, 1.0, 0.01);
+  Trajectory reference, model;
+  reference.response = Eigen::Vector3d(0.5, 1.0, 0.01);
   model.response = Eigen::Vector3d(0.55, 1.0, 0.01);
   // 10 % of the force there: 5 % of the peak, and above what is felt of stiffness.
-  CHECK_THAT(trajectory_error(model, truth, {}), WithinRel(0.05, 1e-12));
-  CHECK_THAT(trajectory_error(model, truth, felt.measure), WithinRel(0.1 * 0.07 / 0.08, 1e-12));
+  CHECK_THAT(trajectory_error(model, reference, {}), WithinRel(0.05, 1e-12));
+  CHECK_THAT(trajectory_error(model, reference, felt.measure), WithinRel(0.1 * 0.07 / 0.08, 1e-12));
   set_tolerance(felt, "2.5%");
   CHECK_THAT(felt.tolerance, WithinRel(0.025, 1e-12));
 }
@@ -265,8 +265,8 @@ TEST_CASE("a claim names its quantity, and what is not claimed stands beside it"
   const Trajectory answer = run_planned(plan, scene, times);
   QuasiStaticOptions tight;
   tight.tolerance = 1e-9;
-  const Trajectory truth = PlanScene(scene).quasi_static(tight, times, false);
-  CHECK(trajectory_error(answer, truth, {}) <= 1.05 * *plan.chosen().verified_response_error);
+  const Trajectory reference = PlanScene(scene).quasi_static(tight, times, false);
+  CHECK(trajectory_error(answer, reference, {}) <= 1.05 * *plan.chosen().verified_response_error);
   const test::TempFolder folder;
   write_planned_run(plan, scene, times, answer, folder / "p.h5");
   const Hdf5Reader file(folder / "p.h5");

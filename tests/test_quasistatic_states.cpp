@@ -32,7 +32,7 @@ struct Scene {
   [[nodiscard]] SeenRun see(const Protocol& protocol, const std::vector<double>& times,
                             const QuasiStaticState* from = nullptr) const {
     SeenRun seen;
-    const QuasiStatic network(bonds, organ.network.organ.position, organ.freedom, organ.probe,
+    const QuasiStatic network(bonds, organ.network.organ.position, organ.constraints, organ.probe,
                               {.tolerance = kTolerance, .energies = true});
     seen.run = network.run(
         protocol, times, [&](const QuasiStaticState& s) { seen.states.push_back(s); }, from);
@@ -91,7 +91,7 @@ TEST_CASE("the forces of a state balance, and its response is that of its positi
       CHECK_THAT(by_depth ? depth : contact, WithinAbs(state.imposed, 1e-9));
       CHECK_THAT(by_depth ? contact : depth, WithinAbs(state.response, by_depth ? 1e-8 : 1e-10));
       force.col(probe) += contact * axis;
-      scene.organ.freedom.project(force);
+      scene.organ.constraints.project(force);
       CHECK(force.cwiseAbs().maxCoeff() < 1e-8);
     }
   }
@@ -141,7 +141,7 @@ TEST_CASE("a run from a state ends at full relaxation as one run does") {
   const tpm_test::Star star(p);
   const Protocol protocol = step_and_hold(2e-3, std::numeric_limits<double>::infinity());
   std::vector<QuasiStaticState> states;
-  const QuasiStatic network(star.bonds, star.network.organ.position, star.freedom,
+  const QuasiStatic network(star.bonds, star.network.organ.position, star.constraints,
                             tpm_test::Star::probe(), {.tolerance = 1e-9});
   const double inf = std::numeric_limits<double>::infinity();
   const std::vector<double> times{0.0, 0.5, inf};

@@ -33,7 +33,7 @@ TEST_CASE("the shipped scene is the liver of the paper, held on its far side", "
   const Tissue tissue = read_tissue(share_dir() / "configs" / "liver_scene.json");
   CHECK(tissue.network.organ.position == paper_liver().position);
   CHECK(tissue.anchors.size() == 69);
-  CHECK(tissue.freedom().count() == 1065);  // 3 (424 - 69)
+  CHECK(tissue.constraints().count() == 1065);  // 3 (424 - 69)
   double shallowest = 1.0;
   for (const std::size_t i : tissue.anchors) {
     shallowest =
@@ -44,7 +44,7 @@ TEST_CASE("the shipped scene is the liver of the paper, held on its far side", "
   const NetworkInspection seen = inspect(tissue);
   CHECK(seen.radial_bonds + seen.lateral_bonds == tissue.network.bonds.size());
   REQUIRE(seen.contact_over_star);
-  CHECK_THAT(seen.contact_over_star->at_once, WithinRel(1.0, 1e-6));
+  CHECK_THAT(seen.contact_over_star->instantaneous, WithinRel(1.0, 1e-6));
   CHECK_THAT(seen.contact_over_star->relaxed, WithinRel(1.0, 1e-6));
   // The defaults say the same.
   const Tissue plain = tissue_of(R"({"organ": {"kind": "liver"}})");
@@ -88,7 +88,7 @@ TEST_CASE("a star in a scene is the element: B guided, the others held, three bo
   const Tissue tissue =
       tissue_of(R"({"organ": {"kind": "star", "spacing": "30 mm", "length": "20 mm"}})");
   CHECK(tissue.network.bonds.size() == 3);
-  CHECK(tissue.freedom().count() == 1);
+  CHECK(tissue.constraints().count() == 1);
   for (const Bond& bond : tissue.network.bonds) CHECK_THAT(bond.factor, WithinRel(1.0, 1e-12));
   CHECK_NOTHROW(require_standing(tissue, "scene"));
 }

@@ -125,8 +125,8 @@ TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][
   for (const bool portable : {false, true}) {
     ServoBonds servo(bonds, rest, all, static_cast<std::uint32_t>(spheres), portable);
     const RelaxationWeights w = relaxation_weights(z);
-    Eigen::VectorXd remembered = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size()));
-    Eigen::VectorXd before = remembered;
+    Eigen::VectorXd viscous = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size()));
+    Eigen::VectorXd before = viscous;
     Random random(1);
     for (int step = 0; step < 5; ++step) {
       Positions position = rest;
@@ -154,13 +154,13 @@ TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][
       };
       Eigen::VectorXd now;
       bonds.elongations(position, now);
-      remembered = (w.r * remembered + w.w0 * before + w.w1 * now).eval();
+      viscous = (w.r * viscous + w.w0 * before + w.w1 * now).eval();
       // Advancing twice is advancing once: only what is accepted is remembered.
       servo.advance(u.data(), servo_weights(bonds, z * bonds.relaxation_time_s()), force.data());
       std::fill(force.begin(), force.end(), 0.0F);
       servo.advance(u.data(), servo_weights(bonds, z * bonds.relaxation_time_s()), force.data());
-      expect(0, remembered);
-      const Eigen::VectorXd later = w.r * remembered + (w.w0 + w.w1) * now;
+      expect(0, viscous);
+      const Eigen::VectorXd later = w.r * viscous + (w.w0 + w.w1) * now;
       expect(4, later);
       servo.accept();
       std::fill(force.begin(), force.end(), 0.0F);
@@ -178,8 +178,8 @@ TEST_CASE("the servo network follows the network along the normal and in space",
   const ContactAxes axes = contact_axes(into);
   for (const double tau : {2e-4, 0.05, 100.0}) {
     const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(tau));
-    const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
-    ServoNetwork servo(bonds, rest, scene.freedom, scene.probe.sphere, into);
+    const TouchedTissue tissue{bonds, rest, scene.constraints, scene.probe.sphere};
+    ServoNetwork servo(bonds, rest, scene.constraints, scene.probe.sphere, into);
     const ContactMotion ramp = ramp_motion(into, 6e-3, 0.05, 0.1, servo.period_s());
     const Eigen::VectorXd exact = line_reference(tissue, ramp, 1e-9);
     const Answers along = follow(servo, ramp);
@@ -206,7 +206,7 @@ TEST_CASE("the servo network follows the network along the normal and in space",
 TEST_CASE("the fine reference is the quasi-static network", "[servo][heavy]") {
   const OrganScene& scene = small_liver();
   const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(5e-3));
-  const TouchedTissue tissue{bonds, scene.network.organ.position, scene.freedom,
+  const TouchedTissue tissue{bonds, scene.network.organ.position, scene.constraints,
                              scene.probe.sphere};
   const ContactAxes axes = contact_axes(scene.probe.direction);
   const Eigen::Vector3d slanted = (2.0 * axes.into + axes.first - 0.5 * axes.second).normalized();
@@ -226,13 +226,13 @@ TEST_CASE("the cost of linear elongations is what halving the step says", "[serv
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(2e-3));
-  const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
+  const TouchedTissue tissue{bonds, rest, scene.constraints, scene.probe.sphere};
   const double period_s = 1e-3;
   // So small that the network is linear.
   const ContactMotion motion = ramp_motion(scene.probe.direction, 2e-5, 2e-3, 0.01, period_s);
   const ContactReference exact = fine_reference(tissue, motion, 8);
   FineContact stepped(tissue, period_s);
-  PushedContact pushed(bonds, rest, scene.freedom, scene.probe.sphere);
+  PushedContact pushed(bonds, rest, scene.constraints, scene.probe.sphere);
   StepError estimate(pushed, rest, 0.0, period_s);
   double worst = 0.0;
   double largest_N = 0.0;
@@ -252,7 +252,8 @@ TEST_CASE("a step of the servo network allocates nothing, and runs repeat", "[se
   const OrganScene& scene = small_liver();
   const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.01));
   const Eigen::Vector3d into = scene.probe.direction;
-  ServoNetwork servo(bonds, scene.network.organ.position, scene.freedom, scene.probe.sphere, into);
+  ServoNetwork servo(bonds, scene.network.organ.position, scene.constraints, scene.probe.sphere,
+                     into);
   const ContactMotion motion = random_motion_in_space(contact_axes(into), 6e-3, 1e-3, 50, 0, 1e-3);
   const Answers first = follow(servo, motion);
   const Answers again = follow(servo, motion);
@@ -266,7 +267,7 @@ TEST_CASE("a step of the servo network allocates nothing, and runs repeat", "[se
   const Eigen::Vector3d at = motion.displacement_m.rightCols<1>();
   CHECK((all.col(static_cast<Eigen::Index>(scene.probe.sphere)) - at).norm() < 1e-9);
 
-  ServoNetwork portable(bonds, scene.network.organ.position, scene.freedom, scene.probe.sphere,
+  ServoNetwork portable(bonds, scene.network.organ.position, scene.constraints, scene.probe.sphere,
                         into, {.portable = true});
   const Answers plain = follow(portable, motion);
   CHECK(largest(plain.force_N - first.force_N) < 1e-5 * largest(first.force_N));
@@ -277,17 +278,19 @@ TEST_CASE("the servo network says when it is out of its range", "[servo]") {
   const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.01));
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
-  ServoNetwork servo(bonds, rest, scene.freedom, scene.probe.sphere, into, {.deepest_m = 5e-3});
+  ServoNetwork servo(bonds, rest, scene.constraints, scene.probe.sphere, into, {.deepest_m = 5e-3});
   CHECK(servo.step(1e-3 * into).trusted);
   servo.reset();
   CHECK_FALSE(follow(servo, ramp_motion(into, 6e-3, 0.1, 0.01, 1e-3)).trusted);
   CHECK_FALSE(servo.step(Eigen::Vector3d::Constant(std::nan(""))).trusted);
   servo.reset();
   CHECK(servo.step(1e-3 * into).trusted);
-  CHECK_THROWS_AS(ServoNetwork(bonds, rest, scene.freedom, scene.probe.sphere, 2.0 * into), Error);
+  CHECK_THROWS_AS(ServoNetwork(bonds, rest, scene.constraints, scene.probe.sphere, 2.0 * into),
+                  Error);
   CHECK_THROWS_AS(
-      ServoNetwork(bonds, rest, scene.freedom, scene.probe.sphere, into, {.period_s = 0.0}), Error);
-  Freedom held = scene.freedom;
+      ServoNetwork(bonds, rest, scene.constraints, scene.probe.sphere, into, {.period_s = 0.0}),
+      Error);
+  Constraints held = scene.constraints;
   held.hold(scene.probe.sphere);
   CHECK_THROWS_AS(ServoNetwork(bonds, rest, held, scene.probe.sphere, into), Error);
 }
@@ -298,14 +301,14 @@ TEST_CASE("a guided sphere stays on its guide in the servo network", "[servo]") 
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
   std::size_t guided = 0;
-  while (!scene.freedom.is_free(guided) || guided == scene.probe.sphere) ++guided;
+  while (!scene.constraints.is_free(guided) || guided == scene.probe.sphere) ++guided;
   const Eigen::Vector3d along = Eigen::Vector3d(1.0, 2.0, -0.5).normalized();
-  Freedom freedom = scene.freedom;
-  freedom.guide(guided, along);
-  ServoNetwork servo(bonds, rest, freedom, scene.probe.sphere, into);
+  Constraints constraints = scene.constraints;
+  constraints.guide(guided, along);
+  ServoNetwork servo(bonds, rest, constraints, scene.probe.sphere, into);
   const ContactMotion ramp = ramp_motion(into, 4e-3, 0.05, 0.02, 1e-3);
   const Answers answers = follow(servo, ramp);
-  const TouchedTissue tissue{bonds, rest, freedom, scene.probe.sphere};
+  const TouchedTissue tissue{bonds, rest, constraints, scene.probe.sphere};
   const Eigen::VectorXd exact = line_reference(tissue, ramp, 1e-9);
   CHECK((answers.force_N.transpose() * into - exact).cwiseAbs().maxCoeff() <
         1e-3 * exact.cwiseAbs().maxCoeff());

@@ -77,7 +77,7 @@ TEST_CASE("every block of a scene reaches the experiment") {
   CHECK(scene.formulation.tolerance == 1e-4);
   CHECK(scene.outputs.times_s == std::vector<double>{1.0, 2.0});
   CHECK_FALSE(scene.outputs.force);
-  CHECK(scene.outputs.remembered);
+  CHECK(scene.outputs.viscous);
   CHECK(scene.tissue.unused_blocks.empty());
 }
 
@@ -105,7 +105,7 @@ TEST_CASE("a run in parts is the run of the whole, within its tolerance", "[heav
     for (const CurvePoint& p : record.curve) times.push_back(p.time_s);
     const BondSystem bonds = scene.tissue.bonds();
     const QuasiStaticRun whole =
-        QuasiStatic(bonds, scene.tissue.network.organ.position, scene.tissue.freedom(),
+        QuasiStatic(bonds, scene.tissue.network.organ.position, scene.tissue.constraints(),
                     scene.probe(), {.tolerance = scene.formulation.tolerance})
             .run(scene.protocol, times);
     const double peak = whole.response.cwiseAbs().maxCoeff();
@@ -281,8 +281,8 @@ TEST_CASE("static states are those that a load held for ever reaches", "[heavy]"
   const SimulationRecord record = run_of(scene).record;
   const double forever = std::numeric_limits<double>::infinity();
   const BondSystem bonds = scene.tissue.bonds();
-  const QuasiStatic equations(bonds, scene.tissue.network.organ.position, scene.tissue.freedom(),
-                              scene.probe(), {.tolerance = 1e-8});
+  const QuasiStatic equations(bonds, scene.tissue.network.organ.position,
+                              scene.tissue.constraints(), scene.probe(), {.tolerance = 1e-8});
   for (const double load : {0.1, 0.2}) {
     const double depth = equations.run(creep(load, forever), {&forever, 1}).response[0];
     for (const CurvePoint& p : record.curve) {

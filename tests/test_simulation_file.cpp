@@ -90,13 +90,13 @@ TEST_CASE("the file of a run holds its scene, version, tolerance, and what was f
   CHECK(file.attribute("/validity/indentation_over_12_mm", "passed") == "no");
   // Forces balance on free spheres; the probe holds its own with the contact force.
   const std::vector<double> force = file.table("/steps/00003/force_N");
-  const Freedom freedom = scene.tissue.freedom();
-  for (std::size_t i = 0; i < freedom.size(); ++i) {
+  const Constraints constraints = scene.tissue.constraints();
+  for (std::size_t i = 0; i < constraints.size(); ++i) {
     const Eigen::Vector3d on_sphere(&force[3 * i]);
     if (i == scene.probe().sphere) {
       CHECK_THAT(-on_sphere.dot(scene.probe().direction),
                  WithinAbs(run.record.curve.back().response, 1e-6));
-    } else if (freedom.is_free(i)) {
+    } else if (constraints.is_free(i)) {
       CHECK(on_sphere.norm() < 1e-6);
     }
   }

@@ -27,12 +27,12 @@ Organ block_with_contact() {
   return organ;
 }
 
-Freedom standing(const Organ& organ) {
-  Freedom freedom(organ.size());
+Constraints standing(const Organ& organ) {
+  Constraints constraints(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
-    if (organ.layer[i] == 2) freedom.hold(i);
+    if (organ.layer[i] == 2) constraints.hold(i);
   }
-  return freedom;
+  return constraints;
 }
 
 /// A block of 60 spheres that stands on its lowest plane, under a ball.
@@ -40,13 +40,13 @@ struct BallScene {
   explicit BallScene(double tau_s, double radius_m = 10e-3)
       : network(build_network(block_with_contact(), {}, "scene")),
         bonds(network, TpmParameters{}.with_relaxation_time(tau_s)),
-        freedom(standing(network.organ)),
+        constraints(standing(network.organ)),
         ball(ball_on_surface(network.organ, *network.organ.contact, into, radius_m)) {}
   [[nodiscard]] const Positions& rest() const { return network.organ.position; }
   [[nodiscard]] SurfaceNetwork servo(const SurfaceNetworkOptions& options = {}) const {
-    return {bonds, rest(), freedom, ball, options};
+    return {bonds, rest(), constraints, ball, options};
   }
-  [[nodiscard]] BallOnNetwork full() const { return {bonds, rest(), freedom, ball}; }
+  [[nodiscard]] BallOnNetwork full() const { return {bonds, rest(), constraints, ball}; }
   /// On, over 20 mm of the surface, and off.
   [[nodiscard]] Way slide(double depth_m, int steps) const {
     Way way;
@@ -62,7 +62,7 @@ struct BallScene {
 
   Network network;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
   Eigen::Vector3d into = -Eigen::Vector3d::UnitZ();
   Eigen::Vector3d aside{std::cos(0.2), std::sin(0.2), 0.0};  // not quite over the next sphere
   BallTool ball;
@@ -130,7 +130,7 @@ TEST_CASE("Pressed for long a ball feels the least of the potential energy", "[h
       felt += force;
       g.col(column) += force;
     }
-    scene.freedom.project(g);
+    scene.constraints.project(g);
     return g;
   };
   Positions x = scene.rest(), ahead = x;
@@ -182,7 +182,7 @@ TEST_CASE("Steps under a ball approach what CVODE finds, in the second order", "
     places.push_back({kKnot_s * static_cast<double>(places.size()), scene.ball.start_m + at});
   }
   const auto by_cvode = [&](double tolerance) {
-    return ball_forces_by_cvode(scene.bonds, scene.rest(), scene.freedom, scene.ball, places,
+    return ball_forces_by_cvode(scene.bonds, scene.rest(), scene.constraints, scene.ball, places,
                                 tolerance);
   };
   const std::vector<Eigen::Vector3d> expected = by_cvode(1e-9);
@@ -340,14 +340,14 @@ TEST_CASE("A network under a ball says when it is out of its range") {
   BallTool inside = scene.ball;
   inside.start_m += 1e-3 * scene.into;
   const auto build = [&](const BallTool& ball, const SurfaceNetworkOptions& options) {
-    (void)SurfaceNetwork(scene.bonds, scene.rest(), scene.freedom, ball, options);
+    (void)SurfaceNetwork(scene.bonds, scene.rest(), scene.constraints, ball, options);
   };
   CHECK_THROWS_AS(build(inside, {}), Error);
   CHECK_THROWS_AS(build(scene.ball, {.period_s = 0.0}), Error);
   BallTool soft = scene.ball;
   soft.stiffness_N_per_m = 0.0;
   CHECK_THROWS_AS(build(soft, {}), Error);
-  CHECK_THROWS_AS(BallOnNetwork(scene.bonds, scene.rest(), scene.freedom, soft), Error);
+  CHECK_THROWS_AS(BallOnNetwork(scene.bonds, scene.rest(), scene.constraints, soft), Error);
 }
 
 TEST_CASE("The smallest turn takes one direction onto another, opposite ones too") {

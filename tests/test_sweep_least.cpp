@@ -173,10 +173,10 @@ TEST_CASE("static curves are the equilibria, at once and relaxed, also where E2 
   const Json text = creeping_liver("0.06 kPa", "12 kPa", "412912.5 Pa s", "30 s");
   const PlanScene scene = PlanScene(parse_experiment(text, "scene", "."))
                               .with_protocol(ramp_and_hold(kDepth_m, kDepth_m, 0.0));
-  const PlanScout scout(scene, {}, false);
-  const ContactCurves& curves = scout.curves();
+  const PlanSurrogate surrogate(scene, {}, false);
+  const ContactCurves& curves = surrogate.curves();
   const DrivenNetwork& driven = scene.driven();
-  StaticPath relaxed(driven.bonds, driven.rest, 0.020, driven.freedom, driven.probes,
+  StaticPath relaxed(driven.bonds, driven.rest, 0.020, driven.constraints, driven.probes,
                      Drive::displacement, kDepth_m, 1e-8);
   for (const double share : {0.1, 0.5, 1.0}) {
     const double depth = share * kDepth_m;
@@ -185,8 +185,8 @@ TEST_CASE("static curves are the equilibria, at once and relaxed, also where E2 
           Approx(relaxed.move_to(depth, 0.0).response).epsilon(1e-4 / share));
     const Protocol jump(Drive::displacement, {{0.0, depth}, {1.0, depth}}, "jump");
     const std::vector<double> start{0.0};
-    const Trajectory at_once = scene.with_protocol(jump).quasi_static({}, start, false);
+    const Trajectory instantaneous = scene.with_protocol(jump).quasi_static({}, start, false);
     CHECK(curves.relaxed(depth) + curves.relaxing(depth) ==
-          Approx(at_once.response[0]).epsilon(1e-4 / share));
+          Approx(instantaneous.response[0]).epsilon(1e-4 / share));
   }
 }

@@ -48,8 +48,8 @@ TEST_CASE("a zone that holds the whole organ is the servo network", "[zone][heav
   const Positions& rest = scene.network.organ.position;
   const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.02));
   const Eigen::Vector3d into = scene.probe.direction;
-  ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, into, {.rings = 50});
-  ServoNetwork whole(bonds, rest, scene.freedom, scene.probe.sphere, into);
+  ZoneNetwork zone(bonds, rest, scene.constraints, scene.probe.sphere, into, {.rings = 50});
+  ServoNetwork whole(bonds, rest, scene.constraints, scene.probe.sphere, into);
   const ContactMotion motion = random_motion_in_space(contact_axes(into), 4e-3, 1e-3, 200, 5, 1e-3);
   const Followed some = follow(zone, motion);
   const Followed all = follow(whole, motion);
@@ -68,8 +68,8 @@ TEST_CASE("the surroundings of a zone are exact where the network is linear", "[
   const Eigen::Vector3d into = scene.probe.direction;
   for (const double tau : {2e-3, 10.0}) {
     const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(tau));
-    const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
-    ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, into,
+    const TouchedTissue tissue{bonds, rest, scene.constraints, scene.probe.sphere};
+    ZoneNetwork zone(bonds, rest, scene.constraints, scene.probe.sphere, into,
                      {.rings = 1, .linear_depth_m = 0.0, .frozen_depth_m = 0.0});
     REQUIRE(zone.own_displacements() > 0);
     // So small that nothing is nonlinear; the zone's edge is a few spheres away.
@@ -97,13 +97,13 @@ TEST_CASE("a zone's error falls with its rings, and the estimate follows", "[zon
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
   const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.02));
-  const TouchedTissue tissue{bonds, rest, scene.freedom, scene.probe.sphere};
+  const TouchedTissue tissue{bonds, rest, scene.constraints, scene.probe.sphere};
   const ContactMotion ramp = ramp_motion(into, 6e-3, 0.05, 0.05, 1e-3);
   const Eigen::VectorXd exact = line_reference(tissue, ramp, 1e-9);
   const double peak_N = exact.cwiseAbs().maxCoeff();
   std::vector<double> error;
   for (const int rings : {1, 2}) {
-    ZoneNetwork zone(bonds, rest, scene.freedom, scene.probe.sphere, into, {.rings = rings});
+    ZoneNetwork zone(bonds, rest, scene.constraints, scene.probe.sphere, into, {.rings = rings});
     const Followed followed = follow(zone, ramp);
     error.push_back((followed.force_N.transpose() * into - exact).cwiseAbs().maxCoeff() / peak_N);
     CAPTURE(rings, error.back(), followed.estimate_N / (error.back() * peak_N));
@@ -119,11 +119,11 @@ TEST_CASE("a zone refuses what it cannot do", "[zone][heavy]") {
   const Positions& rest = scene.network.organ.position;
   const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.02));
   const Eigen::Vector3d into = scene.probe.direction;
-  CHECK_THROWS_AS(ZoneNetwork(bonds, rest, scene.freedom, scene.probe.sphere, into, {.rings = 0}),
-                  Error);
-  Freedom guided = scene.freedom;
+  CHECK_THROWS_AS(
+      ZoneNetwork(bonds, rest, scene.constraints, scene.probe.sphere, into, {.rings = 0}), Error);
+  Constraints guided = scene.constraints;
   std::size_t some = 0;
-  while (!scene.freedom.is_free(some) || some == scene.probe.sphere) ++some;
+  while (!scene.constraints.is_free(some) || some == scene.probe.sphere) ++some;
   guided.guide(some, into);
   CHECK_THROWS_AS(ZoneNetwork(bonds, rest, guided, scene.probe.sphere, into), Error);
 }

@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/solve/sundials.hpp"
@@ -71,10 +71,10 @@ inline std::vector<WrittenBond> written_bonds(const tpm::Network& network,
 class WrittenNetwork {
  public:
   WrittenNetwork(const tpm::Network& network, std::vector<WrittenBond> bonds,
-                 const tpm::Freedom& freedom, const tpm::Probe& probe)
+                 const tpm::Constraints& constraints, const tpm::Probe& probe)
       : rest_(network.organ.position), bonds_(std::move(bonds)), probe_(probe) {
     for (std::size_t i = 0; i < network.organ.size(); ++i) {
-      Eigen::Matrix3d free = freedom.projector(i);
+      Eigen::Matrix3d free = constraints.projector(i);
       if (i == probe.sphere) free -= probe.direction * probe.direction.transpose();
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(free);
       for (int axis = 0; axis < 3; ++axis) {

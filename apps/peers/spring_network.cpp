@@ -25,7 +25,7 @@ SpringNetwork::SpringNetwork(const PosedNetwork& posed)
   driven = static_cast<int>(probe.sphere);
   direction = probe.direction;
   for (Eigen::Index i = 0; i < rest.cols(); ++i) {
-    const Eigen::Matrix3d& free = posed.network.freedom.projector(static_cast<std::size_t>(i));
+    const Eigen::Matrix3d& free = posed.network.constraints.projector(static_cast<std::size_t>(i));
     held.push_back(free.isZero() ? 1 : 0);
   }
 }

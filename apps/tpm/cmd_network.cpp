@@ -81,7 +81,7 @@ int check(const NetworkChoice& choice, const Session& session) {
   }
   const NetworkInspection inspection = inspect(tissue);
   const std::vector<double> support =
-      local_support(tissue.bonds(), tissue.network.organ, tissue.freedom());
+      local_support(tissue.bonds(), tissue.network.organ, tissue.constraints());
   const auto least = std::min_element(support.begin(), support.end());
   if (session.json()) {
     Json json = network_json(tissue, inspection);

@@ -76,7 +76,7 @@ class Model {
 
   /// A much cheaper model of the same parameters whose best fits lie near those of this one: where
   /// a search can begin. None if this one is cheap.
-  [[nodiscard]] virtual std::unique_ptr<Model> scout() const { return nullptr; }
+  [[nodiscard]] virtual std::unique_ptr<Model> surrogate() const { return nullptr; }
 
   /// The response to an imposed displacement is linear in this parameter while the others are held:
   /// a search can solve for it.

@@ -63,7 +63,7 @@ class Scene {
 
  private:
   Scene(std::shared_ptr<const ExperimentScene> scene, std::shared_ptr<const RunNetwork> network);
-  [[nodiscard]] double stiffness_N_per_m(double following) const;
+  [[nodiscard]] double stiffness_N_per_m(double relaxation_factor) const;
 
   std::shared_ptr<const ExperimentScene> scene_;
   std::shared_ptr<const RunNetwork> network_;

@@ -17,7 +17,7 @@ class DummyFormulation final : public Formulation, public SceneRunner {
                                bool /*with_field*/) const override {
     const double stiffness =
         contact_stiffness_N_per_m(network.driven.bonds, network.network.organ.position,
-                                  scene.tissue.freedom(), scene.probe(), 1.0);
+                                  scene.tissue.constraints(), scene.probe(), 1.0);
     const bool by_depth = scene.protocol.drive() == Drive::displacement;
     Trajectory answer;
     answer.response.resize(static_cast<Eigen::Index>(times_s.size()));

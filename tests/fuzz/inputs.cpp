@@ -19,11 +19,11 @@
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpm/simulate/checkpoint.hpp"
+#include "tpm/store/checksum.hpp"
 #include "tpm/store/delimited.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/store/row_log.hpp"
-#include "tpm/store/seal.hpp"
 #include "tpm/study/claims.hpp"
 #include "tpm/study/design.hpp"
 #include "tpm/study/organ_study.hpp"
@@ -76,7 +76,7 @@ void read_block_log(const Path& path) {
 /// Puts a check sum behind the file: what was changed is read, not refused for its old one.
 void seal_again(const Path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
-  const bool sealed = file >= 0 && seal(file, std::filesystem::file_size(path));
+  const bool sealed = file >= 0 && write_checksum(file, std::filesystem::file_size(path));
   if (file >= 0) ::close(file);
   if (!sealed) throw Error(ExitCode::environment, path.native(), "cannot be sealed", "room");
 }

@@ -40,7 +40,7 @@ class Work {
 
 void measure(const std::string& file, Eigen::Index steps, std::uint64_t seed) {
   const Tissue tissue = read_tissue(file);
-  const Freedom freedom = tissue.freedom();
+  const Constraints constraints = tissue.constraints();
   const Positions& rest = tissue.network.organ.position;
   const std::size_t contact = tissue.network.organ.contact.value();
   const Eigen::Vector3d into = -tissue.network.organ.normal.col(static_cast<Eigen::Index>(contact));
@@ -53,12 +53,12 @@ void measure(const std::string& file, Eigen::Index steps, std::uint64_t seed) {
     const BondSystem bonds(tissue.network, tissue.element().with_relaxation_time(tau_s));
     const auto network = [&](double period_s) {
       return std::make_unique<ServoNetwork>(
-          bonds, rest, freedom, contact, into,
+          bonds, rest, constraints, contact, into,
           ServoNetworkOptions{.period_s = period_s, .deepest_m = kDeepest_m});
     };
     const auto inside = network(kPeriod_s);
     NetworkBeside beside(network(kPeriod_s * NetworkBeside::periods_between(kPeriod_s)),
-                         {bonds, rest, freedom, contact, into, kDeepest_m}, kPeriod_s, false);
+                         {bonds, rest, constraints, contact, into, kDeepest_m}, kPeriod_s, false);
     double peak_N = 0.0, off_N = 0.0, squares = 0.0, estimate_N = 0.0;
     Work drawn, drawn_inside;
     for (Eigen::Index i = 0; i < steps; ++i) {

@@ -95,7 +95,7 @@ struct Comparison {
 Comparison compare(const Scene& scene, const CondensedContact& built, double relaxation_time_s,
                    const Path& path, int every) {
   const BondSystem bonds = scene.bonds(relaxation_time_s);
-  ContactPath full(bonds, scene.tissue.network.organ.position, scene.tissue.freedom(),
+  ContactPath full(bonds, scene.tissue.network.organ.position, scene.tissue.constraints(),
                    scene.contact);
   CondensedContact contact = built.with_relaxation_time(relaxation_time_s);
   Comparison result;
@@ -123,8 +123,8 @@ Comparison compare(const Scene& scene, const CondensedContact& built, double rel
 double quasistatic_error(const Scene& scene, const CondensedContact& built,
                          double relaxation_time_s, const NamedPath& named) {
   const BondSystem bonds = scene.bonds(relaxation_time_s);
-  Freedom freedom = scene.tissue.freedom();
-  freedom.guide(scene.contact, scene.into);
+  Constraints constraints = scene.tissue.constraints();
+  constraints.guide(scene.contact, scene.into);
   const Path path = path_of(scene, named, built.period_s());
   std::vector<double> times;
   std::vector<std::size_t> steps;
@@ -136,7 +136,7 @@ double quasistatic_error(const Scene& scene, const CondensedContact& built,
   QuasiStaticOptions options;
   options.tolerance = 1e-9;
   options.step_s = std::max(0.5 * relaxation_time_s, 4e-3);
-  const QuasiStaticRun run = QuasiStatic(bonds, scene.tissue.network.organ.position, freedom,
+  const QuasiStaticRun run = QuasiStatic(bonds, scene.tissue.network.organ.position, constraints,
                                          Probe{scene.contact, scene.into}, options)
                                  .run(Protocol(Drive::displacement, named.depths), times);
   CondensedContact contact = built.with_relaxation_time(relaxation_time_s);
@@ -189,7 +189,7 @@ void measure(const char* file) {
   const std::clock_t start = std::clock();
   const CondensedContact built =
       build_condensed(scene.tissue.bonds(), scene.tissue.network.organ.position,
-                      scene.tissue.freedom(), scene.contact, scene.into);
+                      scene.tissue.constraints(), scene.contact, scene.into);
   fmt::print("\n{}: built in {:.2f} s of CPU\n", scene.tissue.title,
              static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
   print_times(scene, built);

@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "tpm/core/random.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/network/filling.hpp"
-#include "tpm/network/freedom.hpp"
 #include "tpm/network/indentation.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/liver_surface.hpp"
@@ -32,19 +32,19 @@ namespace tpm {
 /// The whole stiffness matrix.
 class StiffnessBlocks {
  public:
-  StiffnessBlocks(const BondSystem& bonds, const Freedom& freedom)
-      : bonds_(bonds), freedom_(freedom), matrix_(bonds.pattern()) {}
+  StiffnessBlocks(const BondSystem& bonds, const Constraints& constraints)
+      : bonds_(bonds), constraints_(constraints), matrix_(bonds.pattern()) {}
   const BlockMatrix& assemble(const Positions& position, const BondMemory& memory) {
     matrix_.set_zero();
     bonds_.add_stiffness(position, memory, matrix_);
-    freedom_.constrain(bonds_, matrix_);
+    constraints_.constrain(bonds_, matrix_);
     return matrix_;
   }
   [[nodiscard]] const BlockPattern& pattern() const { return bonds_.pattern(); }
 
  private:
   const BondSystem& bonds_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   BlockMatrix matrix_;
 };
 }  // namespace tpm
@@ -85,12 +85,12 @@ Organ organ_of(const std::string& kind, std::size_t count) {
 }
 
 /// Free coordinates are numbered in the order of the spheres.
-void write_matrix(const BondSystem& bonds, const Freedom& freedom, const Positions& rest,
+void write_matrix(const BondSystem& bonds, const Constraints& constraints, const Positions& rest,
                   const BondMemory& memory, const char* path) {
-  std::vector<std::int32_t> number(freedom.size(), -1);
+  std::vector<std::int32_t> number(constraints.size(), -1);
   std::int32_t free = 0;
-  for (std::size_t i = 0; i < freedom.size(); ++i) {
-    if (!freedom.is_free(i)) continue;
+  for (std::size_t i = 0; i < constraints.size(); ++i) {
+    if (!constraints.is_free(i)) continue;
     number[i] = free;
     free += 3;
   }
@@ -106,7 +106,7 @@ void write_matrix(const BondSystem& bonds, const Freedom& freedom, const Positio
       }
     }
   };
-  std::vector<Eigen::Matrix3d> diagonal(freedom.size(), Eigen::Matrix3d::Zero());
+  std::vector<Eigen::Matrix3d> diagonal(constraints.size(), Eigen::Matrix3d::Zero());
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const Eigen::Matrix3d block = bonds.stiffness_block(i, rest, memory);
     diagonal[bonds.end_a()[i]] += block;
@@ -115,7 +115,7 @@ void write_matrix(const BondSystem& bonds, const Freedom& freedom, const Positio
     const std::int32_t b = number[bonds.end_b()[i]];
     if (a >= 0 && b >= 0) add(std::max(a, b), std::min(a, b), -block);
   }
-  for (std::size_t i = 0; i < freedom.size(); ++i) {
+  for (std::size_t i = 0; i < constraints.size(); ++i) {
     if (number[i] >= 0) add(number[i], number[i], diagonal[i]);
   }
   std::sort(entries.begin(), entries.end(), [](const Entry& x, const Entry& y) {
@@ -142,12 +142,12 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
   const Network network = build_network(std::move(organ), options, "measure");
   const double join_s = lap();
   const BondSystem bonds(network, TpmParameters{});
-  Freedom freedom(network.organ.size());
+  Constraints constraints(network.organ.size());
   for (const std::size_t i : far_side(network.organ, Eigen::Vector3d::UnitZ(), 0.060)) {
-    freedom.hold(i);
+    constraints.hold(i);
   }
   (void)lap();
-  StiffnessBlocks blocks(bonds, freedom);
+  StiffnessBlocks blocks(bonds, constraints);
   const BlockPattern& pattern = blocks.pattern();
   const double order_s = lap();
   const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
@@ -156,7 +156,7 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
   const BlockMatrix& matrix = blocks.assemble(network.organ.position, memory);
   const double assemble_s = lap();
   if (matrix_file != nullptr) {
-    write_matrix(bonds, freedom, network.organ.position, memory, matrix_file);
+    write_matrix(bonds, constraints, network.organ.position, memory, matrix_file);
   }
   (void)lap();
   const bool done = factor.factorise(matrix);
@@ -167,7 +167,7 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
   Eigen::Matrix3Xd x(3, network.organ.position.cols());
   Random random(1);
   for (double& value : x.reshaped()) value = random.normal();
-  freedom.project(x);
+  constraints.project(x);
   const Eigen::Matrix3Xd right = x;
   (void)lap();
   for (int i = 0; i < again; ++i) {
@@ -177,9 +177,9 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
   const double solve_s = lap() / again;
   // What is left of the forces, in parts.
   Eigen::Matrix3Xd left = Eigen::Matrix3Xd::Zero(3, x.cols());
-  freedom.project(x);
+  constraints.project(x);
   bonds.add_stiffness_times(network.organ.position, memory, x, left);
-  freedom.project(left);
+  constraints.project(left);
   const double residual = (left - right).norm() / right.norm();
   LaneFactor lanes(pattern);
   (void)lap();
@@ -195,7 +195,7 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
       "{:.4g}, \"factorise_s\": {:.4g}, \"solve_s\": {:.4g}, \"lane_copy_s\": {:.4g}, "
       "\"lanes_s\": {:.4g}, \"factor_entries\": {:.5g}, \"operations\": {:.5g}, \"residual\": "
       "{:.2g}, \"definite\": {}, \"peak_GiB\": {:.4g}}}\n",
-      kind, network.organ.size(), bonds.size(), freedom.count(), fill_s, join_s, order_s,
+      kind, network.organ.size(), bonds.size(), constraints.count(), fill_s, join_s, order_s,
       assemble_s, first_s, factorise_s, solve_s, copy_s, lanes_s,
       9.0 * static_cast<double>(pattern.factor_blocks()),
       54.0 * static_cast<double>(pattern.factor_products()), residual,

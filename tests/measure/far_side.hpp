@@ -1,17 +1,17 @@
 #pragma once
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 
 namespace tpm_measure {
 
 /// Spheres of the outer layer beyond 60 % of the organ's extent along z are held.
-inline tpm::Freedom held_on_the_far_side(const tpm::Organ& organ) {
-  tpm::Freedom freedom(organ.size());
+inline tpm::Constraints held_on_the_far_side(const tpm::Organ& organ) {
+  tpm::Constraints constraints(organ.size());
   const Eigen::RowVectorXd z = organ.position.row(2);
   const double limit = z.minCoeff() + 0.6 * (z.maxCoeff() - z.minCoeff());
   for (std::size_t i = 0; i < organ.size(); ++i) {
-    if (organ.layer[i] == 0 && z[static_cast<Eigen::Index>(i)] > limit) freedom.hold(i);
+    if (organ.layer[i] == 0 && z[static_cast<Eigen::Index>(i)] > limit) constraints.hold(i);
   }
-  return freedom;
+  return constraints;
 }
 
 }  // namespace tpm_measure

@@ -99,18 +99,18 @@ void solve(const Case& c, const Network& network, Measured& m) {
   push.strides = c.strides;
   push.tolerance_N = kTolerance;
   push.patch = surface_patch(organ, organ.position.col(contact), kPatchRadius);
-  Freedom freedom(organ.size());
-  for (const std::size_t i : push.patch) freedom.hold(i);
-  for (const std::size_t i : far_side(organ, push.direction, kAnchorDepth)) freedom.hold(i);
+  Constraints constraints(organ.size());
+  for (const std::size_t i : push.patch) constraints.hold(i);
+  for (const std::size_t i : far_side(organ, push.direction, kAnchorDepth)) constraints.hold(i);
   IndentationResult result;
   if (c.solver == "direct") {
-    Equilibrium solver(bonds, freedom);
-    result = indent(bonds, freedom, organ.position, push, finder_of(solver));
+    Equilibrium solver(bonds, constraints);
+    result = indent(bonds, constraints, organ.position, push, finder_of(solver));
   } else {
     LargeEquilibriumOptions options;
     options.preconditioner = parse_word(kPreconditionerWords, "solver", c.solver, "growth");
-    LargeEquilibrium solver(bonds, freedom, organ.position, options);
-    result = indent(bonds, freedom, organ.position, push, finder_of(solver));
+    LargeEquilibrium solver(bonds, constraints, organ.position, options);
+    result = indent(bonds, constraints, organ.position, push, finder_of(solver));
     m.iterations = solver.work().iterations;
     m.probe_iterations = solver.work().probe_iterations;
   }

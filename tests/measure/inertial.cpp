@@ -21,12 +21,12 @@ struct Scene {
   explicit Scene(const TpmParameters& p)
       : network(build_network(paper_liver(), {}, "liver")),
         bonds(network, p),
-        freedom(tpm_measure::held_on_the_far_side(network.organ)),
+        constraints(tpm_measure::held_on_the_far_side(network.organ)),
         probe{*network.organ.contact, Eigen::Vector3d::UnitZ()},
         mass(sphere_masses_kg(network.organ)) {}
   Network network;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
   Probe probe;
   Eigen::VectorXd mass;
 };
@@ -50,7 +50,7 @@ Reference quasi_static(const Scene& scene) {
   Reference reference;
   for (int i = 1; i <= 29; ++i) reference.times.push_back(2.0 + i);
   const auto force = [&](double tolerance) {
-    return QuasiStatic(scene.bonds, scene.network.organ.position, scene.freedom, scene.probe,
+    return QuasiStatic(scene.bonds, scene.network.organ.position, scene.constraints, scene.probe,
                        {tolerance})
         .run(reference.protocol, reference.times)
         .response;
@@ -75,7 +75,7 @@ struct Outcome {
 };
 
 Outcome measure(const Scene& scene, const Reference& reference, const InertialOptions& options) {
-  const Inertial inertial(scene.bonds, scene.network.organ.position, scene.freedom, scene.probe,
+  const Inertial inertial(scene.bonds, scene.network.organ.position, scene.constraints, scene.probe,
                           scene.mass, options);
   InertialRun run;
   Outcome outcome;
@@ -103,9 +103,9 @@ void measure_material(double eta1) {
   p.eta1_Pa_s = eta1;
   const Scene scene(p);
   const LowestMode lowest =
-      lowest_mode(scene.bonds, scene.network.organ.position, scene.freedom, scene.mass);
+      lowest_mode(scene.bonds, scene.network.organ.position, scene.constraints, scene.mass);
   fmt::print("\ntau = {:.3g} s; {} free coordinates; lowest mode {:.4f} Hz, damping ratio 0.1\n",
-             p.relaxation_time_s(), scene.freedom.count(), lowest.frequency_Hz);
+             p.relaxation_time_s(), scene.constraints.count(), lowest.frequency_Hz);
   const Reference reference = quasi_static(scene);
   fmt::print("{:<10} {:>5} {:>9} {:>8} {:>8} {:>8} {:>8} {:>9} {:>9} {:>10} {:>10}\n", "solver",
              "order", "tolerance", "steps", "rejected", "Newton", "factors", "CPU s", "ratio",

@@ -27,7 +27,7 @@ void measure() {
   for (const double tau : {2e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0}) {
     const TpmParameters material = TpmParameters{}.with_relaxation_time(tau);
     const BondSystem bonds(tissue.network, material);
-    const QuasiStatic solver(bonds, organ.position, tissue.freedom(), probe, {});
+    const QuasiStatic solver(bonds, organ.position, tissue.constraints(), probe, {});
     std::vector<double> taken;
     Eigen::VectorXd force;
     for (int i = 0; i < 7; ++i) {

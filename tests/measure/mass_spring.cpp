@@ -33,7 +33,7 @@ class Scene {
  public:
   Scene()
       : liver_(build_network(paper_liver(), {}, "liver")),
-        freedom_(tpm_measure::held_on_the_far_side(liver_.organ)),
+        constraints_(tpm_measure::held_on_the_far_side(liver_.organ)),
         probe_{*liver_.organ.contact, Eigen::Vector3d::UnitZ()},
         near_(spheres_around(liver_, probe_.sphere, 2)),
         rim_(free_ones(spheres_at_rim(liver_, 25.0 * std::numbers::pi / 180.0))) {
@@ -73,7 +73,7 @@ class Scene {
       const BondSystem bonds(tissue.network, tissue.materials);
       InertialOptions options;
       options.stiffness_share = tissue.name.starts_with("MSM") ? 1.0 : 0.0;
-      const InertialRun run = Inertial(bonds, liver_.organ.position, freedom_, probe_,
+      const InertialRun run = Inertial(bonds, liver_.organ.position, constraints_, probe_,
                                        sphere_masses_kg(liver_.organ), options)
                                   .run(creep(load, time), {});
       print_row(tissue, run.position - liver_.organ.position, msm);
@@ -82,26 +82,27 @@ class Scene {
 
  private:
   [[nodiscard]] std::vector<std::size_t> free_ones(std::vector<std::size_t> spheres) const {
-    std::erase_if(spheres, [&](std::size_t i) { return !freedom_.is_free(i); });
+    std::erase_if(spheres, [&](std::size_t i) { return !constraints_.is_free(i); });
     return spheres;
   }
 
   [[nodiscard]] double stiffness(const Network& network, const BondMaterial& p,
-                                 double following) const {
-    return contact_stiffness_N_per_m(BondSystem(network, p), liver_.organ.position, freedom_,
-                                     probe_, following);
+                                 double relaxation_factor) const {
+    return contact_stiffness_N_per_m(BondSystem(network, p), liver_.organ.position, constraints_,
+                                     probe_, relaxation_factor);
   }
 
   void add_msm(std::string name, SpringRule rule, double contact_stiffness) {
     Network msm = msm_network(liver_, rule);
-    const BondMaterial material = msm_material(msm, freedom_, probe_, contact_stiffness);
+    const BondMaterial material = msm_material(msm, constraints_, probe_, contact_stiffness);
     tissues_.push_back({std::move(name), std::move(msm), material});
   }
 
   [[nodiscard]] Eigen::Matrix3Xd settled(const Tissue& tissue, double load) const {
     const BondSystem bonds(tissue.network, tissue.materials);
-    const QuasiStaticRun run = QuasiStatic(bonds, liver_.organ.position, freedom_, probe_, {1e-6})
-                                   .run(creep(load, kForever), std::span(&kForever, 1));
+    const QuasiStaticRun run =
+        QuasiStatic(bonds, liver_.organ.position, constraints_, probe_, {1e-6})
+            .run(creep(load, kForever), std::span(&kForever, 1));
     return run.position - liver_.organ.position;
   }
 
@@ -117,7 +118,7 @@ class Scene {
   }
 
   Network liver_;
-  Freedom freedom_;
+  Constraints constraints_;
   Probe probe_;
   std::vector<std::size_t> near_, rim_;
   std::vector<Tissue> tissues_;

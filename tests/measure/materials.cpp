@@ -90,10 +90,10 @@ void print_written() {
     if (named.field.factor.size() > 0) continue;
     const BondMaterial& m = named.field.materials.front();
     const BondSystem bonds(scene.network, named.field);
-    const QuasiStaticRun run = QuasiStatic(bonds, scene.network.organ.position, scene.freedom,
+    const QuasiStaticRun run = QuasiStatic(bonds, scene.network.organ.position, scene.constraints,
                                            scene.probe, {.tolerance = 1e-7, .energies = true})
                                    .run(ramp_and_hold(6e-3, 1.0, 4.0), times);
-    WrittenNetwork written(scene.network, written_bonds(scene.network, m), scene.freedom,
+    WrittenNetwork written(scene.network, written_bonds(scene.network, m), scene.constraints,
                            scene.probe);
     const std::vector<double> force = written_ramp(written, 6e-3, 1.0, times);
     double peak = 0.0, worst = 0.0;
@@ -130,20 +130,20 @@ void print_cost() {
              "back-solves", "run ms", "fixed step ms", "servo us", "condensed us");
   const BondSystem one(scene.network, material_of({1.0}, 0.5));
   const CondensedContact built =
-      build_condensed(one, rest, scene.freedom, scene.probe.sphere, scene.probe.direction);
+      build_condensed(one, rest, scene.constraints, scene.probe.sphere, scene.probe.direction);
   for (const std::vector<double>& set : sets) {
     const BondSystem bonds(scene.network, material_of(set, 0.5));
-    const QuasiStatic free(bonds, rest, scene.freedom, scene.probe, {.tolerance = 1e-6});
+    const QuasiStatic free(bonds, rest, scene.constraints, scene.probe, {.tolerance = 1e-6});
     QuasiStaticRun run;
     const double run_ms =
         least_ms(7, [&] { run = free.run(ramp_and_hold(8e-3, 2.0, 31.0), times); });
     // 62 steps of half a second each: what one step costs.
-    const QuasiStatic fixed(bonds, rest, scene.freedom, scene.probe,
+    const QuasiStatic fixed(bonds, rest, scene.constraints, scene.probe,
                             {.tolerance = 1e-6, .step_s = 0.5});
     QuasiStaticRun stepped;
     const double fixed_ms =
         least_ms(7, [&] { stepped = fixed.run(ramp_and_hold(8e-3, 2.0, 31.0), times); });
-    ServoNetwork servo(bonds, rest, scene.freedom, scene.probe.sphere, scene.probe.direction);
+    ServoNetwork servo(bonds, rest, scene.constraints, scene.probe.sphere, scene.probe.direction);
     const double servo_ms = least_ms(7, [&] {
       servo.reset();
       for (int i = 1; i <= 1000; ++i) servo.step(8e-6 * i * scene.probe.direction);
@@ -177,7 +177,7 @@ void print_servo() {
   for (const Named& named : materials(scene.network)) {
     const BondSystem bonds(scene.network, named.field);
     // The models move the contact in space: it does not yield to the side.
-    Freedom guided = scene.freedom;
+    Constraints guided = scene.constraints;
     guided.guide(scene.probe.sphere, scene.probe.direction);
     const QuasiStaticRun run =
         QuasiStatic(bonds, rest, guided, scene.probe, {.tolerance = 1e-7})
@@ -207,18 +207,18 @@ void print_servo() {
                  claim / peak, fmt::format("{} of {}", over, kSteps));
     };
     judge("full", [&] {
-      return std::make_unique<ServoNetwork>(bonds, rest, scene.freedom, scene.probe.sphere,
+      return std::make_unique<ServoNetwork>(bonds, rest, scene.constraints, scene.probe.sphere,
                                             scene.probe.direction,
                                             ServoNetworkOptions{.period_s = kPeriod_s});
     });
     judge("zone 2", [&] {
-      return std::make_unique<ZoneNetwork>(bonds, rest, scene.freedom, scene.probe.sphere,
+      return std::make_unique<ZoneNetwork>(bonds, rest, scene.constraints, scene.probe.sphere,
                                            scene.probe.direction,
                                            ZoneNetworkOptions{.period_s = kPeriod_s, .rings = 2});
     });
     judge("condensed", [&] {
-      return std::make_unique<CondensedContact>(
-          build_condensed(bonds, rest, scene.freedom, scene.probe.sphere, scene.probe.direction));
+      return std::make_unique<CondensedContact>(build_condensed(
+          bonds, rest, scene.constraints, scene.probe.sphere, scene.probe.direction));
     });
   }
 }
@@ -236,14 +236,14 @@ void print_lag() {
     request.seed = seed;
     const OrganScene scene(fill_liver(request));
     const Positions& rest = scene.network.organ.position;
-    Freedom guided = scene.freedom;
+    Constraints guided = scene.constraints;
     guided.guide(scene.probe.sphere, scene.probe.direction);
     for (const double share : {0.2, 0.5, 0.9}) {
       for (const std::vector<double>& branches : {std::vector{1.0}, std::vector{0.2, 5.0}}) {
         const BondSystem bonds(scene.network, MaterialField(material_of(branches, share)));
         const CondensedContact built =
-            build_condensed(bonds, rest, scene.freedom, scene.probe.sphere, scene.probe.direction,
-                            {.depth_m = kDepth_m});
+            build_condensed(bonds, rest, scene.constraints, scene.probe.sphere,
+                            scene.probe.direction, {.depth_m = kDepth_m});
         for (const double ramp_s : {0.05, 0.5, 2.5, 12.0}) {  // the mean relaxation time is 1 s
           const double step_s = ramp_s / kRamp;
           const Protocol protocol(Drive::displacement,

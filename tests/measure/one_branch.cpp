@@ -23,7 +23,7 @@ int main() {
     for (double* least_ms : {&chosen_ms, &fixed_ms}) {
       QuasiStaticOptions options{.tolerance = 1e-6};
       if (least_ms == &fixed_ms) options.step_s = 0.5;
-      const QuasiStatic network(bonds, scene.network.organ.position, scene.freedom, scene.probe,
+      const QuasiStatic network(bonds, scene.network.organ.position, scene.constraints, scene.probe,
                                 options);
       const std::clock_t start = std::clock();
       force_N = network.run(protocol, times).response[310];

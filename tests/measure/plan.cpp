@@ -108,10 +108,10 @@ int count(const std::vector<std::string>& files) {
   Tally picks, all;
   std::vector<double> cpu;
   int rejected = 0;
-  const auto add = [](Tally& tally, double claimed, double truth) {
+  const auto add = [](Tally& tally, double claimed, double reference) {
     ++tally.count;
-    if (truth > claimed) ++tally.violated;
-    tally.ratio.push_back(claimed / std::max(truth, kNothing));
+    if (reference > claimed) ++tally.violated;
+    tally.ratio.push_back(claimed / std::max(reference, kNothing));
   };
   for (const std::string& file : files) {
     open.clear();
@@ -129,14 +129,14 @@ int count(const std::vector<std::string>& files) {
       for (const Fields& claim : open[scene]) {
         if (!counted.insert(claim.at(3)).second) continue;
         const double claimed = std::stod(claim.at(5));
-        const double truth = std::stod(claim.at(6));
-        add(by_formulation[claim.at(4)], claimed, truth);
-        add(all, claimed, truth);
-        if (claim.at(8) == "1") add(picks, claimed, truth);
+        const double reference = std::stod(claim.at(6));
+        add(by_formulation[claim.at(4)], claimed, reference);
+        add(all, claimed, reference);
+        if (claim.at(8) == "1") add(picks, claimed, reference);
         if (claim.at(9) == "1") ++rejected;
-        if (truth > claimed) {
+        if (reference > claimed) {
           fmt::print("{} of {}: {}{} claims {:.3g}, true {:.3g}\n", line[2], line[1], claim[3],
-                     claim[8] == "1" ? ", picked," : "", claimed, truth);
+                     claim[8] == "1" ? ", picked," : "", claimed, reference);
         }
       }
     }

@@ -64,19 +64,19 @@ int main() {
                step_us(model, into));
   };
   CondensedContact condensed =
-      build_condensed(bonds, rest, tissue.freedom(), contact, into, {.depth_m = kDepth_m});
+      build_condensed(bonds, rest, tissue.constraints(), contact, into, {.depth_m = kDepth_m});
   row("condensed", condensed, OperationCount().add(Operation::condensed_step, 1.0));
   for (const int rings : {1, 2, 3}) {
     ZoneNetworkOptions options;
     options.rings = rings;
     options.portable = true;
-    ZoneNetwork zone(bonds, rest, tissue.freedom(), contact, into, options);
+    ZoneNetwork zone(bonds, rest, tissue.constraints(), contact, into, options);
     row(fmt::format("zone_{}", rings), zone, counted(zone.work()));
   }
   ServoNetworkOptions options;
   options.portable = true;
   options.most_balances = 1;  // as many as counted
-  ServoNetwork network(bonds, rest, tissue.freedom(), contact, into, options);
+  ServoNetwork network(bonds, rest, tissue.constraints(), contact, into, options);
   row("servo_network", network, counted(network.work()));
   return 0;
 }

@@ -54,15 +54,15 @@ Timed timed_run(const QuasiStatic& solver, const Protocol& protocol,
 OrganScene liver_scene(bool inner_held) {
   if (!inner_held) return OrganScene(paper_liver());
   OrganScene scene(paper_liver(), 1.0);
-  for (std::size_t i = 0; i < scene.freedom.size(); ++i) {
-    if (scene.network.organ.layer[i] == 1) scene.freedom.hold(i);
+  for (std::size_t i = 0; i < scene.constraints.size(); ++i) {
+    if (scene.network.organ.layer[i] == 1) scene.constraints.hold(i);
   }
   return scene;
 }
 
 void measure(const OrganScene& scene) {
   fmt::print("{} spheres, {} bonds, {} free coordinates\n", scene.network.organ.size(),
-             scene.network.bonds.size(), scene.freedom.count());
+             scene.network.bonds.size(), scene.constraints.count());
   fmt::print("{:>10} {:>9} {:>9} {:>6} {:>6} {:>6} {:>6} {:>7} {:>9} {:>9} {:>9}\n", "tau, s",
              "CPU ms", "least", "steps", "again", "iter", "factor", "solves", "error", "estimate",
              "end, N");
@@ -72,8 +72,9 @@ void measure(const OrganScene& scene) {
     const std::vector<double> times = output_times(tau);
     const BondSystem bonds(scene.network, material);
     const Positions& rest = scene.network.organ.position;
-    const QuasiStatic solver(bonds, rest, scene.freedom, scene.probe, {.tolerance = kTolerance});
-    const QuasiStatic judge(bonds, rest, scene.freedom, scene.probe, {.tolerance = 1e-10});
+    const QuasiStatic solver(bonds, rest, scene.constraints, scene.probe,
+                             {.tolerance = kTolerance});
+    const QuasiStatic judge(bonds, rest, scene.constraints, scene.probe, {.tolerance = 1e-10});
     const Timed timed = timed_run(solver, protocol, times, kRepeats);
     const QuasiStaticRun exact = judge.run(protocol, times);
     const double peak = exact.response.maxCoeff();

@@ -17,16 +17,16 @@ namespace {
 constexpr std::array<Word<StiffnessRule>, 2> kRules{
     {{StiffnessRule::per_bond, "per_bond"}, {StiffnessRule::normalised, "normalised"}}};
 
-void print_moduli(std::string_view what, const Elasticity& elasticity, double following,
+void print_moduli(std::string_view what, const Elasticity& elasticity, double relaxation_factor,
                   double bond_Pa) {
   const Moduli m = moduli_of(elasticity);
   fmt::print(
       "{:<34} {:<8} E {:6.2f} {:6.2f} kPa  G {:5.2f} {:5.2f} kPa  nu {:5.3f} {:5.3f}  volume "
       "{:5.3f}  "
       "A {:5.3f}  E/E_bond {:5.3f}\n",
-      what, following == 0.0 ? "at once" : "relaxed", m.young_Pa[0] * 1e-3, m.young_Pa[2] * 1e-3,
-      m.shear_Pa[0] * 1e-3, m.shear_Pa[2] * 1e-3, m.poisson(0, 2), m.poisson(2, 0),
-      m.volume_change[2], m.anisotropy, m.young_Pa[2] / bond_Pa);
+      what, relaxation_factor == 0.0 ? "at once" : "relaxed", m.young_Pa[0] * 1e-3,
+      m.young_Pa[2] * 1e-3, m.shear_Pa[0] * 1e-3, m.shear_Pa[2] * 1e-3, m.poisson(0, 2),
+      m.poisson(2, 0), m.volume_change[2], m.anisotropy, m.young_Pa[2] / bond_Pa);
 }
 
 /// Along x and z, xz and xy; x = 20 mm and the default material.
@@ -41,12 +41,12 @@ void print_lattices() {
       const Network network =
           build_network(block(cells, cells, cells, x, lattice.meaning), options, "block");
       const BondSystem bonds(network, material);
-      for (const double following : {0.0, 1.0}) {
+      for (const double relaxation_factor : {0.0, 1.0}) {
         const PatchTest patch =
-            affine_patch_test(network, bonds, following, 2.0 * options.support * x,
+            affine_patch_test(network, bonds, relaxation_factor, 2.0 * options.support * x,
                               volume_per_sphere(lattice.meaning, x));
-        print_moduli(fmt::format("{} {}", lattice.text, rule.text), patch.elasticity, following,
-                     material.E2_Pa);
+        print_moduli(fmt::format("{} {}", lattice.text, rule.text), patch.elasticity,
+                     relaxation_factor, material.E2_Pa);
       }
     }
   }
@@ -60,9 +60,9 @@ void print_organ(const std::string& name, Organ organ, std::span<const std::size
   const Network network = build_network(std::move(organ), options, name);
   const TpmParameters material;
   const BondSystem bonds(network, material);
-  for (const double following : {0.0, 1.0}) {
-    print_moduli(name, affine_elasticity(network, bonds, following, spheres, volume_m3), following,
-                 material.E2_Pa);
+  for (const double relaxation_factor : {0.0, 1.0}) {
+    print_moduli(name, affine_elasticity(network, bonds, relaxation_factor, spheres, volume_m3),
+                 relaxation_factor, material.E2_Pa);
   }
 }
 

@@ -30,7 +30,8 @@ double cpu_s() {
 }
 
 struct Setup {
-  explicit Setup(const std::string& file) : tissue(read_tissue(file)), freedom(tissue.freedom()) {
+  explicit Setup(const std::string& file)
+      : tissue(read_tissue(file)), constraints(tissue.constraints()) {
     contact = tissue.network.organ.contact.value();
     into = -tissue.network.organ.normal.col(static_cast<Eigen::Index>(contact));
   }
@@ -40,7 +41,7 @@ struct Setup {
   [[nodiscard]] const Positions& rest() const { return tissue.network.organ.position; }
 
   Tissue tissue;
-  Freedom freedom;
+  Constraints constraints;
   std::size_t contact = 0;
   Eigen::Vector3d into;
 };
@@ -62,12 +63,12 @@ std::vector<Built> models(const Setup& setup, const BondSystem& bonds) {
   for (const int rings : {2, 3, 4}) {
     add(fmt::format("zone of {} rings", rings), [&] {
       return std::make_unique<ZoneNetwork>(
-          bonds, setup.rest(), setup.freedom, setup.contact, setup.into,
+          bonds, setup.rest(), setup.constraints, setup.contact, setup.into,
           ZoneNetworkOptions{.period_s = kPeriod_s, .rings = rings});
     });
   }
   add("full network", [&] {
-    return std::make_unique<ServoNetwork>(bonds, setup.rest(), setup.freedom, setup.contact,
+    return std::make_unique<ServoNetwork>(bonds, setup.rest(), setup.constraints, setup.contact,
                                           setup.into, ServoNetworkOptions{.period_s = kPeriod_s});
   });
   return all;
@@ -113,7 +114,7 @@ void measure_errors(const Setup& setup, const std::vector<double>& taus_s) {
       "median_us,p99_us,build_cpu_s\n");
   for (const double tau_s : taus_s) {
     const BondSystem bonds = setup.bonds(tau_s);
-    const TouchedTissue tissue{bonds, setup.rest(), setup.freedom, setup.contact};
+    const TouchedTissue tissue{bonds, setup.rest(), setup.constraints, setup.contact};
     std::vector<Built> all = models(setup, bonds);
     for (const ContactMotion& motion : motions(setup.into)) {
       ContactReference exact;

@@ -29,18 +29,21 @@ struct Setup {
       : session(read_session(file)),
         surface(session),
         bonds(surface.scene.tissue.bonds()),
-        freedom(surface.scene.tissue.freedom()),
+        constraints(surface.scene.tissue.constraints()),
         into(surface.scene.probe.direction),
         x(into.unitOrthogonal()),
         y(into.cross(x)) {}
   [[nodiscard]] SurfaceNetwork network() const {
-    return {
-        bonds, surface.scene.rest(), freedom, surface.ball, {.period_s = session.servo.period_s}};
+    return {bonds,
+            surface.scene.rest(),
+            constraints,
+            surface.ball,
+            {.period_s = session.servo.period_s}};
   }
   HilSession session;
   SurfaceScene surface;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
   Eigen::Vector3d into, x, y;
 };
 
@@ -65,7 +68,8 @@ Way slide_of(const Setup& setup, double depth_m, double angle) {
 void compare(const Setup& setup, double depth_m, double angle) {
   constexpr std::size_t kEvery = 10;
   SurfaceNetwork network = setup.network();
-  BallOnNetwork full(setup.bonds, setup.surface.scene.rest(), setup.freedom, setup.surface.ball);
+  BallOnNetwork full(setup.bonds, setup.surface.scene.rest(), setup.constraints,
+                     setup.surface.ball);
   const Way way = slide_of(setup, depth_m, angle);
   double peak = 0.0, most = 0.0, aside = 0.0, estimate = 0.0;
   int touching = 0, compared = 0, exceeded = 0;
@@ -99,9 +103,9 @@ void claim(const Setup& setup, double speed_m_per_s, double tau_s) {
   const BondMaterial material = setup.surface.scene.tissue.element().with_relaxation_time(tau_s);
   const BondSystem bonds = setup.bonds.with_materials(setup.surface.scene.tissue.network, material);
   const double period_s = setup.session.servo.period_s;
-  SurfaceNetwork network(bonds, setup.surface.scene.rest(), setup.freedom, setup.surface.ball,
+  SurfaceNetwork network(bonds, setup.surface.scene.rest(), setup.constraints, setup.surface.ball,
                          {.period_s = period_s});
-  BallOnNetwork full(bonds, setup.surface.scene.rest(), setup.freedom, setup.surface.ball);
+  BallOnNetwork full(bonds, setup.surface.scene.rest(), setup.constraints, setup.surface.ball);
   Way way;
   const auto line = [&](const Eigen::Vector3d& to) {
     const Eigen::Vector3d from =

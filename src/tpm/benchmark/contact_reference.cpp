@@ -15,10 +15,10 @@ constexpr double kBalance = 1e-13;  // of the stiffest bond times 1 m
 constexpr int kMostIterations = 60;
 constexpr int kSlow = 6;  // iterations after which a factorisation is found anew
 
-Freedom with_contact_held(const TouchedTissue& tissue) {
-  Freedom freedom = tissue.freedom;
-  freedom.hold(tissue.contact);
-  return freedom;
+Constraints with_contact_held(const TouchedTissue& tissue) {
+  Constraints constraints = tissue.constraints;
+  constraints.hold(tissue.contact);
+  return constraints;
 }
 
 /// Forces and displacements as they are found.
@@ -65,8 +65,8 @@ ContactReference answers_with(const TouchedTissue& tissue, const ContactMotion& 
 
 BalancedContact::BalancedContact(const TouchedTissue& tissue)
     : tissue_(tissue),
-      freedom_(with_contact_held(tissue)),
-      equilibrium_(tissue.bonds, freedom_),
+      constraints_(with_contact_held(tissue)),
+      equilibrium_(tissue.bonds, constraints_),
       position_(tissue.rest) {
   require_one_linear_branch(tissue.bonds, "the reference of contact models");
 }
@@ -81,7 +81,7 @@ Eigen::Vector3d BalancedContact::go_to(const Eigen::Vector3d& displacement_m,
   for (int iteration = 0;; ++iteration) {
     equilibrium_.forces(position_, memory, load, force);
     Eigen::Matrix3Xd left = force;
-    freedom_.project(left);
+    constraints_.project(left);
     const double residual_N = left.cwiseAbs().maxCoeff();
     if (residual_N <= tolerance_N) return force.col(column);
     if (iteration == kMostIterations || !std::isfinite(residual_N)) {
@@ -101,7 +101,7 @@ Eigen::Vector3d BalancedContact::go_to(const Eigen::Vector3d& displacement_m,
 FineContact::FineContact(const TouchedTissue& tissue, double step_s)
     : bonds_(tissue.bonds),
       balanced_(tissue),
-      remembered_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tissue.bonds.size()))) {
+      viscous_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tissue.bonds.size()))) {
   const RelaxationWeights w = relaxation_weights(step_s / bonds_.relaxation_time_s());
   keep_ = w.r;
   of_start_ = w.w0;
@@ -110,15 +110,15 @@ FineContact::FineContact(const TouchedTissue& tissue, double step_s)
 }
 
 Eigen::Vector3d FineContact::step(const Eigen::Vector3d& displacement_m) {
-  const BondMemory memory{keep_ * remembered_ + of_start_ * elongation_, of_end_};
+  const BondMemory memory{keep_ * viscous_ + of_start_ * elongation_, of_end_};
   Eigen::Vector3d force_N = balanced_.go_to(displacement_m, memory);
   bonds_.elongations(position(), elongation_);
-  remembered_ = memory.offset + of_end_ * elongation_;
+  viscous_ = memory.offset + of_end_ * elongation_;
   return force_N;
 }
 
 double FineContact::stored_J() const {
-  return bonds_.stored_energy_J(position(), remembered_);
+  return bonds_.stored_energy_J(position(), viscous_);
 }
 
 ContactReference fine_reference(const TouchedTissue& tissue, const ContactMotion& motion,
@@ -145,7 +145,7 @@ ContactReference runge_kutta_reference(const TouchedTissue& tissue, const Contac
     tissue.bonds.elongations(balanced.position(), elongation);
     return Eigen::VectorXd((elongation - y) / tau_s);
   };
-  Eigen::VectorXd remembered = memory.offset;
+  Eigen::VectorXd viscous = memory.offset;
   Record record(tissue, motion, field_every);
   Eigen::Vector3d from = Eigen::Vector3d::Zero();
   for (Eigen::Index i = 0; i < motion.steps(); ++i) {
@@ -154,13 +154,13 @@ ContactReference runge_kutta_reference(const TouchedTissue& tissue, const Contac
       const auto at = [&](double share) -> Eigen::Vector3d {
         return from + (s + share) / substeps * (to - from);
       };
-      const Eigen::VectorXd first = rate(at(0.0), remembered);
-      const Eigen::VectorXd second = rate(at(0.5), remembered + 0.5 * step_s * first);
-      const Eigen::VectorXd third = rate(at(0.5), remembered + 0.5 * step_s * second);
-      const Eigen::VectorXd fourth = rate(at(1.0), remembered + step_s * third);
-      remembered += step_s / 6.0 * (first + 2.0 * second + 2.0 * third + fourth);
+      const Eigen::VectorXd first = rate(at(0.0), viscous);
+      const Eigen::VectorXd second = rate(at(0.5), viscous + 0.5 * step_s * first);
+      const Eigen::VectorXd third = rate(at(0.5), viscous + 0.5 * step_s * second);
+      const Eigen::VectorXd fourth = rate(at(1.0), viscous + step_s * third);
+      viscous += step_s / 6.0 * (first + 2.0 * second + 2.0 * third + fourth);
     }
-    memory.offset = remembered;
+    memory.offset = viscous;
     const Eigen::Vector3d force_N = balanced.go_to(to, memory);
     record.put(i, force_N, balanced.position());
     from = to;
@@ -174,9 +174,9 @@ Eigen::VectorXd line_reference(const TouchedTissue& tissue, const ContactMotion&
     throw bad_input("motion", fmt::format("'{}' is not along a line", motion.name),
                     "a motion along a line through rest");
   }
-  Freedom freedom = tissue.freedom;
-  freedom.guide(tissue.contact, motion.direction);
-  const QuasiStatic solver(tissue.bonds, tissue.rest, freedom,
+  Constraints constraints = tissue.constraints;
+  constraints.guide(tissue.contact, motion.direction);
+  const QuasiStatic solver(tissue.bonds, tissue.rest, constraints,
                            Probe{tissue.contact, motion.direction}, {.tolerance = tolerance});
   std::vector<double> times;
   for (Eigen::Index i = 1; i <= motion.steps(); ++i) {

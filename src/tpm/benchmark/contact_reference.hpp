@@ -10,7 +10,7 @@ namespace tpm {
 struct TouchedTissue {
   const BondSystem& bonds;
   const Positions& rest;
-  const Freedom& freedom;  ///< without the probe
+  const Constraints& constraints;  ///< without the probe
   std::size_t contact = 0;
 };
 
@@ -39,7 +39,7 @@ class BalancedContact {
 
  private:
   const TouchedTissue& tissue_;
-  Freedom freedom_;
+  Constraints constraints_;
   Equilibrium equilibrium_;
   Positions position_;
   bool factorised_ = false;
@@ -65,7 +65,7 @@ class FineContact {
   BalancedContact balanced_;
   double keep_, of_start_, of_end_;
   Eigen::VectorXd elongation_;
-  Eigen::VectorXd remembered_;
+  Eigen::VectorXd viscous_;
 };
 
 /// By FineContact with `substeps` and twice as many steps a period, extrapolated (the error falls

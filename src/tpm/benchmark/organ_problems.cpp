@@ -17,8 +17,8 @@ std::shared_ptr<PosedNetwork> posed_liver(const Tissue& tissue, const Protocol& 
   const std::size_t contact = organ.contact.value();
   const Eigen::Vector3d into = -organ.normal.col(static_cast<Eigen::Index>(contact));
   return std::make_shared<PosedNetwork>(
-      driven_network(tissue.bonds(), organ, tissue.freedom(), {{contact, into, 1.0}}, {}), protocol,
-      std::move(times_s));
+      driven_network(tissue.bonds(), organ, tissue.constraints(), {{contact, into, 1.0}}, {}),
+      protocol, std::move(times_s));
 }
 
 constexpr double kMovingPoke_s = 0.2;
@@ -75,7 +75,7 @@ std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guid
   auto posed = posed_liver(tissue, ramp_and_hold(8e-3, 0.1, kMovingPoke_s - 0.08), times_s);
   if (guided) {
     const Probe& probe = posed->network.probes.front();
-    posed->network.freedom.guide(probe.sphere, probe.direction);
+    posed->network.constraints.guide(probe.sphere, probe.direction);
   }
   posed->set_masses(sphere_masses_kg(tissue.network.organ), kDampingRatio);
   return posed;

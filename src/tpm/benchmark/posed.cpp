@@ -16,7 +16,7 @@ PosedNetwork::PosedNetwork(DrivenNetwork driven, Protocol imposed, std::vector<d
 
 void PosedNetwork::set_masses(Eigen::VectorXd mass_kg, double ratio) {
   damping_ratio = ratio;
-  const LowestMode lowest = lowest_mode(network.bonds, network.rest, network.freedom, mass_kg);
+  const LowestMode lowest = lowest_mode(network.bonds, network.rest, network.constraints, mass_kg);
   mass = MethodMasses{std::move(mass_kg), 2.0 * ratio * lowest.angular_frequency()};
 }
 
@@ -27,10 +27,10 @@ DrivenNetwork driven_star(const BondElement& material) {
   const Network network = join(organ, pairs, {}, "star");
   constexpr std::size_t kB = 1;  // A, B, C, D
   const Eigen::Vector3d into = -organ.normal.col(kB);
-  Freedom freedom(organ.size());
-  freedom.guide(kB, into);
-  for (const std::size_t held : {0, 2, 3}) freedom.hold(held);
-  return driven_network(BondSystem(network, material), organ, freedom, {{kB, into, 1.0}}, {});
+  Constraints constraints(organ.size());
+  constraints.guide(kB, into);
+  for (const std::size_t held : {0, 2, 3}) constraints.hold(held);
+  return driven_network(BondSystem(network, material), organ, constraints, {{kB, into, 1.0}}, {});
 }
 
 std::vector<double> times_every(double spacing_s, double end_s, int first) {
@@ -140,7 +140,7 @@ BenchmarkRun outcome_of(Run&& run) {
 
 MethodRun run_collocation(const PosedNetwork& posed, double tolerance) {
   const DrivenNetwork& n = posed.network;
-  const QuasiStatic solver(n.bonds, n.rest, n.freedom, n.probes, {.tolerance = tolerance});
+  const QuasiStatic solver(n.bonds, n.rest, n.constraints, n.probes, {.tolerance = tolerance});
   QuasiStaticRun run = solver.run(posed.protocol, posed.times_s);
   MethodRun outcome;
   outcome.response = std::move(run.response);
@@ -156,7 +156,7 @@ MethodRun run_inertial(const PosedNetwork& posed, double tolerance, int order) {
   options.tolerance = tolerance;
   options.highest_order = order;
   options.damping_ratio = posed.damping_ratio;
-  const Inertial solver(n.bonds, n.rest, n.freedom, n.probes, posed.mass->mass_kg, options);
+  const Inertial solver(n.bonds, n.rest, n.constraints, n.probes, posed.mass->mass_kg, options);
   InertialRun run = solver.run(posed.protocol, posed.times_s);
   MethodRun outcome;
   outcome.response = std::move(run.response);

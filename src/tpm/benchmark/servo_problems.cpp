@@ -48,7 +48,7 @@ class ServoCase {
   ServoCase(Tissue read, const std::vector<double>& relaxation_times_s, bool along_line,
             const std::function<std::vector<ContactMotion>(const Eigen::Vector3d&)>& motions)
       : tissue(std::move(read)),
-        freedom(tissue.freedom()),
+        constraints(tissue.constraints()),
         contact(tissue.network.organ.contact.value()),
         into(-tissue.network.organ.normal.col(static_cast<Eigen::Index>(contact))),
         taus_s(relaxation_times_s),
@@ -75,7 +75,7 @@ class ServoCase {
   [[nodiscard]] const CondensedContact& condensed() {
     if (!condensed_) {
       const auto start = Clock::now();
-      condensed_.emplace(build_condensed(bonds(0), rest(), freedom, contact, into,
+      condensed_.emplace(build_condensed(bonds(0), rest(), constraints, contact, into,
                                          {.depth_m = kDepth_m, .tangential_m = kAside_m}));
       condensed_s_ = seconds_of(Clock::now() - start);
     }
@@ -104,7 +104,7 @@ class ServoCase {
   }
 
   const Tissue tissue;
-  const Freedom freedom;
+  const Constraints constraints;
   const std::size_t contact;
   const Eigen::Vector3d into;
   const std::vector<double> taus_s;
@@ -130,7 +130,7 @@ class ServoCase {
   /// Judge and second of one motion.
   [[nodiscard]] std::array<ContactReference, 2> answers(std::size_t tau,
                                                         const ContactMotion& motion) const {
-    const TouchedTissue touched{bonds(tau), rest(), freedom, contact};
+    const TouchedTissue touched{bonds(tau), rest(), constraints, contact};
     const double x = motion.period_s / taus_s[tau];
     const auto substeps = [&](double longest) {
       return std::max(1, static_cast<int>(std::ceil(x / longest)));
@@ -335,7 +335,7 @@ ServoModel network_model(std::string method, std::string variant, const Options&
           1,
           [options](ServoCase& asked, std::size_t tau) {
             const auto start = Clock::now();
-            auto model = std::make_unique<Model>(asked.bonds(tau), asked.rest(), asked.freedom,
+            auto model = std::make_unique<Model>(asked.bonds(tau), asked.rest(), asked.constraints,
                                                  asked.contact, asked.into, options);
             return std::pair<std::unique_ptr<ContactModel>, double>(
                 std::move(model), seconds_of(Clock::now() - start));

@@ -24,17 +24,17 @@ struct StandingLiver {
   StandingLiver(std::size_t count, bool solid)
       : network(build_network(organ_of(count, solid), continuum(), "speed record")),
         bonds(network, paper_element()),
-        freedom(network.organ.size()) {
+        constraints(network.organ.size()) {
     const Positions& rest = network.organ.position;
     const double near = rest.row(2).minCoeff();
     const double far = rest.row(2).maxCoeff();
-    for (std::size_t i = 0; i < freedom.size(); ++i) {
-      if (rest(2, static_cast<Eigen::Index>(i)) > near + 0.7 * (far - near)) freedom.hold(i);
+    for (std::size_t i = 0; i < constraints.size(); ++i) {
+      if (rest(2, static_cast<Eigen::Index>(i)) > near + 0.7 * (far - near)) constraints.hold(i);
     }
     right.resize(3, rest.cols());
     Random random(1);
     for (double& value : right.reshaped()) value = random.normal();
-    freedom.project(right);
+    constraints.project(right);
   }
 
   static NetworkOptions continuum() {
@@ -63,7 +63,7 @@ struct StandingLiver {
 
   Network network;
   BondSystem bonds;
-  Freedom freedom;
+  Constraints constraints;
   Eigen::Matrix3Xd right;  ///< random forces on what is free, N
 };
 
@@ -78,7 +78,7 @@ struct Factorised {
   explicit Factorised(std::size_t count)
       : liver(count, false), matrix(liver.bonds.pattern()), factor(liver.bonds.pattern()) {
     liver.bonds.add_stiffness(liver.rest(), liver.memory(), matrix);
-    liver.freedom.constrain(liver.bonds, matrix);
+    liver.constraints.constrain(liver.bonds, matrix);
     factorise();
   }
   void factorise() {
@@ -102,8 +102,8 @@ Run join(std::size_t count) {
 Run check(std::size_t count) {
   const auto liver = standing(count);
   return [liver] {
-    (void)zero_energy_modes(liver->bonds, liver->rest(), liver->freedom);
-    (void)local_support(liver->bonds, liver->network.organ, liver->freedom);
+    (void)zero_energy_modes(liver->bonds, liver->rest(), liver->constraints);
+    (void)local_support(liver->bonds, liver->network.organ, liver->constraints);
   };
 }
 
@@ -148,7 +148,7 @@ Run ramp_and_hold_liver(std::size_t count, int outputs) {
   std::vector<double> times;
   for (int i = 1; i <= outputs; ++i) times.push_back(31.0 * i / outputs);
   return [liver, probe, protocol, times] {
-    (void)QuasiStatic(liver->bonds, liver->rest(), liver->freedom, probe, {.tolerance = 1e-6})
+    (void)QuasiStatic(liver->bonds, liver->rest(), liver->constraints, probe, {.tolerance = 1e-6})
         .run(*protocol, times);
   };
 }
@@ -156,7 +156,7 @@ Run ramp_and_hold_liver(std::size_t count, int outputs) {
 Run iterate_solid(std::size_t count) {
   const auto liver = standing(count, true);
   const auto solver =
-      std::make_shared<LargeEquilibrium>(liver->bonds, liver->freedom, liver->rest());
+      std::make_shared<LargeEquilibrium>(liver->bonds, liver->constraints, liver->rest());
   return [liver, solver] {
     Eigen::Matrix3Xd x = liver->right;
     if (solver->solve(liver->rest(), liver->memory(), x, 1e-8) == TangentAnswer::solved) return;
@@ -168,7 +168,7 @@ Run iterate_solid(std::size_t count) {
 Run servo_second() {
   const auto liver = standing(424);
   const Eigen::Vector3d into = Eigen::Vector3d::UnitZ();
-  const auto model = std::make_shared<ServoNetwork>(liver->bonds, liver->rest(), liver->freedom,
+  const auto model = std::make_shared<ServoNetwork>(liver->bonds, liver->rest(), liver->constraints,
                                                     liver->network.organ.contact.value(), into);
   return [liver, model, into] {
     constexpr int kSteps = 1000;

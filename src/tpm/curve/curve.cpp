@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "tpm/core/word_table.hpp"
+#include "tpm/core/enum_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

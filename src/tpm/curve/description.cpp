@@ -4,8 +4,8 @@
 
 #include <array>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

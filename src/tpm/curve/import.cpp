@@ -6,8 +6,8 @@
 #include <array>
 #include <numeric>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/curve/assemble.hpp"
 #include "tpm/curve/import_digitizer.hpp"
 #include "tpm/curve/import_jpk.hpp"

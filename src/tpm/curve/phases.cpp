@@ -177,8 +177,8 @@ class Finder {
       if (moved) relabel(0, response_.size() - 1, PhaseKind::before_contact);
       return;
     }
-    found_.preloaded =
-        touch.at_once && !options_.contact_response && touch.floor > 0.5 * touch_margin(search());
+    found_.preloaded = touch.instantaneous && !options_.contact_response &&
+                       touch.floor > 0.5 * touch_margin(search());
     found_.contact_index = found_.preloaded ? touch.motion_start : *touch.index;
     found_.contact_drive = drive_[found_.contact_index];
     if (!found_.preloaded) relabel(0, found_.contact_index, PhaseKind::before_contact);

@@ -113,7 +113,8 @@ Touch find_touch(const TouchSearch& search, std::optional<double> level) {
   }
   if (touch.index) {
     const auto [low, high] = std::minmax_element(drive.begin(), drive.end());
-    touch.at_once = drive[*touch.index] - drive[touch.motion_start] < kAtOnce * (*high - *low);
+    touch.instantaneous =
+        drive[*touch.index] - drive[touch.motion_start] < kAtOnce * (*high - *low);
   }
   return touch;
 }

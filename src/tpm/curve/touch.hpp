@@ -18,7 +18,7 @@ struct Touch {
   std::optional<std::size_t> index;  ///< none if the response never leaves its floor
   std::size_t motion_start = 0;      ///< first sample of the first rise of the drive
   double floor = 0.0;                ///< level of the response before contact
-  bool at_once = false;              ///< the response rises with the first movement
+  bool instantaneous = false;        ///< the response rises with the first movement
 };
 
 /// What a search for contact or detachment looks at. All SI.

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpmkit/error.hpp"

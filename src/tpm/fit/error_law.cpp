@@ -9,8 +9,8 @@
 #include <limits>
 #include <numbers>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

@@ -19,15 +19,15 @@ ExperimentResiduals::ExperimentResiduals(const FitConfig& config, const std::vec
   resolve_noise_parameters();
   count_residuals();
   find_linear();
-  set_up_scout();
+  set_up_surrogate();
 }
 
-void ExperimentResiduals::set_up_scout() {
-  std::shared_ptr<const Model> scout = model_->scout();
-  if (!scout) return;
-  scout_ = copy();
-  scout_->model_ = std::move(scout);
-  scout_->find_linear();
+void ExperimentResiduals::set_up_surrogate() {
+  std::shared_ptr<const Model> surrogate = model_->surrogate();
+  if (!surrogate) return;
+  surrogate_ = copy();
+  surrogate_->model_ = std::move(surrogate);
+  surrogate_->find_linear();
 }
 
 void ExperimentResiduals::find_linear() {
@@ -313,7 +313,7 @@ double ExperimentResiduals::weight(std::size_t datum) const {
 }
 
 void ExperimentResiduals::set_counts(std::vector<int> counts) {
-  if (scout_) scout_->set_counts(counts);
+  if (surrogate_) surrogate_->set_counts(counts);
   counts_ = std::move(counts);
   count_residuals();
 }
@@ -378,7 +378,7 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   other->plain_ = plain_;
   other->residual_count_ = residual_count_;
   other->offset_ = offset_;
-  if (scout_) other->scout_ = scout_->copy();
+  if (surrogate_) other->surrogate_ = surrogate_->copy();
   return other;
 }
 

@@ -26,7 +26,7 @@ class ExperimentResiduals final : public ResidualFunction {
                                       RowMatrix& root) const override;
   [[nodiscard]] double offset() const override { return offset_; }
   [[nodiscard]] bool linear_in(std::size_t parameter) const override { return linear_[parameter]; }
-  [[nodiscard]] const ExperimentResiduals* scout() const override { return scout_.get(); }
+  [[nodiscard]] const ExperimentResiduals* surrogate() const override { return surrogate_.get(); }
   [[nodiscard]] const ExchangeOrder& exchange_order() const override { return order_; }
 
   [[nodiscard]] const std::vector<FitDatum>& data() const { return data_; }
@@ -102,9 +102,9 @@ class ExperimentResiduals final : public ResidualFunction {
                                         RowMatrix* sensitivity) const;
   /// Fills fitted_.
   void leave_out_held_out();
-  void set_up_scout();
+  void set_up_surrogate();
   /// A costly model is asked for derivatives by the estimated parameters only.
-  [[nodiscard]] bool asks_along() const { return scout_ != nullptr; }
+  [[nodiscard]] bool asks_along() const { return surrogate_ != nullptr; }
   /// Changes of the model parameters with each of the estimated ones.
   [[nodiscard]] Eigen::MatrixXd changes_for(std::size_t choice) const;
   /// Columns of a response's sensitivity and the estimated parameters that they belong to.
@@ -140,7 +140,7 @@ class ExperimentResiduals final : public ResidualFunction {
   std::vector<bool> linear_;  ///< of each estimated parameter: linear_in
   ExchangeOrder order_;
   std::optional<PlainResiduals> plain_;
-  std::unique_ptr<ExperimentResiduals> scout_;  ///< the same, asking the model's scout
+  std::unique_ptr<ExperimentResiduals> surrogate_;  ///< the same, asking the model's surrogate
   Eigen::Index residual_count_ = 0;
   double offset_ = 0.0;
 };

@@ -15,7 +15,7 @@ namespace {
 
 constexpr Eigen::Index kMostSearched = 20'000;  // residuals that many starts are followed with
 constexpr std::size_t kThinnedTo = 2'000;       // samples that stand for a longer recording
-constexpr std::size_t kMostScouted = 5;         // minima of a cheap model that are gone on from
+constexpr std::size_t kMostSurrogate = 5;       // minima of a cheap model that are gone on from
 
 /// Where the search begins and how it goes on from there.
 struct Approach {
@@ -33,12 +33,12 @@ FitResult survey(const ExperimentResiduals& stand_in, std::span<const FitParamet
 }
 
 /// The configured start, and the minima of a cheap model.
-Approach scouted_approach(const ExperimentResiduals& scout,
-                          std::span<const FitParameter> parameters) {
+Approach surrogate_approach(const ExperimentResiduals& surrogate,
+                            std::span<const FitParameter> parameters) {
   Approach approach{{{}}, StartKind::solved};
   for (const FitParameter& p : parameters) approach.starts.front().push_back(p.start);
-  for (const DistinctMinimum& m : survey(scout, parameters).minima) {
-    if (approach.starts.size() > kMostScouted) break;
+  for (const DistinctMinimum& m : survey(surrogate, parameters).minima) {
+    if (approach.starts.size() > kMostSurrogate) break;
     approach.starts.push_back(m.minimum.natural);
   }
   return approach;
@@ -48,8 +48,8 @@ Approach scouted_approach(const ExperimentResiduals& scout,
 /// all of them.
 Approach approach_to(const ExperimentResiduals& function,
                      std::span<const FitParameter> parameters) {
-  if (const ExperimentResiduals* scout = function.scout())
-    return scouted_approach(*scout, parameters);
+  if (const ExperimentResiduals* surrogate = function.surrogate())
+    return surrogate_approach(*surrogate, parameters);
   if (function.residual_count() <= kMostSearched) {
     return {fit_starts(function, parameters), start_kind(function)};
   }

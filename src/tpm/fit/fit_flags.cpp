@@ -85,11 +85,11 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
                                          data.protocol.rate_m_per_s * 1e3, data.dataset));
     }
   }
-  if (const ExperimentResiduals* scout = function.scout()) {
+  if (const ExperimentResiduals* surrogate = function.surrogate()) {
     result.flags.push_back(fmt::format(
         "the search began at the configured start and at the best minima ({}) that {} starts of "
         "the model '{}' have",
-        result.starts_run - 1, result.config.starts, scout->model().name()));
+        result.starts_run - 1, result.config.starts, surrogate->model().name()));
   }
   if (result.band_count > 0) {
     result.flags.push_back(fmt::format(

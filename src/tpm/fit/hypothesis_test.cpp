@@ -41,8 +41,8 @@ HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitR
       for (auto& start : starts) start[i] = value;
     }
   }
-  if (const ResidualFunction* scout = function.scout()) {
-    const Minimum there = deepest(*scout, parameters, starts, fixed);
+  if (const ResidualFunction* surrogate = function.surrogate()) {
+    const Minimum there = deepest(*surrogate, parameters, starts, fixed);
     starts.resize(1);
     if (there.usable) starts.push_back(there.natural);
   }

@@ -10,7 +10,7 @@
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/fit/scouted_minimum.hpp"
+#include "tpm/fit/surrogate_minimum.hpp"
 
 namespace tpm {
 namespace {
@@ -200,8 +200,8 @@ void polish(const ResidualFunction& function, std::span<const FitParameter> para
 
 Minimum minimise(const ResidualFunction& function, std::span<const FitParameter> parameters,
                  std::span<const double> start, const FixedMask& fixed, FirstStep first_step) {
-  if (const ResidualFunction* scout = function.scout()) {
-    return minimise_by_scout(function, *scout, parameters, start, fixed);
+  if (const ResidualFunction* surrogate = function.surrogate()) {
+    return minimise_by_surrogate(function, *surrogate, parameters, start, fixed);
   }
   keep_ceres_quiet();
   Minimum minimum;

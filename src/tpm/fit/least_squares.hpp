@@ -46,7 +46,7 @@ class ResidualFunction {
 
   /// A cheap function of the same parameters whose residuals change much as these do, where these
   /// are costly: searches then take it along. None if these are cheap.
-  [[nodiscard]] virtual const ResidualFunction* scout() const { return nullptr; }
+  [[nodiscard]] virtual const ResidualFunction* surrogate() const { return nullptr; }
 
   /// Constant part of the sum of squares that is not deviance.
   [[nodiscard]] virtual double offset() const { return 0.0; }
@@ -75,7 +75,7 @@ enum class FirstStep { bold, cautious };
 /// Trust-region descent (Ceres, Levenberg-Marquardt with box bounds) in theta.
 /// @param start natural values within the bounds (a start outside is moved to the bound)
 /// @param fixed empty, or one flag per parameter
-/// A function with a scout is searched with its help instead (scouted_minimum.hpp).
+/// A function with a surrogate is searched with its help instead (surrogate_minimum.hpp).
 [[nodiscard]] Minimum minimise(const ResidualFunction& function,
                                std::span<const FitParameter> parameters,
                                std::span<const double> start, const FixedMask& fixed = {},
@@ -85,7 +85,7 @@ enum class FirstStep { bold, cautious };
 /// linear parameters were solved for): projected Levenberg-Marquardt with an active set of bounds,
 /// a few evaluations where the general search needs dozens. Ends when a step changes the residuals
 /// by less than 1e-4 standard deviations in all, or after 200 steps (then not `converged`).
-/// A function with a scout is searched with its help instead.
+/// A function with a surrogate is searched with its help instead.
 [[nodiscard]] Minimum minimise_near(const ResidualFunction& function,
                                     std::span<const FitParameter> parameters,
                                     std::span<const double> start, const FixedMask& fixed = {});

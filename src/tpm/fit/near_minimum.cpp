@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "tpm/fit/least_squares.hpp"
-#include "tpm/fit/scouted_minimum.hpp"
 #include "tpm/fit/starts.hpp"
+#include "tpm/fit/surrogate_minimum.hpp"
 
 namespace tpm {
 namespace {
@@ -272,8 +272,8 @@ Minimum NearSearch::end() const {
 
 Minimum minimise_near(const ResidualFunction& function, std::span<const FitParameter> parameters,
                       std::span<const double> start, const FixedMask& fixed) {
-  if (const ResidualFunction* scout = function.scout()) {
-    return minimise_by_scout(function, *scout, parameters, start, fixed);
+  if (const ResidualFunction* surrogate = function.surrogate()) {
+    return minimise_by_surrogate(function, *surrogate, parameters, start, fixed);
   }
   NearSearch search(function, parameters, start, fixed);
   if (!search.begin()) return minimise(function, parameters, start, fixed);

@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

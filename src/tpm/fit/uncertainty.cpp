@@ -115,7 +115,7 @@ class ProfileWalk {
         best_deviance_(best_deviance),
         index_(index),
         rise_(rise),
-        accuracy_(function.scout() == nullptr ? kLimitAccuracy : kCostlyLimitAccuracy),
+        accuracy_(function.surrogate() == nullptr ? kLimitAccuracy : kCostlyLimitAccuracy),
         fixed_(parameters.size(), false) {
     fixed_[index] = true;
   }

@@ -27,7 +27,7 @@ SimulationRun run_with_mass(const ExperimentScene& scene, const RunNetwork& netw
   const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
     const PartOfProtocol part(scene, times.back());
     options.tolerance = part.tolerance;
-    const Inertial equations(driven.bonds, driven.rest, driven.freedom, driven.probes, mass_kg,
+    const Inertial equations(driven.bonds, driven.rest, driven.constraints, driven.probes, mass_kg,
                              options);
     const auto see = [&](const QuasiStaticState& state, const Eigen::VectorXd& pushes) {
       recorder.see(state, pushes);
@@ -37,7 +37,7 @@ SimulationRun run_with_mass(const ExperimentScene& scene, const RunNetwork& netw
   };
   SimulationRun result = run_in_parts(scene, network, controls, run_part);
   result.lowest_frequency_Hz =
-      lowest_mode(driven.bonds, driven.rest, driven.freedom, mass_kg).frequency_Hz;
+      lowest_mode(driven.bonds, driven.rest, driven.constraints, mass_kg).frequency_Hz;
   return result;
 }
 

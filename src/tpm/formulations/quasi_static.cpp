@@ -14,7 +14,7 @@ std::size_t parts_of(const ExperimentScene& scene, const RunNetwork& network) {
   constexpr double kMostRestart = 1.25e9;  // operations
   constexpr std::size_t kPiecesAPart = 8;  // of the protocol
   const std::size_t least = std::min(scene.protocol.knots().size() / kPiecesAPart + 1, kRunParts);
-  const SolverChoice factor = choose_solver(network.driven.bonds, network.driven.freedom,
+  const SolverChoice factor = choose_solver(network.driven.bonds, network.driven.constraints,
                                             {.solver = scene.formulation.solver});
   if (!factor.direct) return kRunParts;
   return std::max<std::size_t>(least, kRestart * factor.operations < kMostRestart ? 2 : 1);
@@ -41,7 +41,7 @@ class QuasiStaticFormulation final : public Formulation,
     const auto run_part = [&](Recorder& recorder, std::span<const double> times) {
       const PartOfProtocol part(scene, times.back());
       const DrivenNetwork& driven = network.driven;
-      const QuasiStatic equations(driven.bonds, driven.rest, driven.freedom, driven.probes,
+      const QuasiStatic equations(driven.bonds, driven.rest, driven.constraints, driven.probes,
                                   {.tolerance = part.tolerance,
                                    .energies = true,
                                    .equilibrium = {.solver = scene.formulation.solver}});

@@ -77,7 +77,7 @@ LoopModel condensed_model(const HilSession& session) {
   options.depth_m = scene.deepest_m;
   options.period_s = session.servo.period_s;
   const CondensedContact condensed =
-      build_condensed(scene.tissue.bonds(), scene.rest(), scene.tissue.freedom(),
+      build_condensed(scene.tissue.bonds(), scene.rest(), scene.tissue.constraints(),
                       scene.probe.sphere, scene.probe.direction, options);
   LoopModel loop = scene.begun("condensed", "seen from");
   loop.model = std::make_unique<CondensedContact>(condensed);

@@ -52,7 +52,7 @@ class StaticFormulation final : public Formulation, public SceneRunner, public S
     return {driven.bonds,
             driven.rest,
             network.network.organ.spacing,
-            driven.freedom,
+            driven.constraints,
             driven.probes,
             scene.protocol.drive(),
             scene.protocol.peak(),

@@ -45,7 +45,7 @@ class StepRuleFormulation final : public Formulation, public SceneRunner {
     if (!scene.formulation.masses) return std::nullopt;
     const DrivenNetwork& driven = network.driven;
     Eigen::VectorXd mass_kg = masses_kg(scene, network);
-    const LowestMode lowest = lowest_mode(driven.bonds, driven.rest, driven.freedom, mass_kg);
+    const LowestMode lowest = lowest_mode(driven.bonds, driven.rest, driven.constraints, mass_kg);
     const double drag = 2.0 * scene.formulation.damping_ratio * lowest.angular_frequency();
     return MethodMasses{std::move(mass_kg), drag};
   }

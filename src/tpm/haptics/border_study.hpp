@@ -59,7 +59,7 @@ struct BorderStudy {
   PlantSettings plant;
   double relaxation_time_s = 0.01;          ///< where rate, delay and friction vary
   double stiffness_N_per_m = 300.0;         ///< at once, where the relaxation time varies
-  std::vector<BorderPoint> passive;         ///< largest stiffness at once, N/m
+  std::vector<BorderPoint> passive;         ///< largest instantaneous stiffness, N/m
   std::vector<BorderPoint> stable;          ///< the same, of device and arm together
   std::vector<RulePoint> rules;             ///< at 1 kHz
   std::vector<BorderPoint> shortest;        ///< smallest relaxation time, s, forward Euler

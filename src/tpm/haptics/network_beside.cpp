@@ -16,10 +16,10 @@ constexpr std::uint64_t kOldest = 4;  // steps of the network that an answer may
 }  // namespace
 
 StiffnessByDepth::StiffnessByDepth(const BondSystem& bonds, const Positions& rest,
-                                   const Freedom& freedom, std::size_t contact,
+                                   const Constraints& constraints, std::size_t contact,
                                    const Eigen::Vector3d& into_tissue, double deepest_m)
     : into_(into_tissue) {
-  PushedContact tissue(bonds, rest, freedom, contact);
+  PushedContact tissue(bonds, rest, constraints, contact);
   const auto count = static_cast<int>(std::max(1.0, std::ceil(deepest_m / kStiffnessStride_m)));
   stride_m_ = deepest_m / count;
   for (int i = 0; i <= count; ++i) {

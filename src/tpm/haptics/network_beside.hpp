@@ -12,7 +12,7 @@ namespace tpm {
 class StiffnessByDepth {
  public:
   /// Arguments as of ServoNetwork. Throws Error(numerical) where the tissue buckles.
-  StiffnessByDepth(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  StiffnessByDepth(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                    std::size_t contact, const Eigen::Vector3d& into_tissue, double deepest_m);
   /// N/m; beyond the range that of its end.
   [[nodiscard]] Eigen::Matrix3d at(const Eigen::Vector3d& displacement_m) const noexcept;

@@ -146,19 +146,19 @@ LoopModel planned_model(const HilSession& session, const PlanningTold& told) {
 LoopModel offered_loop(const Formulation& formulation, const HilSession& session) {
   const PushedScene pushed(session);
   const ExperimentScene scene = scene_of(pushed, range_of(session, pushed.deepest_m));
-  const PlanScout scout(PlanScene(scene), {}, false);
+  const PlanSurrogate surrogate(PlanScene(scene), {}, false);
   PlanBudget budget;
   budget.rate_Hz = 1.0 / session.servo.period_s;
   std::string reason = "no candidate that a loop steps";
-  for (const auto& candidate : formulation.as<PlanOffer>()->candidates(scout.scene())) {
+  for (const auto& candidate : formulation.as<PlanOffer>()->candidates(surrogate.scene())) {
     if (!candidate->for_loop()) continue;
-    if (const auto why = candidate->why_not(scout, budget)) {
+    if (const auto why = candidate->why_not(surrogate, budget)) {
       reason = *why;
       continue;
     }
     LoopModel loop = pushed.begun(candidate->name(), "seen from");
     loop.error_bound = "not verified beforehand; what tpm hil verify measures";
-    auto models = candidate->contacts(scout, std::array{session.servo.period_s, kDrawnEvery_s});
+    auto models = candidate->contacts(surrogate, std::array{session.servo.period_s, kDrawnEvery_s});
     loop.model = std::move(models.front());
     if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
     return loop;

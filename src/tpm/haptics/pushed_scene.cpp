@@ -49,7 +49,7 @@ LoopModel PushedScene::begun(std::string_view kind, std::string_view how) const 
 std::unique_ptr<ServoNetwork> PushedScene::network(double period_s) const {
   const ServoNetworkOptions options{
       .period_s = period_s, .frozen_depth_m = 0.5 * deepest_m, .deepest_m = deepest_m};
-  return std::make_unique<ServoNetwork>(tissue.bonds(), rest(), tissue.freedom(), probe.sphere,
+  return std::make_unique<ServoNetwork>(tissue.bonds(), rest(), tissue.constraints(), probe.sphere,
                                         probe.direction, options);
 }
 

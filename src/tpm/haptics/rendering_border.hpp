@@ -41,7 +41,8 @@ struct RenderedContact {
 /// Which of the two ways to find a border.
 enum class BorderBy { measurement, prediction };
 
-/// Largest stiffness at once that is passive on a device with that friction, N/m, by bisection.
+/// Largest instantaneous stiffness that is passive on a device with that friction, N/m, by
+/// bisection.
 [[nodiscard]] double largest_passive_stiffness(RenderedContact contact, double damping_N_s_per_m,
                                                BorderBy by);
 
@@ -56,8 +57,8 @@ enum class BorderBy { measurement, prediction };
 [[nodiscard]] double loop_spectral_radius(const RenderedContact& contact,
                                           const PlantSettings& plant);
 
-/// Largest stiffness at once at which device, arm and contact come to rest, N/m, by bisection: on
-/// the simulated device, or by the spectral radius.
+/// Largest instantaneous stiffness at which device, arm and contact come to rest, N/m, by
+/// bisection: on the simulated device, or by the spectral radius.
 [[nodiscard]] double largest_stable_stiffness(RenderedContact contact, const PlantSettings& plant,
                                               BorderBy by);
 

@@ -90,11 +90,12 @@ LoopModel surface_model(const HilSession& session) {
   const SurfaceScene surface(session);
   const PushedScene& scene = surface.scene;
   const BondSystem bonds = scene.tissue.bonds();
-  const Freedom freedom = scene.tissue.freedom();
+  const Constraints constraints = scene.tissue.constraints();
   const auto network = [&](double period_s) {
     const SurfaceNetworkOptions options{
         .period_s = period_s, .deepest_m = std::max(kLeastRange_m, kRoomAside * scene.deepest_m)};
-    return std::make_unique<SurfaceNetwork>(bonds, scene.rest(), freedom, surface.ball, options);
+    return std::make_unique<SurfaceNetwork>(bonds, scene.rest(), constraints, surface.ball,
+                                            options);
   };
   LoopModel loop = scene.begun(
       "surface", fmt::format("under a ball of {} mm that moves over them in space, starting at",

@@ -106,10 +106,10 @@ double apart_from_reference(const Verification& v, const std::vector<double>& ti
   return most;
 }
 
-void ask(Verification& v, const std::string& what, const std::function<void()>& opinion) {
+void ask(Verification& v, const std::string& what, const std::function<void()>& cross_check) {
   const std::size_t others = v.others.size();
   try {
-    opinion();
+    cross_check();
   } catch (const Error& error) {
     if (error.code() != ExitCode::numerical) throw;
     v.others.resize(others);

@@ -11,7 +11,7 @@ struct VerifyOptions {
   double motion_tolerance_m = 5e-6;  ///< of the decimated motion, > 0; not of a ball in space
   double spacing_s = 0.01;           ///< of the instants compared, >= the period
   double tolerance = 1e-9;           ///< of the reference run, see QuasiStaticOptions
-  /// Of the second opinion, from the start; of a tool that moves in space from the first touch; 0:
+  /// Of the cross-check, from the start; of a tool that moves in space from the first touch; 0:
   /// none.
   double window_s = 10.0;
   double window_tolerance = 1e-9;  ///< of its integrator, relative
@@ -30,12 +30,12 @@ struct PhaseFidelity {
   double depth_rms_m = 0.0;  ///< of the tool from the depth asked for; says how well it was guided
 };
 
-/// A second opinion on the same motion.
-struct OtherOpinion {
+/// A cross-check on the same motion.
+struct CrossCheck {
   std::string name;
   double start_s = 0.0, end_s = 0.0;
-  ForceFidelity commanded;  ///< against this opinion
-  double apart_N = 0.0;     ///< between this opinion and the reference, at most
+  ForceFidelity commanded;  ///< against this cross-check
+  double apart_N = 0.0;     ///< between this cross-check and the reference, at most
 };
 
 /// A reading of the experiment beside the session's.
@@ -51,13 +51,13 @@ struct Verification {
   bool whole = true;  ///< false: the recording is cut off; verified up to there
   ForceFidelity all;
   std::vector<PhaseFidelity> phases;
-  std::vector<OtherOpinion> others;
+  std::vector<CrossCheck> others;
   std::vector<BesideExperiment> experiment;
   std::size_t knots = 0;  ///< of the motion that the reference was moved through
   /// How far what was recorded lies from the lines between the knots, at most.
   double motion_tolerance_m = 0.0;
-  /// What that can cost: times the stiffness at once. None where every instant compared is a knot:
-  /// what lies between is then part of the reference's error.
+  /// What that can cost: times the instantaneous stiffness. None where every instant compared is a
+  /// knot: what lies between is then part of the reference's error.
   std::optional<double> motion_error_N;
   double reference_error_N = 0.0;  ///< as the reference run estimates
   double model_error_N = 0.0;      ///< largest estimate of the model itself, in any period

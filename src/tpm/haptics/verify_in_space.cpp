@@ -57,7 +57,7 @@ std::vector<std::optional<Eigen::Vector3d>> forces_on_ball(const SurfaceScene& s
                                                            const std::vector<BallPlace>& places,
                                                            std::size_t stride) {
   BallOnNetwork network(surface.scene.tissue.bonds(), surface.scene.rest(),
-                        surface.scene.tissue.freedom(), surface.ball);
+                        surface.scene.tissue.constraints(), surface.ball);
   std::vector<std::optional<Eigen::Vector3d>> forces;
   double before_s = places.front().time_s;
   for (std::size_t k = 1; k < places.size(); k += stride) {
@@ -93,21 +93,21 @@ void ask_cvode_in_space(Verification& v, const SurfaceScene& surface,
   // some micronewtons already.
   constexpr double kFinest = 1e-8;
   const std::vector<Eigen::Vector3d> answer = ball_forces_by_cvode(
-      surface.scene.tissue.bonds(), surface.scene.rest(), surface.scene.tissue.freedom(),
+      surface.scene.tissue.bonds(), surface.scene.rest(), surface.scene.tissue.constraints(),
       surface.ball, window, std::max(kFinest, options.window_tolerance));
   FidelitySum sum;
-  OtherOpinion& opinion = v.others.emplace_back();
+  CrossCheck& cross_check = v.others.emplace_back();
   for (std::size_t i = 1; i < answer.size(); ++i) {
     const std::size_t k = touched + i - 1;
     if (!reference[k]) continue;
     const Eigen::Map<const Eigen::Vector3d> commanded_N(rows[compared[k]]->commanded_N);
     sum.add_error((surface.to_model * commanded_N - answer[i]).norm(), answer[i].norm());
-    opinion.apart_N = std::max(opinion.apart_N, (answer[i] - *reference[k]).norm());
+    cross_check.apart_N = std::max(cross_check.apart_N, (answer[i] - *reference[k]).norm());
   }
-  opinion.name = "CVODE (Adams) on what the bonds remember, in balance at each evaluation";
-  opinion.start_s = window.front().time_s;
-  opinion.end_s = window.back().time_s;
-  opinion.commanded = sum.take();
+  cross_check.name = "CVODE (Adams) on what the bonds remember, in balance at each evaluation";
+  cross_check.start_s = window.front().time_s;
+  cross_check.end_s = window.back().time_s;
+  cross_check.commanded = sum.take();
 }
 
 }  // namespace

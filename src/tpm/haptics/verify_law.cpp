@@ -23,9 +23,9 @@ std::vector<double> touched_depth_m(const RowList& rows) {
   return depth;
 }
 
-OtherOpinion opinion_of(const Verification& v, std::string name, const std::vector<double>& time_s,
-                        const std::vector<double>& answer_N, const HilRecording& recording,
-                        const RowList& rows) {
+CrossCheck cross_check_of(const Verification& v, std::string name,
+                          const std::vector<double>& time_s, const std::vector<double>& answer_N,
+                          const HilRecording& recording, const RowList& rows) {
   FidelitySum sum;
   for (std::size_t i = 0; i < time_s.size(); ++i) {
     sum.add(recording.commanded_N(*rows[i]), answer_N[i]);
@@ -51,22 +51,22 @@ std::optional<double> measured_at(const HilSession& session, double time_s) {
 void put_beside_recording(Verification& v, const HilRecording& recording, const RowList& rows) {
   const HilSession& session = recording.session;
   if (session.measured_N.size() < 2) return;
-  OtherOpinion& opinion = v.others.emplace_back();
-  opinion.name =
+  CrossCheck& cross_check = v.others.emplace_back();
+  cross_check.name =
       fmt::format("MEASURED: the recording {}, its offset taken off", session.phases.back().name);
   FidelitySum sum;
   for (const ServoRecord* row : rows) {
     const auto measured_N = measured_at(session, recording.time_s(*row));
     if (!measured_N) continue;
-    if (opinion.end_s == 0.0) opinion.start_s = recording.time_s(*row);
-    opinion.end_s = recording.time_s(*row);
+    if (cross_check.end_s == 0.0) cross_check.start_s = recording.time_s(*row);
+    cross_check.end_s = recording.time_s(*row);
     sum.add(recording.commanded_N(*row), *measured_N);
   }
-  opinion.commanded = sum.take();
+  cross_check.commanded = sum.take();
   for (std::size_t k = 0; k < v.time_s.size(); ++k) {
     const auto measured_N = measured_at(session, v.time_s[k]);
     if (!measured_N || std::isnan(v.reference_N[k])) continue;
-    opinion.apart_N = std::max(opinion.apart_N, std::abs(*measured_N - v.reference_N[k]));
+    cross_check.apart_N = std::max(cross_check.apart_N, std::abs(*measured_N - v.reference_N[k]));
   }
 }
 
@@ -104,11 +104,11 @@ Verification verify_law(const HilRecording& recording, const VerifyOptions& opti
   }
   compare_phases(v, recording, rows, compared, v.reference_N);
   if (integral) {
-    v.others.push_back(
-        opinion_of(v, "Ting's solution, as far as it answers", time_s, by_model, recording, rows));
+    v.others.push_back(cross_check_of(v, "Ting's solution, as far as it answers", time_s, by_model,
+                                      recording, rows));
   } else if (branches) {
     v.others.push_back(
-        opinion_of(v, "the law's integral by Gauss's rule", time_s, by_gauss, recording, rows));
+        cross_check_of(v, "the law's integral by Gauss's rule", time_s, by_gauss, recording, rows));
   }
   if (!v.others.empty() && !integral) v.reference_error_N = v.others.front().apart_N;
   put_beside_recording(v, recording, rows);

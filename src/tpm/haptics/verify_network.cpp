@@ -56,12 +56,12 @@ void ask_cvode(Verification& v, const HilRecording& recording, const DrivenNetwo
   const std::vector<double> answer(run.response.begin(), run.response.end());
   FidelitySum sum;
   for (std::size_t k = 0; k < times.size(); ++k) sum.add(v.commanded_N[k], answer[k]);
-  OtherOpinion& opinion = v.others.emplace_back();
-  opinion.name = "CVODE (BDF) on what the bonds remember, in balance at each evaluation";
-  opinion.start_s = times.front();
-  opinion.end_s = times.back();
-  opinion.commanded = sum.take();
-  opinion.apart_N = apart_from_reference(v, times, answer);
+  CrossCheck& cross_check = v.others.emplace_back();
+  cross_check.name = "CVODE (BDF) on what the bonds remember, in balance at each evaluation";
+  cross_check.start_s = times.front();
+  cross_check.end_s = times.back();
+  cross_check.commanded = sum.take();
+  cross_check.apart_N = apart_from_reference(v, times, answer);
 }
 
 /// The star's own models: in closed form on every sample, and CVODES on the reference's motion.
@@ -217,10 +217,11 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   QuasiStaticOptions settings;
   settings.tolerance = options.tolerance;
   // As in the loop, the tool takes the sphere along the push and not across it.
-  Freedom freedom = tissue.freedom();
-  freedom.guide(probe.sphere, probe.direction);
-  const DrivenNetwork driven = driven_network(bonds, tissue.network.organ, freedom, {probe}, {});
-  const QuasiStatic network(bonds, driven.rest, freedom, probe, settings);
+  Constraints constraints = tissue.constraints();
+  constraints.guide(probe.sphere, probe.direction);
+  const DrivenNetwork driven =
+      driven_network(bonds, tissue.network.organ, constraints, {probe}, {});
+  const QuasiStatic network(bonds, driven.rest, constraints, probe, settings);
 
   const std::vector<std::size_t> compared =
       compared_rows(recording, rows.size(), options.spacing_s);

@@ -49,8 +49,8 @@ void compare_phases(Verification& v, const HilRecording& recording, const RowLis
 [[nodiscard]] double apart_from_reference(const Verification& v, const std::vector<double>& time_s,
                                           const std::vector<double>& answer_N);
 
-/// Asks for a second opinion; one that cannot be had becomes a note.
-void ask(Verification& v, const std::string& what, const std::function<void()>& opinion);
+/// Asks for a cross-check; one that cannot be had becomes a note.
+void ask(Verification& v, const std::string& what, const std::function<void()>& cross_check);
 
 /// Drops the instants without a reference, and counts them. Throws Error(numerical) if less than
 /// half are left.

@@ -16,9 +16,8 @@ Eigen::ArrayXd kept(const Memory& memory, const ContactEdge& edge) {
 double ContactHistory::force_within(const ContactEdge& edge) const {
   const Memory& m = law_.memory;
   const Point met = imposed(edge.met_drive, true);
-  const double remembered = (m.stiffness.array() * kept(m, edge) * (met.v - w_)).sum();
-  return law_.offset + m.constant * met.v + remembered +
-         law_.kernel.tangent(met.u).slope * edge.pull;
+  const double viscous = (m.stiffness.array() * kept(m, edge) * (met.v - w_)).sum();
+  return law_.offset + m.constant * met.v + viscous + law_.kernel.tangent(met.u).slope * edge.pull;
 }
 
 Slopes ContactHistory::force_slopes_within(const ContactEdge& edge) const {

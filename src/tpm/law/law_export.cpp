@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/law/law_json.hpp"
 #include "tpmkit/error.hpp"
 

@@ -341,10 +341,10 @@ void LawModel::require_no_jump(const Protocol& protocol, double contact) const {
   double before = protocol.relaxed_at_start() ? knots.front().value : 0.0;
   double time = knots.front().time_s;
   for (const Knot& k : knots) {
-    const bool at_once = k.time_s == time && &k != knots.data();
+    const bool instantaneous = k.time_s == time && &k != knots.data();
     const bool first = &k == knots.data();
     const double depth = std::max(k.value - contact, 0.0);
-    if ((at_once || first) && depth != std::max(before - contact, 0.0)) {
+    if ((instantaneous || first) && depth != std::max(before - contact, 0.0)) {
       throw bad_input(fmt::format("law {}", name_),
                       fmt::format("the drive jumps at {} s, which a spring-pot answers with an "
                                   "infinite force",

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "tpm/core/dense_algebra.hpp"
-#include "tpm/core/word_table.hpp"
+#include "tpm/core/enum_names.hpp"
 #include "tpm/law/law_json.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"

@@ -84,14 +84,14 @@ CreepSteps::CreepSteps(const LawAtParameters& law, double load, Want want)
     course_by_.setZero(kCreepNodes + 1, law.parameter_count);
   }
   if (slow_start_ || !(load_ > 0.0)) return;
-  ContactHistory at_once(law, law.tension.reference, want);
-  at_once.jump_to_load(load);
-  u_ = at_once.drive() - law.contact;
+  ContactHistory instantaneous(law, law.tension.reference, want);
+  instantaneous.jump_to_load(load);
+  u_ = instantaneous.drive() - law.contact;
   const KernelShape::Values k = law_.kernel.at(u_);
   v_ = k.value;
   y_.setConstant(v_);
   if (!want_slopes_) return;
-  Slopes u_by = at_once.drive_slopes();
+  Slopes u_by = instantaneous.drive_slopes();
   u_by[law.place.contact] -= 1.0;
   course_by_.row(0) = (kernel_slopes(k) + k.slope * u_by).matrix().transpose();
   y_by_ = course_by_.row(0).array().replicate(branches, 1);

@@ -58,9 +58,10 @@ BondElement Scene::element() const {
   return scene_->tissue.element("Scene::element()");
 }
 
-double Scene::stiffness_N_per_m(double following) const {
+double Scene::stiffness_N_per_m(double relaxation_factor) const {
   return contact_stiffness_N_per_m(network_->driven.bonds, network_->driven.rest,
-                                   network_->driven.freedom, scene_->probe(), following);
+                                   network_->driven.constraints, scene_->probe(),
+                                   relaxation_factor);
 }
 
 double Scene::instantaneous_stiffness_N_per_m() const {

@@ -72,12 +72,12 @@ double step_relaxation_force_N(const TpmParameters& p, double lambda1, double de
 double creep_depth_m(const TpmParameters& p, double lambda1, double load_N, double time_s) {
   const double sum = p.E1_Pa + p.E2_Pa;
   const double relaxed = p.relaxed_modulus_Pa() + lambda1;
-  const double at_once = p.E2_Pa + lambda1;
+  const double instantaneous = p.E2_Pa + lambda1;
   // T = (P3 + lambda1 P1) / (P2 + lambda1), the retardation time
-  const double retardation = p.eta1_Pa_s * at_once / sum / relaxed;
+  const double retardation = p.eta1_Pa_s * instantaneous / sum / relaxed;
   const double stress_length = load_N / p.modulus_to_stiffness_m();
   const double grown = -std::expm1(-time_s / retardation);
-  return stress_length * (1.0 / at_once + (1.0 / relaxed - 1.0 / at_once) * grown);
+  return stress_length * (1.0 / instantaneous + (1.0 / relaxed - 1.0 / instantaneous) * grown);
 }
 
 }  // namespace tpm

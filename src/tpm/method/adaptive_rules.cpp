@@ -225,7 +225,7 @@ int dae_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunreal
     side(solver->content).system.solve(solution);
   } else {
     auto place = solution.head(balance->places());
-    auto y = solution.tail(balance->remembered());
+    auto y = solution.tail(balance->viscous());
     balance->solve_pair(place, y);
   }
   return 0;
@@ -362,7 +362,7 @@ int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* us
     left = view(z_dot) - left;
   } else {
     const Eigen::Index n = balance->places();
-    const Eigen::Index m = system.remembered();
+    const Eigen::Index m = system.viscous();
     Vector elongation;
     auto imbalance = left.head(n);
     balance->imbalance(t, view(z).head(n), view(z).tail(m), imbalance, elongation);
@@ -382,7 +382,7 @@ int dae_setup(sunrealtype t, sunrealtype c, N_Vector z, N_Vector, N_Vector, SUNM
     return side(user_data).answer(system.factorise(t, view(z), 1.0 / c), t);
   }
   const MethodEnd end = balance->factorise_pair(t, view(z).head(balance->places()),
-                                                view(z).tail(system.remembered()), c);
+                                                view(z).tail(system.viscous()), c);
   return side(user_data).answer(end, t);
 }
 }

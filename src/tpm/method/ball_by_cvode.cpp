@@ -30,12 +30,12 @@ using FixedPoint = std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, Fr
 /// The network as an equation for what its bonds remember.
 class RememberingNetwork {
  public:
-  RememberingNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  RememberingNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                      const BallTool& ball, std::span<const BallPlace> places)
-      : network_(bonds, rest, freedom, ball),
+      : network_(bonds, rest, constraints, ball),
         places_(places),
         viscous_(bonds),
-        balance_(network_.bonds, network_.freedom, work_),
+        balance_(network_.bonds, network_.constraints, work_),
         load_(Eigen::Matrix3Xd::Zero(3, network_.position.cols())) {
     memory_.offset = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(network_.bonds.size()));
   }
@@ -111,11 +111,12 @@ extern "C" int ball_rate(sunrealtype t, N_Vector y, N_Vector y_dot, void* networ
 }  // namespace
 
 std::vector<Eigen::Vector3d> ball_forces_by_cvode(const BondSystem& bonds, const Positions& rest,
-                                                  const Freedom& freedom, const BallTool& ball,
+                                                  const Constraints& constraints,
+                                                  const BallTool& ball,
                                                   std::span<const BallPlace> places,
                                                   double tolerance) {
   using sundials::check;
-  RememberingNetwork network(bonds, rest, freedom, ball, places);
+  RememberingNetwork network(bonds, rest, constraints, ball, places);
   std::vector<Eigen::Vector3d> forces;
   if (places.empty()) return forces;
   const sundials::Context context = sundials::make_context();

@@ -22,7 +22,7 @@ struct BallPlace {
 /// Throws Error(bad_input) as NetworkUnderBall, Error(numerical) where forces cannot be balanced or
 /// the integrator gives up.
 [[nodiscard]] std::vector<Eigen::Vector3d> ball_forces_by_cvode(
-    const BondSystem& bonds, const Positions& rest, const Freedom& freedom, const BallTool& ball,
-    std::span<const BallPlace> places, double tolerance);
+    const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
+    const BallTool& ball, std::span<const BallPlace> places, double tolerance);
 
 }  // namespace tpm

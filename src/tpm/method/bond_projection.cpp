@@ -2,13 +2,13 @@
 
 namespace tpm {
 
-BondProjection::BondProjection(const BondSystem& bonds, const Freedom& freedom)
+BondProjection::BondProjection(const BondSystem& bonds, const Constraints& constraints)
     : bonds_(bonds),
-      freedom_(freedom),
+      constraints_(constraints),
       tension_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size()))) {}
 
 void BondProjection::sweep(Positions& position, const BondMemory& memory,
-                           const Eigen::VectorXd& give_m_per_N) {
+                           const Eigen::VectorXd& compliance_m_per_N) {
   for (std::size_t i = 0; i < bonds_.first_contact(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const std::uint32_t a = bonds_.end_a()[i];
@@ -20,7 +20,7 @@ void BondProjection::sweep(Positions& position, const BondMemory& memory,
     const bool slack = bonds_.is_rope(i) && l < 0.0;
     const double g = bonds_.relaxing()[row];
     const ViscousLaw& law = bonds_.laws()[bonds_.law_of(i)];
-    const double follows = 1.0 - memory.following(bonds_.law_of(i));
+    const double follows = 1.0 - memory.relaxation_factor(bonds_.law_of(i));
     double slope = 0.0;
     double pull = 0.0;
     if (!slack) {
@@ -28,10 +28,10 @@ void BondProjection::sweep(Positions& position, const BondMemory& memory,
       slope = k * law.equilibrium_slope(l) + g * follows * law.kernel.slope(l);
       pull = k * law.equilibrium(l) + g * (follows * law.kernel.value(l) - memory.offset[row]);
     }
-    const Eigen::Vector3d move_a = give_m_per_N[a] * (freedom_.projector(a) * n);
-    const Eigen::Vector3d move_b = give_m_per_N[b] * (freedom_.projector(b) * n);
-    const double give = n.dot(move_a + move_b);
-    const double more = (pull - tension_[row]) / (1.0 + slope * give);
+    const Eigen::Vector3d move_a = compliance_m_per_N[a] * (constraints_.projector(a) * n);
+    const Eigen::Vector3d move_b = compliance_m_per_N[b] * (constraints_.projector(b) * n);
+    const double compliance = n.dot(move_a + move_b);
+    const double more = (pull - tension_[row]) / (1.0 + slope * compliance);
     tension_[row] += more;
     position.col(a) += more * move_a;
     position.col(b) -= more * move_b;

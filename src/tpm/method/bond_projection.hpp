@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "tpm/network/bond_system.hpp"
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 
 namespace tpm {
 
@@ -15,7 +15,7 @@ namespace tpm {
 class BondProjection {
  public:
   /// @param bonds, freedom must live as long as this; contacts with tools are not projected
-  BondProjection(const BondSystem& bonds, const Freedom& freedom);
+  BondProjection(const BondSystem& bonds, const Constraints& constraints);
 
   /// Multipliers start at 0.
   void forget() { tension_.setZero(); }
@@ -25,12 +25,13 @@ class BondProjection {
   }
 
   /// One sweep over the bonds in their order (Gauss-Seidel).
-  /// @param give_m_per_N how far each sphere goes under a force
-  void sweep(Positions& position, const BondMemory& memory, const Eigen::VectorXd& give_m_per_N);
+  /// @param compliance_m_per_N how far each sphere goes under a force
+  void sweep(Positions& position, const BondMemory& memory,
+             const Eigen::VectorXd& compliance_m_per_N);
 
  private:
   const BondSystem& bonds_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   Eigen::VectorXd tension_;  ///< N
 };
 

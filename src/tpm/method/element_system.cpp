@@ -22,12 +22,12 @@ class ElementForce {
         tension_(p.tension()) {}
 
   [[nodiscard]] double relaxing() const { return relaxing_; }
-  [[nodiscard]] double force(double e, double offset, double following) const {
-    return (stiffness_ - following * relaxing_) * e - relaxing_ * offset +
+  [[nodiscard]] double force(double e, double offset, double relaxation_factor) const {
+    return (stiffness_ - relaxation_factor * relaxing_) * e - relaxing_ * offset +
            unit_ * tension_.value(e);
   }
-  [[nodiscard]] double slope(double e, double following) const {
-    return stiffness_ - following * relaxing_ + unit_ * tension_.slope(e);
+  [[nodiscard]] double slope(double e, double relaxation_factor) const {
+    return stiffness_ - relaxation_factor * relaxing_ + unit_ * tension_.slope(e);
   }
 
  private:
@@ -60,7 +60,7 @@ class ElementSystem final : public StageSystem,
                             : 0.0) {}
 
   [[nodiscard]] Eigen::Index coordinates() const override { return moves_ ? 1 : 0; }
-  [[nodiscard]] Eigen::Index remembered() const override { return 1; }
+  [[nodiscard]] Eigen::Index viscous() const override { return 1; }
   [[nodiscard]] const Vector& relaxation_times_s() const override { return times_s_; }
   [[nodiscard]] double drag_per_s() const override { return drag_; }
   [[nodiscard]] Vector scales() const override {
@@ -118,11 +118,11 @@ class ElementSystem final : public StageSystem,
       if (depth_driven_) {
         ++work().rates;
         e_ = imposed(t);
-      } else if (const auto end = balance(imposed(t), offset, stage.following[0], {}, e_);
+      } else if (const auto end = balance(imposed(t), offset, stage.relaxation_factor[0], {}, e_);
                  end != MethodEnd::completed) {
         return end;
       }
-      state[0] = offset + stage.following[0] * e_;
+      state[0] = offset + stage.relaxation_factor[0] * e_;
       known_ = {imposed(t), state[0]};
       return MethodEnd::completed;
     }
@@ -130,11 +130,11 @@ class ElementSystem final : public StageSystem,
     const Drawn inertia{mass_ * held / (stage.c * stage.c),
                         stage.known[0] + stage.c * stage.known[1] / held};
     double e = state[0];
-    if (const auto end = balance(imposed(t), offset, stage.following[0], inertia, e);
+    if (const auto end = balance(imposed(t), offset, stage.relaxation_factor[0], inertia, e);
         end != MethodEnd::completed) {
       return end;
     }
-    state << e, (e - stage.known[0]) / stage.c, offset + stage.following[0] * e;
+    state << e, (e - stage.known[0]) / stage.c, offset + stage.relaxation_factor[0] * e;
     return MethodEnd::completed;
   }
 
@@ -150,7 +150,7 @@ class ElementSystem final : public StageSystem,
 
   MethodEnd project(double t, double h, int sweeps, Vector& state) override {
     const double ratio = h / tau_;
-    const double following = ratio / (1.0 + ratio);
+    const double relaxation_factor = ratio / (1.0 + ratio);
     const double offset = state[size() - 1] / (1.0 + ratio);
     double weight = 0.0;  // how far the sphere goes under a force, m/N
     double force = 0.0;   // of the constraint
@@ -169,22 +169,22 @@ class ElementSystem final : public StageSystem,
     for (int i = 0; i < sweeps && !depth_driven_; ++i) {
       if (!moves_) {  // the mass is made up: that of the stiffness itself
         weight = 1.0 / law_.slope(e, 0.0);
-        force = law_.force(e, offset, following);
+        force = law_.force(e, offset, relaxation_factor);
         e += weight * (imposed(t) - force);
       }
       ++work().rates;
-      const double more =
-          (law_.force(e, offset, following) - force) / (1.0 + law_.slope(e, following) * weight);
+      const double more = (law_.force(e, offset, relaxation_factor) - force) /
+                          (1.0 + law_.slope(e, relaxation_factor) * weight);
       e -= weight * more;
       force += more;
     }
     if (moves_) {
       const double speed = (e - state[0]) / h;
-      state << e, speed, offset + following * e;
+      state << e, speed, offset + relaxation_factor * e;
       return MethodEnd::completed;
     }
     e_ = e;
-    state[0] = offset + following * e;
+    state[0] = offset + relaxation_factor * e;
     known_ = {imposed(t), state[0]};
     return MethodEnd::completed;
   }
@@ -197,8 +197,9 @@ class ElementSystem final : public StageSystem,
     }
     ++work().factorisations;
     gamma_ = gamma;
-    following_ = gamma / tau_ / (1.0 + gamma / tau_);
-    pivot_ = mass_ * (1.0 + gamma * drag_) + gamma * gamma * law_.slope(state[0], following_);
+    relaxation_factor_ = gamma / tau_ / (1.0 + gamma / tau_);
+    pivot_ =
+        mass_ * (1.0 + gamma * drag_) + gamma * gamma * law_.slope(state[0], relaxation_factor_);
     return pivot_ != 0.0 ? MethodEnd::completed : MethodEnd::newton_failed;
   }
 
@@ -235,8 +236,8 @@ class ElementSystem final : public StageSystem,
                            double per_y) override {
     ++work().factorisations;
     per_y_ = per_y;
-    const double following = 1.0 / (1.0 + per_y * tau_);
-    pivot_ = depth_driven_ ? 1.0 : law_.slope(place[0], following);
+    const double relaxation_factor = 1.0 / (1.0 + per_y * tau_);
+    pivot_ = depth_driven_ ? 1.0 : law_.slope(place[0], relaxation_factor);
     return pivot_ != 0.0 ? MethodEnd::completed : MethodEnd::newton_failed;
   }
 
@@ -275,7 +276,8 @@ class ElementSystem final : public StageSystem,
   }
 
   /// Where the element and what draws it carry a load.
-  MethodEnd balance(double load, double offset, double following, const Drawn& drawn, double& at) {
+  MethodEnd balance(double load, double offset, double relaxation_factor, const Drawn& drawn,
+                    double& at) {
     constexpr int kMost = 100;
     double e = at;
     for (int i = 0; i < kMost; ++i) {
@@ -283,8 +285,8 @@ class ElementSystem final : public StageSystem,
       ++work().factorisations;
       ++work().solves;
       const double left =
-          law_.force(e, offset, following) + drawn.stiffness * (e - drawn.to) - load;
-      const double slope = law_.slope(e, following) + drawn.stiffness;
+          law_.force(e, offset, relaxation_factor) + drawn.stiffness * (e - drawn.to) - load;
+      const double slope = law_.slope(e, relaxation_factor) + drawn.stiffness;
       // Where nothing resists at rest, tension does further on.
       const double step = slope > 0.0 ? left / slope : std::copysign(depth_scale_, left);
       if (!std::isfinite(step)) return MethodEnd::newton_failed;
@@ -327,7 +329,7 @@ class ElementSystem final : public StageSystem,
   };
   Known known_{0.0, 0.0};  ///< what it belongs to
 
-  double gamma_ = 0.0, per_y_ = 0.0, following_ = 0.0, pivot_ = 0.0;
+  double gamma_ = 0.0, per_y_ = 0.0, relaxation_factor_ = 0.0, pivot_ = 0.0;
 };
 
 }  // namespace

@@ -15,9 +15,10 @@ constexpr double kForceGrain = 8.0 * std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
-ImplicitBalance::ImplicitBalance(const BondSystem& bonds, const Freedom& freedom, MethodWork& work)
+ImplicitBalance::ImplicitBalance(const BondSystem& bonds, const Constraints& constraints,
+                                 MethodWork& work)
     : bonds_(bonds),
-      freedom_(freedom),
+      constraints_(constraints),
       work_(work),
       matrix_(bonds.pattern()),
       factor_(bonds.pattern()),
@@ -57,7 +58,7 @@ bool ImplicitBalance::factorise_matrix(const Positions& position, const BondMemo
       matrix_.diagonal[i].diagonal().array() += anchors->stiffness[static_cast<Eigen::Index>(i)];
     }
   }
-  freedom_.constrain(bonds_, matrix_);
+  constraints_.constrain(bonds_, matrix_);
   return factor.factorise(matrix_);
 }
 
@@ -72,21 +73,22 @@ void ImplicitBalance::displace(Eigen::Matrix3Xd& vectors) {
 
 void ImplicitBalance::displace(Eigen::Matrix3Xd& vectors, const BlockLdlt& factor) {
   ++work_.solves;
-  freedom_.project(vectors);
+  constraints_.project(vectors);
   factor.solve(vectors);
-  freedom_.project(vectors);
+  constraints_.project(vectors);
 }
 
 ImplicitBalance::KeptFactor& ImplicitBalance::kept_for(const BondMemory& memory,
                                                        const SphereAnchors* anchors) {
   const double anchored = anchors == nullptr ? 0.0 : anchors->stiffness.maxCoeff();
   for (KeptFactor& kept : kept_) {
-    const bool alike = kept.following == memory.following && kept.anchored == anchored;
+    const bool alike =
+        kept.relaxation_factor == memory.relaxation_factor && kept.anchored == anchored;
     if (kept.used > 0 && alike) return kept;
   }
   KeptFactor& oldest = kept_[0].used <= kept_[1].used ? kept_[0] : kept_[1];
   oldest.used = 0;
-  oldest.following = memory.following;
+  oldest.relaxation_factor = memory.relaxation_factor;
   oldest.anchored = anchored;
   return oldest;
 }
@@ -106,7 +108,7 @@ MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
     if (anchors != nullptr) {
       force_ -= (position - anchors->to) * anchors->stiffness.asDiagonal();
     }
-    freedom_.project(force_);
+    constraints_.project(force_);
     const double left = force_.colwise().norm().maxCoeff();
     if (!std::isfinite(left)) return MethodEnd::newton_failed;
     if (left <= tolerance && iteration > 0) {

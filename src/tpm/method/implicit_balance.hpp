@@ -20,7 +20,7 @@ struct SphereAnchors {
 class ImplicitBalance {
  public:
   /// @param bonds, freedom, work must live as long as this
-  ImplicitBalance(const BondSystem& bonds, const Freedom& freedom, MethodWork& work);
+  ImplicitBalance(const BondSystem& bonds, const Constraints& constraints, MethodWork& work);
 
   /// @param position start, with what is imposed in place; the balance if `completed`
   /// @param load on each sphere, N
@@ -39,7 +39,7 @@ class ImplicitBalance {
   struct KeptFactor {
     explicit KeptFactor(const BlockPattern& pattern) : factor(pattern) {}
     BlockLdlt factor;
-    Following following;
+    RelaxationFactor relaxation_factor;
     double anchored = 0.0;
     long used = 0;  ///< number of the balance that used it last; 0: holds nothing
   };
@@ -56,7 +56,7 @@ class ImplicitBalance {
                                    const SphereAnchors* anchors) const;
 
   const BondSystem& bonds_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   MethodWork& work_;
   BlockMatrix matrix_;
   BlockLdlt factor_;  ///< of factorise()

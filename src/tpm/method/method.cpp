@@ -119,7 +119,7 @@ class MethodDriver {
 
   /// Forces that cannot be balanced because a memory has run away are not the tissue's failure.
   [[nodiscard]] MethodEnd cause(MethodEnd end, const Vector& state) const {
-    const Eigen::Index m = system_.remembered();
+    const Eigen::Index m = system_.viscous();
     const auto reach = kBeyondReach / kDivergedTimes * bound_.tail(m).array();
     return (state.tail(m).cwiseAbs().array() <= reach).all() ? end : MethodEnd::diverged;
   }
@@ -354,7 +354,7 @@ class NetworkProblem final : public MethodProblem {
     if (!network_.tools.empty() || network_.bonds.contact_count() > 0) {
       throw bad_input("network", "contacts with tools", "spheres that are driven themselves");
     }
-    require_valid(network_.probes, network_.freedom);
+    require_valid(network_.probes, network_.constraints);
     if (mass_) require_valid(*mass_, network_.spheres());
   }
 

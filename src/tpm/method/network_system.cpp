@@ -24,9 +24,9 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
   NetworkSystem(const DrivenNetwork& network, const Protocol& protocol)
       : bonds_(network.bonds),
         rest_(network.rest),
-        tissue_(bonds_, rest_, network.freedom, network.probes, protocol.drive()),
-        balance_(bonds_, tissue_.freedom(), work()),
-        projection_(bonds_, tissue_.freedom()),
+        tissue_(bonds_, rest_, network.constraints, network.probes, protocol.drive()),
+        balance_(bonds_, tissue_.constraints(), work()),
+        projection_(bonds_, tissue_.constraints()),
         position_(rest_),
         memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0},
         viscous_(bonds_),
@@ -34,7 +34,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     depth_scale_ = depth_scale(protocol);
   }
 
-  [[nodiscard]] Eigen::Index remembered() const override { return viscous_.size(); }
+  [[nodiscard]] Eigen::Index viscous() const override { return viscous_.size(); }
   [[nodiscard]] const Vector& relaxation_times_s() const override { return viscous_.times_s(); }
 
  protected:
@@ -43,12 +43,12 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
   /// What the bonds pull with where they have the y.
   void set_memory(const ConstVector& y) {
     viscous_.set_mean(y, memory_.offset);
-    memory_.following = 0.0;
+    memory_.relaxation_factor = 0.0;
   }
   /// The same where y = offset + following V(l).
-  void set_memory(const ConstVector& offset, const ConstVector& following) {
+  void set_memory(const ConstVector& offset, const ConstVector& relaxation_factor) {
     viscous_.set_mean(offset, memory_.offset);
-    memory_.following = viscous_.mean_following(following);
+    memory_.relaxation_factor = viscous_.mean_relaxation_factor(relaxation_factor);
   }
 
   /// What is imposed at one time, found in two ways.
@@ -93,16 +93,16 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
 
   /// Positions with everything relaxed under an imposed value.
   MethodEnd relax_under(double imposed, Vector& y) {
-    set_memory(Vector::Zero(remembered()), Vector::Ones(remembered()));
+    set_memory(Vector::Zero(viscous()), Vector::Ones(viscous()));
     const MethodEnd end = follow(0.0, imposed);
     find_elongations(position_, y);
     return end;
   }
 
   /// Bonds pulled sphere by sphere towards what they want, `memory_` in place.
-  void sweep(Positions& position, const Eigen::VectorXd& give_m_per_N) {
+  void sweep(Positions& position, const Eigen::VectorXd& compliance_m_per_N) {
     ++work().rates;
-    projection_.sweep(position, memory_, give_m_per_N);
+    projection_.sweep(position, memory_, compliance_m_per_N);
   }
 
   const BondSystem& bonds_;
@@ -127,9 +127,9 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     // What flows has no end: it is judged by what it does at once and how long it lasts.
     const TissueState rest = tissue_.at_rest(0.0);
     if (!tissue_.equilibrium().factorise(rest.position, rest.memory())) return relaxed;
-    const double at_once = std::abs(tissue_.unit_field(rest, rest.memory()).stiffness) * peak;
+    const double instantaneous = std::abs(tissue_.unit_field(rest, rest.memory()).stiffness) * peak;
     const double lasts = protocol.knots().back().time_s - protocol.start_s();
-    const double most = at_once * (1.0 + lasts / bonds_.shortest_relaxation_time_s());
+    const double most = instantaneous * (1.0 + lasts / bonds_.shortest_relaxation_time_s());
     return relaxed > 0.0 ? std::min(relaxed, most) : most;
   }
 };
@@ -141,12 +141,10 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
 
   [[nodiscard]] Eigen::Index coordinates() const override { return 0; }
   [[nodiscard]] double drag_per_s() const override { return 0.0; }
-  [[nodiscard]] Vector scales() const override {
-    return Vector::Constant(remembered(), depth_scale_);
-  }
+  [[nodiscard]] Vector scales() const override { return Vector::Constant(viscous(), depth_scale_); }
 
   MethodEnd start(const Knot& first, bool relaxed, Vector& state) override {
-    state.setZero(remembered());
+    state.setZero(viscous());
     position_ = rest_;
     known_ = {0.0, state};
     if (!relaxed) return MethodEnd::completed;
@@ -172,10 +170,10 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   }
 
   MethodEnd stage(double t, const ImplicitStage& stage, Vector& state) override {
-    set_memory(stage.known, stage.following);
+    set_memory(stage.known, stage.relaxation_factor);
     if (const auto end = follow(known_.imposed, imposed(t)); end != MethodEnd::completed)
       return end;
-    follow_memory(stage.known, stage.following, imposed(t), state);
+    follow_memory(stage.known, stage.relaxation_factor, imposed(t), state);
     return MethodEnd::completed;
   }
 
@@ -194,21 +192,21 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   /// balances stays.
   MethodEnd project(double t, double h, int sweeps, Vector& state) override {
     const Eigen::ArrayXd ratio = h / relaxation_times_s().array();
-    const Vector following = ratio / (1.0 + ratio);
+    const Vector relaxation_factor = ratio / (1.0 + ratio);
     const Vector offset = state.array() / (1.0 + ratio);
     if (give_.size() == 0) set_give();
-    set_memory(offset, following);
+    set_memory(offset, relaxation_factor);
     tissue_.impose(position_, imposed(t));
     tissue_.load(imposed(t), load_);
     for (int i = 0; i < sweeps; ++i) {
       ++work().rates;
       balance_forces(bonds_, position_, memory_, load_, force_);
-      tissue_.freedom().project(force_);
+      tissue_.constraints().project(force_);
       projection_.remember(position_, memory_);
       position_ += force_ * give_.asDiagonal();
       sweep(position_, give_);
     }
-    follow_memory(offset, following, imposed(t), state);
+    follow_memory(offset, relaxation_factor, imposed(t), state);
     return MethodEnd::completed;
   }
 
@@ -226,7 +224,7 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   [[nodiscard]] Eigen::Index places() const override { return 3 * columns(); }
   [[nodiscard]] Vector placed() const override {
     Eigen::Matrix3Xd displacement = position_ - rest_;
-    tissue_.freedom().project(displacement);
+    tissue_.constraints().project(displacement);
     return displacement.reshaped();
   }
 
@@ -237,10 +235,10 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
     set_memory(y);
     tissue_.load(imposed(t), load_);
     balance_forces(bonds_, put_, memory_, load_, force_);
-    tissue_.freedom().project(force_);
+    tissue_.constraints().project(force_);
     // What is not free has to stay 0.
     Eigen::Matrix3Xd bound = ConstSpheres(place.data(), 3, columns());
-    tissue_.freedom().project(bound);
+    tissue_.constraints().project(bound);
     Spheres left(imbalance.data(), 3, columns());
     left = ConstSpheres(place.data(), 3, columns()) - bound - force_;
     find_elongations(put_, elongation);
@@ -259,7 +257,7 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
     Spheres x(place.data(), 3, columns());
     Eigen::Matrix3Xd right = x;
     Eigen::Matrix3Xd bound = x;
-    tissue_.freedom().project(bound);
+    tissue_.constraints().project(bound);
     bound = x - bound;
     viscous_.set_mean((y.array() / sum).matrix(), all_);
     for (const std::size_t bond : viscous_.bonds()) {
@@ -307,10 +305,10 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   }
 
   /// y at the end of a step, where the positions are.
-  void follow_memory(const ConstVector& offset, const ConstVector& following, double imposed,
-                     Vector& state) {
+  void follow_memory(const ConstVector& offset, const ConstVector& relaxation_factor,
+                     double imposed, Vector& state) {
     find_elongations(position_, elongation_);
-    state = offset + following.cwiseProduct(elongation_);
+    state = offset + relaxation_factor.cwiseProduct(elongation_);
     known_ = {imposed, state};
   }
 
@@ -326,9 +324,9 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
   MethodEnd factorise_at(const Positions& position, const ConstVector& y, double per_y) {
     per_y_ = per_y;
     factorised_at_ = position;
-    const Vector following = 1.0 / (1.0 + per_y * relaxation_times_s().array());
+    const Vector relaxation_factor = 1.0 / (1.0 + per_y * relaxation_times_s().array());
     find_elongations(position, elongation_);
-    set_memory(y - following.cwiseProduct(elongation_), following);
+    set_memory(y - relaxation_factor.cwiseProduct(elongation_), relaxation_factor);
     if (!bonds_.is_linear()) bonds_.kernel_slopes(position, kernel_slope_);
     return balance_.factorise(position, memory_);
   }
@@ -353,7 +351,7 @@ class MovingNetwork final : public NetworkSystem {
         equation_(tissue_, rest_, Inertia{mass.mass_kg, mass.drag_per_s, {}}),
         speed_scale_(
             depth_scale_ *
-            lowest_mode(bonds_, rest_, network.freedom, mass.mass_kg).angular_frequency()) {}
+            lowest_mode(bonds_, rest_, network.constraints, mass.mass_kg).angular_frequency()) {}
 
   void set_piece(const Knot& from, const Knot& to) override {
     StepSystem::set_piece(from, to);
@@ -375,8 +373,8 @@ class MovingNetwork final : public NetworkSystem {
     if (const auto end = relax_under(first.value, y); end != MethodEnd::completed) return end;
     Spheres displacement(state.data(), 3, columns());
     displacement = position_ - rest_;
-    tissue_.freedom().project(displacement);
-    state.tail(remembered()) = y;
+    tissue_.constraints().project(displacement);
+    state.tail(viscous()) = y;
     return MethodEnd::completed;
   }
 
@@ -404,7 +402,7 @@ class MovingNetwork final : public NetworkSystem {
     put(t, to);
     anchors_.to = position_;
     put(t, state);
-    set_memory(stage.known.tail(remembered()), stage.following);
+    set_memory(stage.known.tail(viscous()), stage.relaxation_factor);
     tissue_.load(imposed(t), load_);
     if (const auto end = balance_.find(position_, memory_, load_, depth_scale_, &anchors_);
         end != MethodEnd::completed) {
@@ -412,8 +410,8 @@ class MovingNetwork final : public NetworkSystem {
     }
     take(stage.known, stage.c, state);
     find_elongations(position_, elongation_);
-    state.tail(remembered()) =
-        stage.known.tail(remembered()) + stage.following.cwiseProduct(elongation_);
+    state.tail(viscous()) =
+        stage.known.tail(viscous()) + stage.relaxation_factor.cwiseProduct(elongation_);
     return MethodEnd::completed;
   }
 
@@ -427,21 +425,21 @@ class MovingNetwork final : public NetworkSystem {
     if (h == 0.0) return MethodEnd::completed;
     const Eigen::Index n = coordinates();
     const double held = 1.0 + h * drag_per_s();
-    const Eigen::VectorXd give = h * h / held * equation_.inertia().mass_kg.cwiseInverse();
+    const Eigen::VectorXd compliance = h * h / held * equation_.inertia().mass_kg.cwiseInverse();
     const Eigen::ArrayXd ratio = h / relaxation_times_s().array();
-    const Vector following = ratio / (1.0 + ratio);
-    const Vector offset = state.tail(remembered()).array() / (1.0 + ratio);
+    const Vector relaxation_factor = ratio / (1.0 + ratio);
+    const Vector offset = state.tail(viscous()).array() / (1.0 + ratio);
     const Vector ahead = state.head(n) + h / held * state.segment(n, n);
     put(t, ahead);
     tissue_.load(imposed(t), load_);
-    tissue_.freedom().project(load_);
-    position_ += load_ * give.asDiagonal();
-    set_memory(offset, following);
+    tissue_.constraints().project(load_);
+    position_ += load_ * compliance.asDiagonal();
+    set_memory(offset, relaxation_factor);
     projection_.forget();
-    for (int i = 0; i < sweeps; ++i) sweep(position_, give);
+    for (int i = 0; i < sweeps; ++i) sweep(position_, compliance);
     take(Vector(state), h, state);
     find_elongations(position_, elongation_);
-    state.tail(remembered()) = offset + following.cwiseProduct(elongation_);
+    state.tail(viscous()) = offset + relaxation_factor.cwiseProduct(elongation_);
     return MethodEnd::completed;
   }
 
@@ -465,7 +463,7 @@ class MovingNetwork final : public NetworkSystem {
   void take(const Vector& known, double c, Vector& state) {
     const Eigen::Index n = coordinates();
     Eigen::Matrix3Xd displacement = position_ - rest_;
-    tissue_.freedom().project(displacement);
+    tissue_.constraints().project(displacement);
     state.head(n) = displacement.reshaped();
     state.segment(n, n) = (state.head(n) - known.head(n)) / c;
   }

@@ -100,7 +100,7 @@ class SemiImplicitEuler final : public RateRule {
       return end;
     }
     const Eigen::ArrayXd ratio = h / system.relaxation_times_s().array();
-    auto y = state.tail(system.remembered()).array();
+    auto y = state.tail(system.viscous()).array();
     y = (y + ratio * elongation_.array()) / (1.0 + ratio);
     return MethodEnd::completed;
   }
@@ -229,7 +229,7 @@ class Exponential final : public RateStageRule {
         return end;
       stage.known.head(2 * n) += 0.5 * h * rate_.head(2 * n);
     }
-    const Eigen::Index m = system.remembered();
+    const Eigen::Index m = system.viscous();
     stage.known.tail(m) = keep_.cwiseProduct(state.tail(m)) + of_start_.cwiseProduct(elongation_);
     return stages.stage(time_s + h, stage, state);
   }

@@ -11,9 +11,9 @@ namespace tpm {
 /// Without masses there are no x and v in a state and c does not count: x is where the forces
 /// balance.
 struct ImplicitStage {
-  Eigen::VectorXd known;      ///< (x*, v*, y*), as a state
-  double c = 0.0;             ///< s, > 0
-  Eigen::VectorXd following;  ///< of each y, 0 to 1
+  Eigen::VectorXd known;              ///< (x*, v*, y*), as a state
+  double c = 0.0;                     ///< s, > 0
+  Eigen::VectorXd relaxation_factor;  ///< of each y, 0 to 1
 
   /// z = known + c rate(t, z) in every part.
   /// @param relaxation_times_s of each y
@@ -46,8 +46,8 @@ class StepSystem {
   [[nodiscard]] MethodWork& work() { return work_; }
 
   [[nodiscard]] virtual Eigen::Index coordinates() const = 0;  ///< of x in a state, 0 without mass
-  [[nodiscard]] virtual Eigen::Index remembered() const = 0;   ///< of y
-  [[nodiscard]] Eigen::Index size() const { return 2 * coordinates() + remembered(); }
+  [[nodiscard]] virtual Eigen::Index viscous() const = 0;      ///< of y
+  [[nodiscard]] Eigen::Index size() const { return 2 * coordinates() + viscous(); }
   [[nodiscard]] virtual const Vector& relaxation_times_s() const = 0;  ///< of each y
   [[nodiscard]] virtual double drag_per_s() const = 0;
   /// The size that each part of a state may be expected to have, for tolerances and divergence.

@@ -25,17 +25,18 @@ void ViscousElongations::set_mean(const ConstVector& y, Vector& mean) const {
   for (const One& one : ones_) mean[static_cast<Eigen::Index>(one.bond)] += one.share * y[k++];
 }
 
-Following ViscousElongations::mean_following(const ConstVector& following) const {
+RelaxationFactor ViscousElongations::mean_relaxation_factor(
+    const ConstVector& relaxation_factor) const {
   std::vector<double> means;
   for (const OfLaw& law : of_law_) {
     double mean = 0.0;
     for (std::size_t k = law.first; k < law.first + law.count; ++k) {
-      mean += ones_[k].share * following[static_cast<Eigen::Index>(k)];
+      mean += ones_[k].share * relaxation_factor[static_cast<Eigen::Index>(k)];
     }
     means.push_back(mean);
   }
   if (means.size() == 1) return means.front();
-  return Following(std::move(means));
+  return RelaxationFactor(std::move(means));
 }
 
 void ViscousElongations::spread(const Vector& of_bond, Vector& of_y) const {

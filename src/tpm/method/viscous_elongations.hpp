@@ -22,7 +22,7 @@ class ViscousElongations {
   /// Sets the mean of each bond, sum gamma_j y_j; what does not relax has 0.
   void set_mean(const ConstVector& y, Vector& mean) const;
   /// The same of shares that follow the elongation within a step, which bonds of a law have alike.
-  [[nodiscard]] Following mean_following(const ConstVector& following) const;
+  [[nodiscard]] RelaxationFactor mean_relaxation_factor(const ConstVector& relaxation_factor) const;
   /// What each y has of something that bonds have.
   void spread(const Vector& of_bond, Vector& of_y) const;
 

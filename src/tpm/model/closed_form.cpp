@@ -105,28 +105,29 @@ Response force_driven_frozen(const Protocol& protocol, std::span<const double> t
                              const TpmParameters& p, double lambda1, Want want) {
   Response response = make_response(times_s.size(), want);
   const double scale = p.modulus_to_stiffness_m();
-  const double at_once = p.E2_Pa + lambda1;
+  const double instantaneous = p.E2_Pa + lambda1;
   const double finally = p.relaxed_modulus_Pa() + lambda1;
-  if (!(at_once > 0.0 && finally > 0.0)) {
+  if (!(instantaneous > 0.0 && finally > 0.0)) {
     throw bad_input("creep", "no spring carries the load in the end", "E1, E2 or lambda1 above 0");
   }
   const BranchDerivatives d(p);
   const auto order = rising_order(times_s);
   run_relaxation(
-      protocol, p.relaxation_time_s() * at_once / finally, times_s, order,
+      protocol, p.relaxation_time_s() * instantaneous / finally, times_s, order,
       [&](std::size_t i, double load, const RelaxationState& branch) {
         const auto row = static_cast<Eigen::Index>(i);
-        const double value = load / at_once + (1.0 / finally - 1.0 / at_once) * branch.w;
+        const double value =
+            load / instantaneous + (1.0 / finally - 1.0 / instantaneous) * branch.w;
         response.value[row] = value / scale;
         if (want == Want::values) return;
-        const double d_at_once = -(load - branch.w) / (at_once * at_once);
+        const double d_at_once = -(load - branch.w) / (instantaneous * instantaneous);
         const double d_finally = -branch.w / (finally * finally);
-        const double d_log_T = (1.0 / finally - 1.0 / at_once) * branch.d_w;
+        const double d_log_T = (1.0 / finally - 1.0 / instantaneous) * branch.d_w;
         auto s = response.sensitivity.row(row);
         s[kE1] =
             (d_finally * d.relaxed_E1 + d_log_T * (d.log_tau_E - d.relaxed_E1 / finally)) / scale;
         s[kE2] = (d_at_once + d_finally * d.relaxed_E2 +
-                  d_log_T * (d.log_tau_E + 1.0 / at_once - d.relaxed_E2 / finally)) /
+                  d_log_T * (d.log_tau_E + 1.0 / instantaneous - d.relaxed_E2 / finally)) /
                  scale;
         s[kEta1] = d_log_T * d.log_tau_eta1 / scale;
         s[kA0] = -response.value[row] / p.A0_m2;

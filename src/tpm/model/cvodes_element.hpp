@@ -8,7 +8,7 @@ namespace tpm {
 ///     eta1 de1/dt = E2 e - (E1 + E2) e1
 /// with e imposed, or e the root of E2 (e - e1) + lambda1(e) e = load l0/A0. Restarted at every
 /// knot of the protocol, because integrating across a kink loses order. Covers every protocol and
-/// both the true and a frozen lambda1; a second opinion on the closed form, and the formulation
+/// both the true and a frozen lambda1; a cross-check on the closed form, and the formulation
 /// for changing loads.
 class CvodesElement final : public Model {
  public:

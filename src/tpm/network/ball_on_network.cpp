@@ -27,9 +27,9 @@ BondSystem with_ball(const BondSystem& bonds, const BallTool& ball) {
   return bonds.with_tools(1, contacts);
 }
 
-Freedom with_ball_held(const Freedom& freedom) {
-  Freedom all = freedom.extended(1);
-  all.hold(freedom.size());
+Constraints with_ball_held(const Constraints& constraints) {
+  Constraints all = constraints.extended(1);
+  all.hold(constraints.size());
   return all;
 }
 
@@ -72,19 +72,20 @@ BallTool ball_on_surface(const Organ& organ, std::size_t aim, const Eigen::Vecto
 }
 
 NetworkUnderBall::NetworkUnderBall(const BondSystem& organ_bonds, const Positions& rest,
-                                   const Freedom& organ_freedom, const BallTool& ball)
+                                   const Constraints& organ_freedom, const BallTool& ball)
     : bonds(with_ball(organ_bonds, ball)),
-      freedom(with_ball_held(organ_freedom)),
+      constraints(with_ball_held(organ_freedom)),
       position(with_ball_at(rest, ball.start_m)) {}
 
-BallOnNetwork::BallOnNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
-                             const BallTool& ball, double tolerance_N)
-    : network_(bonds, rest, freedom, ball),
-      equilibrium_(network_.bonds, network_.freedom),
+BallOnNetwork::BallOnNetwork(const BondSystem& bonds, const Positions& rest,
+                             const Constraints& constraints, const BallTool& ball,
+                             double tolerance_N)
+    : network_(bonds, rest, constraints, ball),
+      equilibrium_(network_.bonds, network_.constraints),
       tolerance_N_(tolerance_N) {
   require_one_linear_branch(network_.bonds, "a ball on a network");
   network_.bonds.elongations(network_.position, elongation_);
-  remembered_ = Eigen::VectorXd::Zero(elongation_.size());
+  viscous_ = Eigen::VectorXd::Zero(elongation_.size());
 }
 
 bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const BondMemory& memory) {
@@ -110,8 +111,8 @@ bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const BondMemory& mem
 Eigen::Vector3d BallOnNetwork::step(const Eigen::Vector3d& ball_m, double step_s) {
   const RelaxationWeights w = relaxation_weights(step_s / network_.bonds.relaxation_time_s());
   BondMemory memory;
-  memory.offset = w.r * remembered_ + w.w0 * elongation_;
-  memory.following = w.w1;
+  memory.offset = w.r * viscous_ + w.w0 * elongation_;
+  memory.relaxation_factor = w.w1;
   if (!balance(ball_m, memory)) {
     throw Error(ExitCode::numerical, "ball",
                 fmt::format("no stable equilibrium with the ball at ({}, {}, {}) mm",
@@ -119,7 +120,7 @@ Eigen::Vector3d BallOnNetwork::step(const Eigen::Vector3d& ball_m, double step_s
                             significant(1e3 * ball_m.z(), 5)));
   }
   network_.bonds.elongations(network_.position, elongation_);
-  remembered_ = memory.offset + w.w1 * elongation_;
+  viscous_ = memory.offset + w.w1 * elongation_;
   Eigen::Matrix3Xd force;
   equilibrium_.forces(network_.position, memory,
                       Eigen::Matrix3Xd::Zero(3, network_.position.cols()), force);
@@ -132,11 +133,11 @@ int BallOnNetwork::touching() const {
 }
 
 double BallOnNetwork::stored_J() const {
-  return network_.bonds.stored_energy_J(network_.position, remembered_);
+  return network_.bonds.stored_energy_J(network_.position, viscous_);
 }
 
 double BallOnNetwork::dissipation_W() const {
-  return network_.bonds.dissipation_W(network_.position, remembered_);
+  return network_.bonds.dissipation_W(network_.position, viscous_);
 }
 
 }  // namespace tpm

@@ -41,11 +41,11 @@ struct NetworkUnderBall {
   /// @param organ_bonds, rest, organ_freedom of the organ, without tools
   /// Throws Error(bad_input) for a ball without radius or stiffness.
   NetworkUnderBall(const BondSystem& organ_bonds, const Positions& rest,
-                   const Freedom& organ_freedom, const BallTool& ball);
+                   const Constraints& organ_freedom, const BallTool& ball);
 
-  BondSystem bonds;    ///< with the contacts of the ball
-  Freedom freedom;     ///< the ball is held where it is put
-  Positions position;  ///< of all spheres at rest, then of the ball
+  BondSystem bonds;         ///< with the contacts of the ball
+  Constraints constraints;  ///< the ball is held where it is put
+  Positions position;       ///< of all spheres at rest, then of the ball
 };
 
 /// The quasi-static network under a ball that moves in space: double precision, every step balanced
@@ -56,7 +56,7 @@ class BallOnNetwork {
   /// @param bonds, freedom of the organ, without tools
   /// @param tolerance_N of the force left on each sphere
   /// Throws Error(bad_input) for a ball without radius or stiffness.
-  BallOnNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  BallOnNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                 const BallTool& ball, double tolerance_N = 1e-10);
   BallOnNetwork(const BallOnNetwork&) = delete;
   BallOnNetwork& operator=(const BallOnNetwork&) = delete;
@@ -79,7 +79,7 @@ class BallOnNetwork {
   NetworkUnderBall network_;
   Equilibrium equilibrium_;
   double tolerance_N_;
-  Eigen::VectorXd elongation_, remembered_;
+  Eigen::VectorXd elongation_, viscous_;
 };
 
 }  // namespace tpm

@@ -126,11 +126,11 @@ double BondSystem::relaxation_time_s() const {
   return shortest_relaxation_time_s();
 }
 
-Eigen::VectorXd BondSystem::stiffness_when(const Following& following) const {
+Eigen::VectorXd BondSystem::stiffness_when(const RelaxationFactor& relaxation_factor) const {
   Eigen::VectorXd stiffness = stiffness_;
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    stiffness[row] -= following(law_[i]) * relaxing_[row];
+    stiffness[row] -= relaxation_factor(law_[i]) * relaxing_[row];
   }
   return stiffness;
 }
@@ -237,11 +237,11 @@ BondSystem::Pull BondSystem::pull(std::size_t bond, double elongation,
   const double k = stiffness_[i];
   const double g = relaxing_[i];
   if (linear_ || bond >= first_contact()) {
-    const double slope = k - g * memory.following(law_[bond]);
+    const double slope = k - g * memory.relaxation_factor(law_[bond]);
     return {slope * elongation - g * memory.offset[i], slope};
   }
   const ViscousLaw& law = laws_[law_[bond]];
-  const double now = 1.0 - memory.following(law_[bond]);
+  const double now = 1.0 - memory.relaxation_factor(law_[bond]);
   return {(k - g) * law.equilibrium(elongation) +
               g * (now * law.kernel.value(elongation) - memory.offset[i]),
           (k - g) * law.equilibrium_slope(elongation) + g * now * law.kernel.slope(elongation)};
@@ -285,11 +285,12 @@ Eigen::VectorXd BondSystem::mean_viscous(const Eigen::MatrixXd& viscous) const {
 }
 
 BondMemory BondSystem::memory_at(const Eigen::VectorXd& y, const Eigen::VectorXd& followed,
-                                 Following following, std::span<const char> closed) const {
-  BondMemory memory{y, std::move(following), closed};
+                                 RelaxationFactor relaxation_factor,
+                                 std::span<const char> closed) const {
+  BondMemory memory{y, std::move(relaxation_factor), closed};
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    memory.offset[row] -= memory.following(law_[i]) * followed[row];
+    memory.offset[row] -= memory.relaxation_factor(law_[i]) * followed[row];
   }
   return memory;
 }
@@ -374,14 +375,14 @@ double BondSystem::potential_J(const Positions& position, const BondMemory& memo
     if (!carries(i, l, memory.closed)) continue;
     const double k = stiffness_[row];
     const double g = relaxing_[row];
-    const double following = memory.following(law_[i]);
+    const double relaxation_factor = memory.relaxation_factor(law_[i]);
     if (linear_ || i >= first_contact()) {
-      energy += l * (0.5 * (k - g * following) * l - g * memory.offset[row]);
+      energy += l * (0.5 * (k - g * relaxation_factor) * l - g * memory.offset[row]);
       continue;
     }
     const ViscousLaw& law = laws_[law_[i]];
     energy += (k - g) * law.equilibrium_integral(l) +
-              g * ((1.0 - following) * law.kernel.integral(l) - memory.offset[row] * l);
+              g * ((1.0 - relaxation_factor) * law.kernel.integral(l) - memory.offset[row] * l);
   }
   return energy;
 }

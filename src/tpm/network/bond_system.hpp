@@ -16,16 +16,16 @@ namespace tpm {
 
 /// A share of the viscous elongation that follows the elongation within a step: one number for all
 /// bonds, or one for each law of a BondSystem.
-class Following {
+class RelaxationFactor {
  public:
   // NOLINTNEXTLINE(google-explicit-constructor): one number for all bonds is the usual case
-  Following(double all = 0.0) : all_(all) {}
-  explicit Following(std::vector<double> of_law) : of_law_(std::move(of_law)) {}
+  RelaxationFactor(double all = 0.0) : all_(all) {}
+  explicit RelaxationFactor(std::vector<double> of_law) : of_law_(std::move(of_law)) {}
 
   [[nodiscard]] double operator()(std::size_t law) const {
     return of_law_.empty() ? all_ : of_law_[law];
   }
-  [[nodiscard]] bool operator==(const Following& other) const = default;
+  [[nodiscard]] bool operator==(const RelaxationFactor& other) const = default;
 
  private:
   double all_ = 0.0;
@@ -35,8 +35,8 @@ class Following {
 /// The mean viscous elongation of the bonds as a function of what they follow, V(l) (for linear
 /// branches l itself): y = offset + following V(l).
 struct BondMemory {
-  Eigen::VectorXd offset;  ///< m, one per bond
-  Following following;     ///< 0 to 1
+  Eigen::VectorXd offset;              ///< m, one per bond
+  RelaxationFactor relaxation_factor;  ///< 0 to 1
   /// Which tool contacts are closed, one entry each; none: those that overlap or just touch.
   std::span<const char> closed = {};
 };
@@ -113,7 +113,7 @@ class BondSystem {
   /// g of each bond, N/m, 0 <= g <= k.
   [[nodiscard]] const Eigen::VectorXd& relaxing() const { return relaxing_; }
   /// The stiffness of each bond at rest of which a share has relaxed, k - following g, N/m.
-  [[nodiscard]] Eigen::VectorXd stiffness_when(const Following& following) const;
+  [[nodiscard]] Eigen::VectorXd stiffness_when(const RelaxationFactor& relaxation_factor) const;
 
   /// The contacts that overlap or just touch, as BondMemory::closed.
   [[nodiscard]] std::vector<char> closed_contacts(const Positions& position) const;
@@ -127,7 +127,8 @@ class BondSystem {
   [[nodiscard]] Eigen::VectorXd mean_viscous(const Eigen::MatrixXd& viscous) const;
   /// The memory with mean viscous elongations y at this instant, of which a share follows.
   [[nodiscard]] BondMemory memory_at(const Eigen::VectorXd& y, const Eigen::VectorXd& followed,
-                                     Following following, std::span<const char> closed = {}) const;
+                                     RelaxationFactor relaxation_factor,
+                                     std::span<const char> closed = {}) const;
 
   /// What each bond pulls with, N: positive in tension.
   void tensions(const Positions& position, const BondMemory& memory,

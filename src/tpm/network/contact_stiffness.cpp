@@ -7,9 +7,9 @@ HeldStiffness held_stiffness(const BondSystem& bonds, const Positions& rest, std
   const auto column = static_cast<Eigen::Index>(sphere);
   Eigen::Matrix3Xd displacement = Eigen::Matrix3Xd::Zero(3, rest.cols());
   displacement.col(column) = direction;
-  const auto stiffness = [&](double following) {
+  const auto stiffness = [&](double relaxation_factor) {
     const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
-                            following};
+                            relaxation_factor};
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.cols());
     bonds.add_stiffness_times(rest, memory, displacement, force);
     return direction.dot(force.col(column));

@@ -10,12 +10,13 @@
 
 namespace tpm {
 
-DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ, const Freedom& freedom,
-                             std::vector<Probe> driven, std::vector<PressedTool> tools) {
+DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,
+                             const Constraints& constraints, std::vector<Probe> driven,
+                             std::vector<PressedTool> tools) {
   const std::size_t spheres = organ.size();
   Positions rest(3, organ.position.cols() + static_cast<Eigen::Index>(tools.size()));
   rest.leftCols(organ.position.cols()) = organ.position;
-  Freedom with_tools = freedom.extended(tools.size());
+  Constraints with_tools = constraints.extended(tools.size());
   std::vector<ToolContact> contacts;
   for (std::size_t i = 0; i < tools.size(); ++i) {
     const auto& [tool, share, stiffness] = tools[i];

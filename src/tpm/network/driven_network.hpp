@@ -16,9 +16,9 @@ struct PressedTool {
 
 /// A network with all that touches it: what a run needs.
 struct DrivenNetwork {
-  BondSystem bonds;  ///< with the contacts
-  Positions rest;    ///< of spheres, then tools
-  Freedom freedom;   ///< a tool that is driven is guided, one that stands still is held
+  BondSystem bonds;         ///< with the contacts
+  Positions rest;           ///< of spheres, then tools
+  Constraints constraints;  ///< a tool that is driven is guided, one that stands still is held
   Probes probes;
   std::vector<PressedTool> tools;
 
@@ -32,7 +32,8 @@ struct DrivenNetwork {
 /// @param driven spheres that are driven themselves
 /// Throws Error(bad_input) if nothing is driven.
 [[nodiscard]] DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,
-                                           const Freedom& freedom, std::vector<Probe> driven,
+                                           const Constraints& constraints,
+                                           std::vector<Probe> driven,
                                            std::vector<PressedTool> tools);
 
 /// Stiff enough for a force to be known to about 1e-4, and not so stiff that rounding shows: 1e4

@@ -4,19 +4,19 @@
 
 namespace tpm {
 
-DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom,
+DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Constraints constraints,
                            const Probes& probes, Drive drive, EquilibriumOptions options)
     : bonds_(bonds),
       rest_(std::move(rest)),
-      freedom_(std::move(freedom)),
+      constraints_(std::move(constraints)),
       drive_(drive),
-      equilibrium_(bonds_, freedom_, options) {
+      equilibrium_(bonds_, constraints_, options) {
   double shares = 0.0;
   for (const Probe& probe : probes) shares += probe.share;
   for (const Probe& probe : probes) {
     driven_.push_back({static_cast<Eigen::Index>(probe.sphere), probe.direction,
                        depth_driven() ? probe.share : probe.share / shares});
-    if (depth_driven()) freedom_.impose(probe.sphere, probe.direction);
+    if (depth_driven()) constraints_.impose(probe.sphere, probe.direction);
   }
   const TissueState start = at_rest(0.0);
   if (held_stiffness(start.position, start.memory()) > 0.0) return;

@@ -29,14 +29,14 @@ struct TissueState {
 class DrivenTissue {
  public:
   /// Throws Error(bad_input) if what an imposed depth drives touches nothing at rest.
-  DrivenTissue(const BondSystem& bonds, Positions rest, Freedom freedom, const Probes& probes,
-               Drive drive, EquilibriumOptions options = {});
+  DrivenTissue(const BondSystem& bonds, Positions rest, Constraints constraints,
+               const Probes& probes, Drive drive, EquilibriumOptions options = {});
   DrivenTissue(const DrivenTissue&) = delete;
   DrivenTissue& operator=(const DrivenTissue&) = delete;
 
   [[nodiscard]] TissueState at_rest(double time_s) const;
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
-  [[nodiscard]] const Freedom& freedom() const { return freedom_; }
+  [[nodiscard]] const Constraints& constraints() const { return constraints_; }
   /// The depth, or its rate, that belongs to displacements, or velocities, of spheres and tools.
   [[nodiscard]] double depth_of(const Eigen::Matrix3Xd& displacement) const;
   [[nodiscard]] bool depth_driven() const { return drive_ == Drive::displacement; }
@@ -106,7 +106,7 @@ class DrivenTissue {
 
   const BondSystem& bonds_;
   Positions rest_;
-  Freedom freedom_;
+  Constraints constraints_;
   std::vector<Driven> driven_;
   Drive drive_;
   Equilibrium equilibrium_;

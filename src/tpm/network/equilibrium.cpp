@@ -12,12 +12,12 @@ constexpr double kOperationsPerProduct = 54.0;  // of 3x3 blocks
 
 }  // namespace
 
-SolverChoice choose_solver(const BondSystem& bonds, const Freedom& freedom,
+SolverChoice choose_solver(const BondSystem& bonds, const Constraints& constraints,
                            const EquilibriumOptions& options) {
   SolverChoice choice;
   choice.direct = options.solver != StiffnessSolver::iterative;
   if (!choice.direct) return choice;
-  const auto graph = moving_graph(bonds, freedom);
+  const auto graph = moving_graph(bonds, constraints);
   const BlockPattern& pattern = graph->pattern;
   choice.operations = kOperationsPerProduct * static_cast<double>(pattern.factor_products());
   choice.bytes = static_cast<double>(pattern.factor_bytes());
@@ -27,17 +27,19 @@ SolverChoice choose_solver(const BondSystem& bonds, const Freedom& freedom,
   return choice;
 }
 
-Equilibrium::Equilibrium(const BondSystem& bonds, const Freedom& freedom,
+Equilibrium::Equilibrium(const BondSystem& bonds, const Constraints& constraints,
                          EquilibriumOptions options)
-    : bonds_(bonds), freedom_(freedom), choice_(choose_solver(bonds, freedom, options)) {
-  if (choice_.direct) direct_.emplace(bonds, freedom);
+    : bonds_(bonds),
+      constraints_(constraints),
+      choice_(choose_solver(bonds, constraints, options)) {
+  if (choice_.direct) direct_.emplace(bonds, constraints);
 }
 
 Equilibrium::~Equilibrium() = default;
 Equilibrium::Equilibrium(Equilibrium&&) noexcept = default;
 
 LargeEquilibrium& Equilibrium::iterative(const Positions& position) {
-  if (!iterative_) iterative_ = std::make_unique<LargeEquilibrium>(bonds_, freedom_, position);
+  if (!iterative_) iterative_ = std::make_unique<LargeEquilibrium>(bonds_, constraints_, position);
   return *iterative_;
 }
 
@@ -71,9 +73,9 @@ void Equilibrium::displace(Eigen::Ref<Eigen::Matrix3Xd> vectors, double toleranc
     vectors = x;
     return;
   }
-  freedom_.project(vectors);
+  constraints_.project(vectors);
   direct_->factor.solve(vectors);
-  freedom_.project(vectors);
+  constraints_.project(vectors);
 }
 
 EquilibriumSearch Equilibrium::find(Positions& position, const BondMemory& memory,
@@ -105,7 +107,7 @@ EquilibriumSearch Equilibrium::find_directly(Positions& position, const BondMemo
     return TangentAnswer::solved;
   };
   EquilibriumSearch search =
-      newton_balance(bonds_, freedom_, position, memory, load, tolerance_N, solve);
+      newton_balance(bonds_, constraints_, position, memory, load, tolerance_N, solve);
   search.factorisations -= kept;
   if (!keeps || !search.converged || !search.stable) return search;
   // The equilibrium itself is looked at, unless the factor was made as good as there.

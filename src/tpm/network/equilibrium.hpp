@@ -3,7 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "tpm/core/word_table.hpp"
+#include "tpm/core/enum_names.hpp"
 #include "tpm/network/newton_balance.hpp"
 #include "tpm/network/stiffness_blocks.hpp"
 
@@ -42,7 +42,7 @@ struct SolverChoice {
 
 /// The solver that options choose for a network. Finds the pattern of what moves unless the options
 /// say `iterative`.
-[[nodiscard]] SolverChoice choose_solver(const BondSystem& bonds, const Freedom& freedom,
+[[nodiscard]] SolverChoice choose_solver(const BondSystem& bonds, const Constraints& constraints,
                                          const EquilibriumOptions& options);
 
 /// Balances the forces on the free spheres of a network by Newton's method with solutions of the
@@ -54,7 +54,8 @@ struct SolverChoice {
 class Equilibrium {
  public:
   /// @param bonds, freedom must live as long as this
-  Equilibrium(const BondSystem& bonds, const Freedom& freedom, EquilibriumOptions options = {});
+  Equilibrium(const BondSystem& bonds, const Constraints& constraints,
+              EquilibriumOptions options = {});
   ~Equilibrium();
   Equilibrium(Equilibrium&&) noexcept;
 
@@ -87,7 +88,7 @@ class Equilibrium {
   /// Of that. There is none where solutions iterate.
   [[nodiscard]] const BlockPattern& pattern() const { return direct_->blocks.pattern(); }
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
-  [[nodiscard]] const Freedom& freedom() const { return freedom_; }
+  [[nodiscard]] const Constraints& constraints() const { return constraints_; }
 
  private:
   [[nodiscard]] EquilibriumSearch find_directly(Positions& position, const BondMemory& memory,
@@ -96,14 +97,14 @@ class Equilibrium {
   [[nodiscard]] LargeEquilibrium& iterative(const Positions& position);
 
   struct Direct {
-    Direct(const BondSystem& bonds, const Freedom& freedom)
-        : blocks(bonds, freedom), factor(blocks.pattern()) {}
+    Direct(const BondSystem& bonds, const Constraints& constraints)
+        : blocks(bonds, constraints), factor(blocks.pattern()) {}
     StiffnessBlocks blocks;
     BlockLdlt factor;
   };
 
   const BondSystem& bonds_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   SolverChoice choice_;
   std::optional<Direct> direct_;
   std::unique_ptr<LargeEquilibrium> iterative_;

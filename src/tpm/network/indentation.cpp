@@ -17,13 +17,13 @@ constexpr std::string_view kNotDefinite =
     "the stiffness is not positive definite (the tissue buckles, or strides are too long)";
 constexpr double kFollowTolerance = 1e-2;  // of the first-order answer to a stride
 
-void require_valid(const PatchIndentation& indentation, const Freedom& freedom) {
+void require_valid(const PatchIndentation& indentation, const Constraints& constraints) {
   const auto refuse = [](const std::string& got, std::string_view expected) {
     throw bad_input("indentation", got, expected);
   };
   if (indentation.patch.empty()) refuse("a patch without spheres", "a wider patch");
   for (const std::size_t sphere : indentation.patch) {
-    if (sphere >= freedom.size() || !freedom.projector(sphere).isZero(0.0)) {
+    if (sphere >= constraints.size() || !constraints.projector(sphere).isZero(0.0)) {
       refuse(fmt::format("sphere {} of the patch", sphere + 1), "a sphere that is held by it");
     }
   }
@@ -36,8 +36,8 @@ void require_valid(const PatchIndentation& indentation, const Freedom& freedom) 
   }
 }
 
-BondMemory at_rest(const BondSystem& bonds, double following) {
-  return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), following};
+BondMemory at_rest(const BondSystem& bonds, double relaxation_factor) {
+  return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxation_factor};
 }
 
 [[noreturn]] void give_up(double depth_m, std::string_view why) {
@@ -46,13 +46,13 @@ BondMemory at_rest(const BondSystem& bonds, double following) {
 }
 
 /// The free spheres follow a motion of the patch to first order.
-void follow(const BondSystem& bonds, const Freedom& freedom, const BondMemory& memory,
+void follow(const BondSystem& bonds, const Constraints& constraints, const BondMemory& memory,
             const Eigen::Matrix3Xd& moved, const EquilibriumFinder& finder, double depth_m,
             Positions& position) {
   Eigen::Matrix3Xd left = Eigen::Matrix3Xd::Zero(3, moved.cols());
   bonds.add_stiffness_times(position, memory, moved, left);
   left = -left;
-  freedom.project(left);
+  constraints.project(left);
   const TangentAnswer answer = finder.solve(position, memory, left);
   if (answer == TangentAnswer::not_definite) give_up(depth_m, kNotDefinite);
   if (answer == TangentAnswer::failed) give_up(depth_m, "no solution with the stiffness");
@@ -110,8 +110,8 @@ std::vector<std::size_t> far_side(const Organ& organ, const Eigen::Vector3d& dir
 
 double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,
                        std::span<const std::size_t> patch, const Eigen::Vector3d& direction,
-                       double following, double tolerance) {
-  const BondMemory memory = at_rest(solver.bonds(), following);
+                       double relaxation_factor, double tolerance) {
+  const BondMemory memory = at_rest(solver.bonds(), relaxation_factor);
   Eigen::Matrix3Xd moved = Eigen::Matrix3Xd::Zero(3, rest.cols());
   for (const std::size_t sphere : patch) moved.col(static_cast<Eigen::Index>(sphere)) = direction;
   const EquilibriumFinder finder{
@@ -120,17 +120,18 @@ double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,
       },
       {}};
   Positions after = rest;
-  follow(solver.bonds(), solver.freedom(), memory, moved, finder, 0.0, after);
+  follow(solver.bonds(), solver.constraints(), memory, moved, finder, 0.0, after);
   const Eigen::Matrix3Xd displacement = after - rest;
   Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.cols());
   solver.bonds().add_stiffness_times(rest, memory, displacement, force);
   return displacement.cwiseProduct(force).sum();
 }
 
-IndentationResult indent(const BondSystem& bonds, const Freedom& freedom, const Positions& rest,
-                         const PatchIndentation& indentation, const EquilibriumFinder& finder) {
-  require_valid(indentation, freedom);
-  const BondMemory memory = at_rest(bonds, indentation.following);
+IndentationResult indent(const BondSystem& bonds, const Constraints& constraints,
+                         const Positions& rest, const PatchIndentation& indentation,
+                         const EquilibriumFinder& finder) {
+  require_valid(indentation, constraints);
+  const BondMemory memory = at_rest(bonds, indentation.relaxation_factor);
   const double stride = indentation.depth_m / indentation.strides;
   const Eigen::Matrix3Xd no_load = Eigen::Matrix3Xd::Zero(3, rest.cols());
   Eigen::Matrix3Xd moved = no_load;
@@ -141,7 +142,7 @@ IndentationResult indent(const BondSystem& bonds, const Freedom& freedom, const 
   result.position = rest;
   for (int i = 1; i <= indentation.strides; ++i) {
     const double depth = stride * i;
-    follow(bonds, freedom, memory, moved, finder, depth, result.position);
+    follow(bonds, constraints, memory, moved, finder, depth, result.position);
     const EquilibriumSearch search =
         finder.find(result.position, memory, no_load, indentation.tolerance_N);
     if (!search.stable) give_up(depth, kNotDefinite);

@@ -11,9 +11,9 @@ struct PatchIndentation {
   std::vector<std::size_t> patch;                        ///< spheres, from 0
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector into the tissue
   double depth_m = 0.002;
-  int strides = 1;            ///< equal parts of the depth, >= 1
-  double following = 0.0;     ///< 0: at once, 1: relaxed; see BondMemory
-  double tolerance_N = 1e-9;  ///< of the force left on each free sphere
+  int strides = 1;                 ///< equal parts of the depth, >= 1
+  double relaxation_factor = 0.0;  ///< 0: at once, 1: relaxed; see BondMemory
+  double tolerance_N = 1e-9;       ///< of the force left on each free sphere
 };
 
 struct IndentationResult {
@@ -57,7 +57,7 @@ class LargeEquilibrium;
 /// Throws Error(numerical) if the stiffness is not positive definite or the solution fails.
 [[nodiscard]] double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,
                                      std::span<const std::size_t> patch,
-                                     const Eigen::Vector3d& direction, double following,
+                                     const Eigen::Vector3d& direction, double relaxation_factor,
                                      double tolerance);
 
 /// Pushes the patch to its depth, stride by stride: in each the free spheres follow to first order,
@@ -66,7 +66,7 @@ class LargeEquilibrium;
 /// Throws Error(bad_input) for an empty patch or numbers out of range, Error(numerical) where the
 /// stiffness is not positive definite, at the balance or on the way to it, or no balance is found;
 /// the message tells the depth.
-[[nodiscard]] IndentationResult indent(const BondSystem& bonds, const Freedom& freedom,
+[[nodiscard]] IndentationResult indent(const BondSystem& bonds, const Constraints& constraints,
                                        const Positions& rest, const PatchIndentation& indentation,
                                        const EquilibriumFinder& finder);
 

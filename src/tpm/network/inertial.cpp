@@ -39,7 +39,7 @@ Inertia inertia_of(const BondSystem& bonds, const Eigen::VectorXd& mass, const L
                   options.contact_damping_ratio};
   const double beta = 2.0 * options.damping_ratio * options.stiffness_share / omega;
   if (beta > 0.0) {
-    inertia.dashpot_N_s_m = beta * bonds.stiffness_when(lowest.following);
+    inertia.dashpot_N_s_m = beta * bonds.stiffness_when(lowest.relaxation_factor);
     inertia.dashpot_N_s_m.tail(static_cast<Eigen::Index>(bonds.contact_count())).setZero();
   }
   return inertia;
@@ -86,7 +86,7 @@ void require_after(const InertialState& from, std::span<const double> times_s) {
 /// One run: the state and how it is carried through the protocol.
 class MotionRun {
  public:
-  MotionRun(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  MotionRun(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
             const Probes& probes, const Inertia& inertia, const InertialOptions& options,
             double omega, const Protocol& protocol, std::span<const double> times_s,
             const InertialObserver& observer, const InertialState* from)
@@ -96,13 +96,13 @@ class MotionRun {
         times_s_(times_s),
         order_(rising_order(times_s)),
         knots_(finite_knots(protocol, times_s)),
-        tissue_(bonds, rest, freedom, probes, protocol.drive()),
+        tissue_(bonds, rest, constraints, probes, protocol.drive()),
         equation_(tissue_, rest, inertia) {
     TissueState start = tissue_.at_rest(knots_.front().time_s);
     const double response_scale = std::abs(tissue_.linear_response(start, protocol.peak()));
     const double depth = tissue_.depth_driven() ? protocol.peak() : response_scale;
     if (!from && protocol.relaxed_at_start() && knots_.front().value != 0.0) {
-      preload(bonds, rest, freedom, probes, start);
+      preload(bonds, rest, constraints, probes, start);
     }
     if (from && from->motion.size() != equation_.size()) {
       throw bad_input("state", fmt::format("{} numbers", from->motion.size()),
@@ -141,12 +141,12 @@ class MotionRun {
   }
 
   /// Where a load or a depth held for ever has brought the tissue.
-  void preload(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  void preload(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                const Probes& probes, TissueState& state) const {
     const double forever = std::numeric_limits<double>::infinity();
     const Protocol held(protocol_.drive(), {{0.0, knots_.front().value}}, "preload", true);
     const QuasiStaticRun run =
-        QuasiStatic(bonds, rest, freedom, probes, {std::min(options_.tolerance, 1e-6), 5})
+        QuasiStatic(bonds, rest, constraints, probes, {std::min(options_.tolerance, 1e-6), 5})
             .run(held, std::span(&forever, 1));
     state.position = run.position;
     state.viscous = run.viscous;
@@ -270,23 +270,23 @@ class MotionRun {
 
 }  // namespace
 
-Inertial::Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Probes probes,
+Inertial::Inertial(const BondSystem& bonds, Positions rest, Constraints constraints, Probes probes,
                    Eigen::VectorXd mass_kg, InertialOptions options)
     : bonds_(bonds),
       rest_(std::move(rest)),
-      freedom_(std::move(freedom)),
+      constraints_(std::move(constraints)),
       probes_(std::move(probes)),
       mass_kg_(std::move(mass_kg)),
       options_(options) {
   require_valid(options_);
-  require_valid(probes_, freedom_);
+  require_valid(probes_, constraints_);
   for (Eigen::Index i = 0; i < rest_.cols(); ++i) {
     if (mass_kg_.size() == rest_.cols() && mass_kg_[i] > 0.0 && std::isfinite(mass_kg_[i]))
       continue;
     throw bad_input("mass", fmt::format("of sphere {} is not above 0", i + 1),
                     "one mass above 0 for every sphere");
   }
-  lowest_ = lowest_mode(bonds_, rest_, freedom_, mass_kg_);
+  lowest_ = lowest_mode(bonds_, rest_, constraints_, mass_kg_);
 }
 
 InertialRun Inertial::run(const Protocol& protocol, std::span<const double> times_s,
@@ -294,7 +294,7 @@ InertialRun Inertial::run(const Protocol& protocol, std::span<const double> time
   require_times_within(protocol, times_s);
   require_no_jump_of_depth(protocol);
   if (from) require_after(*from, times_s);
-  return MotionRun(bonds_, rest_, freedom_, probes_,
+  return MotionRun(bonds_, rest_, constraints_, probes_,
                    inertia_of(bonds_, mass_kg_, lowest_, options_), options_,
                    lowest_.angular_frequency(), protocol, times_s, observer, from)
       .go();

@@ -119,7 +119,7 @@ class Inertial {
   /// @param bonds must live as long as this
   /// Throws Error(bad_input) for options out of range, masses that are not positive, a probe that
   /// cannot move, and a network with zero-energy modes.
-  Inertial(const BondSystem& bonds, Positions rest, Freedom freedom, Probes probes,
+  Inertial(const BondSystem& bonds, Positions rest, Constraints constraints, Probes probes,
            Eigen::VectorXd mass_kg, InertialOptions options = {});
 
   /// @param times_s any order, finite, within the protocol; at a jump the value just after it
@@ -140,7 +140,7 @@ class Inertial {
  private:
   const BondSystem& bonds_;
   Positions rest_;
-  Freedom freedom_;
+  Constraints constraints_;
   Probes probes_;
   Eigen::VectorXd mass_kg_;
   InertialOptions options_;

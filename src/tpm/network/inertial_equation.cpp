@@ -12,7 +12,7 @@ using Spheres = Eigen::Map<Eigen::Matrix3Xd>;
 using ConstSpheres = Eigen::Map<const Eigen::Matrix3Xd>;
 
 /// The share of the viscous elongations of each law that follows in an implicit step of size gamma.
-Following following_over(const BondSystem& bonds, double gamma) {
+RelaxationFactor relaxation_factor_over(const BondSystem& bonds, double gamma) {
   std::vector<double> of_law;
   for (const ViscousLaw& law : bonds.laws()) {
     double share = 0.0;
@@ -22,7 +22,7 @@ Following following_over(const BondSystem& bonds, double gamma) {
     }
     of_law.push_back(share);
   }
-  return Following(std::move(of_law));
+  return RelaxationFactor(std::move(of_law));
 }
 
 constexpr double kTouching_m = 1e-14;  // a gap that is none: above the rounding of positions
@@ -33,7 +33,8 @@ Eigen::VectorXd contact_dashpots(const DrivenTissue& tissue, const Inertia& iner
   Eigen::VectorXd c(std::ssize(contacts));
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const auto moves = [&](std::uint32_t column) {
-      return tissue.freedom().projector(column).isZero(0.0) ? 0.0 : 1.0 / inertia.mass_kg[column];
+      return tissue.constraints().projector(column).isZero(0.0) ? 0.0
+                                                                : 1.0 / inertia.mass_kg[column];
     };
     const double per_mass = moves(contacts[i].sphere) + moves(contacts[i].tool);
     c[static_cast<Eigen::Index>(i)] = per_mass > 0.0
@@ -102,7 +103,7 @@ InertialEquation::Vector InertialEquation::pack(const Positions& position,
   Vector state = Vector::Zero(size());
   Spheres displacement(state.data(), 3, rest_.cols());
   displacement = position - rest_;
-  tissue_.freedom().project(displacement);
+  tissue_.constraints().project(displacement);
   for (const std::size_t bond : relaxing_) {
     const auto count = static_cast<Eigen::Index>(branches_of(bond).size());
     state.segment(viscous_of_[bond], count) =
@@ -227,7 +228,7 @@ void InertialEquation::rate(double time_s, const ConstVector& state, Eigen::Ref<
   Spheres acceleration(rate.data() + coordinates(), 3, n);
   acceleration = force_ * inertia_.mass_kg.cwiseInverse().asDiagonal();
   acceleration -= now.velocity * drag_per_s_.asDiagonal();
-  tissue_.freedom().project(acceleration);
+  tissue_.constraints().project(acceleration);
   rate.head(coordinates()) = state.segment(coordinates(), coordinates());
   tissue_.bonds().followed(now.position, followed_);
   for (const std::size_t bond : relaxing_) {
@@ -293,14 +294,14 @@ ToolImpact InertialEquation::strike(double time_s, Eigen::Ref<Vector> state) {
       pairs.push_back({contacts[i].sphere, contacts[i].tool, lies.normal});
   }
   Eigen::Matrix3Xd velocity = motion_.velocity;
-  const Vector impulse = inelastic_impact(pairs, tissue_.freedom(), inertia_.mass_kg, velocity);
+  const Vector impulse = inelastic_impact(pairs, tissue_.constraints(), inertia_.mass_kg, velocity);
   Eigen::Matrix3Xd on_tools = Eigen::Matrix3Xd::Zero(3, rest_.cols());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     on_tools.col(pairs[i].tool) += impulse[static_cast<Eigen::Index>(i)] * pairs[i].normal;
   }
   Spheres free_velocity(state.data() + coordinates(), 3, rest_.cols());
   free_velocity = velocity;
-  tissue_.freedom().project(free_velocity);
+  tissue_.constraints().project(free_velocity);
   ToolImpact impact;
   impact.on_tissue_N_s = tissue_.push_on_tissue(on_tools);
   impact.work_J = tissue_.depth_driven() ? impact.on_tissue_N_s * imposed_speed() : 0.0;
@@ -352,10 +353,10 @@ bool InertialEquation::factorise(double time_s, const ConstVector& state, double
   find_pressing();
   factorised_pressing_ = pressing_;
   matrix_.set_zero();
-  bonds.add_stiffness(
-      now.position,
-      bonds.memory_at(now.mean, followed_, following_over(bonds, gamma), factorised_pressing_),
-      matrix_);
+  bonds.add_stiffness(now.position,
+                      bonds.memory_at(now.mean, followed_, relaxation_factor_over(bonds, gamma),
+                                      factorised_pressing_),
+                      matrix_);
   for (Eigen::Matrix3d& block : matrix_.diagonal) block *= gamma * gamma;
   for (Eigen::Matrix3d& block : matrix_.below) block *= gamma * gamma;
   const bool bonds_damped = inertia_.dashpot_N_s_m.size() > 0;
@@ -374,7 +375,7 @@ bool InertialEquation::factorise(double time_s, const ConstVector& state, double
         inertia_.mass_kg[static_cast<Eigen::Index>(i)] *
         (1.0 + gamma * drag_per_s_[static_cast<Eigen::Index>(i)]);
   }
-  tissue_.freedom().constrain(bonds, matrix_);
+  tissue_.constraints().constrain(bonds, matrix_);
   return factor_.factorise(matrix_);
 }
 
@@ -406,9 +407,9 @@ void InertialEquation::solve(Eigen::Ref<Vector> x) {
     right.col(a) -= f;
     right.col(b) += f;
   }
-  tissue_.freedom().project(right);
+  tissue_.constraints().project(right);
   factor_.solve(right);
-  tissue_.freedom().project(right);
+  tissue_.constraints().project(right);
   v = (right - u) / gamma_;
   u = right;
   bonds.elongation_changes(factorised_at_, right, followed_);

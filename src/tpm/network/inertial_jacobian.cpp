@@ -39,7 +39,7 @@ void InertialEquation::add_bond_entries(Triplets& entries, std::size_t bond,
                lengthening * (Eigen::Matrix3d::Identity() - n * n.transpose()));
   }
   const auto end = [&](std::uint32_t here, std::uint32_t there, double sign) {
-    const Eigen::Matrix3d p = tissue_.freedom().projector(here) / inertia_.mass_kg[here];
+    const Eigen::Matrix3d p = tissue_.constraints().projector(here) / inertia_.mass_kg[here];
     const Eigen::Index u = 3 * Eigen::Index{here};
     const Eigen::Index u_there = 3 * Eigen::Index{there};
     const Eigen::Index v = coordinates() + u;
@@ -79,7 +79,7 @@ InertialEquation::Sparse InertialEquation::jacobian(double time_s, const ConstVe
   }
   for (Eigen::Index i = 0; i < rest_.cols(); ++i) {
     const auto sphere = static_cast<std::size_t>(i);
-    const Eigen::Matrix3d& p = tissue_.freedom().projector(sphere);
+    const Eigen::Matrix3d& p = tissue_.constraints().projector(sphere);
     const Eigen::Index v = coordinates() + 3 * i;
     add_block(entries, v, 3 * i, p / -inertia_.mass_kg[i] * stiffness.diagonal[sphere]);
     add_block(entries, v, v, -drag_per_s_[i] * p);

@@ -116,22 +116,23 @@ void LaneBonds::close_contacts(std::span<const char> closed) {
   }
 }
 
-LaneBonds::Lie LaneBonds::lie(const ToolContact& contact, const LaneMatrix& position) const {
-  Lie lie;
+LaneBonds::ContactGeometry LaneBonds::contact_geometry(const ToolContact& contact,
+                                                       const LaneMatrix& position) const {
+  ContactGeometry contact_geometry;
   const Eigen::Matrix<double, kLanes, 3> apart =
       columns_of(position, contact.tool) - columns_of(position, contact.sphere);
   if (contact.normal) {
-    lie.direction.rowwise() = contact.normal->transpose();
-    lie.overlap_force =
+    contact_geometry.direction.rowwise() = contact.normal->transpose();
+    contact_geometry.overlap_force =
         contact.stiffness_N_per_m * ((apart * *contact.normal).array() - contact.reach_m);
-    lie.turning.setZero();
-    return lie;
+    contact_geometry.turning.setZero();
+    return contact_geometry;
   }
   const LaneVector length = apart.rowwise().norm();
-  lie.direction = apart.array().colwise() / length.array();
-  lie.overlap_force = contact.stiffness_N_per_m * (length.array() - contact.reach_m);
-  lie.turning = lie.overlap_force.cwiseQuotient(length);
-  return lie;
+  contact_geometry.direction = apart.array().colwise() / length.array();
+  contact_geometry.overlap_force = contact.stiffness_N_per_m * (length.array() - contact.reach_m);
+  contact_geometry.turning = contact_geometry.overlap_force.cwiseQuotient(length);
+  return contact_geometry;
 }
 
 Eigen::VectorXd LaneBonds::in_order(const Eigen::VectorXd& all) const {
@@ -172,7 +173,7 @@ void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
   linear_ ? add_bond_forces<true>(position, memory, force)
           : add_bond_forces<false>(position, memory, force);
   for (const ToolContact& contact : closed_) {
-    const Lie now = lie(contact, position);
+    const ContactGeometry now = contact_geometry(contact, position);
     const Eigen::Matrix<double, kLanes, 3> pull =
         now.direction.array().colwise() * now.overlap_force.array();
     columns_of(force, contact.sphere) += pull;
@@ -338,7 +339,7 @@ void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& 
   linear_ ? add_bond_force_changes<true>(position, memory, changes, force)
           : add_bond_force_changes<false>(position, memory, changes, force);
   for (const ToolContact& contact : closed_) {
-    const Lie now = lie(contact, position);
+    const ContactGeometry now = contact_geometry(contact, position);
     const Eigen::Matrix<double, kLanes, 3> apart = columns_of(changes.displacement, contact.tool) -
                                                    columns_of(changes.displacement, contact.sphere);
     const LaneVector along = now.direction.cwiseProduct(apart).rowwise().sum();

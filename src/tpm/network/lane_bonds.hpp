@@ -68,11 +68,12 @@ class LaneBonds {
     std::size_t law;
   };
   /// How a contact lies in every lane.
-  struct Lie {
+  struct ContactGeometry {
     Eigen::Matrix<double, kLanes, 3> direction;
     LaneVector overlap_force, turning;  ///< N (negative), N/m
   };
-  [[nodiscard]] Lie lie(const ToolContact& contact, const LaneMatrix& position) const;
+  [[nodiscard]] ContactGeometry contact_geometry(const ToolContact& contact,
+                                                 const LaneMatrix& position) const;
 
   template <bool kLinear>
   void add_bond_forces(const LaneMatrix& position, const LaneMatrix& memory,

@@ -21,7 +21,7 @@ constexpr double kTired = 1.5;  // growth of the iterations that makes a precond
 /// How exactly the next step is worth solving.
 class Forcing {
  public:
-  explicit Forcing(double goal) : goal_(goal) {}
+  explicit Forcing(double goal) : adjoint_(goal) {}
   /// @param residual now, in the unit of the goal
   double next(double residual) {
     double eta = kFirstForcing;
@@ -32,29 +32,29 @@ class Forcing {
       if (safe > kSafeguard) eta = std::max(eta, safe);
     }
     // Not more exactly than the goal asks for; by a good part, as norms differ.
-    eta = std::max(eta, kSafeguard * kSafeguard * goal_ / residual);
+    eta = std::max(eta, kSafeguard * kSafeguard * adjoint_ / residual);
     last_eta_ = std::clamp(eta, kLeastForcing, kFirstForcing);
     last_residual_ = residual;
     return last_eta_;
   }
 
  private:
-  double goal_;
+  double adjoint_;
   double last_residual_ = 0.0, last_eta_ = 0.0;
 };
 
 /// Translations, and turns about the middle scaled to the size of the body.
-RigidModes<3> rigid_modes(const Positions& rest, const Freedom& freedom) {
+RigidModes<3> rigid_modes(const Positions& rest, const Constraints& constraints) {
   const Eigen::Vector3d middle = rest.rowwise().mean();
   const Positions from = rest.colwise() - middle;
   const double size = std::max(from.colwise().norm().maxCoeff(), 1e-300);
-  RigidModes<3> modes(freedom.size());
+  RigidModes<3> modes(constraints.size());
   for (std::size_t i = 0; i < modes.size(); ++i) {
     const Eigen::Vector3d p = from.col(static_cast<Eigen::Index>(i)) / size;
     Eigen::Matrix<double, 3, 6> mode;
     mode.leftCols<3>().setIdentity();
     mode.rightCols<3>() << 0, p.z(), -p.y(), -p.z(), 0, p.x(), p.y(), -p.x(), 0;
-    modes[i] = freedom.projector(i) * mode;
+    modes[i] = constraints.projector(i) * mode;
   }
   return modes;
 }
@@ -66,13 +66,13 @@ TangentAnswer answer_of(GradientsEnd end) {
 
 }  // namespace
 
-LargeEquilibrium::LargeEquilibrium(const BondSystem& bonds, const Freedom& freedom,
+LargeEquilibrium::LargeEquilibrium(const BondSystem& bonds, const Constraints& constraints,
                                    const Positions& rest, LargeEquilibriumOptions options)
     : bonds_(bonds),
-      freedom_(freedom),
+      constraints_(constraints),
       options_(options),
-      modes_(rigid_modes(rest, freedom)),
-      stiffness_(bonds, freedom) {
+      modes_(rigid_modes(rest, constraints)),
+      stiffness_(bonds, constraints) {
   if (options.most_iterations < 1) {
     throw bad_input("iterations of conjugate gradients", fmt::format("{}", options.most_iterations),
                     "1 or more");
@@ -106,7 +106,7 @@ void LargeEquilibrium::assemble(const Positions& position, const BondMemory& mem
 }
 
 TangentAnswer LargeEquilibrium::displace(Eigen::Matrix3Xd& vectors, double tolerance) {
-  freedom_.project(vectors);
+  constraints_.project(vectors);
   Eigen::Matrix3Xd x;
   const GradientsOutcome outcome = conjugate_gradients(
       stiffness_.matrix(), *preconditioner_, vectors, tolerance, options_.most_iterations, x);
@@ -116,7 +116,7 @@ TangentAnswer LargeEquilibrium::displace(Eigen::Matrix3Xd& vectors, double toler
     last_rate_ = -outcome.iterations / std::log10(std::min(outcome.reduction, 0.5));
     if (rate_when_new_ == 0.0) rate_when_new_ = last_rate_;
   }
-  freedom_.project(x);
+  constraints_.project(x);
   vectors = std::move(x);
   return answer_of(outcome.end);
 }
@@ -143,7 +143,7 @@ EquilibriumSearch LargeEquilibrium::find(Positions& position, const BondMemory& 
     return solve(at, with, forces, forcing.next(residual));
   };
   EquilibriumSearch search =
-      newton_balance(bonds_, freedom_, position, memory, load, tolerance_N, step);
+      newton_balance(bonds_, constraints_, position, memory, load, tolerance_N, step);
   if (!search.converged || !search.stable) return search;
   assemble(position, memory);
   const TangentAnswer answer = probe();

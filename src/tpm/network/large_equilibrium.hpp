@@ -2,7 +2,7 @@
 #include <array>
 #include <memory>
 
-#include "tpm/core/word_table.hpp"
+#include "tpm/core/enum_names.hpp"
 #include "tpm/network/newton_balance.hpp"
 #include "tpm/network/stiffness_rows.hpp"
 #include "tpm/solve/multigrid.hpp"
@@ -44,7 +44,7 @@ class LargeEquilibrium {
   /// @param bonds, freedom must live as long as this
   /// @param rest positions of the spheres, m: whence the rigid motions of the multigrid
   /// Throws Error(bad_input) if a solution is allowed no iteration.
-  LargeEquilibrium(const BondSystem& bonds, const Freedom& freedom, const Positions& rest,
+  LargeEquilibrium(const BondSystem& bonds, const Constraints& constraints, const Positions& rest,
                    LargeEquilibriumOptions options = {});
 
   /// As Equilibrium::find; `factorisations` counts linear solutions.
@@ -65,7 +65,7 @@ class LargeEquilibrium {
 
   [[nodiscard]] const LargeEquilibriumWork& work() const { return work_; }
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
-  [[nodiscard]] const Freedom& freedom() const { return freedom_; }
+  [[nodiscard]] const Constraints& constraints() const { return constraints_; }
   /// Nodes on each level of the last multigrid; empty without one.
   [[nodiscard]] std::vector<std::size_t> level_sizes() const;
 
@@ -75,7 +75,7 @@ class LargeEquilibrium {
   void prepare();
 
   const BondSystem& bonds_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   LargeEquilibriumOptions options_;
   RigidModes<3> modes_;
   StiffnessRows stiffness_;

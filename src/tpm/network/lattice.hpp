@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "tpm/core/word_table.hpp"
+#include "tpm/core/enum_names.hpp"
 
 namespace tpm {
 

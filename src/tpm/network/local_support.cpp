@@ -46,19 +46,19 @@ class BondsOfSpheres {
 
 /// The stiffness of a sphere and its neighbours, all others held, on their free coordinates.
 /// @param place scratch: -1 for every sphere, before and after
-Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Freedom& freedom,
+Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Constraints& constraints,
                                 const std::vector<std::size_t>& patch, std::vector<Index>& place) {
   const auto n = static_cast<Index>(patch.size());
   for (Index i = 0; i < n; ++i) place[patch[static_cast<std::size_t>(i)]] = i;
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(3 * n, 3 * n);
   for (Index i = 0; i < n; ++i) {
     const std::size_t sphere = patch[static_cast<std::size_t>(i)];
-    const Eigen::Matrix3d& p = freedom.projector(sphere);
+    const Eigen::Matrix3d& p = constraints.projector(sphere);
     for (const auto& end : bonds.of(sphere)) {
       const Eigen::Matrix3d block = bonds.stiffness(sphere, end);
       matrix.block<3, 3>(3 * i, 3 * i) += p * block * p;
       if (const Index j = place[end.other]; j >= 0) {
-        matrix.block<3, 3>(3 * i, 3 * j) -= p * block * freedom.projector(end.other);
+        matrix.block<3, 3>(3 * i, 3 * j) -= p * block * constraints.projector(end.other);
       }
     }
   }
@@ -66,7 +66,8 @@ Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Freedom& free
   for (Index i = 0; i < n; ++i) {
     const std::size_t sphere = patch[static_cast<std::size_t>(i)];
     matrix.block<3, 3>(3 * i, 3 * i) +=
-        scale * (Eigen::Matrix3d::Identity() - (1.0 - kRegularised) * freedom.projector(sphere));
+        scale *
+        (Eigen::Matrix3d::Identity() - (1.0 - kRegularised) * constraints.projector(sphere));
     place[sphere] = -1;
   }
   return matrix;
@@ -75,17 +76,17 @@ Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Freedom& free
 }  // namespace
 
 std::vector<double> local_support(const BondSystem& bonds, const Organ& organ,
-                                  const Freedom& freedom) {
+                                  const Constraints& constraints) {
   const BondsOfSpheres of(bonds, organ.position);
   std::vector<Index> place(organ.size(), -1);
   std::vector<double> support(organ.size(), 1.0);
   for (std::size_t i = 0; i < organ.size(); ++i) {
     const Eigen::Vector3d normal = organ.normal.col(static_cast<Index>(i));
-    const Eigen::Vector3d along = freedom.projector(i) * normal;
+    const Eigen::Vector3d along = constraints.projector(i) * normal;
     if (along.norm() < 1e-6) continue;
     std::vector<std::size_t> patch{i};
     for (const auto& end : of.of(i)) patch.push_back(end.other);
-    const Eigen::MatrixXd matrix = patch_stiffness(of, freedom, patch, place);
+    const Eigen::MatrixXd matrix = patch_stiffness(of, constraints, patch, place);
     const double held = along.dot(matrix.topLeftCorner<3, 3>() * along);
     if (!(matrix.trace() > 0.0) || of.of(i).empty()) {
       support[i] = 0.0;
@@ -120,9 +121,9 @@ std::string sphere_list(const std::vector<std::size_t>& spheres) {
   return fmt::format("sphere{} {}", spheres.size() == 1 ? "" : "s", list);
 }
 
-void require_supported(const BondSystem& bonds, const Organ& organ, const Freedom& freedom,
+void require_supported(const BondSystem& bonds, const Organ& organ, const Constraints& constraints,
                        std::string_view where) {
-  const std::vector<double> support = local_support(bonds, organ, freedom);
+  const std::vector<double> support = local_support(bonds, organ, constraints);
   const std::vector<std::size_t> loose = loose_spheres(support);
   if (loose.empty()) return;
   throw bad_input(

@@ -2,7 +2,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/network/network.hpp"
 
 namespace tpm {
@@ -17,13 +17,13 @@ inline constexpr double kLooseSupport = 0.05;
 /// does not fall with the number of spheres, and so tells a near mechanism (a shell whose curvature
 /// alone resists, docs/notation.md) from a large organ that bends.
 [[nodiscard]] std::vector<double> local_support(const BondSystem& bonds, const Organ& organ,
-                                                const Freedom& freedom);
+                                                const Constraints& constraints);
 
 /// The spheres below kLooseSupport, the loosest first; from 0.
 [[nodiscard]] std::vector<std::size_t> loose_spheres(const std::vector<double>& support);
 
 /// Throws Error(bad_input) that names the loose spheres, unless there are none.
-void require_supported(const BondSystem& bonds, const Organ& organ, const Freedom& freedom,
+void require_supported(const BondSystem& bonds, const Organ& organ, const Constraints& constraints,
                        std::string_view where);
 
 /// "sphere 7", "spheres 12, 14 and 5 more"; numbers from 1.

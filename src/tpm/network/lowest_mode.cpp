@@ -19,23 +19,23 @@ constexpr double kConverged = 1e-13;  // relative change of omega^2
 /// Subspace iteration for the lowest eigenvalues of K against M.
 class InverseIteration {
  public:
-  InverseIteration(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  InverseIteration(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                    const Eigen::VectorXd& mass)
-      : bonds_(bonds), rest_(rest), freedom_(freedom), factor_(bonds.pattern()) {
+      : bonds_(bonds), rest_(rest), constraints_(constraints), factor_(bonds.pattern()) {
     mass_ = mass.transpose().replicate(3, 1).reshaped();
-    basis_.resize(mass_.size(), static_cast<Eigen::Index>(std::min(kVectors, freedom.count())));
+    basis_.resize(mass_.size(), static_cast<Eigen::Index>(std::min(kVectors, constraints.count())));
     Random random(1);
     for (double& x : basis_.reshaped()) x = random.normal();
-    for (Eigen::Index j = 0; j < basis_.cols(); ++j) freedom_.project(column(j));
+    for (Eigen::Index j = 0; j < basis_.cols(); ++j) constraints_.project(column(j));
   }
 
   /// The lowest omega^2 where a share of the relaxing stiffness has relaxed.
-  double lowest(const Following& following) {
+  double lowest(const RelaxationFactor& relaxation_factor) {
     const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())),
-                            following};
+                            relaxation_factor};
     BlockMatrix matrix(bonds_.pattern());
     bonds_.add_stiffness(rest_, memory, matrix);
-    freedom_.constrain(bonds_, matrix);
+    constraints_.constrain(bonds_, matrix);
     if (!factor_.factorise(matrix) || factor_.negative_count() > 0) {
       throw Error(ExitCode::numerical, "lowest mode", "the stiffness at rest is not positive");
     }
@@ -63,7 +63,7 @@ class InverseIteration {
     basis_ = pushed;
     for (Eigen::Index j = 0; j < basis_.cols(); ++j) {
       factor_.solve(column(j));
-      freedom_.project(column(j));
+      constraints_.project(column(j));
     }
     // basis = K^-1 pushed, so that basis' K basis = basis' pushed.
     const Eigen::MatrixXd stiffness = basis_.transpose() * pushed;
@@ -75,14 +75,14 @@ class InverseIteration {
 
   const BondSystem& bonds_;
   const Positions& rest_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   BlockLdlt factor_;
   Eigen::VectorXd mass_;   ///< of each coordinate
   Eigen::MatrixXd basis_;  ///< one column a vector, M-orthonormal
 };
 
 /// The relaxed share of each law at the square of an angular frequency.
-Following relaxed_at(const BondSystem& bonds, double square) {
+RelaxationFactor relaxed_at(const BondSystem& bonds, double square) {
   std::vector<double> of_law;
   for (const ViscousLaw& law : bonds.laws()) {
     double share = 0.0;
@@ -92,7 +92,7 @@ Following relaxed_at(const BondSystem& bonds, double square) {
     }
     of_law.push_back(share);
   }
-  return Following(std::move(of_law));
+  return RelaxationFactor(std::move(of_law));
 }
 
 }  // namespace
@@ -106,27 +106,28 @@ Eigen::VectorXd sphere_masses_kg(const Organ& organ, double density_kg_per_m3) {
   return Eigen::VectorXd::Constant(organ.position.cols(), density_kg_per_m3 * volume);
 }
 
-LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
-                       const Eigen::VectorXd& mass_kg) {
+LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest,
+                       const Constraints& constraints, const Eigen::VectorXd& mass_kg) {
   if (bonds.contact_count() > 0) {
     const BondSystem tissue = bonds.without_tools();
     const auto spheres = static_cast<Eigen::Index>(tissue.spheres());
-    LowestMode mode = lowest_mode(tissue, rest.leftCols(spheres), freedom.first(tissue.spheres()),
-                                  mass_kg.head(spheres));
+    LowestMode mode = lowest_mode(tissue, rest.leftCols(spheres),
+                                  constraints.first(tissue.spheres()), mass_kg.head(spheres));
     mode.shape.conservativeResize(Eigen::NoChange, rest.cols());
     mode.shape.rightCols(rest.cols() - spheres).setZero();
     return mode;
   }
-  require_rigid(bonds, rest, freedom, "lowest mode");
-  if (freedom.count() == 0) throw bad_input("lowest mode", "nothing is free", "a free coordinate");
-  InverseIteration iteration(bonds, rest, freedom, mass_kg);
+  require_rigid(bonds, rest, constraints, "lowest mode");
+  if (constraints.count() == 0)
+    throw bad_input("lowest mode", "nothing is free", "a free coordinate");
+  InverseIteration iteration(bonds, rest, constraints, mass_kg);
   LowestMode mode;
   // From the unrelaxed network downwards: omega falls steadily to its own fixed point.
   double square = iteration.lowest(0.0);
   for (int i = 0; i < kMostModeIterations; ++i) {
-    mode.following = relaxed_at(bonds, square);
+    mode.relaxation_factor = relaxed_at(bonds, square);
     const double last = square;
-    square = iteration.lowest(mode.following);
+    square = iteration.lowest(mode.relaxation_factor);
     if (std::abs(square - last) > 10.0 * kConverged * square) continue;
     mode.frequency_Hz = std::sqrt(square) / (2.0 * std::numbers::pi);
     mode.shape = iteration.shape();

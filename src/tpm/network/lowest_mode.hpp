@@ -1,6 +1,6 @@
 #pragma once
 #include "tpm/network/bond_system.hpp"
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 
 namespace tpm {
 
@@ -14,7 +14,7 @@ struct LowestMode {
   double frequency_Hz = 0.0;
   /// Share of the relaxing stiffness that has relaxed at that frequency, of each law the sum of
   /// gamma_j/(1 + (omega tau_j)^2).
-  Following following;
+  RelaxationFactor relaxation_factor;
   /// Displacements of the spheres (of tools 0), modal mass 1: the sum of m |shape|^2 is 1 kg (m^2).
   /// Up to sign, and within their span where several modes have one frequency.
   Eigen::Matrix3Xd shape;
@@ -35,6 +35,7 @@ struct LowestMode {
 /// Throws Error(bad_input) for a network with zero-energy modes, Error(numerical) if an iteration
 /// does not converge.
 [[nodiscard]] LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest,
-                                     const Freedom& freedom, const Eigen::VectorXd& mass_kg);
+                                     const Constraints& constraints,
+                                     const Eigen::VectorXd& mass_kg);
 
 }  // namespace tpm

@@ -11,12 +11,13 @@
 namespace tpm {
 
 double contact_stiffness_N_per_m(const BondSystem& bonds, const Positions& rest,
-                                 const Freedom& freedom, const Probe& probe, double following) {
-  require_valid(probe, freedom);
-  require_rigid(bonds, rest, freedom, "contact stiffness");
+                                 const Constraints& constraints, const Probe& probe,
+                                 double relaxation_factor) {
+  require_valid(probe, constraints);
+  require_rigid(bonds, rest, constraints, "contact stiffness");
   const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
-                          following};
-  Equilibrium equilibrium(bonds, freedom);
+                          relaxation_factor};
+  Equilibrium equilibrium(bonds, constraints);
   if (!equilibrium.factorise(rest, memory)) {
     throw Error(ExitCode::numerical, "contact stiffness", "the stiffness cannot be factorised");
   }
@@ -36,7 +37,7 @@ Network msm_network(const Network& network, SpringRule rule) {
   return msm;
 }
 
-BondMaterial msm_material(const Network& msm, const Freedom& freedom, const Probe& probe,
+BondMaterial msm_material(const Network& msm, const Constraints& constraints, const Probe& probe,
                           double stiffness_N_per_m) {
   if (!(stiffness_N_per_m > 0.0) || !std::isfinite(stiffness_N_per_m)) {
     throw bad_input("mass-spring model",
@@ -46,7 +47,7 @@ BondMaterial msm_material(const Network& msm, const Freedom& freedom, const Prob
   BondMaterial material;
   material.lateral_Pa = 1e4;  // any will do: the stiffness is in proportion to it
   const double per_Pa = contact_stiffness_N_per_m(BondSystem(msm, material), msm.organ.position,
-                                                  freedom, probe, 0.0) /
+                                                  constraints, probe, 0.0) /
                         material.lateral_Pa;
   material.lateral_Pa = stiffness_N_per_m / per_Pa;
   return material;

@@ -14,8 +14,8 @@ enum class SpringRule {
 /// or before anything has (0).
 /// Throws Error(bad_input) for a probe that cannot move or a network with zero-energy modes.
 [[nodiscard]] double contact_stiffness_N_per_m(const BondSystem& bonds, const Positions& rest,
-                                               const Freedom& freedom, const Probe& probe,
-                                               double following);
+                                               const Constraints& constraints, const Probe& probe,
+                                               double relaxation_factor);
 
 /// The mass-spring model on the spheres of a network: every bond becomes one elastic spring along
 /// itself (in this library's terms a lateral bond), so that nothing relaxes. The masses are the
@@ -26,7 +26,7 @@ enum class SpringRule {
 /// small depth with the given stiffness.
 /// @param stiffness_N_per_m > 0, as contact_stiffness_N_per_m gives it for the tissue
 /// Throws Error(bad_input) as contact_stiffness_N_per_m does, and for a stiffness that is not > 0.
-[[nodiscard]] BondMaterial msm_material(const Network& msm, const Freedom& freedom,
+[[nodiscard]] BondMaterial msm_material(const Network& msm, const Constraints& constraints,
                                         const Probe& probe, double stiffness_N_per_m);
 
 }  // namespace tpm

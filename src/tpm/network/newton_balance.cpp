@@ -21,7 +21,7 @@ void balance_forces(const BondSystem& bonds, const Positions& position, const Bo
   bonds.add_forces(position, memory, force);
 }
 
-EquilibriumSearch newton_balance(const BondSystem& bonds, const Freedom& freedom,
+EquilibriumSearch newton_balance(const BondSystem& bonds, const Constraints& constraints,
                                  Positions& position, const BondMemory& memory,
                                  const Eigen::Matrix3Xd& load, double tolerance_N,
                                  const TangentSolve& solve) {
@@ -31,7 +31,7 @@ EquilibriumSearch newton_balance(const BondSystem& bonds, const Freedom& freedom
   double energy = potential(bonds, position, memory, load);
   for (;;) {
     balance_forces(bonds, position, memory, load, force);
-    freedom.project(force);
+    constraints.project(force);
     search.residual_N = force.colwise().norm().maxCoeff();
     if (!std::isfinite(search.residual_N)) return search;
     search.converged = search.residual_N <= tolerance_N;

@@ -2,7 +2,7 @@
 #include <functional>
 
 #include "tpm/network/bond_system.hpp"
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 
 namespace tpm {
 
@@ -33,8 +33,9 @@ void balance_forces(const BondSystem& bonds, const Positions& position, const Bo
 /// at one at least.
 /// @param position start, with what is imposed in place; the equilibrium if converged
 /// @param tolerance_N of the force left on each sphere
-[[nodiscard]] EquilibriumSearch newton_balance(const BondSystem& bonds, const Freedom& freedom,
-                                               Positions& position, const BondMemory& memory,
+[[nodiscard]] EquilibriumSearch newton_balance(const BondSystem& bonds,
+                                               const Constraints& constraints, Positions& position,
+                                               const BondMemory& memory,
                                                const Eigen::Matrix3Xd& load, double tolerance_N,
                                                const TangentSolve& solve);
 

@@ -52,14 +52,14 @@ class StepGrowth {
 /// One run: the state and how it is carried through the protocol.
 class Run {
  public:
-  Run(const BondSystem& bonds, const Positions& rest, const Freedom& freedom, const Probes& probes,
-      const QuasiStaticOptions& options, const Protocol& protocol, std::span<const double> times_s,
-      const QuasiStaticObserver& observer)
+  Run(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
+      const Probes& probes, const QuasiStaticOptions& options, const Protocol& protocol,
+      std::span<const double> times_s, const QuasiStaticObserver& observer)
       : protocol_(protocol),
         options_(options),
         times_s_(times_s),
         observer_(observer),
-        tissue_(bonds, rest, freedom, probes, protocol.drive(), options.equilibrium),
+        tissue_(bonds, rest, constraints, probes, protocol.drive(), options.equilibrium),
         stages_(tissue_, options.stages, !options.step_s) {
     order_ = rising_order(times_s);
     const auto asked = static_cast<Eigen::Index>(times_s.size());
@@ -419,36 +419,36 @@ Probes::Probes(std::vector<Probe> all) : all_(std::move(all)) {
   if (all_.empty()) throw bad_input("probe", "there is none", "a sphere or a tool to be driven");
 }
 
-void require_valid(const Probe& probe, const Freedom& freedom) {
+void require_valid(const Probe& probe, const Constraints& constraints) {
   if (!(probe.share > 0.0 && std::isfinite(probe.share))) {
     throw bad_input("probe", fmt::format("a share of {}", shortest(probe.share)), "above 0");
   }
-  if (probe.sphere >= freedom.size()) {
+  if (probe.sphere >= constraints.size()) {
     throw bad_input("probe", fmt::format("sphere {}", probe.sphere + 1),
-                    fmt::format("a sphere from 1 to {}", freedom.size()));
+                    fmt::format("a sphere from 1 to {}", constraints.size()));
   }
-  const Eigen::Vector3d free = freedom.projector(probe.sphere) * probe.direction;
+  const Eigen::Vector3d free = constraints.projector(probe.sphere) * probe.direction;
   if (std::abs(free.norm() - 1.0) > 1e-9) {
     throw bad_input("probe", fmt::format("sphere {} is held", probe.sphere + 1),
                     "a sphere that is free to move along the direction of the probe");
   }
 }
 
-void require_valid(const Probes& probes, const Freedom& freedom) {
+void require_valid(const Probes& probes, const Constraints& constraints) {
   std::set<std::size_t> driven;
   for (const Probe& probe : probes) {
-    require_valid(probe, freedom);
+    require_valid(probe, constraints);
     if (driven.insert(probe.sphere).second) continue;
     throw bad_input("probe", fmt::format("sphere {} is driven twice", probe.sphere + 1),
                     "each sphere once");
   }
 }
 
-QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probes probes,
-                         QuasiStaticOptions options)
+QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Constraints constraints,
+                         Probes probes, QuasiStaticOptions options)
     : bonds_(bonds),
       rest_(std::move(rest)),
-      freedom_(std::move(freedom)),
+      constraints_(std::move(constraints)),
       probes_(std::move(probes)),
       options_(options) {
   if (!(options.tolerance >= 1e-12 && options.tolerance <= 0.1)) {
@@ -466,7 +466,7 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedo
   if (options.step_s && !(*options.step_s > 0.0 && std::isfinite(*options.step_s))) {
     throw bad_input("step", shortest(*options.step_s) + " s", "a time above 0");
   }
-  require_valid(probes_, freedom_);
+  require_valid(probes_, constraints_);
 }
 
 QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double> times_s,
@@ -482,7 +482,7 @@ QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double
     require_same_network(*from, bonds_);
     require_later(times_s, from->time_s);
   }
-  return Run(bonds_, rest_, freedom_, probes_, options_, protocol, times_s, observer).go(from);
+  return Run(bonds_, rest_, constraints_, probes_, options_, protocol, times_s, observer).go(from);
 }
 
 }  // namespace tpm

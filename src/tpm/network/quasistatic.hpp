@@ -39,9 +39,9 @@ class Probes {
 
 /// Throws Error(bad_input) unless the probe's sphere exists and is free to move along its
 /// direction, and its share is above 0.
-void require_valid(const Probe& probe, const Freedom& freedom);
+void require_valid(const Probe& probe, const Constraints& constraints);
 /// The same for each, and none may be driven twice.
-void require_valid(const Probes& probes, const Freedom& freedom);
+void require_valid(const Probes& probes, const Constraints& constraints);
 
 /// Changes of one law of a BondSystem (viscous_law.hpp).
 struct LawChange {
@@ -133,7 +133,7 @@ class QuasiStatic {
   /// @param freedom of the network without the probe: what is held and guided
   /// @param bonds must live as long as this
   /// Throws Error(bad_input) for options out of range or a probe that cannot move.
-  QuasiStatic(const BondSystem& bonds, Positions rest, Freedom freedom, Probes probes,
+  QuasiStatic(const BondSystem& bonds, Positions rest, Constraints constraints, Probes probes,
               QuasiStaticOptions options = {});
 
   /// @param times_s any order, within the protocol
@@ -150,7 +150,7 @@ class QuasiStatic {
  private:
   const BondSystem& bonds_;
   Positions rest_;
-  Freedom freedom_;
+  Constraints constraints_;
   Probes probes_;
   QuasiStaticOptions options_;
 };

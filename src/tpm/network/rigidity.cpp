@@ -20,10 +20,10 @@ constexpr int kInverseIterations = 4;   // each gains about nine digits over wha
 constexpr double kTakesPart = 0.01;     // of the largest motion in the modes
 
 /// The matrix at rest plus a multiple of 1 on what is free.
-BlockMatrix shifted(const BlockMatrix& stiffness, const Freedom& freedom, double shift) {
+BlockMatrix shifted(const BlockMatrix& stiffness, const Constraints& constraints, double shift) {
   BlockMatrix matrix = stiffness;
-  for (std::size_t i = 0; i < freedom.size(); ++i) {
-    matrix.diagonal[i] += shift * freedom.projector(i);
+  for (std::size_t i = 0; i < constraints.size(); ++i) {
+    matrix.diagonal[i] += shift * constraints.projector(i);
   }
   return matrix;
 }
@@ -38,9 +38,9 @@ double mean_diagonal(const BondSystem& bonds, const Positions& rest, const BondM
 
 /// An orthonormal basis of the softest motions, one column each, coordinates of all spheres.
 Eigen::MatrixXd softest(const BlockPattern& pattern, const BlockMatrix& matrix,
-                        const Freedom& freedom, Eigen::Index count) {
+                        const Constraints& constraints, Eigen::Index count) {
   BlockLdlt factor(pattern);
-  const auto n = static_cast<Eigen::Index>(freedom.size());
+  const auto n = static_cast<Eigen::Index>(constraints.size());
   Eigen::MatrixXd basis(3 * n, count);
   Random random(1);
   for (double& x : basis.reshaped()) x = random.normal();
@@ -48,9 +48,9 @@ Eigen::MatrixXd softest(const BlockPattern& pattern, const BlockMatrix& matrix,
   for (int i = 0; i < kInverseIterations; ++i) {
     for (Eigen::Index j = 0; j < count; ++j) {
       Eigen::Map<Eigen::Matrix3Xd> mode(basis.col(j).data(), 3, n);
-      freedom.project(mode);
+      constraints.project(mode);
       factor.solve(mode);
-      freedom.project(mode);
+      constraints.project(mode);
     }
     basis = orthonormal_columns(basis);
   }
@@ -74,24 +74,24 @@ std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::si
 }  // namespace
 
 ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
-                                  const Freedom& freedom) {
+                                  const Constraints& constraints) {
   const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
-  StiffnessBlocks blocks(bonds, freedom);
+  StiffnessBlocks blocks(bonds, constraints);
   const BlockMatrix& stiffness = blocks.assemble(rest, none);
   const double mean = mean_diagonal(bonds, rest, none);
   const double size = mean > 0.0 ? mean : 1.0;
 
   ZeroEnergyModes modes;
   BlockLdlt factor(blocks.pattern());
-  if (!factor.factorise(shifted(stiffness, freedom, -kZero * size))) {
+  if (!factor.factorise(shifted(stiffness, constraints, -kZero * size))) {
     throw Error(ExitCode::numerical, "network", "the stiffness at rest cannot be factorised");
   }
   modes.count = factor.negative_count();
   if (modes.count == 0) return modes;
   const auto found = static_cast<Eigen::Index>(std::min(modes.count, kMostModes));
   modes.spheres = spheres_that_move(
-      softest(blocks.pattern(), shifted(stiffness, freedom, kZero * size), freedom, found),
-      freedom.size());
+      softest(blocks.pattern(), shifted(stiffness, constraints, kZero * size), constraints, found),
+      constraints.size());
   return modes;
 }
 
@@ -100,9 +100,9 @@ std::string words(const ZeroEnergyModes& modes) {
                      sphere_list(modes.spheres));
 }
 
-void require_rigid(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+void require_rigid(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                    std::string_view where) {
-  const ZeroEnergyModes modes = zero_energy_modes(bonds, rest, freedom);
+  const ZeroEnergyModes modes = zero_energy_modes(bonds, rest, constraints);
   if (modes.is_rigid()) return;
   throw bad_input(where, words(modes),
                   "a network without mechanisms: more bonds (a wider support) or more anchors");

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 
 namespace tpm {
 
@@ -21,13 +21,13 @@ struct ZeroEnergyModes {
 /// iteration.
 /// @param rest the positions at which every bond has its rest length
 [[nodiscard]] ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
-                                                const Freedom& freedom);
+                                                const Constraints& constraints);
 
 /// "3 zero-energy modes; loose: spheres 12, 14 and 5 more": for messages.
 [[nodiscard]] std::string words(const ZeroEnergyModes& modes);
 
 /// Throws Error(bad_input) unless the network is rigid.
-void require_rigid(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+void require_rigid(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                    std::string_view where);
 
 }  // namespace tpm

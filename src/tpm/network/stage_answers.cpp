@@ -49,7 +49,7 @@ LaneVector StageBalance::responses(const Within& states) {
   tissue_.add_load(states.imposed, force_);
   bonds_.add_forces(states.position, states.memory, force_);
   const LaneVector plain = tissue_.response(states.position, force_);
-  tissue_.freedom().project(force_);
+  tissue_.constraints().project(force_);
   return plain + tissue_.adjoint_sign() * (force_ * lane_field_.transpose());
 }
 
@@ -65,7 +65,7 @@ StatesWithin StageBalance::states_within(const TissueState& state,
   StatesWithin all{responses(states), std::vector<TissueState>(fractions.size(), state)};
   d_ = force_;  // what responses() left of them
   factor_.solve(d_);
-  tissue_.freedom().project(d_);
+  tissue_.constraints().project(d_);
   Eigen::MatrixXd viscous;
   for (std::size_t lane = 0; lane < fractions.size(); ++lane) {
     const auto row = static_cast<Eigen::Index>(lane);

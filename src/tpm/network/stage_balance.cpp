@@ -38,7 +38,7 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
     : tissue_(tissue),
       stages_(stages),
       choosing_(choosing),
-      coordinates_(3 * static_cast<Eigen::Index>(tissue.freedom().size())),
+      coordinates_(3 * static_cast<Eigen::Index>(tissue.constraints().size())),
       bonds_(tissue.bonds()),
       full_(with_start(radau_nodes(stages))),
       inner_(radau_nodes(stages)),
@@ -250,15 +250,16 @@ void StageBalance::set_weights(double h) {
   }
 }
 
-Following StageBalance::following_of_step() const {
+RelaxationFactor StageBalance::relaxation_factor_of_step() const {
   std::vector<double> of_law(tissue_.bonds().laws().size(), 0.0);
   for (std::size_t i = 0; i < weights_.size(); ++i) {
     of_law[bonds_.groups()[i].law] = weights_[i].mean.of_stages.diagonal().head(stages_).mean();
   }
-  return of_law.size() == 1 ? Following(of_law.front()) : Following(std::move(of_law));
+  return of_law.size() == 1 ? RelaxationFactor(of_law.front())
+                            : RelaxationFactor(std::move(of_law));
 }
 
-double StageBalance::difference(const Following& a, const Following& b) const {
+double StageBalance::difference(const RelaxationFactor& a, const RelaxationFactor& b) const {
   double largest = 0.0;
   for (const LaneBonds::Group& group : bonds_.groups()) {
     largest = std::max(largest, std::abs(a(group.law) - b(group.law)));
@@ -266,11 +267,12 @@ double StageBalance::difference(const Following& a, const Following& b) const {
   return largest;
 }
 
-bool StageBalance::refactorise(const TissueState& state, const Following& following) {
-  following_ = following;
+bool StageBalance::refactorise(const TissueState& state,
+                               const RelaxationFactor& relaxation_factor) {
+  relaxation_factor_ = relaxation_factor;
   // The same viscous elongations at this instant, of which a share follows.
   const BondMemory memory =
-      tissue_.bonds().memory_at(state.mean, state.followed, following, state.closed);
+      tissue_.bonds().memory_at(state.mean, state.followed, relaxation_factor, state.closed);
   ++work_.factorisations;
   Equilibrium& equilibrium = tissue_.equilibrium();
   factorised_ = equilibrium.factorise(state.position, memory) && equilibrium.is_stable();
@@ -282,17 +284,19 @@ bool StageBalance::refactorise(const TissueState& state, const Following& follow
   ++work_.back_solves;
   Eigen::VectorXd change;
   tissue_.bonds().elongation_changes(state.position, field.judge, change);
-  goal_ =
+  adjoint_ =
       tissue_.adjoint_sign() * bonds_.of_relaxing(change.cwiseProduct(tissue_.bonds().relaxing()));
-  grain_ = kGrains * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
-  if (tissue_.depth_driven()) grain_ *= tissue_.held_stiffness(state.position, memory);
+  rounding_ =
+      kGrains * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
+  if (tissue_.depth_driven()) rounding_ *= tissue_.held_stiffness(state.position, memory);
   last_iterations_ = 0;
   return true;
 }
 
-void StageBalance::require_factor(const TissueState& state, const Following& following) {
-  if (factorised_ && difference(following_, following) == 0.0) return;
-  if (refactorise(state, following)) return;
+void StageBalance::require_factor(const TissueState& state,
+                                  const RelaxationFactor& relaxation_factor) {
+  if (factorised_ && difference(relaxation_factor_, relaxation_factor) == 0.0) return;
+  if (refactorise(state, relaxation_factor)) return;
   throw Error(ExitCode::numerical, "network",
               "the stiffness behind a jump is not positive: its derivatives do not exist");
 }
@@ -312,7 +316,7 @@ void StageBalance::predict(const TissueState& state, double h, double rate) {
     x_.noalias() = shape * last_path_;
     x_.rowwise() -= last_path_.row(stages_ - 1).eval();
     // Only what is free moves: rounding would make held spheres drift.
-    tissue_.freedom().project(x_);
+    tissue_.constraints().project(x_);
     x_.rowwise() += start_;
   } else {
     x_.noalias() = h * rate * c * lane_field_;
@@ -331,10 +335,10 @@ void StageBalance::residuals() {
   force_.setZero();
   tissue_.add_load(imposed_, force_);
   bonds_.add_forces(x_, memory_, force_);
-  tissue_.freedom().project(force_);
+  tissue_.constraints().project(force_);
   d_ = force_;
   factor_.solve(d_);
-  tissue_.freedom().project(d_);
+  tissue_.constraints().project(d_);
   work_.back_solves += stages_;
   ++work_.iterations;
   const double energy = d_.cwiseProduct(force_).rowwise().sum().maxCoeff();
@@ -369,7 +373,7 @@ double StageBalance::error() const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(places);
   Eigen::VectorXd size = sum;
   for (const LaneBonds::Group& group : bonds_.groups()) {
-    const auto goal = goal_.segment(group.first, group.count);
+    const auto goal = adjoint_.segment(group.first, group.count);
     const auto followed = followed_.middleCols(group.first, group.count);
     const auto start = begin_.followed.segment(group.first, group.count);
     const LaneVector aimed = followed * goal;
@@ -395,10 +399,10 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
                                    double tolerance) {
   set_weights(h);
   StepOutcome outcome;
-  const Following following = following_of_step();
+  const RelaxationFactor relaxation_factor = relaxation_factor_of_step();
   const bool stale = !factorised_ || last_iterations_ > kTooManyIterations ||
-                     difference(following, following_) > kFollowingChange;
-  if (stale && !refactorise(state, following)) {
+                     difference(relaxation_factor, relaxation_factor_) > kFollowingChange;
+  if (stale && !refactorise(state, relaxation_factor)) {
     outcome.unstable = true;
     return outcome;
   }
@@ -409,7 +413,7 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   find_known(weights_, begin_, known_);
   predict(state, h, rate);
   outcome.allowed = tolerance * scale_;
-  const Balance balanced = balance(std::max(outcome.allowed, grain_));
+  const Balance balanced = balance(std::max(outcome.allowed, rounding_));
   outcome.balanced = balanced != Balance::failed;
   if (!outcome.balanced) {
     factorised_ = false;
@@ -418,7 +422,7 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
   if (balanced == Balance::found) update_memory();
   outcome.error = std::max(error(), 1e-12 * outcome.allowed);
   outcome.accepted =
-      balanced == Balance::found && outcome.error <= std::max(outcome.allowed, grain_);
+      balanced == Balance::found && outcome.error <= std::max(outcome.allowed, rounding_);
   return outcome;
 }
 

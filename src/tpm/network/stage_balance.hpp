@@ -124,7 +124,7 @@ class StageBalance {
   /// The fractions of the step at which the lanes stand.
   [[nodiscard]] const std::array<double, kLanes>& lane_nodes() const { return lane_nodes_; }
   /// A factorisation at a state, for what follows a move.
-  void require_factor(const TissueState& state, const Following& following);
+  void require_factor(const TissueState& state, const RelaxationFactor& relaxation_factor);
 
   /// States within a step, one per lane.
   struct Within {
@@ -150,10 +150,11 @@ class StageBalance {
   [[nodiscard]] double node(int lane) const;
   void set_weights(double h);
   /// The share of the viscous elongation of each law that follows in a step, the mean over stages.
-  [[nodiscard]] Following following_of_step() const;
+  [[nodiscard]] RelaxationFactor relaxation_factor_of_step() const;
   /// The largest difference of two such shares.
-  [[nodiscard]] double difference(const Following& a, const Following& b) const;
-  [[nodiscard]] bool refactorise(const TissueState& state, const Following& following);
+  [[nodiscard]] double difference(const RelaxationFactor& a, const RelaxationFactor& b) const;
+  [[nodiscard]] bool refactorise(const TissueState& state,
+                                 const RelaxationFactor& relaxation_factor);
   void predict(const TissueState& state, double h, double rate);
   [[nodiscard]] Balance balance(double tolerance);
   /// The forces left on the free spheres of every stage, and from them the next correction.
@@ -182,12 +183,12 @@ class StageBalance {
 
   // The factorisation in use.
   bool factorised_ = false;
-  Following following_;
+  RelaxationFactor relaxation_factor_;
   int last_iterations_ = 0;
   Eigen::RowVectorXd lane_field_;  ///< displacement per unit imposed, by coordinate
-  Eigen::VectorXd goal_;           ///< change of the response per change of each bond's y
+  Eigen::VectorXd adjoint_;        ///< change of the response per change of each bond's y
   double path_stiffness_ = 0.0;    ///< bounds a response by the energy of an imbalance
-  double grain_ = 0.0;             ///< what rounding of positions does to the response, N or m
+  double rounding_ = 0.0;          ///< what rounding of positions does to the response, N or m
 
   // The step being balanced, stages in lanes.
   std::vector<char> closed_;  ///< contacts

@@ -78,7 +78,7 @@ StageTangents::Stages StageTangents::stages_of_step(double h) const {
   return stages;
 }
 
-StageTangents::Stages StageTangents::at_once(const TissueState& state, bool relaxed) const {
+StageTangents::Stages StageTangents::instantaneous(const TissueState& state, bool relaxed) const {
   Stages stages;
   const Eigen::Map<const Eigen::RowVectorXd> position(state.position.data(), state.position.size());
   stages.position = position.replicate(kLanes, 1);
@@ -136,19 +136,19 @@ void StageTangents::force_changes(const Tangent& tangent, const Stages& stages,
 }
 
 void StageTangents::solve(Tangent& tangent, const Stages& stages) {
-  const Freedom& freedom = tissue_.freedom();
+  const Constraints& constraints = tissue_.constraints();
   prepare(tangent, stages);
   tangent.position = tangent.start.replicate(kLanes, 1);
   tissue_.impose_change(tangent.position, tangent.imposed * stages.imposed);
   anderson_.restart();
-  const double allowed = std::max(tolerance_ * balance_.scale_, balance_.grain_);
+  const double allowed = std::max(tolerance_ * balance_.scale_, balance_.rounding_);
   for (int i = 0; i < kMostTangentIterations; ++i) {
     update_memory(tangent, stages);
     force_changes(tangent, stages, tangent.position, tangent.mean);
-    freedom.project(force_);
+    constraints.project(force_);
     d_ = force_;
     balance_.factor_.solve(d_);
-    freedom.project(d_);
+    constraints.project(d_);
     const double energy = d_.cwiseProduct(force_).rowwise().sum().maxCoeff();
     if (!std::isfinite(energy)) break;
     if (std::sqrt(std::max(energy, 0.0) * balance_.path_stiffness_) <= allowed) {
@@ -189,7 +189,7 @@ void StageTangents::end_at(Tangent& tangent, const Stages& stages, Eigen::Index 
 void StageTangents::follow_move(const TissueState& state, bool relaxed) {
   balance_.require_factor(state, relaxed ? 1.0 : 0.0);
   balance_.bonds_.close_contacts(state.closed);
-  const Stages stages = at_once(state, relaxed);
+  const Stages stages = instantaneous(state, relaxed);
   for (Tangent& tangent : tangent_) {
     solve(tangent, stages);
     end_at(tangent, stages, 0);
@@ -207,7 +207,7 @@ void StageTangents::accept() {
 
 LaneVector StageTangents::response_changes(const LaneMatrix& position) {
   const LaneVector plain = tissue_.response_change(position, force_);
-  tissue_.freedom().project(force_);
+  tissue_.constraints().project(force_);
   return plain + tissue_.adjoint_sign() * (force_ * balance_.lane_field_.transpose());
 }
 
@@ -238,7 +238,7 @@ Eigen::MatrixXd StageTangents::responses_within(const TissueState& state,
 }
 
 Eigen::RowVectorXd StageTangents::response(const TissueState& state) {
-  const Stages stages = at_once(state, false);
+  const Stages stages = instantaneous(state, false);
   Eigen::RowVectorXd answer(count());
   for (Eigen::Index i = 0; i < count(); ++i) {
     Tangent& tangent = tangent_[static_cast<std::size_t>(i)];

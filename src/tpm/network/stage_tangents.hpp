@@ -59,7 +59,7 @@ class StageTangents {
   [[nodiscard]] Stages stages_of_step(double h) const;
   [[nodiscard]] Stages stages_at(const StageBalance::Places& places,
                                  std::span<const double> fractions, double h) const;
-  [[nodiscard]] Stages at_once(const TissueState& state, bool relaxed) const;
+  [[nodiscard]] Stages instantaneous(const TissueState& state, bool relaxed) const;
   void prepare(Tangent& tangent, const Stages& stages) const;
   void solve(Tangent& tangent, const Stages& stages);
   void update_memory(Tangent& tangent, const Stages& stages) const;

@@ -3,18 +3,18 @@
 namespace tpm {
 
 std::shared_ptr<const BondSystem::PartGraph> moving_graph(const BondSystem& bonds,
-                                                          const Freedom& freedom) {
+                                                          const Constraints& constraints) {
   std::vector<bool> held(bonds.spheres());
   for (std::size_t i = 0; i < held.size(); ++i) {
-    held[i] = !freedom.is_free(i) && freedom.projector(i).isZero(0.0);
+    held[i] = !constraints.is_free(i) && constraints.projector(i).isZero(0.0);
   }
   return bonds.part_graph(held);
 }
 
-StiffnessBlocks::StiffnessBlocks(const BondSystem& bonds, const Freedom& freedom)
+StiffnessBlocks::StiffnessBlocks(const BondSystem& bonds, const Constraints& constraints)
     : bonds_(bonds),
-      freedom_(freedom),
-      graph_(moving_graph(bonds, freedom)),
+      constraints_(constraints),
+      graph_(moving_graph(bonds, constraints)),
       matrix_(graph_->pattern) {}
 
 const BlockMatrix& StiffnessBlocks::assemble(const Positions& position, const BondMemory& memory) {
@@ -28,19 +28,19 @@ const BlockMatrix& StiffnessBlocks::assemble(const Positions& position, const Bo
     if (!graph_->place[i]) continue;
     const auto [index, transposed] = *graph_->place[i];
     Eigen::Matrix3d& below = matrix_.below[index];
-    if (freedom_.is_free(a) && freedom_.is_free(b)) {
+    if (constraints_.is_free(a) && constraints_.is_free(b)) {
       below -= block;  // symmetric: the same either way round
     } else {
-      below -=
-          freedom_.projector(transposed ? b : a) * block * freedom_.projector(transposed ? a : b);
+      below -= constraints_.projector(transposed ? b : a) * block *
+               constraints_.projector(transposed ? a : b);
     }
   }
-  for (std::size_t i = 0; i < freedom_.size(); ++i) {
-    if (freedom_.is_free(i)) continue;
+  for (std::size_t i = 0; i < constraints_.size(); ++i) {
+    if (constraints_.is_free(i)) continue;
     Eigen::Matrix3d& block = matrix_.diagonal[i];
     const double scale = block.trace() > 0.0 ? block.trace() : 1.0;
-    block = (freedom_.projector(i) * block * freedom_.projector(i)).eval() +
-            scale * (Eigen::Matrix3d::Identity() - freedom_.projector(i));
+    block = (constraints_.projector(i) * block * constraints_.projector(i)).eval() +
+            scale * (Eigen::Matrix3d::Identity() - constraints_.projector(i));
   }
   return matrix_;
 }

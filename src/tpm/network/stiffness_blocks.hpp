@@ -1,14 +1,14 @@
 #pragma once
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 
 namespace tpm {
 
 /// The stiffness matrix of what is free, for factorisations: P K P + s (1 - P) as
-/// Freedom::constrain makes it, without the blocks of spheres that are held.
+/// Constraints::constrain makes it, without the blocks of spheres that are held.
 class StiffnessBlocks {
  public:
   /// @param bonds, freedom must live as long as this
-  StiffnessBlocks(const BondSystem& bonds, const Freedom& freedom);
+  StiffnessBlocks(const BondSystem& bonds, const Constraints& constraints);
 
   /// The matrix at a position; the one before is overwritten.
   const BlockMatrix& assemble(const Positions& position, const BondMemory& memory);
@@ -16,13 +16,13 @@ class StiffnessBlocks {
 
  private:
   const BondSystem& bonds_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   std::shared_ptr<const BondSystem::PartGraph> graph_;
   BlockMatrix matrix_;
 };
 
 /// The graph of the spheres of a network that can move.
-[[nodiscard]] std::shared_ptr<const BondSystem::PartGraph> moving_graph(const BondSystem& bonds,
-                                                                        const Freedom& freedom);
+[[nodiscard]] std::shared_ptr<const BondSystem::PartGraph> moving_graph(
+    const BondSystem& bonds, const Constraints& constraints);
 
 }  // namespace tpm

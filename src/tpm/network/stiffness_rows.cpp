@@ -8,8 +8,8 @@ namespace {
 
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-bool can_move(const Freedom& freedom, std::size_t sphere) {
-  return freedom.is_free(sphere) || !freedom.projector(sphere).isZero(0.0);
+bool can_move(const Constraints& constraints, std::size_t sphere) {
+  return constraints.is_free(sphere) || !constraints.projector(sphere).isZero(0.0);
 }
 
 std::size_t place(const BlockRows<3, 3>& matrix, std::uint32_t row, std::uint32_t column) {
@@ -22,14 +22,14 @@ std::size_t place(const BlockRows<3, 3>& matrix, std::uint32_t row, std::uint32_
 
 }  // namespace
 
-StiffnessRows::StiffnessRows(const BondSystem& bonds, const Freedom& freedom)
-    : bonds_(bonds), freedom_(freedom), off_diagonal_(bonds.size(), Pair{kNone, kNone}) {
+StiffnessRows::StiffnessRows(const BondSystem& bonds, const Constraints& constraints)
+    : bonds_(bonds), constraints_(constraints), off_diagonal_(bonds.size(), Pair{kNone, kNone}) {
   const std::size_t n = bonds.spheres();
   matrix_.columns = n;
   matrix_.begin.assign(n + 1, 1);  // the diagonal
   matrix_.begin[0] = 0;
   const auto kept = [&](std::size_t bond) {
-    return can_move(freedom, bonds.end_a()[bond]) && can_move(freedom, bonds.end_b()[bond]);
+    return can_move(constraints, bonds.end_a()[bond]) && can_move(constraints, bonds.end_b()[bond]);
   };
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     if (!kept(i)) continue;
@@ -77,12 +77,13 @@ void StiffnessRows::constrain() {
   for (std::size_t i = 0; i < matrix_.rows(); ++i) {
     for (std::size_t p = matrix_.begin[i]; p < matrix_.begin[i + 1]; ++p) {
       const std::uint32_t j = matrix_.column[p];
-      if (freedom_.is_free(i) && freedom_.is_free(j)) continue;
+      if (constraints_.is_free(i) && constraints_.is_free(j)) continue;
       Eigen::Matrix3d& block = matrix_.block[p];
       const double trace = block.trace();
-      block = (freedom_.projector(i) * block * freedom_.projector(j)).eval();
+      block = (constraints_.projector(i) * block * constraints_.projector(j)).eval();
       if (i != j) continue;
-      block += (trace > 0.0 ? trace : 1.0) * (Eigen::Matrix3d::Identity() - freedom_.projector(i));
+      block +=
+          (trace > 0.0 ? trace : 1.0) * (Eigen::Matrix3d::Identity() - constraints_.projector(i));
     }
   }
 }

@@ -1,15 +1,15 @@
 #pragma once
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/solve/block_rows.hpp"
 
 namespace tpm {
 
 /// The stiffness matrix of what is free, by rows, for solvers that iterate: P K P + s (1 - P) as
-/// Freedom::constrain makes it, without the blocks between spheres of which one is held.
+/// Constraints::constrain makes it, without the blocks between spheres of which one is held.
 class StiffnessRows {
  public:
   /// @param bonds, freedom must live as long as this
-  StiffnessRows(const BondSystem& bonds, const Freedom& freedom);
+  StiffnessRows(const BondSystem& bonds, const Constraints& constraints);
 
   /// The matrix at a position; the one before is overwritten.
   const BlockRows<3, 3>& assemble(const Positions& position, const BondMemory& memory);
@@ -19,7 +19,7 @@ class StiffnessRows {
   void constrain();
 
   const BondSystem& bonds_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   BlockRows<3, 3> matrix_;
   std::vector<std::size_t> diagonal_;  ///< where each sphere's block stands
   struct Pair {

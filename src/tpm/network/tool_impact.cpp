@@ -18,9 +18,10 @@ struct Answer {
   double of_gap = 0.0;                 ///< rate of the gap per impulse, 1/kg
 };
 
-Answer answer_of(const TouchingPair& pair, const Freedom& freedom, const Eigen::VectorXd& mass_kg) {
+Answer answer_of(const TouchingPair& pair, const Constraints& constraints,
+                 const Eigen::VectorXd& mass_kg) {
   const auto moved = [&](Eigen::Index column) {
-    return Eigen::Vector3d(freedom.projector(static_cast<std::size_t>(column)) * pair.normal /
+    return Eigen::Vector3d(constraints.projector(static_cast<std::size_t>(column)) * pair.normal /
                            mass_kg[column]);
   };
   Answer answer{-moved(pair.sphere), moved(pair.tool), 0.0};
@@ -30,15 +31,16 @@ Answer answer_of(const TouchingPair& pair, const Freedom& freedom, const Eigen::
 
 }  // namespace
 
-Eigen::VectorXd inelastic_impact(std::span<const TouchingPair> pairs, const Freedom& freedom,
-                                 const Eigen::VectorXd& mass_kg, Eigen::Matrix3Xd& velocity) {
+Eigen::VectorXd inelastic_impact(std::span<const TouchingPair> pairs,
+                                 const Constraints& constraints, const Eigen::VectorXd& mass_kg,
+                                 Eigen::Matrix3Xd& velocity) {
   std::vector<Answer> answers;
   double scale = 0.0;
   const auto gap_rate = [&](const TouchingPair& pair) {
     return pair.normal.dot(velocity.col(pair.tool) - velocity.col(pair.sphere));
   };
   for (const TouchingPair& pair : pairs) {
-    answers.push_back(answer_of(pair, freedom, mass_kg));
+    answers.push_back(answer_of(pair, constraints, mass_kg));
     scale = std::max(scale, -gap_rate(pair));
   }
   Eigen::VectorXd impulse = Eigen::VectorXd::Zero(std::ssize(pairs));

@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 
 namespace tpm {
 
@@ -29,7 +29,7 @@ struct TouchingPair {
 ///          0 for a pair of which nothing is free.
 /// Throws Error(numerical) if the impulses do not settle.
 [[nodiscard]] Eigen::VectorXd inelastic_impact(std::span<const TouchingPair> pairs,
-                                               const Freedom& freedom,
+                                               const Constraints& constraints,
                                                const Eigen::VectorXd& mass_kg,
                                                Eigen::Matrix3Xd& velocity);
 

@@ -47,14 +47,14 @@ class Bench {
   Bench()
       : network_(build_network(paper_liver(), {}, "calibration")),
         bonds_(network_, paper_element()),
-        freedom_(network_.organ.size()),
-        equilibrium_(bonds_, freedom_),
+        constraints_(network_.organ.size()),
+        equilibrium_(bonds_, constraints_),
         factor_(equilibrium_.pattern()),
         memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0, {}} {
     const Eigen::RowVectorXd height = network_.organ.position.row(2);
     const double middle = height.mean();
-    for (std::size_t i = 0; i < freedom_.size(); ++i) {
-      if (height[static_cast<Eigen::Index>(i)] > middle) freedom_.hold(i);
+    for (std::size_t i = 0; i < constraints_.size(); ++i) {
+      if (height[static_cast<Eigen::Index>(i)] > middle) constraints_.hold(i);
     }
   }
 
@@ -144,7 +144,7 @@ class Bench {
 
   [[nodiscard]] double contact_step_s() {
     const Eigen::Vector3d into = push();
-    PushedContact tissue(bonds_, rest(), freedom_, contact());
+    PushedContact tissue(bonds_, rest(), constraints_, contact());
     StepError error(tissue, rest(), kPeriodOverTau, kPeriod_s);
     double share = 0.0;
     return time_of([&] {
@@ -158,7 +158,8 @@ class Bench {
     CondensedOptions options;
     options.depth_m = kCondensedDepth_m;
     options.tangential_m = 0.5 * kCondensedDepth_m;
-    CondensedContact model = build_condensed(bonds_, rest(), freedom_, contact(), into, options);
+    CondensedContact model =
+        build_condensed(bonds_, rest(), constraints_, contact(), into, options);
     double share = 0.0;
     return time_of([&] {
       share = share > 0.9 ? 0.0 : share + 1e-3;
@@ -185,7 +186,7 @@ class Bench {
 
   Network network_;
   BondSystem bonds_;
-  Freedom freedom_;
+  Constraints constraints_;
   Equilibrium equilibrium_;
   LaneFactor factor_;
   BondMemory memory_;

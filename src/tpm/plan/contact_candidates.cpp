@@ -38,11 +38,11 @@ bool is_guided(const PlanScene& scene) {
 }
 
 /// Of the tissue, the contact free: where it is, a ContactModel is told.
-Freedom freedom_around(const PlanScene& scene) {
+Constraints freedom_around(const PlanScene& scene) {
   Tissue tissue = scene.scene().tissue;
   std::erase_if(tissue.guides,
                 [&](const Guide& guide) { return guide.sphere == scene.scene().probe().sphere; });
-  return tissue.freedom();
+  return tissue.constraints();
 }
 
 /// A ContactModel moved through a protocol of depths. Where the scene leaves its sphere free across
@@ -123,43 +123,44 @@ OperationCount counted(const BalanceWork& work) {
 /// What is common to them.
 class ContactCandidate : public PlanModel {
  public:
-  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+  [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                    const PlanBudget& budget) const override {
-    const PlanScene& scene = scout.scene();
+    const PlanScene& scene = surrogate.scene();
     if (!budget.rate_Hz) return "steps a servo's period, and there is none";
     if (!scene.single_sphere() || !scene.by_depth()) return "sees one sphere that is moved";
     if (scene.jumps()) return "a servo's contact does not jump";
     const Probe& probe = scene.scene().probe();
-    const Freedom freedom = scene.scene().tissue.freedom();
-    const Eigen::Vector3d along = freedom.projector(probe.sphere) * probe.direction;
+    const Constraints constraints = scene.scene().tissue.constraints();
+    const Eigen::Vector3d along = constraints.projector(probe.sphere) * probe.direction;
     if (!along.isApprox(probe.direction, kParallel)) return "the contact is guided elsewhere";
-    if (scout.wants_field()) return "is planned for its force only";
+    if (surrogate.wants_field()) return "is planned for its force only";
     for (const Knot& knot : scene.protocol().knots()) {
       if (knot.value < 0.0) return "its range is a push";
     }
     return std::nullopt;
   }
 
-  [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
-    const BuiltContact built = build(scout.scene(), budget.period_s().value(), kPortable);
-    const Trajectory answer = moved(scout.scene(), built, scout.times());
+  [[nodiscard]] ModelClaim claim(const PlanSurrogate& surrogate,
+                                 const PlanBudget& budget) const override {
+    const BuiltContact built = build(surrogate.scene(), budget.period_s().value(), kPortable);
+    const Trajectory answer = moved(surrogate.scene(), built, surrogate.times());
     OperationCount worst = built.of_balance.times(built.most_balances);
     worst += built.of_step;
-    return {scout.claim_of(answer), answer.work, worst};
+    return {surrogate.claim_of(answer), answer.work, worst};
   }
 
-  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& budget,
+  [[nodiscard]] Trajectory run(const PlanSurrogate& surrogate, const PlanBudget& budget,
                                const std::vector<double>& times_s) const override {
-    return moved(scout.scene(), build(scout.scene(), budget.period_s().value(), kPortable),
+    return moved(surrogate.scene(), build(surrogate.scene(), budget.period_s().value(), kPortable),
                  times_s);
   }
 
   [[nodiscard]] bool for_loop() const override { return true; }
   [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
-      const PlanScout& scout, std::span<const double> periods_s) const override {
+      const PlanSurrogate& surrogate, std::span<const double> periods_s) const override {
     std::vector<std::unique_ptr<ContactModel>> models;
     for (const double period_s : periods_s) {
-      models.push_back(build(scout.scene(), period_s, !kPortable).model);
+      models.push_back(build(surrogate.scene(), period_s, !kPortable).model);
     }
     return models;
   }
@@ -196,10 +197,10 @@ class CondensedCandidate final : public ContactCandidate {
   [[nodiscard]] std::string formulation() const override { return "condensed"; }
   [[nodiscard]] std::string settings() const override { return "potential of a slow manifold"; }
   [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
-      const PlanScout& scout, std::span<const double> periods_s) const override {
+      const PlanSurrogate& surrogate, std::span<const double> periods_s) const override {
     std::vector<std::unique_ptr<ContactModel>> models;
     if (periods_s.empty()) return models;
-    const CondensedContact fitted = condensed(scout.scene(), periods_s.front());
+    const CondensedContact fitted = condensed(surrogate.scene(), periods_s.front());
     for (const double period_s : periods_s) {
       models.push_back(std::make_unique<CondensedContact>(fitted.with_period(period_s)));
     }

@@ -88,7 +88,7 @@ struct BranchFit {
 BranchFit fit_shares(const ContactSpectrum& spectrum, const std::vector<double>& times_s) {
   const auto rows = static_cast<Eigen::Index>(spectrum.per_rate_s.size());
   const auto columns = static_cast<Eigen::Index>(times_s.size());
-  const double whole = spectrum.at_once() - spectrum.relaxed();
+  const double whole = spectrum.instantaneous() - spectrum.relaxed();
   Eigen::MatrixXd a(rows, columns);
   Eigen::VectorXd b(rows);
   for (Eigen::Index i = 0; i < rows; ++i) {
@@ -141,7 +141,7 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
   const DrivenNetwork& driven = scene.driven();
   // Times a factor, the material of all bonds.
   const BondMaterial& material = scene.scene().tissue.materials.materials.front();
-  DrivenTissue tissue(driven.bonds, driven.rest, driven.freedom, driven.probes,
+  DrivenTissue tissue(driven.bonds, driven.rest, driven.constraints, driven.probes,
                       scene.protocol().drive());
   const TissueState rest = tissue.at_rest(0.0);
   ContactSpectrum spectrum;
@@ -187,7 +187,8 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
 }
 
 std::vector<ScalarBranch> fitted_branches(const ContactSpectrum& spectrum, int most) {
-  if (!(spectrum.at_once() - spectrum.relaxed() > 1e-12 * spectrum.at_once())) return {};
+  if (!(spectrum.instantaneous() - spectrum.relaxed() > 1e-12 * spectrum.instantaneous()))
+    return {};
   BranchFit best;
   std::vector<double> times_s;
   search(spectrum, times_s, 0, most, best);

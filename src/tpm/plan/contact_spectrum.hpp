@@ -15,10 +15,10 @@ struct ContactSpectrum {
   std::vector<double> stiffness_N_per_m;  ///< falling
   double shortest_s = 0.0;                ///< relaxation time of the contact
   double longest_s = 0.0;
-  /// Displacements of the spheres per unit of depth, at once and relaxed.
+  /// Displacements of the spheres per unit of depth, instantaneous and relaxed.
   Eigen::Matrix3Xd field_at_once, field_relaxed;
 
-  [[nodiscard]] double at_once() const { return stiffness_N_per_m.front(); }
+  [[nodiscard]] double instantaneous() const { return stiffness_N_per_m.front(); }
   [[nodiscard]] double relaxed() const { return stiffness_N_per_m.back(); }
 };
 

@@ -27,17 +27,17 @@ struct SeenMode {
 /// Lanczos' method with full orthogonalisation.
 class Lanczos {
  public:
-  Lanczos(const PlanScene& scene, const TissueState& rest, const Freedom& freedom,
-          const Eigen::VectorXd& mass_kg, const Following& following)
+  Lanczos(const PlanScene& scene, const TissueState& rest, const Constraints& constraints,
+          const Eigen::VectorXd& mass_kg, const RelaxationFactor& relaxation_factor)
       : bonds_(scene.driven().bonds),
         rest_(rest),
-        freedom_(freedom),
+        constraints_(constraints),
         root_(mass_kg.cwiseSqrt().transpose().replicate(3, 1).reshaped()),
-        memory_{rest.mean, following, rest.closed} {}
+        memory_{rest.mean, relaxation_factor, rest.closed} {}
 
   /// @param field displacements, m
   [[nodiscard]] std::vector<SeenMode> modes(Eigen::Matrix3Xd field) const {
-    freedom_.project(field);
+    constraints_.project(field);
     Eigen::VectorXd q = root_.cwiseProduct(field.reshaped());
     const double size = q.norm();
     if (!(size > 0.0)) return {};
@@ -73,13 +73,13 @@ class Lanczos {
     const Eigen::Matrix3Xd x = q.cwiseQuotient(root_).reshaped(3, q.size() / 3);
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, x.cols());
     bonds_.add_stiffness_times(rest_.position, memory_, x, force);
-    freedom_.project(force);
+    constraints_.project(force);
     return force.reshaped().cwiseQuotient(root_);
   }
 
   const BondSystem& bonds_;
   const TissueState& rest_;
-  const Freedom& freedom_;
+  const Constraints& constraints_;
   Eigen::VectorXd root_;
   BondMemory memory_;
 };
@@ -191,20 +191,20 @@ double of_jump(double jump, const std::vector<SeenMode>& modes, double alpha, do
 InertiaEstimate estimate_inertia(const PlanScene& scene) {
   const DrivenNetwork& driven = scene.driven();
   const Eigen::VectorXd mass = masses_kg(scene.scene(), scene.run_network());
-  const LowestMode lowest = lowest_mode(driven.bonds, driven.rest, driven.freedom, mass);
+  const LowestMode lowest = lowest_mode(driven.bonds, driven.rest, driven.constraints, mass);
   const double omega = lowest.angular_frequency();
   const double alpha = 2.0 * scene.scene().formulation.damping_ratio * omega;
-  DrivenTissue tissue(driven.bonds, driven.rest, driven.freedom, driven.probes,
+  DrivenTissue tissue(driven.bonds, driven.rest, driven.constraints, driven.probes,
                       scene.protocol().drive());
   const TissueState rest = tissue.at_rest(0.0);
-  const BondMemory memory{rest.mean, lowest.following, rest.closed};
+  const BondMemory memory{rest.mean, lowest.relaxation_factor, rest.closed};
   if (!tissue.equilibrium().factorise(rest.position, memory)) {
     throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");
   }
-  const auto modes =
-      without_ringing_contacts(Lanczos(scene, rest, tissue.freedom(), mass, lowest.following)
-                                   .modes(tissue.unit_field(rest, memory).displacement),
-                               driven.bonds, mass);
+  const auto modes = without_ringing_contacts(
+      Lanczos(scene, rest, tissue.constraints(), mass, lowest.relaxation_factor)
+          .modes(tissue.unit_field(rest, memory).displacement),
+      driven.bonds, mass);
   InertiaEstimate estimate;
   estimate.lowest_Hz = lowest.frequency_Hz;
   for (const SeenMode& mode : modes) {

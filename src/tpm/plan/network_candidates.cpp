@@ -19,10 +19,10 @@ class LayeredCandidate : public PlanModel {
   [[nodiscard]] ModelReach reach() const override {
     return layers_ == 0 ? ModelReach::full : ModelReach::reduced;
   }
-  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+  [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                    const PlanBudget& /*budget*/) const override {
-    const Organ& organ = scout.scene().network().organ;
-    for (const SceneContact& contact : scout.scene().scene().contacts) {
+    const Organ& organ = surrogate.scene().network().organ;
+    for (const SceneContact& contact : surrogate.scene().scene().contacts) {
       if (layers_ == 0 || organ.layer[contact.probe.sphere] < layers_) continue;
       return "a contact lies in a layer that would be held";
     }
@@ -62,29 +62,30 @@ class CollocationCandidate final : public LayeredCandidate {
   }
   [[nodiscard]] bool last_resort() const override { return tolerance_ < kUsualFinest; }
 
-  [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
+  [[nodiscard]] ModelClaim claim(const PlanSurrogate& surrogate,
+                                 const PlanBudget& budget) const override {
     if (layers() > 0) {
-      const Trajectory answer = run(scout, budget, scout.times());
-      return {scout.claim_of(answer), answer.work, {}};
+      const Trajectory answer = run(surrogate, budget, surrogate.times());
+      return {surrogate.claim_of(answer), answer.work, {}};
     }
-    const Trajectory& answer = scout.collocation(tolerance_);
-    if (scout.inertial()) return {scout.claim_of(answer), answer.work, {}};
+    const Trajectory& answer = surrogate.collocation(tolerance_);
+    if (surrogate.inertial()) return {surrogate.claim_of(answer), answer.work, {}};
     // Against a run much finer: one at a tenth of the tolerance may well take the same steps.
     const Trajectory& finer =
-        scout.collocation(std::max(0.01 * tolerance_, last_resort() ? kFinest : kUsual));
-    const double error = trajectory_error(answer, finer, scout.measure());
+        surrogate.collocation(std::max(0.01 * tolerance_, last_resort() ? kFinest : kUsual));
+    const double error = trajectory_error(answer, finer, surrogate.measure());
     return {kSafety * error + kFloor * tolerance_, answer.work, {}};
   }
 
-  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
+  [[nodiscard]] Trajectory run(const PlanSurrogate& surrogate, const PlanBudget& /*budget*/,
                                const std::vector<double>& times_s) const override {
     QuasiStaticOptions options;
     options.tolerance = tolerance_;
-    return own(scout.scene()).quasi_static(options, times_s, scout.wants_field());
+    return own(surrogate.scene()).quasi_static(options, times_s, surrogate.wants_field());
   }
 
  private:
-  // Between the times of the scout errors have been seen to be 3.5 times those at them.
+  // Between the times of the surrogate errors have been seen to be 3.5 times those at them.
   static constexpr double kSafety = 5.0;
   static constexpr double kFloor = 1e-3;   // of the tolerance: what forces left unbalanced may hide
   static constexpr double kFinest = 1e-9;  // ten times that of the reference
@@ -102,34 +103,36 @@ class NetworkStepCandidate final : public LayeredCandidate {
   [[nodiscard]] std::string settings() const override {
     return fmt::format("a step a period, {} stages{}", kStages, words());
   }
-  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+  [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                    const PlanBudget& budget) const override {
     if (!budget.rate_Hz) return "steps a servo's period, and there is none";
-    return LayeredCandidate::why_not(scout, budget);
+    return LayeredCandidate::why_not(surrogate, budget);
   }
 
-  [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
-    const PlanScene scene = own(scout.scene());
+  [[nodiscard]] ModelClaim claim(const PlanSurrogate& surrogate,
+                                 const PlanBudget& budget) const override {
+    const PlanScene scene = own(surrogate.scene());
     // Long protocols are tried at longer steps, of which the error is known to be larger.
     const double period = budget.period_s().value();
     const double step = std::max(period, scene.duration_s() / kTried);
-    const Trajectory answer = stepped(scene, step, scout.times(), scout.wants_field());
+    const Trajectory answer = stepped(scene, step, surrogate.times(), surrogate.wants_field());
     ModelClaim claim;
     claim.of_period = answer.work.times(kWorst / answer.steps);
     claim.work = answer.work.times(scene.duration_s() / period / answer.steps);
-    if (layers() > 0 || scout.inertial()) {
-      claim.error = scout.claim_of(answer);
+    if (layers() > 0 || surrogate.inertial()) {
+      claim.error = surrogate.claim_of(answer);
       return claim;
     }
-    const Trajectory half = stepped(scene, 0.5 * step, scout.times(), scout.wants_field());
-    const double halved = trajectory_error(answer, half, scout.measure());
+    const Trajectory half = stepped(scene, 0.5 * step, surrogate.times(), surrogate.wants_field());
+    const double halved = trajectory_error(answer, half, surrogate.measure());
     claim.error = kSafety * halved * std::min(1.0, period / step) + kFloor * kTolerance;
     return claim;
   }
 
-  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& budget,
+  [[nodiscard]] Trajectory run(const PlanSurrogate& surrogate, const PlanBudget& budget,
                                const std::vector<double>& times_s) const override {
-    return stepped(own(scout.scene()), budget.period_s().value(), times_s, scout.wants_field());
+    return stepped(own(surrogate.scene()), budget.period_s().value(), times_s,
+                   surrogate.wants_field());
   }
 
  private:
@@ -163,24 +166,24 @@ class InertialCandidate final : public PlanModel {
   [[nodiscard]] ModelReach reach() const override { return ModelReach::full; }
   [[nodiscard]] bool has_masses() const override { return true; }
   [[nodiscard]] bool last_resort() const override { return tolerance_ < kUsualFinest; }
-  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+  [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                    const PlanBudget& /*budget*/) const override {
-    if (!scout.inertial()) return "has masses, which scene and reference leave out";
+    if (!surrogate.inertial()) return "has masses, which scene and reference leave out";
     return std::nullopt;
   }
   [[nodiscard]] std::optional<std::string> why_no_servo() const override {
     return "its steps follow the error: no bound on the cost of a period";
   }
-  [[nodiscard]] ModelClaim claim(const PlanScout& scout,
+  [[nodiscard]] ModelClaim claim(const PlanSurrogate& surrogate,
                                  const PlanBudget& /*budget*/) const override {
-    const Trajectory& answer = scout.with_masses(tolerance_);
-    const Trajectory& finer = scout.with_masses(0.1 * tolerance_);
-    return {kSafety * trajectory_error(answer, finer, scout.measure()), answer.work, {}};
+    const Trajectory& answer = surrogate.with_masses(tolerance_);
+    const Trajectory& finer = surrogate.with_masses(0.1 * tolerance_);
+    return {kSafety * trajectory_error(answer, finer, surrogate.measure()), answer.work, {}};
   }
-  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
+  [[nodiscard]] Trajectory run(const PlanSurrogate& surrogate, const PlanBudget& /*budget*/,
                                const std::vector<double>& times_s) const override {
-    return scout.scene().inertial(inertial_options(scout.scene(), tolerance_), times_s,
-                                  scout.wants_field());
+    return surrogate.scene().inertial(inertial_options(surrogate.scene(), tolerance_), times_s,
+                                      surrogate.wants_field());
   }
 
  private:

@@ -41,7 +41,7 @@ bool masses_known(const ExperimentScene& scene) {
 }
 
 /// Whether the truth has masses: the scene says so, or they would be felt at this tolerance.
-bool truth_has_masses(const ExperimentScene& scene, const PlanScout& massless,
+bool truth_has_masses(const ExperimentScene& scene, const PlanSurrogate& massless,
                       const PlanRequest& request) {
   if (request.for_loop) return false;
   if (scene.formulation.masses) return true;
@@ -63,16 +63,16 @@ class Planning {
     plan_.spheres = scene_.network().organ.size();
     plan_.bonds = scene_.network().bonds.size();
     tell("coarse runs of the network");
-    PlanScout massless(scene_, request.measure, false);
+    PlanSurrogate massless(scene_, request.measure, false);
     plan_.inertial = truth_has_masses(scene, massless, request);
     if (!plan_.inertial && masses_known(scene)) {
       const double share = massless.inertia_share();
       if (share > request.tolerance) plan_.masses_left_out = share;
     }
     if (plan_.inertial) {
-      scout_.emplace(scene_, request.measure, true);
+      surrogate_.emplace(scene_, request.measure, true);
     } else {
-      scout_.emplace(std::move(massless));
+      surrogate_.emplace(std::move(massless));
     }
   }
 
@@ -81,8 +81,9 @@ class Planning {
     for (const auto& model : models_) consider(*model);
     sort();
     tell("reference");
-    truth_ = verified_truth(scene_, plan_.request.measure, plan_.inertial, plan_.request.tolerance);
-    plan_.reference = truth_.reference;
+    reference_ =
+        verified_reference(scene_, plan_.request.measure, plan_.inertial, plan_.request.tolerance);
+    plan_.reference = reference_.reference;
     tell("verification");
     verify_cheap();
     choose();
@@ -92,12 +93,12 @@ class Planning {
     plan_.validity = passed_limits(scene_);
     if (plan_.request.relevance) {
       tell("what does not matter");
-      plan_.relevance = plan_relevance(*scout_, plan_.request.tolerance);
+      plan_.relevance = plan_relevance(*surrogate_, plan_.request.tolerance);
       settle_masses_left_out();
     }
     if (plan_.request.changes && plan_.choice) {
       tell("what would break first");
-      plan_.changes = plan_changes(*scout_, model_of(plan_.chosen()), plan_.request);
+      plan_.changes = plan_changes(*surrogate_, model_of(plan_.chosen()), plan_.request);
     }
     return std::move(plan_);
   }
@@ -121,7 +122,7 @@ class Planning {
     candidate.reach = model.reach();
     if (request.for_loop && !model.for_loop()) {
       candidate.reason = "nothing that a loop steps";
-    } else if (const auto reason = model.why_not(*scout_, request.budget)) {
+    } else if (const auto reason = model.why_not(*surrogate_, request.budget)) {
       candidate.reason = *reason;
     } else if (model.last_resort() && network_found_) {
       candidate.reason = "not tried: a coarser one meets the tolerance";
@@ -140,7 +141,7 @@ class Planning {
 
   void judge(const PlanModel& model, PlannedCandidate& candidate) {
     const PlanRequest& request = plan_.request;
-    const ModelClaim claim = model.claim(*scout_, request.budget);
+    const ModelClaim claim = model.claim(*surrogate_, request.budget);
     candidate.claimed_error = claim.error;
     candidate.cost_s_per_s = request.costs.seconds_of(claim.work) / plan_.duration_s;
     if (request.budget.rate_Hz && !model.why_no_servo()) {
@@ -171,12 +172,13 @@ class Planning {
   /// The error against the reference, whose own uncertainty is added.
   void verify(PlannedCandidate& candidate) {
     const Trajectory answer =
-        model_of(candidate).run(*scout_, plan_.request.budget, truth_.times_s);
-    candidate.verified_error = trajectory_error(answer, truth_.trajectory, plan_.request.measure) +
-                               truth_.reference.difference;
+        model_of(candidate).run(*surrogate_, plan_.request.budget, reference_.times_s);
+    candidate.verified_error =
+        trajectory_error(answer, reference_.trajectory, plan_.request.measure) +
+        reference_.reference.difference;
     if (plan_.request.measure.output == PlanOutput::force) return;
-    candidate.verified_response_error =
-        trajectory_error(answer, truth_.trajectory, {}) + truth_.reference.response_difference;
+    candidate.verified_response_error = trajectory_error(answer, reference_.trajectory, {}) +
+                                        reference_.reference.response_difference;
   }
 
   /// What a run says of masses goes before the estimate: there is one number.
@@ -220,8 +222,8 @@ class Planning {
   PlanScene scene_;
   PlanModels models_;
   Plan plan_;
-  std::optional<PlanScout> scout_;
-  VerifiedTruth truth_;
+  std::optional<PlanSurrogate> surrogate_;
+  VerifiedReference reference_;
   bool with_masses_found_ = false;
   bool network_found_ = false;  ///< a nonlinear network whose claim meets the tolerance
 };
@@ -286,16 +288,16 @@ Plan make_plan(const ExperimentScene& scene, const PlanRequest& request) {
 
 namespace {
 
-/// What a plan chose, with the scout of its scene.
+/// What a plan chose, with the surrogate of its scene.
 struct Chosen {
   Chosen(const Plan& plan, const ExperimentScene& scene)
-      : scout(PlanScene(scene), plan.request.measure, plan.inertial) {
-    for (auto& candidate : plan_models(scout.scene())) {
+      : surrogate(PlanScene(scene), plan.request.measure, plan.inertial) {
+    for (auto& candidate : plan_models(surrogate.scene())) {
       if (candidate->name() == plan.chosen().name) model = std::move(candidate);
     }
     if (!model) throw bad_input("plan", "made for another scene", "a plan of this scene");
   }
-  PlanScout scout;
+  PlanSurrogate surrogate;
   std::unique_ptr<PlanModel> model;
 };
 
@@ -304,7 +306,7 @@ struct Chosen {
 Trajectory run_planned(const Plan& plan, const ExperimentScene& scene,
                        const std::vector<double>& times_s) {
   const Chosen chosen(plan, scene);
-  return chosen.model->run(chosen.scout, plan.request.budget, times_s);
+  return chosen.model->run(chosen.surrogate, plan.request.budget, times_s);
 }
 
 std::vector<std::unique_ptr<ContactModel>> planned_contacts(const Plan& plan,
@@ -314,7 +316,7 @@ std::vector<std::unique_ptr<ContactModel>> planned_contacts(const Plan& plan,
   if (!chosen.model->for_loop()) {
     throw bad_input("plan", "chose nothing that a loop steps", "a plan for a loop");
   }
-  return chosen.model->contacts(chosen.scout, periods_s);
+  return chosen.model->contacts(chosen.surrogate, periods_s);
 }
 
 ExperimentScene contact_scene(const ExperimentScene& scene, const ContactRange& range) {

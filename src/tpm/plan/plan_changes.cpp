@@ -28,16 +28,16 @@ Validity validity_of(const PlanScene& scene) {
 /// The changes of a scene, and whether a model survives them.
 class Survival {
  public:
-  Survival(const PlanScout& scout, const PlanModel& model, const PlanRequest& request)
-      : scout_(scout),
+  Survival(const PlanSurrogate& surrogate, const PlanModel& model, const PlanRequest& request)
+      : surrogate_(surrogate),
         model_(model),
         request_(request),
-        valid_(passed_limits(scout.scene()).empty()) {}
+        valid_(passed_limits(surrogate.scene()).empty()) {}
 
   /// What breaks in a changed scene; none if nothing does.
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
     try {
-      const PlanScout changed(scene, request_.measure, scout_.inertial());
+      const PlanSurrogate changed(scene, request_.measure, surrogate_.inertial());
       if (auto reason = model_.why_not(changed, request_.budget)) return reason;
       if (valid_) {
         const auto passed = passed_limits(scene);
@@ -45,7 +45,7 @@ class Survival {
       }
       const ModelClaim claim = model_.claim(changed, request_.budget);
       if (!(claim.error <= request_.tolerance)) return "tolerance: the claimed error leaves it";
-      if (!scout_.inertial() && masses_known() &&
+      if (!surrogate_.inertial() && masses_known() &&
           changed.inertia_share() >= std::max(request_.tolerance, kMassesFelt)) {
         return fmt::format("inertia: masses then change the answer by {} % of the peak",
                            significant(100.0 * changed.inertia_share(), 2));
@@ -93,12 +93,12 @@ class Survival {
 
  private:
   [[nodiscard]] bool masses_known() const {
-    return std::all_of(scout_.scene().scene().contacts.begin(),
-                       scout_.scene().scene().contacts.end(),
+    return std::all_of(surrogate_.scene().scene().contacts.begin(),
+                       surrogate_.scene().scene().contacts.end(),
                        [](const SceneContact& c) { return !c.is_tool() || c.mass_kg; });
   }
 
-  const PlanScout& scout_;
+  const PlanSurrogate& surrogate_;
   const PlanModel& model_;
   const PlanRequest& request_;
   bool valid_;
@@ -116,10 +116,10 @@ std::vector<std::string> passed_limits(const PlanScene& scene) {
   return words;
 }
 
-std::vector<PlanChange> plan_changes(const PlanScout& scout, const PlanModel& model,
+std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate, const PlanModel& model,
                                      const PlanRequest& request) {
-  const Survival survival(scout, model, request);
-  const PlanScene& scene = scout.scene();
+  const Survival survival(surrogate, model, request);
+  const PlanScene& scene = surrogate.scene();
   return {survival.first(
               scene.by_depth() ? "deeper, and as much faster" : "the load, put on as much faster",
               [&](double f) { return scene.deeper(f); }),

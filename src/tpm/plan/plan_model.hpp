@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/plan/plan_scout.hpp"
+#include "tpm/plan/plan_surrogate.hpp"
 #include "tpmkit/contact_model.hpp"
 
 namespace tpm {
@@ -52,7 +52,7 @@ class PlanModel {
   [[nodiscard]] virtual bool last_resort() const { return false; }
 
   /// Why the model has no answer to a scene at all; none if it has.
-  [[nodiscard]] virtual std::optional<std::string> why_not(const PlanScout& scout,
+  [[nodiscard]] virtual std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                            const PlanBudget& budget) const = 0;
   /// Why a servo cannot step it, whatever it costs; none if it can.
   [[nodiscard]] virtual std::optional<std::string> why_no_servo() const { return std::nullopt; }
@@ -61,14 +61,14 @@ class PlanModel {
   /// What a servo loop steps, at rest, one for each period; none unless for_loop(). Throws as
   /// claim() does.
   [[nodiscard]] virtual std::vector<std::unique_ptr<ContactModel>> contacts(
-      const PlanScout& /*scout*/, std::span<const double> /*periods_s*/) const {
+      const PlanSurrogate& /*surrogate*/, std::span<const double> /*periods_s*/) const {
     return {};
   }
   /// Throws Error(numerical) where the model fails.
-  [[nodiscard]] virtual ModelClaim claim(const PlanScout& scout,
+  [[nodiscard]] virtual ModelClaim claim(const PlanSurrogate& surrogate,
                                          const PlanBudget& budget) const = 0;
   /// The answer over the protocol, as the model would be used under the budget.
-  [[nodiscard]] virtual Trajectory run(const PlanScout& scout, const PlanBudget& budget,
+  [[nodiscard]] virtual Trajectory run(const PlanSurrogate& surrogate, const PlanBudget& budget,
                                        const std::vector<double>& times_s) const = 0;
 };
 

@@ -22,54 +22,55 @@ constexpr double kAgreement = 0.1;  // of the tolerance
 
 }  // namespace
 
-VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure, bool inertial,
-                             double tolerance) {
-  VerifiedTruth truth;
+VerifiedReference verified_reference(const PlanScene& scene, const PlanMeasure& measure,
+                                     bool inertial, double tolerance) {
+  VerifiedReference reference;
   const bool field = measure.output == PlanOutput::field;
   const double tau_s = scene.driven().bonds.shortest_relaxation_time_s();
   Trajectory judge;
   if (inertial) {
-    truth.times_s =
+    reference.times_s =
         sampled_times(scene.protocol(), kTimesOfPieceWithMasses, kMostTimesWithMasses, tau_s);
     // Errors gather over the periods of ringing, which few steps of a rise do not show: as tight as
     // it takes for the two to agree.
     for (double own = kInertialTolerance;; own *= kTighter) {
-      truth.trajectory = scene.inertial(inertial_options(scene, own), truth.times_s, field);
+      reference.trajectory = scene.inertial(inertial_options(scene, own), reference.times_s, field);
       InertialOptions other = inertial_options(scene, own);
       other.newton = NewtonSolver::klu;
       other.highest_order = kJudgeOrder;
-      judge = scene.inertial(other, truth.times_s, field);
-      truth.reference.method =
+      judge = scene.inertial(other, reference.times_s, field);
+      reference.reference.method =
           fmt::format("network with masses, BDF of order 2, tolerance {}", shortest(own));
-      truth.reference.judge = fmt::format("BDF of order 3 with KLU, tolerance {}", shortest(own));
-      const double apart = trajectory_error(judge, truth.trajectory, measure);
+      reference.reference.judge =
+          fmt::format("BDF of order 3 with KLU, tolerance {}", shortest(own));
+      const double apart = trajectory_error(judge, reference.trajectory, measure);
       if (apart <= kAgreement * tolerance || own < kTightest * (1.0 + kTighter)) break;
     }
   } else {
-    truth.times_s = sampled_times(scene.protocol(), kTimesOfPiece, kMostTimes, tau_s);
+    reference.times_s = sampled_times(scene.protocol(), kTimesOfPiece, kMostTimes, tau_s);
     QuasiStaticOptions options;
     options.tolerance = kTolerance;
-    truth.trajectory = scene.quasi_static(options, truth.times_s, field);
+    reference.trajectory = scene.quasi_static(options, reference.times_s, field);
     options.tolerance = kJudgeTolerance;
     options.stages = kJudgeStages;
-    judge = scene.quasi_static(options, truth.times_s, field);
-    truth.reference.method =
+    judge = scene.quasi_static(options, reference.times_s, field);
+    reference.reference.method =
         fmt::format("nonlinear network, Radau collocation of {} stages, tolerance {}", kLanes,
                     shortest(kTolerance));
-    truth.reference.judge = fmt::format("Radau collocation of {} stages, tolerance {}",
-                                        kJudgeStages, shortest(kJudgeTolerance));
+    reference.reference.judge = fmt::format("Radau collocation of {} stages, tolerance {}",
+                                            kJudgeStages, shortest(kJudgeTolerance));
   }
-  truth.reference.peak = truth.trajectory.response.cwiseAbs().maxCoeff();
-  if (!(truth.reference.peak > 0.0)) {
+  reference.reference.peak = reference.trajectory.response.cwiseAbs().maxCoeff();
+  if (!(reference.reference.peak > 0.0)) {
     throw bad_input("scene", "nothing is imposed, or nothing answers", "a protocol with a peak");
   }
-  truth.reference.difference = trajectory_error(judge, truth.trajectory, measure);
-  truth.reference.response_difference = trajectory_error(judge, truth.trajectory, {});
-  if (truth.reference.difference <= kAgreement * tolerance) return truth;
+  reference.reference.difference = trajectory_error(judge, reference.trajectory, measure);
+  reference.reference.response_difference = trajectory_error(judge, reference.trajectory, {});
+  if (reference.reference.difference <= kAgreement * tolerance) return reference;
   throw Error(
       ExitCode::numerical, "reference",
       fmt::format("it and its judge differ by {} of the peak",
-                  significant(truth.reference.difference, 2)),
+                  significant(reference.reference.difference, 2)),
       fmt::format("at most {}: a looser tolerance", significant(kAgreement * tolerance, 2)));
 }
 

@@ -4,7 +4,7 @@
 namespace tpm {
 
 /// The truth that a pick is verified against, and how sure it is.
-struct VerifiedTruth {
+struct VerifiedReference {
   std::vector<double> times_s;
   Trajectory trajectory;
   PlanReference reference;
@@ -15,7 +15,8 @@ struct VerifiedTruth {
 /// motion); with masses BDF of order 2 with the elimination by hand against order 3 with KLU.
 /// Throws Error(numerical) as the runs do, and where the two differ by more than a tenth of the
 /// tolerance.
-[[nodiscard]] VerifiedTruth verified_truth(const PlanScene& scene, const PlanMeasure& measure,
-                                           bool inertial, double tolerance);
+[[nodiscard]] VerifiedReference verified_reference(const PlanScene& scene,
+                                                   const PlanMeasure& measure, bool inertial,
+                                                   double tolerance);
 
 }  // namespace tpm

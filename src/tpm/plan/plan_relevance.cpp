@@ -16,34 +16,35 @@ constexpr double kAffordable = 1.2e6;  // steps times spheres of a run with mass
 constexpr double kInertiaTolerance = 1e-4;
 
 /// The tissue as the truth has it, changed in one part.
-Trajectory answer_of(const PlanScene& scene, const PlanScout& like) {
-  const PlanScout changed(scene, like.measure(), false);
+Trajectory answer_of(const PlanScene& scene, const PlanSurrogate& like) {
+  const PlanSurrogate changed(scene, like.measure(), false);
   QuasiStaticOptions options;
-  options.tolerance = PlanScout::kTolerance;
+  options.tolerance = PlanSurrogate::kTolerance;
   return changed.scene().quasi_static(options, like.times(), like.wants_field());
 }
 
 /// Runs the scene with a part switched off.
 template <class Change>
-PlanRelevance switched_off(const PlanScout& scout, std::string part, std::string note,
+PlanRelevance switched_off(const PlanSurrogate& surrogate, std::string part, std::string note,
                            Change&& change) {
   PlanRelevance result;
   result.part = std::move(part);
   result.note = std::move(note);
   try {
-    const PlanScene without = std::forward<Change>(change)(scout.scene());
-    result.error = trajectory_error(answer_of(without, scout), scout.coarse(), scout.measure());
+    const PlanScene without = std::forward<Change>(change)(surrogate.scene());
+    result.error =
+        trajectory_error(answer_of(without, surrogate), surrogate.coarse(), surrogate.measure());
   } catch (const Error& error) {
     result.note = fmt::format("cannot be switched off: {}", error.what());
   }
   return result;
 }
 
-PlanRelevance relevance_of_viscosity(const PlanScout& scout) {
-  PlanRelevance relaxed = switched_off(scout, "viscosity", "",
+PlanRelevance relevance_of_viscosity(const PlanSurrogate& surrogate) {
+  PlanRelevance relaxed = switched_off(surrogate, "viscosity", "",
                                        [](const PlanScene& scene) { return scene.all_relaxed(); });
   PlanRelevance elastic = switched_off(
-      scout, "viscosity", "", [](const PlanScene& scene) { return scene.nothing_relaxing(); });
+      surrogate, "viscosity", "", [](const PlanScene& scene) { return scene.nothing_relaxing(); });
   if (relaxed.error && elastic.error) {
     const double of_relaxed = *relaxed.error, of_elastic = *elastic.error;
     PlanRelevance& less = of_relaxed <= of_elastic ? relaxed : elastic;
@@ -54,34 +55,34 @@ PlanRelevance relevance_of_viscosity(const PlanScout& scout) {
   return relaxed.error ? relaxed : elastic;
 }
 
-PlanRelevance relevance_of_tension(const PlanScout& scout) {
+PlanRelevance relevance_of_tension(const PlanSurrogate& surrogate) {
   return switched_off(
-      scout, "tension", "lateral bonds without stiffness", [](const PlanScene& scene) {
+      surrogate, "tension", "lateral bonds without stiffness", [](const PlanScene& scene) {
         return scene.with_materials([](BondMaterial& material) { material.lateral_Pa = 0.0; });
       });
 }
 
-PlanRelevance relevance_of_layers(const PlanScout& scout) {
-  const int moving = scout.scene().moving_layers();
+PlanRelevance relevance_of_layers(const PlanSurrogate& surrogate) {
+  const int moving = surrogate.scene().moving_layers();
   if (moving < 2) {
     return {"layers", std::nullopt, false, false, "only the outer layer moves"};
   }
-  return switched_off(scout, "layers", fmt::format("layer {} held", moving),
+  return switched_off(surrogate, "layers", fmt::format("layer {} held", moving),
                       [&](const PlanScene& scene) { return scene.with_layers(moving - 1); });
 }
 
-PlanRelevance relevance_of_inertia(const PlanScout& scout) {
+PlanRelevance relevance_of_inertia(const PlanSurrogate& surrogate) {
   PlanRelevance result;
   result.part = "inertia";
   try {
-    if (scout.inertial()) {
-      const Trajectory& massless = scout.coarse();
+    if (surrogate.inertial()) {
+      const Trajectory& massless = surrogate.coarse();
       result.error =
-          trajectory_error(massless, scout.with_masses(kInertiaTolerance), scout.measure());
+          trajectory_error(massless, surrogate.with_masses(kInertiaTolerance), surrogate.measure());
       return result;
     }
-    const InertiaEstimate& estimate = scout.inertia();
-    result.error = scout.inertia_share();
+    const InertiaEstimate& estimate = surrogate.inertia();
+    result.error = surrogate.inertia_share();
     result.estimated = true;
     result.note = "by the linear network";
     if (std::isinf(estimate.of_jumps)) {
@@ -89,22 +90,22 @@ PlanRelevance relevance_of_inertia(const PlanScout& scout) {
       return result;
     }
     if (estimate.of_jumps > 0.0) {
-      const double peak = scout.coarse().response.cwiseAbs().maxCoeff();
+      const double peak = surrogate.coarse().response.cwiseAbs().maxCoeff();
       result.note += fmt::format("; a load put on at once would ring by {} % of the peak",
                                  significant(100.0 * estimate.of_jumps / peak, 3));
       return result;
     }
-    if (!scout.scene().driven().tools.empty()) {
+    if (!surrogate.scene().driven().tools.empty()) {
       // A run would count the instants at which a tool leaves a sphere, and its force is 0.
       result.note += "; the instants at which a tool leaves and strikes are left out";
       return result;
     }
-    const double steps = 10.0 * estimate.highest_Hz * scout.scene().duration_s();
-    if (steps * static_cast<double>(scout.scene().network().organ.size()) > kAffordable)
+    const double steps = 10.0 * estimate.highest_Hz * surrogate.scene().duration_s();
+    if (steps * static_cast<double>(surrogate.scene().network().organ.size()) > kAffordable)
       return result;
-    const PlanScout moving(scout.scene(), scout.measure(), true);
-    const Trajectory& truth = moving.with_masses(kInertiaTolerance);
-    result.error = trajectory_error(moving.coarse(), truth, scout.measure());
+    const PlanSurrogate moving(surrogate.scene(), surrogate.measure(), true);
+    const Trajectory& reference = moving.with_masses(kInertiaTolerance);
+    result.error = trajectory_error(moving.coarse(), reference, surrogate.measure());
     result.estimated = false;
     result.note.clear();
   } catch (const Error& error) {
@@ -139,9 +140,10 @@ std::optional<std::string> over_budget(const PlanModel& model, const ModelClaim&
   return std::nullopt;
 }
 
-std::vector<PlanRelevance> plan_relevance(const PlanScout& scout, double tolerance) {
-  std::vector<PlanRelevance> all{relevance_of_inertia(scout), relevance_of_layers(scout),
-                                 relevance_of_tension(scout), relevance_of_viscosity(scout)};
+std::vector<PlanRelevance> plan_relevance(const PlanSurrogate& surrogate, double tolerance) {
+  std::vector<PlanRelevance> all{relevance_of_inertia(surrogate), relevance_of_layers(surrogate),
+                                 relevance_of_tension(surrogate),
+                                 relevance_of_viscosity(surrogate)};
   for (PlanRelevance& part : all) {
     if (part.error) part.matters = *part.error > tolerance;
   }

@@ -5,11 +5,13 @@ namespace tpm {
 
 /// What switching inertia, the deepest moving layer, tension and viscosity off changes, each by a
 /// run of the reference's formulation without it.
-[[nodiscard]] std::vector<PlanRelevance> plan_relevance(const PlanScout& scout, double tolerance);
+[[nodiscard]] std::vector<PlanRelevance> plan_relevance(const PlanSurrogate& surrogate,
+                                                        double tolerance);
 
 /// By what factor each the scene can become deeper, faster and stiffer until the claim of a model
 /// leaves the tolerance, its cost the budget, or the scene a limit of validity.
-[[nodiscard]] std::vector<PlanChange> plan_changes(const PlanScout& scout, const PlanModel& model,
+[[nodiscard]] std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate,
+                                                   const PlanModel& model,
                                                    const PlanRequest& request);
 
 /// Limits that the scene passes at the corners of its protocol, in words.

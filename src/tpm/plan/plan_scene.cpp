@@ -27,24 +27,24 @@ ExperimentScene plannable(ExperimentScene scene) {
 
 }  // namespace
 
-double trajectory_error(const Trajectory& model, const Trajectory& truth,
+double trajectory_error(const Trajectory& model, const Trajectory& reference,
                         const PlanMeasure& measure) {
   constexpr double kFelt = 0.1;  // of the peak: less is no stiffness to be felt
   if (measure.output == PlanOutput::force) {
-    const double peak = truth.response.cwiseAbs().maxCoeff();
-    const Eigen::VectorXd difference = (model.response - truth.response).cwiseAbs();
+    const double peak = reference.response.cwiseAbs().maxCoeff();
+    const Eigen::VectorXd difference = (model.response - reference.response).cwiseAbs();
     double error = difference.maxCoeff() / peak;
     for (Eigen::Index i = 0; i < difference.size() && measure.relative_weight > 0.0; ++i) {
-      const double size = std::abs(truth.response[i]);
+      const double size = std::abs(reference.response[i]);
       if (size > kFelt * peak)
         error = std::max(error, measure.relative_weight * difference[i] / size);
     }
     return error;
   }
   double peak = 0.0, worst = 0.0;
-  for (std::size_t i = 0; i < truth.displacement.size(); ++i) {
-    peak = std::max(peak, truth.displacement[i].colwise().norm().maxCoeff());
-    const Eigen::Matrix3Xd difference = model.displacement.at(i) - truth.displacement[i];
+  for (std::size_t i = 0; i < reference.displacement.size(); ++i) {
+    peak = std::max(peak, reference.displacement[i].colwise().norm().maxCoeff());
+    const Eigen::Matrix3Xd difference = model.displacement.at(i) - reference.displacement[i];
     worst = std::max(worst, difference.colwise().norm().maxCoeff());
   }
   return worst / peak;
@@ -113,11 +113,11 @@ bool PlanScene::jumps() const {
 }
 
 int PlanScene::moving_layers() const {
-  const Freedom freedom = scene_.tissue.freedom();
+  const Constraints constraints = scene_.tissue.constraints();
   const std::vector<int>& layer = network().organ.layer;
   int moving = 0;
   for (std::size_t i = 0; i < layer.size(); ++i) {
-    if (!freedom.projector(i).isZero(0.0)) moving = std::max(moving, layer[i] + 1);
+    if (!constraints.projector(i).isZero(0.0)) moving = std::max(moving, layer[i] + 1);
   }
   return moving;
 }

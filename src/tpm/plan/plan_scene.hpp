@@ -24,7 +24,7 @@ struct PlanMeasure {
 /// Largest absolute difference over all times (field: and spheres), in parts of the largest
 /// absolute value of `truth`; with a relative weight, the larger of that and the weighted relative
 /// difference.
-[[nodiscard]] double trajectory_error(const Trajectory& model, const Trajectory& truth,
+[[nodiscard]] double trajectory_error(const Trajectory& model, const Trajectory& reference,
                                       const PlanMeasure& measure);
 
 /// The protocol's pieces sampled densely near their ends, where rates change: 1 to `per_piece`

@@ -17,11 +17,12 @@ class RunCandidate final : public PlanModel {
   [[nodiscard]] std::string formulation() const override { return name(); }
   [[nodiscard]] std::string settings() const override { return ""; }
   [[nodiscard]] bool has_masses() const override { return formulation_.can().masses; }
-  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+  [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                    const PlanBudget& /*budget*/) const override {
-    if (scout.wants_field() && !formulation_.can().field) return "knows the contact's force only";
+    if (surrogate.wants_field() && !formulation_.can().field)
+      return "knows the contact's force only";
     try {
-      require_runnable(own(scout));
+      require_runnable(own(surrogate));
     } catch (const Error& refusal) {
       return refusal.what();
     }
@@ -31,19 +32,21 @@ class RunCandidate final : public PlanModel {
     if (formulation_.can().servo) return std::nullopt;
     return "its steps have no bound on the cost of a period";
   }
-  [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
-    const Trajectory answer = run(scout, budget, scout.times());
-    return {scout.claim_of(answer), answer.work,
+  [[nodiscard]] ModelClaim claim(const PlanSurrogate& surrogate,
+                                 const PlanBudget& budget) const override {
+    const Trajectory answer = run(surrogate, budget, surrogate.times());
+    return {surrogate.claim_of(answer), answer.work,
             answer.work.times(1.0 / std::max(answer.steps, 1.0))};
   }
-  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& /*budget*/,
+  [[nodiscard]] Trajectory run(const PlanSurrogate& surrogate, const PlanBudget& /*budget*/,
                                const std::vector<double>& times_s) const override {
-    return runner_.run(own(scout), scout.scene().run_network(), times_s, scout.wants_field());
+    return runner_.run(own(surrogate), surrogate.scene().run_network(), times_s,
+                       surrogate.wants_field());
   }
 
  private:
-  [[nodiscard]] ExperimentScene own(const PlanScout& scout) const {
-    ExperimentScene scene = scout.scene().scene();
+  [[nodiscard]] ExperimentScene own(const PlanSurrogate& surrogate) const {
+    ExperimentScene scene = surrogate.scene().scene();
     scene.formulation.kind = name();
     return scene;
   }
@@ -65,13 +68,13 @@ Trajectory run_candidate_on(const PlanModel& candidate, const ExperimentScene& s
   measure.output = with_field ? PlanOutput::field : PlanOutput::force;
   PlanBudget budget;
   budget.rate_Hz = 1.0 / scene.formulation.step_s.value_or(kUsualPeriod_s);
-  const PlanScout scout(PlanScene(scene), measure, scene.formulation.masses);
-  if (const auto reason = candidate.why_not(scout, budget)) {
+  const PlanSurrogate surrogate(PlanScene(scene), measure, scene.formulation.masses);
+  if (const auto reason = candidate.why_not(surrogate, budget)) {
     throw bad_input(scene.formulation.where,
                     "the formulation '" + scene.formulation.kind + "' has no answer: " + *reason,
                     "another formulation");
   }
-  return candidate.run(scout, budget, times_s);
+  return candidate.run(surrogate, budget, times_s);
 }
 
 PlanModels plan_models(const PlanScene& scene) {

@@ -11,81 +11,82 @@ namespace {
 /// What all of them share: a ScalarModel made for the scene and stepped over the protocol.
 class ScalarCandidate : public PlanModel {
  public:
-  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+  [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                    const PlanBudget& /*budget*/) const override {
-    if (scout.scene().has_tools()) return "a tool touches and leaves spheres";
-    if (scout.wants_field() && !knows_field()) return "knows the contact's force only";
+    if (surrogate.scene().has_tools()) return "a tool touches and leaves spheres";
+    if (surrogate.wants_field() && !knows_field()) return "knows the contact's force only";
     return std::nullopt;
   }
 
-  [[nodiscard]] ModelClaim claim(const PlanScout& scout, const PlanBudget& budget) const override {
-    const Trajectory answer = run(scout, budget, scout.times());
-    return {scout.claim_of(answer), answer.work, of_step(scout)};
+  [[nodiscard]] ModelClaim claim(const PlanSurrogate& surrogate,
+                                 const PlanBudget& budget) const override {
+    const Trajectory answer = run(surrogate, budget, surrogate.times());
+    return {surrogate.claim_of(answer), answer.work, of_step(surrogate)};
   }
 
-  [[nodiscard]] Trajectory run(const PlanScout& scout, const PlanBudget& budget,
+  [[nodiscard]] Trajectory run(const PlanSurrogate& surrogate, const PlanBudget& budget,
                                const std::vector<double>& times_s) const override;
 
   [[nodiscard]] bool for_loop() const override { return true; }
   [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
-      const PlanScout& scout, std::span<const double> periods_s) const override {
+      const PlanSurrogate& surrogate, std::span<const double> periods_s) const override {
     constexpr double kRange = 1.05;  // as of other contact models
-    const ContactSpectrum& spectrum = scout.spectrum();
-    const ScalarContact::Range range{spectrum.at_once(), spectrum.relaxed(),
-                                     kRange * scout.scene().protocol().peak()};
+    const ContactSpectrum& spectrum = surrogate.spectrum();
+    const ScalarContact::Range range{spectrum.instantaneous(), spectrum.relaxed(),
+                                     kRange * surrogate.scene().protocol().peak()};
     std::vector<std::unique_ptr<ContactModel>> models;
     for (const double period_s : periods_s) {
       models.push_back(std::make_unique<ScalarContact>(
-          model(scout), scout.scene().scene().probe().direction, range, period_s));
+          model(surrogate), surrogate.scene().scene().probe().direction, range, period_s));
     }
     return models;
   }
 
  protected:
-  [[nodiscard]] virtual ScalarModel model(const PlanScout& scout) const = 0;
+  [[nodiscard]] virtual ScalarModel model(const PlanSurrogate& surrogate) const = 0;
   [[nodiscard]] virtual bool knows_field() const { return true; }
   [[nodiscard]] virtual double terms() const = 0;  ///< exponentials, curves and roots in a step
 
   /// The operations of a step, under a load those of the search for the depth.
-  [[nodiscard]] OperationCount of_step(const PlanScout& scout) const {
+  [[nodiscard]] OperationCount of_step(const PlanSurrogate& surrogate) const {
     constexpr double kSearch = 4.0;
     OperationCount step;
     step.add(Operation::scalar_step, 1.0).add(Operation::scalar_term, terms());
-    if (!scout.scene().by_depth()) step = step.times(kSearch);
-    if (scout.wants_field()) {
+    if (!surrogate.scene().by_depth()) step = step.times(kSearch);
+    if (surrogate.wants_field()) {
       step.add(Operation::dense_flop,
-               6.0 * static_cast<double>(scout.scene().network().organ.size()));
+               6.0 * static_cast<double>(surrogate.scene().network().organ.size()));
     }
     return step;
   }
 };
 
-Trajectory ScalarCandidate::run(const PlanScout& scout, const PlanBudget& budget,
+Trajectory ScalarCandidate::run(const PlanSurrogate& surrogate, const PlanBudget& budget,
                                 const std::vector<double>& times_s) const {
   constexpr double kSteps = 400.0;  // of a protocol, where no rate is given
-  const PlanScene& scene = scout.scene();
-  ScalarRun run(scene.protocol(), model(scout),
+  const PlanScene& scene = surrogate.scene();
+  ScalarRun run(scene.protocol(), model(surrogate),
                 budget.period_s().value_or(scene.duration_s() / kSteps));
   Trajectory answer;
   answer.response.resize(std::ssize(times_s));
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     const double response = run.at(times_s[i]);
     answer.response[static_cast<Eigen::Index>(i)] = response;
-    if (!scout.wants_field()) continue;
+    if (!surrogate.wants_field()) continue;
     // What has not relaxed yet, as a depth.
     const ScalarModel& at = run.model();
     const double stiffness = at.relaxing().stiffness_N_per_m;
     double followed = 0.0;
     for (std::size_t k = 0; k < at.branches().size(); ++k) {
-      followed += at.branches()[k].share * at.remembered_N()[k];
+      followed += at.branches()[k].share * at.viscous_N()[k];
     }
     const double fresh = stiffness > 0.0 ? at.depth_m() - followed / stiffness : 0.0;
-    const ContactSpectrum& spectrum = scout.spectrum();
+    const ContactSpectrum& spectrum = surrogate.spectrum();
     answer.displacement.emplace_back(spectrum.field_relaxed * at.depth_m() +
                                      (spectrum.field_at_once - spectrum.field_relaxed) * fresh);
   }
   answer.steps = budget.rate_Hz ? scene.duration_s() * *budget.rate_Hz : run.steps();
-  answer.work = of_step(scout).times(answer.steps);
+  answer.work = of_step(surrogate).times(answer.steps);
   return answer;
 }
 
@@ -106,8 +107,8 @@ class LinearCandidate : public ScalarCandidate {
 
  protected:
   [[nodiscard]] double terms() const override { return branches_; }
-  [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
-    return linear_contact(scout.spectrum(), branches_);
+  [[nodiscard]] ScalarModel model(const PlanSurrogate& surrogate) const override {
+    return linear_contact(surrogate.spectrum(), branches_);
   }
 
  private:
@@ -124,19 +125,20 @@ class ElementCandidate final : public LinearCandidate {
 
  protected:
   [[nodiscard]] double terms() const override { return 2.0; }
-  [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
-    const ContactSpectrum& spectrum = scout.spectrum();
-    const Tissue& tissue = scout.scene().scene().tissue;
+  [[nodiscard]] ScalarModel model(const PlanSurrogate& surrogate) const override {
+    const ContactSpectrum& spectrum = surrogate.spectrum();
+    const Tissue& tissue = surrogate.scene().scene().tissue;
     const BondMaterial& material = tissue.materials.materials.front();
     DepthCurve relaxed = straight(spectrum.relaxed());
     relaxed.tension_N_per_m = 2.0 * material.lateral_Pa * material.modulus_to_stiffness_m();
     relaxed.spacing_m = tissue.network.organ.spacing;
-    return {std::move(relaxed), straight(spectrum.at_once() - spectrum.relaxed()),
+    return {std::move(relaxed), straight(spectrum.instantaneous() - spectrum.relaxed()),
             fitted_branches(spectrum, 1), 1.0};
   }
 };
 
-/// Static curves of the nonlinear network at once and relaxed, and the linear network's shares.
+/// Static curves of the nonlinear network instantaneous and relaxed, and the linear network's
+/// shares.
 class CurvesCandidate final : public ScalarCandidate {
  public:
   explicit CurvesCandidate(int branches) : branches_(branches) {}
@@ -145,19 +147,19 @@ class CurvesCandidate final : public ScalarCandidate {
   [[nodiscard]] std::string settings() const override {
     return fmt::format("{} exponential{}", branches_, branches_ == 1 ? "" : "s");
   }
-  [[nodiscard]] std::optional<std::string> why_not(const PlanScout& scout,
+  [[nodiscard]] std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                    const PlanBudget& budget) const override {
-    if (!scout.scene().by_depth() && !scout.scene().single_sphere()) {
+    if (!surrogate.scene().by_depth() && !surrogate.scene().single_sphere()) {
       return "under a load the spheres of a patch do not move alike";
     }
-    return ScalarCandidate::why_not(scout, budget);
+    return ScalarCandidate::why_not(surrogate, budget);
   }
 
  protected:
   [[nodiscard]] bool knows_field() const override { return false; }
   [[nodiscard]] double terms() const override { return branches_ + 6.0; }
-  [[nodiscard]] ScalarModel model(const PlanScout& scout) const override {
-    return curves_contact(scout.curves(), scout.spectrum(), branches_);
+  [[nodiscard]] ScalarModel model(const PlanSurrogate& surrogate) const override {
+    return curves_contact(surrogate.curves(), surrogate.spectrum(), branches_);
   }
 
  private:

@@ -32,8 +32,8 @@ ScalarModel::ScalarModel(DepthCurve relaxed, DepthCurve relaxing,
       relaxing_(std::move(relaxing)),
       branches_(std::move(branches)),
       weights_(branches_.size()),
-      at_once_(branches_.size(), Weights{1.0, 0.0, 0.0}),
-      remembered_(branches_.size(), 0.0) {
+      instantaneous_(branches_.size(), Weights{1.0, 0.0, 0.0}),
+      viscous_(branches_.size(), 0.0) {
   set_period(period_s);
 }
 
@@ -50,7 +50,7 @@ void ScalarModel::set_period(double period_s) {
 void ScalarModel::settle(double depth_m) {
   depth_m_ = depth_m;
   start_N_ = relaxing_(depth_m);
-  std::fill(remembered_.begin(), remembered_.end(), start_N_);
+  std::fill(viscous_.begin(), viscous_.end(), start_N_);
 }
 
 double ScalarModel::force_at(double depth_m, const std::vector<Weights>& weights) const {
@@ -58,7 +58,7 @@ double ScalarModel::force_at(double depth_m, const std::vector<Weights>& weights
   double force = relaxed_(depth_m);
   for (std::size_t i = 0; i < branches_.size(); ++i) {
     const Weights& w = weights[i];
-    const double memory = w.memory * remembered_[i] + w.start * start_N_ + w.end * end_N;
+    const double memory = w.memory * viscous_[i] + w.start * start_N_ + w.end * end_N;
     force += branches_[i].share * (end_N - memory);
   }
   return force;
@@ -68,7 +68,7 @@ void ScalarModel::accept(double depth_m, const std::vector<Weights>& weights) {
   const double end_N = relaxing_(depth_m);
   for (std::size_t i = 0; i < branches_.size(); ++i) {
     const Weights& w = weights[i];
-    remembered_[i] = w.memory * remembered_[i] + w.start * start_N_ + w.end * end_N;
+    viscous_[i] = w.memory * viscous_[i] + w.start * start_N_ + w.end * end_N;
   }
   depth_m_ = depth_m;
   start_N_ = end_N;
@@ -81,8 +81,8 @@ double ScalarModel::step_to(double depth_m) {
 }
 
 double ScalarModel::jump_to(double depth_m) {
-  const double force = force_at(depth_m, at_once_);
-  accept(depth_m, at_once_);
+  const double force = force_at(depth_m, instantaneous_);
+  accept(depth_m, instantaneous_);
   return force;
 }
 
@@ -112,7 +112,7 @@ double ScalarModel::step_under(double load_N) {
 }
 
 double ScalarModel::jump_under(double load_N) {
-  accept(depth_under(load_N, at_once_), at_once_);
+  accept(depth_under(load_N, instantaneous_), instantaneous_);
   return depth_m_;
 }
 

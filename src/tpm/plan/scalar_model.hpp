@@ -49,7 +49,7 @@ class ScalarModel {
   void set_period(double period_s);
 
   [[nodiscard]] double depth_m() const { return depth_m_; }
-  [[nodiscard]] const std::vector<double>& remembered_N() const { return remembered_; }
+  [[nodiscard]] const std::vector<double>& viscous_N() const { return viscous_; }
   [[nodiscard]] const DepthCurve& relaxing() const { return relaxing_; }
   [[nodiscard]] const std::vector<ScalarBranch>& branches() const { return branches_; }
 
@@ -63,8 +63,8 @@ class ScalarModel {
 
   DepthCurve relaxed_, relaxing_;
   std::vector<ScalarBranch> branches_;
-  std::vector<Weights> weights_, at_once_;
-  std::vector<double> remembered_;
+  std::vector<Weights> weights_, instantaneous_;
+  std::vector<double> viscous_;
   double depth_m_ = 0.0, start_N_ = 0.0;  ///< and B there
 };
 

@@ -17,7 +17,7 @@ DepthCurve straight_curve(double stiffness_N_per_m) {
 
 ScalarModel linear_contact(const ContactSpectrum& spectrum, int branches) {
   return {straight_curve(spectrum.relaxed()),
-          straight_curve(spectrum.at_once() - spectrum.relaxed()),
+          straight_curve(spectrum.instantaneous() - spectrum.relaxed()),
           fitted_branches(spectrum, branches), 1.0};
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <span>
 
-#include "tpm/plan/plan_scout.hpp"
+#include "tpm/plan/plan_surrogate.hpp"
 #include "tpm/plan/scalar_model.hpp"
 
 namespace tpm {

@@ -90,9 +90,9 @@ const SharedPlan::OfDepth& SharedPlan::of_depth(int place) {
   try {
     if (!spectrum_) spectrum_ = contact_spectrum(scene_);
     const double depth = depth_of_place(place);
-    const PlanScout scout(scene_.with_protocol(ramp_and_hold(depth, depth, 0.0)), {}, false,
-                          kMostIterations);
-    const ContactCurves& curves = scout.curves();
+    const PlanSurrogate surrogate(scene_.with_protocol(ramp_and_hold(depth, depth, 0.0)), {}, false,
+                                  kMostIterations);
+    const ContactCurves& curves = surrogate.curves();
     for (const int branches : {1, 2, 3}) {
       made.models.push_back(linear_contact(*spectrum_, branches));
     }
@@ -114,14 +114,14 @@ const std::vector<double>& SharedPlan::claims_at(Place place) {
   if (!here.models.empty()) try {
       const double depth = depth_of_place(place.first), ramp = std::exp2(place.second);
       const double hold = kHoldOfLongest * spectrum_->longest_s;
-      const PlanScout scout(scene_.with_protocol(ramp_and_hold(depth, depth / ramp, hold)), {},
-                            false, kMostIterations);
+      const PlanSurrogate surrogate(scene_.with_protocol(ramp_and_hold(depth, depth / ramp, hold)),
+                                    {}, false, kMostIterations);
       for (std::size_t m = 0; m < claims.size(); ++m) {
         Trajectory answer;
         answer.response = response_of(
-            ScalarRun(scout.scene().protocol(), here.models[m], ramp / kStepsOfRamp, true),
-            scout.times(), answer.steps);
-        claims[m] = scout.claim_of(answer);
+            ScalarRun(surrogate.scene().protocol(), here.models[m], ramp / kStepsOfRamp, true),
+            surrogate.times(), answer.steps);
+        claims[m] = surrogate.claim_of(answer);
       }
     } catch (const Error& error) {
       if (error.code() == ExitCode::environment) throw;

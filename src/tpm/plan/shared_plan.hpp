@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "tpm/plan/plan_scout.hpp"
+#include "tpm/plan/plan_surrogate.hpp"
 
 namespace tpm {
 
@@ -21,9 +21,9 @@ struct SharedAnswer {
 /// The least reduced model for each of many ramps and holds on one contact, where only depth,
 /// speed, hold and eta1 differ. In units of the relaxation time they are one family of two numbers:
 /// the depth, and the length of the ramp. On a grid of these two every model makes its claim as in
-/// a plan (PlanScout::claim_of); a protocol has the larger claim of the two lengths around its own
-/// at the next greater depth. What is found depends on the protocol alone, not on what was asked
-/// before. Any number of threads may ask.
+/// a plan (PlanSurrogate::claim_of); a protocol has the larger claim of the two lengths around its
+/// own at the next greater depth. What is found depends on the protocol alone, not on what was
+/// asked before. Any number of threads may ask.
 class SharedPlan {
  public:
   /// @param scene of which organ, contacts, E1, E2 and E' are used; quasi-static

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tpm/core/word_table.hpp"
+#include "tpm/core/enum_names.hpp"
 #include "tpm/store/document_place.hpp"
 #include "tpmkit/protocol.hpp"
 #include "tpmkit/units.hpp"

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "tpm/network/bond_system.hpp"
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/reduce/condensed_branches.hpp"
 #include "tpmkit/contact_model.hpp"
 
@@ -90,7 +90,7 @@ class CondensedContact final : public ContactModel {
 /// that do not relax alike or do not relax, and branches on a kernel;
 /// Error(numerical) where the tissue buckles within the range.
 [[nodiscard]] CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
-                                               const Freedom& freedom, std::size_t contact,
+                                               const Constraints& constraints, std::size_t contact,
                                                const Eigen::Vector3d& into_tissue,
                                                const CondensedOptions& options = {});
 

@@ -100,11 +100,11 @@ CondensedFrame frame_of(const Eigen::Vector3d& into_tissue, const CondensedOptio
 }  // namespace
 
 CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
-                                 const Freedom& freedom, std::size_t contact,
+                                 const Constraints& constraints, std::size_t contact,
                                  const Eigen::Vector3d& into_tissue,
                                  const CondensedOptions& options) {
   require_valid(bonds, rest, contact, into_tissue, options);
-  Freedom held = freedom;
+  Constraints held = constraints;
   held.hold(contact);
   const auto fit = std::make_shared<CondensedFit>();
   fit->frame = frame_of(into_tissue, options);
@@ -149,7 +149,7 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   fit->fit_error_N = potential.worst_N();
   fit->field = CondensedField(fit->frame, rest, samples, metrics);
   CondensedContact model{fit, std::move(branches), options.period_s};
-  fit->lag_error_N = condensed_lag_error_N(model, *fit, bonds, rest, freedom, into_tissue);
+  fit->lag_error_N = condensed_lag_error_N(model, *fit, bonds, rest, constraints, into_tissue);
   return model;
 }
 

@@ -58,13 +58,13 @@ double condensed_lag(const Eigen::Vector3d& u, const Eigen::Vector3d& w, double 
 }
 
 double condensed_lag_error_N(const CondensedContact& model, const CondensedFit& fit,
-                             const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
-                             const Eigen::Vector3d& into_tissue) {
+                             const BondSystem& bonds, const Positions& rest,
+                             const Constraints& constraints, const Eigen::Vector3d& into_tissue) {
   const double depth_m = 2.0 * fit.frame.half_depth_m;
   Probe probe;
   probe.sphere = static_cast<std::size_t>(fit.contact);
   probe.direction = into_tissue;
-  Freedom guided = freedom;
+  Constraints guided = constraints;
   guided.guide(probe.sphere, into_tissue);
   const QuasiStatic network(bonds, rest, guided, probe, {.tolerance = kReferenceTolerance});
   double per_lag_N = 0.0;

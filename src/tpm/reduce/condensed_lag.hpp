@@ -1,5 +1,5 @@
 #pragma once
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
 
@@ -25,7 +25,7 @@ namespace tpm {
 /// Throws Error(numerical) where the network cannot be balanced before the release.
 [[nodiscard]] double condensed_lag_error_N(const CondensedContact& model, const CondensedFit& fit,
                                            const BondSystem& bonds, const Positions& rest,
-                                           const Freedom& freedom,
+                                           const Constraints& constraints,
                                            const Eigen::Vector3d& into_tissue);
 
 }  // namespace tpm

@@ -20,13 +20,14 @@ constexpr int kMostIterations = 40;
 
 }  // namespace
 
-CondensedSampler::CondensedSampler(const BondSystem& bonds, Positions rest, const Freedom& freedom,
-                                   std::size_t contact, double stride_m)
+CondensedSampler::CondensedSampler(const BondSystem& bonds, Positions rest,
+                                   const Constraints& constraints, std::size_t contact,
+                                   double stride_m)
     : bonds_(bonds),
       rest_(std::move(rest)),
       contact_(static_cast<Eigen::Index>(contact)),
       stride_m_(stride_m),
-      equilibrium_(bonds, freedom),
+      equilibrium_(bonds, constraints),
       no_load_(Eigen::Matrix3Xd::Zero(3, rest_.cols())) {
   relaxed_.position = rest_;
   memory_ = {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 1.0};
@@ -67,7 +68,7 @@ bool CondensedSampler::balance(Positions& position, const BondMemory& memory) {
   bool factorised = false;
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
     equilibrium_.forces(position, memory, no_load_, force);
-    equilibrium_.freedom().project(force);
+    equilibrium_.constraints().project(force);
     const double left_N = force.colwise().norm().maxCoeff();
     if (left_N <= tolerance_N_) return true;
     if (!std::isfinite(left_N)) return false;

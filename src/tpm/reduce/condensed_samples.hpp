@@ -42,7 +42,7 @@ class CondensedSampler {
  public:
   /// @param bonds, freedom must live as long as this; the contact is held by `freedom`
   /// @param stride_m longest way of the contact from one equilibrium to the next
-  CondensedSampler(const BondSystem& bonds, Positions rest, const Freedom& freedom,
+  CondensedSampler(const BondSystem& bonds, Positions rest, const Constraints& constraints,
                    std::size_t contact, double stride_m);
 
   /// Goes to the relaxed equilibrium under another fictitious displacement.

@@ -16,13 +16,13 @@ constexpr double kBalanceLength_m = 0.5e-3;
 constexpr double kBalance = 1e-11;  // of the stiffest bond times that length
 constexpr double kRestLength = 1e-9;
 
-Freedom with_contact_held(Freedom freedom, std::size_t contact) {
-  if (contact >= freedom.size() || !freedom.is_free(contact)) {
+Constraints with_contact_held(Constraints constraints, std::size_t contact) {
+  if (contact >= constraints.size() || !constraints.is_free(contact)) {
     throw bad_input("contact", fmt::format("sphere {} is not free", contact + 1),
                     "a sphere that nothing holds or guides");
   }
-  freedom.hold(contact);
-  return freedom;
+  constraints.hold(contact);
+  return constraints;
 }
 
 void require_at_rest(const BondSystem& bonds, const Positions& rest) {
@@ -37,22 +37,22 @@ void require_at_rest(const BondSystem& bonds, const Positions& rest) {
 
 }  // namespace
 
-PushedContact::PushedContact(const BondSystem& bonds, Positions rest, Freedom freedom,
+PushedContact::PushedContact(const BondSystem& bonds, Positions rest, Constraints constraints,
                              std::size_t contact)
     : bonds_(bonds),
       rest_(std::move(rest)),
-      freedom_(with_contact_held(std::move(freedom), contact)),
+      constraints_(with_contact_held(std::move(constraints), contact)),
       contact_(contact),
-      equilibrium_(bonds_, freedom_) {
+      equilibrium_(bonds_, constraints_) {
   require_at_rest(bonds_, rest_);
 }
 
 BondMemory PushedContact::memory(const Positions& position, double relaxed,
-                                 double following) const {
+                                 double relaxation_factor) const {
   BondMemory memory;
   bonds_.elongations(position, memory.offset);
-  memory.offset *= relaxed - following;
-  memory.following = following;
+  memory.offset *= relaxed - relaxation_factor;
+  memory.relaxation_factor = relaxation_factor;
   return memory;
 }
 

@@ -21,14 +21,15 @@ class PushedContact {
   /// @param contact a sphere that is free
   /// Throws Error(bad_input) for tools among the bonds, a contact that is not free, or bonds that
   /// do not have their rest length.
-  PushedContact(const BondSystem& bonds, Positions rest, Freedom freedom, std::size_t contact);
+  PushedContact(const BondSystem& bonds, Positions rest, Constraints constraints,
+                std::size_t contact);
   PushedContact(const PushedContact&) = delete;
   PushedContact& operator=(const PushedContact&) = delete;
 
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Positions& rest() const { return rest_; }
   /// With the contact held.
-  [[nodiscard]] const Freedom& freedom() const { return freedom_; }
+  [[nodiscard]] const Constraints& constraints() const { return constraints_; }
   [[nodiscard]] std::size_t contact() const { return contact_; }
 
   /// The equilibrium with the contact displaced, found along a straight line from rest or from the
@@ -39,7 +40,7 @@ class PushedContact {
   /// What bonds remember at such an equilibrium, told so that changes are felt with a given
   /// stiffness: 0 that at once, 1 the relaxed one.
   [[nodiscard]] BondMemory memory(const Positions& position, double relaxed,
-                                  double following) const;
+                                  double relaxation_factor) const;
   /// About such an equilibrium. Throws Error(numerical) if the tissue is not stiff there.
   [[nodiscard]] ContactFields fields(const Positions& position, const BondMemory& memory);
   /// Replaces forces by the displacements of what is free under them, with the stiffness of the
@@ -54,7 +55,7 @@ class PushedContact {
   };
   const BondSystem& bonds_;
   Positions rest_;
-  Freedom freedom_;
+  Constraints constraints_;
   std::size_t contact_;
   Equilibrium equilibrium_;
   std::vector<Found> found_;

@@ -87,13 +87,13 @@ struct ServoBondKernels {
       const float length = std::sqrt(x * x + y * y + z * z);
       const float l = (ux * (group.x[i] + x) + uy * (group.y[i] + y) + uz * (group.z[i] + z)) /
                       (length + group.rest[i]);
-      const float remembered = group.offset[latest][i] + w.of_end * l;
+      const float viscous = group.offset[latest][i] + w.of_end * l;
       const float taut = l >= group.least[i] ? 1.0F / length : 0.0F;
       const float elastic = (group.k[i] + group.cubic[i] * l * l) * l;
-      float now = taut * (elastic - group.g[i] * remembered);
+      float now = taut * (elastic - group.g[i] * viscous);
       float next = now;
       if constexpr (kSweep != Sweep::next) {
-        float offset = w.keep * remembered + w.of_start * l;
+        float offset = w.keep * viscous + w.of_start * l;
         if (step.branch != nullptr) {
           offset = 0.0F;
           for (std::size_t j = 0; j < w.branches.size(); ++j) {
@@ -193,9 +193,8 @@ struct ServoBondKernels {
       const __m256 cubic = _mm256_mul_ps(_mm256_load_ps(group.cubic.data()), l);
       elastic = _mm256_mul_ps(_mm256_fmadd_ps(cubic, l, k), l);
     }
-    const __m256 remembered =
-        _mm256_fmadd_ps(of_end, l, _mm256_load_ps(group.offset[latest].data()));
-    const __m256 now = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, remembered, elastic));
+    const __m256 viscous = _mm256_fmadd_ps(of_end, l, _mm256_load_ps(group.offset[latest].data()));
+    const __m256 now = _mm256_mul_ps(taut, _mm256_fnmadd_ps(g, viscous, elastic));
     __m256 next = now;
     if constexpr (kSweep != Sweep::next) {
       __m256 offset = _mm256_setzero_ps();
@@ -211,7 +210,7 @@ struct ServoBondKernels {
           offset = _mm256_fmadd_ps(_mm256_set1_ps(branch.share), left, offset);
         }
       } else {
-        offset = _mm256_fmadd_ps(_mm256_set1_ps(w.keep), remembered,
+        offset = _mm256_fmadd_ps(_mm256_set1_ps(w.keep), viscous,
                                  _mm256_mul_ps(_mm256_set1_ps(w.of_start), l));
       }
       _mm256_store_ps(group.offset[1 - latest].data(), offset);

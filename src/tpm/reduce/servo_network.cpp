@@ -54,20 +54,20 @@ void require(const ServoNetworkOptions& options, const Eigen::Vector3d& into_tis
 
 }  // namespace
 
-ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
-                           std::size_t contact, const Eigen::Vector3d& into_tissue,
-                           const ServoNetworkOptions& options)
+ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest,
+                           const Constraints& constraints, std::size_t contact,
+                           const Eigen::Vector3d& into_tissue, const ServoNetworkOptions& options)
     : options_(options), into_(into_tissue) {
   require(options, into_tissue);
   require_servo_material(bonds, "the network at servo rate");
-  PushedContact tissue(bonds, rest, freedom, contact);
+  PushedContact tissue(bonds, rest, constraints, contact);
   weights_ = servo_weights(bonds, options.period_s);
-  at_once_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
+  instantaneous_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
   relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
   branch_error_.assign(weights_.branches.size(), Eigen::Vector3d::Zero());
   const double forgotten = 1.0 - static_cast<double>(weights_.longest_kept());
   rounding_ = kRounding + kRememberedRounding / std::max(forgotten, 1.0 / kLongestMemory);
-  spheres_ = std::make_unique<ServoStiffness>(bonds, rest, tissue.freedom());
+  spheres_ = std::make_unique<ServoStiffness>(bonds, rest, tissue.constraints());
   contact_ = spheres_->column(contact);
   choose_bonds(tissue);
   const auto relaxed = static_cast<double>(weights_.of_end);
@@ -107,7 +107,8 @@ void ServoNetwork::choose_bonds(const PushedContact& tissue) {
 void ServoNetwork::factorise(PushedContact& tissue, const Positions& position) {
   const auto relaxed = static_cast<double>(weights_.of_end);
   const BondMemory memory = tissue.memory(position, relaxed, relaxed);
-  if (spheres_->factorise(tissue.bonds(), tissue.freedom(), position, memory, options_.portable)) {
+  if (spheres_->factorise(tissue.bonds(), tissue.constraints(), position, memory,
+                          options_.portable)) {
     return;
   }
   throw Error(ExitCode::numerical, "contact",
@@ -138,13 +139,13 @@ void ServoNetwork::add_remembering(PushedContact& tissue, const Positions& posit
   const auto relaxed = static_cast<double>(weights_.of_end);
   ContactFields fields = tissue.fields(position, tissue.memory(position, relaxed, relaxed));
   for (Eigen::Matrix3Xd& field : fields.displacement) {
-    Eigen::Matrix3Xd at_once = Eigen::Matrix3Xd::Zero(3, position.cols());
-    Eigen::Matrix3Xd in_the_end = at_once;
+    Eigen::Matrix3Xd instantaneous = Eigen::Matrix3Xd::Zero(3, position.cols());
+    Eigen::Matrix3Xd in_the_end = instantaneous;
     tissue.bonds().add_stiffness_times(position, tissue.memory(position, relaxed, 0.0), field,
-                                       at_once);
+                                       instantaneous);
     tissue.bonds().add_stiffness_times(position, tissue.memory(position, relaxed, 1.0), field,
                                        in_the_end);
-    field = at_once - in_the_end;
+    field = instantaneous - in_the_end;
     tissue.displace(field);
   }
   remembering_ = field_of(fields.displacement, options_.frozen_depth_m);
@@ -157,9 +158,9 @@ void ServoNetwork::reset() noexcept {
   std::fill(displacement_.begin(), displacement_.end(), 0.0F);
   std::fill(force_.begin(), force_.end(), 0.0F);
   largest_N_ = held_error_N_ = 0.0;
-  remembered_error_.setZero();
+  viscous_error_.setZero();
   std::fill(branch_error_.begin(), branch_error_.end(), Eigen::Vector3d::Zero());
-  remembered_source_.setZero();
+  viscous_source_.setZero();
   source_.setZero();
 }
 
@@ -219,7 +220,7 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
       change.norm() * (kAside * aside_m + beyond_m + kFieldSlack_m) / stride_m +
       rounding_ * largest_N_;
   answer_.error_N =
-      std::max(field_error_N, kHold * held_error_N_) + remembered_error_.norm() + step_error_N;
+      std::max(field_error_N, kHold * held_error_N_) + viscous_error_.norm() + step_error_N;
   const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
   answer_.trusted = depth_m <= options_.deepest_m && depth_m >= -options_.deepest_m &&
                     aside_m <= options_.aside_m && answer_.error_N <= kTrusted * scale_N;
@@ -234,7 +235,7 @@ ContactAnswer ServoNetwork::step(const ToolPose& tool) noexcept {
   const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
   balance(kNext);
   answer(tool.displacement_m, step_error_N);
-  const double elsewhere_N = remembered_error_.norm() + step_error_N;
+  const double elsewhere_N = viscous_error_.norm() + step_error_N;
   for (balances_ = 1; balances_ < options_.most_balances; ++balances_) {
     if (answer_.error_N - elsewhere_N <= options_.balance_again_above * scale_N) break;
     held_error_N_ = 0.0;
@@ -251,20 +252,20 @@ ContactAnswer ServoNetwork::step(const ToolPose& tool) noexcept {
 void ServoNetwork::keep_error() noexcept {
   const auto after = [&](const auto& by, const Eigen::Vector3d& error) -> Eigen::Vector3d {
     return static_cast<double>(by.keep) * error +
-           static_cast<double>(by.of_start) * remembered_source_ +
+           static_cast<double>(by.of_start) * viscous_source_ +
            static_cast<double>(by.of_end) * source_;
   };
   if (branch_error_.empty()) {
-    remembered_error_ = after(weights_, remembered_error_);
+    viscous_error_ = after(weights_, viscous_error_);
   } else {
-    remembered_error_.setZero();
+    viscous_error_.setZero();
     for (std::size_t j = 0; j < branch_error_.size(); ++j) {
       const ServoBranch& branch = weights_.branches[j];
       branch_error_[j] = after(branch, branch_error_[j]);
-      remembered_error_ += static_cast<double>(branch.share) * branch_error_[j];
+      viscous_error_ += static_cast<double>(branch.share) * branch_error_[j];
     }
   }
-  remembered_source_ = source_;
+  viscous_source_ = source_;
 }
 
 double ServoNetwork::residual_N() const noexcept {

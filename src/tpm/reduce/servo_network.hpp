@@ -36,7 +36,7 @@ class ServoNetwork final : public ContactModel {
   /// @param into_tissue unit vector
   /// Throws Error(bad_input) for options out of range and tissues that PushedContact refuses,
   /// Error(numerical) where the tissue buckles before it is as deep as asked for.
-  ServoNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  ServoNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                std::size_t contact, const Eigen::Vector3d& into_tissue,
                const ServoNetworkOptions& options = {});
 
@@ -44,7 +44,7 @@ class ServoNetwork final : public ContactModel {
   ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return options_.period_s; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return at_once_;
+    return instantaneous_;
   }
   [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
   [[nodiscard]] Eigen::Index spheres() const noexcept override {
@@ -88,16 +88,16 @@ class ServoNetwork final : public ContactModel {
   std::vector<Field> fields_;  ///< at even depths from rest on
   Field remembering_;          ///< what forces left do through what is remembered of the places
   std::unique_ptr<StepError> step_error_;
-  Eigen::Matrix3d at_once_, relaxed_;
+  Eigen::Matrix3d instantaneous_, relaxed_;
 
   AlignedFloats displacement_, force_, change_;
   ContactAnswer answer_;
   double rounding_ = 0.0;  ///< of forces, in parts of the largest
   double largest_N_ = 0.0, held_error_N_ = 0.0;
   /// Force from what is remembered of places that were not balanced, and its source, N.
-  Eigen::Vector3d remembered_error_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d viscous_error_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> branch_error_;  ///< of each branch, where there are several
-  Eigen::Vector3d remembered_source_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d viscous_source_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d source_ = Eigen::Vector3d::Zero();  ///< the same, of the balance just made
   int balances_ = 0;
 };

@@ -3,12 +3,12 @@
 namespace tpm {
 
 ServoStiffness::ServoStiffness(const BondSystem& bonds, const Positions& rest,
-                               const Freedom& freedom)
+                               const Constraints& constraints)
     : column_(bonds.spheres(), 0) {
   std::vector<std::uint32_t> rank(bonds.spheres(), 0);
   std::vector<char> moves(bonds.spheres(), 0);
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-    if (freedom.projector(i).isZero(0.0)) continue;
+    if (constraints.projector(i).isZero(0.0)) continue;
     moves[i] = 1;
     rank[i] = static_cast<std::uint32_t>(free_.size());
     free_.push_back(i);
@@ -27,12 +27,12 @@ ServoStiffness::ServoStiffness(const BondSystem& bonds, const Positions& rest,
   auto next = static_cast<std::uint32_t>(free_.size());
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
     column_[i] = moves[i] != 0 ? pattern_->place()[rank[i]] : next++;
-    if (moves[i] == 0 || freedom.is_free(i)) continue;
-    partly_.push_back({column_[i], freedom.projector(i).cast<float>()});
+    if (moves[i] == 0 || constraints.is_free(i)) continue;
+    partly_.push_back({column_[i], constraints.projector(i).cast<float>()});
   }
 }
 
-bool ServoStiffness::factorise(const BondSystem& bonds, const Freedom& freedom,
+bool ServoStiffness::factorise(const BondSystem& bonds, const Constraints& constraints,
                                const Positions& position, const BondMemory& memory, bool portable) {
   std::vector<Eigen::Matrix3d> diagonal(column_.size(), Eigen::Matrix3d::Zero());
   std::vector<Eigen::Matrix3d> across;
@@ -43,11 +43,11 @@ bool ServoStiffness::factorise(const BondSystem& bonds, const Freedom& freedom,
     diagonal[from] += block;
     diagonal[to] += block;
     if (!moves(from) || !moves(to)) continue;
-    across.emplace_back(-freedom.projector(from) * block * freedom.projector(to));
+    across.emplace_back(-constraints.projector(from) * block * constraints.projector(to));
   }
   std::vector<Eigen::Matrix3d> of_free;
   for (const std::size_t i : free_) {
-    const Eigen::Matrix3d& p = freedom.projector(i);
+    const Eigen::Matrix3d& p = constraints.projector(i);
     of_free.emplace_back(p * diagonal[i] * p +
                          diagonal[i].trace() * (Eigen::Matrix3d::Identity() - p));
   }

@@ -2,7 +2,7 @@
 #include <memory>
 #include <vector>
 
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/reduce/servo_bonds.hpp"
 #include "tpm/solve/frontal_factor.hpp"
 
@@ -14,11 +14,11 @@ class ServoStiffness {
  public:
   /// @param rest places by which the order is chosen
   /// @param freedom what is held does not move
-  ServoStiffness(const BondSystem& bonds, const Positions& rest, const Freedom& freedom);
+  ServoStiffness(const BondSystem& bonds, const Positions& rest, const Constraints& constraints);
 
   /// To be called before solve(), with bonds and freedom as before. False if the tissue is not
   /// stiff there.
-  [[nodiscard]] bool factorise(const BondSystem& bonds, const Freedom& freedom,
+  [[nodiscard]] bool factorise(const BondSystem& bonds, const Constraints& constraints,
                                const Positions& position, const BondMemory& memory, bool portable);
 
   /// Spheres that move, in the order of the organ; they have the first columns.

@@ -34,9 +34,9 @@ std::vector<ViscousLaw::Branch> branches_of(const BondSystem& bonds) {
 
 StepError::StepError(PushedContact& tissue, const Positions& position, double relaxed,
                      double period_s) {
-  const BondMemory at_once = tissue.memory(position, relaxed, 0.0);
+  const BondMemory instantaneous = tissue.memory(position, relaxed, 0.0);
   const BondMemory in_the_end = tissue.memory(position, relaxed, 1.0);
-  const ContactFields first = tissue.fields(position, at_once);
+  const ContactFields first = tissue.fields(position, instantaneous);
   const ContactFields last = tissue.fields(position, in_the_end);
   std::array<Eigen::Matrix3Xd, 6> field;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -48,7 +48,7 @@ StepError::StepError(PushedContact& tissue, const Positions& position, double re
   for (int j = 0; j < 6; ++j) {
     const Eigen::Matrix3Xd& displacement = field[static_cast<std::size_t>(j)];
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, position.cols());
-    tissue.bonds().add_stiffness_times(position, at_once, displacement, force);
+    tissue.bonds().add_stiffness_times(position, instantaneous, displacement, force);
     for (int i = 0; i < 6; ++i) {
       stiffness(i, j) = field[static_cast<std::size_t>(i)].cwiseProduct(force).sum();
     }

@@ -71,9 +71,9 @@ void require_unstretched(const BondSystem& bonds, const Positions& rest) {
 }  // namespace
 
 SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
-                               const Freedom& freedom, BallTool ball,
+                               const Constraints& constraints, BallTool ball,
                                const SurfaceNetworkOptions& options)
-    : options_(options), ball_(std::move(ball)), rest_(rest), stiffness_(bonds, rest, freedom) {
+    : options_(options), ball_(std::move(ball)), rest_(rest), stiffness_(bonds, rest, constraints) {
   require_valid(options, ball_);
   require_servo_material(bonds, "the network under a ball at servo rate");
   require_unstretched(bonds, rest);
@@ -94,14 +94,15 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   change_.assign(stride_, 0.0F);
   const auto relaxed = static_cast<double>(weights_.of_end);
   const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxed};
-  if (!stiffness_.factorise(bonds, freedom, rest, memory, options.portable)) {
+  if (!stiffness_.factorise(bonds, constraints, rest, memory, options.portable)) {
     throw Error(ExitCode::numerical, "tissue", "it is not stiff at rest");
   }
-  add_skin();
-  find_stiffness(bonds, freedom);
+  add_surface();
+  find_stiffness(bonds, constraints);
   // An elongation that bends by b between periods lies b v (1 - v)/2 off the line, v from the end;
   // what it leaves in the memory is the integral of that over exp(-z v) z dv.
-  const double lasting = at_once_.norm() > 0.0 ? relaxed_.norm() / at_once_.norm() : 1.0;
+  const double lasting =
+      instantaneous_.norm() > 0.0 ? relaxed_.norm() / instantaneous_.norm() : 1.0;
   // Not all of a bond relaxes: all of its force is taken.
   const double z = options.period_s / bonds.longest_relaxation_time_s();
   bend_kept_ = std::exp(-lasting * z);
@@ -114,7 +115,7 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   }
 }
 
-void SurfaceNetwork::add_skin() {
+void SurfaceNetwork::add_surface() {
   const std::size_t moving = stiffness_.free().size();
   fields_.assign(3 * stride_ * ball_.touchable.size(), 0.0F);
   float* field = fields_.data();
@@ -124,10 +125,10 @@ void SurfaceNetwork::add_skin() {
     const std::size_t column = stiffness_.column(sphere);
     const bool moves = stiffness_.moves(sphere);
     const Eigen::Vector3d rest_m = rest_.col(static_cast<Eigen::Index>(sphere)) - ball_.start_m;
-    skin_.push_back({.column = column,
-                     .rest_m = rest_m,
-                     .fields = moves ? field : nullptr,
-                     .pushed_N = Eigen::Vector3d::Zero()});
+    surface_.push_back({.column = column,
+                        .rest_m = rest_m,
+                        .fields = moves ? field : nullptr,
+                        .pushed_N = Eigen::Vector3d::Zero()});
     for (std::size_t axis = 0; moves && axis < 3; ++axis, field += stride_) {
       field[4 * column + axis] = 1.0F;
       stiffness_.solve(field);
@@ -139,22 +140,22 @@ void SurfaceNetwork::add_skin() {
   }
 }
 
-void SurfaceNetwork::find_stiffness(const BondSystem& bonds, const Freedom& freedom) {
-  const Skin* nearest = nullptr;
+void SurfaceNetwork::find_stiffness(const BondSystem& bonds, const Constraints& constraints) {
+  const SurfaceSphere* nearest = nullptr;
   std::size_t sphere = 0;
-  for (std::size_t i = 0; i < skin_.size(); ++i) {
-    if (nearest != nullptr && skin_[i].rest_m.norm() >= nearest->rest_m.norm()) continue;
-    nearest = &skin_[i];
+  for (std::size_t i = 0; i < surface_.size(); ++i) {
+    if (nearest != nullptr && surface_[i].rest_m.norm() >= nearest->rest_m.norm()) continue;
+    nearest = &surface_[i];
     sphere = ball_.touchable[i];
   }
-  at_once_.setZero();
+  instantaneous_.setZero();
   relaxed_.setZero();
   if (nearest == nullptr) return;
   const Eigen::Vector3d normal = nearest->rest_m.normalized();
-  Equilibrium equilibrium(bonds, freedom);
-  for (const double following : {0.0, 1.0}) {
+  Equilibrium equilibrium(bonds, constraints);
+  for (const double relaxation_factor : {0.0, 1.0}) {
     const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
-                            following};
+                            relaxation_factor};
     Eigen::Matrix3Xd push = Eigen::Matrix3Xd::Zero(3, rest_.cols());
     push.col(static_cast<Eigen::Index>(sphere)) = normal;
     if (!equilibrium.factorise(rest_, memory)) {
@@ -162,7 +163,7 @@ void SurfaceNetwork::find_stiffness(const BondSystem& bonds, const Freedom& free
     }
     equilibrium.displace(push);
     const double compliance = normal.dot(push.col(static_cast<Eigen::Index>(sphere)));
-    (following > 0.0 ? relaxed_ : at_once_) =
+    (relaxation_factor > 0.0 ? relaxed_ : instantaneous_) =
         normal * normal.transpose() / (compliance + 1.0 / ball_.stiffness_N_per_m);
   }
 }
@@ -171,11 +172,11 @@ void SurfaceNetwork::reset() noexcept {
   bonds_.forget();
   std::fill(displacement_.begin(), displacement_.end(), 0.0F);
   std::fill(force_.begin(), force_.end(), 0.0F);
-  for (Skin& skin : skin_) {
+  for (SurfaceSphere& skin : surface_) {
     skin.pushed_N.setZero();
     skin.before_N.setZero();
     skin.change_N.setZero();
-    skin.bent_N.setZero();
+    skin.linearisation_N.setZero();
   }
   ball_at_.setZero();
   largest_N_ = held_error_N_ = linear_error_N_ = 0.0;
@@ -185,11 +186,12 @@ Eigen::Vector3d SurfaceNetwork::displacement_of(std::size_t column) const noexce
   return Eigen::Map<const Eigen::Vector3f>(displacement_.data() + 4 * column).cast<double>();
 }
 
-Eigen::Vector3d SurfaceNetwork::from_ball(const Skin& skin) const noexcept {
+Eigen::Vector3d SurfaceNetwork::from_ball(const SurfaceSphere& skin) const noexcept {
   return skin.rest_m - ball_at_ + displacement_of(skin.column);
 }
 
-Eigen::Matrix3d SurfaceNetwork::compliance(const Skin& of, const Skin& under) const noexcept {
+Eigen::Matrix3d SurfaceNetwork::compliance(const SurfaceSphere& of,
+                                           const SurfaceSphere& under) const noexcept {
   Eigen::Matrix3d c = Eigen::Matrix3d::Zero();
   if (of.fields == nullptr || under.fields == nullptr) return c;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -203,8 +205,8 @@ void SurfaceNetwork::find_near(double way_m) noexcept {
   const double within_m = ball_.reach_m() + kNearBy_m + way_m;
   near_count_ = 0;
   too_many_ = false;
-  for (std::size_t s = 0; s < skin_.size(); ++s) {
-    const Skin& skin = skin_[s];
+  for (std::size_t s = 0; s < surface_.size(); ++s) {
+    const SurfaceSphere& skin = surface_[s];
     const Eigen::Vector3d apart = from_ball(skin);
     const bool pushed = !skin.pushed_N.isZero(0.0);
     if (!pushed && !(apart.squaredNorm() <= within_m * within_m)) continue;
@@ -221,7 +223,7 @@ void SurfaceNetwork::press() noexcept {
   std::array<std::array<Eigen::Matrix3d, kMostTouched>, kMostTouched> yields;
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t j = 0; j < count; ++j) {
-      yields[i][j] = compliance(skin_[near_[i].skin], skin_[near_[j].skin]);
+      yields[i][j] = compliance(surface_[near_[i].skin], surface_[near_[j].skin]);
     }
   }
   std::array<Eigen::Vector3d, kMostTouched> left;
@@ -283,7 +285,7 @@ void SurfaceNetwork::press() noexcept {
       near_[closed[a]].pushed_N += right.segment<3>(3 * static_cast<Eigen::Index>(a));
     }
   }
-  for (std::size_t i = 0; i < count; ++i) skin_[near_[i].skin].pushed_N = near_[i].pushed_N;
+  for (std::size_t i = 0; i < count; ++i) surface_[near_[i].skin].pushed_N = near_[i].pushed_N;
 }
 
 Eigen::Vector3d SurfaceNetwork::total_N() const noexcept {
@@ -301,7 +303,7 @@ void SurfaceNetwork::balance(std::size_t first, double way_m) noexcept {
   find_near(way_m);
   for (int i = 0; i < near_count_; ++i) {
     Near& near = near_[static_cast<std::size_t>(i)];
-    const Skin& skin = skin_[near.skin];
+    const SurfaceSphere& skin = surface_[near.skin];
     if (skin.fields == nullptr) continue;
     near.free_m +=
         Eigen::Map<const Eigen::Vector3f>(change_.data() + 4 * skin.column).cast<double>();
@@ -309,7 +311,7 @@ void SurfaceNetwork::balance(std::size_t first, double way_m) noexcept {
   press();
   for (int i = 0; i < near_count_; ++i) {
     const Near& near = near_[static_cast<std::size_t>(i)];
-    const float* const field = skin_[near.skin].fields;
+    const float* const field = surface_[near.skin].fields;
     if (field == nullptr || near.pushed_N.isZero(0.0)) continue;
     const Eigen::Vector3f push = near.pushed_N.cast<float>();
     run_wide([&] {
@@ -358,15 +360,15 @@ void SurfaceNetwork::answer() noexcept {
   double deepest_m = 0.0;
   for (int i = 0; i < near_count_; ++i) {
     Near& near = near_[static_cast<std::size_t>(i)];
-    const Skin& skin = skin_[near.skin];
+    const SurfaceSphere& skin = surface_[near.skin];
     if (skin.fields != nullptr) near.free_m += weighed(skin.fields);
   }
   press();
   for (int i = 0; i < near_count_; ++i) {
     const Near& near = near_[static_cast<std::size_t>(i)];
     if (near.pushed_N.isZero(0.0)) continue;
-    held = held || skin_[near.skin].fields == nullptr;
-    deepest_m = std::max(deepest_m, displacement_of(skin_[near.skin].column).norm());
+    held = held || surface_[near.skin].fields == nullptr;
+    deepest_m = std::max(deepest_m, displacement_of(surface_[near.skin].column).norm());
   }
   // Written so that a force that is no number is passed on, and found.
   answer_.force_N = total_N() + 0.0 * Eigen::Vector3d::Constant(static_cast<double>(sum));
@@ -379,12 +381,12 @@ void SurfaceNetwork::answer() noexcept {
 
 void SurfaceNetwork::add_linear_error() noexcept {
   linear_error_N_ = 0.0;
-  for (Skin& skin : skin_) {
+  for (SurfaceSphere& skin : surface_) {
     const Eigen::Vector3d change_N = skin.pushed_N - skin.before_N;
-    skin.bent_N = bend_kept_ * skin.bent_N + bend_ * (change_N - skin.change_N);
+    skin.linearisation_N = bend_kept_ * skin.linearisation_N + bend_ * (change_N - skin.change_N);
     skin.before_N = skin.pushed_N;
     skin.change_N = change_N;
-    linear_error_N_ += skin.bent_N.norm();
+    linear_error_N_ += skin.linearisation_N.norm();
   }
   answer_.error_N += linear_error_N_;
   if (!(answer_.error_N <= kTrustedError * scale_N())) answer_.trusted = false;

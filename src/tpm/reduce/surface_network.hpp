@@ -39,7 +39,7 @@ class SurfaceNetwork final : public ContactModel {
   /// Throws Error(bad_input) for options out of range, bonds that do not have their rest length, a
   /// ball without radius or stiffness or one that has come into a sphere at its start,
   /// Error(numerical) for a tissue that is not stiff.
-  SurfaceNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  SurfaceNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                  BallTool ball, const SurfaceNetworkOptions& options = {});
 
   void reset() noexcept override;
@@ -48,7 +48,7 @@ class SurfaceNetwork final : public ContactModel {
   [[nodiscard]] double period_s() const noexcept override { return options_.period_s; }
   /// Against the sphere nearest to the ball's start, with the compliance of the overlap.
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return at_once_;
+    return instantaneous_;
   }
   [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return rest_.cols(); }
@@ -62,7 +62,7 @@ class SurfaceNetwork final : public ContactModel {
 
  private:
   /// A sphere that the ball may touch.
-  struct Skin {
+  struct SurfaceSphere {
     std::size_t column;        ///< of displacements
     Eigen::Vector3d rest_m;    ///< its centre at rest, from the ball's start
     const float* fields;       ///< its displacements per force on it, x, y and z; null: it is held
@@ -70,7 +70,7 @@ class SurfaceNetwork final : public ContactModel {
     /// At the end of the last period, and its change in that.
     Eigen::Vector3d before_N = Eigen::Vector3d::Zero(), change_N = Eigen::Vector3d::Zero();
     /// What taking elongations as linear has cost so far.
-    Eigen::Vector3d bent_N = Eigen::Vector3d::Zero();
+    Eigen::Vector3d linearisation_N = Eigen::Vector3d::Zero();
   };
   /// A sphere in reach of the ball while forces are balanced.
   struct Near {
@@ -79,12 +79,13 @@ class SurfaceNetwork final : public ContactModel {
     Eigen::Vector3d pushed_N;  ///< with what the ball pushes it
   };
 
-  void add_skin();
-  void find_stiffness(const BondSystem& bonds, const Freedom& freedom);
+  void add_surface();
+  void find_stiffness(const BondSystem& bonds, const Constraints& constraints);
   [[nodiscard]] Eigen::Vector3d displacement_of(std::size_t column) const noexcept;
-  [[nodiscard]] Eigen::Vector3d from_ball(const Skin& skin) const noexcept;
+  [[nodiscard]] Eigen::Vector3d from_ball(const SurfaceSphere& skin) const noexcept;
   /// Displacement of the first per force on the second.
-  [[nodiscard]] Eigen::Matrix3d compliance(const Skin& of, const Skin& under) const noexcept;
+  [[nodiscard]] Eigen::Matrix3d compliance(const SurfaceSphere& of,
+                                           const SurfaceSphere& under) const noexcept;
   /// @param way_m how far the ball may come towards spheres
   void find_near(double way_m) noexcept;
   /// Balances the forces of the ball against the compliance of the spheres near it.
@@ -108,9 +109,9 @@ class SurfaceNetwork final : public ContactModel {
   ServoBonds bonds_;
   AlignedFloats fields_;  ///< of all skin, three each
   std::size_t stride_ = 0;
-  std::vector<Skin> skin_;
+  std::vector<SurfaceSphere> surface_;
   std::vector<std::size_t> inside_;  ///< spheres that it is not to touch
-  Eigen::Matrix3d at_once_, relaxed_;
+  Eigen::Matrix3d instantaneous_, relaxed_;
 
   AlignedFloats displacement_, force_, change_;
   std::array<Near, kMostTouched> near_{};

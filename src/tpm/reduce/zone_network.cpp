@@ -49,9 +49,9 @@ std::size_t padded(std::size_t size) {
 
 }  // namespace
 
-ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
-                         std::size_t contact, const Eigen::Vector3d& into_tissue,
-                         const ZoneNetworkOptions& options)
+ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest,
+                         const Constraints& constraints, std::size_t contact,
+                         const Eigen::Vector3d& into_tissue, const ZoneNetworkOptions& options)
     : options_(options),
       into_(into_tissue),
       kernels_(panel_kernels(options.portable)),
@@ -59,9 +59,9 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest, const F
   require(options, into_tissue);
   require_servo_material(bonds, "the zone");
   missed_in_motion_ = kMissedInMotion * (bonds.is_linear() ? 1.0 : kMissedStiffening);
-  PushedContact tissue(bonds, rest, freedom, contact);
+  PushedContact tissue(bonds, rest, constraints, contact);
   weights_ = servo_weights(bonds, options.period_s);
-  at_once_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
+  instantaneous_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
   relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
   choose_zone(tissue);
   build(tissue);
@@ -71,8 +71,8 @@ void ZoneNetwork::choose_zone(const PushedContact& tissue) {
   const BondSystem& bonds = tissue.bonds();
   held_or_free_.assign(bonds.spheres(), 1);
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-    if (i == contact_ || tissue.freedom().is_free(i)) continue;
-    if (!tissue.freedom().projector(i).isZero(0.0)) {
+    if (i == contact_ || tissue.constraints().is_free(i)) continue;
+    if (!tissue.constraints().projector(i).isZero(0.0)) {
       throw bad_input("guides", "sphere " + std::to_string(i + 1) + " is guided",
                       "spheres that are free or held");
     }

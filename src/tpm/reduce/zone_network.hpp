@@ -27,7 +27,7 @@ struct ZoneNetworkOptions {
 ///
 /// The spheres outside follow those at the edge of the zone as they do in a step of the linear
 /// tissue, and have a few displacements of their own beside that: those by which the fields of the
-/// contact, at once and relaxed, differ from it. On these the linear tissue is projected
+/// contact, instantaneous and relaxed, differ from it. On these the linear tissue is projected
 /// symmetrically, its viscous part with the same memory as every bond has, so that it stores and
 /// dissipates as a tissue does (docs/reduction_servo.md).
 ///
@@ -37,7 +37,7 @@ struct ZoneNetworkOptions {
 class ZoneNetwork final : public ContactModel {
  public:
   /// As ServoNetwork. Throws Error(bad_input) for guided spheres as well.
-  ZoneNetwork(const BondSystem& bonds, const Positions& rest, const Freedom& freedom,
+  ZoneNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
               std::size_t contact, const Eigen::Vector3d& into_tissue,
               const ZoneNetworkOptions& options = {});
 
@@ -45,7 +45,7 @@ class ZoneNetwork final : public ContactModel {
   ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return options_.period_s; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return at_once_;
+    return instantaneous_;
   }
   [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
   [[nodiscard]] Eigen::Index spheres() const noexcept override {
@@ -90,7 +90,7 @@ class ZoneNetwork final : public ContactModel {
   std::vector<std::size_t> outside_;
   Eigen::Index own_ = 0;
   double softest_ = 0.0;
-  Eigen::Matrix3d at_once_, relaxed_;
+  Eigen::Matrix3d instantaneous_, relaxed_;
 
   ServoBonds at_contact_, elsewhere_;
   Dense inverse_;   ///< of the frozen stiffness, by coordinates of zone and own displacements

@@ -87,7 +87,7 @@ void ZoneNetwork::build(PushedContact& tissue) {
 
   const Positions pressed = tissue.at(options_.linear_depth_m * into_, relaxed);
   const LinearBonds around(tissue, pressed, relaxed, linear);
-  Freedom outside = tissue.freedom();
+  Constraints outside = tissue.constraints();
   for (const std::size_t i : zone_) outside.hold(i);
   BlockLdlt factor(bonds.pattern());
   {
@@ -115,11 +115,11 @@ void ZoneNetwork::build(PushedContact& tissue) {
       basis.push_back(follow(unit));
     }
   }
-  const ContactFields at_once = tissue.fields(pressed, tissue.memory(pressed, relaxed, 0.0));
+  const ContactFields instantaneous = tissue.fields(pressed, tissue.memory(pressed, relaxed, 0.0));
   const ContactFields in_the_end = tissue.fields(pressed, tissue.memory(pressed, relaxed, 1.0));
   Fields own;
   Fields resisted;
-  for (const ContactFields* const fields : {&at_once, &in_the_end}) {
+  for (const ContactFields* const fields : {&instantaneous, &in_the_end}) {
     for (const Eigen::Matrix3Xd& whole : fields->displacement) {
       Eigen::Matrix3Xd in_zone = whole;
       for (const std::size_t i : outside_) in_zone.col(static_cast<Eigen::Index>(i)).setZero();

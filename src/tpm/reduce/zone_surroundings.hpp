@@ -13,18 +13,18 @@ class LinearBonds {
               const std::vector<char>& chosen);
 
   /// Adds what they resist displacements with, N: at once less `following` times what relaxes.
-  void add_resistance(const Eigen::Matrix3Xd& displacement, double following,
+  void add_resistance(const Eigen::Matrix3Xd& displacement, double relaxation_factor,
                       Eigen::Matrix3Xd& force) const;
   /// What relaxes of it.
   void add_relaxing(const Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& force) const;
   /// The stiffness matrix of the system's spheres.
-  [[nodiscard]] BlockMatrix matrix(double following) const;
+  [[nodiscard]] BlockMatrix matrix(double relaxation_factor) const;
 
  private:
   struct Linear {
     std::size_t bond;
     std::uint32_t a, b;
-    Eigen::Matrix3d at_once, relaxing;
+    Eigen::Matrix3d instantaneous, relaxing;
   };
   const BondSystem& bonds_;
   std::vector<Linear> linear_;

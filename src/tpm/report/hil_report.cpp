@@ -173,7 +173,7 @@ void add_glance(Document& d, const HilRecording& r, const Verification& v,
                                percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)),
                    v.all.max_N <= kMostError * v.all.peak_N ? Tone::good : Tone::bad});
   if (r.session.measured_N.empty()) lines.push_back({experiment_line(v)});
-  for (const OtherOpinion& o : v.others) {
+  for (const CrossCheck& o : v.others) {
     if (o.name.starts_with("MEASURED")) {
       lines.push_back({fmt::format("{}: {} mN rms, {} mN at most", o.name, mN(o.commanded.rms_N),
                                    mN(o.commanded.max_N))});
@@ -250,7 +250,7 @@ void add_fidelity(Document& d, const Verification& v) {
       mN(v.reference_error_N), v.all.instants, mN(v.all.rms_N), mN(v.all.max_N),
       percent(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4)));
   std::vector<Cell> others;
-  for (const OtherOpinion& o : v.others) {
+  for (const CrossCheck& o : v.others) {
     others.push_back(
         {fmt::format("{}, {} to {} s: {} mN rms, {} mN at most; {} mN from the reference at most",
                      o.name, significant(o.start_s, 4), significant(o.end_s, 4),

@@ -168,7 +168,7 @@ Json verification_json(const HilRecording& recording, const Verification& v) {
     json["depth_rms_m"] = rounded(p.depth_rms_m, kHilDigits);
     phases.push_back(std::move(json));
   }
-  for (const OtherOpinion& o : v.others) {
+  for (const CrossCheck& o : v.others) {
     Json json = fidelity_json(o.commanded);
     json["name"] = o.name;
     json["start_s"] = rounded(o.start_s, kHilDigits);
@@ -243,7 +243,7 @@ std::string verification_text(const HilRecording& recording, const Verification&
                       significant(1e3 * v.all.rms_N, 3), significant(1e3 * v.all.max_N, 3),
                       share(v.all.max_N, v.all.peak_N), significant(v.all.peak_N, 4));
   for (const std::string& note : v.notes) text += "note: " + note + "\n";
-  for (const OtherOpinion& o : v.others) {
+  for (const CrossCheck& o : v.others) {
     text += fmt::format("beside: {}, {} to {} s: rms {} mN, max {} mN; {} mN from the reference\n",
                         o.name, significant(o.start_s, 4), significant(o.end_s, 4),
                         significant(1e3 * o.commanded.rms_N, 3),

@@ -61,7 +61,7 @@ Json network_json(const Tissue& tissue, const NetworkInspection& inspection) {
   if (organ.contact) {
     json["contact"] = {
         {"sphere", *organ.contact + 1},
-        {"stiffness_over_star_at_once", rounded(inspection.contact_over_star->at_once, 9)},
+        {"stiffness_over_star_at_once", rounded(inspection.contact_over_star->instantaneous, 9)},
         {"stiffness_over_star_relaxed", rounded(inspection.contact_over_star->relaxed, 9)}};
   }
   json["assumptions"] = organ.assumptions;
@@ -95,7 +95,7 @@ std::string network_text(const Tissue& tissue, const NetworkInspection& inspecti
     text += fmt::format(
         "contact: sphere {}, with its neighbours held {} times as stiff as the star at once, {} "
         "times relaxed\n",
-        *organ.contact + 1, significant(inspection.contact_over_star->at_once, 7),
+        *organ.contact + 1, significant(inspection.contact_over_star->instantaneous, 7),
         significant(inspection.contact_over_star->relaxed, 7));
   }
   for (const std::string& assumption : organ.assumptions) {

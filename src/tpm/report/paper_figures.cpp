@@ -102,17 +102,17 @@ Figure static_force_figure(const PaperFigureData& data) {
   const TpmParameters& p = data.paper;
   const std::vector<double> depth_mm = evenly(0.0, 8.0, 160);
   std::vector<double> relaxed;
-  std::vector<double> at_once;
+  std::vector<double> instantaneous;
   for (const double mm : depth_mm) {
     const double e = mm * 1e-3;
     const double lambda1 = lambda1_Pa(p.Eprime_Pa, e, p.spacing_m);
     relaxed.push_back(step_relaxation_force_N(p, lambda1, e, kForever));
-    at_once.push_back(step_relaxation_force_N(p, lambda1, e, 0.0));
+    instantaneous.push_back(step_relaxation_force_N(p, lambda1, e, 0.0));
   }
   Panel panel{"", {"indentation depth", "mm", false, 0.0, 8.4}, force_axis(), {}};
   panel.series = {
       line("relaxed force (t → ∞)", depth_mm, relaxed),
-      line("force at once (t = 0+)", depth_mm, at_once),
+      line("force at once (t = 0+)", depth_mm, instantaneous),
       brackets("range over three pigs (Table 5)", data.static_bands.data, 1.0,
                [](const Datum& d) { return d.depth_m.value_or(0.0) * 1e3; }),
   };

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpmkit/error.hpp"

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpmkit/error.hpp"
 
@@ -158,7 +158,7 @@ Outputs parse_outputs(const Json& block, const Protocol& protocol, const Documen
   };
   outputs.force = wanted("force");
   outputs.bond_force = wanted("bond_force");
-  outputs.remembered = wanted("remembered");
+  outputs.viscous = wanted("remembered");
   return outputs;
 }
 

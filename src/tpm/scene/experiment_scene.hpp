@@ -37,7 +37,7 @@ struct Outputs {
   std::vector<double> times_s;  ///< rising
   bool force = true;
   bool bond_force = true;
-  bool remembered = false;
+  bool viscous = false;
 };
 
 /// How something meets the tissue.

@@ -36,7 +36,7 @@ NetworkInspection inspect(const Tissue& tissue) {
   for (const Bond& bond : tissue.network.bonds) {
     ++(bond.kind == BondKind::radial ? result.radial_bonds : result.lateral_bonds);
   }
-  result.free_coordinates = tissue.freedom().count();
+  result.free_coordinates = tissue.constraints().count();
   result.nearest = nearest_distances(organ);
   result.lateral_count = by_layer(organ, sums, [](const BondSums& s) { return s.lateral_count; });
   result.radial_count = by_layer(organ, sums, [](const BondSums& s) { return s.radial_count; });
@@ -55,7 +55,7 @@ NetworkInspection inspect(const Tissue& tissue) {
                      organ.normal.col(static_cast<Eigen::Index>(*organ.contact)));
   const BondLaw star_bond = tissue.materials.materials.front().radial_law();
   const HeldStiffness star{star_bond.instantaneous_N_per_m(), star_bond.equilibrium_N_per_m()};
-  result.contact_over_star = HeldStiffness{held.at_once / star.at_once, 0.0};
+  result.contact_over_star = HeldStiffness{held.instantaneous / star.instantaneous, 0.0};
   // A material that relaxes to nothing has no relaxed stiffness to compare.
   if (star.relaxed > 0.0) result.contact_over_star->relaxed = held.relaxed / star.relaxed;
   return result;

@@ -3,8 +3,8 @@
 
 #include <array>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/scene/place_function.hpp"
 #include "tpm/solve/fractional_branches.hpp"

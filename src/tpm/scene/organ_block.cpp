@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/liver.hpp"
 #include "tpm/network/mesh_file.hpp"

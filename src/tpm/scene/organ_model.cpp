@@ -97,9 +97,9 @@ OrganModel::OrganModel(std::shared_ptr<const Tissue> tissue)
     : tissue_(std::move(tissue)),
       element_(tissue_->by_constants && tissue_->materials.factor.size() == 0),
       bonds_(tissue_->bonds()),
-      freedom_(tissue_->freedom()),
+      constraints_(tissue_->constraints()),
       probe_(probe_of(*tissue_)) {
-  require_valid(probe_, freedom_);
+  require_valid(probe_, constraints_);
   if (element_) {
     table_.assign(kTpmParameterTable.begin(), kTpmParameterTable.end());
     return;
@@ -178,7 +178,8 @@ Response OrganModel::respond_by_table(const Protocol& protocol, std::span<const 
         direction_between(beside(-1.0), bonds, beside(1.0), 2.0 * kDifference));
   }
   const QuasiStaticRun run =
-      QuasiStatic(bonds, network.organ.position, freedom_, probe_, options).run(protocol, times_s);
+      QuasiStatic(bonds, network.organ.position, constraints_, probe_, options)
+          .run(protocol, times_s);
   Response response;
   response.value = run.response;
   response.sensitivity.resize(run.response.size(), along.cols());
@@ -216,8 +217,9 @@ Response OrganModel::respond_by_element(const Protocol& protocol, std::span<cons
     }
   }
   const BondSystem bonds = bonds_.with_materials(network, p.bonds(tissue_->materials.lateral()));
-  const QuasiStaticRun run = QuasiStatic(bonds, network.organ.position, freedom_, probe_, options)
-                                 .run(protocol.scaled(1.0 / similarity.of_imposed(drive)), times_s);
+  const QuasiStaticRun run =
+      QuasiStatic(bonds, network.organ.position, constraints_, probe_, options)
+          .run(protocol.scaled(1.0 / similarity.of_imposed(drive)), times_s);
   const double factor = similarity.of_response(drive);
   Response response;
   response.value = factor * run.response;
@@ -228,7 +230,7 @@ Response OrganModel::respond_by_element(const Protocol& protocol, std::span<cons
   return response;
 }
 
-std::unique_ptr<Model> OrganModel::scout() const {
+std::unique_ptr<Model> OrganModel::surrogate() const {
   if (!element_) return nullptr;
   return make_model("closed_form");
 }

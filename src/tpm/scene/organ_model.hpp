@@ -36,7 +36,7 @@ class OrganModel final : public Model {
   [[nodiscard]] Response respond_along(const Protocol& protocol, std::span<const double> times_s,
                                        std::span<const double> parameters,
                                        const Eigen::MatrixXd& along) const override;
-  [[nodiscard]] std::unique_ptr<Model> scout() const override;
+  [[nodiscard]] std::unique_ptr<Model> surrogate() const override;
 
  private:
   [[nodiscard]] Response respond_by_element(const Protocol& protocol,
@@ -54,7 +54,7 @@ class OrganModel final : public Model {
   std::vector<MaterialParameter> names_;  ///< of the material's table
   std::vector<ParameterDescription> table_;
   BondSystem bonds_;
-  Freedom freedom_;
+  Constraints constraints_;
   Probe probe_;
 };
 

@@ -89,11 +89,11 @@ BondElement Tissue::element(std::string_view user) const {
                   })));
 }
 
-Freedom Tissue::freedom() const {
-  Freedom freedom(network.organ.size());
-  for (const Guide& guide : guides) freedom.guide(guide.sphere, guide.direction);
-  for (const std::size_t sphere : anchors) freedom.hold(sphere);
-  return freedom;
+Constraints Tissue::constraints() const {
+  Constraints constraints(network.organ.size());
+  for (const Guide& guide : guides) constraints.guide(guide.sphere, guide.direction);
+  for (const std::size_t sphere : anchors) constraints.hold(sphere);
+  return constraints;
 }
 
 Tissue parse_tissue(const Json& scene, std::string_view where,
@@ -156,11 +156,11 @@ Tissue read_tissue(const std::filesystem::path& scene) {
 void require_standing(const Tissue& tissue, std::string_view where) {
   const Organ& organ = tissue.network.organ;
   const BondSystem bonds = tissue.bonds();
-  const Freedom freedom = tissue.freedom();
+  const Constraints constraints = tissue.constraints();
   if (tissue.anchors.empty()) {
     const std::string modes = organ.size() > kMostSpheresForModes
                                   ? std::string("the 6 motions of a rigid body")
-                                  : words(zero_energy_modes(bonds, organ.position, freedom));
+                                  : words(zero_energy_modes(bonds, organ.position, constraints));
     throw bad_input(where, fmt::format("not anchored: {}", modes),
                     "anchors that hold the organ, such as [{\"kind\": \"inner_layer\"}]");
   }
@@ -168,8 +168,9 @@ void require_standing(const Tissue& tissue, std::string_view where) {
     throw bad_input(where, fmt::format("the contact sphere {} is anchored", *organ.contact + 1),
                     "anchors that leave it free");
   }
-  if (organ.size() <= kMostSpheresForModes) require_rigid(bonds, organ.position, freedom, where);
-  require_supported(bonds, organ, freedom, where);
+  if (organ.size() <= kMostSpheresForModes)
+    require_rigid(bonds, organ.position, constraints, where);
+  require_supported(bonds, organ, constraints, where);
 }
 
 void require_loadable(const Tissue& tissue, std::size_t sphere, const Eigen::Vector3d& direction,
@@ -182,7 +183,7 @@ void require_loadable(const Tissue& tissue, std::size_t sphere, const Eigen::Vec
     throw bad_input(where, fmt::format("a load on sphere {}, which is anchored", sphere + 1),
                     "a sphere that may move");
   }
-  if ((tissue.freedom().projector(sphere) * direction).norm() < 1e-6 * direction.norm()) {
+  if ((tissue.constraints().projector(sphere) * direction).norm() < 1e-6 * direction.norm()) {
     throw bad_input(where, fmt::format("a load on sphere {} square to its guide", sphere + 1),
                     "a direction in which the sphere may move");
   }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tpm/network/bond_system.hpp"
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/store/json.hpp"
 #include "tpmkit/bond_element.hpp"
@@ -36,7 +36,7 @@ struct Tissue {
       unused_blocks;  ///< blocks of the scene that say nothing about the tissue
 
   [[nodiscard]] BondSystem bonds() const { return {network, materials}; }
-  [[nodiscard]] Freedom freedom() const;
+  [[nodiscard]] Constraints constraints() const;
 
   /// One material of one linear branch everywhere: the paper's element.
   [[nodiscard]] bool is_element() const;

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpmkit/error.hpp"
 

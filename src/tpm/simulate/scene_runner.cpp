@@ -19,7 +19,7 @@ bool jumps(const Protocol& protocol) {
 
 /// The graph of what moves, which is what is factorised.
 const BlockPattern& pattern_of(const DrivenNetwork& driven) {
-  return moving_graph(driven.bonds, driven.freedom)->pattern;
+  return moving_graph(driven.bonds, driven.constraints)->pattern;
 }
 
 double blocks_of_solve(const BlockPattern& pattern) {
@@ -46,7 +46,8 @@ Trajectory run_quasi_static(const ExperimentScene& scene, const RunNetwork& netw
                             const QuasiStaticOptions& options, const std::vector<double>& times_s,
                             bool with_field) {
   const DrivenNetwork& driven = network.driven;
-  const QuasiStatic equations(driven.bonds, driven.rest, driven.freedom, driven.probes, options);
+  const QuasiStatic equations(driven.bonds, driven.rest, driven.constraints, driven.probes,
+                              options);
   Trajectory result;
   ValidityWatch watch(network.network, scene.probe(), depth_limits_apply(scene.tissue));
   const Eigen::Index spheres = network.network.organ.position.cols();
@@ -74,7 +75,7 @@ Trajectory run_inertial(const ExperimentScene& scene, const RunNetwork& network,
                         const InertialOptions& options, const std::vector<double>& times_s,
                         bool with_field) {
   const DrivenNetwork& driven = network.driven;
-  const Inertial equations(driven.bonds, driven.rest, driven.freedom, driven.probes,
+  const Inertial equations(driven.bonds, driven.rest, driven.constraints, driven.probes,
                            masses_kg(scene, network), options);
   Trajectory result;
   const Eigen::Index spheres = network.network.organ.position.cols();

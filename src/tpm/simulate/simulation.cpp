@@ -32,7 +32,8 @@ DrivenNetwork with_contacts(const ExperimentScene& scene, const BondSystem& bond
       driven.push_back({sphere, probe.direction, probe.share});
     }
   }
-  return driven_network(bonds, organ, scene.tissue.freedom(), std::move(driven), std::move(tools));
+  return driven_network(bonds, organ, scene.tissue.constraints(), std::move(driven),
+                        std::move(tools));
 }
 
 }  // namespace
@@ -42,11 +43,11 @@ RunNetwork network_to_run(const ExperimentScene& scene) {
   if (!scene.formulation.mass_spring) {
     return {tissue.network, with_contacts(scene, tissue.bonds())};
   }
-  const Freedom freedom = tissue.freedom();
+  const Constraints constraints = tissue.constraints();
   const double stiffness = contact_stiffness_N_per_m(tissue.bonds(), tissue.network.organ.position,
-                                                     freedom, scene.probe(), 1.0);
+                                                     constraints, scene.probe(), 1.0);
   Network msm = msm_network(tissue.network, scene.formulation.springs);
-  const BondMaterial springs = msm_material(msm, freedom, scene.probe(), stiffness);
+  const BondMaterial springs = msm_material(msm, constraints, scene.probe(), stiffness);
   DrivenNetwork driven = with_contacts(scene, BondSystem(msm, springs));
   return {std::move(msm), std::move(driven)};
 }

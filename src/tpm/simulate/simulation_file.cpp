@@ -231,7 +231,7 @@ std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
   if (scene.outputs.bond_force) {
     text += source.scalar("bond_force_N", group + "/bond_force_N", Centre::cell, m, Number::real);
   }
-  if (scene.outputs.remembered) {
+  if (scene.outputs.viscous) {
     for (Eigen::Index j = 0; j < branches; ++j) {
       const std::string name = viscous_name(j, branches);
       text += source.scalar(name, group + "/" + name, Centre::cell, m, Number::real);

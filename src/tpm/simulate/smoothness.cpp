@@ -9,8 +9,8 @@ SmoothnessProbe::SmoothnessProbe(const ExperimentScene& scene)
       neighbours_(lateral_neighbours(network_)),
       near_(spheres_around(network_, scene.probe().sphere, kNearSteps)),
       rim_(spheres_at_rim(network_, kRimAngle_rad)) {
-  const Freedom freedom = scene.tissue.freedom();
-  std::erase_if(rim_, [&](std::size_t i) { return !freedom.is_free(i); });
+  const Constraints constraints = scene.tissue.constraints();
+  std::erase_if(rim_, [&](std::size_t i) { return !constraints.is_free(i); });
 }
 
 std::optional<Smoothness> SmoothnessProbe::at(const Positions& position) const {

@@ -20,12 +20,12 @@ constexpr double kLeastBalance = 1e-13;  // of the force: below, rounding decide
 }  // namespace
 
 StaticPath::StaticPath(const BondSystem& bonds, Positions rest, double spacing_m,
-                       const Freedom& freedom, const Probes& probes, Drive drive, double peak,
-                       double tolerance, EquilibriumOptions equilibrium)
-    : tissue_(bonds, std::move(rest), freedom, probes, drive, equilibrium),
+                       const Constraints& constraints, const Probes& probes, Drive drive,
+                       double peak, double tolerance, EquilibriumOptions equilibrium)
+    : tissue_(bonds, std::move(rest), constraints, probes, drive, equilibrium),
       state_(tissue_.at_rest(0.0)),
       longest_move_m_(kLongestMove * spacing_m) {
-  require_valid(probes, freedom);
+  require_valid(probes, constraints);
   const double force =
       drive == Drive::force ? peak : std::abs(tissue_.linear_response(state_, peak));
   tolerance_N_ = std::max(kBalanceShare * tolerance, kLeastBalance) * force;

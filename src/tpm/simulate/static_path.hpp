@@ -12,9 +12,9 @@ class StaticPath {
   /// @param rest of spheres and tools
   /// @param peak of what will be imposed, m or N: the force left on a sphere is a thousandth of the
   ///        tolerance, in parts of the load or of the force that the peak meets at small depth
-  StaticPath(const BondSystem& bonds, Positions rest, double spacing_m, const Freedom& freedom,
-             const Probes& probes, Drive drive, double peak, double tolerance,
-             EquilibriumOptions equilibrium = {});
+  StaticPath(const BondSystem& bonds, Positions rest, double spacing_m,
+             const Constraints& constraints, const Probes& probes, Drive drive, double peak,
+             double tolerance, EquilibriumOptions equilibrium = {});
 
   [[nodiscard]] const SolverChoice& solver() { return tissue_.equilibrium().choice(); }
 

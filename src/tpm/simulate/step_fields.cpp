@@ -36,7 +36,7 @@ StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,
   if (scene.outputs.bond_force) {
     fields.of_bonds.push_back({"bond_force_N", 1, list_of(bond_force)});
   }
-  if (scene.outputs.remembered) {
+  if (scene.outputs.viscous) {
     const auto bonds = static_cast<Eigen::Index>(network.network.bonds.size());
     for (Eigen::Index j = 0; j < state.viscous.cols(); ++j) {
       fields.of_bonds.push_back(

@@ -16,7 +16,7 @@ void MemoryWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
   const double* const from_start = of_start.data();
   const double* const from_memory = of_memory.data();
   const double* const at_start = start.data();
-  const double* const remembered = memory.data();
+  const double* const viscous = memory.data();
   const double* const in = stages.data();
   double* const to = out.data();
   const auto bonds = static_cast<std::size_t>(start.size());
@@ -25,7 +25,7 @@ void MemoryWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
       std::array<double, kLanes> sum;
 #pragma omp simd
       for (std::size_t s = 0; s < kLanes; ++s) {
-        double lane = from_start[s] * at_start[i] + from_memory[s] * remembered[i];
+        double lane = from_start[s] * at_start[i] + from_memory[s] * viscous[i];
         for (std::size_t j = 0; j < kLanes; ++j)
           lane += weight[kLanes * j + s] * in[kLanes * i + j];
         sum[s] = lane;

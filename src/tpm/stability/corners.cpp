@@ -63,8 +63,8 @@ LinearElement under_depth(const BondElement& p) {
   return e;
 }
 
-StabilityCorner depth_at_once(std::string name, const BondElement& p, double depth_m, double step_s,
-                              std::string expected) {
+StabilityCorner instantaneous_depth(std::string name, const BondElement& p, double depth_m,
+                                    double step_s, std::string expected) {
   const Protocol protocol = step_and_hold(depth_m, kStudySteps * step_s);
   return tried(std::move(name),
                significant(1e3 * depth_m, 3) + " mm at once and held for 300 steps of " +
@@ -81,10 +81,10 @@ constexpr double kPaperSum_Pa = 24e3;  // E1 + E2
 
 void add_relaxation_times(std::vector<StabilityCorner>& corners) {
   BondElement p = paper_element(1e-9 / kPaperSum_Pa);
-  corners.push_back(
-      depth_at_once("eta1 -> 0 (1e-9 Pa s)", p, kCornerDepth_m, kStep_s,
-                    "explicit rules diverge, Adams too or is too much work, midpoint and Newmark "
-                    "ring, all else holds"));
+  corners.push_back(instantaneous_depth(
+      "eta1 -> 0 (1e-9 Pa s)", p, kCornerDepth_m, kStep_s,
+      "explicit rules diverge, Adams too or is too much work, midpoint and Newmark "
+      "ring, all else holds"));
   // Functional iteration follows the relaxation time for as long as it runs.
   for (CornerCell& cell : corners.back().cells) {
     if (cell.rule == StepRule::cvode_adams) {
@@ -93,12 +93,12 @@ void add_relaxation_times(std::vector<StabilityCorner>& corners) {
     }
   }
   p = paper_element(1e15 / kPaperSum_Pa);
-  corners.push_back(depth_at_once("eta1 -> infinity (1e15 Pa s)", p, kCornerDepth_m, kStep_s,
-                                  "an elastic element: all hold"));
+  corners.push_back(instantaneous_depth("eta1 -> infinity (1e15 Pa s)", p, kCornerDepth_m, kStep_s,
+                                        "an elastic element: all hold"));
   for (const double ratio : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
     StabilityCorner corner =
-        depth_at_once("h/tau = " + significant(ratio, 2), paper_element(kStep_s / ratio),
-                      kCornerDepth_m, kStep_s, kByTheory);
+        instantaneous_depth("h/tau = " + significant(ratio, 2), paper_element(kStep_s / ratio),
+                            kCornerDepth_m, kStep_s, kByTheory);
     for (CornerCell& cell : corner.cells) {
       if (cell.rule != StepRule::cvode_adams || ratio < 1e4) continue;
       cell.expected = StabilityClass::too_much_work;
@@ -113,21 +113,21 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
   BondElement maxwell = paper_element(kTau_s);
   maxwell.branches.front().modulus_Pa = maxwell.instantaneous_Pa();
   maxwell.equilibrium_Pa = 0.0;
-  corners.push_back(depth_at_once("E1 = 0, a depth", maxwell, kCornerDepth_m, kStep_s,
-                                  "a Maxwell fluid: all hold, down to the tension"));
+  corners.push_back(instantaneous_depth("E1 = 0, a depth", maxwell, kCornerDepth_m, kStep_s,
+                                        "a Maxwell fluid: all hold, down to the tension"));
   maxwell.lateral_Pa = 0.0;
   const double end = kStudySteps * kStep_s;
   JudgedProblem flow;
   constexpr double kLoad_N = 0.05;
   flow.problem = element_problem(maxwell, creep(kLoad_N, end));
   flow.times_s = last_steps(end, kStep_s, kJudgedSteps);
-  flow.truth.resize(kJudgedSteps);
+  flow.reference.resize(kJudgedSteps);
   for (int i = 0; i < kJudgedSteps; ++i) {
     const double t = flow.times_s[static_cast<std::size_t>(i)];
-    flow.truth[i] =
+    flow.reference[i] =
         kLoad_N / maxwell.modulus_to_stiffness_m() / maxwell.relaxing_Pa() * (1.0 + t / kTau_s);
   }
-  flow.peak = flow.truth.maxCoeff();
+  flow.peak = flow.reference.maxCoeff();
   corners.push_back(tried("E1 = 0, a load", "0.05 N at once and held; no tension",
                           "it flows for as long as it is pushed: semi-implicit Euler and XPBD too "
                           "slowly by h/tau = 5 %, all else holds",
@@ -138,8 +138,8 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
                           }));
   BondElement loose = paper_element(kTau_s);
   loose.equilibrium_Pa = loose.branches.front().modulus_Pa = 0.0;
-  corners.push_back(
-      depth_at_once("E2 = 0, a depth", loose, kCornerDepth_m, kStep_s, "tension only: all hold"));
+  corners.push_back(instantaneous_depth("E2 = 0, a depth", loose, kCornerDepth_m, kStep_s,
+                                        "tension only: all hold"));
   corners.push_back(
       tried("E2 = 0, a load", "0.05 N at once and held",
             "tension carries it: all hold but XPBD, whose made-up mass is that of the "
@@ -150,7 +150,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
   loose.lateral_Pa = 0.0;
   JudgedProblem nothing;
   nothing.times_s = last_steps(end, kStep_s, kJudgedSteps);
-  nothing.truth.setZero(kJudgedSteps);
+  nothing.reference.setZero(kJudgedSteps);
   nothing.peak = 1.0;
   nothing.problem = element_problem(loose, creep(0.05, end));
   corners.push_back(tried(
@@ -162,11 +162,12 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
 
 void add_depths(std::vector<StabilityCorner>& corners) {
   const BondElement p = paper_element(0.02);
-  corners.push_back(depth_at_once(
+  corners.push_back(instantaneous_depth(
       "beyond 12 mm", p, 0.015, kStep_s,
       "all hold: no rule fails at the depth where liver is damaged, results carry a flag"));
-  corners.push_back(depth_at_once("theta over pi/6", p, 0.020, kStep_s,
-                                  "all hold: 33.7 degrees at x = 30 mm, results carry a flag"));
+  corners.push_back(
+      instantaneous_depth("theta over pi/6", p, 0.020, kStep_s,
+                          "all hold: 33.7 degrees at x = 30 mm, results carry a flag"));
 }
 
 /// A star whose sphere B is guided onto its partner D, or free.
@@ -184,11 +185,11 @@ struct CornerStar {
     static const std::vector<NeighbourPair> list{{0, 1}, {1, 2}, {1, 3}};
     return list;
   }
-  static Freedom freedom_of(bool guided) {
-    Freedom freedom(4);
-    if (guided) freedom.guide(1, Eigen::Vector3d::UnitZ());
-    for (const std::size_t i : {0, 2, 3}) freedom.hold(i);
-    return freedom;
+  static Constraints freedom_of(bool guided) {
+    Constraints constraints(4);
+    if (guided) constraints.guide(1, Eigen::Vector3d::UnitZ());
+    for (const std::size_t i : {0, 2, 3}) constraints.hold(i);
+    return constraints;
   }
 
   Organ organ;
@@ -222,11 +223,11 @@ double star_force_N(const BondElement& p, double rate, double time_s) {
 /// What the straight path of a star answers in its last steps.
 void set_star_truth(const BondElement& p, double rate, double end_s, JudgedProblem& judged) {
   judged.times_s = last_steps(end_s, kStep_s, kJudgedSteps);
-  judged.truth.resize(kJudgedSteps);
+  judged.reference.resize(kJudgedSteps);
   for (int i = 0; i < kJudgedSteps; ++i) {
-    judged.truth[i] = star_force_N(p, rate, judged.times_s[static_cast<std::size_t>(i)]);
+    judged.reference[i] = star_force_N(p, rate, judged.times_s[static_cast<std::size_t>(i)]);
   }
-  judged.peak = judged.truth.cwiseAbs().maxCoeff();
+  judged.peak = judged.reference.cwiseAbs().maxCoeff();
 }
 
 StabilityCorner pushed_star(std::string name, std::string setup, std::string expected,

@@ -17,7 +17,7 @@ constexpr double kSoft_Pa = 12e3;
 }  // namespace
 
 StabilityVerdict JudgedProblem::judge(const MethodSettings& settings) const {
-  return judge_run(problem->run(settings, times_s), truth, peak, moves);
+  return judge_run(problem->run(settings, times_s), reference, peak, moves);
 }
 
 std::vector<double> last_steps(double end_s, double step_s, int count) {
@@ -32,13 +32,14 @@ JudgedProblem judged_rest(const BondElement& p, const Protocol& protocol, double
   ModelOptions options;
   if (p.lateral_Pa == 0.0) options.tension = TensionRule::frozen(0.0);
   const ClosedForm exact(options);
-  judged.truth = exact.respond(protocol, judged.times_s, element_constants(p), Want::values).value;
+  judged.reference =
+      exact.respond(protocol, judged.times_s, element_constants(p), Want::values).value;
   // The peak of the whole protocol, not of the part that is judged.
   const double unit = p.modulus_to_stiffness_m();
-  judged.peak = judged.truth.cwiseAbs().maxCoeff();
+  judged.peak = judged.reference.cwiseAbs().maxCoeff();
   if (protocol.drive() == Drive::displacement) {
-    const double at_once = p.instantaneous_Pa() > 0.0 ? p.instantaneous_Pa() : kSoft_Pa;
-    judged.peak = unit * (at_once * protocol.peak() + p.tension().value(protocol.peak()));
+    const double instantaneous = p.instantaneous_Pa() > 0.0 ? p.instantaneous_Pa() : kSoft_Pa;
+    judged.peak = unit * (instantaneous * protocol.peak() + p.tension().value(protocol.peak()));
   }
   judged.problem = element_problem(p, protocol);
   return judged;
@@ -52,7 +53,7 @@ JudgedProblem judged_motion(const BondElement& p, double mass_kg, double drag_pe
   LinearElement linear = linear_element(p, 0.0);
   linear.mass_kg = mass_kg;
   linear.drag_per_s = drag_per_s;
-  judged.truth = linear_motion_m(linear, load_N, judged.times_s);
+  judged.reference = linear_motion_m(linear, load_N, judged.times_s);
   judged.peak = load_N / (linear.stiffness_N_per_m - linear.relaxing_N_per_m);
   judged.problem = element_problem(p, creep(load_N, end_s),
                                    MethodMasses{Eigen::VectorXd::Constant(1, mass_kg), drag_per_s});
@@ -75,12 +76,13 @@ DrivenNetwork pushed(const Network& network, const BondSystem& bonds) {
   const Eigen::Vector3d direction = -organ.normal.col(static_cast<Eigen::Index>(contact));
   const Eigen::VectorXd along = organ.position.transpose() * direction;
   const double near = along[static_cast<Eigen::Index>(contact)];
-  Freedom freedom(organ.size());
+  Constraints constraints(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
     const double further = along[static_cast<Eigen::Index>(i)] - near;
-    if (organ.layer[i] == 0 && further > kFarShare * (along.maxCoeff() - near)) freedom.hold(i);
+    if (organ.layer[i] == 0 && further > kFarShare * (along.maxCoeff() - near)) constraints.hold(i);
   }
-  return {bonds, organ.position, std::move(freedom), Probes(Probe{contact, direction, 1.0}), {}};
+  return {
+      bonds, organ.position, std::move(constraints), Probes(Probe{contact, direction, 1.0}), {}};
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace tpm {
 struct JudgedProblem {
   std::unique_ptr<MethodProblem> problem;
   std::vector<double> times_s;
-  Eigen::VectorXd truth;
+  Eigen::VectorXd reference;
   double peak = 0.0;
   bool moves = false;
 

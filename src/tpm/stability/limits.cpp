@@ -123,11 +123,11 @@ double highest_frequency(const DrivenNetwork& network, const Eigen::VectorXd& ma
   for (double& value : u.reshaped()) value = static_cast<double>(random() >> 11) * 0x1p-53 - 0.5;
   double square = 0.0;
   for (int i = 0; i < kMost; ++i) {
-    network.freedom.project(u);
+    network.constraints.project(u);
     u /= std::sqrt((u.colwise().squaredNorm() * mass_kg).value());
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, n);
     network.bonds.add_stiffness_times(network.rest, none, u, force);
-    network.freedom.project(force);
+    network.constraints.project(force);
     const double next = force.cwiseProduct(u).sum();
     u = force * mass_kg.cwiseInverse().asDiagonal();
     if (std::abs(next - square) <= 1e-12 * next) return std::sqrt(next);
@@ -195,15 +195,15 @@ Protocol as_sampled(const Protocol& protocol, const std::vector<double>& ticks_s
   return {protocol.drive(), std::move(knots), protocol.name()};
 }
 
-ServoRow servo_row(std::string name, const MethodProblem& problem, const Eigen::VectorXd& truth,
+ServoRow servo_row(std::string name, const MethodProblem& problem, const Eigen::VectorXd& reference,
                    const std::vector<double>& times, double rate_Hz) {
   ServoRow row{std::move(name), rate_Hz, {}};
-  const double peak = truth.cwiseAbs().maxCoeff();
+  const double peak = reference.cwiseAbs().maxCoeff();
   for (const StepRuleEntry& entry : kStepRules) {
     if (entry.adaptive) continue;
     row.cells.push_back(
-        {entry.meaning,
-         judge_run(problem.run(stepped(entry.meaning, 1.0 / rate_Hz), times), truth, peak, false)});
+        {entry.meaning, judge_run(problem.run(stepped(entry.meaning, 1.0 / rate_Hz), times),
+                                  reference, peak, false)});
   }
   return row;
 }
@@ -229,10 +229,10 @@ std::vector<ServoRow> stability_at_servo_rates() {
   Progress progress("servo rates", servo_rates_Hz().size() + kNetworkRates_Hz.size());
   for (const double rate : servo_rates_Hz()) {
     const std::vector<double> times = ticks(rate);
-    const Eigen::VectorXd truth =
+    const Eigen::VectorXd reference =
         exact.respond(protocol, times, element_constants(paper), Want::values).value;
     const auto element = element_problem(paper, as_sampled(protocol, times));
-    rows.push_back(servo_row("element", *element, truth, times, rate));
+    rows.push_back(servo_row("element", *element, reference, times, rate));
     progress.advance();
   }
   constexpr std::size_t kSmall = 24;
@@ -241,12 +241,13 @@ std::vector<ServoRow> stability_at_servo_rates() {
     const std::vector<double> times = ticks(rate);
     QuasiStaticOptions options;
     options.tolerance = 1e-9;
-    const Eigen::VectorXd truth = QuasiStatic(organ.bonds, organ.driven.rest, organ.driven.freedom,
-                                              organ.driven.probes, options)
-                                      .run(protocol, times)
-                                      .response;
+    const Eigen::VectorXd reference =
+        QuasiStatic(organ.bonds, organ.driven.rest, organ.driven.constraints, organ.driven.probes,
+                    options)
+            .run(protocol, times)
+            .response;
     const auto network = network_problem(organ.driven, as_sampled(protocol, times));
-    rows.push_back(servo_row("24 spheres", *network, truth, times, rate));
+    rows.push_back(servo_row("24 spheres", *network, reference, times, rate));
     progress.advance();
   }
   return rows;

@@ -32,12 +32,12 @@ std::string_view stability_class_name(StabilityClass c) {
   return kStabilityClasses[static_cast<std::size_t>(c)].text;
 }
 
-StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& truth, double peak,
+StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& reference, double peak,
                            bool moves) {
   if (run.end != MethodEnd::completed) {
     return {class_of(run.end), std::numeric_limits<double>::quiet_NaN(), run.reason};
   }
-  const Eigen::VectorXd off = (run.response - truth) / peak;
+  const Eigen::VectorXd off = (run.response - reference) / peak;
   StabilityVerdict verdict{StabilityClass::holds, off.cwiseAbs().maxCoeff(), {}};
   if (verdict.error <= kHoldsWithin) return verdict;
   const Eigen::Index half = off.size() / 2;

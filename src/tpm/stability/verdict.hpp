@@ -53,7 +53,7 @@ struct StabilityVerdict {
 /// @param truth at the same times
 /// @param peak size of the response that the error is relative to, > 0
 /// @param moves spheres have mass
-[[nodiscard]] StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& truth,
+[[nodiscard]] StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& reference,
                                          double peak, bool moves);
 
 }  // namespace tpm

@@ -39,7 +39,7 @@ class Contained;
 
 /// Writes an HDF5 file through a Replacement. HDF5 itself, which crashes if memory is short, runs
 /// in a child process (contained.hpp) and arranges the file; numbers are written past it, by this
-/// process, to where they stand. commit() seals the file (seal.hpp), passes it to the disk
+/// process, to where they stand. commit() seals the file (checksum.hpp), passes it to the disk
 /// and gives it its name. A writer that is destroyed without commit() leaves nothing behind. Paths
 /// inside the file are absolute ("/curves/a/time"); groups on the way are created. No time stamps
 /// are stored, so that the same content gives the same bytes. Errors are Error(environment).
@@ -101,7 +101,7 @@ class Hdf5Writer {
   std::map<std::string, std::uint64_t> places_;  ///< of arrays, in bytes from the file's beginning
 };
 
-enum class SealState;
+enum class ChecksumState;
 
 /// Reads an HDF5 file, of which nothing is trusted: a child process reads it with limits of memory
 /// and processor time (contained.hpp), and content that lies outside the file is refused. A file
@@ -140,7 +140,7 @@ class Hdf5Reader {
   [[nodiscard]] Result ask(const std::string& request) const;
 
   std::filesystem::path path_;
-  SealState seal_{};
+  ChecksumState seal_{};
   std::unique_ptr<Contained> child_;
 };
 

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <array>
 
+#include "tpm/store/checksum.hpp"
 #include "tpm/store/contained.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/hdf5_contents.hpp"
 #include "tpm/store/packed.hpp"
-#include "tpm/store/seal.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -116,8 +116,8 @@ Hdf5Reader::Hdf5Reader(fs::path path) : path_(std::move(path)) {
   try {
     note_reading(path_, file);
     require_hdf5(path_, file);
-    seal_ = seal_of(file);
-    if (seal_ == SealState::broken) {
+    seal_ = checksum_of(file);
+    if (seal_ == ChecksumState::broken) {
       throw bad_input(path_.string(), "is damaged: its check sum is another",
                       "the file as it was written");
     }
@@ -139,7 +139,7 @@ Hdf5Reader::Hdf5Reader(Hdf5Reader&&) noexcept = default;
 Hdf5Reader& Hdf5Reader::operator=(Hdf5Reader&&) noexcept = default;
 
 bool Hdf5Reader::sealed() const noexcept {
-  return seal_ == SealState::whole;
+  return seal_ == ChecksumState::whole;
 }
 
 template <class Result>

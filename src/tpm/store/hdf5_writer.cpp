@@ -7,12 +7,12 @@
 #include <new>
 #include <utility>
 
+#include "tpm/store/checksum.hpp"
 #include "tpm/store/contained.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/hdf5_assembly.hpp"
 #include "tpm/store/packed.hpp"
-#include "tpm/store/seal.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -246,7 +246,7 @@ void Hdf5Writer::attach_scale(const std::string& array, unsigned dimension,
 void Hdf5Writer::commit() {
   const std::uint64_t size = number_in(child_->ask(request_for(Part::end, "").take()));
   if (::ftruncate(place_.descriptor(), static_cast<off_t>(size)) != 0 ||
-      !seal(place_.descriptor(), size)) {
+      !write_checksum(place_.descriptor(), size)) {
     throw cannot_write(path_, errno);
   }
   place_.put_in_place();

@@ -94,7 +94,7 @@ RowLogWriter::RowLogWriter(std::filesystem::path path, std::string_view header,
   put_text(kept_, header);
   try {
     flush();
-    if (name == Name::at_once) appear();
+    if (name == Name::instantaneous) appear();
   } catch (...) {
     give_up();
     throw;

@@ -19,9 +19,9 @@ namespace tpm {
 class RowLogWriter {
  public:
   /// Throws Error(environment) if the file cannot be written.
-  enum class Name { at_once, later };
+  enum class Name { instantaneous, later };
   RowLogWriter(std::filesystem::path path, std::string_view header, std::size_t row_bytes,
-               Name name = Name::at_once);
+               Name name = Name::instantaneous);
   ~RowLogWriter();
   RowLogWriter(const RowLogWriter&) = delete;
   RowLogWriter& operator=(const RowLogWriter&) = delete;

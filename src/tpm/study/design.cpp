@@ -131,12 +131,12 @@ double score_of(const DesignProblem& problem, const Expectation& expected, doubl
     largest = std::max(largest, expected.parameters[i].relative_error);
     log_slopes += std::log(relative_slope(problem.parameter(i)));
   }
-  switch (problem.goal) {
-    case Goal::parameter:
-      return expected.parameters[problem.goal_parameter].relative_error;
-    case Goal::all:
+  switch (problem.criterion) {
+    case Criterion::parameter:
+      return expected.parameters[problem.criterion_parameter].relative_error;
+    case Criterion::all:
       return std::exp((log_slopes - 0.5 * log_determinant) / k);
-    case Goal::worst:
+    case Criterion::worst:
       break;
   }
   return largest;

@@ -58,7 +58,7 @@ struct PlannedNoise {
 };
 
 /// What the best design is best at. Smaller scores are better.
-enum class Goal {
+enum class Criterion {
   parameter,  ///< relative standard error of one parameter
   all,        ///< D-optimal: geometric mean of the axes of the confidence ellipsoid, relative
   worst,      ///< largest relative standard error
@@ -77,8 +77,8 @@ struct DesignProblem {
   MachineLimits limits;
   std::vector<PlannedExperiment> candidates;
   std::vector<PlannedExperiment> previous;  ///< already done: their information is added
-  Goal goal = Goal::worst;
-  std::size_t goal_parameter = 0;  ///< place in config.parameters
+  Criterion criterion = Criterion::worst;
+  std::size_t criterion_parameter = 0;  ///< place in config.parameters
   double factor = 2.0;  ///< identified: the interval is within value / factor, value factor
 
   [[nodiscard]] const FitParameter& parameter(std::size_t i) const {

@@ -175,15 +175,15 @@ void parse_known(const Json& document, DesignProblem& problem, std::string_view 
   }
 }
 
-void parse_goal(const Json& document, DesignProblem& problem, std::string_view where) {
-  const std::string goal = document.value("goal", "worst");
-  if (goal == "all" || goal == "worst") {
-    problem.goal = goal == "all" ? Goal::all : Goal::worst;
+void parse_criterion(const Json& document, DesignProblem& problem, std::string_view where) {
+  const std::string criterion = document.value("goal", "worst");
+  if (criterion == "all" || criterion == "worst") {
+    problem.criterion = criterion == "all" ? Criterion::all : Criterion::worst;
     return;
   }
-  problem.goal = Goal::parameter;
-  problem.goal_parameter =
-      parameter_place(problem.config, goal, key_of(where, "goal"), "all, worst, ");
+  problem.criterion = Criterion::parameter;
+  problem.criterion_parameter =
+      parameter_place(problem.config, criterion, key_of(where, "goal"), "all, worst, ");
 }
 
 void require_creep_noise(const DesignProblem& problem, std::string_view where) {
@@ -213,7 +213,7 @@ DesignProblem parse_design(const Json& document, std::string_view where) {
   problem.candidates = parse_grids(document, "candidates", where);
   problem.previous = parse_grids(document, "previous", where);
   require_creep_noise(problem, where);
-  parse_goal(document, problem, where);
+  parse_criterion(document, problem, where);
   problem.factor = document.value("identified_factor", problem.factor);
   problem.config.level = document.value("level", problem.config.level);
   return problem;

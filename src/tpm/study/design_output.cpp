@@ -138,7 +138,7 @@ std::string check_words(const DesignCheck& check, double level) {
 Json to_json(const DesignResult& result, const DesignCheck* check, std::size_t top) {
   const DesignProblem& problem = result.problem;
   Json j{{"title", problem.config.title},
-         {"goal", goal_words(problem)},
+         {"goal", criterion_words(problem)},
          {"confidence_level", problem.config.level},
          {"identified_factor", problem.factor},
          {"candidates_evaluated", result.ranked.size()},
@@ -167,7 +167,7 @@ std::string to_terminal_text(const DesignResult& result, const DesignCheck* chec
                              std::size_t top) {
   const DesignProblem& problem = result.problem;
   std::string text = fmt::format("{}\n{} candidates; best by the {}\n", problem.config.title,
-                                 result.ranked.size(), goal_words(problem));
+                                 result.ranked.size(), criterion_words(problem));
   for (const std::string& line : result.left_out) text += fmt::format("left out: {}\n", line);
   text += "\nexpected relative standard errors; ? marks what would not be identified\n";
   text += candidate_rows(result, top) + "\n";

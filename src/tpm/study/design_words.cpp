@@ -160,14 +160,14 @@ std::string interval_words(const FitParameter& p, const ExpectedParameter& expec
                      in_unit(p, *expected.upper));
 }
 
-std::string goal_words(const DesignProblem& problem) {
-  switch (problem.goal) {
-    case Goal::parameter:
+std::string criterion_words(const DesignProblem& problem) {
+  switch (problem.criterion) {
+    case Criterion::parameter:
       return fmt::format("relative standard error of {}",
-                         problem.parameter(problem.goal_parameter).name);
-    case Goal::all:
+                         problem.parameter(problem.criterion_parameter).name);
+    case Criterion::all:
       return "geometric mean of the relative axes of the confidence ellipsoid (D-optimal)";
-    case Goal::worst:
+    case Criterion::worst:
       break;
   }
   return "largest relative standard error";

@@ -15,6 +15,6 @@ namespace tpm {
 [[nodiscard]] std::vector<std::string> design_words(const DesignResult& result);
 
 /// "relative standard error of eta1"
-[[nodiscard]] std::string goal_words(const DesignProblem& problem);
+[[nodiscard]] std::string criterion_words(const DesignProblem& problem);
 
 }  // namespace tpm

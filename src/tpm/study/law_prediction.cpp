@@ -8,9 +8,9 @@
 #include <limits>
 
 #include "tpm/core/dense_algebra.hpp"
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/study/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"

@@ -57,8 +57,8 @@ class OrganLessReadings final : public ResidualFunction {
         bonds_(bonds),
         recordings_(recordings),
         bond_parameters_(bond_parameters),
-        scout_(rows_of(recordings),
-               static_cast<Eigen::Index>(bond_parameters) + 2 * std::ssize(recordings)) {
+        surrogate_(rows_of(recordings),
+                   static_cast<Eigen::Index>(bond_parameters) + 2 * std::ssize(recordings)) {
     double peak = 0.0;
     for (const OrganReadings& r : recordings) {
       ranges_.push_back(press_range(r));
@@ -69,7 +69,7 @@ class OrganLessReadings final : public ResidualFunction {
   }
 
   [[nodiscard]] Eigen::Index residual_count() const override { return rows_of(recordings_); }
-  [[nodiscard]] const ResidualFunction* scout() const override { return &scout_; }
+  [[nodiscard]] const ResidualFunction* surrogate() const override { return &surrogate_; }
 
   [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                               RowMatrix* jacobian) const override {
@@ -138,7 +138,7 @@ class OrganLessReadings final : public ResidualFunction {
   std::size_t bond_parameters_;
   std::vector<PressRange> ranges_;
   double unit_N_ = 1.0;
-  NothingKnown scout_;
+  NothingKnown surrogate_;
 };
 
 FitParameter placement_parameter(std::string name, Dimension dimension, double start, double down,

@@ -7,7 +7,7 @@
 #include <limits>
 #include <optional>
 
-#include "tpm/core/word_table.hpp"
+#include "tpm/core/enum_names.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/solve/creep_exact.hpp"
@@ -171,7 +171,7 @@ class ContactCell final : public CellModel {
       throw bad_input("creep", "a time after the end of the load", "times within it");
     };
     switch (output.kind) {
-      case Kind::creep_depth_at_once:
+      case Kind::instantaneous_creep_depth:
         found[0] = creep.depth_at_once_m();
         return;
       case Kind::creep_depth_at:

@@ -217,7 +217,7 @@ class OrganCell final : public CellModel {
     const auto run_at = [&](double tolerance) {
       options.tolerance = tolerance;
       QuasiStaticRun run =
-          QuasiStatic(driven.bonds, driven.rest, driven.freedom, driven.probes, options)
+          QuasiStatic(driven.bonds, driven.rest, driven.constraints, driven.probes, options)
               .run(scene.protocol(), times.all());
       counts[kSteps] += run.work.steps;
       counts[kIterations] += run.work.iterations;
@@ -322,7 +322,7 @@ class OrganCell final : public CellModel {
         case Kind::creep_depth_over:
           for (const double t : output.variable.times_s) values[next++] = at(start + t);
           break;
-        case Kind::creep_depth_at_once:
+        case Kind::instantaneous_creep_depth:
           values[next++] = at(start);
           break;
         default:

@@ -5,8 +5,8 @@
 #include <array>
 #include <set>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/core/word_table.hpp"
 #include "tpm/sample/sensitivity.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/expression.hpp"

@@ -12,13 +12,13 @@ namespace tpm {
 /// Of what and when a variable is.
 struct SweepOutput {
   enum class Kind {
-    lambda1,              ///< lambda1 at the imposed depth
-    peak_force,           ///< the largest force of an indentation
-    end_force,            ///< at its end
-    force_at,             ///< at a time
-    force_over,           ///< at several times: a curve
-    creep_depth_at_once,  ///< just after the load
-    creep_depth,          ///< at the end of the load
+    lambda1,                    ///< lambda1 at the imposed depth
+    peak_force,                 ///< the largest force of an indentation
+    end_force,                  ///< at its end
+    force_at,                   ///< at a time
+    force_over,                 ///< at several times: a curve
+    instantaneous_creep_depth,  ///< just after the load
+    creep_depth,                ///< at the end of the load
     creep_depth_at,
     creep_depth_over,
   };
@@ -27,7 +27,7 @@ struct SweepOutput {
   double time_s = 0.0;  ///< of force_at and creep_depth_at, from the start on
 
   [[nodiscard]] bool of_creep() const {
-    return kind == Kind::creep_depth_at_once || kind == Kind::creep_depth ||
+    return kind == Kind::instantaneous_creep_depth || kind == Kind::creep_depth ||
            kind == Kind::creep_depth_at || kind == Kind::creep_depth_over;
   }
 };

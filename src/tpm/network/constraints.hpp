@@ -9,16 +9,16 @@ namespace tpm {
 
 /// In which directions each sphere may follow the forces on it. Where it may not, it stands still
 /// or moves as something outside decides, and the force there is a reaction.
-class Freedom {
+class Constraints {
  public:
   /// All spheres free.
-  explicit Freedom(std::size_t spheres);
+  explicit Constraints(std::size_t spheres);
 
   /// With more spheres after those there are, all free.
-  [[nodiscard]] Freedom extended(std::size_t more) const;
+  [[nodiscard]] Constraints extended(std::size_t more) const;
 
   /// That of the first spheres alone.
-  [[nodiscard]] Freedom first(std::size_t spheres) const;
+  [[nodiscard]] Constraints first(std::size_t spheres) const;
 
   /// Nothing is free any more.
   void hold(std::size_t sphere);

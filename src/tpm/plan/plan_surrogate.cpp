@@ -1,4 +1,4 @@
-#include "tpm/plan/plan_scout.hpp"
+#include "tpm/plan/plan_surrogate.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 namespace tpm {
 namespace {
 
-constexpr int kScoutedTimesOfPiece = 20;
-constexpr int kMostScoutedTimes = 160;
+constexpr int kSurrogateTimesOfPiece = 20;
+constexpr int kMostSurrogateTimes = 160;
 constexpr int kCurvePoints = 33;
 constexpr double kCurveTolerance = 1e-5;
 constexpr double kRamp_s = 1.0;      // in which static curves are followed
@@ -67,18 +67,18 @@ InertialOptions inertial_options(const PlanScene& scene, double tolerance) {
   return options;
 }
 
-PlanScout::PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial,
-                     std::optional<int> most_iterations)
+PlanSurrogate::PlanSurrogate(PlanScene scene, const PlanMeasure& measure, bool inertial,
+                             std::optional<int> most_iterations)
     : scene_(std::move(scene)),
       measure_(measure),
       inertial_(inertial),
       most_iterations_(most_iterations),
       times_(sampled_times(scene_.protocol(),
-                           inertial ? 8 * kScoutedTimesOfPiece : kScoutedTimesOfPiece,
-                           inertial ? 8 * kMostScoutedTimes : kMostScoutedTimes,
+                           inertial ? 8 * kSurrogateTimesOfPiece : kSurrogateTimesOfPiece,
+                           inertial ? 8 * kMostSurrogateTimes : kMostSurrogateTimes,
                            scene_.driven().bonds.shortest_relaxation_time_s())) {}
 
-const Trajectory& PlanScout::collocation(double tolerance) const {
+const Trajectory& PlanSurrogate::collocation(double tolerance) const {
   const auto found = collocation_.find(tolerance);
   if (found != collocation_.end()) return found->second;
   QuasiStaticOptions options;
@@ -88,15 +88,15 @@ const Trajectory& PlanScout::collocation(double tolerance) const {
       .first->second;
 }
 
-const Trajectory& PlanScout::coarse() const {
+const Trajectory& PlanSurrogate::coarse() const {
   return collocation(kTolerance);
 }
 
-double PlanScout::coarse_error() const {
+double PlanSurrogate::coarse_error() const {
   return trajectory_error(collocation(10.0 * kTolerance), coarse(), measure_);
 }
 
-const Trajectory& PlanScout::with_masses(double tolerance) const {
+const Trajectory& PlanSurrogate::with_masses(double tolerance) const {
   const auto found = with_masses_.find(tolerance);
   if (found != with_masses_.end()) return found->second;
   return with_masses_
@@ -105,21 +105,21 @@ const Trajectory& PlanScout::with_masses(double tolerance) const {
       .first->second;
 }
 
-const ContactSpectrum& PlanScout::spectrum() const {
+const ContactSpectrum& PlanSurrogate::spectrum() const {
   if (!spectrum_) spectrum_ = contact_spectrum(scene_);
   return *spectrum_;
 }
 
-const InertiaEstimate& PlanScout::inertia() const {
+const InertiaEstimate& PlanSurrogate::inertia() const {
   if (!inertia_) inertia_ = estimate_inertia(scene_);
   return *inertia_;
 }
 
-double PlanScout::inertia_share() const {
+double PlanSurrogate::inertia_share() const {
   return inertia().of_rates / coarse().response.cwiseAbs().maxCoeff();
 }
 
-const ContactCurves& PlanScout::curves() const {
+const ContactCurves& PlanSurrogate::curves() const {
   if (curves_) return *curves_;
   double least = 0.0, most = 0.0;
   const auto see = [&](double depth) {
@@ -141,7 +141,7 @@ const ContactCurves& PlanScout::curves() const {
   return *curves_;
 }
 
-double PlanScout::claim_of(const Trajectory& model) const {
+double PlanSurrogate::claim_of(const Trajectory& model) const {
   if (!inertial_) {
     return kSafety * trajectory_error(model, coarse(), measure_) + coarse_error() + kRounding;
   }

@@ -1,4 +1,4 @@
-#include "tpm/fit/scouted_minimum.hpp"
+#include "tpm/fit/surrogate_minimum.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -51,16 +51,17 @@ bool evaluate(const ResidualFunction& function, std::span<const FitParameter> pa
   return std::isfinite(point.cost()) && point.jacobian.allFinite();
 }
 
-/// The scout with what it lacks at a point, and below its residuals the pull towards that point.
-class CorrectedScout final : public ResidualFunction {
+/// The surrogate with what it lacks at a point, and below its residuals the pull towards that
+/// point.
+class CorrectedSurrogate final : public ResidualFunction {
  public:
-  CorrectedScout(const ResidualFunction& scout, std::span<const FitParameter> parameters)
-      : scout_(scout), parameters_(parameters) {}
+  CorrectedSurrogate(const ResidualFunction& surrogate, std::span<const FitParameter> parameters)
+      : surrogate_(surrogate), parameters_(parameters) {}
 
-  /// Corrects it at a point; false if the scout cannot be evaluated there.
+  /// Corrects it at a point; false if the surrogate cannot be evaluated there.
   [[nodiscard]] bool correct_at(const KnownPoint& point) {
     KnownPoint own{point.natural, {}, {}, {}};
-    if (!tpm::evaluate(scout_, parameters_, own)) return false;
+    if (!tpm::evaluate(surrogate_, parameters_, own)) return false;
     const RowMatrix slope = point.jacobian - own.jacobian;
     if (theta_.size() > 0) learn(point.theta - theta_, slope - slope_lacking_);
     theta_ = point.theta;
@@ -72,12 +73,12 @@ class CorrectedScout final : public ResidualFunction {
   void set_pull(double pull) { root_pull_ = std::sqrt(pull); }
 
   [[nodiscard]] Eigen::Index residual_count() const override {
-    return scout_.residual_count() + std::ssize(parameters_);
+    return surrogate_.residual_count() + std::ssize(parameters_);
   }
 
   [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                               RowMatrix* jacobian) const override {
-    if (!scout_.evaluate(natural, residual, jacobian)) return false;
+    if (!surrogate_.evaluate(natural, residual, jacobian)) return false;
     const Eigen::VectorXd moved = theta_of(parameters_, natural) - theta_;
     const Eigen::VectorXd pull = root_pull_ * unit_;
     const RowMatrix bend = bend_along(moved);
@@ -96,13 +97,13 @@ class CorrectedScout final : public ResidualFunction {
   [[nodiscard]] double cost_at(std::span<const double> natural) const {
     Eigen::VectorXd residual;
     if (!evaluate(natural, residual, nullptr)) return std::numeric_limits<double>::infinity();
-    return residual.head(scout_.residual_count()).squaredNorm();
+    return residual.head(surrogate_.residual_count()).squaredNorm();
   }
 
  private:
-  /// Second derivatives of what the scout lacks, times a step: one row per residual.
+  /// Second derivatives of what the surrogate lacks, times a step: one row per residual.
   [[nodiscard]] RowMatrix bend_along(const Eigen::VectorXd& step) const {
-    RowMatrix bend = RowMatrix::Zero(scout_.residual_count(), step.size());
+    RowMatrix bend = RowMatrix::Zero(surrogate_.residual_count(), step.size());
     for (std::size_t i = 0; i < bend_.size(); ++i) {
       bend.row(static_cast<Eigen::Index>(i)) = bend_[i] * step;
     }
@@ -125,7 +126,7 @@ class CorrectedScout final : public ResidualFunction {
     }
   }
 
-  const ResidualFunction& scout_;
+  const ResidualFunction& surrogate_;
   std::span<const FitParameter> parameters_;
   Eigen::VectorXd theta_, lacking_, unit_;
   RowMatrix slope_lacking_;
@@ -135,9 +136,9 @@ class CorrectedScout final : public ResidualFunction {
 
 }  // namespace
 
-Minimum minimise_by_scout(const ResidualFunction& function, const ResidualFunction& scout,
-                          std::span<const FitParameter> parameters, std::span<const double> start,
-                          const FixedMask& fixed) {
+Minimum minimise_by_surrogate(const ResidualFunction& function, const ResidualFunction& surrogate,
+                              std::span<const FitParameter> parameters,
+                              std::span<const double> start, const FixedMask& fixed) {
   KnownPoint here{{start.begin(), start.end()}, {}, {}, {}};
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (!fixed.empty() && fixed[i]) continue;
@@ -145,7 +146,7 @@ Minimum minimise_by_scout(const ResidualFunction& function, const ResidualFuncti
   }
   Minimum minimum;
   minimum.natural = here.natural;
-  CorrectedScout corrected(scout, parameters);
+  CorrectedSurrogate corrected(surrogate, parameters);
   if (!evaluate(function, parameters, here) || !corrected.correct_at(here)) {
     return minimum;
   }

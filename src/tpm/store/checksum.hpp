@@ -6,11 +6,11 @@ namespace tpm {
 /// Writes behind the first `size` bytes of an open file a check sum of them, and passes the file to
 /// the disk: from here on it survives the machine. HDF5 ignores what stands behind its own end.
 /// False with errno if that is not possible.
-[[nodiscard]] bool seal(int descriptor, std::uint64_t size);
+[[nodiscard]] bool write_checksum(int descriptor, std::uint64_t size);
 
 /// What the end of a file says about its content.
-enum class SealState { none, whole, broken };
+enum class ChecksumState { none, whole, broken };
 
-[[nodiscard]] SealState seal_of(int descriptor);
+[[nodiscard]] ChecksumState checksum_of(int descriptor);
 
 }  // namespace tpm

@@ -17,12 +17,12 @@ struct ContactCurves {
 /// What the claims about a scene are made from: coarse runs of its network at few times, its linear
 /// behaviour about rest, and what masses would do. Everything is found when first asked for. What
 /// throws Error(numerical) does so each time.
-class PlanScout {
+class PlanSurrogate {
  public:
   /// @param inertial what is asked for is the network with masses
   /// @param most_iterations of each run without masses, if given: QuasiStaticOptions
-  PlanScout(PlanScene scene, const PlanMeasure& measure, bool inertial,
-            std::optional<int> most_iterations = std::nullopt);
+  PlanSurrogate(PlanScene scene, const PlanMeasure& measure, bool inertial,
+                std::optional<int> most_iterations = std::nullopt);
 
   [[nodiscard]] const PlanScene& scene() const { return scene_; }
   [[nodiscard]] const PlanMeasure& measure() const { return measure_; }
@@ -32,7 +32,7 @@ class PlanScout {
 
   /// The network without masses, by collocation at a tolerance, at times().
   [[nodiscard]] const Trajectory& collocation(double tolerance) const;
-  /// That at the scout's own tolerance, by which models are judged before they are verified.
+  /// That at the surrogate's own tolerance, by which models are judged before they are verified.
   [[nodiscard]] const Trajectory& coarse() const;
   /// Its difference from a run at ten times its tolerance.
   [[nodiscard]] double coarse_error() const;

@@ -1,38 +1,38 @@
-#include "tpm/network/freedom.hpp"
+#include "tpm/network/constraints.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 namespace tpm {
 
-Freedom::Freedom(std::size_t spheres)
+Constraints::Constraints(std::size_t spheres)
     : state_(spheres, State::free), projector_(spheres, Eigen::Matrix3d::Identity()) {}
 
-Freedom Freedom::extended(std::size_t more) const {
-  Freedom all = *this;
+Constraints Constraints::extended(std::size_t more) const {
+  Constraints all = *this;
   all.state_.resize(size() + more, State::free);
   all.projector_.resize(size() + more, Eigen::Matrix3d::Identity());
   return all;
 }
 
-Freedom Freedom::first(std::size_t spheres) const {
-  Freedom some(spheres);
+Constraints Constraints::first(std::size_t spheres) const {
+  Constraints some(spheres);
   std::copy_n(state_.begin(), spheres, some.state_.begin());
   std::copy_n(projector_.begin(), spheres, some.projector_.begin());
   return some;
 }
 
-void Freedom::hold(std::size_t sphere) {
+void Constraints::hold(std::size_t sphere) {
   state_.at(sphere) = State::held;
   projector_[sphere].setZero();
 }
 
-void Freedom::guide(std::size_t sphere, const Eigen::Vector3d& direction) {
+void Constraints::guide(std::size_t sphere, const Eigen::Vector3d& direction) {
   state_.at(sphere) = State::partly;
   projector_[sphere] = direction * direction.transpose();
 }
 
-void Freedom::impose(std::size_t sphere, const Eigen::Vector3d& direction) {
+void Constraints::impose(std::size_t sphere, const Eigen::Vector3d& direction) {
   Eigen::Matrix3d& p = projector_.at(sphere);
   const Eigen::Vector3d free = p * direction;
   const double part = free.norm();
@@ -43,13 +43,13 @@ void Freedom::impose(std::size_t sphere, const Eigen::Vector3d& direction) {
   state_[sphere] = held ? State::held : State::partly;
 }
 
-std::size_t Freedom::count() const {
+std::size_t Constraints::count() const {
   double sum = 0.0;
   for (const Eigen::Matrix3d& p : projector_) sum += p.trace();
   return static_cast<std::size_t>(std::lround(sum));
 }
 
-void Freedom::project(Eigen::Ref<Eigen::Matrix3Xd> vectors) const {
+void Constraints::project(Eigen::Ref<Eigen::Matrix3Xd> vectors) const {
   for (std::size_t i = 0; i < size(); ++i) {
     if (state_[i] == State::free) continue;
     const auto column = static_cast<Eigen::Index>(i);
@@ -57,7 +57,7 @@ void Freedom::project(Eigen::Ref<Eigen::Matrix3Xd> vectors) const {
   }
 }
 
-void Freedom::project(LaneMatrix& vectors) const {
+void Constraints::project(LaneMatrix& vectors) const {
   for (std::size_t i = 0; i < size(); ++i) {
     if (state_[i] == State::free) continue;
     auto of_sphere = vectors.middleCols<3>(3 * static_cast<Eigen::Index>(i));
@@ -69,7 +69,7 @@ void Freedom::project(LaneMatrix& vectors) const {
   }
 }
 
-void Freedom::constrain(const BondSystem& bonds, BlockMatrix& matrix) const {
+void Constraints::constrain(const BondSystem& bonds, BlockMatrix& matrix) const {
   for (std::size_t i = 0; i < bonds.size(); ++i) {
     const std::uint32_t a = bonds.end_a()[i];
     const std::uint32_t b = bonds.end_b()[i];

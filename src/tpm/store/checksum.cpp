@@ -1,4 +1,4 @@
-#include "tpm/store/seal.hpp"
+#include "tpm/store/checksum.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -20,7 +20,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "seals hold little-endian numbers");
 
-constexpr std::string_view kSealMagic = "TPMSEAL1";
+constexpr std::string_view kChecksumMagic = "TPMSEAL1";
 
 struct Seal {
   char magic[8];
@@ -30,7 +30,7 @@ struct Seal {
 };
 
 /// False if there are fewer bytes.
-bool read_sealed(int file, void* to, std::uint64_t size, std::uint64_t from) {
+bool read_checked(int file, void* to, std::uint64_t size, std::uint64_t from) {
   auto* bytes = static_cast<char*>(to);
   while (size > 0) {
     const ssize_t n = ::pread(file, bytes, size, static_cast<off_t>(from));
@@ -52,7 +52,7 @@ std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::u
   std::uint32_t crc = 0;
   while (from < to) {
     const std::uint64_t part = std::min(to - from, kAtOnce);
-    if (!read_sealed(file, bytes.data(), part, from)) return std::nullopt;
+    if (!read_checked(file, bytes.data(), part, from)) return std::nullopt;
     crc = check_sum(bytes.data(), static_cast<std::size_t>(part), crc);
     from += part;
   }
@@ -76,32 +76,36 @@ std::optional<std::uint32_t> crc_of(int file, std::uint64_t size) {
 
 }  // namespace
 
-bool seal(int descriptor, std::uint64_t size) {
-  Seal seal{{}, size, 0, 0};
-  std::copy(kSealMagic.begin(), kSealMagic.end(), seal.magic);
+bool write_checksum(int descriptor, std::uint64_t size) {
+  Seal write_checksum{{}, size, 0, 0};
+  std::copy(kChecksumMagic.begin(), kChecksumMagic.end(), write_checksum.magic);
   const auto crc = crc_of(descriptor, size);
   if (!crc) {
     if (errno == 0) errno = EIO;
     return false;
   }
-  seal.crc = *crc;
-  const ssize_t n = ::pwrite(descriptor, &seal, sizeof seal, static_cast<off_t>(size));
-  if (n >= 0 && n != sizeof seal) errno = ENOSPC;
-  return n == sizeof seal && ::fsync(descriptor) == 0;
+  write_checksum.crc = *crc;
+  const ssize_t n =
+      ::pwrite(descriptor, &write_checksum, sizeof write_checksum, static_cast<off_t>(size));
+  if (n >= 0 && n != sizeof write_checksum) errno = ENOSPC;
+  return n == sizeof write_checksum && ::fsync(descriptor) == 0;
 }
 
-SealState seal_of(int descriptor) {
+ChecksumState checksum_of(int descriptor) {
   struct stat found {};
-  if (::fstat(descriptor, &found) != 0) return SealState::none;
+  if (::fstat(descriptor, &found) != 0) return ChecksumState::none;
   const auto size = static_cast<std::uint64_t>(found.st_size);
-  Seal seal{};
-  if (size < sizeof seal || !read_sealed(descriptor, &seal, sizeof seal, size - sizeof seal) ||
-      !std::equal(kSealMagic.begin(), kSealMagic.end(), seal.magic)) {
-    return SealState::none;
+  Seal write_checksum{};
+  if (size < sizeof write_checksum ||
+      !read_checked(descriptor, &write_checksum, sizeof write_checksum,
+                    size - sizeof write_checksum) ||
+      !std::equal(kChecksumMagic.begin(), kChecksumMagic.end(), write_checksum.magic)) {
+    return ChecksumState::none;
   }
-  const bool whole = seal.size + sizeof seal == size && seal.nothing == 0 &&
-                     crc_of(descriptor, seal.size) == seal.crc;
-  return whole ? SealState::whole : SealState::broken;
+  const bool whole = write_checksum.size + sizeof write_checksum == size &&
+                     write_checksum.nothing == 0 &&
+                     crc_of(descriptor, write_checksum.size) == write_checksum.crc;
+  return whole ? ChecksumState::whole : ChecksumState::broken;
 }
 
 }  // namespace tpm
