@@ -52,5 +52,5 @@ cat >"$folder/html/index.html" <<'END'
 END
 
 step "checking links"
-/usr/bin/python3 tests/site_pages.py links "$folder/html"
+/usr/bin/python3 tests/programs/site_pages.py links "$folder/html"
 step "done: $PWD/$folder/html/index.html"

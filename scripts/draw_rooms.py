@@ -3,7 +3,7 @@
 
     python3 scripts/draw_rooms.py > docs/figures/rooms.svg
 
-Everything comes from the tables of the page and from the includes; tests/rooms.py checks both.
+Everything comes from the tables of the page and from the includes; tests/programs/rooms.py checks both.
 """
 import re
 import sys

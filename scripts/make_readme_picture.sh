@@ -10,6 +10,6 @@ install_missing "to photograph a page" chromium
 find_python numpy matplotlib
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-"$TPMKIT_PYTHON" tests/page_in_chromium.py build/release/tpm configs/hil_surface.json "$folder/page.png" 14
+"$TPMKIT_PYTHON" tests/programs/page_in_chromium.py build/release/tpm configs/hil_surface.json "$folder/page.png" 14
 "$TPMKIT_PYTHON" scripts/draw_first_look.py "$folder/page.png" reports/accuracy/servo_normal.csv docs/figures/first_look.png
 say "docs/figures/first_look.png"

@@ -35,6 +35,7 @@ source_that_includes() {
   fi
   written=${header#src/}
   written=${written#tests/}
+  written=${written#support/}
   written=${written#apps/tpm/}
   includer=$(git grep -lF "#include \"$written\"" -- '*.cpp' ':!tests/consumer' ':!tests/measure' | head -n 1 || true)
   if [ -n "$includer" ]; then

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "../coverage_studies.hpp"
+#include "coverage_studies.hpp"
 
 namespace {
 

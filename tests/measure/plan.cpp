@@ -13,7 +13,7 @@
 #include <set>
 #include <sstream>
 
-#include "../random_plan_scene.hpp"
+#include "random_plan_scene.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpmkit/error.hpp"
 

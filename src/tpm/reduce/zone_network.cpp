@@ -16,7 +16,7 @@ constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
 /// deeper places is missed too.
 constexpr double kMissedInMotion = 1.5;
 /// Times that where bonds of the surroundings stiffen: the linear surroundings miss more between
-/// the equilibria that are looked at (set by tests/test_material_servo.cpp).
+/// the equilibria that are looked at (set by tests/reduce/test_material_servo.cpp).
 constexpr double kMissedStiffening = 16.0;
 constexpr double kUnbalanced = 0.1;  // what is left of the correction for what is unbalanced
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;

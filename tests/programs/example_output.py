@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs an example and compares what it prints with what its opening comment says it prints, to the digits printed.
 
-    python3 tests/example_output.py SOURCE PROGRAM [ARGUMENTS]
+    python3 tests/programs/example_output.py SOURCE PROGRAM [ARGUMENTS]
 
 The comment's line "Prints:" is followed by the output, indented by four. An example has less than 80 lines.
 """

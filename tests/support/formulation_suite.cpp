@@ -460,7 +460,7 @@ Broken broken_words(const Formulation& f) {
 
 Broken broken_in_loop(const Formulation& f, HeapCalls heap_calls) {
   Broken broken;
-  // A law needs a file of its own: tests/test_law_contact.cpp.
+  // A law needs a file of its own: tests/haptics/test_law_contact.cpp.
   if (f.name() == "law") return broken;
   const std::string organ = f.name() == "element" ? R"({"kind": "star", "spacing": "30 mm"})"
                                                   : R"({"kind": "liver", "count": 40})";

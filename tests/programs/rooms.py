@@ -6,7 +6,7 @@
 - docs/library.md lists every public header, with a folder that includes it or one that another public header includes;
 - docs/figures/rooms.svg is what scripts/draw_rooms.py draws of all that.
 
-    python3 tests/rooms.py ROOT
+    python3 tests/programs/rooms.py ROOT
 """
 import re
 import sys

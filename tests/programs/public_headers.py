@@ -2,7 +2,7 @@
 """Checks the public headers, include/tpmkit: at most 30, each includes only other public headers, the standard library,
 Eigen and fmt, and CMakeLists.txt installs no other folder of headers.
 
-    python3 tests/public_headers.py ROOT
+    python3 tests/programs/public_headers.py ROOT
 """
 import re
 import sys

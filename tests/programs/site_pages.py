@@ -18,7 +18,7 @@ import urllib.parse
 from html.parser import HTMLParser
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 
 class Reader(HTMLParser):
