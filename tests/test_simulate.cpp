@@ -150,7 +150,7 @@ TEST_CASE("an interrupted run goes on to the same result, to the bit", "[heavy]"
        {kPush, kLoad, kStatic + kPush, kMoving + kPush, kMoving + kLoad}) {
     const ExperimentScene scene = small_scene(protocol);
     const SimulationRecord whole = run_of(scene).record;
-    for (const std::size_t stop_at : {3UL, 100UL, whole.curve.size() - 1}) {
+    for (const std::size_t stop_at : {3UL, 3 * whole.curve.size() / 4, whole.curve.size() - 1}) {
       const TempFolder folder;
       CAPTURE(protocol, stop_at);
       SimulationControls controls;

@@ -7,19 +7,17 @@
 namespace tpm {
 namespace {
 
-/// Every part of a quasi-static run begins with some factorisations: there are as many parts as
-/// these are cheap, but a long protocol is cut.
+/// Every part of a quasi-static run begins with some factorisations and ends a step of time: a run
+/// is halved where these are cheap. A long protocol is cut into more.
 std::size_t parts_of(const ExperimentScene& scene, const RunNetwork& network) {
   constexpr double kRestart = 3.0;         // factorisations
-  constexpr double kAllRestarts = 2.5e9;   // operations
+  constexpr double kMostRestart = 1.25e9;  // operations
   constexpr std::size_t kPiecesAPart = 8;  // of the protocol
   const std::size_t least = std::min(scene.protocol.knots().size() / kPiecesAPart + 1, kRunParts);
   const SolverChoice factor = choose_solver(network.driven.bonds, network.driven.freedom,
                                             {.solver = scene.formulation.solver});
   if (!factor.direct) return kRunParts;
-  const double cheap = kAllRestarts / (kRestart * factor.operations + 1.0);
-  return std::clamp(cheap < kRunParts ? static_cast<std::size_t>(cheap) : kRunParts, least,
-                    kRunParts);
+  return std::max<std::size_t>(least, kRestart * factor.operations < kMostRestart ? 2 : 1);
 }
 
 class QuasiStaticFormulation final : public Formulation,

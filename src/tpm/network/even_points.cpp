@@ -79,8 +79,12 @@ void require_sphere_count(std::size_t count) {
   throw bad_input("number of spheres", fmt::format("{}", count), fmt::format("2 to {}", kMost));
 }
 
+double even_spacing(double area, std::size_t count) {
+  return std::sqrt(area / (kCell * static_cast<double>(count)));
+}
+
 double even_spacing(const Surface& surface, std::size_t count) {
-  return std::sqrt(surface.area() / (kCell * static_cast<double>(count)));
+  return even_spacing(surface.area(), count);
 }
 
 std::size_t even_count(const Surface& surface, double spacing) {

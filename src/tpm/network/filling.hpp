@@ -55,7 +55,8 @@ struct SolidRequest {
 /// even_spacing(surface, count) from its neighbours.
 [[nodiscard]] Positions even_points(const Surface& surface, std::size_t count, std::uint64_t seed);
 
-/// Distance of neighbours if `count` points cover a surface as a triangular lattice, m.
+/// Distance of neighbours if `count` points cover an area (m^2) as a triangular lattice, m.
+[[nodiscard]] double even_spacing(double area, std::size_t count);
 [[nodiscard]] double even_spacing(const Surface& surface, std::size_t count);
 
 /// Number of points that cover a surface at a spacing, rounded; may be 0.

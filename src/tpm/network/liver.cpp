@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/error.hpp"
@@ -21,17 +22,26 @@ Vector3d printed_place() {
   return {0.002, 0.136, 0.057};
 }
 
-/// The shape at the size that count and spacing ask for.
-LiverShape sized(const LiverRequest& request) {
-  if (!request.spacing) return request.shape;
+struct SizedLiver {
+  LiverShape shape;
+  MeshSurface surface;
+};
+
+/// The liver at the size that count and spacing ask for.
+SizedLiver sized(const LiverRequest& request) {
+  TriangleMesh mesh = liver_mesh(request.shape);
+  if (!request.spacing) return {request.shape, MeshSurface(std::move(mesh))};
   if (!std::isfinite(*request.spacing) || !(*request.spacing > 0.0)) {
     throw bad_input("spacing", fmt::format("{} m", *request.spacing), "a length above 0");
   }
   require_sphere_count(request.count);
   const auto layers = static_cast<std::size_t>(std::clamp(request.layers, 1, 100));
   const std::size_t outer = (request.count + layers - 1) / layers;
-  const MeshSurface surface = liver_surface(request.shape);
-  return scaled(request.shape, *request.spacing / even_spacing(surface, outer));
+  const double factor = *request.spacing / even_spacing(mesh_area(mesh), outer);
+  const LiverShape shape = scaled(request.shape, factor);
+  require_valid(shape, "liver");
+  mesh.vertices *= factor;
+  return {shape, MeshSurface(std::move(mesh))};
 }
 
 /// The organ with the first `full` spheres of every layer moved on by `shift` numbers, cyclically.
@@ -68,8 +78,7 @@ Organ placed(const Organ& organ, std::size_t contact) {
 }  // namespace
 
 Organ fill_liver(const LiverRequest& request) {
-  const LiverShape shape = sized(request);
-  const MeshSurface surface = liver_surface(shape);
+  const auto [shape, surface] = sized(request);
   ShellRequest shell;
   shell.count = request.count;
   shell.layers = request.layers;

@@ -240,7 +240,7 @@ LiverShape scaled(LiverShape shape, double factor) {
   return shape;
 }
 
-MeshSurface liver_surface(const LiverShape& shape) {
+TriangleMesh liver_mesh(const LiverShape& shape) {
   require_valid(shape, "liver");
   const LiverFunction liver(shape);
   TriangleMesh mesh = icosphere(kSubdivisions);
@@ -249,7 +249,11 @@ MeshSurface liver_surface(const LiverShape& shape) {
     const Vector3d direction = mesh.vertices.col(v);
     mesh.vertices.col(v) = liver.middle() + reach_along(liver, direction, farthest) * direction;
   }
-  return MeshSurface(std::move(mesh));
+  return mesh;
+}
+
+MeshSurface liver_surface(const LiverShape& shape) {
+  return MeshSurface(liver_mesh(shape));
 }
 
 SurfacePoint front_of_right_lobe(const LiverShape& shape, const Surface& surface) {

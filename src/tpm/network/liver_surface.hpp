@@ -44,6 +44,9 @@ void require_valid(const LiverShape& shape, std::string_view where);
 /// roots only, so that it does not depend on a mathematical library. Throws as require_valid.
 [[nodiscard]] MeshSurface liver_surface(const LiverShape& shape);
 
+/// The triangles of that surface alone: what its area needs. Throws as require_valid.
+[[nodiscard]] TriangleMesh liver_mesh(const LiverShape& shape);
+
 /// The point in the middle of the front of the right lobe, where a surgeon's probe gets at it.
 [[nodiscard]] SurfacePoint front_of_right_lobe(const LiverShape& shape, const Surface& surface);
 
