@@ -33,6 +33,8 @@ inline std::vector<ErrorCase> organ_law_error_cases() {
       {type, "no motion", put, both(law, scene(""))},
       {type, "load imposed", put,
        both(law, scene(R"(, "protocol": {"kind": "creep", "load": "1 N", "duration": "5 s"})"))},
+      {type, "intervals of readings without a recording", press + " --intervals readings",
+       both(law, scene(""))},
       {type, "spring-pot", press, both(fractional, scene(""))},
       {type, "two contacts", press,
        both(law, scene(R"(, "contacts": [{"kind": "sphere", "number": 1},

@@ -260,7 +260,7 @@ ReadingsFit fit_to_readings(const OrganModel& model, const FittedBonds& bonds,
   threshold.parameter_count = static_cast<int>(all.size());
   ReadingsFit result;
   result.fit = fit_residuals(
-      function, all, {start}, threshold, profiles, StartKind::solved,
+      function, all, {start}, threshold, false, StartKind::solved,
       [&](std::span<const double> best) { return function.correlation(best).inflation(); });
   threshold.inflation = result.fit.inflation;
   add_linear_intervals(result.fit, threshold);
