@@ -14,7 +14,9 @@ namespace plain {
 #define TPM_CONDENSED_WIDE
 #pragma GCC push_options
 #pragma GCC target("avx2")
-namespace wide {}  // namespace wide
+namespace wide {
+#include "tpm/reduce/condensed_kernel.inc"
+}  // namespace wide
 #pragma GCC pop_options
 #endif
 #pragma GCC diagnostic pop
