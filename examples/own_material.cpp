@@ -36,7 +36,7 @@ int main() try {
   tpm::BondMaterial own;
   own.equilibrium_Pa = 6e3;
   own.branches = {{3e3, 1.0}, {3e3, 20.0}};
-  own.potential = {tpm::ElongationShape::cubic, 5e-3};
+  own.potential = tpm::elongation_function("cubic", {5e-3});
   tpm::require_valid(own, "own material");
   const tpm::BondLaw bond = own.radial_law();
   double at_once_N = 0.0;
