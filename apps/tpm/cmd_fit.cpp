@@ -20,6 +20,7 @@
 #include "tpm/report/recording_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
+#include "tpm/study/fitted_scene.hpp"
 #include "tpm/study/specimens.hpp"
 #include "tpm/study/young_moduli.hpp"
 #include "tpmkit/error.hpp"
@@ -220,13 +221,24 @@ void write_moduli(const std::filesystem::path& folder, const std::optional<Young
   files.insert(files.end(), {"young_moduli.json", "young_moduli.csv"});
 }
 
+/// Of a fit with an organ: the organ with its material, and a session that feels it.
+void write_scene(const std::filesystem::path& folder, const FitResult& fit,
+                 std::vector<std::string>& files) {
+  const std::optional<FittedScene> fitted = fitted_scene(fit);
+  if (!fitted) return;
+  write_file(folder / "scene.json", to_text(fitted->scene));
+  write_file(folder / "session.json", to_text(fitted->session));
+  files.insert(files.end(), {"scene.json", "session.json"});
+}
+
 int fit_configuration(const FitOptions& options, const Session& session) {
   const auto csv = csv_beside(options.output, session);
   if (!options.no_draw) will_write_into(options.folder, {"figures.json", "law.json"});
   const FitResult result = run_fit(configured(options));
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
   if (!options.folder.empty() && !options.no_draw) {
-    const auto files = write_fit_report(options.folder, result);
+    auto files = write_fit_report(options.folder, result);
+    write_scene(options.folder, result, files);
     if (!session.json()) text += written(options.folder, files);
   }
   deliver(text, options.output);

@@ -1,0 +1,136 @@
+#include "tpm/study/fitted_scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tpm/core/text.hpp"
+#include "tpm/scene/organ_model.hpp"
+
+namespace tpm {
+namespace {
+
+constexpr int kSceneDigits = 10;
+
+std::string with_si_unit(double value, Dimension dimension) {
+  return fmt::format("{} {}", shortest(rounded(value, kSceneDigits)), si_symbol(dimension));
+}
+
+/// The values of a material that is not the paper's element, where a scene has them.
+void set_material(Json& material, const std::vector<ParameterDescription>& table,
+                  const std::vector<double>& values) {
+  Json branches = Json::array();
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const std::string name(table[i].name);
+    const std::string text = with_si_unit(values[i], table[i].dimension);
+    const bool of_branch = name.starts_with("tau") || (name[0] == 'g' && name.size() > 1);
+    if (name == "stiffening") {
+      material["potential"]["stiffening"] = text;
+    } else if (name == "kernel_stiffening") {
+      material["kernel"]["stiffening"] = text;
+    } else if (!of_branch) {
+      material[name] = text;
+    } else if (name[0] == 'g') {
+      branches.push_back({{"g", text}});
+    } else {
+      branches.back()["tau"] = text;
+    }
+  }
+  material.erase("fractional");
+  material.erase("branches");
+  if (!branches.empty()) material["branches"] = std::move(branches);
+}
+
+/// The paper's constants; the spacing builds the organ.
+void set_element(Json& scene, const std::vector<ParameterDescription>& table,
+                 const std::vector<double>& values, double spacing_m) {
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const std::string name(table[i].name);
+    const std::string text = with_si_unit(values[i], table[i].dimension);
+    if (name != "spacing") {
+      scene["material"][name] = text;
+    } else if (std::abs(values[i] - spacing_m) > 1e-9 * spacing_m) {
+      scene["organ"]["spacing"] = text;
+    }
+  }
+}
+
+/// A ramp to the largest fitted depth, at the rate of the data, and a hold.
+struct FittedRamp {
+  double depth_m = 0.0, rate_m_per_s = 0.0, hold_s = 0.0, longest_s = 0.0;
+};
+
+FittedRamp ramp_of(const FitResult& fit) {
+  constexpr double kUsualDepth_m = 1e-3, kUsualRate_m_per_s = 1e-3, kUsualHold_s = 30.0;
+  FittedRamp ramp;
+  for (const FittedDatum& d : fit.data) {
+    ramp.depth_m = std::max(ramp.depth_m, d.imposed_depth_m.value_or(0.0));
+    if (std::isfinite(d.datum.time_s)) ramp.longest_s = std::max(ramp.longest_s, d.datum.time_s);
+  }
+  for (const RecordingFit& r : fit.recordings) {
+    for (std::size_t i = 0; i < r.drive.size(); ++i) {
+      if (!r.fitted[i] || r.drive[i] <= ramp.depth_m) continue;
+      ramp.depth_m = r.drive[i];
+      const double passed_s = r.time_s[i] - r.time_s.front();
+      if (passed_s > 0.0) ramp.rate_m_per_s = (r.drive[i] - r.drive.front()) / passed_s;
+      ramp.longest_s = r.time_s.back() - r.time_s.front();
+    }
+  }
+  for (const DataChoice& data : fit.config.data) {
+    if (data.protocol.rate_m_per_s > 0.0) ramp.rate_m_per_s = data.protocol.rate_m_per_s;
+  }
+  if (!(ramp.depth_m > 0.0)) ramp.depth_m = kUsualDepth_m;
+  if (!(ramp.rate_m_per_s > 0.0)) ramp.rate_m_per_s = kUsualRate_m_per_s;
+  const double held_s = ramp.longest_s - ramp.depth_m / ramp.rate_m_per_s;
+  ramp.hold_s = held_s > 1.0 ? held_s : kUsualHold_s;
+  return ramp;
+}
+
+Json ramp_json(const FittedRamp& ramp) {
+  constexpr int kDigits = 4;
+  return {{"kind", "ramp_hold"},
+          {"depth", fmt::format("{} mm", significant(1e3 * ramp.depth_m, kDigits))},
+          {"rate", fmt::format("{} mm/s", significant(1e3 * ramp.rate_m_per_s, kDigits))},
+          {"hold", fmt::format("{} s", significant(ramp.hold_s, kDigits))}};
+}
+
+}  // namespace
+
+std::optional<FittedScene> fitted_scene(const FitResult& fit) {
+  const FitConfig& config = fit.config;
+  if (!config.organ) return std::nullopt;
+  const std::filesystem::path path = config.folder / config.scene;
+  FittedScene result;
+  Json& scene = result.scene;
+  scene = with_mesh_listed(read_json(path), path.string(), path.parent_path());
+  const OrganModel model(config.organ);
+  const auto described = model.parameters();
+  const std::vector<ParameterDescription> table(described.begin(), described.end());
+  const std::vector<double> values = model_parameters(config, fit.best.natural, 0);
+  if (model.has_element()) {
+    set_element(scene, table, values, config.organ->network.organ.spacing);
+  } else {
+    set_material(scene["material"], table, values);
+  }
+  scene["description"] = fmt::format("material: fitted, {}", config.title);
+
+  const Json ramp = ramp_json(ramp_of(fit));
+  Json tissue = Json::object();
+  for (const char* key : {"organ", "bonds", "material", "anchors", "guides"}) {
+    if (scene.contains(key)) tissue[key] = scene.at(key);
+  }
+  scene["protocol"] = ramp;
+  scene["contacts"] = Json::array({{{"kind", "sphere"}}});
+  result.session = {{"title", config.title},
+                    {"model", {{"kind", "network"}, {"scene", std::move(tissue)}}},
+                    {"rate", "1 kHz"},
+                    {"indentations",
+                     {{"depths", Json::array({ramp.at("depth")})},
+                      {"rates", Json::array({ramp.at("rate")})},
+                      {"hold", ramp.at("hold")},
+                      {"rest", "10 s"}}}};
+  return result;
+}
+
+}  // namespace tpm
