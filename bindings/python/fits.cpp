@@ -7,6 +7,7 @@
 #include "tpm/fit/prediction.hpp"
 #include "tpm/fit/tables.hpp"
 #include "tpm/fit/verdict.hpp"
+#include "tpm/law/law_json.hpp"
 #include "tpm/report/fit_report.hpp"
 #include "tpm/report/function_report.hpp"
 #include "tpm/report/recording_report.hpp"
