@@ -49,6 +49,7 @@ tpm_find(muparser 2.3)
 tpm_find(OpenSSL 3 COMPONENTS Crypto)
 tpm_find(assimp 5.2)
 tpm_find(Threads)
+tpm_find(TBB 2021)
 tpm_find(ZLIB 1.2)
 
 # libsundials-dev brings the MPI build of HDF5 along, which is not thread safe: the serial one is
@@ -121,7 +122,6 @@ target_link_libraries(tpm_metis INTERFACE ${TPM_METIS_LIBRARY})
 
 # --- headers that only our own sources read, and the program's ----------------------------------
 if(NOT TPM_CONSUMER)
-  find_package(TBB 2021 REQUIRED)
   if(TPM_MPI)
     find_package(MPI 3 REQUIRED COMPONENTS C)
   endif()

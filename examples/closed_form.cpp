@@ -2,7 +2,17 @@
 // paper's element in closed form; the component core is enough.
 //
 // Prints:
-//     0 ms: 0.000 N
+//     0.0 ms: 0.6135 N
+//     0.1 ms: 0.4985 N
+//     0.2 ms: 0.4274 N
+//     1.0 ms: 0.3145 N
+//     1 % more E1      changes it by +1.44 mN
+//     1 % more E2      changes it by +1.48 mN
+//     1 % more Eprime  changes it by +0.11 mN
+//     1 % more eta1    changes it by +0.12 mN
+//     1 % more spacing changes it by -0.21 mN
+//     1 % more A0      changes it by +3.14 mN
+//     1 % more l0      changes it by -3.14 mN
 #include <cstdio>
 #include <tpmkit/model.hpp>
 #include <tpmkit/protocol.hpp>

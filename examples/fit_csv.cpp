@@ -1,19 +1,21 @@
 // Which law explains a recording of an indentation, and how well does the recording determine its
 // parameters? Fits a CSV file with a time, a depth and a force in each row; units are read from the
-// head of the file.
+// head of the file. This one was sampled every 0.25 s and only bounds the relaxation time.
 //
 //     fit_csv configs/oscillation_example/hold.csv
 //
 // Prints:
-//     ...
+//     5 of 5 starts agree
+//     k_inf = 39.94 N/m, 95 % interval 38.6 to 41.64, identified
+//     k1    = 22.18 N/m, 95 % interval 9.286 to 29.66, identified
+//     tau1  = 0.125 s, one-sided: upper limit only
 #include <cstdio>
 #include <tpmkit/error.hpp>
 #include <tpmkit/fit.hpp>
 
 int main(int argc, char** argv) try {
   tpm::FitRequest request;
-  request.law =
-      "linear-1";  // a spring beside a spring with a dashpot; leave it empty to have the law chosen
+  request.law = "linear-1";  // a spring beside a Maxwell element; empty: the law is chosen
   const tpm::FitSummary fit = tpm::fit_recordings({argv + 1, argv + argc}, request);
   std::printf("%d of %d starts agree\n", fit.starts_agreeing, fit.starts_run);
   for (const tpm::FittedParameter& p : fit.parameters) {

@@ -2,7 +2,8 @@
 // "spring", the contact as an elastic spring, to those of the library and runs one scene by both.
 //
 // Prints:
-//     ...
+//     quasi_static 2 mm: 0.0737 N, 4 mm: 0.1454 N, held: 0.1454 N
+//     spring       2 mm: 0.0794 N, 4 mm: 0.1588 N, held: 0.1588 N
 #include <cstdio>
 #include <string>
 #include <tpmkit/error.hpp>

@@ -3,7 +3,9 @@
 // of one bond is worked out beside it.
 //
 // Prints:
-//     ...
+//     paper's  peak 0.2484 N, after 2 s 0.2302 N, after 30 s 0.1510 N
+//     own      peak 0.2379 N, after 2 s 0.2121 N, after 30 s 0.1713 N
+//     one bond 0.7958 N, at equilibrium 0.4944 N
 #include <cstdio>
 #include <string>
 #include <tpmkit/bond_material.hpp>

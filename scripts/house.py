@@ -4,6 +4,8 @@
     python3 scripts/house.py                     the committed sources
     python3 scripts/house.py v0.1.0 HEAD         two commits side by side
     python3 scripts/house.py --build build/release   seconds of compilation by folder as well, from ninja's log
+    python3 scripts/house.py --header include tpmkit/model.hpp --header src tpm/model/model.hpp
+                                                 what a program pays that includes one header: files read, processor time
 
 A line of code is one that is neither blank nor only a comment. A name is a class, struct, enumeration, alias, concept,
 constant or function that a header declares at namespace level. Installed headers are those below include/, and those
@@ -11,6 +13,7 @@ of src/tpm if CMakeLists.txt installs that folder.
 """
 import argparse
 import re
+import resource
 import subprocess
 import sys
 from collections import Counter
@@ -116,6 +119,18 @@ def seconds_by_folder(build: Path) -> Counter:
     return total
 
 
+def cost_of_header(folder: str, header: str) -> str:
+    """A row: files of this project that the header reads, and the processor time that g++ takes for it alone."""
+    command = ["g++", "-std=c++20", "-x", "c++", "-", f"-I{folder}", "-Iinclude", "-isystem", "/usr/include/eigen3"]
+    text = f'#include "{header}"\n'
+    needs = subprocess.run([*command, "-MM"], input=text, capture_output=True, text=True, check=True).stdout
+    files = [word for word in needs.split() if word.endswith((".hpp", ".h")) and not word.startswith("/usr")]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([*command, "-fsyntax-only"], input=text, text=True, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return f"| {header} | {len(files)} | {after.ru_utime - before.ru_utime:.1f} |"
+
+
 def count(commit: str) -> dict:
     texts = sources(commit)
     lines: Counter = Counter()
@@ -141,7 +156,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("commits", nargs="*", default=["HEAD"])
     parser.add_argument("--build", type=Path, help="a build folder of ninja")
+    parser.add_argument("--header", nargs=2, action="append", metavar=("FOLDER", "HEADER"), help="measure this header")
     options = parser.parse_args()
+    if options.header:
+        print("| header | files of the project | s of g++ |\n| --- | --- | --- |")
+        print("\n".join(cost_of_header(folder, header) for folder, header in options.header))
+        return 0
     counts = [count(commit) for commit in options.commits]
     print(table("lines of code", options.commits, [c["lines"] for c in counts]))
     print(table("names in headers", options.commits, [c["names"] for c in counts]))
