@@ -22,9 +22,9 @@ step "formatting (clang-format)"
 git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror
 
 step "one name, one type"  # two types of one name link without a word and break at run time
-twice=$(git ls-files 'src/tpm/*.hpp' | xargs grep -hoE '^(struct|class|enum class) \w+( final)?( :.*)? ?\{' |
+twice=$(git ls-files 'src/tpm/*.hpp' 'include/tpmkit/*.hpp' | xargs grep -hoE '^(struct|class|enum class) \w+( final)?( :.*)? ?\{' |
         awk '{print $1 == "enum" ? $3 : $2}' | sort | uniq -d)
-[[ -z "$twice" ]] || die "src/tpm defines more than one type named: $twice; expected one of a name"
+[[ -z "$twice" ]] || die "src/tpm and include define more than one type named: $twice; expected one of a name"
 
 step "building the slow tests (build/release)"
 configure release -DTPM_BUILD_TESTS=ON -DTPM_SLOW_TESTS=ON -DTPM_PYTHON=ON

@@ -1,5 +1,5 @@
-// JPK force files: written by Python's zipfile (tests/programs/write_jpk.py) from numbers whose forces and
-// depths are known, and refused where they are not sound.
+// JPK force files: written by Python's zipfile (tests/programs/write_jpk.py) from numbers whose
+// forces and depths are known, and refused where they are not sound.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -29,8 +29,8 @@ namespace {
 std::string written_by_python(const TempFolder& folder, const std::string& variant,
                               const std::string& csv = {}) {
   std::string path = folder / (variant + ".jpk-force");
-  const std::string command = "python3 '" TPM_TEST_SOURCE_DIR "/tests/programs/write_jpk.py' '" + path +
-                              "' " + variant + (csv.empty() ? "" : " '" + csv + "'");
+  const std::string command = "python3 '" TPM_TEST_SOURCE_DIR "/tests/programs/write_jpk.py' '" +
+                              path + "' " + variant + (csv.empty() ? "" : " '" + csv + "'");
   REQUIRE(std::system(command.c_str()) == 0);
   return path;
 }

@@ -125,7 +125,8 @@ TEST_CASE("sensitivities of every law agree with differences", "[law][heavy]") {
   const Protocol push(Drive::displacement,
                       {{0.0, 0.0}, {0.7, 2e-3}, {1.5, 1.8e-3}, {2.0, 3e-3}, {6.0, 3e-3}});
   Protocol load(Drive::force, {{0.0, 0.0}, {0.5, 0.08}, {2.0, 0.08}, {3.0, 0.2}, {5.0, 0.15}});
-  // A Hertz contact predicts nothing once it has shrunk and grows again (tests/law/test_retreat.cpp).
+  // A Hertz contact predicts nothing once it has shrunk and grows again
+  // (tests/law/test_retreat.cpp).
   const Protocol growing(Drive::displacement,
                          {{0.0, 0.0}, {0.7, 2e-3}, {1.5, 2e-3}, {2.0, 3e-3}, {6.0, 3e-3}});
   const Protocol more_load(Drive::force, {{0.0, 0.0}, {0.5, 0.08}, {2.0, 0.08}, {5.0, 0.2}});

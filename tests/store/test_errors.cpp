@@ -769,7 +769,8 @@ std::string table_row(const ErrorCase& error_case, const Answer& answer, const T
 TEST_CASE("bad input gives one line, an exit code and no output; docs/errors.md says which") {
   std::string table =
       "# What tpm says to bad input\n\n"
-      "Written by `tests/store/test_errors.cpp`, which runs the program on each of these files; after a\n"
+      "Written by `tests/store/test_errors.cpp`, which runs the program on each of these files; "
+      "after a\n"
       "wanted change run it with `TPM_UPDATE_DOCS=1`. Exit codes: 1 the answer is no, 2 command\n"
       "line, 3 bad input, 4 numerical failure, 5 environment.\n\n"
       "| file type | fault | exit code | message |\n| --- | --- | --- | --- |\n";

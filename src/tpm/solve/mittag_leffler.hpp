@@ -8,8 +8,8 @@ namespace tpm {
 ///
 /// by its power series up to z = 0.1 and above it by the spectral integral with the trapezoidal
 /// rule, where every term is positive, so that the *relative* accuracy holds however small the
-/// value is: better than 1e-13 against a table in 25 digits (tests/solve/test_fractional.cpp). For alpha
-/// = 1 it is exp(-z) and (1 - exp(-z))/z exactly.
+/// value is: better than 1e-13 against a table in 25 digits (tests/solve/test_fractional.cpp). For
+/// alpha = 1 it is exp(-z) and (1 - exp(-z))/z exactly.
 ///
 ///     E_alpha(-(t/tau)^alpha)             relaxation after a step, beta = 1
 ///     t E_{alpha,2}(-(t/tau)^alpha)       its integral from 0 to t: response to a ramp
