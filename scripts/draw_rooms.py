@@ -10,7 +10,7 @@ import sys
 from html import escape
 from pathlib import Path
 
-WIDTH, BOX_WIDTH, BOX_HEIGHT, GAP, TOP = 960, 320, 50, 20, 30
+WIDTH, BOX_WIDTH, BOX_HEIGHT, GAP, TOP = 980, 340, 50, 20, 30
 LEFT = 150
 COLOURS = ("#b3541e", "#1f6f8b", "#5b7f2b")
 
