@@ -1,8 +1,15 @@
 // The scene that a fit with an organ leaves answers in a run as the fit says.
+#include <fmt/format.h>
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <filesystem>
 
+#include "temp_folder.hpp"
+#include "tpm/core/random.hpp"
+#include "tpm/protocol/straight_pieces.hpp"
 #include "tpm/scene/experiment_scene.hpp"
+#include "tpm/scene/organ_model.hpp"
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
@@ -59,6 +66,68 @@ TEST_CASE(
       R"({"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "100 kPa s"})",
       R"({"E": {"start": "12 kPa", "lower": "0.1 kPa", "upper": "900 kPa", "sets": ["E1", "E2", "Eprime"]},
           "spacing": {"start": "30 mm", "lower": "8 mm", "upper": "60 mm", "scale": "inverse_square"}})"));
+}
+
+TEST_CASE("an organ follows a measured motion in straight pieces, nearly as it does the whole") {
+  const test::TempFolder folder;
+  write_file(folder / "s.json", R"({"organ": {"kind": "star"}, "material": {"Einf": "8 kPa",
+      "Eprime": "12 kPa", "branches": [{"g": "6 kPa", "tau": "1.5 s"}]}})");
+  constexpr double kDeepest = 4e-3, kRamp_s = 1.0, kJitter = 3e-4;
+  constexpr int kSamples = 1000;
+  Random random(5);
+  std::vector<double> time, depth;
+  for (int i = 0; i < kSamples; ++i) {  // eased in and out, then held, with a motor's jitter
+    time.push_back(5e-3 * i);
+    const double way = std::min(time.back() / kRamp_s, 1.0);
+    depth.push_back(kDeepest * (0.5 - 0.5 * std::cos(M_PI * way) + kJitter * random.normal()));
+  }
+  const OrganModel model(std::make_shared<Tissue>(read_tissue(folder / "s.json")));
+  Protocol whole = measured_history(Drive::displacement, time, depth);
+  whole.set_relaxed_at_start(true);
+  const Eigen::VectorXd force = model.respond(whole, time, model.own_values(), Want::values).value;
+  std::string csv = "time [s],depth [m],force [N]\n";
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    csv += fmt::format("{},{},{}\n", time[i], depth[i], force[static_cast<Eigen::Index>(i)]);
+  }
+  write_file(folder / "r.csv", csv);
+  const FitConfig config =
+      parse_fit_config(Json::parse(
+                           R"({"title": "star", "model": "organ", "scene": "s.json", "parameters": {
+               "Einf": {"start": "5 kPa", "lower": "0.1 kPa", "upper": "900 kPa"},
+               "g1": {"start": "9 kPa", "lower": "0.1 kPa", "upper": "900 kPa"}},
+             "data": [{"dataset": "r.csv", "protocol": {"kind": "measured"},
+               "noise": {"kind": "absolute", "absolute": "1 mN"}}],
+             "starts": {"count": 1}, "profile": {"enabled": false}})"),
+                       "test", folder.path());
+
+  const ExperimentResiduals function(config);
+  const Protocol followed = followed_by_organ(whole);
+  CHECK(followed.knots().size() < 50);
+  CHECK(followed.relaxed_at_start());
+  double off = 0.0;
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    off = std::max(off, std::abs(value_at(followed, time[i]) - depth[i]));
+  }
+  CHECK(off <= kMotionWithin * *std::max_element(depth.begin(), depth.end()));
+  CHECK(off > 0.0);
+  const std::vector<double> truth{8e3, 6e3};
+  const double apart = (function.predict(truth, nullptr) - force).cwiseAbs().maxCoeff();
+  CHECK(apart > 0.0);  // the pieces, not the whole
+  CHECK(apart < 3.0 * kMotionWithin * force.maxCoeff());
+
+  const FitResult fit = run_fit(config);
+  CHECK(fit.best.natural[0] == Approx(truth[0]).epsilon(2e-3));
+  CHECK(fit.best.natural[1] == Approx(truth[1]).epsilon(5e-3));
+  REQUIRE(fit.recordings.size() == 1);
+  REQUIRE(fit.recordings.front().drive.size() == depth.size());
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    CHECK(fit.recordings.front().drive[i] == Approx(depth[i]).margin(1e-12));
+  }
+  const auto stated = [](const std::string& flag) {
+    return flag.find("follows the 1000 samples of the motion of 'r.csv' within 0.2 % of its") !=
+           std::string::npos;
+  };
+  CHECK(std::count_if(fit.flags.begin(), fit.flags.end(), stated) == 1);
 }
 
 }  // namespace tpm

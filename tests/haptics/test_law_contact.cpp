@@ -245,5 +245,42 @@ TEST_CASE("The motion of a recording is repeated, and the recording stands besid
                     Contains("the session feels no law"));
 }
 
+TEST_CASE("A motion and a law named in a call stand beside the caller, not beside the session") {
+  const test::TempFolder folder;
+  const std::filesystem::path caller = folder / "caller", sessions = folder / "sessions";
+  std::filesystem::create_directories(caller);
+  std::filesystem::create_directories(sessions);
+  write_law((caller / "law.json").string(), law_of("power-2"));
+  write_file((sessions / "session.json").string(), to_text(test::short_session()));
+  const auto recording_to = [](double depth_m) {
+    return fmt::format("time [s],depth [m],force [N]\n0,0,0\n1,{},0.3\n2,{},0.2\n", depth_m,
+                       depth_m);
+  };
+  write_file((caller / "r.csv").string(), recording_to(2e-3));
+  write_file((sessions / "r.csv").string(), recording_to(1e-3));  // of the same name
+  write_file((sessions / "other.csv").string(), recording_to(1e-3));
+
+  struct WorkingFolder {  // as if called from there
+    explicit WorkingFolder(const std::filesystem::path& there) {
+      std::filesystem::current_path(there);
+    }
+    WorkingFolder(const WorkingFolder&) = delete;
+    WorkingFolder& operator=(const WorkingFolder&) = delete;
+    ~WorkingFolder() {
+      std::error_code ignored;
+      std::filesystem::current_path(before, ignored);
+    }
+    std::filesystem::path before = std::filesystem::current_path();
+  };
+  const WorkingFolder inside(caller);
+  const std::filesystem::path session = std::filesystem::path("..") / "sessions" / "session.json";
+  const auto read = [&](const char* motion) {
+    return read_session(session, {.law = "law.json", .motion = motion});
+  };
+  CHECK(deepest_asked_m(read("r.csv"), 0.0) == Approx(2e-3));
+  CHECK(deepest_asked_m(read("../sessions/r.csv"), 0.0) == Approx(1e-3));
+  CHECK_THAT(test::refusal_of([&] { (void)read("other.csv"); }), Contains("other.csv"));
+}
+
 }  // namespace
 }  // namespace tpm

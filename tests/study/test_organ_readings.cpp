@@ -177,6 +177,48 @@ TEST_CASE("bonds, contacts and offsets of two recordings are found from their re
   CHECK(r.fit.parameters[0].profile.points.size() > 4);
 }
 
+TEST_CASE("after a descent from a deeper minimum nothing is left of the first one") {
+  const SceneOrgan organ = organ_of_scene(star_with_branch(), "test", {});
+  const FittedBonds bonds(organ.tissue->materials.materials.front(), false);
+  const std::vector<double> truth{8e3, 6e3};
+  std::vector<OrganReadings> readings{
+      recorded(*organ.model, bonds, truth, {0.5e-3, 0.02, 3e-3, 3})};
+  const auto fit_from = [&](double einf, double contact_m, bool profiles) {
+    const std::vector<FitParameter> parameters{searched("Einf", einf, Scale::log, 80.0, 8e5),
+                                               searched("g1", 5e3, Scale::log, 60.0, 6e5)};
+    readings.front().contact_m = contact_m;
+    return fit_to_readings(*organ.model, bonds, parameters, readings, profiles);
+  };
+  const ReadingsFit expected = fit_from(1e4, 0.7e-3, true);
+  // Too stiff and too late a contact: the search ends with the contact on its bound.
+  const ReadingsFit wrong = fit_from(1e5, 1.5e-3, false);
+  REQUIRE(wrong.fit.best.deviance > 10.0 * expected.fit.best.deviance);
+  REQUIRE(wrong.fit.parameters[2].at_lower_bound);
+  REQUIRE(wrong.independent < 0.5 * expected.independent);
+  const ReadingsFit found = fit_from(1e5, 1.5e-3, true);
+  constexpr double kSame = 1e-3;
+  CHECK(found.fit.best.deviance == Approx(expected.fit.best.deviance).epsilon(kSame));
+  CHECK(found.independent == Approx(expected.independent).epsilon(kSame));
+  CHECK(found.rise == Approx(expected.rise).epsilon(kSame));
+  CHECK(found.fit.variance_factor == Approx(expected.fit.variance_factor).epsilon(kSame));
+  REQUIRE(found.fit.parameters.size() == expected.fit.parameters.size());
+  for (std::size_t i = 0; i < found.fit.parameters.size(); ++i) {
+    const ParameterResult& mine = found.fit.parameters[i];
+    const ParameterResult& other = expected.fit.parameters[i];
+    CAPTURE(other.parameter.name);
+    REQUIRE((other.lower && other.upper));
+    REQUIRE((mine.lower && mine.upper));
+    constexpr double kNear = 0.02;
+    const double within = kNear * (*other.upper - *other.lower);
+    CHECK(mine.estimate == Approx(other.estimate).margin(within));
+    CHECK(*mine.lower == Approx(*other.lower).margin(within));
+    CHECK(*mine.upper == Approx(*other.upper).margin(within));
+    CHECK_FALSE(mine.at_lower_bound);
+    REQUIRE(mine.standard_error);
+    CHECK(*mine.standard_error == Approx(*other.standard_error).epsilon(0.01));
+  }
+}
+
 TEST_CASE("intervals of readings need a recording") {
   LawFile law;
   law.spec = parse_law_name("linear-1", "test");

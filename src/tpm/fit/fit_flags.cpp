@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/protocol/straight_pieces.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm {
@@ -73,12 +74,27 @@ void flag_not_predicted(FitResult& result) {
   }
 }
 
+/// What an organ follows of a measured motion.
+void flag_motions(FitResult& result, const ExperimentResiduals& function) {
+  if (!result.config.organ) return;
+  for (const Experiment& e : function.experiments()) {
+    if (!e.is_recording) continue;
+    const auto& course = std::get<TimeCourse>(e.imposed);
+    result.flags.push_back(
+        fmt::format("the organ follows the {} samples of the motion of '{}' within {:g} % of its "
+                    "depth, in {} straight pieces",
+                    course.times_s.size(), result.config.data[e.choice].dataset,
+                    100.0 * kMotionWithin, followed_by_organ(course.protocol).knots().size() - 1));
+  }
+}
+
 }  // namespace
 
 void add_flags(FitResult& result, const ExperimentResiduals& function) {
   flag_outliers(result, function);
   flag_noise(result);
   flag_not_predicted(result);
+  flag_motions(result, function);
   for (const DataChoice& data : result.config.data) {
     if (data.protocol.rate_provenance == Provenance::assumed) {
       result.flags.push_back(fmt::format("the ramp rate of {:.4g} mm/s is assumed for '{}'",

@@ -9,6 +9,7 @@
 #include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/least_squares.hpp"
+#include "tpm/protocol/straight_pieces.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
@@ -19,7 +20,6 @@
 namespace tpm {
 namespace {
 
-constexpr double kMotionWithin = 2e-3;      // of the depth
 constexpr std::size_t kMostTimes = 200;     // of a motion, that the forces are compared at
 constexpr double kBoundFactor = 1e4;        // of moduli about their start
 constexpr double kTimeFactor = 100.0;       // of relaxation times
@@ -67,24 +67,6 @@ Relaxing relaxing_of(const LawFile& law) {
   if (spec.form == BranchForm::series && spec.branches > 0) r.prony = to_parallel(chain);
   if (spec.form == BranchForm::series && spec.branches == 0) r.prony.k_inf = chain.k0;
   return r;
-}
-
-/// Places of the knots that keep a path within a distance (Douglas and Peucker 1973), of values
-/// at a time.
-void keep_corners(const std::vector<double>& t, const std::vector<double>& u, std::size_t from,
-                  std::size_t to, double within, std::vector<bool>& kept) {
-  double furthest = within;
-  std::size_t corner = from;
-  for (std::size_t i = from + 1; i < to; ++i) {
-    const double line = u[from] + (u[to] - u[from]) * (t[i] - t[from]) / (t[to] - t[from]);
-    if (std::abs(u[i] - line) <= furthest) continue;
-    furthest = std::abs(u[i] - line);
-    corner = i;
-  }
-  if (corner == from) return;
-  kept[corner] = true;
-  keep_corners(t, u, from, corner, within, kept);
-  keep_corners(t, u, corner, to, within, kept);
 }
 
 /// An organ whose bonds have the fitted form of material.
@@ -281,14 +263,8 @@ void carry_uncertainty(OrganMaterial& m, const OrganLessLaw& function, const Law
 Protocol in_few_pieces(const std::vector<double>& time_s, const std::vector<double>& depth_m,
                        double contact_m) {
   const double deepest = *std::max_element(depth_m.begin(), depth_m.end()) - contact_m;
-  std::vector<bool> kept(time_s.size(), false);
-  kept.front() = kept.back() = true;
-  keep_corners(time_s, depth_m, 0, time_s.size() - 1, kMotionWithin * deepest, kept);
-  std::vector<Knot> knots;
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    if (kept[i]) knots.push_back({time_s[i], depth_m[i]});
-  }
-  Protocol motion(Drive::displacement, std::move(knots));
+  Protocol motion =
+      in_straight_pieces(Drive::displacement, time_s, depth_m, kMotionWithin * deepest);
   motion.set_relaxed_at_start(true);
   return motion;
 }

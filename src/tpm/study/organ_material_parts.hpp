@@ -12,7 +12,7 @@ namespace tpm {
 void add_protocol_and_session(OrganMaterial& m);
 
 /// A measured motion in as few straight pieces as keep it within 0.2 % of its depth beyond the
-/// contact (Douglas and Peucker 1973). The tissue has relaxed at its start.
+/// contact (in_straight_pieces). The tissue has relaxed at its start.
 [[nodiscard]] Protocol in_few_pieces(const std::vector<double>& time_s,
                                      const std::vector<double>& depth_m, double contact_m);
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "tpm/core/progress.hpp"
@@ -180,36 +181,45 @@ double half_width(const FitResult& fit, std::size_t index, const Threshold& thre
   return std::sqrt(threshold.rise(fit.best.deviance) / factor) * c.theta_sd[place - c.free.begin()];
 }
 
-/// Profiles of the bonds' parameters, contacts and offsets fitted again at every point. On meeting
-/// a deeper minimum descends into it and starts again.
-void profile_bonds(FitResult& fit, const ResidualFunction& function,
-                   std::span<const FitParameter> all, std::size_t bonds,
-                   const Threshold& threshold) {
-  constexpr int kMostDescents = 5;
+/// Profiles of the bonds' parameters, contacts and offsets fitted again at every point.
+/// @return a deeper point, if one is met: the fit is then void
+std::optional<Minimum> profile_bonds(FitResult& fit, const ResidualFunction& function,
+                                     std::span<const FitParameter> all, std::size_t bonds,
+                                     const Threshold& threshold) {
   Progress progress("profiling the bonds", bonds);
-  for (int descents = 0; descents < kMostDescents; ++descents) {
-    bool deeper = false;
-    for (std::size_t i = 0; i < bonds && !deeper; ++i) {
-      const double half = half_width(fit, i, threshold);
-      Profile profile =
-          short_profile(function, all, fit.best, i, half, threshold.rise(fit.best.deviance));
-      if (profile.better) {
-        fit.best = minimise(function, all, profile.better->natural);
-        fit.covariance = linear_covariance(function, all, fit.best, threshold);
-        for (std::size_t k = 0; k < all.size(); ++k) {
-          fit.parameters[k].estimate = fit.best.natural[k];
-        }
-        deeper = true;
-        continue;
-      }
-      ParameterResult& p = fit.parameters[i];
-      p.lower = profile.lower;
-      p.upper = profile.upper;
-      p.profile = std::move(profile);
-      p.verdict = verdict_of(p);
-      if (descents == 0) progress.advance();
-    }
-    if (!deeper) return;
+  for (std::size_t i = 0; i < bonds; ++i) {
+    const double half = half_width(fit, i, threshold);
+    Profile profile =
+        short_profile(function, all, fit.best, i, half, threshold.rise(fit.best.deviance));
+    if (profile.better) return profile.better;
+    ParameterResult& p = fit.parameters[i];
+    p.lower = profile.lower;
+    p.upper = profile.upper;
+    p.profile = std::move(profile);
+    p.verdict = verdict_of(p);
+    progress.advance();
+  }
+  return std::nullopt;
+}
+
+/// Fits from a start, and from every deeper minimum that a profile meets: covariance, independent
+/// readings and intervals are always those of the minimum that is returned.
+/// @param threshold on return with the inflation at that minimum
+FitResult fit_and_profile(const OrganLessReadings& function, const std::vector<FitParameter>& all,
+                          std::size_t bonds, Threshold& threshold, bool profiles) {
+  std::vector<double> start;
+  for (const FitParameter& p : all) start.push_back(p.start);
+  constexpr int kMostDescents = 5;
+  for (int descents = 0; descents <= kMostDescents; ++descents) {
+    FitResult fit = fit_residuals(
+        function, all, {start}, threshold, false, StartKind::solved,
+        [&](std::span<const double> best) { return function.correlation(best).inflation(); });
+    threshold.inflation = fit.inflation;
+    add_linear_intervals(fit, threshold);
+    if (!profiles) return fit;
+    std::optional<Minimum> deeper = profile_bonds(fit, function, all, bonds, threshold);
+    if (!deeper) return fit;
+    start = std::move(deeper->natural);
   }
   throw Error(ExitCode::numerical, "profiles", "a deeper minimum was met again and again");
 }
@@ -250,8 +260,6 @@ ReadingsFit fit_to_readings(const OrganModel& model, const FittedBonds& bonds,
     all.push_back(
         placement_parameter("offset" + number, Dimension::force, r.offset_N, peak_N, peak_N));
   }
-  std::vector<double> start;
-  for (const FitParameter& p : all) start.push_back(p.start);
   const OrganLessReadings function(model, bonds, recordings, parameters.size());
   Threshold threshold;
   threshold.level = kLevel;
@@ -259,12 +267,7 @@ ReadingsFit fit_to_readings(const OrganModel& model, const FittedBonds& bonds,
   threshold.data_count = static_cast<int>(function.residual_count());
   threshold.parameter_count = static_cast<int>(all.size());
   ReadingsFit result;
-  result.fit = fit_residuals(
-      function, all, {start}, threshold, false, StartKind::solved,
-      [&](std::span<const double> best) { return function.correlation(best).inflation(); });
-  threshold.inflation = result.fit.inflation;
-  add_linear_intervals(result.fit, threshold);
-  if (profiles) profile_bonds(result.fit, function, all, parameters.size(), threshold);
+  result.fit = fit_and_profile(function, all, parameters.size(), threshold, profiles);
   result.readings = threshold.data_count;
   result.independent = threshold.data_count / threshold.inflation;
   result.rise = threshold.rise(result.fit.best.deviance);
