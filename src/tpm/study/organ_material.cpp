@@ -447,6 +447,9 @@ void go_on_to_readings(OrganMaterial& m, const OrganLessLaw& function, const Org
       m.flags.push_back(fmt::format("{} stands on a bound of its search", found[k].parameter.name));
     }
   }
+  if (!readings.fit.best.converged) {
+    m.flags.emplace_back("the fit to the readings ended before it converged");
+  }
   m.level = readings.level;
   m.readings = std::move(readings);
 }
