@@ -45,9 +45,9 @@ allocation, lock or exception. Sessions are checked with the schemas of the
 package tpmkit."
   "tpmkit (= ${PROJECT_VERSION})")
 tpm_package(development libtpmkit-dev libdevel "soft-tissue models, files for development"
-  "Headers, static libraries (one for each of the components core, organ, fit and
-haptics) and CMake package of tpmkit, and the header of its C interface for haptic
-loops."
+  "Headers, static libraries (one for each component: core, organ, fit,
+haptics) and CMake package of tpmkit, and the header of its C interface
+for haptic loops."
   "libtpmkit-haptics1 (= ${PROJECT_VERSION})" libeigen3-dev libfmt-dev libceres-dev
   libsundials-dev libhdf5-dev libcsv-dev libmuparser-dev libcpp-httplib-dev libassimp-dev libssl-dev libtbb-dev
   libdeflate-dev libmetis-dev libminizip-dev zlib1g-dev)
