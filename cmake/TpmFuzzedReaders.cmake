@@ -2,7 +2,7 @@
 # comes from a library that is there (TPM_FUZZ_ARCHIVE). What is in both is taken from here, because it stands first.
 set(readers_core error text units)
 set(readers_store check_sum contained delimited document_place file file_roles hdf5_contents hdf5_driver hdf5_handle
-    hdf5_reader json row_log schema seal zip_archive)
+    hdf5_reader json row_log schema checksum zip_archive)
 set(readers_curve assemble contact description drive_pieces header_words import import_digitizer import_jpk import_machine import_wpd_json
     jpk_channel jpk_properties recording_file rows)
 set(readers_law law_file)
@@ -23,7 +23,7 @@ foreach(floor core store curve law network scene simulate fit plan haptics study
   tpm_compile_together(fuzzed_${floor})
   target_link_libraries(fuzz_inputs PRIVATE fuzzed_${floor})
 endforeach()
-target_include_directories(fuzz_inputs PRIVATE ${PROJECT_SOURCE_DIR}/src)
+target_include_directories(fuzz_inputs PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
 target_link_libraries(fuzz_inputs PRIVATE ${TPM_FUZZ_ARCHIVE} Eigen3::Eigen nlohmann_json::nlohmann_json fmt::fmt
                                           ${TPM_PRIVATE_LIBRARIES} tpm_options)
 target_link_options(fuzz_inputs PRIVATE -Wl,-z,muldefs)
