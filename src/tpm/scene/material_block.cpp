@@ -31,7 +31,8 @@ ElongationFunction parse_function(const Json& block, const char* key, const Docu
   const ElongationShape& shape =
       elongation_shape(entry.at("shape").get<std::string>(), here.key("shape").where);
   const std::vector<MaterialParameter>& parameters = shape.parameters();
-  for (const auto& [name, value] : entry.items()) {
+  for (const auto& item : entry.items()) {
+    const std::string& name = item.key();
     const bool known =
         name == "shape" || std::any_of(parameters.begin(), parameters.end(),
                                        [&](const MaterialParameter& p) { return p.name == name; });
