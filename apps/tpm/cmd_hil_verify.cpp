@@ -72,7 +72,7 @@ std::shared_ptr<VerifyChoice> add_choice(CLI::App& command, Session& session) {
   command
       .add_option(
           "--window", choice->window,
-          "Of the second opinion by CVODE: from the start, of a ball over the surface from the "
+          "Of the cross-check by CVODE: from the start, of a ball over the surface from the "
           "first touch")
       ->capture_default_str();
   add_format_option(command, session);

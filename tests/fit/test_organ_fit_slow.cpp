@@ -31,9 +31,9 @@ std::vector<FitParameter> fit_parameters(const FitConfig& config) {
 }
 
 /// The same residuals without the surrogate.
-class Unsurrogate final : public ResidualFunction {
+class WithoutSurrogate final : public ResidualFunction {
  public:
-  explicit Unsurrogate(const ResidualFunction& function) : function_(function) {}
+  explicit WithoutSurrogate(const ResidualFunction& function) : function_(function) {}
   [[nodiscard]] Eigen::Index residual_count() const override { return function_.residual_count(); }
   [[nodiscard]] bool evaluate(std::span<const double> natural, Eigen::VectorXd& residual,
                               RowMatrix* jacobian) const override {
@@ -68,7 +68,7 @@ TEST_CASE("the search that a scout leads ends where Ceres does without") {
   const std::vector<FitParameter> parameters = fit_parameters(config);
   const FitResult fit = fit_experiments(function);
   const Minimum alone =
-      minimise(Unsurrogate(function), parameters, std::vector<double>{2e4, 1e5, 0.04});
+      minimise(WithoutSurrogate(function), parameters, std::vector<double>{2e4, 1e5, 0.04});
   REQUIRE(alone.usable);
   CHECK_THAT(fit.best.deviance, WithinRel(alone.deviance, 1e-4));
   CHECK_THAT(fit.best.natural[0], WithinRel(alone.natural[0], 1e-2));

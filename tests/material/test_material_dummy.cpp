@@ -131,6 +131,15 @@ TEST_CASE("a fit finds the parameters of a shape in one file by their names") {
     if (p.at("name") == "uncrimped") CHECK_THAT(value, WithinRel(kUncrimped_m, 1e-2));
   }
   CHECK(found.size() == 2);
+
+  // The scene that it leaves has the shape with the fitted values, and runs.
+  const std::string left = folder / "left";
+  REQUIRE(test::dummy_program("fit " + (folder / "fit.json") + " --folder " + left).code == 0);
+  const Json material = read_json(left + "/scene.json").at("material");
+  CHECK(material.at("potential").at("shape") == "dummy");
+  CHECK_THAT(material.at("potential").at("collagen").get<double>(), WithinRel(kCollagen, 1e-2));
+  CHECK_FALSE(material.contains("collagen"));
+  CHECK(test::dummy_program("simulate " + left + "/scene.json -o " + (folder / "s.h5")).code == 0);
 }
 
 TEST_CASE("the suite passes the dummy and finds what does not keep its word") {

@@ -35,7 +35,7 @@ struct Moduli {
 /// an irregular arrangement an estimate that no uniform volume of these bonds exceeds, because
 /// spheres that may give way make it softer. The tensor is symmetric in all four indices (Cauchy),
 /// so C12 = C66, C13 = C55, C23 = C44.
-/// @param following 0: at once (k), 1: relaxed (k - g)
+/// @param relaxation_factor 0: instantaneous (k), 1: equilibrium (k - g)
 /// @param spheres from 0, each once
 /// @param volume_m3 that they fill up together, above 0
 [[nodiscard]] Elasticity affine_elasticity(const Network& network, const BondSystem& bonds,

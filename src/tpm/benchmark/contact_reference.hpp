@@ -23,7 +23,7 @@ struct ContactReference {
   [[nodiscard]] double peak_N() const { return force_N.colwise().norm().maxCoeff(); }
 };
 
-/// The network balanced under what its bonds remember, by Newton's method with a factorisation that
+/// The network balanced under its viscous elongations, by Newton's method with a factorisation that
 /// is found anew when it converges slowly.
 class BalancedContact {
  public:
@@ -46,7 +46,7 @@ class BalancedContact {
 };
 
 /// The quasi-static network in double precision with many steps a period: elongations are linear
-/// in a step, under which what is remembered is advanced exactly.
+/// in a step, under which viscous elongations are advanced exactly.
 class FineContact {
  public:
   /// @param tissue must live as long as this
@@ -75,8 +75,8 @@ class FineContact {
                                               const ContactMotion& motion, int substeps,
                                               Eigen::Index field_every = 0);
 
-/// By Runge-Kutta's rule of order 4 for what bonds remember, the forces balanced at each stage: it
-/// shares no integrator with FineContact. The error is not estimated.
+/// By Runge-Kutta's rule of order 4 for the viscous elongations, the forces balanced at each stage:
+/// it shares no integrator with FineContact. The error is not estimated.
 /// @param substeps a period; @param field_every as above
 /// Throws Error(numerical) if the forces cannot be balanced.
 [[nodiscard]] ContactReference runge_kutta_reference(const TouchedTissue& tissue,

@@ -190,10 +190,11 @@ class ServoCase {
     const auto vector = [](const std::vector<double>& all) {
       return Eigen::VectorXd::Map(all.data(), static_cast<Eigen::Index>(all.size())).eval();
     };
-    BenchmarkAnswer judge{"rk4",
-                          "Runge-Kutta of order 4 for what bonds remember, forces balanced at each "
-                          "stage to rounding",
-                          vector(numbers[0])};
+    BenchmarkAnswer judge{
+        "rk4",
+        "Runge-Kutta of order 4 for the viscous elongations, forces balanced at each "
+        "stage to rounding",
+        vector(numbers[0])};
     if (line) judge = {"collocation", "collocation (QuasiStatic) at 1e-8", judge.response};
     constexpr double kWorstFloor = 2e-4;
     truth_ = checked_reference(

@@ -19,6 +19,8 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   void advance(std::size_t steps = 1);
+  /// False: nobody sees it, and what only serves it can be left out.
+  [[nodiscard]] bool is_shown() const { return on_terminal_; }
 
  private:
   void draw() const;

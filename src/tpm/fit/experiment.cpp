@@ -9,6 +9,7 @@
 
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/estimated_sigma.hpp"
+#include "tpm/protocol/straight_pieces.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -208,7 +209,9 @@ void add_recording(ExperimentSet& set, const FitConfig& config, std::size_t choi
   const std::vector<double>& sd = recording.response_sd;
   Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
   history.set_relaxed_at_start(true);
-  Experiment experiment{TimeCourse{std::move(history), recording.time_s}, {}, choice, true};
+  TimeCourse course{std::move(history), recording.time_s};
+  if (config.organ) course.followed = followed_by_organ(course.protocol);
+  Experiment experiment{std::move(course), {}, choice, true};
   const std::size_t n = recording.response.size();
   experiment.data.reserve(n);
   set.data.reserve(set.data.size() + n);

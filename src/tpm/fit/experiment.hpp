@@ -29,6 +29,10 @@ struct FitDatum {
 struct TimeCourse {
   Protocol protocol;
   std::vector<double> times_s;
+  /// What an organ is driven by in place of a measured history; none: the history itself.
+  std::optional<Protocol> followed = std::nullopt;
+
+  [[nodiscard]] const Protocol& driven() const { return followed ? *followed : protocol; }
 };
 
 /// What was imposed, and the readings taken.

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "tpm/core/interrupted.hpp"
-#include "tpm/protocol/straight_pieces.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -167,14 +166,11 @@ Response ExperimentResiduals::respond_to(const Experiment& experiment,
     return respond(*oscillation, parameters, want);
   }
   const auto& course = std::get<TimeCourse>(experiment.imposed);
-  std::optional<Protocol> in_pieces;
-  if (config_.organ && experiment.is_recording) in_pieces = followed_by_organ(course.protocol);
-  const Protocol& motion = in_pieces ? *in_pieces : course.protocol;
   if (asks_along() && want == Want::values_and_sensitivity) {
-    return model_->respond_along(motion, course.times_s, parameters,
+    return model_->respond_along(course.driven(), course.times_s, parameters,
                                  changes_for(experiment.choice));
   }
-  return model_->respond(motion, course.times_s, parameters, want);
+  return model_->respond(course.driven(), course.times_s, parameters, want);
 }
 
 Eigen::VectorXd ExperimentResiduals::predict(std::span<const double> natural,
@@ -339,7 +335,8 @@ void thin(Experiment& experiment, std::size_t stride) {
   }
   Protocol protocol(course.protocol.drive(), std::move(knots), course.protocol.name());
   protocol.set_relaxed_at_start(course.protocol.relaxed_at_start());
-  course = {std::move(protocol), std::move(times_s)};
+  course.protocol = std::move(protocol);
+  course.times_s = std::move(times_s);
   experiment.data = std::move(data);
 }
 

@@ -13,9 +13,9 @@
 namespace tpm {
 namespace {
 
-constexpr Eigen::Index kMostSearched = 20'000;  // residuals that many starts are followed with
-constexpr std::size_t kThinnedTo = 2'000;       // samples that stand for a longer recording
-constexpr std::size_t kMostSurrogate = 5;       // minima of a cheap model that are gone on from
+constexpr Eigen::Index kMostSearched = 20'000;   // residuals that many starts are followed with
+constexpr std::size_t kThinnedTo = 2'000;        // samples that stand for a longer recording
+constexpr std::size_t kMostSurrogateMinima = 5;  // minima of a cheap model that are gone on from
 
 /// Where the search begins and how it goes on from there.
 struct Approach {
@@ -38,7 +38,7 @@ Approach surrogate_approach(const ExperimentResiduals& surrogate,
   Approach approach{{{}}, StartKind::solved};
   for (const FitParameter& p : parameters) approach.starts.front().push_back(p.start);
   for (const DistinctMinimum& m : survey(surrogate, parameters).minima) {
-    if (approach.starts.size() > kMostSurrogate) break;
+    if (approach.starts.size() > kMostSurrogateMinima) break;
     approach.starts.push_back(m.minimum.natural);
   }
   return approach;

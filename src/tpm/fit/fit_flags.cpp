@@ -76,15 +76,14 @@ void flag_not_predicted(FitResult& result) {
 
 /// What an organ follows of a measured motion.
 void flag_motions(FitResult& result, const ExperimentResiduals& function) {
-  if (!result.config.organ) return;
   for (const Experiment& e : function.experiments()) {
-    if (!e.is_recording) continue;
-    const auto& course = std::get<TimeCourse>(e.imposed);
+    const auto* course = std::get_if<TimeCourse>(&e.imposed);
+    if (course == nullptr || !course->followed) continue;
     result.flags.push_back(
         fmt::format("the organ follows the {} samples of the motion of '{}' within {:g} % of its "
                     "depth, in {} straight pieces",
-                    course.times_s.size(), result.config.data[e.choice].dataset,
-                    100.0 * kMotionWithin, followed_by_organ(course.protocol).knots().size() - 1));
+                    course->times_s.size(), result.config.data[e.choice].dataset,
+                    100.0 * kMotionWithin, course->followed->knots().size() - 1));
   }
 }
 

@@ -75,7 +75,7 @@ HilSession session_of(const std::filesystem::path& file, const LoopContactOption
 
 /// The session without its end, and without its start if nobody waits for one.
 HilSession endless(HilSession session, const LoopContactOptions& options) {
-  // What spring-pots remember is kept for the length of the session only.
+  // The state of spring-pots is kept for the length of the session only.
   const bool forgets = session.law && session.law->spec.fractional != Fractional::none;
   session.servo.phase_ends = {forgets ? session.servo.phase_ends.back()
                                       : std::numeric_limits<std::uint64_t>::max()};

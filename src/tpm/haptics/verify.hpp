@@ -79,7 +79,7 @@ struct Verification {
 
 /// Feeds the recorded motion of the surface to the full nonlinear quasi-static network of the
 /// session's scene and compares its force with the forces commanded. Beside it, over a window,
-/// CVODE integrates what the bonds remember, forces balanced at each of its evaluations: the same
+/// CVODE integrates the viscous elongations, forces balanced at each of its evaluations: the same
 /// equations by another integrator, with error control of its own. Like the reference it has no
 /// masses. The star's other models are asked as well.
 ///

@@ -104,7 +104,7 @@ void ask_cvode_in_space(Verification& v, const SurfaceScene& surface,
     sum.add_error((surface.to_model * commanded_N - answer[i]).norm(), answer[i].norm());
     cross_check.apart_N = std::max(cross_check.apart_N, (answer[i] - *reference[k]).norm());
   }
-  cross_check.name = "CVODE (Adams) on what the bonds remember, in balance at each evaluation";
+  cross_check.name = "CVODE (Adams) on the viscous elongations, in balance at each evaluation";
   cross_check.start_s = window.front().time_s;
   cross_check.end_s = window.back().time_s;
   cross_check.commanded = sum.take();
@@ -150,7 +150,7 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
     }
   }
   compare_phases(v, recording, rows, compared, size_N);
-  ask(v, "the second opinion by CVODE",
+  ask(v, "the cross-check by CVODE",
       [&] { ask_cvode_in_space(v, surface, places, fine, rows, compared, options); });
   leave_out_what_has_no_reference(v);
   return v;

@@ -1,4 +1,3 @@
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -48,18 +47,17 @@ void ask_cvode(Verification& v, const HilRecording& recording, const DrivenNetwo
   MethodSettings settings;
   settings.rule = StepRule::cvode_bdf;
   settings.tolerance = options.window_tolerance;
-  const Progress progress("second opinion by CVODE over the window", 1);
+  const Progress progress("cross-check by CVODE over the window", 1);
   const MethodRun run = network_problem(network, motion)->run(settings, times);
   if (run.end != MethodEnd::completed) {
     throw Error(ExitCode::numerical, recording.name,
-                "the second opinion by CVODE ends early: " + run.reason,
-                "another --window, or 0 s");
+                "the cross-check by CVODE ends early: " + run.reason, "another --window, or 0 s");
   }
   const std::vector<double> answer(run.response.begin(), run.response.end());
   FidelitySum sum;
   for (std::size_t k = 0; k < times.size(); ++k) sum.add(v.commanded_N[k], answer[k]);
   CrossCheck& cross_check = v.others.emplace_back();
-  cross_check.name = "CVODE (BDF) on what the bonds remember, in balance at each evaluation";
+  cross_check.name = "CVODE (BDF) on the viscous elongations, in balance at each evaluation";
   cross_check.start_s = times.front();
   cross_check.end_s = times.back();
   cross_check.commanded = sum.take();
@@ -169,7 +167,7 @@ void run_reference(Verification& v, const QuasiStatic& network, const Protocol& 
   try {
     // Whoever watches pays a quarter more: the state of every instant is made for the observer.
     QuasiStaticObserver see;
-    if (isatty(STDERR_FILENO) != 0) see = [&](const QuasiStaticState&) { progress.advance(); };
+    if (progress.is_shown()) see = [&](const QuasiStaticState&) { progress.advance(); };
     const QuasiStaticRun run = network.run(motion, v.time_s, see);
     v.reference_N.assign(run.response.begin(), run.response.end());
     v.reference_error_N = run.error_estimate;
@@ -242,8 +240,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
     v.error_N.push_back(v.commanded_N[k] - v.reference_N[k]);
   }
   compare_phases(v, recording, rows, compared, v.reference_N);
-  ask(v, "the second opinion by CVODE",
-      [&] { ask_cvode(v, recording, driven, protocol, options); });
+  ask(v, "the cross-check by CVODE", [&] { ask_cvode(v, recording, driven, protocol, options); });
   if (recording.session.model == "element") {
     ask_others(v, recording, motion, protocol, rows,
                element_constants(tissue.element("hil verify")), options);

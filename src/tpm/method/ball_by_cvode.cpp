@@ -27,7 +27,7 @@ struct FreeFixedPoint {
 };
 using FixedPoint = std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeFixedPoint>;
 
-/// The network as an equation for what its bonds remember.
+/// The network as an equation for its viscous elongations.
 class RememberingNetwork {
  public:
   RememberingNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,

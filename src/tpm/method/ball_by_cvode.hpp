@@ -13,11 +13,11 @@ struct BallPlace {
 };
 
 /// The network of BallOnNetwork under the same ball by other means: CVODE (Adams, functional
-/// iteration: what bonds remember changes no faster than they relax) integrates it with an error
+/// iteration: viscous elongations change no faster than bonds relax) integrates it with an error
 /// control of its own, the free spheres balanced by ImplicitBalance at each evaluation.
 /// @param places at rising times, straight and even between them; nothing is remembered at the
 /// first
-/// @param tolerance of what is remembered, in parts of the ball's reach, > 0
+/// @param tolerance of the viscous elongations, in parts of the ball's reach, > 0
 /// @returns force of the tissue on the ball at each place, N
 /// Throws Error(bad_input) as NetworkUnderBall, Error(numerical) where forces cannot be balanced or
 /// the integrator gives up.

@@ -7,11 +7,12 @@
 
 namespace tpm {
 
-/// Bonds with memory as compliant constraints (Macklin, Mueller, Chentanez: XPBD, 2016). What a
-/// bond remembers at the end of a step is y = offset + following V(l), so that it pulls with
-/// N = (k - g) u(l) + g ((1 - following) V(l) - offset): where it is linear, a constraint on l of
-/// compliance 1/(k - following g) about a rest elongation, and else a step of Newton's method
-/// towards it. The multiplier is N itself here, which leaves bonds without stiffness in.
+/// Bonds with memory as compliant constraints (Macklin, Mueller, Chentanez: XPBD, 2016). The
+/// viscous elongation at the end of a step is y = offset + relaxation_factor V(l), so that it pulls
+/// with N = (k - g) u(l) + g ((1 - relaxation_factor) V(l) - offset): where it is linear, a
+/// constraint on l of compliance 1/(k - relaxation_factor g) about a rest elongation, and else a
+/// step of Newton's method towards it. The multiplier is N itself here, which leaves bonds without
+/// stiffness in.
 class BondProjection {
  public:
   /// @param bonds, freedom must live as long as this; contacts with tools are not projected

@@ -299,7 +299,7 @@ class ElementSystem final : public StageSystem,
     return MethodEnd::newton_failed;
   }
 
-  /// Without masses: puts the sphere where it is for what is imposed and remembered.
+  /// Without masses: puts the sphere where it is for what is imposed and its viscous elongation.
   MethodEnd place_at(double imposed, double y) {
     // What is imposed at one time may have been found in two ways.
     constexpr double kRounding = 1e-13;

@@ -23,7 +23,7 @@ enum class StepRule {
   implicit_midpoint,
   newmark,  ///< average acceleration, beta = 1/4, gamma = 1/2
   tr_bdf2,
-  exponential,  ///< what bonds remember is advanced exactly under linear motion
+  exponential,  ///< viscous elongations advance exactly under linear motion
   xpbd,         ///< position-based dynamics with compliance
   cvode_adams,
   cvode_bdf,
@@ -109,7 +109,7 @@ struct MethodMasses {
 };
 
 /// An element or a network with its protocol: what a method steps. Without masses forces balance at
-/// each instant and only what bonds remember has a rate; with masses spheres move by Newton's law.
+/// each instant and only viscous elongations have a rate; with masses spheres move by Newton's law.
 class MethodProblem {
  public:
   virtual ~MethodProblem() = default;

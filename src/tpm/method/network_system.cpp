@@ -45,7 +45,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     viscous_.set_mean(y, memory_.offset);
     memory_.relaxation_factor = 0.0;
   }
-  /// The same where y = offset + following V(l).
+  /// The same where y = offset + relaxation_factor V(l).
   void set_memory(const ConstVector& offset, const ConstVector& relaxation_factor) {
     viscous_.set_mean(offset, memory_.offset);
     memory_.relaxation_factor = viscous_.mean_relaxation_factor(relaxation_factor);

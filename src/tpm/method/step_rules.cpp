@@ -78,8 +78,8 @@ class ForwardEuler final : public RateRule {
 };
 
 /// With masses velocities first, by the forces where the step begins and the drag where it ends,
-/// then positions by the new velocities. What bonds remember follows at last, towards the new
-/// elongations; without masses positions balance with what was remembered before.
+/// then positions by the new velocities. The viscous elongations follow at last, towards the new
+/// elongations; without masses positions balance with the viscous elongations before.
 class SemiImplicitEuler final : public RateRule {
  public:
   using RuleOn::RuleOn;
@@ -161,7 +161,7 @@ class ImplicitMidpoint final : public StageRule {
 };
 
 /// Average acceleration, beta = 1/4 and gamma = 1/2: the trapezoidal rule for x and v, and with it
-/// for what bonds remember.
+/// for the viscous elongations.
 class Newmark final : public RateStageRule {
  public:
   using RuleOn::RuleOn;
@@ -207,9 +207,9 @@ class TrBdf2 final : public RateStageRule {
   Vector rate_, middle_;
 };
 
-/// What bonds remember is advanced exactly under elongations that are linear over the step, solved
-/// together with the positions where it ends: those that balance or, with masses, those of the
-/// trapezoidal rule (Newmark).
+/// The viscous elongations are advanced exactly under elongations that are linear over the step,
+/// solved together with the positions where it ends: those that balance or, with masses, those of
+/// the trapezoidal rule (Newmark).
 class Exponential final : public RateStageRule {
  public:
   using RuleOn::RuleOn;

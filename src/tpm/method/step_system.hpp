@@ -4,9 +4,9 @@
 
 namespace tpm {
 
-/// An implicit stage of a step, the velocities and what bonds remember eliminated:
+/// An implicit stage of a step, the velocities and the viscous elongations eliminated:
 ///
-///     x = x* + c v,   v = v* + c a(t, x, y),   y = y* + following V(l(x))
+///     x = x* + c v,   v = v* + c a(t, x, y),   y = y* + relaxation_factor V(l(x))
 ///
 /// Without masses there are no x and v in a state and c does not count: x is where the forces
 /// balance.

@@ -33,7 +33,7 @@ class RelaxationFactor {
 };
 
 /// The mean viscous elongation of the bonds as a function of what they follow, V(l) (for linear
-/// branches l itself): y = offset + following V(l).
+/// branches l itself): y = offset + relaxation_factor V(l).
 struct BondMemory {
   Eigen::VectorXd offset;              ///< m, one per bond
   RelaxationFactor relaxation_factor;  ///< 0 to 1
@@ -112,7 +112,7 @@ class BondSystem {
   [[nodiscard]] const Eigen::VectorXd& stiffness() const { return stiffness_; }
   /// g of each bond, N/m, 0 <= g <= k.
   [[nodiscard]] const Eigen::VectorXd& relaxing() const { return relaxing_; }
-  /// The stiffness of each bond at rest of which a share has relaxed, k - following g, N/m.
+  /// The stiffness of each bond at rest of which a share has relaxed, k - relaxation_factor g, N/m.
   [[nodiscard]] Eigen::VectorXd stiffness_when(const RelaxationFactor& relaxation_factor) const;
 
   /// The contacts that overlap or just touch, as BondMemory::closed.
@@ -134,9 +134,9 @@ class BondSystem {
   void tensions(const Positions& position, const BondMemory& memory,
                 Eigen::VectorXd& tension) const;
 
-  /// Adds to `force` what the bonds pull their spheres with, N: with following = 0 the offset is
-  /// the mean viscous elongation now; with 1 and no offset everything is at equilibrium; between
-  /// them it is an implicit step of time.
+  /// Adds to `force` what the bonds pull their spheres with, N: with relaxation_factor = 0 the
+  /// offset is the mean viscous elongation now; with 1 and no offset everything is at equilibrium;
+  /// between them it is an implicit step of time.
   void add_forces(const Positions& position, const BondMemory& memory,
                   Eigen::Matrix3Xd& force) const;
 

@@ -52,7 +52,7 @@ class LargeEquilibrium;
 /// Force of a glued punch per depth at rest, to first order, N/m: u^T K u of the displacements
 /// under a motion of 1 of the patch, so that an error of u counts by its square.
 /// @param patch spheres that are held in the freedom of the solver
-/// @param following see BondMemory
+/// @param relaxation_factor see BondMemory
 /// @param tolerance of LargeEquilibrium::solve
 /// Throws Error(numerical) if the stiffness is not positive definite or the solution fails.
 [[nodiscard]] double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,

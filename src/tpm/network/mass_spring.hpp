@@ -10,9 +10,9 @@ enum class SpringRule {
   equal,           ///< one stiffness for all: the textbook's model
 };
 
-/// Force per depth at the probe for small depths, N/m, after everything has relaxed (following = 1)
-/// or before anything has (0).
-/// Throws Error(bad_input) for a probe that cannot move or a network with zero-energy modes.
+/// Force per depth at the probe for small depths, N/m, after everything has relaxed
+/// (relaxation_factor = 1) or before anything has (0). Throws Error(bad_input) for a probe that
+/// cannot move or a network with zero-energy modes.
 [[nodiscard]] double contact_stiffness_N_per_m(const BondSystem& bonds, const Positions& rest,
                                                const Constraints& constraints, const Probe& probe,
                                                double relaxation_factor);

@@ -94,7 +94,7 @@ LaneVector StageBalance::heat_W(const Within& states) const {
       general.push_back(group);
       continue;
     }
-    // V(l) = l, and the only branch is what the bond remembers: all lanes at once.
+    // V(l) = l, and the only branch is the viscous elongation: all lanes at once.
     const auto apart = elongation.middleCols(group.first, group.count) -
                        states.memory.middleCols(group.first, group.count);
     heat += apart.cwiseAbs2() * relaxing.segment(group.first, group.count) /

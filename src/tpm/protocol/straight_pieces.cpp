@@ -2,26 +2,27 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 #include <vector>
 
 namespace tpm {
+namespace {
 
-Protocol in_straight_pieces(Drive drive, std::span<const double> time_s,
-                            std::span<const double> value, double within) {
-  const Protocol whole = measured_history(drive, time_s, value);  // refuses what is no history
-  const std::size_t n = time_s.size();
-  std::vector<bool> kept(n, false);
+/// The knots that the straight lines between them leave within a distance of all others.
+std::vector<Knot> in_straight_pieces(std::span<const Knot> knots, double within) {
+  std::vector<bool> kept(knots.size(), false);
   kept.front() = kept.back() = true;
-  std::vector<std::pair<std::size_t, std::size_t>> pieces{{0, n - 1}};
+  std::vector<std::pair<std::size_t, std::size_t>> pieces{{0, knots.size() - 1}};
   while (!pieces.empty()) {
     const auto [from, to] = pieces.back();
     pieces.pop_back();
+    const Knot &begin = knots[from], &end = knots[to];
     double furthest = within;
     std::size_t corner = from;
     for (std::size_t i = from + 1; i < to; ++i) {
-      const double share = (time_s[i] - time_s[from]) / (time_s[to] - time_s[from]);
-      const double off = std::abs(value[i] - value[from] - (value[to] - value[from]) * share);
+      const double share = (knots[i].time_s - begin.time_s) / (end.time_s - begin.time_s);
+      const double off = std::abs(knots[i].value - begin.value - (end.value - begin.value) * share);
       if (off <= furthest) continue;
       furthest = off;
       corner = i;
@@ -31,21 +32,20 @@ Protocol in_straight_pieces(Drive drive, std::span<const double> time_s,
     pieces.emplace_back(from, corner);
     pieces.emplace_back(corner, to);
   }
-  std::vector<Knot> knots;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (kept[i]) knots.push_back({time_s[i], value[i]});
+  std::vector<Knot> few;
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    if (kept[i]) few.push_back(knots[i]);
   }
-  return {drive, std::move(knots), whole.name()};
+  return few;
 }
 
-Protocol followed_by_organ(const Protocol& measured) {
-  std::vector<double> time_s, depth_m;
-  for (const Knot& knot : measured.knots()) {
-    time_s.push_back(knot.time_s);
-    depth_m.push_back(knot.value);
-  }
-  const double deepest = std::max(*std::max_element(depth_m.begin(), depth_m.end()), 0.0);
-  Protocol motion = in_straight_pieces(measured.drive(), time_s, depth_m, kMotionWithin * deepest);
+}  // namespace
+
+Protocol followed_by_organ(const Protocol& measured, double contact) {
+  double deepest = 0.0;
+  for (const Knot& knot : measured.knots()) deepest = std::max(deepest, knot.value - contact);
+  Protocol motion(measured.drive(), in_straight_pieces(measured.knots(), kMotionWithin * deepest),
+                  measured.name());
   motion.set_relaxed_at_start(measured.relaxed_at_start());
   return motion;
 }

@@ -6,8 +6,8 @@
 
 namespace tpm {
 
-/// A network whose contact sphere stands at u while its bonds remember the relaxed equilibrium
-/// under the contact displacement w: y_b = l_b of that equilibrium. With
+/// A network whose contact sphere stands at u while its viscous elongations are those of the
+/// equilibrium under the contact displacement w: y_b = l_b there. With
 ///
 ///     Psi(u, w) = min over the free spheres of the energy stored in the springs
 ///
@@ -33,7 +33,7 @@ struct CondensedMetric {
   Eigen::Matrix3d metric = Eigen::Matrix3d::Zero();         ///< J' g J, N/m
   Eigen::Matrix3d second_metric = Eigen::Matrix3d::Zero();  ///< P' g P, N/m
   Eigen::Matrix3d second_energy = Eigen::Matrix3d::Zero();  ///< of P in the reduced energy, N/m
-  /// How all positions (3 per sphere) answer to what is remembered along P, the contact held.
+  /// How all positions (3 per sphere) answer to viscous elongations along P, the contact held.
   Eigen::Matrix<double, Eigen::Dynamic, 3> second_moves;
 };
 

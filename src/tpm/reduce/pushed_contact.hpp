@@ -34,11 +34,11 @@ class PushedContact {
 
   /// The equilibrium with the contact displaced, found along a straight line from rest or from the
   /// nearest of those found before with the same `relaxed`.
-  /// @param relaxed how far what bonds remember has caught up: 0 at once, 1 relaxed
+  /// @param relaxed how far the viscous elongations have caught up: 0 instantaneous, 1 equilibrium
   /// Throws Error(numerical) where the tissue buckles or none is found.
   [[nodiscard]] Positions at(const Eigen::Vector3d& displacement_m, double relaxed);
-  /// What bonds remember at such an equilibrium, told so that changes are felt with a given
-  /// stiffness: 0 that at once, 1 the relaxed one.
+  /// The viscous elongations at such an equilibrium, told so that changes are felt with a given
+  /// stiffness: 0 the instantaneous one, 1 that of equilibrium.
   [[nodiscard]] BondMemory memory(const Positions& position, double relaxed,
                                   double relaxation_factor) const;
   /// About such an equilibrium. Throws Error(numerical) if the tissue is not stiff there.

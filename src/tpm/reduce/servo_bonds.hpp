@@ -70,8 +70,8 @@ class ServoBonds {
   /// All viscous elongations become 0, as at rest.
   void forget() noexcept;
 
-  /// Adds what bonds pull with under displacements, now and at the end of the next period. What
-  /// they remember moves on with accept().
+  /// Adds what bonds pull with under displacements, now and at the end of the next period. The
+  /// viscous elongations move on with accept().
   void advance(const float* displacement, const ServoWeights& weights, float* force) noexcept;
   /// The same, now only.
   void advance_now(const float* displacement, const ServoWeights& weights, float* force) noexcept;

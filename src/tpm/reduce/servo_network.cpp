@@ -21,7 +21,7 @@ constexpr double kHold = 0.7;           // of an error, from one step to the nex
 constexpr double kTrusted = 0.02;       // error over the largest force
 constexpr double kScaleDepth_m = 1e-4;  // at which forces begin to count
 constexpr double kAside = 2.0;  // how much faster the fields change across the normal than along it
-// Rounding, of the largest force: at once, and of what is remembered, a step.
+// Rounding, of the largest force: at once, and of the viscous elongations, a step.
 constexpr double kRounding = 3e-7;
 constexpr double kRememberedRounding = 6e-9;
 constexpr double kLongestMemory = 1e3;  // steps

@@ -21,12 +21,12 @@ struct ServoNetworkOptions {
 };
 
 /// The quasi-static network (QuasiStatic), stepped at servo rate in single precision. Over a period
-/// elongations are taken as linear and what bonds remember is advanced exactly; the free spheres
+/// elongations are taken as linear and viscous elongations advance exactly; the free spheres
 /// are moved by one solution with a stiffness that was factorised beforehand, and the force at the
 /// contact is corrected, to first order, for what is left unbalanced.
 ///
 /// `error_N` estimates three things: what is left of that correction, by how the fields that it
-/// uses change with the place of the contact; what the bonds remember of places that were not
+/// uses change with the place of the contact; the viscous elongations of places that were not
 /// balanced; and what linear elongations cost (StepError). A step whose forces are not finite
 /// leaves the model so until reset().
 class ServoNetwork final : public ContactModel {

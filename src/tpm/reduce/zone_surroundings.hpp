@@ -12,7 +12,8 @@ class LinearBonds {
   LinearBonds(const PushedContact& tissue, const Positions& position, double relaxed,
               const std::vector<char>& chosen);
 
-  /// Adds what they resist displacements with, N: at once less `following` times what relaxes.
+  /// Adds what they resist displacements with, N: at once less `relaxation_factor` times what
+  /// relaxes.
   void add_resistance(const Eigen::Matrix3Xd& displacement, double relaxation_factor,
                       Eigen::Matrix3Xd& force) const;
   /// What relaxes of it.

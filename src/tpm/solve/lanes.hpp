@@ -19,7 +19,7 @@ struct MemoryWeights {
   LaneSquare of_stages;  ///< by (lane, stage)
   LaneVector of_start, of_memory;
 
-  /// What is remembered in every lane, one column per bond; `stages` is no part of `out`.
+  /// The viscous elongations in every lane, one column per bond; `stages` is no part of `out`.
   void apply(const Eigen::Ref<const LaneMatrix>& stages,
              const Eigen::Ref<const Eigen::RowVectorXd>& start,
              const Eigen::Ref<const Eigen::RowVectorXd>& memory, Eigen::Ref<LaneMatrix> out) const;

@@ -7,6 +7,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/scene/organ_model.hpp"
+#include "tpm/study/organ_material_parts.hpp"
 
 namespace tpm {
 namespace {
@@ -17,29 +18,19 @@ std::string with_si_unit(double value, Dimension dimension) {
   return fmt::format("{} {}", shortest(rounded(value, kSceneDigits)), si_symbol(dimension));
 }
 
-/// The values of a material that is not the paper's element, where a scene has them.
-void set_material(Json& material, const std::vector<ParameterDescription>& table,
+/// A material that is not the paper's element, with the fitted values.
+void set_material(Json& block, BondMaterial material,
+                  const std::vector<ParameterDescription>& table,
                   const std::vector<double>& values) {
-  Json branches = Json::array();
+  Json constants = Json::object();
   for (std::size_t i = 0; i < table.size(); ++i) {
-    const std::string name(table[i].name);
-    const std::string text = with_si_unit(values[i], table[i].dimension);
-    const bool of_branch = name.starts_with("tau") || (name[0] == 'g' && name.size() > 1);
-    if (name == "stiffening") {
-      material["potential"]["stiffening"] = text;
-    } else if (name == "kernel_stiffening") {
-      material["kernel"]["stiffening"] = text;
-    } else if (!of_branch) {
-      material[name] = text;
-    } else if (name[0] == 'g') {
-      branches.push_back({{"g", text}});
-    } else {
-      branches.back()["tau"] = text;
+    set_value(material, table[i].name, values[i], "the fitted material");
+    if (table[i].name == "A0" || table[i].name == "l0") {
+      constants[std::string(table[i].name)] = with_si_unit(values[i], table[i].dimension);
     }
   }
-  material.erase("fractional");
-  material.erase("branches");
-  if (!branches.empty()) material["branches"] = std::move(branches);
+  block = material_block(material, block);
+  block.update(constants);
 }
 
 /// The paper's constants; the spacing builds the organ.
@@ -111,7 +102,7 @@ std::optional<FittedScene> fitted_scene(const FitResult& fit) {
   if (model.has_element()) {
     set_element(scene, table, values, config.organ->network.organ.spacing);
   } else {
-    set_material(scene["material"], table, values);
+    set_material(scene["material"], config.organ->materials.materials.front(), table, values);
   }
   scene["description"] = fmt::format("material: fitted, {}", config.title);
 

@@ -9,18 +9,15 @@
 #include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/least_squares.hpp"
-#include "tpm/protocol/straight_pieces.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
-#include "tpm/study/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
 namespace tpm {
 namespace {
 
-constexpr std::size_t kMostTimes = 200;     // of a motion, that the forces are compared at
 constexpr double kBoundFactor = 1e4;        // of moduli about their start
 constexpr double kTimeFactor = 100.0;       // of relaxation times
 constexpr double kStiffeningFactor = 20.0;  // of the deepest depth
@@ -260,78 +257,12 @@ void carry_uncertainty(OrganMaterial& m, const OrganLessLaw& function, const Law
 
 }  // namespace
 
-Protocol in_few_pieces(const std::vector<double>& time_s, const std::vector<double>& depth_m,
-                       double contact_m) {
-  const double deepest = *std::max_element(depth_m.begin(), depth_m.end()) - contact_m;
-  Protocol motion =
-      in_straight_pieces(Drive::displacement, time_s, depth_m, kMotionWithin * deepest);
-  motion.set_relaxed_at_start(true);
-  return motion;
-}
-
 std::string_view intervals_name(MaterialIntervals intervals) noexcept {
   return entry_of(kIntervalsWords, intervals).text;
 }
 
 MaterialIntervals parse_intervals(std::string_view text, std::string_view where) {
   return parse_word(kIntervalsWords, "kind of intervals", text, where);
-}
-
-namespace {
-
-/// The law's own contact and offset if it was fitted to this recording alone; else those that suit
-/// the recording best.
-RecordingPlacement placement_of(const LawFile& law, const PreparedRecording& recording) {
-  const std::string& sha256 = recording.recording.header.sha256;
-  const bool own = law.uncertainty && law.uncertainty->data.size() == 1 && !sha256.empty() &&
-                   law.uncertainty->data.front().sha256 == sha256;
-  const std::vector<double> values = own ? law.values : place_recording(law, recording).values;
-  return {values[values.size() - 2], values.back()};
-}
-
-}  // namespace
-
-MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& recording) {
-  const Recording& r = recording.recording;
-  if (r.drive_quantity != law.spec.drive || r.response_quantity != law.spec.response) {
-    throw bad_input(fmt::format("recording '{}'", recording.name),
-                    fmt::format("{} over {}", quantity_name(r.response_quantity),
-                                quantity_name(r.drive_quantity)),
-                    fmt::format("{} over {}, as the law answers", quantity_name(law.spec.response),
-                                quantity_name(law.spec.drive)));
-  }
-  const RecordingPlacement placement = placement_of(law, recording);
-  std::vector<double> time_s, drive_m, force_N;
-  for (std::size_t i = 0; i < r.time_s.size() && r.time_s[i] <= recording.to_s; ++i) {
-    if (r.time_s[i] < recording.from_s) continue;
-    time_s.push_back(r.time_s[i]);
-    drive_m.push_back(r.drive[i]);
-    force_N.push_back(r.response[i] - placement.offset_N);
-  }
-  if (!(*std::max_element(drive_m.begin(), drive_m.end()) > placement.contact_m)) {
-    throw bad_input(fmt::format("recording '{}'", recording.name), "does not press the tissue",
-                    "a depth beyond the law's contact");
-  }
-  const Protocol drive = in_few_pieces(time_s, drive_m, placement.contact_m);
-  MaterialMotion motion{recording.name, beyond_contact(drive, placement.contact_m), {}};
-  const std::size_t stride = 1 + time_s.size() / kMostTimes;
-  for (std::size_t i = 0; i < time_s.size(); i += stride) {
-    motion.time_s.push_back(time_s[i]);
-    motion.measured_N.push_back(force_N[i]);
-  }
-  motion.drive = drive;
-  motion.placement = placement;
-  return motion;
-}
-
-MaterialMotion motion_of_protocol(const Protocol& protocol, std::vector<double> times_s) {
-  if (protocol.drive() != Drive::displacement || !(protocol.peak() > 0.0)) {
-    throw bad_input("protocol", "does not press the tissue to a depth", "imposed depths above 0");
-  }
-  std::vector<double> times;
-  const std::size_t stride = 1 + times_s.size() / kMostTimes;
-  for (std::size_t i = 0; i < times_s.size(); i += stride) times.push_back(times_s[i]);
-  return {{}, protocol, std::move(times)};
 }
 
 namespace {

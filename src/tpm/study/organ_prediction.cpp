@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "tpm/law/law_json.hpp"
-#include "tpm/study/organ_material_parts.hpp"
+#include "tpm/protocol/straight_pieces.hpp"
 #include "tpm/study/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 
@@ -284,7 +284,9 @@ LawPrediction predict_organ(const OrganOfLaw& organ, const PreparedRecording& re
     time_s.push_back(r.time_s[i]);
     depth_m.push_back(r.drive[i]);
   }
-  const Protocol motion = in_few_pieces(time_s, depth_m, placed(organ.law().values).contact);
+  Protocol whole = measured_history(Drive::displacement, time_s, depth_m);
+  whole.set_relaxed_at_start(true);
+  const Protocol motion = followed_by_organ(whole, placed(organ.law().values).contact);
   return named(predict_recording_by(
                    organ, organ.law(), recording, motion,
                    [&] { return place_on_organ(organ, recording, motion); }, options),

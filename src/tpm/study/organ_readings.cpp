@@ -154,12 +154,17 @@ FitParameter placement_parameter(std::string name, Dimension dimension, double s
   return p;
 }
 
+/// Half widths of linearised intervals, in standard deviations of theta.
+double linear_quantile(const FitResult& fit, const Threshold& threshold) {
+  const double factor = threshold.inflation * threshold.variance_factor(fit.best.deviance);
+  return std::sqrt(threshold.rise(fit.best.deviance) / factor);
+}
+
 /// t intervals from the covariance, open at the bounds.
 void add_linear_intervals(FitResult& fit, const Threshold& threshold) {
   const Covariance& c = fit.covariance;
   if (!c.full_rank) return;
-  const double factor = threshold.inflation * threshold.variance_factor(fit.best.deviance);
-  const double quantile = std::sqrt(threshold.rise(fit.best.deviance) / factor);
+  const double quantile = linear_quantile(fit, threshold);
   for (std::size_t k = 0; k < c.free.size(); ++k) {
     ParameterResult& p = fit.parameters[c.free[k]];
     const double theta = p.parameter.theta(p.estimate);
@@ -177,8 +182,7 @@ double half_width(const FitResult& fit, std::size_t index, const Threshold& thre
   const Covariance& c = fit.covariance;
   const auto place = std::find(c.free.begin(), c.free.end(), index);
   if (!c.full_rank || place == c.free.end()) return kPart * searched;
-  const double factor = threshold.inflation * threshold.variance_factor(fit.best.deviance);
-  return std::sqrt(threshold.rise(fit.best.deviance) / factor) * c.theta_sd[place - c.free.begin()];
+  return linear_quantile(fit, threshold) * c.theta_sd[place - c.free.begin()];
 }
 
 /// Profiles of the bonds' parameters, contacts and offsets fitted again at every point.
