@@ -22,12 +22,17 @@ TEST_CASE("a quantity is a number and a unit of the right dimension") {
   CHECK_THAT(parse_quantity("12 kPa", Dimension::stress, "here"), WithinRel(12000.0, 1e-15));
   CHECK_THAT(parse_quantity("12.56 mm^2", Dimension::area, "here"), WithinRel(12.56e-6, 1e-15));
   CHECK_THAT(parse_quantity("5 Pa s", Dimension::viscosity, "here"), WithinRel(5.0, 1e-15));
+  CHECK_THAT(parse_quantity("4mm", Dimension::length, "here"), WithinRel(4e-3, 1e-15));
+  CHECK_THAT(parse_quantity("1e3Pa", Dimension::stress, "here"), WithinRel(1e3, 1e-15));
+  CHECK_THROWS_WITH(parse_quantity("4mm", Dimension::stress, "key E"),
+                    Catch::StartsWith("key E: 'mm' is a unit of length"));
   CHECK_THROWS_WITH(
       parse_quantity("12 mm", Dimension::stress, "key E"),
       Catch::StartsWith("key E: 'mm' is a unit of length; expected a unit of stress"));
   CHECK_THROWS_WITH(parse_quantity("12", Dimension::stress, "key E"),
                     Catch::StartsWith("key E: '12' has no unit"));
-  for (const char* wrong : {"nan kPa", "inf kPa", "1e400 kPa", "3,5 kPa", "kPa", "", "0x10 kPa"}) {
+  for (const char* wrong :
+       {"nan kPa", "inf kPa", "1e400 kPa", "3,5 kPa", "kPa", "", "0x10 kPa", "0x10kPa", "infkPa"}) {
     CHECK_THROWS_AS(parse_quantity(wrong, Dimension::stress, "here"), Error);
   }
 }

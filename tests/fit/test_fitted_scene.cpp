@@ -19,8 +19,9 @@ namespace tpm {
 namespace {
 
 /// A fit of the paper's relaxation table with a star of four spheres.
-FitResult star_fit(const std::string& material, const std::string& parameters) {
-  const auto folder = std::filesystem::temp_directory_path() / "tpm_fitted_scene";
+/// @param folder for the scene, which fitted_scene() reads again
+FitResult star_fit(const test::TempFolder& folder, const std::string& material,
+                   const std::string& parameters) {
   write_file(folder / "s.json", R"({"organ": {"kind": "star"}, "material": )" + material + "}");
   const Json config = Json::parse(
       R"({"title": "star", "model": "organ", "scene": "s.json", "parameters": )" + parameters +
@@ -28,7 +29,7 @@ FitResult star_fit(const std::string& material, const std::string& parameters) {
            "protocol": {"kind": "ramp_hold", "rate": "4 mm/s", "rate_provenance": "assumed"},
            "noise": {"kind": "relative_to_datum", "relative": 0.1}}],
          "starts": {"count": 1}, "profile": {"enabled": false}})");
-  const FitResult fit = run_fit(parse_fit_config(config, "test", folder));
+  const FitResult fit = run_fit(parse_fit_config(config, "test", folder.path()));
   return fit;
 }
 
@@ -54,7 +55,9 @@ void check_run(const FitResult& fit) {
 }  // namespace
 
 TEST_CASE("the scene of an organ with branches answers as its fit") {
+  const test::TempFolder folder;
   check_run(star_fit(
+      folder,
       R"({"Einf": "8 kPa", "Eprime": "12 kPa", "branches": [{"g": "6 kPa", "tau": "5 s"}]})",
       R"({"Einf": {"start": "8 kPa", "lower": "0.1 kPa", "upper": "900 kPa"},
           "g1": {"start": "6 kPa", "lower": "0.1 kPa", "upper": "900 kPa"}})"));
@@ -62,8 +65,9 @@ TEST_CASE("the scene of an organ with branches answers as its fit") {
 
 TEST_CASE(
     "the scene of an organ of the paper's element answers as its fit, at the fitted spacing") {
+  const test::TempFolder folder;
   check_run(star_fit(
-      R"({"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "100 kPa s"})",
+      folder, R"({"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "100 kPa s"})",
       R"({"E": {"start": "12 kPa", "lower": "0.1 kPa", "upper": "900 kPa", "sets": ["E1", "E2", "Eprime"]},
           "spacing": {"start": "30 mm", "lower": "8 mm", "upper": "60 mm", "scale": "inverse_square"}})"));
 }

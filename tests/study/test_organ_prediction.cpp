@@ -7,6 +7,7 @@
 
 #include "liver_of_60.hpp"
 #include "refusal.hpp"
+#include "temp_folder.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/organ_prediction.hpp"
@@ -132,8 +133,8 @@ TEST_CASE("a small depth on an organ has the law's band") {
 }
 
 TEST_CASE("the written files carry the covariance, and only for their own tissue") {
-  const auto folder = std::filesystem::temp_directory_path() / "tpm_organ_prediction";
-  std::filesystem::remove_all(folder);
+  const test::TempFolder temporary;
+  const std::filesystem::path& folder = temporary.path();
   const OrganMaterial m = fitted_organ();
   write_file(folder / "scene.json", to_text(m.scene));
   const auto scene = (folder / "scene.json").string();
@@ -157,7 +158,6 @@ TEST_CASE("the written files carry the covariance, and only for their own tissue
   certain.uncertainty.reset();
   CHECK_THAT(test::refusal_of([&] { (void)organ_of_law(fitted_star(certain), "test"); }),
              Contains("carries no uncertainty"));
-  std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("an organ beside a recording finds its contact and offset") {

@@ -398,10 +398,14 @@ double parse_number(std::string_view text, std::string_view where) {
 
 double parse_quantity(std::string_view text, Dimension expected, std::string_view where) {
   const std::string_view t = trimmed(text);
-  const auto split = t.find_first_of(" \t");
+  std::size_t split = std::min(t.find_first_of(" \t"), t.size());
+  if (split == t.size()) {  // "4mm": the unit begins where the number ends
+    double number = 0.0;
+    const auto end = std::from_chars(t.data(), t.data() + t.size(), number).ptr;
+    if (end != t.data()) split = static_cast<std::size_t>(end - t.data());
+  }
   const std::string_view number = t.substr(0, split);
-  const std::string_view unit =
-      split == std::string_view::npos ? std::string_view{} : trimmed(t.substr(split));
+  const std::string_view unit = trimmed(t.substr(split));
   if (unit.empty() && expected != Dimension::dimensionless) {
     throw bad_input(where, fmt::format("'{}' has no unit", printable(t)),
                     fmt::format("a number and a unit of {}: {}", dimension_name(expected),
