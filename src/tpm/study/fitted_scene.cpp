@@ -19,9 +19,10 @@ std::string with_si_unit(double value, Dimension dimension) {
 }
 
 /// A material that is not the paper's element, with the fitted values.
-void set_material(Json& block, BondMaterial material,
-                  const std::vector<ParameterDescription>& table,
-                  const std::vector<double>& values) {
+/// @return its longest relaxation time, s
+double set_material(Json& block, BondMaterial material,
+                    const std::vector<ParameterDescription>& table,
+                    const std::vector<double>& values) {
   Json constants = Json::object();
   for (std::size_t i = 0; i < table.size(); ++i) {
     set_value(material, table[i].name, values[i], "the fitted material");
@@ -31,11 +32,15 @@ void set_material(Json& block, BondMaterial material,
   }
   block = material_block(material, block);
   block.update(constants);
+  double slowest_s = 0.0;
+  for (const auto& b : material.branches) slowest_s = std::max(slowest_s, b.relaxation_time_s);
+  return slowest_s;
 }
 
 /// The paper's constants; the spacing builds the organ.
-void set_element(Json& scene, const std::vector<ParameterDescription>& table,
-                 const std::vector<double>& values, double spacing_m) {
+/// @return the relaxation time, s
+double set_element(Json& scene, const std::vector<ParameterDescription>& table,
+                   const std::vector<double>& values, double spacing_m) {
   for (std::size_t i = 0; i < table.size(); ++i) {
     const std::string name(table[i].name);
     const std::string text = with_si_unit(values[i], table[i].dimension);
@@ -45,6 +50,12 @@ void set_element(Json& scene, const std::vector<ParameterDescription>& table,
       scene["organ"]["spacing"] = text;
     }
   }
+  const auto constant = [&](std::string_view name) {
+    const auto at = std::find_if(table.begin(), table.end(),
+                                 [&](const ParameterDescription& p) { return p.name == name; });
+    return values[static_cast<std::size_t>(at - table.begin())];
+  };
+  return constant("eta1") / (constant("E1") + constant("E2"));
 }
 
 /// A ramp to the largest fitted depth, at the rate of the data, and a hold.
@@ -99,28 +110,16 @@ std::optional<FittedScene> fitted_scene(const FitResult& fit) {
   const auto described = model.parameters();
   const std::vector<ParameterDescription> table(described.begin(), described.end());
   const std::vector<double> values = model_parameters(config, fit.best.natural, 0);
-  if (model.has_element()) {
-    set_element(scene, table, values, config.organ->network.organ.spacing);
-  } else {
-    set_material(scene["material"], config.organ->materials.materials.front(), table, values);
-  }
+  const double slowest_s =
+      model.has_element() ? set_element(scene, table, values, config.organ->network.organ.spacing)
+                          : set_material(scene["material"],
+                                         config.organ->materials.materials.front(), table, values);
   scene["description"] = fmt::format("material: fitted, {}", config.title);
 
   const Json ramp = ramp_json(ramp_of(fit));
-  Json tissue = Json::object();
-  for (const char* key : {"organ", "bonds", "material", "anchors", "guides"}) {
-    if (scene.contains(key)) tissue[key] = scene.at(key);
-  }
   scene["protocol"] = ramp;
   scene["contacts"] = Json::array({{{"kind", "sphere"}}});
-  result.session = {{"title", config.title},
-                    {"model", {{"kind", "network"}, {"scene", std::move(tissue)}}},
-                    {"rate", "1 kHz"},
-                    {"indentations",
-                     {{"depths", Json::array({ramp.at("depth")})},
-                      {"rates", Json::array({ramp.at("rate")})},
-                      {"hold", ramp.at("hold")},
-                      {"rest", "10 s"}}}};
+  result.session = network_session(config.title, scene, ramp, slowest_s);
   return result;
 }
 

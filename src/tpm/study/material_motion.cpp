@@ -28,13 +28,7 @@ RecordingPlacement placement_of(const LawFile& law, const PreparedRecording& rec
 
 MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& recording) {
   const Recording& r = recording.recording;
-  if (r.drive_quantity != law.spec.drive || r.response_quantity != law.spec.response) {
-    throw bad_input(fmt::format("recording '{}'", recording.name),
-                    fmt::format("{} over {}", quantity_name(r.response_quantity),
-                                quantity_name(r.drive_quantity)),
-                    fmt::format("{} over {}, as the law answers", quantity_name(law.spec.response),
-                                quantity_name(law.spec.drive)));
-  }
+  require_quantities_of(law, recording);
   const RecordingPlacement placement = placement_of(law, recording);
   std::vector<double> time_s, drive_m, force_N;
   for (std::size_t i = 0; i < r.time_s.size() && r.time_s[i] <= recording.to_s; ++i) {

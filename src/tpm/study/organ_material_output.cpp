@@ -269,6 +269,23 @@ Json material_block(const BondMaterial& m, const Json& before) {
   return block;
 }
 
+Json network_session(std::string title, const Json& scene, const Json& ramp, double slowest_s) {
+  Json tissue = Json::object();
+  for (const char* key : {"organ", "bonds", "material", "anchors", "guides"}) {
+    if (scene.contains(key)) tissue[key] = scene.at(key);
+  }
+  constexpr double kRests = 8.0, kLeastRest_s = 5.0;
+  return {{"title", std::move(title)},
+          {"model", {{"kind", "network"}, {"scene", std::move(tissue)}}},
+          {"rate", "1 kHz"},
+          {"indentations",
+           {{"depths", Json::array({ramp.at("depth")})},
+            {"rates", Json::array({ramp.at("rate")})},
+            {"hold", ramp.at("hold")},
+            {"rest",
+             fmt::format("{} s", significant(std::max(kRests * slowest_s, kLeastRest_s), 3))}}}};
+}
+
 void add_protocol_and_session(OrganMaterial& m) {
   const MaterialCourse& deepest = deepest_course(m);
   const Json ramp = ramp_block(deepest, ramp_rate(deepest));
@@ -277,23 +294,9 @@ void add_protocol_and_session(OrganMaterial& m) {
     m.scene["protocol"] = ramp;
     if (!m.scene.contains("contacts")) m.scene["contacts"] = Json::array({{{"kind", "sphere"}}});
   }
-  Json tissue = Json::object();
-  for (const char* key : {"organ", "bonds", "material", "anchors", "guides"}) {
-    if (m.scene.contains(key)) tissue[key] = m.scene.at(key);
-  }
-  double longest_s = 0.0;
-  for (const auto& b : m.material.branches) longest_s = std::max(longest_s, b.relaxation_time_s);
-  constexpr double kRests = 8.0, kLeastRest_s = 5.0;
-  m.session = {
-      {"title", fmt::format("{} on an organ", m.law)},
-      {"model", {{"kind", "network"}, {"scene", std::move(tissue)}}},
-      {"rate", "1 kHz"},
-      {"indentations",
-       {{"depths", Json::array({ramp.at("depth")})},
-        {"rates", Json::array({ramp.at("rate")})},
-        {"hold", ramp.at("hold")},
-        {"rest",
-         fmt::format("{} s", significant(std::max(kRests * longest_s, kLeastRest_s), 3))}}}};
+  double slowest_s = 0.0;
+  for (const auto& b : m.material.branches) slowest_s = std::max(slowest_s, b.relaxation_time_s);
+  m.session = network_session(fmt::format("{} on an organ", m.law), m.scene, ramp, slowest_s);
 }
 
 void compare(OrganMaterial& m, const std::vector<MaterialMotion>& motions) {

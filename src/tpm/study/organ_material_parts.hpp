@@ -1,5 +1,5 @@
 #pragma once
-// Parts of put_on_organ that write and compare.
+// What put_on_organ and fitted_scene write, and how forces are compared.
 #include "tpm/study/organ_material.hpp"
 
 namespace tpm {
@@ -7,6 +7,12 @@ namespace tpm {
 /// The block `material` of a scene.
 /// @param before the block in its place, whose A0, l0 and regions stay
 [[nodiscard]] Json material_block(const BondMaterial& material, const Json& before);
+
+/// A session that steps the network of a scene along a ramp and hold, and lets it recover.
+/// @param ramp with `depth`, `rate` and `hold`, as scenes write them
+/// @param slowest_s the tissue's longest relaxation time
+[[nodiscard]] Json network_session(std::string title, const Json& scene, const Json& ramp,
+                                   double slowest_s);
 
 /// Adds the motion as a ramp and hold where the scene has no protocol, and the session.
 void add_protocol_and_session(OrganMaterial& m);

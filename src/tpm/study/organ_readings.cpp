@@ -16,7 +16,7 @@ namespace tpm {
 namespace {
 
 constexpr double kContactDifference = 1e-3;  // of the largest depth
-constexpr double kLevel = 0.95;
+constexpr double kReadingsLevel = 0.95;
 
 struct PressRange {
   double depth_m = 0.0, peak_N = 0.0;
@@ -266,7 +266,7 @@ ReadingsFit fit_to_readings(const OrganModel& model, const FittedBonds& bonds,
   }
   const OrganLessReadings function(model, bonds, recordings, parameters.size());
   Threshold threshold;
-  threshold.level = kLevel;
+  threshold.level = kReadingsLevel;
   threshold.scale_known = false;
   threshold.data_count = static_cast<int>(function.residual_count());
   threshold.parameter_count = static_cast<int>(all.size());

@@ -47,6 +47,9 @@ void fill_prediction(LawPrediction& p, const Model& model, const LawFile& law,
                                        const Protocol& protocol, std::span<const double> times_s,
                                        const PredictionOptions& options);
 
+/// Throws Error(bad_input) if a recording does not have the drive and the response of a law.
+void require_quantities_of(const LawFile& law, const PreparedRecording& recording);
+
 /// Contact and offset of a recording for a held material, and which parameters those are.
 struct OwnPlacement {
   std::vector<double> values;      ///< of the whole law

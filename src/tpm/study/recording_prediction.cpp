@@ -138,11 +138,7 @@ LawPrediction predict_recording(const LawFile& law, const PreparedRecording& rec
       options);
 }
 
-LawPrediction predict_recording_by(const Model& model, const LawFile& law,
-                                   const PreparedRecording& recording, const Protocol& motion,
-                                   const std::function<OwnPlacement()>& place,
-                                   const PredictionOptions& options) {
-  LawPrediction p = begin_prediction(law, options);
+void require_quantities_of(const LawFile& law, const PreparedRecording& recording) {
   const Recording& r = recording.recording;
   if (r.drive_quantity != law.spec.drive || r.response_quantity != law.spec.response) {
     throw bad_input(fmt::format("recording '{}'", recording.name),
@@ -151,6 +147,15 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
                     fmt::format("{} over {}, as the law answers", quantity_name(law.spec.response),
                                 quantity_name(law.spec.drive)));
   }
+}
+
+LawPrediction predict_recording_by(const Model& model, const LawFile& law,
+                                   const PreparedRecording& recording, const Protocol& motion,
+                                   const std::function<OwnPlacement()>& place,
+                                   const PredictionOptions& options) {
+  LawPrediction p = begin_prediction(law, options);
+  const Recording& r = recording.recording;
+  require_quantities_of(law, recording);
   p.placement =
       options.placement.value_or(has_read(law, recording) ? Placement::fitted : Placement::own);
   UncertainCoordinates u = fitted_coordinates(law, p.placement);
