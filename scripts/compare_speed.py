@@ -19,9 +19,10 @@ REGRESSION = 1.10
 # Whole commands that every version knows; files are written into a folder that is removed.
 COMMANDS = {
     "simulate liver_indentation": ["simulate", "{configs}/liver_indentation.json", "-o", "{tmp}/a.h5"],
-    "simulate organ_relaxation": ["simulate", "{configs}/liver_relaxation.json", "-o", "{tmp}/b.h5"],
+    "simulate liver_poke": ["simulate", "{configs}/liver_poke.json", "-o", "{tmp}/b.h5"],
+    "fit liver_relaxation": ["fit", "{configs}/liver_relaxation.json"],
     "network check liver_scene": ["network", "check", "{configs}/liver_scene.json"],
-    "plan liver_relaxation": ["plan", "{configs}/liver_relaxation.json"],
+    "plan deep": ["plan", "{configs}/plan/deep.json"],
     "tables": ["tables"],
 }
 
