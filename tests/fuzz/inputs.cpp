@@ -24,7 +24,7 @@
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/store/row_log.hpp"
-#include "tpm/study/claims.hpp"
+#include "tpm/study/audit.hpp"
 #include "tpm/study/design.hpp"
 #include "tpm/study/organ_study.hpp"
 #include "tpm/sweep/block_log.hpp"
@@ -53,9 +53,7 @@ void read_mesh(const Path& path) {
 }
 
 void read_claim_file(const Path& path) {
-  const Json document = read_json(path);
-  (void)read_claims(document, path.native());
-  (void)read_printed_tables(document, path.native());
+  (void)run_audit(read_json(path), path.native());
 }
 
 void read_scene(const Path& path) {

@@ -31,7 +31,7 @@ constexpr std::pair<const char*, const char*> kTaken[] = {
     {"scene", "configs/liver_poke.json"},
     {"session", "tests/fuzz/corpus/session/star.json"},
     {"sweep", "configs/sweep_x_depth.json"},
-    {"claims", "data/paper_claims.json"},
+    {"claims", "tests/fuzz/corpus/claims/one_of_each_kind.json"},
     {"design", "configs/design_meat.json"},
     {"costs", "tests/fuzz/corpus/costs/equal.json"},
     {"delimited_text", "tests/fuzz/corpus/delimited_text/ramp.csv"},
