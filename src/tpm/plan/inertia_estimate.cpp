@@ -8,6 +8,7 @@
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/network/driven_tissue.hpp"
 #include "tpm/network/lowest_mode.hpp"
+#include "tpm/plan/rest_answers.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -17,12 +18,6 @@ constexpr int kLanczosSteps = 24;
 constexpr std::size_t kMostKinks = 200;
 constexpr int kSamples = 400;     // after each change of rate
 constexpr double kPeriods = 3.0;  // of the lowest mode that they span
-
-/// A mode as the contact sees it.
-struct SeenMode {
-  double omega2 = 0.0;  ///< rad^2/s^2
-  double weight = 0.0;  ///< Gamma^2 omega^2
-};
 
 /// Lanczos' method with full orthogonalisation.
 class Lanczos {
@@ -188,7 +183,7 @@ double of_jump(double jump, const std::vector<SeenMode>& modes, double alpha, do
 
 }  // namespace
 
-InertiaEstimate estimate_inertia(const PlanScene& scene) {
+InertiaModes inertia_modes(const PlanScene& scene) {
   const DrivenNetwork& driven = scene.driven();
   const Eigen::VectorXd mass = masses_kg(scene.scene(), scene.run_network());
   const LowestMode lowest = lowest_mode(driven.bonds, driven.rest, driven.constraints, mass);
@@ -201,26 +196,34 @@ InertiaEstimate estimate_inertia(const PlanScene& scene) {
   if (!tissue.equilibrium().factorise(rest.position, memory)) {
     throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");
   }
-  const auto modes = without_ringing_contacts(
+  InertiaModes found;
+  found.modes = without_ringing_contacts(
       Lanczos(scene, rest, tissue.constraints(), mass, lowest.relaxation_factor)
           .modes(tissue.unit_field(rest, memory).displacement),
       driven.bonds, mass);
+  found.lowest_Hz = lowest.frequency_Hz;
+  found.alpha_per_s = alpha;
+  Eigen::VectorXd damped = mass;  // tools are not
+  for (const ToolContact& contact : driven.bonds.contacts()) damped[contact.tool] = 0.0;
+  if (tissue.depth_driven()) found.own_drag_kg_s = alpha * tissue.driven_mass_kg(damped);
+  return found;
+}
+
+InertiaEstimate estimate_inertia(const PlanScene& scene) {
+  const auto& [modes, lowest_Hz, alpha, own_drag] = modes_at_rest(scene);
   InertiaEstimate estimate;
-  estimate.lowest_Hz = lowest.frequency_Hz;
+  estimate.lowest_Hz = lowest_Hz;
   for (const SeenMode& mode : modes) {
     estimate.highest_Hz =
         std::max(estimate.highest_Hz, std::sqrt(mode.omega2) / (2.0 * std::numbers::pi));
   }
-  const double span_s = kPeriods / lowest.frequency_Hz;
-  Eigen::VectorXd damped = mass;  // tools are not
-  for (const ToolContact& contact : driven.bonds.contacts()) damped[contact.tool] = 0.0;
-  const double own_drag = tissue.depth_driven() ? alpha * tissue.driven_mass_kg(damped) : 0.0;
+  const double span_s = kPeriods / lowest_Hz;
   estimate.of_rates = of_rates(rate_kinks(scene.protocol()), modes, alpha, own_drag, span_s,
                                scene.protocol().knots().back().time_s);
   const double jump = largest_jump(scene.protocol());
   if (jump > 0.0) {
-    estimate.of_jumps = tissue.depth_driven() ? std::numeric_limits<double>::infinity()
-                                              : of_jump(jump, modes, alpha, span_s);
+    estimate.of_jumps = scene.by_depth() ? std::numeric_limits<double>::infinity()
+                                         : of_jump(jump, modes, alpha, span_s);
   }
   return estimate;
 }

@@ -1,7 +1,23 @@
 #pragma once
+#include <vector>
+
 #include "tpm/plan/plan_scene.hpp"
 
 namespace tpm {
+
+/// A mode as the contact sees it.
+struct SeenMode {
+  double omega2 = 0.0;  ///< rad^2/s^2
+  double weight = 0.0;  ///< Gamma^2 omega^2
+};
+
+/// How the network with masses moves about rest.
+struct InertiaModes {
+  std::vector<SeenMode> modes;
+  double lowest_Hz = 0.0;      ///< frequency of the lowest mode
+  double alpha_per_s = 0.0;    ///< damping in proportion to mass
+  double own_drag_kg_s = 0.0;  ///< of what an imposed depth drives, kg/s; 0 under a load
+};
 
 /// What masses do to the response where the network is linear about rest.
 struct InertiaEstimate {
@@ -19,5 +35,8 @@ struct InertiaEstimate {
 /// own mass weighs in the drag is in it, its blows are not, as in InertialRun::response. Throws as
 /// lowest_mode and masses_kg do.
 [[nodiscard]] InertiaEstimate estimate_inertia(const PlanScene& scene);
+
+/// What of it no protocol changes. Throws as estimate_inertia does.
+[[nodiscard]] InertiaModes inertia_modes(const PlanScene& scene);
 
 }  // namespace tpm

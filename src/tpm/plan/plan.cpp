@@ -90,7 +90,7 @@ class Planning {
     plan_.needs_full = std::none_of(
         plan_.candidates.begin(), plan_.candidates.end(),
         [](const PlannedCandidate& c) { return c.reach == ModelReach::reduced && c.accurate; });
-    plan_.validity = passed_limits(scene_);
+    plan_.validity = passed_limits(*surrogate_);
     if (plan_.request.relevance) {
       tell("what does not matter");
       plan_.relevance = plan_relevance(*surrogate_, plan_.request.tolerance);

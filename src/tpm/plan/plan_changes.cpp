@@ -14,16 +14,6 @@ namespace {
 
 constexpr double kStride = 1.5;    // between factors tried
 constexpr double kFoundTo = 1.02;  // by bisection
-constexpr double kValidityTolerance = 1e-3;
-
-Validity validity_of(const PlanScene& scene) {
-  std::vector<double> times;
-  for (const Knot& knot : scene.protocol().knots()) times.push_back(knot.time_s);
-  times.erase(std::unique(times.begin(), times.end()), times.end());
-  QuasiStaticOptions options;
-  options.tolerance = kValidityTolerance;
-  return scene.quasi_static(options, times, true).validity;
-}
 
 /// The changes of a scene, and whether a model survives them.
 class Survival {
@@ -32,7 +22,7 @@ class Survival {
       : surrogate_(surrogate),
         model_(model),
         request_(request),
-        valid_(passed_limits(surrogate.scene()).empty()) {}
+        valid_(passed_limits(surrogate).empty()) {}
 
   /// What breaks in a changed scene; none if nothing does.
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
@@ -40,7 +30,7 @@ class Survival {
       const PlanSurrogate changed(scene, request_.measure, surrogate_.inertial());
       if (auto reason = model_.why_not(changed, request_.budget)) return reason;
       if (valid_) {
-        const auto passed = passed_limits(scene);
+        const auto passed = passed_limits(changed);
         if (!passed.empty()) return "validity: " + passed.front();
       }
       const ModelClaim claim = model_.claim(changed, request_.budget);
@@ -106,8 +96,8 @@ class Survival {
 
 }  // namespace
 
-std::vector<std::string> passed_limits(const PlanScene& scene) {
-  const Validity validity = validity_of(scene);
+std::vector<std::string> passed_limits(const PlanSurrogate& surrogate) {
+  const Validity& validity = surrogate.validity();
   std::vector<std::string> words;
   for (std::size_t k = 0; k < kValidityLimits; ++k) {
     const auto limit = static_cast<ValidityLimit>(k);

@@ -14,8 +14,8 @@ namespace tpm {
                                                    const PlanModel& model,
                                                    const PlanRequest& request);
 
-/// Limits that the scene passes at the corners of its protocol, in words.
-[[nodiscard]] std::vector<std::string> passed_limits(const PlanScene& scene);
+/// Limits that the scene passes in its course, in words.
+[[nodiscard]] std::vector<std::string> passed_limits(const PlanSurrogate& surrogate);
 
 /// Why a model does not fit a budget; none if it does.
 [[nodiscard]] std::optional<std::string> over_budget(const PlanModel& model,

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "tpm/plan/rest_answers.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -92,7 +93,16 @@ std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int m
 }
 
 PlanScene::PlanScene(ExperimentScene scene)
-    : scene_(plannable(std::move(scene))), network_(network_to_run(scene_)) {}
+    : scene_(plannable(std::move(scene))),
+      network_(std::make_shared<const RunNetwork>(network_to_run(scene_))),
+      at_rest_(std::make_shared<RestAnswers>()) {}
+
+PlanScene::PlanScene(ExperimentScene scene, const PlanScene& same_network)
+    : scene_(std::move(scene)),
+      network_(same_network.network_),
+      at_rest_(scene_.protocol.drive() == same_network.protocol().drive()
+                   ? same_network.at_rest_
+                   : std::make_shared<RestAnswers>()) {}
 
 double PlanScene::duration_s() const {
   return protocol().knots().back().time_s - protocol().start_s();
@@ -124,18 +134,18 @@ int PlanScene::moving_layers() const {
 
 Trajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
                                    const std::vector<double>& times_s, bool with_field) const {
-  return run_quasi_static(scene_, network_, options, times_s, with_field);
+  return run_quasi_static(scene_, *network_, options, times_s, with_field);
 }
 
 Trajectory PlanScene::inertial(const InertialOptions& options, const std::vector<double>& times_s,
                                bool with_field) const {
-  return run_inertial(scene_, network_, options, times_s, with_field);
+  return run_inertial(scene_, *network_, options, times_s, with_field);
 }
 
 PlanScene PlanScene::with_protocol(Protocol protocol) const {
   ExperimentScene scene = scene_;
   scene.protocol = std::move(protocol);
-  return PlanScene(std::move(scene));
+  return {std::move(scene), *this};
 }
 
 PlanScene PlanScene::deeper(double factor) const {

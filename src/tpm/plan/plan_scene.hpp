@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "tpm/plan/operations.hpp"
@@ -35,6 +36,8 @@ struct PlanMeasure {
 [[nodiscard]] std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int most,
                                                 double tau_s);
 
+struct RestAnswers;
+
 /// A scene with its network, and the runs of the full nonlinear network on it.
 class PlanScene {
  public:
@@ -43,19 +46,21 @@ class PlanScene {
   explicit PlanScene(ExperimentScene scene);
 
   [[nodiscard]] const ExperimentScene& scene() const { return scene_; }
-  [[nodiscard]] const DrivenNetwork& driven() const { return network_.driven; }
-  [[nodiscard]] const Network& network() const { return network_.network; }
+  [[nodiscard]] const DrivenNetwork& driven() const { return network_->driven; }
+  [[nodiscard]] const Network& network() const { return network_->network; }
   [[nodiscard]] const Protocol& protocol() const { return scene_.protocol; }
   [[nodiscard]] double duration_s() const;
   [[nodiscard]] bool by_depth() const { return protocol().drive() == Drive::displacement; }
-  [[nodiscard]] bool has_tools() const { return !network_.driven.tools.empty(); }
+  [[nodiscard]] bool has_tools() const { return !network_->driven.tools.empty(); }
   /// One sphere driven itself and nothing else in contact.
   [[nodiscard]] bool single_sphere() const;
   /// What is imposed jumps, at the start or later.
   [[nodiscard]] bool jumps() const;
   /// Layers of which a sphere moves.
   [[nodiscard]] int moving_layers() const;
-  [[nodiscard]] const RunNetwork& run_network() const { return network_; }
+  [[nodiscard]] const RunNetwork& run_network() const { return *network_; }
+  /// What the network at rest answers; scenes that differ in their protocols alone share it.
+  [[nodiscard]] RestAnswers& at_rest() const { return *at_rest_; }
 
   /// The network without masses. Throws Error(numerical) as QuasiStatic does.
   /// @param times_s rising
@@ -79,8 +84,11 @@ class PlanScene {
   [[nodiscard]] PlanScene with_layers(int layers) const;
 
  private:
+  PlanScene(ExperimentScene scene, const PlanScene& same_network);
+
   ExperimentScene scene_;
-  RunNetwork network_;
+  std::shared_ptr<const RunNetwork> network_;
+  std::shared_ptr<RestAnswers> at_rest_;
 };
 
 }  // namespace tpm

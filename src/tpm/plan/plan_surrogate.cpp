@@ -84,7 +84,8 @@ const Trajectory& PlanSurrogate::collocation(double tolerance) const {
   QuasiStaticOptions options;
   options.tolerance = tolerance;
   options.most_iterations = most_iterations_;
-  return collocation_.emplace(tolerance, scene_.quasi_static(options, times_, wants_field()))
+  const bool with_field = wants_field() || tolerance == kRoughTolerance;  // its validity is read
+  return collocation_.emplace(tolerance, scene_.quasi_static(options, times_, with_field))
       .first->second;
 }
 
@@ -93,7 +94,7 @@ const Trajectory& PlanSurrogate::coarse() const {
 }
 
 double PlanSurrogate::coarse_error() const {
-  return trajectory_error(collocation(10.0 * kTolerance), coarse(), measure_);
+  return trajectory_error(rough(), coarse(), measure_);
 }
 
 const Trajectory& PlanSurrogate::with_masses(double tolerance) const {
@@ -103,11 +104,6 @@ const Trajectory& PlanSurrogate::with_masses(double tolerance) const {
       .emplace(tolerance,
                scene_.inertial(inertial_options(scene_, tolerance), times_, wants_field()))
       .first->second;
-}
-
-const ContactSpectrum& PlanSurrogate::spectrum() const {
-  if (!spectrum_) spectrum_ = contact_spectrum(scene_);
-  return *spectrum_;
 }
 
 const InertiaEstimate& PlanSurrogate::inertia() const {

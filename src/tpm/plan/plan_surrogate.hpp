@@ -3,9 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "tpm/plan/contact_spectrum.hpp"
-#include "tpm/plan/inertia_estimate.hpp"
-#include "tpm/plan/plan_scene.hpp"
+#include "tpm/plan/rest_answers.hpp"
 
 namespace tpm {
 
@@ -34,12 +32,14 @@ class PlanSurrogate {
   [[nodiscard]] const Trajectory& collocation(double tolerance) const;
   /// That at the surrogate's own tolerance, by which models are judged before they are verified.
   [[nodiscard]] const Trajectory& coarse() const;
-  /// Its difference from a run at ten times its tolerance.
+  /// Where a run at ten times its tolerance leaves the model's limits.
+  [[nodiscard]] const Validity& validity() const { return rough().validity; }
+  /// Its difference from that run.
   [[nodiscard]] double coarse_error() const;
   /// The network with masses.
   [[nodiscard]] const Trajectory& with_masses(double tolerance) const;
 
-  [[nodiscard]] const ContactSpectrum& spectrum() const;
+  [[nodiscard]] const ContactSpectrum& spectrum() const { return spectrum_at_rest(scene_); }
   [[nodiscard]] const InertiaEstimate& inertia() const;
   /// InertiaEstimate::of_rates in parts of the coarse run's peak.
   [[nodiscard]] double inertia_share() const;
@@ -55,13 +55,15 @@ class PlanSurrogate {
   static constexpr double kTolerance = 1e-4;
 
  private:
+  [[nodiscard]] const Trajectory& rough() const { return collocation(kRoughTolerance); }
+
+  static constexpr double kRoughTolerance = 10.0 * kTolerance;
   PlanScene scene_;
   PlanMeasure measure_;
   bool inertial_;
   std::optional<int> most_iterations_;
   std::vector<double> times_;
   mutable std::map<double, Trajectory> collocation_, with_masses_;
-  mutable std::optional<ContactSpectrum> spectrum_;
   mutable std::optional<InertiaEstimate> inertia_;
   mutable std::optional<ContactCurves> curves_;
 };

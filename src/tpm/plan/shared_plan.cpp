@@ -88,16 +88,16 @@ const SharedPlan::OfDepth& SharedPlan::of_depth(int place) {
   if (found != of_depth_.end()) return found->second;
   OfDepth made;
   try {
-    if (!spectrum_) spectrum_ = contact_spectrum(scene_);
+    const ContactSpectrum& spectrum = spectrum_at_rest(scene_);
     const double depth = depth_of_place(place);
     const PlanSurrogate surrogate(scene_.with_protocol(ramp_and_hold(depth, depth, 0.0)), {}, false,
                                   kMostIterations);
     const ContactCurves& curves = surrogate.curves();
     for (const int branches : {1, 2, 3}) {
-      made.models.push_back(linear_contact(*spectrum_, branches));
+      made.models.push_back(linear_contact(spectrum, branches));
     }
     for (const int branches : {1, 2}) {
-      made.models.push_back(curves_contact(curves, *spectrum_, branches));
+      made.models.push_back(curves_contact(curves, spectrum, branches));
     }
   } catch (const Error& error) {
     if (error.code() == ExitCode::environment) throw;
@@ -113,7 +113,7 @@ const std::vector<double>& SharedPlan::claims_at(Place place) {
   const OfDepth& here = of_depth(place.first);
   if (!here.models.empty()) try {
       const double depth = depth_of_place(place.first), ramp = std::exp2(place.second);
-      const double hold = kHoldOfLongest * spectrum_->longest_s;
+      const double hold = kHoldOfLongest * spectrum_at_rest(scene_).longest_s;
       const PlanSurrogate surrogate(scene_.with_protocol(ramp_and_hold(depth, depth / ramp, hold)),
                                     {}, false, kMostIterations);
       for (std::size_t m = 0; m < claims.size(); ++m) {

@@ -56,7 +56,6 @@ class SharedPlan {
   PlanScene scene_;  ///< with a relaxation time of 1 s
   double tolerance_;
   std::mutex one_at_a_time_;
-  std::optional<ContactSpectrum> spectrum_;
   std::map<int, OfDepth> of_depth_;
   std::map<Place, std::vector<double>> claims_;
 };
