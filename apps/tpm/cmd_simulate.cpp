@@ -77,20 +77,24 @@ SimulationRun run_watched(const ExperimentScene& scene, const RunNetwork& networ
 void tell_cost(const RunNetwork& network, const ExperimentScene& scene) {
   constexpr std::size_t kLarge = 2000;  // spheres; smaller ones take seconds
   constexpr double kWorthSaying_s = 1.0;
+  constexpr double kOfProduct = 54.0;      // operations in a product of 3x3 blocks
+  constexpr double kFactorisations = 2.0;  // at rest and in the first step
   if (network.driven.spheres() < kLarge) return;
+  const SolverChoice solver = choose_solver(network.driven.bonds, network.driven.constraints,
+                                            {.solver = scene.formulation.solver});
+  if (!solver.direct) return;
   const fs::path calibrated = usual_costs_file();
   const OperationCosts costs =
       !calibrated.empty() && fs::exists(calibrated) ? read_costs(calibrated) : nominal_costs();
-  const auto products = static_cast<double>(network.driven.bonds.pattern().factor_products());
-  const double seconds =
-      costs.seconds_of(OperationCount().add(Operation::factor_product, products));
+  const double seconds = costs.seconds_of(
+      OperationCount().add(Operation::factor_product, solver.operations / kOfProduct));
   if (seconds < kWorthSaying_s) return;
   tell_user(
       "tpm: {} spheres: a factorisation takes about {} s (costs of operations: {}), and a run of "
-      "{} s at least {} of them, one for each part: {} min or more\n",
+      "{} s at least {} of them: {} min or more\n",
       network.driven.spheres(), significant(seconds, 2), costs.source,
-      significant(scene.protocol.end_s() - scene.protocol.start_s(), 3), kRunParts,
-      significant(static_cast<double>(kRunParts) * seconds / 60.0, 2));
+      significant(scene.protocol.end_s() - scene.protocol.start_s(), 3), kFactorisations,
+      significant(kFactorisations * seconds / 60.0, 2));
 }
 
 Simulated simulated(ExperimentScene scene, fs::path file, double checkpoint_every_s) {

@@ -14,12 +14,12 @@
 namespace tpm {
 namespace {
 
-struct Kind {
+struct ClaimKind {
   std::string_view name;
   void (*check)(const ClaimReader&, Finding&);
 };
 
-constexpr auto kKinds = std::to_array<Kind>({
+constexpr auto kKinds = std::to_array<ClaimKind>({
     {"value", check_value},
     {"range", check_range},
     {"band", check_band},
@@ -30,12 +30,12 @@ constexpr auto kKinds = std::to_array<Kind>({
     {"misfit", check_misfit},
 });
 
-const Kind& kind_named(const std::string& name, std::string_view at) {
-  const auto found =
-      std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return k.name == name; });
+const ClaimKind& kind_named(const std::string& name, std::string_view at) {
+  const auto found = std::find_if(kKinds.begin(), kKinds.end(),
+                                  [&](const ClaimKind& k) { return k.name == name; });
   if (found != kKinds.end()) return *found;
   std::string known;
-  for (const Kind& k : kKinds) known += (known.empty() ? "" : ", ") + std::string(k.name);
+  for (const ClaimKind& k : kKinds) known += (known.empty() ? "" : ", ") + std::string(k.name);
   throw bad_input(at, fmt::format("unknown kind '{}'", printable(name)), "one of " + known);
 }
 
