@@ -222,12 +222,10 @@ class Run {
       }
       if (!lands_on_contact(h, length)) continue;
       if (tangents_) tangents_->follow_step(h);
-      report_within(h, rate);
-      if (options_.energies) {
-        const QuasiStaticEnergy part = stages_.energy_of_step(state_, h, rate);
-        energy_.work_J += part.work_J;
-        energy_.dissipated_J += part.dissipated_J;
-      }
+      std::optional<StepEnergy> energy;
+      if (options_.energies) energy = stages_.energy_of_step(state_, h, rate);
+      report_within(h, rate, energy);
+      if (energy) energy_ = with(energy->whole());
       result_.error_estimate += outcome.error;
       stages_.accept(state_, h, rate);
       if (tangents_) tangents_->accept();
@@ -279,9 +277,16 @@ class Run {
     state_.time_s = until_s;
   }
 
+  /// The energy at the start of a step, and what is spent since.
+  [[nodiscard]] QuasiStaticEnergy with(const QuasiStaticEnergy& part) const {
+    QuasiStaticEnergy sum = energy_;
+    sum.work_J += part.work_J;
+    sum.dissipated_J += part.dissipated_J;
+    return sum;
+  }
+
   /// Answers the times asked for within the step just found, its end left out.
-  void report_within(double h, double rate) {
-    Spent spent{0.0, energy_};
+  void report_within(double h, double rate, const std::optional<StepEnergy>& energy) {
     std::array<double, kLanes> fractions{};
     for (;;) {
       std::size_t count = 0;
@@ -299,7 +304,7 @@ class Run {
         }
       }
       if (observer_) {
-        show_within(asked, h, rate, spent);
+        show_within(asked, h, rate, energy);
         continue;
       }
       const LaneVector responses = stages_.responses_within(state_, asked, h, rate);
@@ -307,25 +312,13 @@ class Run {
     }
   }
 
-  /// Work and heat from the start of the run up to a fraction of a step.
-  struct Spent {
-    double fraction;
-    QuasiStaticEnergy energy;
-  };
-
   /// Responses within the step just found, with the states there.
-  /// @param fractions rising
-  void show_within(std::span<const double> fractions, double h, double rate, Spent& spent) {
+  void show_within(std::span<const double> fractions, double h, double rate,
+                   const std::optional<StepEnergy>& energy) {
     const auto [responses, states] = stages_.states_within(state_, fractions, h, rate);
     for (std::size_t i = 0; i < fractions.size(); ++i) {
-      if (options_.energies && fractions[i] > spent.fraction) {
-        const QuasiStaticEnergy part =
-            stages_.energy_of_step(state_, h, rate, spent.fraction, fractions[i]);
-        spent.energy.work_J += part.work_J;
-        spent.energy.dissipated_J += part.dissipated_J;
-        spent.fraction = fractions[i];
-      }
-      put(responses[static_cast<Eigen::Index>(i)], states[i], spent.energy);
+      const double response = responses[static_cast<Eigen::Index>(i)];
+      put(response, states[i], energy ? with(energy->until(fractions[i], response)) : energy_);
     }
   }
 

@@ -7,7 +7,19 @@
 namespace tpm {
 namespace {
 
-constexpr double kLongPart = 0.25;  // of a step: its quadrature takes 16 points instead of 8
+using LegendreValues = Eigen::Matrix<double, StepEnergy::kPoints + 1, 1>;
+
+/// Legendre's polynomials of degree 0 to kPoints at x, by their recurrence.
+LegendreValues legendre(double x) {
+  LegendreValues value;
+  value[0] = 1.0;
+  value[1] = x;
+  for (Eigen::Index n = 1; n < StepEnergy::kPoints; ++n) {
+    const auto m = static_cast<double>(n);
+    value[n + 1] = ((2.0 * m + 1.0) * x * value[n] - m * value[n - 1]) / (m + 1.0);
+  }
+  return value;
+}
 
 }  // namespace
 
@@ -120,46 +132,59 @@ LaneVector StageBalance::heat_W(const Within& states) const {
   return heat;
 }
 
-QuasiStaticEnergy StageBalance::energy_of_step(const TissueState& state, double h, double rate,
-                                               double from, double until) {
-  using Long = boost::math::quadrature::gauss<double, 2 * kLanes>;
-  using Short = boost::math::quadrature::gauss<double, kLanes>;
-  QuasiStaticEnergy energy;
-  double response_integral = 0.0;  // over the imposed value
-  const double half = 0.5 * (until - from);
-  std::array<double, kLanes> fractions{};
-  LaneVector weight;
-  const auto put = [&](std::size_t lane, double abscissa, double share) {
-    fractions[lane] = from + half * (1.0 + abscissa);
-    weight[static_cast<Eigen::Index>(lane)] = half * h * share;
-  };
-  const auto add = [&] {
-    const Within states = within(state, fractions, h, rate);
-    response_integral += rate * weight.dot(responses(states));
-    energy.dissipated_J += weight.dot(heat_W(states));
-  };
-  if (until - from > kLongPart) {
-    for (const double side : {-1.0, 1.0}) {
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        put(i, side * Long::abscissa()[i], Long::weights()[i]);
-      }
-      add();
-    }
-  } else {
+StepEnergy StageBalance::energy_of_step(const TissueState& state, double h, double rate) {
+  using Points = boost::math::quadrature::gauss<double, StepEnergy::kPoints>;
+  StepEnergy energy;
+  energy.h_s_ = h;
+  energy.rate_ = rate;
+  energy.imposed_ = state.imposed;
+  energy.by_load_ = !tissue_.depth_driven();
+  for (const double side : {-1.0, 1.0}) {
+    std::array<double, kLanes> fractions{};
     for (std::size_t i = 0; i < kLanes; ++i) {
-      const double side = i % 2 == 0 ? -1.0 : 1.0;
-      put(i, side * Short::abscissa()[i / 2], Short::weights()[i / 2]);
+      fractions[i] = 0.5 * (1.0 + side * Points::abscissa()[i]);
     }
-    add();
+    const Within states = within(state, fractions, h, rate);
+    const LaneVector response = responses(states), heat = heat_W(states);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const auto lane = static_cast<Eigen::Index>(i);
+      const StepEnergy::Series projected =
+          Points::weights()[i] * legendre(side * Points::abscissa()[i]).head<StepEnergy::kPoints>();
+      energy.response_ += response[lane] * projected;
+      energy.heat_W_ += heat[lane] * projected;
+    }
   }
-  if (tissue_.depth_driven()) {
-    energy.work_J = response_integral;
-  } else {
-    // The integral of F du, by parts.
-    const std::array<double, 2> ends{from, until};
+  for (Eigen::Index n = 0; n < StepEnergy::kPoints; ++n) {
+    const double norm = 0.5 * static_cast<double>(2 * n + 1);
+    energy.response_[n] *= norm;
+    energy.heat_W_[n] *= norm;
+  }
+  if (energy.by_load_) {
+    const std::array<double, 2> ends{0.0, 1.0};
     const LaneVector depth = responses_within(state, ends, h, rate);
-    energy.work_J = (state.imposed + until * h * rate) * depth[1] -
-                    (state.imposed + from * h * rate) * depth[0] - response_integral;
+    energy.response_at_start_ = depth[0];
+    energy.response_at_end_ = depth[1];
+  }
+  return energy;
+}
+
+double StepEnergy::integral(const Series& series, double fraction) {
+  const double x = 2.0 * fraction - 1.0;
+  const LegendreValues value = legendre(x);
+  double sum = series[0] * (x + 1.0);
+  for (Eigen::Index n = 1; n < kPoints; ++n) {
+    sum += series[n] * (value[n + 1] - value[n - 1]) / static_cast<double>(2 * n + 1);
+  }
+  return 0.5 * sum;
+}
+
+QuasiStaticEnergy StepEnergy::until(double fraction, double response) const {
+  QuasiStaticEnergy energy;
+  energy.dissipated_J = h_s_ * integral(heat_W_, fraction);
+  energy.work_J = rate_ * h_s_ * integral(response_, fraction);
+  if (by_load_) {  // the integral of F du, by parts
+    energy.work_J = (imposed_ + fraction * h_s_ * rate_) * response -
+                    imposed_ * response_at_start_ - energy.work_J;
   }
   return energy;
 }

@@ -28,6 +28,30 @@ struct ContactChange {
   double fraction = 0.0;  ///< of the step, 0 to 1
 };
 
+/// Work done and heat made within a step: what is spent at an instant is known at Gauss points, and
+/// the polynomial through it is integrated up to any fraction (by Legendre's polynomials).
+class StepEnergy {
+ public:
+  static constexpr int kPoints = 2 * kLanes;
+  using Series = Eigen::Matrix<double, kPoints, 1>;
+
+  /// From the start of the step, J.
+  /// @param fraction in [0, 1]
+  /// @param response at the fraction; only a load asks for it
+  [[nodiscard]] QuasiStaticEnergy until(double fraction, double response) const;
+  /// Of the whole step.
+  [[nodiscard]] QuasiStaticEnergy whole() const { return until(1.0, response_at_end_); }
+
+ private:
+  friend class StageBalance;
+  [[nodiscard]] static double integral(const Series& series, double fraction);
+
+  Series response_ = Series::Zero(), heat_W_ = Series::Zero();  ///< coefficients of the series
+  double h_s_ = 0.0, rate_ = 0.0, imposed_ = 0.0;
+  bool by_load_ = false;
+  double response_at_start_ = 0.0, response_at_end_ = 0.0;  ///< of a load
+};
+
 /// Responses and states at fractions of a step.
 struct StatesWithin {
   LaneVector response;
@@ -74,9 +98,8 @@ class StageBalance {
   [[nodiscard]] StatesWithin states_within(const TissueState& state,
                                            std::span<const double> fractions, double h,
                                            double rate);
-  /// Work done and heat made between two fractions of the step just balanced, by Gauss quadrature.
-  [[nodiscard]] QuasiStaticEnergy energy_of_step(const TissueState& state, double h, double rate,
-                                                 double from = 0.0, double until = 1.0);
+  /// Work done and heat made within the step just balanced.
+  [[nodiscard]] StepEnergy energy_of_step(const TissueState& state, double h, double rate);
   /// Moves the state to the end of the step just balanced.
   void accept(TissueState& state, double h, double rate);
 
