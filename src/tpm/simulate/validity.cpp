@@ -14,6 +14,12 @@ void insert(std::vector<std::size_t>& rising, std::size_t sphere) {
   if (at == rising.end() || *at != sphere) rising.insert(at, sphere);
 }
 
+/// What no bond that has turned beyond an angle stays below; 0 where the tangent says nothing.
+double cautious_tangent(double angle_rad) {
+  constexpr double kAlmost = 1.0 - 1e-9;
+  return angle_rad > 1.0 ? 0.0 : kAlmost * std::tan(angle_rad);
+}
+
 }  // namespace
 
 std::string_view key_of(ValidityLimit limit) {
@@ -65,14 +71,13 @@ double ValidityWatch::turned_rad(const Bond& bond, const Positions& position) co
 }
 
 bool ValidityWatch::may_have_turned_beyond(const Bond& bond, const Positions& position,
-                                           double angle_rad) const {
-  constexpr double kAlmost = 1.0 - 1e-9;
+                                           double tangent) const {
   const Positions& rest = network_.organ.position;
   const Eigen::Vector3d before = rest.col(bond.b) - rest.col(bond.a);
   const Eigen::Vector3d now = position.col(bond.b) - position.col(bond.a);
   const double along = before.dot(now);
-  if (along <= 0.0 || angle_rad > 1.0) return true;
-  const double across = kAlmost * std::tan(angle_rad) * along;
+  if (along <= 0.0) return true;
+  const double across = tangent * along;
   return before.cross(now).squaredNorm() >= across * across;
 }
 
@@ -87,9 +92,10 @@ std::vector<std::int32_t> ValidityWatch::flags(const Positions& position) const 
     if (indentation > kValidIndentation_m + kRounding_m) flags[i] |= 1;
     if (indentation > kDamageIndentation_m + kRounding_m) flags[i] |= 2;
   }
+  const double tangent = cautious_tangent(kValidTurning_rad);
   for (const Bond& bond : network_.bonds) {
     if (bond.kind != BondKind::lateral) continue;
-    if (!may_have_turned_beyond(bond, position, kValidTurning_rad)) continue;
+    if (!may_have_turned_beyond(bond, position, tangent)) continue;
     if (!(turned_rad(bond, position) > kValidTurning_rad)) continue;
     flags[bond.a] |= 4;
     flags[bond.b] |= 4;
@@ -109,10 +115,14 @@ void ValidityWatch::see(double time_s, const Positions& position) {
       insert(breach.spheres, i);
     }
   }
+  double tangent = cautious_tangent(seen_.most_turned_rad);
   for (const Bond& bond : network_.bonds) {
     if (bond.kind != BondKind::lateral) continue;
-    if (!may_have_turned_beyond(bond, position, seen_.most_turned_rad)) continue;
-    seen_.most_turned_rad = std::max(seen_.most_turned_rad, turned_rad(bond, position));
+    if (!may_have_turned_beyond(bond, position, tangent)) continue;
+    const double turned = turned_rad(bond, position);
+    if (!(turned > seen_.most_turned_rad)) continue;
+    seen_.most_turned_rad = turned;
+    tangent = cautious_tangent(turned);
   }
 }
 

@@ -31,10 +31,10 @@ class ValidityWatch {
   void restore(Validity earlier) { seen_ = std::move(earlier); }
 
  private:
-  /// The angle by which a bond has turned since rest.
-  /// False if the bond has turned by less, without the cost of the angle.
+  /// False if a bond has turned by less than an angle of that tangent, without the cost of angles.
   [[nodiscard]] bool may_have_turned_beyond(const Bond& bond, const Positions& position,
-                                            double angle_rad) const;
+                                            double tangent) const;
+  /// The angle by which a bond has turned since rest.
   [[nodiscard]] double turned_rad(const Bond& bond, const Positions& position) const;
   [[nodiscard]] double indentation_m(Eigen::Index sphere, const Positions& position) const;
 
