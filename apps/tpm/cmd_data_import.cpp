@@ -87,7 +87,7 @@ CurveHeader header_options(const ImportArguments& arguments, Provenance provenan
 
 ImportOptions options_of(const ImportArguments& arguments) {
   ImportOptions options;
-  options.format = parse_import_format(arguments.from, "--from");
+  options.format = arguments.from;
   options.text = text_options(arguments);
   if (!arguments.header_rows.empty()) {
     options.header_rows = parse_count(arguments.header_rows, 0, "--header-rows");
@@ -262,8 +262,9 @@ int import_files(const Session& session, const ImportArguments& arguments) {
 }
 
 void add_text_options(CLI::App& command, ImportArguments& a) {
-  command.add_option("--from", a.from, "auto, machine, wpd-csv, wpd-json, engauge or jpk")
-      ->check(CLI::IsMember({"auto", "machine", "wpd-csv", "wpd-json", "engauge", "jpk"}));
+  const std::vector<std::string> formats = import_formats();
+  command.add_option("--from", a.from, fmt::format("{}", fmt::join(formats, ", ")))
+      ->check(CLI::IsMember(formats));
   command.add_option("--separator", a.separator, "auto, comma, semicolon or tab")
       ->check(CLI::IsMember({"auto", "comma", "semicolon", "tab"}));
   command.add_option("--decimal", a.decimal, "Decimal sign: auto, point or comma")

@@ -144,7 +144,7 @@ void add_measures(ImportedSeries& series) {
 
 /// A digitised curve with a known imposed quantity is a set of points that a model can answer.
 bool becomes_points(const ImportedSeries& series, const ImportOptions& options) {
-  if (options.format == ImportFormat::machine || !series.lines.empty()) return false;
+  if (options.format == "machine" || !series.lines.empty()) return false;
   const Quantity response = observed(series).quantity;
   const bool force = response == Quantity::contact_force;
   const bool depth = response == Quantity::indentation_depth;

@@ -1,17 +1,18 @@
 #include "tpm/curve/import.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <numeric>
 
-#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/assemble.hpp"
 #include "tpm/curve/import_digitizer.hpp"
 #include "tpm/curve/import_jpk.hpp"
 #include "tpm/curve/import_machine.hpp"
+#include "tpm/curve/importer.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/zip_archive.hpp"
 #include "tpmkit/error.hpp"
@@ -19,25 +20,9 @@
 namespace tpm {
 namespace {
 
-constexpr auto kFormats = std::to_array<Word<ImportFormat>>({
-    {ImportFormat::automatic, "auto"},
-    {ImportFormat::machine, "machine"},
-    {ImportFormat::wpd_csv, "wpd-csv"},
-    {ImportFormat::wpd_json, "wpd-json"},
-    {ImportFormat::engauge, "engauge"},
-    {ImportFormat::jpk, "jpk"},
-});
-
 bool looks_like_json(std::string_view bytes) {
   const auto first = bytes.find_first_not_of(" \t\r\n");
   return first != std::string_view::npos && bytes[first] == '{';
-}
-
-std::vector<ImportFinding> text_findings(const DelimitedTable& table, ImportFormat format) {
-  return {{"format", std::string(import_format_name(format))},
-          {"encoding", std::string(encoding_name(table.encoding))},
-          {"separator", std::string(separator_name(table.separator))},
-          {"decimal sign", table.decimal_comma ? "comma" : "point"}};
 }
 
 const DigitizedAxis& required_axis(const std::optional<DigitizedAxis>& axis, char name,
@@ -68,12 +53,11 @@ void sort_along(std::vector<double>& x, std::vector<double>& y,
 }
 
 ImportedSeries digitized_series(DigitizedDataset dataset, const std::string& file,
-                                const ImportOptions& options, std::vector<ImportFinding> findings) {
+                                const ImportOptions& options) {
   const DigitizedAxis& x = required_axis(options.x, 'x', file);
   const DigitizedAxis& y = required_axis(options.y, 'y', file);
   ImportedSeries series;
   series.name = dataset.name;
-  series.findings = std::move(findings);
   if (!dataset.name.empty()) series.findings.push_back({"dataset", printable(dataset.name)});
   if (x.quantity == Quantity::time) sort_along(dataset.x, dataset.y, series.findings);
   for (const auto& [name, axis] : {std::pair{"x axis", &x}, std::pair{"y axis", &y}}) {
@@ -87,8 +71,7 @@ ImportedSeries digitized_series(DigitizedDataset dataset, const std::string& fil
 }
 
 std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datasets,
-                                            const std::string& file, const ImportOptions& options,
-                                            const std::vector<ImportFinding>& findings) {
+                                            const std::string& file, const ImportOptions& options) {
   std::string names;
   std::vector<ImportedSeries> all;
   for (DigitizedDataset& dataset : datasets) {
@@ -96,32 +79,79 @@ std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datase
     if (!options.dataset.empty() && dataset.name != options.dataset) continue;
     if (dataset.x.empty() && options.dataset.empty()) continue;
     if (dataset.x.empty()) throw bad_input(file, "the dataset has no points", "a digitised curve");
-    all.push_back(digitized_series(std::move(dataset), file, options, findings));
+    all.push_back(digitized_series(std::move(dataset), file, options));
   }
   if (!all.empty()) return all;
   if (options.dataset.empty()) throw bad_input(file, "no dataset has points", "a digitised curve");
   throw bad_input(file, fmt::format("no dataset '{}'", printable(options.dataset)), names);
 }
 
-ImportedFile import_table(const DelimitedTable& table, const std::string& file,
-                          const ImportOptions& options) {
-  ImportFormat format = options.format;
-  if (format == ImportFormat::automatic) {
-    format = recognize_digitizer(table).value_or(ImportFormat::machine);
+bool is_jpk(ImportInput& input) {
+  return looks_like_zip(input.bytes());
+}
+
+std::vector<ImportedSeries> read_jpk_file(ImportInput& input) {
+  return {read_jpk(input.bytes(), input.file(), input.options())};
+}
+
+bool is_wpd_json(ImportInput& input) {
+  return looks_like_json(input.bytes());
+}
+
+std::vector<ImportedSeries> read_wpd_json_file(ImportInput& input) {
+  return datasets_series(read_wpd_json(input.bytes(), input.file()), input.file(), input.options());
+}
+
+bool is_wpd_table(ImportInput& input) {
+  return is_wpd_csv(input.table());
+}
+
+std::vector<ImportedSeries> read_wpd_table(ImportInput& input) {
+  return datasets_series(read_wpd_csv(input.table(), input.file()), input.file(), input.options());
+}
+
+bool is_engauge_table(ImportInput& input) {
+  return is_engauge(input.table());
+}
+
+std::vector<ImportedSeries> read_engauge_table(ImportInput& input) {
+  return datasets_series(read_engauge(input.table(), input.file()), input.file(), input.options());
+}
+
+bool is_anything(ImportInput& /*input*/) {
+  return true;
+}
+
+std::vector<ImportedSeries> read_machine_table(ImportInput& input) {
+  return {read_machine(input.table(), input.file(), input.options())};
+}
+
+// Asked in this order whether they recognise a file; the last takes what is left.
+constexpr auto kImporters = std::to_array<Importer>({
+    {"jpk", Provenance::measured, is_jpk, read_jpk_file},
+    {"wpd-json", Provenance::digitized, is_wpd_json, read_wpd_json_file},
+    {"wpd-csv", Provenance::digitized, is_wpd_table, read_wpd_table},
+    {"engauge", Provenance::digitized, is_engauge_table, read_engauge_table},
+    {"machine", Provenance::measured, is_anything, read_machine_table},
+});
+
+const Importer& importer_of(ImportInput& input) {
+  const std::string& format = input.options().format;
+  for (const Importer& importer : kImporters) {
+    if (format == "auto" ? importer.recognizes(input) : importer.name == format) return importer;
   }
-  std::vector<ImportFinding> findings = text_findings(table, format);
-  ImportedFile imported;
-  if (format == ImportFormat::machine) {
-    ImportedSeries series = read_machine(table, file, options);
-    series.findings.insert(series.findings.begin(), findings.begin(), findings.end());
-    imported.series.push_back(std::move(series));
-    return imported;
-  }
-  imported.usual = Provenance::digitized;
-  imported.series = datasets_series(
-      format == ImportFormat::wpd_csv ? read_wpd_csv(table, file) : read_engauge(table, file), file,
-      options, findings);
-  return imported;
+  throw bad_input(input.file(), fmt::format("unknown format '{}'", printable(format)),
+                  fmt::format("one of {}", fmt::join(import_formats(), ", ")));
+}
+
+std::vector<ImportFinding> format_findings(const Importer& importer, ImportInput& input) {
+  std::vector<ImportFinding> findings{{"format", std::string(importer.name)}};
+  if (!input.is_table()) return findings;
+  const DelimitedTable& table = input.table();
+  findings.push_back({"encoding", std::string(encoding_name(table.encoding))});
+  findings.push_back({"separator", std::string(separator_name(table.separator))});
+  findings.push_back({"decimal sign", table.decimal_comma ? "comma" : "point"});
+  return findings;
 }
 
 void require_no_jpk_options(const ImportOptions& options, const std::string& file) {
@@ -132,12 +162,19 @@ void require_no_jpk_options(const ImportOptions& options, const std::string& fil
 
 }  // namespace
 
-std::string_view import_format_name(ImportFormat format) noexcept {
-  return entry_of(kFormats, format).text;
+const DelimitedTable& ImportInput::table() {
+  if (!table_) {
+    DelimitedOptions text = options_.text;
+    text.ragged = true;  // headers and columns of unequal length
+    table_ = parse_delimited(bytes_, file_, text);
+  }
+  return *table_;
 }
 
-ImportFormat parse_import_format(std::string_view text, std::string_view where) {
-  return parse_word(kFormats, "format", text, where);
+std::vector<std::string> import_formats() {
+  std::vector<std::string> formats{"auto"};
+  for (const Importer& importer : kImporters) formats.emplace_back(importer.name);
+  return formats;
 }
 
 DigitizedAxis parse_axis(std::string_view text, std::string_view where) {
@@ -150,31 +187,18 @@ DigitizedAxis parse_axis(std::string_view text, std::string_view where) {
 }
 
 ImportedFile import_series(const std::filesystem::path& path, const ImportOptions& options) {
-  const std::string file = path.string();
-  const std::string bytes = read_file(path);
-  if (options.format == ImportFormat::jpk ||
-      (options.format == ImportFormat::automatic && looks_like_zip(bytes))) {
-    ImportedFile imported;
-    imported.series.push_back(read_jpk(bytes, file, options));
-    imported.series.front().findings.insert(imported.series.front().findings.begin(),
-                                            {"format", "jpk"});
-    imported.sha256 = sha256_hex(bytes);
-    return imported;
-  }
-  require_no_jpk_options(options, file);
-  const bool json = options.format == ImportFormat::wpd_json ||
-                    (options.format == ImportFormat::automatic && looks_like_json(bytes));
+  ImportInput input(read_file(path), path.string(), options);
+  const bool jpk = options.format == "jpk" || (options.format == "auto" && is_jpk(input));
+  if (!jpk) require_no_jpk_options(options, input.file());
+  const Importer& importer = importer_of(input);
   ImportedFile imported;
-  if (json) {
-    imported.usual = Provenance::digitized;
-    imported.series =
-        datasets_series(read_wpd_json(bytes, file), file, options, {{"format", "wpd-json"}});
-  } else {
-    DelimitedOptions text = options.text;
-    text.ragged = true;  // headers and columns of unequal length; each reader checks its own rows
-    imported = import_table(parse_delimited(bytes, file, text), file, options);
+  imported.usual = importer.usual;
+  imported.series = importer.read(input);
+  const std::vector<ImportFinding> findings = format_findings(importer, input);
+  for (ImportedSeries& series : imported.series) {
+    series.findings.insert(series.findings.begin(), findings.begin(), findings.end());
   }
-  imported.sha256 = sha256_hex(bytes);
+  imported.sha256 = sha256_hex(input.bytes());
   return imported;
 }
 

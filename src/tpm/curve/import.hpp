@@ -12,21 +12,9 @@
 
 namespace tpm {
 
-/// What wrote the file that is imported.
-enum class ImportFormat {
-  automatic,  ///< found out from the content
-  machine,    ///< testing machine: header rows, then samples
-  wpd_csv,    ///< WebPlotDigitizer: x and y without header, or dataset names over X,Y pairs
-  wpd_json,   ///< WebPlotDigitizer project: version 4 (datasetColl) or version 3 (wpd)
-  engauge,    ///< Engauge Digitizer: x,Curve1,Curve2 in one block or one block for each curve
-  jpk,        ///< force curve of a JPK atomic force microscope (.jpk-force)
-};
-
-/// "machine", "wpd-csv", ...
-[[nodiscard]] std::string_view import_format_name(ImportFormat format) noexcept;
-
-/// Throws Error(bad_input) naming the known words.
-[[nodiscard]] ImportFormat parse_import_format(std::string_view text, std::string_view where);
+/// The kinds of files that are imported, as --from takes them: "auto", which finds the kind out
+/// from the content, "machine", "jpk", ...
+[[nodiscard]] std::vector<std::string> import_formats();
 
 /// What one axis of a digitised figure shows.
 struct DigitizedAxis {
@@ -40,7 +28,7 @@ struct DigitizedAxis {
 /// What the user says about a file; everything left out is found in the file or is an error that
 /// names the option. Nothing is guessed: a column without a unit is not imported.
 struct ImportOptions {
-  ImportFormat format = ImportFormat::automatic;
+  std::string format = "auto";  ///< one of import_formats()
   DelimitedOptions text;
   CurveHeader header;                    ///< id is set for each curve; sha256 is ignored
   std::optional<Provenance> provenance;  ///< else `measured` for machines, `digitized` for figures

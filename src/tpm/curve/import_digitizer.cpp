@@ -131,17 +131,18 @@ std::vector<DigitizedDataset> read_engauge(const DelimitedTable& table, const st
   return datasets;
 }
 
-std::optional<ImportFormat> recognize_digitizer(const DelimitedTable& table) {
+bool is_wpd_csv(const DelimitedTable& table) {
   const auto& rows = table.rows;
-  if (rows.size() > 1 && is_pair_row(rows[1])) return ImportFormat::wpd_csv;
+  if (rows.size() > 1 && is_pair_row(rows[1])) return true;
   const auto& first = rows[0].fields;
-  const bool plain_pairs = first.size() == 2 && is_number(first[0], table.decimal_comma) &&
-                           is_number(first[1], table.decimal_comma);
-  if (plain_pairs) return ImportFormat::wpd_csv;
+  return first.size() == 2 && is_number(first[0], table.decimal_comma) &&
+         is_number(first[1], table.decimal_comma);
+}
+
+bool is_engauge(const DelimitedTable& table) {
   // "x,y" is a table of plain numbers; Engauge puts curve names beside its x.
-  const bool named_curves = first.size() > 1 && is_word(first[0], 'x') && !is_word(first[1], 'y');
-  if (named_curves) return ImportFormat::engauge;
-  return std::nullopt;
+  const auto& first = table.rows[0].fields;
+  return first.size() > 1 && is_word(first[0], 'x') && !is_word(first[1], 'y');
 }
 
 }  // namespace tpm

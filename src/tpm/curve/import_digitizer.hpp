@@ -30,7 +30,8 @@ struct DigitizedDataset {
 [[nodiscard]] std::vector<DigitizedDataset> read_engauge(const DelimitedTable& table,
                                                          const std::string& file);
 
-/// What kind of digitiser file a table is; nothing if it looks like none.
-[[nodiscard]] std::optional<ImportFormat> recognize_digitizer(const DelimitedTable& table);
+/// Whether a table can only be such a file.
+[[nodiscard]] bool is_wpd_csv(const DelimitedTable& table);
+[[nodiscard]] bool is_engauge(const DelimitedTable& table);
 
 }  // namespace tpm

@@ -29,7 +29,7 @@ bool is_described(const fs::path& path) {
 }
 
 bool says_something_about_columns(const ImportOptions& options) {
-  return options.format != ImportFormat::automatic || options.header_rows ||
+  return options.format != "auto" || options.header_rows ||
          !options.time_column.empty() || !options.drive_column.empty() ||
          !options.response_column.empty() || !options.sd_column.empty() ||
          !options.frequency_column.empty() || !options.storage_column.empty() ||

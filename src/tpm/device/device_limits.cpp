@@ -11,7 +11,8 @@ namespace {
 // Force and reach of the Omega.7: its data sheet. Stiffness and damping of omega, lambda and
 // Falcon: CHAI3D 3.3. All else of the others is assumed, and no higher than that of the Omega.7.
 constexpr DeviceLimits kDeviceLimits[] = {
-    {"virtual", "simulated Omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
+    {"virtual", "simulated Omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0, 0.0,
+     true},
     {"replay", "replay", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 0},
     {"omega7", "omega.7", true, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},
     {"omega3", "omega.3", false, 12.0, 0.075, 5000.0, 30.0, 2000.0, 0.1, 0.1, 1},

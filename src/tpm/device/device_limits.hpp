@@ -19,12 +19,11 @@ struct DeviceLimits {
   double friction_N_s_per_m;     ///< assumed: the least of what is usual, 0.1 to 1
   int delay_periods;             ///< assumed, from a command to its force
   double encoder_step_m = 1e-5;  ///< assumed: the data sheet of the Omega.7 says less
+  bool plant = false;            ///< it is VirtualOmega7 with these limits, not a device
   bool simulated = false;        ///< of a plugin: it says that it has no motors
 
   /// Its motors may move: it is neither simulated nor a replay.
-  [[nodiscard]] bool hardware() const {
-    return kind != "virtual" && kind != "replay" && !simulated;
-  }
+  [[nodiscard]] bool hardware() const { return kind != "replay" && !plant && !simulated; }
 };
 
 /// Of the kind that a session is run on, "omega7" or what simulates or replays one; the simulated

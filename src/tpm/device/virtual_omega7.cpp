@@ -3,13 +3,24 @@
 #include <algorithm>
 
 namespace tpm {
+namespace {
 
-VirtualOmega7::VirtualOmega7(const PlantSettings& settings, OperatorScript script)
-    : settings_(settings), script_(std::move(script)), plant_(settings_, script_) {}
+PlantSettings limited(PlantSettings settings, const DeviceLimits& limits) {
+  settings.motor_limit_N = std::min(settings.motor_limit_N, limits.force_N);
+  settings.encoder_step_m = std::max(settings.encoder_step_m, limits.encoder_step_m);
+  return settings;
+}
+
+}  // namespace
+
+VirtualOmega7::VirtualOmega7(const PlantSettings& settings, OperatorScript script,
+                             const DeviceLimits& limits)
+    : settings_(limited(settings, limits)), script_(std::move(script)), plant_(settings_, script_) {
+  identity_.kind = limits.kind;
+  identity_.name = limits.name;
+}
 
 const DeviceIdentity& VirtualOmega7::open() {
-  identity_.kind = "virtual";
-  identity_.name = "simulated Omega.7";
   identity_.link = DeviceLink::none;
   identity_.assumptions = assumptions_of(settings_);
   return identity_;

@@ -1,15 +1,19 @@
 #pragma once
 #include <atomic>
 
+#include "tpm/device/device_limits.hpp"
 #include "tpm/device/virtual_plant.hpp"
 #include "tpmkit/device.hpp"
 
 namespace tpm {
 
-/// A simulated Omega.7 held by a simulated arm. Its time passes in advance() only.
+/// A simulated Omega.7 held by a simulated arm, or another device of the list whose row says
+/// `plant`. Its time passes in advance() only.
 class VirtualOmega7 final : public HapticDevice {
  public:
-  VirtualOmega7(const PlantSettings& settings, OperatorScript script);
+  /// @param limits the motors are no stronger, the encoders no finer
+  VirtualOmega7(const PlantSettings& settings, OperatorScript script,
+                const DeviceLimits& limits = limits_of("virtual"));
 
   const DeviceIdentity& open() override;
   void prepare(const DevicePreparation& preparation) override;

@@ -34,7 +34,8 @@ std::vector<std::string> assumptions_of(const PlantSettings& s) {
   std::vector<std::string> assumptions{
       line_of("moving mass %g kg (assumed; 0.2 to 0.4 is usual)", s.mass_kg),
       line_of("viscous friction %g N s/m (assumed; 0.1 to 1 is usual)", s.damping_N_s_per_m),
-      line_of("encoder step %g m (assumed; the data sheet says below 1e-5)", s.encoder_step_m),
+      line_of("encoder step %g m (assumed; the Omega.7's data sheet says below 1e-5)",
+              s.encoder_step_m),
       line_of("delay from command to force %g s (assumed)", s.delay_periods * s.period_s),
       line_of("forces cut above %g m/s (assumed)", s.velocity_limit_m_per_s),
       "arm of the operator: " + line_of("%g kg, ", s.arm.mass_kg) +

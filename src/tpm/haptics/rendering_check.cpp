@@ -128,7 +128,10 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
   check.delay_periods = own ? limits.delay_periods : session.plant.delay_periods;
   check.friction_N_s_per_m = own ? limits.friction_N_s_per_m : session.plant.damping_N_s_per_m;
   check.largest_N_per_m = limits.stiffness_N_per_m;
-  check.encoder_step_m = own ? limits.encoder_step_m : session.plant.encoder_step_m;
+  check.encoder_step_m = own ? limits.encoder_step_m
+                         : limits.plant
+                             ? std::max(session.plant.encoder_step_m, limits.encoder_step_m)
+                             : session.plant.encoder_step_m;
   check.rise_N = session.servo.slew_limit_N_per_s * session.servo.period_s;
   find_stiffness(check, session, model, loop.push);
 

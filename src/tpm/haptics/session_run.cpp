@@ -61,8 +61,8 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
 }
 
 void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& choice,
-                        const SessionRunOptions& options) {
-  if (options.accept_unstable && choice.kind != "virtual") {
+                        const DeviceLimits& limits, const SessionRunOptions& options) {
+  if (options.accept_unstable && !limits.plant) {
     throw Error(ExitCode::usage, "--accept-unstable", "is not for the device '" + choice.kind + "'",
                 "--device virtual");
   }
@@ -91,7 +91,7 @@ SessionRun run_on(const HilSession& session, const DeviceChoice& choice, const D
   run.model = make_loop_model(session, options.real_time, options.planning);
   const std::shared_ptr<ContactModel> stepped = std::move(run.model.model);
   run.rendering = check_rendering(session, *stepped, run.model, limits);
-  require_acceptable(run.rendering, choice, options);
+  require_acceptable(run.rendering, choice, limits, options);
   const std::shared_ptr<HapticDevice> device = make();
   DevicePreparation preparation = session.preparation;
   preparation.period_s = session.servo.period_s;
@@ -125,11 +125,12 @@ DeviceLimits limits_of(const DeviceChoice& choice) {
 }
 
 std::shared_ptr<HapticDevice> make_device(const DeviceChoice& choice, const HilSession& session) {
-  if (choice.kind == "virtual") {
-    return std::make_shared<VirtualOmega7>(session.plant, session.operator_script());
-  }
   if (choice.kind == "plugin") return plugin_of(choice);
-  if (limits_of(choice.kind).hardware()) {
+  const DeviceLimits& limits = limits_of(choice.kind);
+  if (limits.plant) {
+    return std::make_shared<VirtualOmega7>(session.plant, session.operator_script(), limits);
+  }
+  if (limits.hardware()) {
     return std::make_shared<ForceDimension>(choice.library, choice.kind, choice.which);
   }
   if (choice.replay.empty() && session.phases.back().kind == SessionPhaseKind::motion) {
