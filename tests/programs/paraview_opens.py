@@ -18,7 +18,7 @@ from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 SCENE = {
     "organ": {"kind": "liver", "count": 60},
     "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "2 mm/s", "hold": "1 s"},
-    "outputs": {"count": 7, "fields": ["force", "bond_force", "remembered"]},
+    "outputs": {"count": 7, "fields": ["force", "bond_force", "viscous"]},
 }
 
 
@@ -51,7 +51,7 @@ def check_step(output, result, time):
     assert abs(depth - min(2e-3 * time, 4e-3)) < 1e-10, (time, depth)
     assert np.allclose(np.linalg.norm(fields["displacement_m"], axis=1), fields["displacement_magnitude_m"], 1e-12)
     on_bonds = arrays(bonds.GetCellData())
-    assert {"kind", "bond_force_N", "remembered_m"} == set(on_bonds), on_bonds.keys()
+    assert {"kind", "bond_force_N", "viscous_m"} == set(on_bonds), on_bonds.keys()
     check_forces(bonds, at, fields, on_bonds["bond_force_N"])
     return at - fields["displacement_m"]
 

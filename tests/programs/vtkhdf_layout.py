@@ -17,7 +17,7 @@ import numpy as np
 SCENE = {
     "organ": {"kind": "liver", "count": 60},
     "protocol": {"kind": "ramp_hold", "depth": "4 mm", "rate": "2 mm/s", "hold": "1 s"},
-    "outputs": {"count": 4, "fields": ["force", "bond_force", "remembered"]},
+    "outputs": {"count": 4, "fields": ["force", "bond_force", "viscous"]},
 }
 
 

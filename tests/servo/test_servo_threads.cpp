@@ -327,19 +327,19 @@ TEST_CASE("The jitter check says no where a session with the same limits would h
   o.cycles = 40'000;
   for (int i = 0; i < 40'000; ++i) o.woke_late.note(30'000);
   o.counts.missed = o.counts.most_missed_at_once = 3;
-  judge(check);
+  assess(check);
   CHECK(check.fit);
   CHECK(check.verdict == "fit for 4000 Hz");
   CHECK_THAT(check.advice, Catch::Contains("can do 4000 Hz; its longest stall was 0.03 ms"));
 
   // One stall of 17 ms in ten seconds: 68 periods, 0.17 % of all.
   o.counts.missed = o.counts.most_missed_at_once = 68;
-  judge(check);
+  assess(check);
   CHECK_FALSE(check.fit);
   CHECK_THAT(check.verdict,
              Catch::Contains("68 periods were missed at once, a session stops after 50"));
   o.woke_late.note(17'000'000);
-  judge(check);
+  assess(check);
   CHECK_THAT(check.verdict,
              Catch::Contains("a stall of 17 ms is longer than the watchdog of 8 ms"));
   CHECK_THAT(check.advice, Catch::Contains("longer than any watchdog of the device"));
@@ -348,18 +348,18 @@ TEST_CASE("The jitter check says no where a session with the same limits would h
   o.cause = StopCause::finished;
   o.cycles = 40'000;
   o.counts.most_late = 101;
-  judge(check);
+  assess(check);
   CHECK_THAT(check.verdict,
              Catch::Contains("101 cycles of 1000 were late, a session stops after 100"));
   o.counts.most_late = 100;
   o.counts.missed = 900;
-  judge(check);
+  assess(check);
   CHECK_THAT(check.verdict, Catch::Contains("2.25 % of the periods were missed"));
   check.outcome = ServoOutcome{};
   o.cause = StopCause::finished;
   o.cycles = 1000;
   for (int i = 0; i < 1000; ++i) o.woke_late.note(300'000);
-  judge(check);
+  assess(check);
   CHECK_THAT(check.verdict, Catch::Contains("more than half a period"));
   CHECK_THAT(check.advice, Catch::Contains("can do 1000 Hz; a lower"));
 }

@@ -64,7 +64,7 @@ TEST_CASE("every block of a scene reaches the experiment") {
     "protocol": {"kind": "creep", "load": "30 mN", "duration": "2 s"},
     "formulation": {"kind": "inertial", "damping_ratio": 0.3, "density_kg_per_m3": 1000,
                     "comparison": "mass_spring", "springs": "equal"},
-    "outputs": {"times": ["2 s", "1 s"], "fields": ["remembered"]}, "tolerance": 1e-4})");
+    "outputs": {"times": ["2 s", "1 s"], "fields": ["viscous"]}, "tolerance": 1e-4})");
   CHECK(scene.probe().sphere == 6);
   CHECK(scene.probe().direction == Eigen::Vector3d::UnitZ());
   CHECK(scene.protocol.drive() == Drive::force);

@@ -326,7 +326,7 @@ void ForceDimension::note_error() noexcept {
   status_.error_text[length] = '\0';
 }
 
-DeviceAnswer ForceDimension::judged(int answer) noexcept {
+DeviceAnswer ForceDimension::noted(int answer) noexcept {
   if (answer == kTimeGuard) {
     ++status_.time_guards;
     return DeviceAnswer::time_guard;
@@ -343,20 +343,20 @@ DeviceAnswer ForceDimension::judged(int answer) noexcept {
 DeviceAnswer ForceDimension::read(Eigen::Vector3d& position_m) noexcept {
   if (cut_) return DeviceAnswer::failed;
   Eigen::Vector3d at;
-  const DeviceAnswer answer = judged(call_.get_position(&at.x(), &at.y(), &at.z(), id_));
+  const DeviceAnswer answer = noted(call_.get_position(&at.x(), &at.y(), &at.z(), id_));
   if (answer != DeviceAnswer::failed) position_m = at;
   return answer;
 }
 
 DeviceAnswer ForceDimension::write(const Eigen::Vector3d& force_N) noexcept {
   if (cut_) return DeviceAnswer::failed;  // never again, should the stuck thread come back
-  return judged(call_.set_force(force_N.x(), force_N.y(), force_N.z(), id_));
+  return noted(call_.set_force(force_N.x(), force_N.y(), force_N.z(), id_));
 }
 
 DeviceStatus ForceDimension::status() noexcept {
   if (cut_) return status_;
   int entries[kStatusRoom] = {};
-  status_.failed = judged(call_.get_status(entries, id_)) == DeviceAnswer::failed;
+  status_.failed = noted(call_.get_status(entries, id_)) == DeviceAnswer::failed;
   if (!status_.failed) {
     const int cause = entries[kForcesOffEntry];
     status_.forces_off =

@@ -59,7 +59,7 @@ class ForceDimension final : public HapticDevice {
   void stop_moving() noexcept;
   void set_watchdog(double seconds);
   void set_mounting(const DeviceMounting& mounting);
-  DeviceAnswer judged(int answer) noexcept;
+  DeviceAnswer noted(int answer) noexcept;
   void note_error() noexcept;
 
   std::shared_ptr<DhdLibrary> library_;  ///< shared with a call that is stuck in it

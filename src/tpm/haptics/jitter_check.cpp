@@ -132,7 +132,7 @@ std::string advice_of(const JitterCheck& check) {
 
 }  // namespace
 
-void judge(JitterCheck& check) {
+void assess(JitterCheck& check) {
   const std::string fault = fault_of(check);
   check.fit = fault.empty();
   check.verdict =
@@ -171,7 +171,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
     device->stop();
     throw;
   }
-  judge(check);
+  assess(check);
   return check;
 }
 

@@ -22,7 +22,7 @@ inline constexpr double kSessionRates_Hz[] = {4000.0, 2000.0, 1000.0, 500.0};
 /// limits would have come to its end: the wake-up of 99 % of the cycles was late by less than half
 /// a period, less than 1 % of the periods were missed, and neither the longest stall, nor the work
 /// of a cycle, nor the periods missed at once, nor the late cycles of any thousand reached a limit.
-void judge(JitterCheck& check);
+void assess(JitterCheck& check);
 
 /// Runs the servo loop on the clock with forces of zero, with the rate, watchdog, limit of a
 /// hanging cycle and limits of lateness of a session: is this machine, with this device, up to it?

@@ -108,7 +108,7 @@ class MethodDriver {
     return MethodEnd::completed;
   }
 
-  [[nodiscard]] MethodEnd judge(const Vector& state) const {
+  [[nodiscard]] MethodEnd end_at(const Vector& state) const {
     // Written so that what is not a number fails.
     if (!(state.cwiseAbs().array() <= bound_.array()).all() || !state.allFinite()) {
       return MethodEnd::diverged;
@@ -206,7 +206,7 @@ class FixedDriver final : public MethodDriver {
         return cause(end, state_);
       }
       ++steps_;
-      if (const auto end = judge(state_); end != MethodEnd::completed) return end;
+      if (const auto end = end_at(state_); end != MethodEnd::completed) return end;
       time_s_ = until;
     }
     // Just before a jump at the end.
@@ -230,7 +230,7 @@ class FixedDriver final : public MethodDriver {
         return cause(end, there);
       }
       ++steps_;
-      if (const auto end = judge(there); end != MethodEnd::completed) return end;
+      if (const auto end = end_at(there); end != MethodEnd::completed) return end;
       if (const auto end = answer(time_s_ + part, there); end != MethodEnd::completed) return end;
       if (balance_ != nullptr) balance_->set_place(place);
     }
@@ -280,7 +280,7 @@ class AdaptiveDriver final : public MethodDriver {
       return end;
     }
     time_s_ = time_s;
-    return judge(state_);
+    return end_at(state_);
   }
 
   [[nodiscard]] long steps() const override { return rule_ ? rule_->steps() : 0; }

@@ -46,13 +46,13 @@ EquilibriumSearch newton_balance(const BondSystem& bonds, const Constraints& con
     ++search.iterations;
     const double slope = -force.cwiseProduct(step).sum();
     // What rounding leaves of the potential is not to stop the last steps.
-    const double grain = 1e-14 * std::abs(energy);
+    const double rounding = 1e-14 * std::abs(energy);
     double length = 1.0;
     for (int halvings = 0;; ++halvings, length *= 0.5) {
       if (halvings == kMostHalvings) return search;
       const Positions next = position + length * step;
       const double there = potential(bonds, next, memory, load);
-      if (!(there <= energy + 1e-4 * length * slope + grain)) continue;
+      if (!(there <= energy + 1e-4 * length * slope + rounding)) continue;
       position = next;
       energy = there;
       break;

@@ -130,7 +130,7 @@ class Planning {
       candidate.reason = "not tried: a cheaper one with masses meets the tolerance";
     } else {
       try {
-        judge(model, candidate);
+        assess(model, candidate);
       } catch (const Error& error) {
         if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
         candidate.reason = fmt::format("fails: {}", error.what());
@@ -139,7 +139,7 @@ class Planning {
     plan_.candidates.push_back(std::move(candidate));
   }
 
-  void judge(const PlanModel& model, PlannedCandidate& candidate) {
+  void assess(const PlanModel& model, PlannedCandidate& candidate) {
     const PlanRequest& request = plan_.request;
     const ModelClaim claim = model.claim(*surrogate_, request.budget);
     candidate.claimed_error = claim.error;

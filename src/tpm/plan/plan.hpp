@@ -49,7 +49,7 @@ struct PlannedCandidate {
 
 /// What the pick is verified against.
 struct PlanReference {
-  std::string method, judge;         ///< in words
+  std::string method, cross_check;   ///< in words
   double difference = 0.0;           ///< between the two, in parts of the peak
   double response_difference = 0.0;  ///< the same of the response
   double peak = 0.0;                 ///< of the response, N or m
@@ -109,7 +109,8 @@ struct PlanClaim {
 [[nodiscard]] PlanClaim claim_of(const Plan& plan);
 
 /// The least model for a scene. Throws Error(bad_input) for scenes and requests that no plan is
-/// made for, Error(numerical) where the reference itself cannot be computed or its judge disagrees.
+/// made for, Error(numerical) where the reference itself cannot be computed or its cross-check
+/// disagrees.
 [[nodiscard]] Plan make_plan(const ExperimentScene& scene, const PlanRequest& request);
 
 /// The planned model's answer over the scene's protocol, at the times given.

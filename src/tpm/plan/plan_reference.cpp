@@ -27,7 +27,7 @@ VerifiedReference verified_reference(const PlanScene& scene, const PlanMeasure& 
   VerifiedReference reference;
   const bool field = measure.output == PlanOutput::field;
   const double tau_s = scene.driven().bonds.shortest_relaxation_time_s();
-  Trajectory judge;
+  Trajectory cross_check;
   if (inertial) {
     reference.times_s =
         sampled_times(scene.protocol(), kTimesOfPieceWithMasses, kMostTimesWithMasses, tau_s);
@@ -38,12 +38,12 @@ VerifiedReference verified_reference(const PlanScene& scene, const PlanMeasure& 
       InertialOptions other = inertial_options(scene, own);
       other.newton = NewtonSolver::klu;
       other.highest_order = kJudgeOrder;
-      judge = scene.inertial(other, reference.times_s, field);
+      cross_check = scene.inertial(other, reference.times_s, field);
       reference.reference.method =
           fmt::format("network with masses, BDF of order 2, tolerance {}", shortest(own));
-      reference.reference.judge =
+      reference.reference.cross_check =
           fmt::format("BDF of order 3 with KLU, tolerance {}", shortest(own));
-      const double apart = trajectory_error(judge, reference.trajectory, measure);
+      const double apart = trajectory_error(cross_check, reference.trajectory, measure);
       if (apart <= kAgreement * tolerance || own < kTightest * (1.0 + kTighter)) break;
     }
   } else {
@@ -53,23 +53,23 @@ VerifiedReference verified_reference(const PlanScene& scene, const PlanMeasure& 
     reference.trajectory = scene.quasi_static(options, reference.times_s, field);
     options.tolerance = kJudgeTolerance;
     options.stages = kJudgeStages;
-    judge = scene.quasi_static(options, reference.times_s, field);
+    cross_check = scene.quasi_static(options, reference.times_s, field);
     reference.reference.method =
         fmt::format("nonlinear network, Radau collocation of {} stages, tolerance {}", kLanes,
                     shortest(kTolerance));
-    reference.reference.judge = fmt::format("Radau collocation of {} stages, tolerance {}",
-                                            kJudgeStages, shortest(kJudgeTolerance));
+    reference.reference.cross_check = fmt::format("Radau collocation of {} stages, tolerance {}",
+                                                  kJudgeStages, shortest(kJudgeTolerance));
   }
   reference.reference.peak = reference.trajectory.response.cwiseAbs().maxCoeff();
   if (!(reference.reference.peak > 0.0)) {
     throw bad_input("scene", "nothing is imposed, or nothing answers", "a protocol with a peak");
   }
-  reference.reference.difference = trajectory_error(judge, reference.trajectory, measure);
-  reference.reference.response_difference = trajectory_error(judge, reference.trajectory, {});
+  reference.reference.difference = trajectory_error(cross_check, reference.trajectory, measure);
+  reference.reference.response_difference = trajectory_error(cross_check, reference.trajectory, {});
   if (reference.reference.difference <= kAgreement * tolerance) return reference;
   throw Error(
       ExitCode::numerical, "reference",
-      fmt::format("it and its judge differ by {} of the peak",
+      fmt::format("it and its cross-check differ by {} of the peak",
                   significant(reference.reference.difference, 2)),
       fmt::format("at most {}: a looser tolerance", significant(kAgreement * tolerance, 2)));
 }

@@ -77,12 +77,12 @@ std::size_t packed(Index i) {
 CondensedModes condensed_modes(const CondensedFit& fit) {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   // A mode that hardly exists is kept from dividing by zero.
-  const Eigen::Matrix3d grain = 1e-9 * fit.mean_metric.trace() * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d ridge = 1e-9 * fit.mean_metric.trace() * Eigen::Matrix3d::Identity();
   Matrix6 metric = Matrix6::Zero();
   metric.topLeftCorner<3, 3>() = fit.mean_metric;
-  metric.bottomRightCorner<3, 3>() = fit.mean_coupling + grain;
+  metric.bottomRightCorner<3, 3>() = fit.mean_coupling + ridge;
   Matrix6 energy;
-  energy << fit.mean_energy, fit.mean_coupling, fit.mean_coupling, fit.mean_second + grain;
+  energy << fit.mean_energy, fit.mean_coupling, fit.mean_coupling, fit.mean_second + ridge;
   const SymmetricModes modes = symmetric_modes(energy, metric);
   return {modes.values, modes.vectors.transpose() * metric, modes.vectors};
 }

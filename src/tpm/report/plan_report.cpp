@@ -173,7 +173,7 @@ Json plan_json(const Plan& plan) {
   json["masses_matter"] = plan.inertial;
   json["masses_left_out"] = number(plan.masses_left_out);
   json["reference"] = {{"method", plan.reference.method},
-                       {"judge", plan.reference.judge},
+                       {"cross_check", plan.reference.cross_check},
                        {"difference", rounded(plan.reference.difference, 2)},
                        {"peak", rounded(plan.reference.peak, kPlanDigits)}};
   json["frontier"] = Json::array();
@@ -199,10 +199,12 @@ std::string plan_text(const Plan& plan) {
                       : request.costs.source);
   text += choice_text(plan);
   text += "\n" + frontier_text(plan);
-  text += fmt::format(
-      "\nreference: {}; peak {} {}; differs from its judge ({}) by {}\n", plan.reference.method,
-      significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
-      plan.by_depth ? "N" : "mm", plan.reference.judge, share_text(plan.reference.difference));
+  text +=
+      fmt::format("\nreference: {}; peak {} {}; differs from its cross-check ({}) by {}\n",
+                  plan.reference.method,
+                  significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
+                  plan.by_depth ? "N" : "mm", plan.reference.cross_check,
+                  share_text(plan.reference.difference));
   if (!plan.relevance.empty()) text += "what leaving a part out changes:\n";
   for (const PlanRelevance& r : plan.relevance) {
     // Of masses that scene and reference leave out there is one sentence, below.

@@ -158,7 +158,7 @@ Outputs parse_outputs(const Json& block, const Protocol& protocol, const Documen
   };
   outputs.force = wanted("force");
   outputs.bond_force = wanted("bond_force");
-  outputs.viscous = wanted("remembered");
+  outputs.viscous = wanted("viscous");
   return outputs;
 }
 

@@ -11,7 +11,7 @@ std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
 }
 
 std::string viscous_name(Eigen::Index branch, Eigen::Index branches) {
-  return branches == 1 ? "remembered_m" : fmt::format("remembered_{}_m", branch + 1);
+  return branches == 1 ? "viscous_m" : fmt::format("viscous_{}_m", branch + 1);
 }
 
 StepFields fields_of(const ExperimentScene& scene, const RunNetwork& network,

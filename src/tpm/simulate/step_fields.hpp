@@ -23,8 +23,8 @@ struct StepFields {
 /// The numbers of a matrix, column after column.
 [[nodiscard]] std::vector<double> list_of(const Eigen::MatrixXd& numbers);
 
-/// The name of the viscous elongations of a branch: remembered_m if there is one, else
-/// remembered_1_m and so on.
+/// The name of the viscous elongations of a branch: viscous_m if there is one, else
+/// viscous_1_m and so on.
 [[nodiscard]] std::string viscous_name(Eigen::Index branch, Eigen::Index branches);
 
 /// Those that the scene asks for.
