@@ -5,6 +5,7 @@
 #include "dummy_program.hpp"
 #include "formulation_suite.hpp"
 #include "temp_folder.hpp"
+#include "tpm/benchmark/organ_problems.hpp"
 #include "tpm/store/file.hpp"
 
 using namespace tpm;
@@ -28,6 +29,21 @@ std::string scene_of(const std::string& kind) {
 TEST_CASE("a formulation in one file is in the lists") {
   CHECK(names(answer_of("benchmark --list").at("formulations"), "dummy"));
   CHECK(names(answer_of("simulate --list-formulations").at("formulations"), "dummy"));
+}
+
+TEST_CASE("a formulation in one file is a method of benchmark problems") {
+  for (const bool loaded : {false, true}) {
+    const BenchmarkProblem problem = loaded ? organ_creep_problem() : organ_hold_problem();
+    int found = 0;
+    for (const BenchmarkSetting& setting : problem.settings) {
+      if (setting.method != "dummy") continue;
+      ++found;
+      const BenchmarkRun run = setting.run(false);
+      REQUIRE(run.outcome.end == MethodEnd::completed);
+      CHECK(run.outcome.response.maxCoeff() > 0.0);
+    }
+    CHECK(found == 1);
+  }
 }
 
 TEST_CASE("a formulation in one file runs a scene and a sweep") {

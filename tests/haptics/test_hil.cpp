@@ -74,6 +74,21 @@ HilRecording recorded(const test::TempFolder& folder, const Json& json = short_s
   return read_recording(folder / "r");
 }
 
+TEST_CASE("A session by a zone takes the fewest rings that are trusted on its slowest push",
+          "[heavy]") {
+  const std::filesystem::path configs = std::filesystem::path(TPM_TEST_SOURCE_DIR) / "configs";
+  Json json = read_json(configs / "hil_planned.json");
+  for (const auto& [scene, taken] :
+       {std::pair{"liver_scene.json", "zone_1"}, std::pair{"liver_tumour.json", "zone_3"}}) {
+    const Json all = read_json(configs / scene);
+    json["model"] = {{"kind", "zone"},
+                     {"scene", {{"organ", all.at("organ")}, {"material", all.at("material")}}}};
+    const LoopModel loop = make_loop_model(parse_session(json, scene, configs));
+    CHECK_THAT(loop.name, Catch::StartsWith(taken));
+    CHECK(loop.model->step(Eigen::Vector3d::Zero()).trusted);
+  }
+}
+
 TEST_CASE("A session of the element verifies against the network, the closed form and CVODES") {
   const test::TempFolder folder;
   const HilRecording recording = recorded(folder);

@@ -21,6 +21,15 @@ std::shared_ptr<PosedNetwork> posed_liver(const Tissue& tissue, const Protocol& 
       protocol, std::move(times_s));
 }
 
+/// The same as a scene.
+std::shared_ptr<const ExperimentScene> scene_on(const Tissue& tissue, const Protocol& protocol) {
+  const Organ& organ = tissue.network.organ;
+  const std::size_t contact = organ.contact.value();
+  SceneContact driven;
+  driven.probe = {contact, -organ.normal.col(static_cast<Eigen::Index>(contact)), 1.0};
+  return std::make_shared<ExperimentScene>(ExperimentScene{tissue, {driven}, protocol, {}, {}, {}});
+}
+
 constexpr double kMovingPoke_s = 0.2;
 
 /// The paper's liver with another dashpot.
@@ -38,8 +47,10 @@ struct Referee {
   double worst_floor;
 };
 
-BenchmarkProblem massless_problem(const std::shared_ptr<const PosedNetwork>& posed,
-                                  const RuleSettings& rules, const Referee& referee) {
+BenchmarkProblem massless_problem(const Tissue& tissue, const Protocol& protocol,
+                                  const std::vector<double>& times_s, const RuleSettings& rules,
+                                  const Referee& referee) {
+  const std::shared_ptr<const PosedNetwork> posed = posed_liver(tissue, protocol, times_s);
   const std::shared_ptr<const MethodProblem> rule_problem = rules_on(posed);
   BenchmarkProblem problem;
   const bool loaded = posed->protocol.drive() == Drive::force;
@@ -51,6 +62,7 @@ BenchmarkProblem massless_problem(const std::shared_ptr<const PosedNetwork>& pos
   add(problem.settings, collocation_settings(posed, {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}));
   problem.settings.push_back(not_applicable("inertial", "the problem has no masses"));
   problem.settings.push_back(not_applicable("closed_form", "a network has no closed form"));
+  add(problem.settings, own_formulation_settings(scene_on(tissue, protocol), times_s));
   problem.reference = [posed, rule_problem, referee] {
     MethodSettings method;
     method.rule = referee.rule;
@@ -84,15 +96,14 @@ std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guid
 }  // namespace
 
 BenchmarkProblem organ_hold_problem() {
-  const auto posed =
-      posed_liver(liver(kFittedEta1_Pa_s), ramp_and_hold(8e-3, 4e-3, 29.0), times_every(0.5, 31.0));
   RuleSettings rules;
   rules.steps_s = {2.0, 1.0, 0.5, 0.2, 1e-3};
   rules.tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
   rules.sweeps = {1, 10, 100};
   rules.most_rates = 20'000;
   BenchmarkProblem problem = massless_problem(
-      posed, rules, {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
+      liver(kFittedEta1_Pa_s), ramp_and_hold(8e-3, 4e-3, 29.0), times_every(0.5, 31.0), rules,
+      {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
   problem.name = "organ_hold";
   problem.title = "Organ, ramp and hold";
   problem.text =
@@ -104,15 +115,14 @@ BenchmarkProblem organ_hold_problem() {
 BenchmarkProblem organ_poke_problem() {
   const Protocol protocol(Drive::displacement, {{0.0, 0.0}, {0.08, 8e-3}, {0.12, 8e-3}, {0.2, 0.0}},
                           "poke");
-  const auto posed =
-      posed_liver(liver(), protocol, with_moments_after_kinks(times_every(5e-3, 0.2), protocol));
   RuleSettings rules;
   rules.steps_s = {2e-2, 5e-3, 2e-3, 1e-3, 2.5e-4};
   rules.tolerances = {1e-2, 1e-4, 1e-6};
   rules.sweeps = {1, 10, 100};
   rules.most_rates = 20'000;
-  BenchmarkProblem problem =
-      massless_problem(posed, rules, {StepRule::cvode_bdf, 1e-11, "CVODE, BDF, at 1e-11", 1e-6});
+  BenchmarkProblem problem = massless_problem(
+      liver(), protocol, with_moments_after_kinks(times_every(5e-3, 0.2), protocol), rules,
+      {StepRule::cvode_bdf, 1e-11, "CVODE, BDF, at 1e-11", 1e-6});
   problem.name = "organ_poke";
   problem.title = "Organ, poked at 100 mm/s";
   problem.text =
@@ -122,15 +132,14 @@ BenchmarkProblem organ_poke_problem() {
 }
 
 BenchmarkProblem organ_creep_problem() {
-  const auto posed =
-      posed_liver(liver(kFittedEta1_Pa_s), creep(0.196, 300.0), times_every(5.0, 300.0));
   RuleSettings rules;
   rules.steps_s = {20.0, 10.0, 5.0, 2.0, 1e-3};
   rules.tolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
   rules.sweeps = {1, 10, 100};
   rules.most_rates = 20'000;
-  BenchmarkProblem problem = massless_problem(
-      posed, rules, {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
+  BenchmarkProblem problem =
+      massless_problem(liver(kFittedEta1_Pa_s), creep(0.196, 300.0), times_every(5.0, 300.0), rules,
+                       {StepRule::cvode_adams, 1e-11, "CVODE, Adams, at 1e-11", 1e-6});
   problem.name = "organ_creep";
   problem.title = "Organ, 300 s of creep";
   problem.text =

@@ -7,6 +7,7 @@
 
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/simple_organs.hpp"
+#include "tpm/simulate/scene_runner.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -193,6 +194,37 @@ std::vector<BenchmarkSetting> inertial_settings(const std::shared_ptr<const Pose
                        return outcome_of([&] { return run_inertial(*posed, tolerance, order); });
                      }});
     }
+  }
+  return all;
+}
+
+std::vector<BenchmarkSetting> own_formulation_settings(
+    const std::shared_ptr<const ExperimentScene>& scene, const std::vector<double>& times_s) {
+  const Formulations shipped = shipped_formulations();
+  std::vector<BenchmarkSetting> all;
+  for (const Formulation* f : formulations()) {
+    if (std::find(shipped.begin(), shipped.end(), f) != shipped.end()) continue;
+    const auto posed = std::make_shared<ExperimentScene>(*scene);
+    posed->formulation = {};
+    posed->formulation.kind = f->name();
+    posed->formulation.where = "problem";
+    try {
+      require_runnable(*posed);
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::bad_input) throw;
+      all.push_back(not_applicable(posed->formulation.kind, error.what()));
+      continue;
+    }
+    all.push_back({posed->formulation.kind, "", "", 0.0, {}, [posed, times_s](bool) {
+                     return outcome_of([&] {
+                       Trajectory answer = run_scene(*posed, times_s, false);
+                       MethodRun run;
+                       run.response = std::move(answer.response);
+                       run.end_time_s = times_s.back();
+                       run.work.steps = std::lround(answer.steps);
+                       return run;
+                     });
+                   }});
   }
   return all;
 }

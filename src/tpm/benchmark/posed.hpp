@@ -3,6 +3,7 @@
 #include <initializer_list>
 
 #include "tpm/benchmark/problem.hpp"
+#include "tpm/scene/experiment_scene.hpp"
 #include "tpmkit/organ.hpp"
 
 namespace tpm {
@@ -63,6 +64,13 @@ struct RuleSettings {
 /// and 5.
 [[nodiscard]] std::vector<BenchmarkSetting> inertial_settings(
     const std::shared_ptr<const PosedNetwork>& posed, std::initializer_list<double> tolerances);
+
+/// One setting of every formulation of this program that the library does not ship
+/// (tpmkit/formulation.hpp), as it runs the scene at its defaults. One whose capabilities the scene
+/// exceeds is not applicable, and says why.
+/// @param scene kept alive by the settings; its formulation is not used
+[[nodiscard]] std::vector<BenchmarkSetting> own_formulation_settings(
+    const std::shared_ptr<const ExperimentScene>& scene, const std::vector<double>& times_s);
 
 /// One setting of one rule.
 [[nodiscard]] BenchmarkSetting rule_setting(const std::shared_ptr<const MethodProblem>& problem,

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
 
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/loop_maker.hpp"
@@ -143,6 +146,31 @@ LoopModel planned_model(const HilSession& session, const PlanningTold& told) {
   return loop;
 }
 
+namespace {
+
+/// Whether a session that pushes to a depth at its slowest would go on with this model, by what the
+/// model says of its forces. The model is at rest after it.
+bool trusted_on_push(ContactModel& model, const HilSession& session, const Eigen::Vector3d& push,
+                     double depth_m) {
+  double slowest_m_per_s = std::numeric_limits<double>::infinity();
+  for (const SessionPhase& phase : session.phases) {
+    if (phase.rate_m_per_s > 0.0) {
+      slowest_m_per_s = std::min(slowest_m_per_s, phase.rate_m_per_s);
+    }
+  }
+  constexpr double kMostSteps = 2e4;  // slower pushes are looked at as one of so many periods
+  const double periods = depth_m / (slowest_m_per_s * session.servo.period_s);
+  const int steps = static_cast<int>(std::clamp(std::ceil(periods), 1.0, kMostSteps));
+  int doubted = 0;
+  for (int i = 1; i <= steps; ++i) {
+    if (!model.step(static_cast<double>(i) / steps * depth_m * push).trusted) ++doubted;
+  }
+  model.reset();
+  return doubted * session.servo.period_s <= session.servo.untrusted_limit_s;
+}
+
+}  // namespace
+
 LoopModel offered_loop(const Formulation& formulation, const HilSession& session) {
   const PushedScene pushed(session);
   const ExperimentScene scene = scene_of(pushed, range_of(session, pushed.deepest_m));
@@ -150,6 +178,7 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
   PlanBudget budget;
   budget.rate_Hz = 1.0 / session.servo.period_s;
   std::string reason = "no candidate that a loop steps";
+  std::optional<LoopModel> found;
   for (const auto& candidate : formulation.as<PlanOffer>()->candidates(surrogate.scene())) {
     if (!candidate->for_loop()) continue;
     if (const auto why = candidate->why_not(surrogate, budget)) {
@@ -161,8 +190,12 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
     auto models = candidate->contacts(surrogate, std::array{session.servo.period_s, kDrawnEvery_s});
     loop.model = std::move(models.front());
     if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
-    return loop;
+    const bool trusted =
+        trusted_on_push(*loop.model, session, pushed.probe.direction, pushed.deepest_m);
+    found = std::move(loop);
+    if (trusted) break;
   }
+  if (found) return std::move(*found);
   throw bad_input(session.scene_place,
                   fmt::format("the model '{}' has no answer: {}", formulation.name(), reason),
                   fmt::format("one of {}, {}", kPlannedModel, formulations_that(for_sessions)));

@@ -12,13 +12,7 @@ namespace {
 
 constexpr double kTrustedZone = 0.05;       // error over the largest force
 constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
-/// What the surroundings miss in motion over what they miss in equilibrium: what they remember of
-/// deeper places is missed too.
-constexpr double kMissedInMotion = 1.5;
-/// Times that where bonds of the surroundings stiffen: the linear surroundings miss more between
-/// the equilibria that are looked at (set by tests/reduce/test_material_servo.cpp).
-constexpr double kMissedStiffening = 16.0;
-constexpr double kUnbalanced = 0.1;  // what is left of the correction for what is unbalanced
+constexpr double kUnbalanced = 0.1;         // what is left of the correction for what is unbalanced
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
 
 void require(const ZoneNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
@@ -58,13 +52,13 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest,
       contact_(contact) {
   require(options, into_tissue);
   require_servo_material(bonds, "the zone");
-  missed_in_motion_ = kMissedInMotion * (bonds.is_linear() ? 1.0 : kMissedStiffening);
   PushedContact tissue(bonds, rest, constraints, contact);
   weights_ = servo_weights(bonds, options.period_s);
   instantaneous_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
   relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
   choose_zone(tissue);
-  build(tissue);
+  const Parts parts = build(tissue);
+  compare(tissue, constraints, parts);
 }
 
 void ZoneNetwork::choose_zone(const PushedContact& tissue) {
@@ -127,6 +121,7 @@ void ZoneNetwork::reset() noexcept {
   at_contact_.forget();
   elsewhere_.forget();
   step_error_->reset();
+  claim_.reset();
   for (AlignedFloats* const all : {&displacement_, &force_, &moved_, &offset_, &next_offset_,
                                    &pull_, &offset_pull_, &next_pull_}) {
     std::fill(all->begin(), all->end(), 0.0F);
@@ -215,13 +210,8 @@ ContactAnswer ZoneNetwork::step(const ToolPose& tool) noexcept {
 
   const double depth_m = tool.displacement_m.dot(into_);
   const double aside_m = (tool.displacement_m - depth_m * into_).norm();
-  const auto last = static_cast<double>(missed_N_.size() - 1);
-  const double at = std::clamp(std::abs(depth_m) / missed_stride_m_, 0.0, last);
-  const std::size_t low = std::min(static_cast<std::size_t>(at), missed_N_.size() - 2);
-  const double share = at - static_cast<double>(low);
-  const double missed_N =
-      (1.0 - share) * missed_N_[low] + share * missed_N_[low + 1] + aside_m * missed_aside_N_per_m_;
-  answer.error_N = missed_in_motion_ * missed_N + kUnbalanced * correction.norm() +
+  claim_.advance(depth_m);
+  answer.error_N = claim_.at(claim_.place(), aside_m) + kUnbalanced * correction.norm() +
                    step_error_->advance(tool.displacement_m).norm();
   const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * relaxed_.norm());
   answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&

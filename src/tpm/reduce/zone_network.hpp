@@ -2,8 +2,10 @@
 #include <memory>
 #include <vector>
 
+#include "tpm/reduce/compared_motion.hpp"
 #include "tpm/reduce/servo_bonds.hpp"
 #include "tpm/reduce/step_error.hpp"
+#include "tpm/reduce/zone_claim.hpp"
 #include "tpm/reduce/zone_surroundings.hpp"
 #include "tpm/solve/aligned_floats.hpp"
 #include "tpm/solve/panel_kernels.hpp"
@@ -31,9 +33,10 @@ struct ZoneNetworkOptions {
 /// symmetrically, its viscous part with the same memory as every bond has, so that it stores and
 /// dissipates as a tissue does (docs/reduction_servo.md).
 ///
-/// `error_N` estimates what the linear surroundings cost, by the forces that they miss at
-/// equilibria of the whole network; what linear elongations cost (StepError); and what is left
-/// unbalanced.
+/// `error_N` is the sum of what the linear surroundings cost, measured when the model is built: the
+/// zone is compared with the quasi-static network along motions on the normal and at equilibria
+/// beside it, and claims twice the errors found (ZoneClaim); what linear elongations cost
+/// (StepError); and what is left unbalanced.
 class ZoneNetwork final : public ContactModel {
  public:
   /// As ServoNetwork. Throws Error(bad_input) for guided spheres as well.
@@ -71,10 +74,22 @@ class ZoneNetwork final : public ContactModel {
     void put(const Eigen::MatrixXd& matrix);
     [[nodiscard]] FloatPanel panel() const { return {numbers.data(), stride, columns}; }
   };
+  /// What a zone is made from, whatever its period.
+  struct Parts {
+    std::vector<ServoBonds::Choice> near, far;
+    Eigen::MatrixXd lasting, relaxing;  ///< of the surroundings, by edge and own displacements
+    Positions frozen;
+    double relaxed = 0.0;  ///< how far the viscous elongations had caught up there
+  };
   void choose_zone(const PushedContact& tissue);
-  void build(PushedContact& tissue);
-  void build_errors(PushedContact& tissue, const LinearBonds& around,
-                    const std::vector<char>& linear);
+  [[nodiscard]] Parts build(PushedContact& tissue);
+  /// Steps with these weights from now on.
+  void set_weights(const PushedContact& tissue, const Parts& parts, ServoWeights weights);
+  /// Finds the claim (zone_comparison.cpp); ends with the weights of the period, at rest.
+  void compare(PushedContact& tissue, const Constraints& constraints, const Parts& parts);
+  void compare_along(const ComparedMotion& motion);
+  void compare_aside(PushedContact& tissue, double relaxed, int steps_there);
+  Eigen::Vector3d force_after(const Eigen::Vector3d& displacement_m, int steps_there);
   void add_surroundings() noexcept;
   void gather(std::size_t first) noexcept;
 
@@ -99,10 +114,7 @@ class ZoneNetwork final : public ContactModel {
   Dense outer_;     ///< displacements outside by those coordinates
   std::array<AlignedFloats, 3> field_;
   std::unique_ptr<StepError> step_error_;
-  /// Force missed at even depths from rest on, and per metre across the normal, N and N/m.
-  std::vector<double> missed_N_;
-  double missed_in_motion_ = 0.0;  ///< factor on it
-  double missed_stride_m_ = 0.0, missed_aside_N_per_m_ = 0.0;
+  ZoneClaim claim_;
 
   AlignedFloats displacement_, force_;
   AlignedFloats right_, change_;              ///< by coordinates of zone and own displacements

@@ -10,10 +10,7 @@
 namespace tpm {
 namespace {
 
-constexpr double kMissedStride_m = 2e-3;
-constexpr double kMissedAside_m = 2e-3;
-constexpr double kAsideDepths = 2.0;  // frozen depths at which the surroundings are tried across
-constexpr double kNoField = 1e-8;     // of the energy of a field: what it adds is nothing
+constexpr double kNoField = 1e-8;  // of the energy of a field: what it adds is nothing
 
 using Fields = std::vector<Eigen::Matrix3Xd>;
 
@@ -33,39 +30,14 @@ Eigen::MatrixXd not_negative(const Eigen::MatrixXd& matrix, double& softest) {
   return modes.vectors * values.cwiseMax(0.0).asDiagonal() * modes.vectors.transpose();
 }
 
-/// What some bonds of a tissue pull with, everything relaxed by a part, N.
-Eigen::Matrix3Xd pulls(const PushedContact& tissue, const Positions& position, double relaxed,
-                       const std::vector<char>& chosen) {
-  const BondSystem& bonds = tissue.bonds();
-  Eigen::VectorXd tension;
-  bonds.tensions(position, tissue.memory(position, relaxed, relaxed), tension);
-  Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, position.cols());
-  for (std::size_t b = 0; b < bonds.size(); ++b) {
-    if (chosen[b] == 0) continue;
-    const std::uint32_t from = bonds.end_a()[b];
-    const std::uint32_t to = bonds.end_b()[b];
-    const Eigen::Vector3d along = (position.col(to) - position.col(from)).normalized();
-    force.col(from) += tension[static_cast<Eigen::Index>(b)] * along;
-    force.col(to) -= tension[static_cast<Eigen::Index>(b)] * along;
-  }
-  return force;
-}
-
-double weighed(const ContactFields& fields, const Eigen::Matrix3Xd& force) {
-  Eigen::Vector3d sum;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    sum[axis] = fields.displacement[static_cast<std::size_t>(axis)].cwiseProduct(force).sum();
-  }
-  return sum.norm();
-}
-
 }  // namespace
 
-void ZoneNetwork::build(PushedContact& tissue) {
+ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
   const BondSystem& bonds = tissue.bonds();
   const auto relaxed = static_cast<double>(weights_.of_end);
   std::vector<char> linear(bonds.size(), 0);
-  std::vector<ServoBonds::Choice> near, far;
+  Parts parts;
+  parts.relaxed = relaxed;
   for (std::size_t b = 0; b < bonds.size(); ++b) {
     const std::uint32_t from = bonds.end_a()[b];
     const std::uint32_t to = bonds.end_b()[b];
@@ -73,15 +45,15 @@ void ZoneNetwork::build(PushedContact& tissue) {
     if (held_or_free_[from] == 1 || held_or_free_[to] == 1) {
       linear[b] = 1;
     } else if (from == contact_ || to == contact_) {
-      near.push_back(choice);
+      parts.near.push_back(choice);
     } else if (held_or_free_[from] == 2 || held_or_free_[to] == 2) {
-      far.push_back(choice);
+      parts.far.push_back(choice);
     }
   }
   const std::size_t filler = zone_.size() + 1;
   const auto filler_column = static_cast<std::uint32_t>(filler);
-  at_contact_ = ServoBonds(bonds, tissue.rest(), near, filler_column, options_.portable);
-  elsewhere_ = ServoBonds(bonds, tissue.rest(), far, filler_column, options_.portable);
+  at_contact_ = ServoBonds(bonds, tissue.rest(), parts.near, filler_column, options_.portable);
+  elsewhere_ = ServoBonds(bonds, tissue.rest(), parts.far, filler_column, options_.portable);
   displacement_.assign(4 * (filler + 1), 0.0F);
   force_.assign(8 * (filler + 1), 0.0F);
 
@@ -142,10 +114,8 @@ void ZoneNetwork::build(PushedContact& tissue) {
   const double size = std::sqrt(bonds.stiffness().maxCoeff());
   for (Eigen::Matrix3Xd& field : own) basis.push_back(field * size);
 
-  const auto n = static_cast<Eigen::Index>(3 * zone_.size()) + own_;
   const auto tail = static_cast<Eigen::Index>(basis.size());
-  Eigen::MatrixXd stiff = Eigen::MatrixXd::Zero(tail, tail);
-  Eigen::MatrixXd relaxing = stiff;
+  parts.lasting = parts.relaxing = Eigen::MatrixXd::Zero(tail, tail);
   if (tail > 0) {
     Fields resist, relax;
     for (const Eigen::Matrix3Xd& field : basis) {
@@ -155,14 +125,12 @@ void ZoneNetwork::build(PushedContact& tissue) {
       around.add_relaxing(field, relax.back());
     }
     const Eigen::MatrixXd all = flat_columns(basis);
-    Eigen::MatrixXd lasting = all.transpose() * flat_columns(resist);
-    relaxing = all.transpose() * flat_columns(relax);
-    lasting = (0.5 * (lasting + lasting.transpose())).eval();
-    relaxing = (0.5 * (relaxing + relaxing.transpose())).eval();
-    stiff = not_negative(lasting, softest_) + (1.0 - relaxed) * relaxing;
+    const Eigen::MatrixXd lasting = all.transpose() * flat_columns(resist);
+    const Eigen::MatrixXd relaxing = all.transpose() * flat_columns(relax);
+    parts.lasting = not_negative(0.5 * (lasting + lasting.transpose()), softest_);
+    parts.relaxing = 0.5 * (relaxing + relaxing.transpose());
   }
-  stiff_.put(stiff);
-  relaxing_.put(relaxing);
+  relaxing_.put(parts.relaxing);
   Eigen::MatrixXd outer(static_cast<Eigen::Index>(3 * outside_.size()), tail);
   for (Eigen::Index j = 0; j < tail; ++j) {
     for (std::size_t i = 0; i < outside_.size(); ++i) {
@@ -172,15 +140,36 @@ void ZoneNetwork::build(PushedContact& tissue) {
   }
   outer_.put(outer);
 
-  const Positions frozen = tissue.at(options_.frozen_depth_m * into_, relaxed);
-  const BondMemory memory = tissue.memory(frozen, relaxed, relaxed);
+  parts.frozen = tissue.at(options_.frozen_depth_m * into_, relaxed);
+  set_weights(tissue, parts, weights_);
+  for (AlignedFloats* const all : {&right_, &change_}) all->assign(inverse_.stride, 0.0F);
+  for (AlignedFloats* const all :
+       {&moved_, &offset_, &next_offset_, &pull_, &offset_pull_, &next_pull_}) {
+    all->assign(std::max<std::size_t>(stiff_.stride, 8), 0.0F);
+  }
+  branch_offset_.assign(weights_.branches.size(), AlignedFloats(next_offset_.size(), 0.0F));
+  step_error_ = std::make_unique<StepError>(tissue, parts.frozen, relaxed, options_.period_s);
+  return parts;
+}
+
+void ZoneNetwork::set_weights(const PushedContact& tissue, const Parts& parts,
+                              ServoWeights weights) {
+  weights_ = std::move(weights);
+  claim_.set_weights(weights_);
+  const auto relaxed = static_cast<double>(weights_.of_end);
+  const Eigen::MatrixXd stiff = parts.lasting + (1.0 - relaxed) * parts.relaxing;
+  stiff_.put(stiff);
+  const BondSystem& bonds = tissue.bonds();
+  const auto n = static_cast<Eigen::Index>(3 * zone_.size()) + own_;
+  const Eigen::Index tail = stiff.rows();
+  const BondMemory memory = tissue.memory(parts.frozen, parts.relaxed, relaxed);
   Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(n, n);
   whole.bottomRightCorner(tail, tail) = stiff;
   Eigen::MatrixXd coupling = Eigen::MatrixXd::Zero(n, 3);
   const auto in_zone = [&](std::uint32_t column) { return column < zone_.size(); };
-  for (const auto* const some : {&near, &far}) {
+  for (const auto* const some : {&parts.near, &parts.far}) {
     for (const auto& [bond, from, to] : *some) {
-      const Eigen::Matrix3d block = bonds.stiffness_block(bond, frozen, memory);
+      const Eigen::Matrix3d block = bonds.stiffness_block(bond, parts.frozen, memory);
       const Eigen::Index a = 3 * static_cast<Eigen::Index>(from);
       const Eigen::Index b = 3 * static_cast<Eigen::Index>(to);
       if (in_zone(from)) whole.block<3, 3>(a, a) += block;
@@ -205,43 +194,6 @@ void ZoneNetwork::build(PushedContact& tissue) {
     for (Eigen::Index i = 0; i < n; ++i) {
       field_[axis][static_cast<std::size_t>(i)] =
           static_cast<float>(field(i, static_cast<Eigen::Index>(axis)));
-    }
-  }
-  for (AlignedFloats* const all : {&right_, &change_}) all->assign(inverse_.stride, 0.0F);
-  for (AlignedFloats* const all :
-       {&moved_, &offset_, &next_offset_, &pull_, &offset_pull_, &next_pull_}) {
-    all->assign(std::max<std::size_t>(stiff_.stride, 8), 0.0F);
-  }
-  branch_offset_.assign(weights_.branches.size(), AlignedFloats(next_offset_.size(), 0.0F));
-  step_error_ = std::make_unique<StepError>(tissue, frozen, relaxed, options_.period_s);
-  build_errors(tissue, around, linear);
-}
-
-void ZoneNetwork::build_errors(PushedContact& tissue, const LinearBonds& around,
-                               const std::vector<char>& linear) {
-  const auto missed = [&](const Eigen::Vector3d& displacement_m, double relaxed) {
-    const Positions position = tissue.at(displacement_m, relaxed);
-    const ContactFields fields = tissue.fields(position, tissue.memory(position, relaxed, relaxed));
-    Eigen::Matrix3Xd force = pulls(tissue, position, relaxed, linear);
-    around.add_resistance(position - tissue.rest(), relaxed, force);
-    return weighed(fields, force);
-  };
-  const auto worst = [&](const Eigen::Vector3d& displacement_m) {
-    return std::max(missed(displacement_m, 0.0), missed(displacement_m, 1.0));
-  };
-  const auto count = static_cast<int>(std::ceil(options_.deepest_m / kMissedStride_m));
-  missed_stride_m_ = options_.deepest_m / count;
-  for (int i = 0; i <= count; ++i) missed_N_.push_back(worst(i * missed_stride_m_ * into_));
-  const Eigen::Vector3d pressed =
-      std::min(kAsideDepths * options_.frozen_depth_m, options_.deepest_m) * into_;
-  const double there_N = worst(pressed);
-  Eigen::Index least = 0;
-  into_.cwiseAbs().minCoeff(&least);
-  const Eigen::Vector3d first = into_.cross(Eigen::Vector3d::Unit(least)).normalized();
-  for (const Eigen::Vector3d& aside : {first, Eigen::Vector3d(into_.cross(first))}) {
-    for (const double way_m : {kMissedAside_m, -kMissedAside_m}) {
-      const double change_N = std::max(0.0, worst(pressed + way_m * aside) - there_N);
-      missed_aside_N_per_m_ = std::max(missed_aside_N_per_m_, change_N / kMissedAside_m);
     }
   }
 }
