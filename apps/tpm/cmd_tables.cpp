@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "command.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/report/study_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/tables.hpp"
@@ -50,8 +51,8 @@ std::vector<double> lengths(const std::string& text, std::string_view option) {
     parts.push_back(std::move(part));
     from = end + 1;
   }
-  const auto space = parts.back().find(' ');
-  const std::string unit = space == std::string::npos ? "mm" : parts.back().substr(space + 1);
+  const std::string_view last = split_quantity(parts.back()).unit;
+  const std::string unit(last.empty() ? "mm" : last);
   std::vector<double> values;
   values.reserve(parts.size());
   for (const std::string& part : parts) values.push_back(in_unit(part, unit, option));

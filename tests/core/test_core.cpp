@@ -9,6 +9,7 @@
 
 #include "sanitizer.hpp"
 #include "tpm/core/memory_reserve.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
@@ -23,6 +24,9 @@ TEST_CASE("a quantity is a number and a unit of the right dimension") {
   CHECK_THAT(parse_quantity("12.56 mm^2", Dimension::area, "here"), WithinRel(12.56e-6, 1e-15));
   CHECK_THAT(parse_quantity("5 Pa s", Dimension::viscosity, "here"), WithinRel(5.0, 1e-15));
   CHECK_THAT(parse_quantity("4mm", Dimension::length, "here"), WithinRel(4e-3, 1e-15));
+  CHECK(split_quantity(" 2.5e-3 kPa s ").unit == "kPa s");
+  CHECK(split_quantity("2.5e-3kPa").number == "2.5e-3");
+  CHECK(split_quantity("4").unit.empty());
   CHECK_THAT(parse_quantity("1e3Pa", Dimension::stress, "here"), WithinRel(1e3, 1e-15));
   CHECK_THROWS_WITH(parse_quantity("4mm", Dimension::stress, "key E"),
                     Catch::StartsWith("key E: 'mm' is a unit of length"));

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -396,7 +397,7 @@ double parse_number(std::string_view text, std::string_view where) {
                   "a number such as 12.5 or 1.2e-3");
 }
 
-double parse_quantity(std::string_view text, Dimension expected, std::string_view where) {
+QuantityText split_quantity(std::string_view text) {
   const std::string_view t = trimmed(text);
   std::size_t split = std::min(t.find_first_of(" \t"), t.size());
   if (split == t.size()) {  // "4mm": the unit begins where the number ends
@@ -404,16 +405,20 @@ double parse_quantity(std::string_view text, Dimension expected, std::string_vie
     const auto end = std::from_chars(t.data(), t.data() + t.size(), number).ptr;
     if (end != t.data()) split = static_cast<std::size_t>(end - t.data());
   }
-  const std::string_view number = t.substr(0, split);
-  const std::string_view unit = trimmed(t.substr(split));
+  return {t.substr(0, split), trimmed(t.substr(split))};
+}
+
+double parse_quantity(std::string_view text, Dimension expected, std::string_view where) {
+  const auto [number, unit] = split_quantity(text);
   if (unit.empty() && expected != Dimension::dimensionless) {
-    throw bad_input(where, fmt::format("'{}' has no unit", printable(t)),
+    throw bad_input(where, fmt::format("'{}' has no unit", printable(trimmed(text))),
                     fmt::format("a number and a unit of {}: {}", dimension_name(expected),
                                 known_units(expected)));
   }
   const double value = parse_number(number, where);
   const double si = value * parse_unit(unit, expected, where).to_si;
-  if (!std::isfinite(si)) throw bad_input(where, fmt::format("'{}' overflows", printable(t)));
+  if (!std::isfinite(si))
+    throw bad_input(where, fmt::format("'{}' overflows", printable(trimmed(text))));
   return si;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/scene/organ_model.hpp"
@@ -50,12 +51,10 @@ std::vector<std::size_t> parse_scope(const Json& j, const FitConfig& config,
 FitParameter parse_search(const std::string& name, const Json& j, Dimension dimension,
                           const DocumentPlace& place) {
   const auto start = j.at("start").get<std::string>();
-  const auto unit_begin = start.find_first_of(" \t", start.find_first_not_of(" \t"));
   FitParameter fit;
   fit.name = name;
   fit.start = quantity_at(j, "start", dimension, place);
-  fit.unit = parse_unit(unit_begin == std::string::npos ? std::string{} : start.substr(unit_begin),
-                        dimension, place.key("start").where);
+  fit.unit = parse_unit(split_quantity(start).unit, dimension, place.key("start").where);
   fit.lower = quantity_at(j, "lower", dimension, place);
   fit.upper = quantity_at(j, "upper", dimension, place);
   const DocumentPlace scale_place = place.key("scale");

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_scene.hpp"
 #include "tpm/plan/shared_plan.hpp"
@@ -100,7 +101,7 @@ SceneRange range_in_scene(const Json& scene, const std::string& target,
   const Json::json_pointer pointer(target);
   if (!scene.contains(pointer)) return {};
   const auto text = scene.at(pointer).get<std::string>();
-  const Unit unit = parse_unit(text.substr(text.find(' ') + 1), target);
+  const Unit unit = parse_unit(split_quantity(text).unit, target);
   const double value = parse_quantity(text, unit.dimension, target);
   return {value, value};
 }

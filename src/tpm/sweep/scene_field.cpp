@@ -1,4 +1,5 @@
 #include "tpm/sweep/scene_field.hpp"
+#include "tpm/core/quantity_text.hpp"
 
 #include <fmt/format.h>
 
@@ -44,11 +45,9 @@ SceneField::SceneField(const Json& scene, const BondMaterial& material, const st
     if (!value.is_string()) throw no_number(target, "is no number", where);
     quantity_ = true;
     const auto text = value.get<std::string>();
-    const std::size_t space = text.find(' ');
-    if (space == std::string::npos || !find_number(text.substr(0, space))) {
-      throw no_number(target, "is no number", where);
-    }
-    dimension_ = parse_unit(std::string_view(text).substr(space + 1), where).dimension;
+    const auto [number, unit] = split_quantity(text);
+    if (unit.empty() || !find_number(number)) throw no_number(target, "is no number", where);
+    dimension_ = parse_unit(unit, where).dimension;
   } catch (const Json::exception&) {
     throw no_number(target, "is not in the scene", where);
   }
