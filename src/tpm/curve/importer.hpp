@@ -29,7 +29,8 @@ class ImportInput {
   std::optional<DelimitedTable> table_;
 };
 
-/// A kind of foreign file. The list in import.cpp holds all (docs/architecture.md, "Adding an importer").
+/// A kind of foreign file. The list in import.cpp holds all (docs/architecture.md, "Adding an
+/// importer").
 struct Importer {
   std::string_view name;  ///< as --from takes it
   Provenance usual;       ///< of such a file if the options give none

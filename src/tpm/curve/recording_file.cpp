@@ -29,15 +29,15 @@ bool is_described(const fs::path& path) {
 }
 
 bool says_something_about_columns(const ImportOptions& options) {
-  return options.format != "auto" || options.header_rows ||
-         !options.time_column.empty() || !options.drive_column.empty() ||
-         !options.response_column.empty() || !options.sd_column.empty() ||
-         !options.frequency_column.empty() || !options.storage_column.empty() ||
-         !options.loss_column.empty() || options.drive_quantity || options.response_quantity ||
-         !options.units.empty() || options.negate_drive || options.negate_response ||
-         options.contact_force_N || options.spring_constant_N_per_m || !options.segments.empty() ||
-         options.rest_length_m || options.area_m2 || options.x || options.y ||
-         !options.dataset.empty() || options.depth_m || options.load_N;
+  return options.format != "auto" || options.header_rows || !options.time_column.empty() ||
+         !options.drive_column.empty() || !options.response_column.empty() ||
+         !options.sd_column.empty() || !options.frequency_column.empty() ||
+         !options.storage_column.empty() || !options.loss_column.empty() ||
+         options.drive_quantity || options.response_quantity || !options.units.empty() ||
+         options.negate_drive || options.negate_response || options.contact_force_N ||
+         options.spring_constant_N_per_m || !options.segments.empty() || options.rest_length_m ||
+         options.area_m2 || options.x || options.y || !options.dataset.empty() || options.depth_m ||
+         options.load_N;
 }
 
 /// The kind that a description names; an id is one of the shipped curves.
