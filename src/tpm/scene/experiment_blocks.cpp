@@ -36,7 +36,7 @@ std::vector<double> listed_times(const Json& list, const Protocol& protocol,
   std::vector<double> times;
   for (const Json& entry : list) {
     const DocumentPlace here = place.key(std::to_string(times.size()));
-    times.push_back(parse_quantity(entry.get<std::string>(), Dimension::time, here.where));
+    times.push_back(quantity_of(entry, Dimension::time, here.where));
     if (times.back() >= protocol.start_s() && times.back() <= protocol.end_s()) continue;
     throw bad_input(here.where, fmt::format("{} s", shortest(times.back())),
                     fmt::format("a time within the protocol, {} to {} s",

@@ -30,7 +30,13 @@ void require_masses(const std::vector<SceneContact>& contacts, std::string_view 
 
 ExperimentScene parse_experiment(const Json& scene, std::string_view where,
                                  const std::filesystem::path& folder) {
-  Tissue tissue = parse_tissue(scene, where, folder);
+  check_schema(scene, "scene", where);
+  return parse_checked_experiment(scene, where, folder);
+}
+
+ExperimentScene parse_checked_experiment(const Json& scene, std::string_view where,
+                                         const std::filesystem::path& folder) {
+  Tissue tissue = parse_checked_tissue(scene, where, folder);
   const DocumentPlace place{std::string(where)};
   if (!scene.contains("protocol")) {
     throw bad_input(place.key("protocol").where, "is missing",

@@ -93,6 +93,9 @@ struct ExperimentScene {
 /// Throws Error(bad_input) with the key, also for a network that does not stand.
 [[nodiscard]] ExperimentScene parse_experiment(const Json& scene, std::string_view where,
                                                const std::filesystem::path& folder);
+/// The same of a scene that the schema has seen with texts where numbers stand now (quantity_of).
+[[nodiscard]] ExperimentScene parse_checked_experiment(const Json& scene, std::string_view where,
+                                                       const std::filesystem::path& folder);
 
 /// The same from a file, whose bytes become the record's text.
 [[nodiscard]] ExperimentScene read_experiment(const std::filesystem::path& scene);

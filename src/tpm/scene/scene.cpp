@@ -99,6 +99,11 @@ Constraints Tissue::constraints() const {
 Tissue parse_tissue(const Json& scene, std::string_view where,
                     const std::filesystem::path& folder) {
   check_schema(scene, "scene", where);
+  return parse_checked_tissue(scene, where, folder);
+}
+
+Tissue parse_checked_tissue(const Json& scene, std::string_view where,
+                            const std::filesystem::path& folder) {
   const DocumentPlace place{std::string(where)};
   const auto block = [&](const char* key) { return scene.value(key, Json::object()); };
   OrganBlock organ = parse_organ(scene.at("organ"), place.key("organ"), folder);

@@ -265,13 +265,16 @@ class OrganCell final : public CellModel {
   /// a run: they are kept while only the material and the protocol change. They are always those
   /// of the scene's own material and protocol, so that no cell depends on which one was before.
   ExperimentScene scene_of(std::span<const double> swept, const Json& changed, std::string& key) {
-    Json structure = setup_.scene;
+    Json texts = setup_.scene;  // as the schema knows it: with quantities as in the file
+    texts.erase("integrator");
+    Json structure = texts;
     for (std::size_t i = 0; i < swept.size(); ++i) {
-      if (!fields_[i].is_light()) fields_[i].set(structure, swept[i]);
+      if (fields_[i].is_light()) continue;
+      fields_[i].set(structure, swept[i]);
+      if (!fields_[i].is_quantity()) fields_[i].set(texts, swept[i]);
     }
-    structure.erase("integrator");
     key = structure.dump();
-    ExperimentScene scene = base_of(structure, key);
+    ExperimentScene scene = base_of(structure, key, texts);
     const DocumentPlace place{"scene"};
     MaterialBlock material =
         parse_material(changed.value("material", Json::object()), scene.tissue.materials.lateral(),
@@ -289,7 +292,7 @@ class OrganCell final : public CellModel {
   }
 
   /// The last few are kept: a design of sensitivities goes back and forth between two organs.
-  const ExperimentScene& base_of(const Json& structure, const std::string& key) {
+  const ExperimentScene& base_of(const Json& structure, const std::string& key, const Json& texts) {
     constexpr std::size_t kKept = 4;
     const auto found = std::find_if(bases_.begin(), bases_.end(),
                                     [&](const auto& base) { return base.first == key; });
@@ -298,7 +301,9 @@ class OrganCell final : public CellModel {
       return bases_.front().second;
     }
     if (bases_.size() == kKept) bases_.pop_back();
-    bases_.emplace(bases_.begin(), key, parse_experiment(structure, "scene", setup_.folder));
+    check_schema(texts, "scene", "scene");
+    bases_.emplace(bases_.begin(), key,
+                   parse_checked_experiment(structure, "scene", setup_.folder));
     return bases_.front().second;
   }
 

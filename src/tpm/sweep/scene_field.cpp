@@ -68,9 +68,7 @@ bool SceneField::is_shared() const {
 
 void SceneField::set(Json& scene, double value) const {
   if (!parameter_.empty() || of_protocol()) return;
-  if (quantity_ && !is_light()) {
-    scene.at(pointer_) = fmt::format("{} {}", shortest(value), si_symbol(dimension_));
-  } else if (!whole_) {
+  if (!whole_) {
     scene.at(pointer_) = value;
   } else if (value == std::round(value) && std::abs(value) < 1e15) {
     scene.at(pointer_) = static_cast<std::int64_t>(value);

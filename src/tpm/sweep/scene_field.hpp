@@ -24,10 +24,12 @@ class SceneField {
   /// Of the protocol or the relaxation time: what a shared plan answers to without being made anew.
   [[nodiscard]] bool is_shared() const;
 
+  /// A text with a unit in files.
+  [[nodiscard]] bool is_quantity() const { return quantity_; }
+
   /// Puts an SI value where the field stands; each leaves the fields of the others alone. In a
-  /// scene a quantity becomes a number (quantity_of), and of spheres and bonds, which the schema
-  /// sees, a text. Throws Error(bad_input) for a fraction where the scene has a whole number, and
-  /// for a value out of the range of a material's parameter.
+  /// scene a quantity becomes a number (quantity_of). Throws Error(bad_input) for a fraction where
+  /// the scene has a whole number, and for a value out of the range of a material's parameter.
   void set(Json& scene, double value) const;
   void set(BondMaterial& material, double value) const;
   void set(ProtocolBlock& protocol, double value) const;
