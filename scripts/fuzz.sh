@@ -111,6 +111,7 @@ fuzz() { # NAME
   for file in $(seeds_of "$name") "$kept"/*; do cp "$file" "$seeds/"; done
   cp -r configs "$place"  # what inputs name stands where they expect it
   cp -r data "$folder/$name/data"
+  if [[ $name == fit_tables ]]; then cp configs/liver_tables/* "$place/"; fi
   find "$seeds" "$place" -name '*.json' -exec python3 -c "$blocks_for_livers" {} +
   # a description has the name of its file
   if [[ $name == curve_description ]]; then sed -i 's/"id": "[a-z_]*"/"id": "case"/' "$seeds"/*; fi
