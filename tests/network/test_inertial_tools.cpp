@@ -146,6 +146,23 @@ TEST_CASE("an impact on several spheres keeps momentum, pulls none, and takes en
   }
 }
 
+TEST_CASE("an impact far below the speed of the whole ends where rounding does") {
+  const Eigen::VectorXd mass = (Eigen::VectorXd(4) << 1.0, 2.0, 4.0, 0.1).finished();
+  const Constraints constraints(4);
+  std::vector<TouchingPair> pairs;
+  for (int i = 0; i < 3; ++i) {
+    pairs.push_back({i, 3, -Eigen::Vector3d(std::cos(i), std::sin(i), 1.0 + i).normalized()});
+  }
+  const Eigen::Vector3d common(3.0, -7.0, 11.0), approach(1e-9, -2e-9, 3e-8);
+  Eigen::Matrix3Xd velocity = common.replicate(1, 4);
+  velocity.col(3) += approach;
+  const Eigen::VectorXd impulse = inelastic_impact(pairs, constraints, mass, velocity);
+  Eigen::Matrix3Xd alone = Eigen::Matrix3Xd::Zero(3, 4);
+  alone.col(3) = approach;
+  const Eigen::VectorXd expected = inelastic_impact(pairs, constraints, mass, alone);
+  CHECK((impulse - expected).norm() < 1e-5 * expected.norm());
+}
+
 TEST_CASE("a tool that moves evenly pushes with the spring's force, and its mass is the probe's") {
   const double speed = 0.2, depth = 4e-3;
   for (const double tool_kg : {0.01, 10.0}) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "tpmkit/error.hpp"
@@ -11,6 +12,8 @@ namespace {
 
 constexpr int kMostSweeps = 20'000;
 constexpr double kSettled = 1e-14;  // of the largest approach speed
+// Roundings of a speed in a sum of three products: no approach slower than that is told from none.
+constexpr double kRoundings = 8.0 * std::numeric_limits<double>::epsilon();
 
 /// What an impulse along the normal changes.
 struct Answer {
@@ -35,13 +38,14 @@ Eigen::VectorXd inelastic_impact(std::span<const TouchingPair> pairs,
                                  const Constraints& constraints, const Eigen::VectorXd& mass_kg,
                                  Eigen::Matrix3Xd& velocity) {
   std::vector<Answer> answers;
-  double scale = 0.0;
+  double scale = 0.0, speed = 0.0;
   const auto gap_rate = [&](const TouchingPair& pair) {
     return pair.normal.dot(velocity.col(pair.tool) - velocity.col(pair.sphere));
   };
   for (const TouchingPair& pair : pairs) {
     answers.push_back(answer_of(pair, constraints, mass_kg));
     scale = std::max(scale, -gap_rate(pair));
+    speed = std::max({speed, velocity.col(pair.tool).norm(), velocity.col(pair.sphere).norm()});
   }
   Eigen::VectorXd impulse = Eigen::VectorXd::Zero(std::ssize(pairs));
   if (!(scale > 0.0)) return impulse;
@@ -57,7 +61,7 @@ Eigen::VectorXd inelastic_impact(std::span<const TouchingPair> pairs,
       velocity.col(pairs[i].tool) += more * answer.of_tool;
       changed = std::max(changed, std::abs(more) * answer.of_gap);
     }
-    if (changed <= kSettled * scale) return impulse;
+    if (changed <= std::max(kSettled * scale, kRoundings * speed)) return impulse;
   }
   throw Error(ExitCode::numerical, "tools", "the impulses of an impact do not settle");
 }
