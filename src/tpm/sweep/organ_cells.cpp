@@ -25,6 +25,8 @@ using Kind = SweepOutput::Kind;
 
 /// What a sweep's document says of the organ.
 struct OrganSetup {
+  explicit OrganSetup(const Json& of_scene) : scene(of_scene) {}
+
   Json scene;
   BondMaterial material;   ///< the scene's first
   ProtocolBlock protocol;  ///< of the scene
@@ -403,8 +405,7 @@ void require_outputs(const OrganSetup& setup, const DocumentPlace& place) {
 std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::string_view where,
                                                     const std::filesystem::path& folder) {
   const DocumentPlace place{std::string(where)};
-  OrganSetup setup;
-  setup.scene = document.at("scene");
+  OrganSetup setup(document.at("scene"));
   setup.folder = folder;
   if (document.contains("tolerance")) {
     const auto text = document.at("tolerance").get<std::string>();
