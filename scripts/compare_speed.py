@@ -7,8 +7,9 @@ Exit 0: nothing is slower; 1: something is, and it is named.
 """
 import argparse
 import csv
-import os
+import json
 import pathlib
+import resource
 import statistics
 import subprocess
 import sys
@@ -16,10 +17,15 @@ import tempfile
 
 REGRESSION = 1.10
 
-# Whole commands that every version knows; files are written into a folder that is removed.
+# Whole commands that every version knows; {out} is a name in a folder that is removed, new in every run.
 COMMANDS = {
-    "simulate liver_indentation": ["simulate", "{configs}/liver_indentation.json", "-o", "{tmp}/a.h5"],
-    "simulate liver_poke": ["simulate", "{configs}/liver_poke.json", "-o", "{tmp}/b.h5"],
+    "simulate liver_indentation": ["simulate", "{configs}/liver_indentation.json", "-o", "{out}.h5"],
+    "simulate liver_poke": ["simulate", "{configs}/liver_poke.json", "-o", "{out}.h5"],
+    "import 200,000 readings": ["data", "import", "{tmp}/readings.csv", "-o", "{out}"],
+    "sweep 200,000 cells": ["sweep", "{tmp}/grid.json", "-o", "{out}"],
+    "sweep x_depth": ["sweep", "{configs}/sweep_x_depth.json", "-o", "{out}"],
+    "sweep organ": ["sweep", "{configs}/sweep_organ.json", "-o", "{out}"],
+    "sweep creep_work": ["sweep", "{configs}/sweep_creep_work.json", "-o", "{out}"],
     "fit liver_relaxation": ["fit", "{configs}/liver_relaxation.json"],
     "network check liver_scene": ["network", "check", "{configs}/liver_scene.json"],
     "plan deep": ["plan", "{configs}/plan/deep.json"],
@@ -27,15 +33,34 @@ COMMANDS = {
 }
 
 
+# Of the closed form over two axes.
+GRID = {"title": "spacing by depth", "model": "single_contact",
+        "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "5 Pa s", "A0": "12.56 mm^2",
+                     "l0": "1 mm"},
+        "indentation": {"kind": "step_hold"},
+        "axes": [{"parameter": "depth", "from": "1 mm", "to": "8 mm", "count": 400},
+                 {"parameter": "spacing", "from": "20 mm", "to": "35 mm", "count": 500}],
+        "outputs": ["lambda1", "peak_force", "end_force"]}
+
+
+def write_inputs(folder):
+    """readings.csv, a ramp of 20 s and a hold of 180 s read every millisecond; grid.json."""
+    with open(pathlib.Path(folder, "readings.csv"), "w", encoding="utf-8") as file:
+        file.write("time (s),depth (mm),force (mN)\n")
+        for i in range(200_000):
+            depth = min(i / 20_000, 1.0) * 4.0
+            file.write(f"{i / 1000:.3f},{depth:.5f},{12 * depth + 3 * depth**2 + (i * 7919 % 200 - 100) / 1000:.4f}\n")
+    pathlib.Path(folder, "grid.json").write_text(json.dumps(GRID), encoding="utf-8")
+
+
 def processor_seconds(command):
     """User and system time of a process and its children; None if it fails."""
-    before = os.times()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    after = os.times()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode != 0:
         return None, done.stderr.strip().splitlines()[-1:] or [f"exit {done.returncode}"]
-    return (after.children_user + after.children_system
-            - before.children_user - before.children_system), None
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, None
 
 
 def recorded(program, names, repeats, folder):
@@ -59,11 +84,15 @@ def measure(programs, configs, rounds, repeats):
     failed = {}
     common = [w for w in works(programs[0]) if w in set(works(programs[1]))]
     with tempfile.TemporaryDirectory() as folder:
+        write_inputs(folder)
+        runs = 0
         for _ in range(rounds):
             for name, words in COMMANDS.items():
                 pair = []
                 for program, config in zip(programs, configs):
-                    command = [program] + [w.format(configs=config, tmp=folder) for w in words]
+                    runs += 1
+                    out = pathlib.Path(folder, f"run{runs}")
+                    command = [program] + [w.format(configs=config, tmp=folder, out=out) for w in words]
                     seconds, why = processor_seconds(command)
                     if why:
                         failed[name] = why[0]
