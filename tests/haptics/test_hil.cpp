@@ -114,7 +114,7 @@ TEST_CASE("A session of the element verifies against the network, the closed for
 std::pair<double, double> depths_while_sliding(const HilSession& session) {
   const SurfaceScene surface(session);
   const Positions& rest = surface.scene.rest();
-  const Eigen::Vector3d into = surface.scene.probe.direction;
+  const Eigen::Vector3d into = surface.scene.probe().direction;
   OperatorScript script = session.operator_script();
   std::pair<double, double> depths{1.0, -1.0};
   const double from_s = session.phases[1].end_s, to_s = session.phases[3].end_s;

@@ -49,7 +49,7 @@ void run(const HilSession& session, const char* how) {
         Eigen::Map<const Eigen::Vector3d>(row.position_m) - session.servo.surface_m;
     const Eigen::Vector3d aside = surface.to_model * (moved - moved.dot(push) * push);
     const auto touch =
-        surface.ball.depth_to_touch_m(surface.scene.rest(), aside, surface.scene.probe.direction);
+        surface.ball.depth_to_touch_m(surface.scene.rest(), aside, surface.scene.probe().direction);
     const auto phase = static_cast<std::size_t>(row.phase);
     if (phase >= depths.size() || !touch) return;
     depths[phase].see(moved.dot(push) - *touch);

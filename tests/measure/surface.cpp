@@ -30,7 +30,7 @@ struct Setup {
         surface(session),
         bonds(surface.scene.tissue.bonds()),
         constraints(surface.scene.tissue.constraints()),
-        into(surface.scene.probe.direction),
+        into(surface.scene.probe().direction),
         x(into.unitOrthogonal()),
         y(into.cross(x)) {}
   [[nodiscard]] SurfaceNetwork network() const {

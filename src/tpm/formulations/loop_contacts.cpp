@@ -40,8 +40,8 @@ LoopModel network_beside_model(const HilSession& session, bool threads) {
   LoopModel loop = scene.begun("network_beside", "stepped beside the loop, pushed at");
   loop.model = std::make_unique<NetworkBeside>(
       scene.network(every * session.servo.period_s),
-      StiffnessByDepth(bonds, scene.rest(), scene.tissue.constraints(), scene.probe.sphere,
-                       scene.probe.direction, scene.deepest_m),
+      StiffnessByDepth(bonds, scene.rest(), scene.tissue.constraints(), scene.only_sphere(),
+                       scene.probe().direction, scene.deepest_m),
       session.servo.period_s, threads);
   loop.shape.field = scene.network(kDrawnEvery_s);
   loop.error_bound = "its own estimate, row by row; what tpm hil verify measures";

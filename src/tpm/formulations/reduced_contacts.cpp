@@ -78,7 +78,7 @@ LoopModel condensed_model(const HilSession& session) {
   options.period_s = session.servo.period_s;
   const CondensedContact condensed =
       build_condensed(scene.tissue.bonds(), scene.rest(), scene.tissue.constraints(),
-                      scene.probe.sphere, scene.probe.direction, options);
+                      scene.only_sphere(), scene.probe().direction, options);
   LoopModel loop = scene.begun("condensed", "seen from");
   loop.model = std::make_unique<CondensedContact>(condensed);
   loop.shape.field = std::make_shared<CondensedContact>(condensed.with_period(kDrawnEvery_s));

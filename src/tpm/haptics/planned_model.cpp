@@ -43,18 +43,17 @@ ContactRange range_of(const HilSession& session, double deepest_m) {
 }
 
 ExperimentScene scene_of(const PushedScene& pushed, const ContactRange& range) {
-  SceneContact contact;
-  contact.probe = pushed.probe;
   ExperimentScene scene{pushed.tissue,
-                        {std::move(contact)},
+                        {pushed.contact},
                         Protocol(Drive::displacement, {{0.0, 0.0}, {1.0, range.depth_m}}, "push"),
                         {},
                         {},
                         {}};
   std::vector<Guide>& guides = scene.tissue.guides;
-  const auto of_contact = [&](const Guide& guide) { return guide.sphere == pushed.probe.sphere; };
-  if (std::none_of(guides.begin(), guides.end(), of_contact)) {
-    guides.push_back({pushed.probe.sphere, pushed.probe.direction});
+  for (const std::size_t sphere : spheres_of(pushed.contact, pushed.tissue.network.organ)) {
+    const auto of_contact = [&](const Guide& guide) { return guide.sphere == sphere; };
+    if (std::any_of(guides.begin(), guides.end(), of_contact)) continue;
+    guides.push_back({sphere, pushed.probe().direction});
   }
   return contact_scene(scene, range);
 }
@@ -191,7 +190,7 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
     loop.model = std::move(models.front());
     if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
     const bool trusted =
-        trusted_on_push(*loop.model, session, pushed.probe.direction, pushed.deepest_m);
+        trusted_on_push(*loop.model, session, pushed.probe().direction, pushed.deepest_m);
     found = std::move(loop);
     if (trusted) break;
   }

@@ -237,6 +237,17 @@ void parse_tissue_of(HilSession& session, const Json& model, const DocumentPlace
   }
 }
 
+void parse_contact_of(HilSession& session, const Json& model, const DocumentPlace& place) {
+  if (!model.contains("contact")) return;
+  const DocumentPlace at = place.key("contact");
+  if (session.law || session.model == "surface" || session.model == "element") {
+    throw bad_input(at.where, fmt::format("is not for the kind '{}'", session.model),
+                    "a kind that moves spheres of a scene, such as planned or zone");
+  }
+  session.contact = model.at("contact");
+  session.contact_place = at.where;
+}
+
 std::string parse_tolerance(const Json& model, std::string_view kind, const DocumentPlace& place) {
   std::string text = model.value("tolerance", std::string("1%"));
   const DocumentPlace at = place.key("tolerance");
@@ -333,6 +344,7 @@ HilSession parse_session(const Json& json, std::string_view where,
   session.tolerance = parse_tolerance(json.at("model"), session.model, place.key("model"));
   parse_tool(session, json.at("model"), place.key("model"));
   parse_tissue_of(session, json.at("model"), place.key("model"), folder);
+  parse_contact_of(session, json.at("model"), place.key("model"));
   constexpr double kSlowest_Hz = 500.0, kUsual_Hz = 1000.0, kFastest_Hz = 4000.0;
   session.servo.period_s = 1.0 / in_range(json, "rate", Dimension::frequency, kUsual_Hz,
                                           kSlowest_Hz, kFastest_Hz, place);

@@ -62,7 +62,9 @@ struct HilSession {
   std::string tolerance = "1%";  ///< of a planned model, as set_tolerance() takes it
   Json scene;                    ///< of the tissue; needs no file. Null with a law
   std::string scene_place;       ///< where the scene stands, for messages: "FILE: key /model/scene"
-  std::optional<LawFile> law;    ///< of the model `law`
+  Json contact;                ///< which spheres the tool moves, as in a scene; null: the usual one
+  std::string contact_place;   ///< where that stands
+  std::optional<LawFile> law;  ///< of the model `law`
   std::vector<SessionPhase> phases;
   /// Forces of the recording whose motion the last phase is, evenly spaced over it; may be empty.
   std::vector<double> measured_N;

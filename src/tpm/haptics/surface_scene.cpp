@@ -23,7 +23,7 @@ class SurfaceAlong {
     const auto count = static_cast<int>(std::ceil(way_m / kStep_m)) + kReach;
     const auto met = [&](int i) {
       return surface.ball.depth_to_touch_m(surface.scene.rest(), i * kStep_m * aside,
-                                           surface.scene.probe.direction);
+                                           surface.scene.probe().direction);
     };
     met_m_.assign(static_cast<std::size_t>(count) + std::size_t{kReach} + 1, 0.0);
     for (int i = 1; i <= count; ++i) value(i) = met(i).value_or(value(i - 1));
@@ -59,9 +59,9 @@ class SurfaceAlong {
 
 SurfaceScene::SurfaceScene(const HilSession& session)
     : scene(session),
-      ball(ball_on_surface(scene.tissue.network.organ, scene.probe.sphere, scene.probe.direction,
+      ball(ball_on_surface(scene.tissue.network.organ, scene.only_sphere(), scene.probe().direction,
                            session.tool_radius_m, session.contact_stiffness_N_per_m)),
-      to_model(turn_onto(session.servo.push, scene.probe.direction)) {}
+      to_model(turn_onto(session.servo.push, scene.probe().direction)) {}
 
 void follow_surface(HilSession& session) {
   double way_m = 0.0;

@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "tpm/core/progress.hpp"
+#include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/haptics/verify_parts.hpp"
 #include "tpm/method/method.hpp"
 #include "tpm/network/quasistatic.hpp"
-#include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
@@ -214,16 +214,20 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   const RowList rows = moved_rows(recording);
   const Motion motion = motion_of(recording, rows);
   const Tissue tissue = parse_tissue(recording.session.scene, recording.name, {});
-  const Probe probe = usual_contact(tissue, DocumentPlace{recording.name}).probe;
+  const SceneContact contact = moved_contact(recording.session, tissue);
   const BondSystem bonds = tissue.bonds();
   QuasiStaticOptions settings;
   settings.tolerance = options.tolerance;
-  // As in the loop, the tool takes the sphere along the push and not across it.
+  // As in the loop, the tool takes the spheres along the push and not across it.
   Constraints constraints = tissue.constraints();
-  constraints.guide(probe.sphere, probe.direction);
+  std::vector<Probe> moved;
+  for (const std::size_t sphere : spheres_of(contact, tissue.network.organ)) {
+    constraints.guide(sphere, contact.probe.direction);
+    moved.push_back({sphere, contact.probe.direction});
+  }
   const DrivenNetwork driven =
-      driven_network(bonds, tissue.network.organ, constraints, {probe}, {});
-  const QuasiStatic network(bonds, driven.rest, constraints, probe, settings);
+      driven_network(bonds, tissue.network.organ, constraints, std::move(moved), {});
+  const QuasiStatic network(bonds, driven.rest, constraints, driven.probes, settings);
 
   const std::vector<std::size_t> compared =
       compared_rows(recording, rows.size(), options.spacing_s);

@@ -37,11 +37,15 @@ bool is_guided(const PlanScene& scene) {
                      [&](const Guide& guide) { return guide.sphere == probe.sphere; });
 }
 
+PushedSpheres contact_of(const PlanScene& scene) {
+  return PushedSpheres(spheres_of(scene.scene().contacts.front(), scene.network().organ));
+}
+
 /// Of the tissue, the contact free: where it is, a ContactModel is told.
 Constraints freedom_around(const PlanScene& scene) {
   Tissue tissue = scene.scene().tissue;
   std::erase_if(tissue.guides,
-                [&](const Guide& guide) { return guide.sphere == scene.scene().probe().sphere; });
+                [&](const Guide& guide) { return contact_of(scene).has(guide.sphere); });
   return tissue.constraints();
 }
 
@@ -127,7 +131,11 @@ class ContactCandidate : public PlanModel {
                                                    const PlanBudget& budget) const override {
     const PlanScene& scene = surrogate.scene();
     if (!budget.rate_Hz) return "steps a servo's period, and there is none";
-    if (!scene.single_sphere() || !scene.by_depth()) return "sees one sphere that is moved";
+    if (!scene.by_depth()) return "sees spheres that are moved";
+    if (!scene.single_sphere() && !(takes_patch() && scene.single_patch())) {
+      return takes_patch() ? "sees one sphere or patch that is moved"
+                           : "sees one sphere that is moved";
+    }
     if (scene.jumps()) return "a servo's contact does not jump";
     const Probe& probe = scene.scene().probe();
     const Constraints constraints = scene.scene().tissue.constraints();
@@ -169,6 +177,9 @@ class ContactCandidate : public PlanModel {
   /// @param portable the same answer on every machine, where the model has the choice
   [[nodiscard]] virtual BuiltContact build(const PlanScene& scene, double period_s,
                                            bool portable) const = 0;
+
+  /// A patch that moves together is a contact too.
+  [[nodiscard]] virtual bool takes_patch() const { return false; }
 
  private:
   static constexpr bool kPortable = true;
@@ -243,6 +254,7 @@ class ZoneCandidate final : public ContactCandidate {
   }
 
  protected:
+  [[nodiscard]] bool takes_patch() const override { return true; }
   [[nodiscard]] BuiltContact build(const PlanScene& scene, double period_s,
                                    bool portable) const override {
     ZoneNetworkOptions options;
@@ -255,7 +267,7 @@ class ZoneCandidate final : public ContactCandidate {
     const DrivenNetwork& driven = scene.driven();
     const Probe& probe = scene.scene().probe();
     auto zone = std::make_unique<ZoneNetwork>(driven.bonds, driven.rest, freedom_around(scene),
-                                              probe.sphere, probe.direction, options);
+                                              contact_of(scene), probe.direction, options);
     BuiltContact built;
     built.of_step = counted(zone->work());
     built.of_step.add(Operation::contact_step, 1.0);

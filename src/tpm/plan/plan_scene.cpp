@@ -112,6 +112,10 @@ bool PlanScene::single_sphere() const {
   return scene_.contacts.size() == 1 && scene_.contacts.front().kind == ContactKind::sphere;
 }
 
+bool PlanScene::single_patch() const {
+  return scene_.contacts.size() == 1 && scene_.contacts.front().kind == ContactKind::patch;
+}
+
 bool PlanScene::jumps() const {
   const auto knots = protocol().knots();
   bool jumps = knots.front().value != 0.0 && !protocol().relaxed_at_start();

@@ -54,6 +54,8 @@ class PlanScene {
   [[nodiscard]] bool has_tools() const { return !network_->driven.tools.empty(); }
   /// One sphere driven itself and nothing else in contact.
   [[nodiscard]] bool single_sphere() const;
+  /// One patch and nothing else in contact.
+  [[nodiscard]] bool single_patch() const;
   /// What is imposed jumps, at the start or later.
   [[nodiscard]] bool jumps() const;
   /// Layers of which a sphere moves.

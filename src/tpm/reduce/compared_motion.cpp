@@ -28,11 +28,11 @@ std::vector<double> ends_of_steps(const Protocol& protocol, double step_s) {
 class Reference {
  public:
   Reference(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
-            const Probe& probe, bool contact_forces)
+            const Probes& probes, bool contact_forces)
       : bonds_(bonds),
-        contact_(static_cast<Eigen::Index>(probe.sphere)),
+        probes_(probes),
         contact_forces_(contact_forces),
-        network_(bonds, rest, guided(constraints, probe), probe,
+        network_(bonds, rest, guided(constraints, probes), probes,
                  {.tolerance = kReferenceTolerance}) {}
 
   void run(const Protocol& protocol, double spacing_s, ComparedMotion& motion) const {
@@ -51,20 +51,24 @@ class Reference {
                    force_N.setZero(3, state.position.cols());
                    bonds_.add_forces(state.position, {bonds_.mean_viscous(state.viscous), 0.0},
                                      force_N);
-                   contact_N.col(at++) = force_N.col(contact_);
+                   Eigen::Vector3d sum_N = Eigen::Vector3d::Zero();
+                   for (const Probe& probe : probes_) {
+                     sum_N += force_N.col(static_cast<Eigen::Index>(probe.sphere));
+                   }
+                   contact_N.col(at++) = sum_N;
                  })
             .response;
     motion.contact_N = std::move(contact_N);
   }
 
  private:
-  static Constraints guided(Constraints constraints, const Probe& probe) {
-    constraints.guide(probe.sphere, probe.direction);
+  static Constraints guided(Constraints constraints, const Probes& probes) {
+    for (const Probe& probe : probes) constraints.guide(probe.sphere, probe.direction);
     return constraints;
   }
 
   const BondSystem& bonds_;
-  Eigen::Index contact_;
+  Probes probes_;
   bool contact_forces_;
   QuasiStatic network_;
 };
@@ -79,9 +83,9 @@ double mean_relaxation_time_s(const std::vector<WeightedTime>& branches) {
 }
 
 std::vector<ComparedMotion> compared_motions(const BondSystem& bonds, const Positions& rest,
-                                             const Constraints& constraints, const Probe& probe,
+                                             const Constraints& constraints, const Probes& probes,
                                              const ComparedMotions& asked) {
-  const Reference reference(bonds, rest, constraints, probe, asked.contact_forces);
+  const Reference reference(bonds, rest, constraints, probes, asked.contact_forces);
   std::vector<ComparedMotion> motions;
   for (const double duration : asked.durations) {
     ComparedMotion motion;

@@ -37,12 +37,12 @@ struct WeightedTime {
 /// Runs the quasi-static network along the motions, none of them twice. A relaxed tissue that is
 /// released fast can buckle: then there is no equilibrium to compare with, and the forces end with
 /// the hold.
-/// @param probe what is pushed, and where to; it does not yield to the side
+/// @param probes what is pushed together, and where to; it does not yield to the side
 /// Throws Error(numerical) where the network cannot be balanced before the release.
 [[nodiscard]] std::vector<ComparedMotion> compared_motions(const BondSystem& bonds,
                                                            const Positions& rest,
                                                            const Constraints& constraints,
-                                                           const Probe& probe,
+                                                           const Probes& probes,
                                                            const ComparedMotions& asked);
 
 }  // namespace tpm

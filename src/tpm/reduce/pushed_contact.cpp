@@ -16,18 +16,21 @@ constexpr double kBalanceLength_m = 0.5e-3;
 constexpr double kBalance = 1e-11;  // of the stiffest bond times that length
 constexpr double kRestLength = 1e-9;
 
-Constraints with_contact_held(Constraints constraints, std::size_t contact) {
-  if (contact >= constraints.size() || !constraints.is_free(contact)) {
-    throw bad_input("contact", fmt::format("sphere {} is not free", contact + 1),
-                    "a sphere that nothing holds or guides");
+Constraints with_contact_held(Constraints constraints, const PushedSpheres& contact) {
+  for (const std::size_t sphere : contact) {
+    if (sphere >= constraints.size() || !constraints.is_free(sphere)) {
+      throw bad_input("contact", fmt::format("sphere {} is not free", sphere + 1),
+                      "a sphere that nothing holds or guides");
+    }
+    constraints.hold(sphere);
   }
-  constraints.hold(contact);
   return constraints;
 }
 
 void require_at_rest(const BondSystem& bonds, const Positions& rest) {
   if (bonds.contact_count() > 0) {
-    throw bad_input("bonds", "there are tools among them", "a tissue touched at one sphere");
+    throw bad_input("bonds", "there are tools among them",
+                    "a tissue whose spheres are moved themselves");
   }
   Eigen::VectorXd elongation;
   bonds.elongations(rest, elongation);
@@ -37,12 +40,18 @@ void require_at_rest(const BondSystem& bonds, const Positions& rest) {
 
 }  // namespace
 
+Eigen::Vector3d PushedSpheres::sum(const Eigen::Matrix3Xd& force) const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const std::size_t sphere : all_) sum += force.col(static_cast<Eigen::Index>(sphere));
+  return sum;
+}
+
 PushedContact::PushedContact(const BondSystem& bonds, Positions rest, Constraints constraints,
-                             std::size_t contact)
+                             PushedSpheres contact)
     : bonds_(bonds),
       rest_(std::move(rest)),
       constraints_(with_contact_held(std::move(constraints), contact)),
-      contact_(contact),
+      contact_(std::move(contact)),
       equilibrium_(bonds_, constraints_) {
   require_at_rest(bonds_, rest_);
 }
@@ -68,7 +77,6 @@ Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxe
   const double tolerance_N = kBalance * kBalanceLength_m * bonds_.stiffness().maxCoeff();
   const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, rest_.cols());
   const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), relaxed};
-  const auto column = static_cast<Eigen::Index>(contact_);
   double done = 0.0;
   double stride = kStride_m;
   // What is free goes on as it went over the stride before.
@@ -78,7 +86,10 @@ Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxe
     const double aim = std::min(done + stride, way);
     Positions next = here.position;
     if (went > 0.0) next += (aim - done) / went * (here.position - before);
-    next.col(column) = rest_.col(column) + from + aim / way * (displacement_m - from);
+    for (const std::size_t sphere : contact_) {
+      const auto column = static_cast<Eigen::Index>(sphere);
+      next.col(column) = rest_.col(column) + from + aim / way * (displacement_m - from);
+    }
     const EquilibriumSearch search = equilibrium_.find(next, memory, load, tolerance_N);
     if (search.converged && search.stable) {
       before = std::move(here.position);
@@ -105,10 +116,9 @@ ContactFields PushedContact::fields(const Positions& position, const BondMemory&
     throw Error(ExitCode::numerical, "contact", "the tissue has no stiffness there");
   }
   ContactFields fields;
-  const auto column = static_cast<Eigen::Index>(contact_);
   for (int axis = 0; axis < 3; ++axis) {
     Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-    unit(axis, column) = 1.0;
+    for (const std::size_t sphere : contact_) unit(axis, static_cast<Eigen::Index>(sphere)) = 1.0;
     Eigen::Matrix3Xd pull = Eigen::Matrix3Xd::Zero(3, rest_.cols());
     bonds_.add_stiffness_times(position, memory, unit, pull);
     Eigen::Matrix3Xd& field = fields.displacement[static_cast<std::size_t>(axis)];
@@ -117,7 +127,7 @@ ContactFields PushedContact::fields(const Positions& position, const BondMemory&
     field += unit;
     pull.setZero();
     bonds_.add_stiffness_times(position, memory, field, pull);
-    fields.stiffness.col(axis) = pull.col(column);
+    fields.stiffness.col(axis) = contact_.sum(pull);
   }
   fields.stiffness = (0.5 * (fields.stiffness + fields.stiffness.transpose())).eval();
   return fields;

@@ -47,7 +47,7 @@ Eigen::Vector3d force_at(PushedContact& tissue, const Eigen::Vector3d& displacem
   const Positions position = tissue.at(displacement_m, relaxed);
   Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, position.cols());
   tissue.bonds().add_forces(position, tissue.memory(position, relaxed, relaxed), force);
-  return force.col(static_cast<Eigen::Index>(tissue.contact()));
+  return tissue.contact().sum(force);
 }
 
 }  // namespace
@@ -106,8 +106,10 @@ void ZoneNetwork::compare(PushedContact& tissue, const Constraints& constraints,
                               .least_step_s = options_.period_s,
                               .every = kStepsApart,
                               .contact_forces = true};
+  std::vector<Probe> probes;
+  for (const std::size_t sphere : contact_) probes.push_back({sphere, into_, 1.0});
   for (const ComparedMotion& motion : compared_motions(tissue.bonds(), tissue.rest(), constraints,
-                                                       {contact_, into_, 1.0}, asked)) {
+                                                       Probes(std::move(probes)), asked)) {
     set_weights(tissue, parts, servo_weights(tissue.bonds(), motion.step_s));
     reset();
     compare_along(motion);

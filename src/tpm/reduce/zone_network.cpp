@@ -44,7 +44,7 @@ std::size_t padded(std::size_t size) {
 }  // namespace
 
 ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest,
-                         const Constraints& constraints, std::size_t contact,
+                         const Constraints& constraints, const PushedSpheres& contact,
                          const Eigen::Vector3d& into_tissue, const ZoneNetworkOptions& options)
     : options_(options),
       into_(into_tissue),
@@ -65,14 +65,14 @@ void ZoneNetwork::choose_zone(const PushedContact& tissue) {
   const BondSystem& bonds = tissue.bonds();
   held_or_free_.assign(bonds.spheres(), 1);
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-    if (i == contact_ || tissue.constraints().is_free(i)) continue;
+    if (contact_.has(i) || tissue.constraints().is_free(i)) continue;
     if (!tissue.constraints().projector(i).isZero(0.0)) {
       throw bad_input("guides", "sphere " + std::to_string(i + 1) + " is guided",
                       "spheres that are free or held");
     }
     held_or_free_[i] = 0;
   }
-  held_or_free_[contact_] = 2;
+  for (const std::size_t sphere : contact_) held_or_free_[sphere] = 2;
   for (int ring = 0; ring < options_.rings; ++ring) {
     std::vector<char> wider = held_or_free_;
     for (std::size_t b = 0; b < bonds.size(); ++b) {
@@ -92,14 +92,17 @@ void ZoneNetwork::choose_zone(const PushedContact& tissue) {
   }
   for (const bool edge : {false, true}) {
     for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-      if (held_or_free_[i] == 2 && i != contact_ && (at_edge[i] != 0) == edge) zone_.push_back(i);
+      if (held_or_free_[i] == 2 && !contact_.has(i) && (at_edge[i] != 0) == edge)
+        zone_.push_back(i);
     }
   }
   edge_ = static_cast<std::size_t>(std::count(at_edge.begin(), at_edge.end(), 1));
   const auto held = static_cast<std::uint32_t>(zone_.size() + 1);
   column_.assign(bonds.spheres(), held);
   for (std::size_t i = 0; i < zone_.size(); ++i) column_[zone_[i]] = static_cast<std::uint32_t>(i);
-  column_[contact_] = static_cast<std::uint32_t>(zone_.size());
+  for (const std::size_t sphere : contact_) {
+    column_[sphere] = static_cast<std::uint32_t>(zone_.size());
+  }
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
     if (held_or_free_[i] == 1) outside_.push_back(i);
   }
@@ -233,8 +236,10 @@ void ZoneNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept
     all.col(static_cast<Eigen::Index>(zone_[i])) =
         Eigen::Map<const Eigen::Vector3f>(displacement_.data() + 4 * i).cast<double>();
   }
-  all.col(static_cast<Eigen::Index>(contact_)) =
-      Eigen::Map<const Eigen::Vector3f>(displacement_.data() + 4 * zone_.size()).cast<double>();
+  for (const std::size_t sphere : contact_) {
+    all.col(static_cast<Eigen::Index>(sphere)) =
+        Eigen::Map<const Eigen::Vector3f>(displacement_.data() + 4 * zone_.size()).cast<double>();
+  }
   const float* column = outer_.numbers.data();
   for (std::size_t j = 0; j < outer_.columns; ++j, column += outer_.stride) {
     for (std::size_t i = 0; i < outside_.size(); ++i) {

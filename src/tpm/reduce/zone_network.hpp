@@ -39,9 +39,10 @@ struct ZoneNetworkOptions {
 /// (StepError); and what is left unbalanced.
 class ZoneNetwork final : public ContactModel {
  public:
-  /// As ServoNetwork. Throws Error(bad_input) for guided spheres as well.
+  /// As ServoNetwork, at one sphere or at a patch that moves together. Throws Error(bad_input) for
+  /// guided spheres as well.
   ZoneNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
-              std::size_t contact, const Eigen::Vector3d& into_tissue,
+              const PushedSpheres& contact, const Eigen::Vector3d& into_tissue,
               const ZoneNetworkOptions& options = {});
 
   void reset() noexcept override;
@@ -58,7 +59,7 @@ class ZoneNetwork final : public ContactModel {
 
   /// Of a step.
   [[nodiscard]] BalanceWork work() const noexcept;
-  /// Spheres of the zone that move, the contact left out.
+  /// Spheres of the zone that move, those of the contact left out.
   [[nodiscard]] std::size_t zone_spheres() const noexcept { return zone_.size(); }
   /// Displacements of the surroundings beside those that follow the edge.
   [[nodiscard]] Eigen::Index own_displacements() const noexcept { return own_; }
@@ -97,7 +98,7 @@ class ZoneNetwork final : public ContactModel {
   Eigen::Vector3d into_;
   ServoWeights weights_;
   const PanelKernels& kernels_;
-  std::size_t contact_ = 0;
+  PushedSpheres contact_;
   std::vector<std::size_t> zone_;      ///< movable spheres of the zone, those at its edge last
   std::size_t edge_ = 0;               ///< how many of them are at the edge
   std::vector<std::uint32_t> column_;  ///< of each sphere among displacements

@@ -44,7 +44,9 @@ ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
     const ServoBonds::Choice choice{b, column_[from], column_[to]};
     if (held_or_free_[from] == 1 || held_or_free_[to] == 1) {
       linear[b] = 1;
-    } else if (from == contact_ || to == contact_) {
+    } else if (column_[from] == column_[to]) {
+      continue;  // within the patch, or between what is held
+    } else if (contact_.has(from) || contact_.has(to)) {
       parts.near.push_back(choice);
     } else if (held_or_free_[from] == 2 || held_or_free_[to] == 2) {
       parts.far.push_back(choice);

@@ -94,6 +94,12 @@ double radius_of(const Json& contact, const Organ& organ, const DocumentPlace& p
       fmt::format("at most the extent of the organ, {} mm", significant(1e3 * extent, 4)));
 }
 
+}  // namespace
+
+std::string_view word_of(ContactKind kind) {
+  return entry_of(contact_kinds(), kind).text;
+}
+
 SceneContact parse_contact(const Json& block, const Tissue& tissue, const DocumentPlace& place) {
   const Organ& organ = tissue.network.organ;
   const auto name = block.at("kind").get<std::string>();
@@ -118,12 +124,6 @@ SceneContact parse_contact(const Json& block, const Tissue& tissue, const Docume
   }
   require_loadable(tissue, contact.probe.sphere, contact.probe.direction, place.where);
   return contact;
-}
-
-}  // namespace
-
-std::string_view word_of(ContactKind kind) {
-  return entry_of(contact_kinds(), kind).text;
 }
 
 std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tissue,

@@ -18,8 +18,12 @@ struct KindKeys {
 [[nodiscard]] std::vector<SceneContact> parse_contacts(const Json& contacts, const Tissue& tissue,
                                                        const DocumentPlace& place);
 
-/// The contact of a scene that names none, and of sessions: the organ's contact sphere, driven
-/// against its normal.
+/// One of them.
+[[nodiscard]] SceneContact parse_contact(const Json& block, const Tissue& tissue,
+                                         const DocumentPlace& place);
+
+/// The contact of a scene or session that names none: the organ's contact sphere, driven against
+/// its normal.
 [[nodiscard]] SceneContact usual_contact(const Tissue& tissue, const DocumentPlace& place);
 
 /// Throws unless what is imposed leaves every contact inside the organ and no tool pulls.
