@@ -147,10 +147,10 @@ LoopModel planned_model(const HilSession& session, const PlanningTold& told) {
 
 namespace {
 
-/// Whether a session that pushes to a depth at its slowest would go on with this model, by what the
-/// model says of its forces. The model is at rest after it.
-bool trusted_on_push(ContactModel& model, const HilSession& session, const Eigen::Vector3d& push,
-                     double depth_m) {
+/// For how many periods of its slowest push to a depth a session's model does not trust its forces.
+/// The model is at rest after it.
+int doubted_on_push(ContactModel& model, const HilSession& session, const Eigen::Vector3d& push,
+                    double depth_m) {
   double slowest_m_per_s = std::numeric_limits<double>::infinity();
   for (const SessionPhase& phase : session.phases) {
     if (phase.rate_m_per_s > 0.0) {
@@ -165,7 +165,7 @@ bool trusted_on_push(ContactModel& model, const HilSession& session, const Eigen
     if (!model.step(static_cast<double>(i) / steps * depth_m * push).trusted) ++doubted;
   }
   model.reset();
-  return doubted * session.servo.period_s <= session.servo.untrusted_limit_s;
+  return doubted;
 }
 
 }  // namespace
@@ -178,6 +178,7 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
   budget.rate_Hz = 1.0 / session.servo.period_s;
   std::string reason = "no candidate that a loop steps";
   std::optional<LoopModel> found;
+  int least_doubted = std::numeric_limits<int>::max();
   for (const auto& candidate : formulation.as<PlanOffer>()->candidates(surrogate.scene())) {
     if (!candidate->for_loop()) continue;
     if (const auto why = candidate->why_not(surrogate, budget)) {
@@ -189,10 +190,12 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
     auto models = candidate->contacts(surrogate, std::array{session.servo.period_s, kDrawnEvery_s});
     loop.model = std::move(models.front());
     if (loop.model->spheres() > 0) loop.shape.field = std::move(models.back());
-    const bool trusted =
-        trusted_on_push(*loop.model, session, pushed.probe().direction, pushed.deepest_m);
+    const int doubted =
+        doubted_on_push(*loop.model, session, pushed.probe().direction, pushed.deepest_m);
+    if (doubted >= least_doubted) continue;
+    least_doubted = doubted;
     found = std::move(loop);
-    if (trusted) break;
+    if (doubted == 0) break;
   }
   if (found) return std::move(*found);
   throw bad_input(session.scene_place,

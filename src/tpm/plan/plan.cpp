@@ -40,9 +40,9 @@ bool masses_known(const ExperimentScene& scene) {
                      [](const SceneContact& c) { return !c.is_tool() || c.mass_kg.has_value(); });
 }
 
-/// Whether the truth has masses: the scene says so, or they would be felt at this tolerance.
-bool truth_has_masses(const ExperimentScene& scene, const PlanSurrogate& massless,
-                      const PlanRequest& request) {
+/// Whether the reference has masses: the scene says so, or they would be felt at this tolerance.
+bool reference_has_masses(const ExperimentScene& scene, const PlanSurrogate& massless,
+                          const PlanRequest& request) {
   if (request.for_loop) return false;
   if (scene.formulation.masses) return true;
   if (!masses_known(scene)) return false;
@@ -64,7 +64,7 @@ class Planning {
     plan_.bonds = scene_.network().bonds.size();
     tell("coarse runs of the network");
     PlanSurrogate massless(scene_, request.measure, false);
-    plan_.inertial = truth_has_masses(scene, massless, request);
+    plan_.inertial = reference_has_masses(scene, massless, request);
     if (!plan_.inertial && masses_known(scene)) {
       const double share = massless.inertia_share();
       if (share > request.tolerance) plan_.masses_left_out = share;
@@ -126,6 +126,8 @@ class Planning {
       candidate.reason = *reason;
     } else if (model.last_resort() && network_found_) {
       candidate.reason = "not tried: a coarser one meets the tolerance";
+    } else if (const auto reason = too_long_to_build(model)) {
+      candidate.reason = *reason;
     } else if (model.has_masses() && with_masses_found_) {
       candidate.reason = "not tried: a cheaper one with masses meets the tolerance";
     } else {
@@ -137,6 +139,21 @@ class Planning {
       }
     }
     plan_.candidates.push_back(std::move(candidate));
+  }
+
+  /// For a loop, where some model does already: a large organ takes minutes to be condensed.
+  [[nodiscard]] std::optional<std::string> too_long_to_build(const PlanModel& model) const {
+    constexpr double kLong_s = 10.0;
+    const double equilibria = model.equilibria_to_build();
+    if (!plan_.request.for_loop || !(equilibria > 0.0)) return std::nullopt;
+    const auto enough = std::find_if(plan_.candidates.begin(), plan_.candidates.end(),
+                                     [](const PlannedCandidate& c) { return c.feasible; });
+    if (enough == plan_.candidates.end()) return std::nullopt;
+    const OperationCount work = newton_iteration_work(scene_.driven()).times(equilibria);
+    const double seconds = nominal_costs().seconds_of(work);
+    if (seconds < kLong_s) return std::nullopt;
+    return fmt::format("not tried: takes some {} s to build, and {} meets the tolerance in time",
+                       significant(seconds, 1), enough->name);
   }
 
   void assess(const PlanModel& model, PlannedCandidate& candidate) {

@@ -51,6 +51,9 @@ class PlanModel {
   /// Tried only if no coarser network meets the tolerance: nearly as dear as the reference.
   [[nodiscard]] virtual bool last_resort() const { return false; }
 
+  /// About how many equilibria of the network are solved to build it, beside the coarse runs.
+  [[nodiscard]] virtual double equilibria_to_build() const { return 0.0; }
+
   /// Why the model has no answer to a scene at all; none if it has.
   [[nodiscard]] virtual std::optional<std::string> why_not(const PlanSurrogate& surrogate,
                                                            const PlanBudget& budget) const = 0;

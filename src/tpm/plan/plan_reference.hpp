@@ -3,18 +3,18 @@
 
 namespace tpm {
 
-/// The truth that a pick is verified against, and how sure it is.
+/// The reference that a pick is verified against, and how sure it is.
 struct VerifiedReference {
   std::vector<double> times_s;
   Trajectory trajectory;
   PlanReference reference;
 };
 
-/// The full nonlinear network at a tight tolerance, and beside it a second run by other formulae:
-/// without masses Radau collocation with eight stages against three (of order 15 and 5 in smooth
-/// motion); with masses BDF of order 2 with the elimination by hand against order 3 with KLU.
-/// Throws Error(numerical) as the runs do, and where the two differ by more than a tenth of the
-/// tolerance.
+/// The full nonlinear network at a thousandth of the tolerance, or tighter until it and a second
+/// run by other formulae agree: without masses Radau collocation with eight stages against three
+/// (of order 15 and 5 in smooth motion); with masses BDF of order 2 with the elimination by hand
+/// against order 3 with KLU. Throws Error(numerical) as the runs do, and where the two differ by
+/// more than a tenth of the tolerance.
 [[nodiscard]] VerifiedReference verified_reference(const PlanScene& scene,
                                                    const PlanMeasure& measure, bool inertial,
                                                    double tolerance);

@@ -23,8 +23,8 @@ struct PlanMeasure {
 };
 
 /// Largest absolute difference over all times (field: and spheres), in parts of the largest
-/// absolute value of `truth`; with a relative weight, the larger of that and the weighted relative
-/// difference.
+/// absolute value of the reference; with a relative weight, the larger of that and the weighted
+/// relative difference.
 [[nodiscard]] double trajectory_error(const Trajectory& model, const Trajectory& reference,
                                       const PlanMeasure& measure);
 

@@ -42,6 +42,12 @@ OperationCount factorisation_work(const DrivenNetwork& driven) {
 
 }  // namespace
 
+OperationCount newton_iteration_work(const DrivenNetwork& driven) {
+  OperationCount work = iteration_work(driven);
+  work += factorisation_work(driven);
+  return work;
+}
+
 Trajectory run_quasi_static(const ExperimentScene& scene, const RunNetwork& network,
                             const QuasiStaticOptions& options, const std::vector<double>& times_s,
                             bool with_field) {

@@ -23,6 +23,8 @@ class StateRunner {
 [[nodiscard]] Trajectory run_quasi_static(const ExperimentScene& scene, const RunNetwork& network,
                                           const QuasiStaticOptions& options,
                                           const std::vector<double>& times_s, bool with_field);
+/// Operations of one Newton iteration for an equilibrium: forces, a factorisation, a solution.
+[[nodiscard]] OperationCount newton_iteration_work(const DrivenNetwork& driven);
 /// The network with masses.
 [[nodiscard]] Trajectory run_inertial(const ExperimentScene& scene, const RunNetwork& network,
                                       const InertialOptions& options,
