@@ -37,7 +37,7 @@ using ShapeValues = std::array<double, kMostShapeParameters>;
 ///   - strictly increasing, so that its integral P is convex and the bond stores energy.
 ///
 /// Shapes are objects that never change, one or several in a file of shapes/, which the build lists
-/// (docs/architecture.md, "Adding a material").
+/// (docs/adding.md, "A material").
 class ElongationShape {
  public:
   struct Entry {

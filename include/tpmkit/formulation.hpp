@@ -78,7 +78,7 @@ inline constexpr std::array<CapabilityEntry, 19> kCapabilities{{
 /// - PlanOffer (plan/plan_model.hpp), asked by plans: candidates that claim an error and a cost;
 /// - LoopMaker (haptics/loop_maker.hpp), asked by sessions: what the servo loop steps.
 ///
-/// Formulations are objects that never change (docs/architecture.md, "Adding a formulation").
+/// Formulations are objects that never change (docs/adding.md, "A formulation").
 class Formulation {
  public:
   /// What stands in a list.
