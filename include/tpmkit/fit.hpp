@@ -45,7 +45,7 @@ struct FitSummary {
   std::vector<FittedParameter> parameters;
   std::vector<std::string> flags;  ///< what a reader must know, one sentence each
   std::string text;                ///< for a terminal
-  std::string json;                ///< everything, keys in docs/fit_files.md
+  std::string json;                ///< everything, keys in docs/fit_results.md
 };
 
 /// What a caller may say about a fit.

@@ -24,7 +24,7 @@ struct CondensedMemory {
   double spread_J = 0.0;  ///< energy stored in the differences of the branches from their mean
 };
 
-/// A network whose bonds relax alike seen from one contact sphere (docs/reduction.md): the memory
+/// A network whose bonds relax alike seen from one contact sphere (docs/reduction_method.md): the memory
 /// of all bonds is held on that of the relaxed equilibrium under a fictitious displacement w of
 /// the contact, and one linear mode q more for each direction. Each branch has a w and a q of its
 /// own (CondensedBranches).
@@ -59,7 +59,7 @@ class CondensedContact final : public ContactModel {
   [[nodiscard]] Eigen::Vector3d force_N(const Eigen::Vector3d& displacement_m,
                                         const CondensedMemory& memory) const noexcept;
   /// Within a step the contact moves straight, and the memory relaxes while it is at this share of
-  /// the way (docs/reduction.md), 0.5 to 1.
+  /// the way (docs/reduction_method.md), 0.5 to 1.
   [[nodiscard]] double resting_share() const noexcept {
     return several() ? of_branches_.resting_share() : rates_.resting_share;
   }
