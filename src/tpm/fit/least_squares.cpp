@@ -155,7 +155,7 @@ void snap_to_bounds(std::span<const FitParameter> parameters, const FixedMask& p
   }
 }
 
-/// Gauss-Newton steps from the end of a descent: a descent judges by the sum of squares, which is
+/// Gauss-Newton steps from the end of a descent: a descent decides by the sum of squares, which is
 /// flat to rounding while the parameters still have half their digits to gain. Stops when steps no
 /// longer shrink, leave the bounds or raise the sum of squares beyond rounding.
 void polish(const ResidualFunction& function, std::span<const FitParameter> parameters,

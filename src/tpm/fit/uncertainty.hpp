@@ -111,7 +111,7 @@ struct Profile {
 
 /// One point of that profile: the least deviance with one parameter held at a value. The value is
 /// in the confidence set if it rises by no more than the threshold, so that one point tells whether
-/// an interval holds a known truth.
+/// an interval contains a known true value.
 /// @param starts natural values of all parameters, from which the others are searched
 /// @return infinity if no search ended in a usable point
 [[nodiscard]] double profile_deviance(const ResidualFunction& function,

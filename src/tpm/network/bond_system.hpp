@@ -125,7 +125,7 @@ class BondSystem {
   /// The mean viscous elongation y of each bond.
   /// @param viscous m_j by (bond, branch)
   [[nodiscard]] Eigen::VectorXd mean_viscous(const Eigen::MatrixXd& viscous) const;
-  /// The memory with mean viscous elongations y at this instant, of which a share follows.
+  /// The viscous state with mean viscous elongations y at this instant, of which a share follows.
   [[nodiscard]] BondMemory memory_at(const Eigen::VectorXd& y, const Eigen::VectorXd& followed,
                                      RelaxationFactor relaxation_factor,
                                      std::span<const char> closed = {}) const;

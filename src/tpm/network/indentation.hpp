@@ -12,7 +12,7 @@ struct PatchIndentation {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector into the tissue
   double depth_m = 0.002;
   int strides = 1;                 ///< equal parts of the depth, >= 1
-  double relaxation_factor = 0.0;  ///< 0: at once, 1: relaxed; see BondMemory
+  double relaxation_factor = 0.0;  ///< 0: instantaneous, 1: equilibrium; see BondMemory
   double tolerance_N = 1e-9;       ///< of the force left on each free sphere
 };
 

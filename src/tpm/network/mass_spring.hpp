@@ -10,7 +10,7 @@ enum class SpringRule {
   equal,           ///< one stiffness for all: the textbook's model
 };
 
-/// Force per depth at the probe for small depths, N/m, after everything has relaxed
+/// Force per depth at the probe for small depths, N/m, at equilibrium
 /// (relaxation_factor = 1) or before anything has (0). Throws Error(bad_input) for a probe that
 /// cannot move or a network with zero-energy modes.
 [[nodiscard]] double contact_stiffness_N_per_m(const BondSystem& bonds, const Positions& rest,

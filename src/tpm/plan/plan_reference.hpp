@@ -3,7 +3,7 @@
 
 namespace tpm {
 
-/// The truth that a pick is verified against, and how sure it is.
+/// The reference that a pick is verified against, and its uncertainty.
 struct VerifiedReference {
   std::vector<double> times_s;
   Trajectory trajectory;

@@ -23,8 +23,8 @@ struct PlanMeasure {
 };
 
 /// Largest absolute difference over all times (field: and spheres), in parts of the largest
-/// absolute value of `truth`; with a relative weight, the larger of that and the weighted relative
-/// difference.
+/// absolute value of `reference`; with a relative weight, the larger of that and the weighted
+/// relative difference.
 [[nodiscard]] double trajectory_error(const Trajectory& model, const Trajectory& reference,
                                       const PlanMeasure& measure);
 
@@ -74,8 +74,8 @@ class PlanScene {
   [[nodiscard]] PlanScene deeper(double factor) const;   ///< what is imposed times a factor
   [[nodiscard]] PlanScene faster(double factor) const;   ///< the protocol in less time
   [[nodiscard]] PlanScene stiffer(double factor) const;  ///< E1, E2, E' times a factor
-  [[nodiscard]] PlanScene nothing_relaxing() const;      ///< bonds as stiff as at once, for ever
-  /// Bonds as stiff as when all has relaxed, from the first instant on. An elastic network like the
+  [[nodiscard]] PlanScene nothing_relaxing() const;      ///< bonds that stay as stiff as at first
+  /// Bonds with their equilibrium stiffness from the first instant on. An elastic network like the
   /// other, not one that relaxes fast: following that takes steps without end where E2 >> E1.
   [[nodiscard]] PlanScene all_relaxed() const;
   [[nodiscard]] PlanScene with_protocol(Protocol protocol) const;

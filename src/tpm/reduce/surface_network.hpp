@@ -29,7 +29,7 @@ struct SurfaceNetworkOptions {
 ///
 /// Its error estimate is by how much it had to be corrected, and what it costs to take elongations
 /// as linear within a period: they curve about as the forces on the touched spheres do from period
-/// to period, and what that leaves in the bonds' memory fades as the contact relaxes.
+/// to period, and what that leaves in the viscous state of the bonds fades as the contact relaxes.
 class SurfaceNetwork final : public ContactModel {
  public:
   /// The most spheres touched, or nearly so, at a time.
