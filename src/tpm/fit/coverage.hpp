@@ -8,7 +8,7 @@
 
 namespace tpm {
 
-/// How often the intervals of one parameter held the true value.
+/// How often the intervals of one parameter contained the true value.
 struct ParameterCoverage {
   std::string name;
   int covered = 0;

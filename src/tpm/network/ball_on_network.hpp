@@ -44,7 +44,7 @@ struct NetworkUnderBall {
                    const Constraints& organ_freedom, const BallTool& ball);
 
   BondSystem bonds;         ///< with the contacts of the ball
-  Constraints constraints;  ///< the ball is held where it is put
+  Constraints constraints;  ///< the ball is fixed where it is put
   Positions position;       ///< of all spheres at rest, then of the ball
 };
 

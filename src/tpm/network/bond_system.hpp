@@ -177,7 +177,7 @@ class BondSystem {
   [[nodiscard]] const BlockPattern& pattern() const { return graph().pattern; }
   [[nodiscard]] BlockPattern::Place place(std::size_t bond) const { return graph().place[bond]; }
 
-  /// The same without the bonds of some spheres, for factorisations: what is held has no part in
+  /// The same without the bonds of some spheres, for factorisations: fixed ones have no part in
   /// them.
   struct PartGraph {
     BlockPattern pattern;  ///< of all spheres; those left out have no neighbours

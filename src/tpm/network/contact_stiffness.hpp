@@ -3,7 +3,7 @@
 
 namespace tpm {
 
-/// Resistance to a small displacement of one sphere while all others are held, N/m.
+/// Resistance to a small displacement of one sphere while all others are fixed, N/m.
 struct HeldStiffness {
   double instantaneous = 0.0;  ///< before the bonds relax
   double relaxed = 0.0;        ///< at equilibrium

@@ -18,7 +18,7 @@ struct PressedTool {
 struct DrivenNetwork {
   BondSystem bonds;         ///< with the contacts
   Positions rest;           ///< of spheres, then tools
-  Constraints constraints;  ///< a tool that is driven is guided, one that stands still is held
+  Constraints constraints;  ///< a tool that is driven is guided, one that stands still is fixed
   Probes probes;
   std::vector<PressedTool> tools;
 

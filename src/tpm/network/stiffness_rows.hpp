@@ -5,7 +5,7 @@
 namespace tpm {
 
 /// The stiffness matrix of what is free, by rows, for solvers that iterate: P K P + s (1 - P) as
-/// Constraints::constrain makes it, without the blocks between spheres of which one is held.
+/// Constraints::constrain makes it, without the blocks between spheres of which one is fixed.
 class StiffnessRows {
  public:
   /// @param bonds, freedom must live as long as this

@@ -80,7 +80,7 @@ class PlanScene {
   [[nodiscard]] PlanScene all_relaxed() const;
   [[nodiscard]] PlanScene with_protocol(Protocol protocol) const;
   [[nodiscard]] PlanScene with_materials(const std::function<void(BondMaterial&)>& change) const;
-  /// Spheres of deeper layers held: `layers` outer ones move.
+  /// Spheres of deeper layers fixed: `layers` outer ones move.
   [[nodiscard]] PlanScene with_layers(int layers) const;
 
  private:

@@ -33,14 +33,14 @@ struct CondensedMetric {
   Eigen::Matrix3d metric = Eigen::Matrix3d::Zero();         ///< J' g J, N/m
   Eigen::Matrix3d second_metric = Eigen::Matrix3d::Zero();  ///< P' g P, N/m
   Eigen::Matrix3d second_energy = Eigen::Matrix3d::Zero();  ///< of P in the reduced energy, N/m
-  /// How all positions (3 per sphere) answer to viscous elongations along P, the contact held.
+  /// How all positions (3 per sphere) answer to viscous elongations along P, the contact fixed.
   Eigen::Matrix<double, Eigen::Dynamic, 3> second_moves;
 };
 
 /// Finds samples by balancing the network, from place to place.
 class CondensedSampler {
  public:
-  /// @param bonds, freedom must live as long as this; the contact is held by `freedom`
+  /// @param bonds, freedom must live as long as this; the contact is fixed by `freedom`
   /// @param stride_m longest way of the contact from one equilibrium to the next
   CondensedSampler(const BondSystem& bonds, Positions rest, const Constraints& constraints,
                    std::size_t contact, double stride_m);

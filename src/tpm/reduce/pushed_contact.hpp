@@ -28,7 +28,7 @@ class PushedContact {
 
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Positions& rest() const { return rest_; }
-  /// With the contact held.
+  /// With the contact fixed.
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
   [[nodiscard]] std::size_t contact() const { return contact_; }
 

@@ -82,7 +82,7 @@ class ServoNetwork final : public ContactModel {
   ServoNetworkOptions options_;
   Eigen::Vector3d into_;
   ServoWeights weights_;
-  std::unique_ptr<ServoStiffness> spheres_;  ///< with the contact held
+  std::unique_ptr<ServoStiffness> spheres_;  ///< with the contact fixed
   std::size_t contact_ = 0;                  ///< its column
   ServoBonds at_contact_, elsewhere_;
   std::vector<Field> fields_;  ///< at even depths from rest on

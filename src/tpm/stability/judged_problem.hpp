@@ -39,7 +39,7 @@ inline constexpr int kJudgedSteps = 32;
 /// kg, of a sphere of 10 mm radius and 1060 kg/m^3.
 inline constexpr double kSphereMass_kg = 1060.0 * 4.0 / 3.0 * 3.14159265358979 * 1e-6;
 
-/// A liver of few spheres, two layers, its far side held.
+/// A liver of few spheres, two layers, its far side fixed.
 struct StudyOrgan {
   StudyOrgan(const BondElement& p, std::size_t spheres);
   StudyOrgan(const StudyOrgan&) = delete;
