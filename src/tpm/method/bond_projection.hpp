@@ -15,7 +15,7 @@ namespace tpm {
 /// stiffness in.
 class BondProjection {
  public:
-  /// @param bonds, freedom must live as long as this; contacts with tools are not projected
+  /// @param bonds, constraints must live as long as this; contacts with tools are not projected
   BondProjection(const BondSystem& bonds, const Constraints& constraints);
 
   /// Multipliers start at 0.

@@ -53,7 +53,7 @@ struct NetworkUnderBall {
 /// remembered is advanced exactly. The error falls with the square of the step.
 class BallOnNetwork {
  public:
-  /// @param bonds, freedom of the organ, without tools
+  /// @param bonds, constraints of the organ, without tools
   /// @param tolerance_N of the force left on each sphere
   /// Throws Error(bad_input) for a ball without radius or stiffness.
   BallOnNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,

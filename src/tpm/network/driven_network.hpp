@@ -28,7 +28,7 @@ struct DrivenNetwork {
   }
 };
 
-/// @param bonds, freedom of the organ
+/// @param bonds, constraints of the organ
 /// @param driven spheres that are driven themselves
 /// Throws Error(bad_input) if nothing is driven.
 [[nodiscard]] DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,

@@ -7,7 +7,7 @@ namespace tpm {
 /// Constraints::constrain makes it, without the blocks of spheres that are fixed.
 class StiffnessBlocks {
  public:
-  /// @param bonds, freedom must live as long as this
+  /// @param bonds, constraints must live as long as this
   StiffnessBlocks(const BondSystem& bonds, const Constraints& constraints);
 
   /// The matrix at a position; the one before is overwritten.

@@ -8,7 +8,7 @@ namespace tpm {
 /// Constraints::constrain makes it, without the blocks between spheres of which one is fixed.
 class StiffnessRows {
  public:
-  /// @param bonds, freedom must live as long as this
+  /// @param bonds, constraints must live as long as this
   StiffnessRows(const BondSystem& bonds, const Constraints& constraints);
 
   /// The matrix at a position; the one before is overwritten.

@@ -21,7 +21,8 @@ struct TouchingPair {
 ///
 /// so that the kinetic energy falls, by 1/2 m_eff (approach speed)^2 for one pair alone. Momentum
 /// is kept but for what is fixed, guided or imposed. Found by successive impulses (Gauss-Seidel).
-/// @param freedom what is not free in it has no velocity to lose: it acts as an infinite mass
+/// @param constraints what they do not leave free has no velocity to lose: it acts as an infinite
+/// mass
 /// @param mass_kg of each column, > 0
 /// @param velocity of each column, m/s; changed
 /// @returns impulse of each pair, N s, >= 0: on the tool along the normal, on the sphere against

@@ -83,8 +83,8 @@ class CondensedContact final : public ContactModel {
 };
 
 /// Balances the network at some 150 places and fits.
-/// @param bonds, rest, freedom of the network; tools are not supported
-/// @param contact from 0; it is held here, whatever `freedom` says of it
+/// @param bonds, rest, constraints of the network; tools are not supported
+/// @param contact from 0; it is fixed, whatever `constraints` say of it
 /// @param into_tissue unit vector
 /// Throws Error(bad_input) for options out of range, a contact that does not exist or tools, bonds
 /// that do not relax alike or do not relax, and branches on a kernel;

@@ -40,7 +40,7 @@ struct CondensedMetric {
 /// Finds samples by balancing the network, from place to place.
 class CondensedSampler {
  public:
-  /// @param bonds, freedom must live as long as this; the contact is fixed by `freedom`
+  /// @param bonds, constraints must live as long as this; the contact is fixed by `constraints`
   /// @param stride_m longest way of the contact from one equilibrium to the next
   CondensedSampler(const BondSystem& bonds, Positions rest, const Constraints& constraints,
                    std::size_t contact, double stride_m);

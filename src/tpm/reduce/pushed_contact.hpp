@@ -17,7 +17,7 @@ struct ContactFields {
 /// A tissue pushed at one of its spheres to given places: what reduced models are built from.
 class PushedContact {
  public:
-  /// @param freedom of the tissue without the probe
+  /// @param constraints of the tissue without the probe
   /// @param contact a sphere that is free
   /// Throws Error(bad_input) for tools among the bonds, a contact that is not free, or bonds that
   /// do not have their rest length.

@@ -31,7 +31,7 @@ struct ServoNetworkOptions {
 /// leaves the model so until reset().
 class ServoNetwork final : public ContactModel {
  public:
-  /// @param freedom of the tissue without the probe
+  /// @param constraints of the tissue without the probe
   /// @param contact a sphere that is free
   /// @param into_tissue unit vector
   /// Throws Error(bad_input) for options out of range and tissues that PushedContact refuses,

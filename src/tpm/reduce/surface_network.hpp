@@ -35,7 +35,7 @@ class SurfaceNetwork final : public ContactModel {
   /// The most spheres touched, or nearly so, at a time.
   static constexpr int kMostTouched = 12;
 
-  /// @param freedom of the tissue
+  /// @param constraints of the tissue
   /// Throws Error(bad_input) for options out of range, bonds that do not have their rest length, a
   /// ball without radius or stiffness or one that has come into a sphere at its start,
   /// Error(numerical) for a tissue that is not stiff.
