@@ -44,11 +44,12 @@ int coverage(const CoverageOptions& options, const Session& session) {
 
 void add_coverage_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand(
-      "coverage", "Check the intervals of a fit by simulation: how often do they hold the truth?");
+      "coverage",
+      "Check the intervals of a fit by simulation: how often do they contain the true values?");
   auto options = std::make_shared<CoverageOptions>();
   command
       ->add_option("CONFIG", options->config,
-                   "Configuration of tpm fit; its start values are the truth")
+                   "Configuration of tpm fit; its start values are the true values")
       ->required();
   command->add_option("--sets", options->sets, "Number of simulated data sets")
       ->capture_default_str();

@@ -88,7 +88,8 @@ int run_material(const MaterialCommand& command, const Session& session) {
 
 void add_material_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand(
-      "material", "Put a fitted law on an organ: the bonds' material that answers as the law does");
+      "material",
+      "Put a fitted law on an organ: find the bonds' material that responds like the law");
   auto options = std::make_shared<MaterialCommand>();
   command->add_option("LAW", options->law, "law.json that tpm fit has written")->required();
   command

@@ -96,7 +96,8 @@ int predict(const PredictOptions& options, const Session& session) {
 
 void add_predict_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand(
-      "predict", "Answer a protocol or a recording's motion with the band of a fit's uncertainty");
+      "predict",
+      "Predict the response to a protocol or a recording's motion, with an uncertainty band");
   auto options = std::make_shared<PredictOptions>();
   command
       ->add_option("LAW|SCENE", options->law,

@@ -71,7 +71,7 @@ void add_recovery_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand(
       "recovery",
       "Check the selection of a law by simulation: does it return the law behind the "
-      "data, and do the intervals hold the truth?");
+      "data, and do the intervals contain the true values?");
   auto options = std::make_shared<RecoveryCommandOptions>();
   command
       ->add_option("--laws", options->laws,

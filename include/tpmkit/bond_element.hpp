@@ -43,12 +43,12 @@ struct BondElement : BondMaterial {
   double spacing_m = 0.030;  ///< x, > 0
 
   [[nodiscard]] TensionLaw tension() const { return {lateral_Pa, spacing_m}; }
-  /// Of its first branch; infinite if it has none.
+  /// Relaxation time of the first branch, s; infinite without a branch.
   [[nodiscard]] double relaxation_time_s() const;
-  /// The same moduli with another relaxation time of the first branch, which there must be.
+  /// A copy with another relaxation time of the first branch. The element must have a branch.
   [[nodiscard]] BondElement with_relaxation_time(double time_s) const;
-  /// One linear branch, and lateral bonds that do not relax (they are stretched alone: ropes will
-  /// do).
+  /// True for one linear branch and lateral bonds that do not relax. Ropes count: in the star the
+  /// lateral bonds are only stretched.
   [[nodiscard]] bool has_one_branch() const;
 };
 
@@ -59,10 +59,10 @@ struct BondElement : BondMaterial {
 /// Throws Error(bad_input) for a parameter out of its range, and unless has_one_branch().
 void require_one_branch(const BondElement& element, std::string_view where);
 
-/// Depth at which the elastic part carries the load with the true lambda1(e):
-/// (modulus + lambda1(e)) e A0/l0 = load. With the instantaneous modulus the depth at once, with
-/// the equilibrium modulus the depth in the end. Converges for every load (the left side rises
-/// strictly).
+/// Depth e, m, at which the elastic part carries the load with the true lambda1(e):
+/// (modulus + lambda1(e)) e A0/l0 = load. The instantaneous modulus yields the instantaneous depth,
+/// the equilibrium modulus the final one. Converges for every load, because the left side is
+/// strictly increasing.
 /// @param modulus_Pa >= 0; if 0, E' must be > 0
 [[nodiscard]] double equilibrium_depth_m(const BondElement& element, double modulus_Pa,
                                          double load_N);

@@ -39,9 +39,10 @@ struct BondLaw {
   ElongationFunction kernel;     ///< V
   std::vector<Branch> branches;  ///< of different relaxation times, the shortest first
 
-  [[nodiscard]] double equilibrium_N_per_m() const;  ///< sum of c_i: slope at rest in the end
-  [[nodiscard]] double relaxing_N_per_m() const;     ///< G
-  /// Slope at rest before anything has relaxed.
+  [[nodiscard]] double equilibrium_N_per_m()
+      const;  ///< sum of c_i: slope at rest after full relaxation
+  [[nodiscard]] double relaxing_N_per_m() const;  ///< G
+  /// Instantaneous slope at rest.
   [[nodiscard]] double instantaneous_N_per_m() const {
     return equilibrium_N_per_m() + relaxing_N_per_m();
   }
@@ -49,11 +50,12 @@ struct BondLaw {
 
   /// All stiffnesses times a factor >= 0.
   [[nodiscard]] BondLaw scaled(double factor) const;
-  /// Sorts branches and joins those of one relaxation time; leaves out what has no stiffness.
+  /// Sorts the branches, joins those with equal relaxation times and removes those without
+  /// stiffness.
   void tidy();
 };
 
-/// How a bond between two materials follows from theirs.
+/// How the law of a bond between two materials follows from their laws.
 enum class BlendRule {
   mean,    ///< half of each side by side: the mean of the forces
   series,  ///< one half of each behind the other: the harmonic mean of the complex moduli

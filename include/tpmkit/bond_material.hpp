@@ -23,8 +23,8 @@ enum class LateralBond {
 ///     f = w (A0/l0) [Einf W(l) + sum_j g_j (V(l) - m_j)],     dm_j/dt = (V(l) - m_j)/tau_j
 ///
 /// W is the shape of the equilibrium potential, V(l) = l or the kernel that the branches act on. A
-/// lateral bond has the same shapes and the modulus E' (LateralBond). docs/network_method.md tells
-/// which formulations take which materials.
+/// lateral bond has the same shapes and the modulus E' (LateralBond). docs/materials.md lists
+/// the formulations that take each material.
 ///
 /// The paper's element is the instance with W(l) = V(l) = l, Einf = P2, one branch of modulus
 /// E2^2/(E1 + E2) and tau = eta1/(E1 + E2).
@@ -54,18 +54,18 @@ struct BondMaterial {
 };
 
 /// The table of a material's parameters: Einf, Eprime, those of the shape of W, those of the shape
-/// of V with `kernel_` before their names, g1, tau1, ... g40, tau40, A0, l0. The one place where
-/// their names, units and ranges come from.
+/// of V with the prefix `kernel_`, g1, tau1, ... g40, tau40, A0, l0. Names, units and ranges come
+/// from this table only.
 [[nodiscard]] std::vector<MaterialParameter> parameters_of(const BondMaterial& material);
 
-/// The name in the table of a parameter of the shape of V.
+/// The name in the table for a parameter of the shape of V.
 [[nodiscard]] std::string kernel_parameter(std::string_view name);
 
 /// The value of a parameter by its name, SI; none if the material has no such parameter.
 [[nodiscard]] std::optional<double> value_of(const BondMaterial& material, std::string_view name);
 
-/// Sets a parameter by its name. Throws Error(bad_input) that lists the names, for a name that the
-/// material does not have, and for a value out of its range.
+/// Sets a parameter by its name. Throws Error(bad_input) for an unknown name, with the list of
+/// names, and for a value out of its range.
 void set_value(BondMaterial& material, std::string_view name, double value, std::string_view where);
 
 /// Throws Error(bad_input) naming the first parameter out of its range, and for too many branches.

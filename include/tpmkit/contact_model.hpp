@@ -4,9 +4,9 @@
 
 namespace tpm {
 
-/// Where a tool is: its displacement from where it touches the tissue at rest, m, and how it has
-/// turned since, in the coordinates of the organ. Models of tools that look alike from all sides,
-/// and of spheres that are moved themselves, do not ask for the orientation.
+/// Position of a tool: its displacement from first contact with the tissue at rest, m, and its
+/// rotation since then, in the coordinates of the organ. Models of round tools and of driven
+/// spheres ignore the orientation.
 struct ToolPose {
   // NOLINTNEXTLINE(google-explicit-constructor): a tool that does not turn is the usual case
   ToolPose(const Eigen::Vector3d& displacement) : displacement_m(displacement) {}
@@ -19,30 +19,31 @@ struct ToolPose {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
 };
 
-/// What a contact model answers after a step.
+/// Result of a step of a contact model.
 struct ContactAnswer {
-  Eigen::Vector3d force_N = Eigen::Vector3d::Zero();  ///< of the tissue on what is in contact
-  double error_N = 0.0;  ///< estimate of how far the force is from that of the full network
-  bool trusted = true;   ///< false beyond the range the model was built or converges in
+  Eigen::Vector3d force_N =
+      Eigen::Vector3d::Zero();  ///< of the tissue on the tool or driven sphere
+  double error_N = 0.0;         ///< estimated difference from the force of the full network
+  bool trusted = true;  ///< false outside the range for which the model was built or converges
 };
 
 /// A tissue under a tool, stepped at a fixed servo period. The tool moves linearly within a step. A
 /// step neither allocates nor locks nor throws. Contact is two-sided, as if tool and tissue were
-/// glued, unless a model says otherwise; OneSidedContact lets any of them go.
+/// glued, unless a model states otherwise; OneSidedContact adds detachment to any model.
 class ContactModel {
  public:
   virtual ~ContactModel() = default;
-  /// Back to rest, everything relaxed.
+  /// Returns to rest, fully relaxed.
   virtual void reset() noexcept = 0;
-  /// Advances by one period, at whose end the tool is there.
+  /// Advances by one period. The tool reaches `tool` at its end.
   virtual ContactAnswer step(const ToolPose& tool) noexcept = 0;
-  /// s
+  /// Servo period, s.
   [[nodiscard]] virtual double period_s() const noexcept = 0;
-  /// Tangent stiffness at rest, all relaxing springs taut, N/m: for limits of passivity.
+  /// Instantaneous tangent stiffness at rest, N/m; limits of passivity use it.
   [[nodiscard]] virtual Eigen::Matrix3d instantaneous_stiffness() const noexcept = 0;
-  /// The same, everything relaxed, N/m.
+  /// Equilibrium tangent stiffness at rest, N/m.
   [[nodiscard]] virtual Eigen::Matrix3d relaxed_stiffness() const noexcept = 0;
-  /// Spheres whose displacements `displacements` writes; 0: the model has none.
+  /// Number of spheres whose displacements displacements() writes; 0: none.
   [[nodiscard]] virtual Eigen::Index spheres() const noexcept = 0;
   /// Displacements of all spheres after the last step, m.
   /// @param all 3 x spheres()

@@ -9,7 +9,7 @@
 
 namespace tpm {
 
-/// Where a number comes from. It travels with every datum into every table and figure.
+/// Origin of a number. It accompanies every datum into every table and figure.
 enum class Provenance { table, text, abstract, derived, assumed, digitized, measured };
 
 [[nodiscard]] std::string_view provenance_name(Provenance provenance) noexcept;
@@ -17,7 +17,7 @@ enum class Provenance { table, text, abstract, derived, assumed, digitized, meas
 /// Throws Error(bad_input) naming the seven known words.
 [[nodiscard]] Provenance parse_provenance(std::string_view text, std::string_view where);
 
-/// What a column of measured numbers holds.
+/// Physical quantity of a column.
 enum class Quantity {
   time,                ///< s
   indentation_depth,   ///< m, positive into the tissue
@@ -34,7 +34,7 @@ enum class Quantity {
   relaxation_modulus,  ///< Pa, stress after a unit step of strain at time 0
   creep_compliance,    ///< 1/Pa, strain after a unit step of stress at time 0
   abscissa,            ///< x of a problem without physical meaning, a plain number
-  ordinate,            ///< its y
+  ordinate,            ///< y of the same
 };
 
 /// The word used in files: "indentation_depth".
@@ -45,11 +45,11 @@ enum class Quantity {
 
 [[nodiscard]] Dimension quantity_dimension(Quantity quantity) noexcept;
 
-/// True for the drives that a stress answers: relative length and strain.
+/// True for drives whose response is a stress: relative length and strain.
 [[nodiscard]] bool is_answered_by_stress(Quantity drive) noexcept;
 
-/// The answer to a unit step at time 0: relaxation modulus or creep compliance. A recording of one
-/// has times and no drive.
+/// True for the response to a unit step at time 0: relaxation modulus or creep compliance. Such a
+/// recording has times and no drive.
 [[nodiscard]] bool is_step_response(Quantity quantity) noexcept;
 
 /// The short name that begins a column header or a JSON key: "depth", "force", "time".
@@ -59,7 +59,7 @@ enum class Quantity {
 /// `part` ("lower", "sd") goes between the two: "force_lower_N".
 [[nodiscard]] std::string si_key(Quantity quantity, std::string_view part = {});
 
-/// What a datum reports, and so what a model must answer.
+/// The quantity that a datum reports and a model computes.
 enum class Observable {
   contact_force,      ///< N, under an imposed indentation depth
   indentation_depth,  ///< m, under an imposed load
@@ -74,7 +74,7 @@ struct ProbeShape {
   std::optional<Provenance> provenance;
 };
 
-/// What a data file says about itself, from its JSON description.
+/// Description of a data file, from its JSON.
 struct CurveHeader {
   std::string id;  ///< file name without ending, e.g. "evren_relaxation"
   std::string title;
@@ -104,16 +104,16 @@ struct Datum {
   [[nodiscard]] bool is_band() const noexcept { return lower.has_value(); }
 };
 
-/// What of a row cannot be, and what was expected.
+/// A fault in a row, and what was expected.
 struct RowFault {
   std::string column, what, expected;
 };
 
-/// The first thing of a reading that cannot be: neither or both of a value and a band, nothing
-/// imposed, a negative depth, load, time or standard deviation, a number that is not finite.
+/// The first fault of a reading: neither or both of a value and a band, nothing imposed, a negative
+/// depth, load, time or standard deviation, or a number that is not finite.
 [[nodiscard]] std::optional<RowFault> find_datum_fault(const Datum& datum, Observable observable);
 
-/// What the times of a point set count from.
+/// Origin of the times of a point set.
 enum class TimeOrigin { none, end_of_ramp, load_applied };
 
 /// "none", "end_of_ramp" or "load_applied".
@@ -173,19 +173,20 @@ struct SpectrumQuantities {
 };
 [[nodiscard]] SpectrumQuantities spectrum_quantities(Dimension dimension) noexcept;
 
-/// The first row of a spectrum that cannot be, and why.
+/// The first invalid row of a spectrum, and the reason.
 struct SpectrumFault {
   std::size_t row;
   std::string what;
   std::string expected;
 };
 
-/// In any unit: every frequency above 0 and once, storage and loss at least 0.
+/// Checks, in any unit, that every frequency is above 0 and occurs once, and that storage and loss
+/// are at least 0.
 [[nodiscard]] std::optional<SpectrumFault> find_spectrum_fault(const std::vector<double>& frequency,
                                                                const std::vector<double>& storage,
                                                                const std::vector<double>& loss);
 
-/// A single value of the literature that belongs to no curve: a modulus, a time constant.
+/// A single value from the literature that is not part of a curve: a modulus, a time constant.
 struct NamedValue {
   std::string name;             ///< unique in its file: "carter_elastic_modulus"
   std::string quantity;         ///< in words: "elastic modulus"
@@ -193,7 +194,7 @@ struct NamedValue {
   std::optional<double> value;  ///< none for a range
   std::optional<double> lower;  ///< a range may be open on one side ("up to 50 %")
   std::optional<double> upper;
-  std::optional<double> plus_minus;  ///< what is printed after the sign, whatever it means
+  std::optional<double> plus_minus;  ///< the number printed after the sign, of unknown meaning
   Provenance provenance = Provenance::assumed;
   std::string where;
   std::string formula;  ///< only for provenance `derived`, and always there
@@ -201,7 +202,7 @@ struct NamedValue {
   int line = 0;
 };
 
-/// The first thing of a named value that cannot be, apart from its name being taken.
+/// The first fault of a named value, except a duplicate name.
 [[nodiscard]] std::optional<RowFault> find_value_fault(const NamedValue& value);
 
 /// Single values, in the order of the file.

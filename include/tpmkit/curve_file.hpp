@@ -12,7 +12,7 @@ namespace tpm {
 /// Any of the four kinds of curve file.
 using Curve = std::variant<PointSet, Recording, ValueSet, Spectrum>;
 
-/// The word for the kind: "points", "recording", "values" or "spectrum".
+/// Name of the kind: "points", "recording", "values" or "spectrum".
 [[nodiscard]] std::string_view curve_kind(const Curve& curve) noexcept;
 
 [[nodiscard]] const CurveHeader& curve_header(const Curve& curve) noexcept;
@@ -23,7 +23,7 @@ using Curve = std::variant<PointSet, Recording, ValueSet, Spectrum>;
 /// Reads a curve: a CSV file and the JSON description of the same name beside it
 /// (schemas/curve.schema.json). `path_or_id` is a path if it ends in .csv or .json (either of the
 /// two), else the id of a curve in the data folder of share_dir(). Every row and key is checked;
-/// the first thing wrong is Error(bad_input) "FILE:LINE: column 'C': WHAT; expected ...".
+/// the first fault throws Error(bad_input) "FILE:LINE: column 'C': WHAT; expected ...".
 [[nodiscard]] Curve load_curve(const std::string& path_or_id);
 
 /// As load_curve, and Error(bad_input) if the file is of another kind.

@@ -10,7 +10,7 @@
 
 namespace tpm {
 
-/// Why a device has cut its forces, in the numbers of the Force Dimension status.
+/// Why a device switched its forces off. Values are those of the Force Dimension status.
 enum class ForcesOff : std::int32_t {
   none = 0,
   button = 1,
@@ -19,33 +19,33 @@ enum class ForcesOff : std::int32_t {
   software = 4,
   unplugged = 5,
   dead_man = 6,
-  unknown = 7,  ///< a number that no list has
+  unknown = 7,  ///< a value that is not listed
 };
 
 [[nodiscard]] std::string_view word_of(ForcesOff cause);
 
-/// How a device answered one call.
+/// Result of a call to a device.
 enum class DeviceAnswer {
   ok,
-  time_guard,  ///< a value of an earlier call, which came too soon: counted, no error
+  time_guard,  ///< called too soon, so the value is that of an earlier call: counted, no error
   saturated,   ///< the force was clipped to what the motors can: counted, no error
   failed,      ///< see DeviceStatus
   finished,    ///< a replayed recording is at its end
 };
 
-/// Over what a device is reached.
+/// Connection to a device.
 enum class DeviceLink {
-  none,          ///< there is no device: simulated here, or replayed
+  none,          ///< no device: simulated by this library, or replayed
   synchronous,   ///< USB
   asynchronous,  ///< USB
-  simulated,     ///< a simulator behind the vendor's library
+  simulated,     ///< a simulator of the vendor's library
   network,       ///< a server of the vendor's library, which may be anything
   unknown,
 };
 
 [[nodiscard]] std::string_view word_of(DeviceLink link);
 
-/// What a device says it is.
+/// Identity of a device, as it reports it.
 struct DeviceIdentity {
   std::string kind;  ///< as limits_of() takes it
   std::string name;
@@ -55,14 +55,14 @@ struct DeviceIdentity {
   std::string library_version;  ///< empty if none
   DeviceLink link = DeviceLink::none;
   bool left_handed = false;
-  /// Motors and encoders that exist: false for all that is simulated, replayed, or reached over a
-  /// link behind which a simulator may be.
+  /// True if motors and encoders exist. False if the device is simulated or replayed, or if its
+  /// link may lead to a simulator.
   bool hardware = false;
   std::vector<std::string> assumptions;  ///< numbers that nobody has measured, one line each
 };
 
-/// How a device stands, where it differs from what it expects; its maker's library takes it into
-/// account for gravity and coordinates.
+/// Mounting of a device where it differs from the default. The vendor's library uses it for gravity
+/// and coordinates.
 struct DeviceMounting {
   std::optional<double> effector_mass_kg;  ///< of a tool mounted on the handle
   std::optional<double> angle_rad, base_angle_x_rad, base_angle_z_rad;
@@ -71,26 +71,26 @@ struct DeviceMounting {
 /// How a device is set up before a session.
 struct DevicePreparation {
   DeviceMounting mounting;
-  double period_s = 1e-3;      ///< of the loop
-  double max_force_N = 12.0;   ///< > 0
-  double watchdog_s = 0.008;   ///< forces are cut without a command for so long; 0.004 to 0.016
-  bool may_move = false;       ///< the device may move by itself to initialise
-  bool take_as_ready = false;  ///< it is initialised, where nobody can tell
-  /// Asked while the device initialises itself; true stops it there.
+  double period_s = 1e-3;     ///< of the loop
+  double max_force_N = 12.0;  ///< > 0
+  double watchdog_s = 0.008;  ///< time without a command after which forces are cut; 0.004 to 0.016
+  bool may_move = false;      ///< the device may move by itself to initialise
+  bool take_as_ready = false;  ///< treat it as initialised if the device cannot tell
+  /// Called while the device initialises itself; true stops it.
   std::function<bool()> interrupted;
 };
 
-/// What a device reports beside its position. Plain data.
+/// State that a device reports besides its position. Plain data.
 struct DeviceStatus {
   ForcesOff forces_off = ForcesOff::none;
-  bool failed = false;  ///< it could not be asked
+  bool failed = false;  ///< the status could not be read
   int error = 0;        ///< of the vendor's library, 0: none
   char error_text[64] = {};
   std::uint64_t time_guards = 0;  ///< since prepare()
   std::uint64_t saturations = 0;  ///< since prepare()
 };
 
-/// What a hand does beside moving the tool.
+/// Input of the hand besides the motion of the tool.
 struct HandState {
   float gripper_m = std::numeric_limits<float>::quiet_NaN();  ///< opening; NaN: there is none
   std::uint32_t buttons = 0;                                  ///< a bit for each that is pressed
@@ -116,15 +116,15 @@ class HapticDevice {
   virtual DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept = 0;
   virtual DeviceStatus status() noexcept = 0;
   virtual HandState hand() noexcept { return {}; }
-  /// The session waits until the tool is in place: a simulated operator holds still meanwhile.
+  /// Called while the session waits for the tool to be in place. A simulated operator holds still.
   virtual void await() noexcept {}
-  /// The first phase begins.
+  /// Called when the first phase begins.
   virtual void begin() noexcept {}
-  /// Lets time pass for a device that is simulated; others do nothing.
+  /// Advances the time of a simulated device; others do nothing.
   virtual void advance(double /*seconds*/) noexcept {}
-  /// Zero force, forces off, closed. More than one call does no harm.
+  /// Sets zero force, switches forces off and closes. May be called more than once.
   virtual void stop() noexcept = 0;
-  /// The same as far as it can be done while another thread is stuck in a call.
+  /// Switches forces off as far as possible while another thread is stuck in a call.
   virtual void cut_forces() noexcept = 0;
 };
 

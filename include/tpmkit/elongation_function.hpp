@@ -11,7 +11,7 @@
 
 namespace tpm {
 
-/// A parameter of a material: what files, fits, sweeps and reports address by its name.
+/// A parameter of a material. Files, fits, sweeps and reports address it by its name.
 struct MaterialParameter {
   std::string name;
   Dimension dimension;
@@ -27,21 +27,21 @@ struct MaterialParameter {
 [[nodiscard]] std::string range_of(const MaterialParameter& parameter);
 
 inline constexpr std::size_t kMostShapeParameters = 4;
-/// Values of a shape's parameters, SI; those that it does not have are 0.
+/// Values of a shape's parameters, SI; unused ones are 0.
 using ShapeValues = std::array<double, kMostShapeParameters>;
 
-/// A family of functions W(l; p) of a bond's elongation l, m: what the potentials and kernels of a
-/// material are made of. For all parameters in their ranges W must be
+/// A family of functions W(l; p) of a bond's elongation l, m. Potentials and kernels of materials
+/// are built from them. For all parameters in their ranges W must be
 ///
 ///   - odd and smooth, with W'(0) = 1: the moduli are those at rest;
 ///   - strictly increasing, so that its integral P is convex and the bond stores energy.
 ///
-/// Shapes are objects that never change, one or several in a file of shapes/, which the build lists
-/// (docs/architecture.md, "Adding a material").
+/// Shapes are immutable. Each file of shapes/ defines one or several, and the build lists them
+/// (docs/adding.md, "A material").
 class ElongationShape {
  public:
   struct Entry {
-    std::string_view name;     ///< its word in files
+    std::string_view name;     ///< its name in files
     std::string_view meaning;  ///< its formula, in l and the parameters
     /// At most kMostShapeParameters.
     std::vector<MaterialParameter> parameters = {};
@@ -72,12 +72,12 @@ class ElongationShape {
   /// The l at which W(l) = w, m: the slope of the Legendre transform of P. By default with Newton's
   /// method between bounds, to rounding.
   [[nodiscard]] virtual double inverse(double w, const ShapeValues& p) const;
-  /// c where W(l) = l + c l^3, 1/m^2. The kernels at servo rate step such functions; they refuse
-  /// shapes that have none.
+  /// c if W(l) = l + c l^3, 1/m^2; otherwise none. Models at servo rate accept only shapes that
+  /// have it.
   [[nodiscard]] virtual std::optional<double> cubic_per_m2(const ShapeValues& /*p*/) const {
     return std::nullopt;
   }
-  /// W(l) = l: everything runs through the faster code of linear bonds.
+  /// True if W(l) = l. The faster code of linear bonds is then used.
   [[nodiscard]] virtual bool is_linear() const { return false; }
 
  private:
@@ -86,14 +86,15 @@ class ElongationShape {
 
 using ElongationShapes = std::span<const ElongationShape* const>;
 
-/// All shapes by rank. Defined in a source that the build writes from the files of shapes/: a
-/// program that is linked with another list has other shapes.
+/// All shapes by rank. Defined in a source that the build generates from the files of shapes/. A
+/// program with its own definition has other shapes.
 [[nodiscard]] ElongationShapes elongation_shapes();
 
-/// Those of the library, for such a list: joined({shipped_elongation_shapes(), own_shapes()}).
+/// The shapes of the library, for such a definition: joined({shipped_elongation_shapes(),
+/// own_shapes()}).
 [[nodiscard]] ElongationShapes shipped_elongation_shapes();
 
-/// Those of several lists, by rank and name. Throws std::logic_error if two share a name.
+/// Joins several lists, ordered by rank and name. Throws std::logic_error if two share a name.
 [[nodiscard]] std::vector<const ElongationShape*> joined(
     std::initializer_list<ElongationShapes> lists);
 
@@ -112,9 +113,9 @@ class ElongationFunction {
   ElongationFunction(const ElongationShape& shape, std::initializer_list<double> values);
 
   [[nodiscard]] bool is_linear() const { return shape_ == nullptr; }
-  /// The linear function is one of the shape `linear`.
+  /// Name of the shape; `linear` for the linear function.
   [[nodiscard]] std::string_view shape_name() const;
-  /// Of the shape; the linear function has none.
+  /// Parameters of the shape; the linear function has none.
   [[nodiscard]] std::span<const MaterialParameter> parameters() const {
     if (shape_ == nullptr) return {};
     return shape_->parameters();
@@ -146,11 +147,11 @@ class ElongationFunction {
   [[nodiscard]] double inverse(double w) const {
     return shape_ == nullptr ? w : shape_->inverse(w, values_);
   }
-  /// Energy of a spring W that was stretched to l while its reference follows at w, m^2 (times a
-  /// stiffness: J): P(l) + P*(w) - l w with P* the Legendre transform of P. Non-negative, and 0
-  /// where w = W(l) (Fenchel-Young). For a linear function (l - w)^2/2.
+  /// Energy of a spring W stretched to l whose viscous elongation is w, m^2 (times a stiffness: J):
+  /// P(l) + P*(w) - l w with P* the Legendre transform of P. Non-negative, and 0 where w = W(l)
+  /// (Fenchel-Young). For a linear function (l - w)^2/2.
   [[nodiscard]] double gap(double l, double w) const;
-  /// c where W(l) = l + c l^3, 1/m^2: what runs at servo rate.
+  /// c if W(l) = l + c l^3, 1/m^2; none if a model at servo rate cannot step it.
   [[nodiscard]] std::optional<double> cubic_per_m2() const {
     return shape_ == nullptr ? 0.0 : shape_->cubic_per_m2(values_);
   }

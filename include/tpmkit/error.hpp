@@ -5,8 +5,8 @@
 
 namespace tpm {
 
-/// What a program that stops with an error returns to the shell. 1 is kept for "ran to the end, and
-/// the answer is no" (a data check or a gradient check that failed).
+/// Exit code of the program. 1 means that it ran to the end and the answer is no: a data check or a
+/// gradient check failed.
 enum class ExitCode : int {
   success = 0,
   answer_is_no = 1,
@@ -16,9 +16,8 @@ enum class ExitCode : int {
   environment = 5,  ///< something outside: cannot write, missing helper program
 };
 
-/// An error with the three things a person needs, printed as one line:
-/// "WHERE: WHAT; expected EXPECTED". Control characters in it, line ends too, are escaped
-/// (for_terminal()): it may repeat names and titles from outside.
+/// An error, printed as one line: "WHERE: WHAT; expected EXPECTED". It may repeat names and titles
+/// from files, so control characters and line ends are escaped (for_terminal()).
 class Error : public std::runtime_error {
  public:
   /// @param where file, file:line, key or option; may be empty
@@ -29,20 +28,20 @@ class Error : public std::runtime_error {
 
   [[nodiscard]] ExitCode code() const noexcept { return code_; }
 
-  /// Adds an outer place in front ("fit.json" before "key 'E'"): used where the inner function
-  /// does not know which file it works on.
+  /// Adds an outer place in front ("fit.json" before "key 'E'"), for an inner function that does
+  /// not know its file.
   [[nodiscard]] Error within(std::string_view outer) const;
 
  private:
   ExitCode code_;
 };
 
-/// Shorthand for the most common kind.
+/// Shorthand for an Error(bad_input).
 [[nodiscard]] Error bad_input(std::string_view where, std::string_view what,
                               std::string_view expected = {});
 
-/// Text from outside made safe for a one-line message: control characters and bytes that are not
-/// UTF-8 become '?', and anything longer than `limit` characters is cut with "...".
+/// Makes text from a file safe for a one-line message. Control characters and bytes that are not
+/// UTF-8 become '?'. Text longer than `limit` characters is cut with "...".
 [[nodiscard]] std::string printable(std::string_view text, std::size_t limit = 60);
 
 }  // namespace tpm

@@ -17,7 +17,7 @@ enum class Verdict {
   lower_only,   ///< only a lower limit: larger values up to the bound cannot be told apart
   upper_only,   ///< only an upper limit
   flat,         ///< no limit within the bounds
-  failed,       ///< a walk along the profile ended in neither a limit nor a bound
+  failed,       ///< the profile reached neither a limit nor a bound
   not_profiled  ///< profiles were switched off
 };
 
@@ -35,7 +35,7 @@ struct FittedParameter {
   std::string words;      ///< the verdict as a sentence
 };
 
-/// What a fit found.
+/// Result of a fit.
 struct FitSummary {
   std::optional<LawFile> law;  ///< the fitted law with its uncertainty; none: no law was fitted
   double chi_square = 0.0;     ///< sum of squared standardised residuals
@@ -43,19 +43,19 @@ struct FitSummary {
   int starts_run = 0, starts_failed = 0;
   int starts_agreeing = 0;  ///< that ended in the best minimum
   std::vector<FittedParameter> parameters;
-  std::vector<std::string> flags;  ///< what a reader must know, one sentence each
+  std::vector<std::string> flags;  ///< warnings and assumptions, one sentence each
   std::string text;                ///< for a terminal
-  std::string json;                ///< everything, keys in docs/fit_files.md
+  std::string json;                ///< everything, keys in docs/fit_results.md
 };
 
-/// What a caller may say about a fit.
+/// Options of a fit.
 struct FitRequest {
-  /// Of fit_recordings(): the law, as law_name() writes it ("linear-2"). Empty: the least law of
-  /// the family that the data do not contradict is chosen.
+  /// For fit_recordings(): the law, as law_name() writes it ("linear-2"). Empty: the simplest law
+  /// of the family that the data support.
   std::string law;
-  std::optional<std::size_t> starts;  ///< of the search; else what the configuration says, or 40
-  std::optional<std::uint64_t> seed;  ///< of the starts; else what the configuration says, or 0
-  /// Asked before each evaluation; true ends the fit with an exception.
+  std::optional<std::size_t> starts;  ///< of the search; default: the configuration's, or 40
+  std::optional<std::uint64_t> seed;  ///< of the starts; default: the configuration's, or 0
+  /// Called before each evaluation; true ends the fit with an exception.
   std::function<bool()> interrupted;
 };
 

@@ -8,19 +8,20 @@
 
 namespace tpm {
 
-/// What a formulation can do. Whoever asks for more than it can is told which ones can.
+/// Capabilities of a formulation. A request beyond them is refused with the names of those that
+/// have them.
 struct Capabilities {
   bool network = false;           ///< any tissue of a scene; else the star of four spheres only
   bool depth = false;             ///< driven by an imposed depth
   bool load = false;              ///< driven by an imposed load
-  bool jumps = false;             ///< what is imposed may jump
+  bool jumps = false;             ///< the imposed depth or load may jump
   bool field = false;             ///< displacements of all spheres
   bool masses = false;            ///< spheres may have mass
   bool several_contacts = false;  ///< patches, or several driven spheres
   bool tools = false;             ///< rigid balls and punches
   bool servo = false;             ///< steps a contact at a fixed rate in bounded time
   bool derivatives = false;       ///< exact derivatives by the parameters
-  bool course = true;             ///< follows the course of time; else each instant stands alone
+  bool course = true;             ///< has a history; otherwise each instant is independent
   bool beforehand = false;        ///< needs the whole protocol before it begins
   bool planned = false;           ///< `tpm plan` considers it
   // Materials of the bonds (docs/materials.md).
@@ -32,7 +33,7 @@ struct Capabilities {
   bool mixed = false;          ///< regions that relax differently
 };
 
-/// A capability with its word in lists and its place in messages: "a formulation that ...".
+/// A capability with its name in lists and its words in messages: "a formulation that ...".
 struct CapabilityEntry {
   bool Capabilities::*meaning;
   std::string_view text;
@@ -67,29 +68,29 @@ inline constexpr std::array<CapabilityEntry, 19> kCapabilities{{
   return can;
 }
 
-/// One way to compute how tissue answers: equations with a method that solves them. It states what
-/// it is and what it can do; what it does for whom stands in its roles, interfaces that it
-/// implements besides this one:
+/// One way to compute the response of tissue: equations with a method that solves them. It states
+/// its name and capabilities. Its uses are its roles, interfaces that it implements besides this
+/// one:
 ///
 /// - ModelMaker (tpmkit/model.hpp), asked by fits, tables, designs: response and derivatives of the
 ///   element;
 /// - SceneRunner (tpmkit/simulation.hpp), asked by scenes and sweeps; by plans, if `planned`;
 /// - StateRunner (simulate/scene_runner.hpp), asked by scenes: all states, with checkpoints;
 /// - PlanOffer (plan/plan_model.hpp), asked by plans: candidates that claim an error and a cost;
-/// - LoopMaker (haptics/loop_maker.hpp), asked by sessions: what the servo loop steps.
+/// - LoopMaker (haptics/loop_maker.hpp), asked by sessions: the model that the servo loop steps.
 ///
-/// Formulations are objects that never change (docs/architecture.md, "Adding a formulation").
+/// Formulations are immutable (docs/adding.md, "A formulation").
 class Formulation {
  public:
-  /// What stands in a list.
+  /// Entry of a formulation in a list.
   struct Entry {
-    std::string_view name;     ///< its word in files
+    std::string_view name;     ///< its name in files
     std::string_view meaning;  ///< one sentence without a full stop
     Capabilities can;
     int rank = 1000;  ///< place in lists: the cheap ones first
     /// Keys of a scene's block `formulation` that it takes besides `kind`.
     std::vector<std::string_view> keys = {};
-    std::string_view also = {};  ///< an older word for it in files; may be empty
+    std::string_view also = {};  ///< an older name in files; may be empty
   };
 
   explicit Formulation(Entry entry) : entry_(std::move(entry)) {}
@@ -130,13 +131,13 @@ using Formulations = std::span<const Formulation* const>;
 ///     }
 [[nodiscard]] Formulations formulations();
 
-/// Those of several lists, by rank and name. Throws std::logic_error if two share a name.
+/// Joins several lists, ordered by rank and name. Throws std::logic_error if two share a name.
 [[nodiscard]] std::vector<const Formulation*> joined(std::initializer_list<Formulations> lists);
 
-/// The one of this name; null if there is none.
+/// The formulation of this name; null if there is none.
 [[nodiscard]] const Formulation* find_formulation(std::string_view name);
 
-/// The names of those for which `is` holds, separated by commas.
+/// Names of the formulations for which `is` is true, separated by commas.
 template <class Predicate>
 [[nodiscard]] std::string formulations_that(Predicate&& is) {
   std::string names;
@@ -146,18 +147,19 @@ template <class Predicate>
   return names;
 }
 
-/// Throws Error(bad_input): there is none of this name where `able` are the names that would do.
-/// @param noun what is named, such as "formulation"
+/// Throws Error(bad_input): no formulation has this name.
+/// @param noun the word in the message, such as "formulation"
+/// @param able names that are possible
 [[noreturn]] void refuse_formulation(std::string_view name, std::string_view noun,
                                      std::string_view where, const std::string& able);
-/// Throws Error(bad_input): this one cannot, those `able` can.
+/// Throws Error(bad_input): this formulation lacks the capability; those in `able` have it.
 [[noreturn]] void refuse_capability(const Formulation& f, bool Capabilities::*capability,
                                     std::string_view where, const std::string& able);
 /// The words of a capability in kCapabilities.
 [[nodiscard]] std::string_view words_of(bool Capabilities::*capability);
 
-/// The formulation of this name, which has the role. Throws Error(bad_input) that names those that
-/// have it.
+/// The formulation of this name in the role. Throws Error(bad_input), naming those that have the
+/// role.
 template <class Role>
 [[nodiscard]] const Formulation& formulation_with(std::string_view name, std::string_view noun,
                                                   std::string_view where) {
@@ -168,7 +170,8 @@ template <class Role>
                      }));
 }
 
-/// Throws Error(bad_input) that names the formulations in the role that can, unless this one can.
+/// Throws Error(bad_input), naming the formulations of the role that have the capability, unless
+/// this one has it.
 template <class Role>
 void require_can(const Formulation& f, bool Capabilities::*capability, std::string_view where) {
   if (f.can().*capability) return;

@@ -9,7 +9,7 @@
 
 namespace tpm {
 
-/// The answer to small oscillations: K*(i omega) = storage + i loss at each frequency, with the
+/// Response to small oscillations: K*(i omega) = storage + i loss at each frequency, with the
 /// derivatives by all parameters. N/m, or Pa for a stretched strip and for the paper's element.
 struct SpectrumResponse {
   Eigen::VectorXd storage;  ///< size n_frequencies
@@ -23,7 +23,7 @@ struct SpectrumResponse {
   [[nodiscard]] Eigen::VectorXd loss_tangent() const;
 };
 
-/// Small oscillations of a law about a depth u_b of the tissue that was held for ever:
+/// Response of a law to small oscillations about the equilibrium at a depth u_b of the tissue:
 ///
 ///     K* = V'(u_b) G*(i omega) + k_tension T'(u_b),   G* = i omega times the transform of G
 ///        = k_inf + sum_i k_i i omega tau_i/(1 + i omega tau_i)          (branches)

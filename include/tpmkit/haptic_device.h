@@ -14,8 +14,8 @@
  * throw, or wait for longer than a fraction of a period. Positions and forces are in the coordinates of
  * the device; forces act on the hand.
  *
- * Functions answer a tpm_device_answer. Those with `message` write one line of text that says what is
- * wrong and what would help; they are not called in the loop.
+ * Functions return a tpm_device_answer. Those with `message` write one line of text with the fault and
+ * its remedy; they are not called in the loop.
  */
 #ifndef TPMKIT_HAPTIC_DEVICE_H
 #define TPMKIT_HAPTIC_DEVICE_H
@@ -50,8 +50,8 @@ enum tpm_device_forces_off {
   TPM_DEVICE_OFF_DEAD_MAN = 6
 };
 
-/** What may be asked of the device. A session that asks for more is refused. Say what you measured;
- * what you assume, name in `assumptions`. */
+/** Limits of the device. A session that exceeds them is refused. State measured values; list assumed
+ * ones in `assumptions`. */
 typedef struct tpm_device_limits {
   double force_N;            /**< > 0, at most 50 */
   double reach_m;            /**< radius of the workspace, > 0, at most 1 */
@@ -59,7 +59,7 @@ typedef struct tpm_device_limits {
   double damping_N_s_per_m;  /**< largest that may be rendered, >= 0 */
   double slew_N_per_s;       /**< largest rise of the force, > 0 */
   double least_ramp_in_s;    /**< forces grow to their limit over at least so long, >= 0.1 */
-  double friction_N_s_per_m; /**< least viscous friction of the device, >= 0: room for passivity */
+  double friction_N_s_per_m; /**< least viscous friction of the device, >= 0; passivity relies on it */
   int32_t delay_periods;     /**< from a command to its force, >= 0 */
 } tpm_device_limits;
 
@@ -82,7 +82,7 @@ typedef struct tpm_device_preparation {
   uint32_t version;
   double period_s;     /**< of the loop */
   double max_force_N;  /**< the device must never be asked for more */
-  double watchdog_s;   /**< cut the forces without a command for so long */
+  double watchdog_s;   /**< cut the forces after this time without a command */
   uint32_t may_move;   /**< 1: the device may move by itself to initialise */
 } tpm_device_preparation;
 
@@ -101,12 +101,12 @@ typedef struct tpm_device_hand {
   uint32_t buttons;  /**< a bit for each that is pressed */
 } tpm_device_hand;
 
-/** The functions of a plugin. All have to be there but hand. */
+/** The functions of a plugin. All are required except hand. */
 typedef struct tpm_device_plugin {
   uint32_t size;
   uint32_t version;
   const char *name;  /**< of the plugin, with its version */
-  /** How many devices there are now; below 0: that cannot be told, the message says why. */
+  /** Number of devices present; below 0: unknown, the message states why. */
   int (*count)(char *message);
   /** Describes one of them without opening it. */
   int (*describe)(int index, tpm_device_description *description, char *message);
@@ -120,9 +120,9 @@ typedef struct tpm_device_plugin {
   int (*hand)(void *device, tpm_device_hand *hand);
   /** Zero force, forces off. May be called more than once. */
   void (*stop)(void *device);
-  /** The same as far as it can be done while another thread is stuck in a call. */
+  /** Switches forces off as far as possible while another thread is stuck in a call. */
   void (*cut_forces)(void *device);
-  /** Gives the device back; called once, after stop. */
+  /** Releases the device; called once, after stop. */
   void (*close)(void *device);
 } tpm_device_plugin;
 

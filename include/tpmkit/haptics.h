@@ -16,13 +16,13 @@
  * Units are SI. Positions and forces are in the coordinates of the device: the session says where the
  * tissue begins (`surface`) and which way is into it (`push`). Forces act on the hand.
  *
- * Threads: one thread steps. One other may call tpm_haptics_get_state and tpm_haptics_positions. All
- * other calls belong to neither loop. Contacts are independent of each other.
+ * Threads: one thread steps. One other may call tpm_haptics_get_state and tpm_haptics_positions. Make
+ * all other calls outside these loops. Contacts are independent of each other.
  *
  * tpm_haptics_step neither allocates nor locks nor throws. It includes what `tpm hil run` does for
- * safety: one-sided contact, limits of the force and of its rise, passivity control, and an end where
- * the rendering gives energy to the hand or oscillates. It knows nothing of your device's own limits,
- * and it is no substitute for them.
+ * safety: one-sided contact, limits of the force and of its rise, passivity control, and a stop if the
+ * rendering delivers energy to the hand or oscillates. It does not know the limits of your device and
+ * does not replace them.
  *
  * Binary interface: every struct begins with its size and the version it was compiled for; the library
  * reads and writes no more than that size. Members are added at the end only. Symbols carry the version
@@ -46,10 +46,10 @@ extern "C" {
 
 /** Version of the structs below. */
 #define TPM_HAPTICS_VERSION 1u
-/** Room that is enough for any message. */
+/** Size that is sufficient for any message. */
 #define TPM_HAPTICS_MESSAGE 512
 
-/** What a call answers. 1 to 5 are the exit codes of the program `tpm`. */
+/** Result of a call. 1 to 5 are the exit codes of the program `tpm`. */
 enum tpm_haptics_code {
   TPM_HAPTICS_OK = 0,
   TPM_HAPTICS_REFUSED = 1,     /**< the rendering would be unstable, or beyond the device's limits */
@@ -63,14 +63,14 @@ enum tpm_haptics_code {
 /** Why a contact has stopped: tpm_haptics_state.cause. */
 enum tpm_haptics_cause {
   TPM_HAPTICS_RUNNING = 0,
-  TPM_HAPTICS_FINISHED = 1,             /**< spring-pots keep no longer history (options.longest_s) */
+  TPM_HAPTICS_FINISHED = 1,             /**< the history of spring-pots is full (options.longest_s) */
   TPM_HAPTICS_POSITION_NOT_FINITE = 2,
   TPM_HAPTICS_POSITION_JUMPED = 3,      /**< faster than 5 m/s */
   TPM_HAPTICS_FORCE_NOT_FINITE = 4,
   TPM_HAPTICS_LATE = 5,                 /**< too many periods missed */
   TPM_HAPTICS_NOT_IN_PLACE = 6,         /**< the tool was never in free air and at rest */
   TPM_HAPTICS_UNTRUSTED = 7,            /**< the model did not trust its force for too long */
-  TPM_HAPTICS_ENERGY = 8,               /**< the rendering gave energy to the hand */
+  TPM_HAPTICS_ENERGY = 8,               /**< the rendering delivered energy to the hand */
   TPM_HAPTICS_OSCILLATION = 9,
   TPM_HAPTICS_OTHER = 10
 };
@@ -105,7 +105,7 @@ typedef struct tpm_haptics_options {
 #define TPM_HAPTICS_OPTIONS_INIT \
   { (uint32_t)sizeof(tpm_haptics_options), TPM_HAPTICS_VERSION, 0.0, 600.0, 0u, 0u, {0} }
 
-/** What does not change while a contact is open. */
+/** Properties that do not change while a contact is open. */
 typedef struct tpm_haptics_info {
   uint32_t size;
   uint32_t version;
@@ -121,7 +121,7 @@ typedef struct tpm_haptics_info {
   double tool_radius_m;        /**< of a ball that moves in space; 0: the tool moves along the push */
   uint64_t spheres;            /**< that tpm_haptics_positions writes, 1 or more */
   uint64_t contact_sphere;     /**< the one that the tool meets, from 0 */
-  char model[128];             /**< what is stepped, for people */
+  char model[128];             /**< description of the model */
 } tpm_haptics_info;
 
 #define TPM_HAPTICS_INFO_INIT \
@@ -169,31 +169,30 @@ TPM_HAPTICS_API int tpm_haptics_open(const char *file, const tpm_haptics_options
 TPM_HAPTICS_API int tpm_haptics_step(tpm_haptics_contact *contact, const double position_m[3],
                                      double force_N[3]);
 
-/** The same after `missed` periods without a step: the tissue lives through them too. */
+/** The same after `missed` periods without a step; the tissue is advanced through them too. */
 TPM_HAPTICS_API int tpm_haptics_step_after(tpm_haptics_contact *contact, uint32_t missed,
                                            const double position_m[3], double force_N[3]);
 
-/** Back to rest; a contact that has stopped goes on. Not for the loop: it allocates. No other thread
- * may use the contact meanwhile. */
+/** Returns to rest; a stopped contact runs again. It allocates, so do not call it in the loop. No other
+ * thread may use the contact meanwhile. */
 TPM_HAPTICS_API int tpm_haptics_reset(tpm_haptics_contact *contact);
 
-/** Fills what does not change. `size` and `version` have to be set (TPM_HAPTICS_INFO_INIT). */
+/** Fills `info`. `size` and `version` must be set (TPM_HAPTICS_INFO_INIT). */
 TPM_HAPTICS_API int tpm_haptics_get_info(const tpm_haptics_contact *contact, tpm_haptics_info *info);
 
 /** Fills the newest state; never waits. For the thread that draws.
- * `size` and `version` have to be set (TPM_HAPTICS_STATE_INIT). */
+ * `size` and `version` must be set (TPM_HAPTICS_STATE_INIT). */
 TPM_HAPTICS_API int tpm_haptics_get_state(tpm_haptics_contact *contact, tpm_haptics_state *state);
 
-/** Writes where the centres of all spheres are, x, y, z of each, in the coordinates of the scene. The
- * contact sphere is where the last step left it; the others follow 25 times a second. For the thread
- * that draws.
+/** Writes the centres of all spheres, x, y, z of each, in the coordinates of the scene. The contact
+ * sphere is that of the last step; the others are updated 25 times a second. For the thread that draws.
  * @param positions_m room for 3 * spheres numbers
  * @param spheres as tpm_haptics_info.spheres says
  */
 TPM_HAPTICS_API int tpm_haptics_positions(tpm_haptics_contact *contact, double *positions_m,
                                           size_t spheres);
 
-/** Closes a contact; NULL does no harm. */
+/** Closes a contact; NULL is allowed. */
 TPM_HAPTICS_API void tpm_haptics_close(tpm_haptics_contact *contact);
 
 /** A cause in words, such as "energy given to the hand". */

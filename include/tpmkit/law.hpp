@@ -29,8 +29,8 @@ enum class BranchForm {
 /// with x infinite T = u (u/u_ref)^2.
 enum class Tension {
   none,
-  elastic,   ///< F += k_tension T(u), at once and for ever (the paper)
-  relaxing,  ///< the kernel is (1 - tension_share) W + tension_share T, and relaxes as one
+  elastic,   ///< F += k_tension T(u), which does not relax (the paper)
+  relaxing,  ///< the kernel is (1 - tension_share) W + tension_share T and relaxes as a whole
 };
 
 /// Relaxation by spring-pots instead of by branches. A spring-pot of the order alpha has the
@@ -56,12 +56,12 @@ enum class Fractional {
   return law == Fractional::maxwell_pair || law == Fractional::kelvin_voigt_pair ||
          law == Fractional::zener_pair;
 }
-/// Whether a spring k_inf stands beside what relaxes.
+/// Whether a spring k_inf is parallel to the relaxing part.
 [[nodiscard]] constexpr bool has_lasting_spring(Fractional law) {
   return law == Fractional::kelvin_voigt || law == Fractional::zener ||
          law == Fractional::zener_pair;
 }
-/// Whether the law has a relaxation time: something stands in series.
+/// Whether the law has a relaxation time, as series combinations do.
 [[nodiscard]] constexpr bool has_relaxation_time(Fractional law) {
   return law == Fractional::maxwell || law == Fractional::zener ||
          law == Fractional::maxwell_pair || law == Fractional::zener_pair;
@@ -102,8 +102,8 @@ struct LawSpec {
 /// Error(bad_input).
 [[nodiscard]] LawSpec parse_law_name(std::string_view text, std::string_view where);
 
-/// Whether the coefficients are secants at the reference depth: kernels and tensions that are no
-/// straight lines. They can be compared only at one reference.
+/// Whether the coefficients are secants at the reference depth, because kernel or tension is
+/// nonlinear. Such coefficients can be compared only at one reference.
 [[nodiscard]] bool depends_on_reference(const LawSpec& spec) noexcept;
 
 /// "coefficients are secants at a depth of 4 mm"; empty if they do not depend on it.
@@ -120,7 +120,7 @@ struct LawParameter {
   std::string name;     ///< k_inf, k1, tau1, k0, kc1, T1, alpha, exponent, k_tension, ...
   Dimension dimension;  ///< stiffness (N/m), or stress for a stretched strip
   std::string meaning;
-  bool linear = false;           ///< the response is linear in it (with the others held)
+  bool linear = false;           ///< the response is linear in it (the others fixed)
   bool nuisance = false;         ///< belongs to the recording, not to the material
   std::optional<double> preset;  ///< value if nobody sets it
   double lower = 0.0;            ///< smallest and largest physical value
@@ -132,7 +132,7 @@ struct LawParameter {
 /// always.
 [[nodiscard]] std::vector<LawParameter> law_parameters(const LawSpec& spec);
 
-/// Stiffness at once, in the end and between: the law's relaxation function in parallel form.
+/// Relaxation function of a law in parallel form: G(t) = k_inf + sum k_i exp(-t/tau_i).
 struct Prony {
   double k_inf = 0.0;
   std::vector<double> k;      ///< N/m (or Pa), >= 0

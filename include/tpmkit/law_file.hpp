@@ -18,7 +18,7 @@ struct LawFile {
   std::string note;
   /// Largest depth (or relative length less the slack) of the data that it was fitted to, > 0.
   std::optional<double> fitted_to = std::nullopt;
-  /// What the fit knows about the parameters: the block "fit" of the file.
+  /// Uncertainty of the parameters: the block "fit" of the file.
   std::optional<LawUncertainty> uncertainty = std::nullopt;
 };
 

@@ -11,29 +11,28 @@ namespace tpm {
 class FractionalMemory;
 struct LawAtParameters;
 
-/// A law of the family, behind the interface that tables, fits and plans ask.
+/// A law of the family as a Model for tables, fits and plans.
 ///
 /// Displacement-driven: exact in time for a drive that is linear between knots (exponential
 /// quadrature of V(u(s)), refined until a polynomial of fourth degree holds to 1e-10 of the peak),
 /// in O(n) for each branch. After detachment (the force would become tensile) the surface recovers
 /// freely and the response is the offset until the probe meets it again. Force-driven: in
 /// closed form where the kernel alone carries the load and the probe stays on the surface
-/// (law/imposed_load.hpp), else adaptive implicit steps. Times at infinity are answered by full
-/// relaxation.
+/// (law/imposed_load.hpp), else adaptive implicit steps. At an infinite time the
+/// response is fully relaxed.
 ///
-/// A hertz kernel that relaxes follows Lee and Radok while the contact grows and Ting (1966) when
-/// it shrinks, without branches any history. Not predicted (NaN) from then on: where the contact
-/// grows again by more than kContactJitter of the largest depth; with fractional elements or
-/// tension, where the depth has fallen by more than that; under an imposed load, where the depth
-/// that follows has.
+/// A relaxing hertz kernel follows Lee and Radok while the contact grows and Ting (1966) when it
+/// shrinks. Without branches any history is possible. The response is not predicted (NaN) from
+/// where the contact grows again by more than kContactJitter of the largest depth; with fractional
+/// elements or tension, or under an imposed load, from where the depth has fallen by more than
+/// that.
 ///
-/// Fractional laws are answered at the knots and asked times to 1e-10 of G at their smallest
-/// spacing times the total variation of the drive (docs/fractional.md), and creep to 1e-9
-/// (spring-pots 5e-6) of the depth. A single step that is kept is answered by G(t) and J(t)
-/// themselves (law/relaxation.hpp): of the depth where the kernel is linear, of the load where no
-/// elastic tension acts beside the kernel. No spring-pot follows any other jump
-/// of the depth: Error(bad_input); under a jump of the load it stays where it is and then gives
-/// way.
+/// The error of fractional laws at knots and output times is 1e-10 of G at their smallest spacing,
+/// times the total variation of the drive (docs/fractional.md); of creep 1e-9 of the depth
+/// (spring-pots 5e-6). A single step that stays constant uses G(t) and J(t) themselves
+/// (law/relaxation.hpp): a step of depth with a linear kernel, a step of load without elastic
+/// tension. Any other jump of the depth of a spring-pot throws Error(bad_input). Under a jump of
+/// the load a spring-pot does not move at first and then creeps.
 class LawModel final : public Model {
  public:
   /// Throws Error(bad_input) as require_valid(spec).
@@ -48,7 +47,7 @@ class LawModel final : public Model {
 
   [[nodiscard]] const LawSpec& spec() const { return spec_; }
   [[nodiscard]] const std::vector<LawParameter>& law_parameters() const { return parameters_; }
-  /// Place of a parameter in the vector. Throws Error(bad_input) naming the known ones.
+  /// Index of a parameter in the vector. Throws Error(bad_input) naming the known ones.
   [[nodiscard]] std::size_t index(std::string_view parameter) const;
   /// Throws Error(bad_input) naming the first parameter out of its range, or if their number is
   /// wrong.

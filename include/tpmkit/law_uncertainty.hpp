@@ -26,8 +26,8 @@ enum class Coordinate {
 /// A file that a law was fitted to.
 struct FittedFile {
   std::string name;
-  std::string sha256;                  ///< of its bytes; empty where the data were no file
-  int readings = 0;                    ///< that were fitted
+  std::string sha256;                  ///< of its bytes; empty if the data came from no file
+  int readings = 0;                    ///< number of fitted readings
   std::optional<double> from_s, to_s;  ///< of a recording: samples outside were not fitted
 
   /// Whether a sample at this time was fitted.
@@ -38,7 +38,7 @@ struct FittedFile {
 
 /// Scatter of one reading about the law, after the fit.
 struct ReadingNoise {
-  /// Words of the fit's noise model (docs/fit_files.md): absolute, combined, relative_to_datum,
+  /// Kind of the fit's noise model (docs/fit_files.md): absolute, combined, relative_to_datum,
   /// relative_to_model, log, per_row; "unknown" where the fit's noise is not normal.
   std::string kind = "absolute";
   double absolute = 0.0;  ///< a of sigma = a + b |model|, SI unit of the response
@@ -47,22 +47,24 @@ struct ReadingNoise {
   double lag_1 = 0.0;     ///< correlation of neighbouring residuals
 };
 
-/// What a fit knows about the parameters of its law: enough to predict with a band.
+/// Uncertainty of the parameters of a fitted law, sufficient to predict with a band.
 struct LawUncertainty {
-  std::vector<std::size_t> place;  ///< of each uncertain parameter in law_parameters()
+  std::vector<std::size_t> place;  ///< index of each uncertain parameter in law_parameters()
   std::vector<Coordinate> coordinate;
-  /// Of theta, in the order of `place`. Correlated readings and an estimated size of the noise are
-  /// counted in. It may be singular: several parameters of the law may follow from one of the fit.
+  /// Covariance of theta, in the order of `place`. It accounts for correlated readings and an
+  /// estimated size of the noise. It may be singular: several parameters of the law may follow from
+  /// one of the fit.
   Eigen::MatrixXd covariance;
   double level = 0.95;  ///< of the fit's intervals
-  /// Of Student's t for the intervals; none: the size of the noise was known, normal quantiles.
+  /// Degrees of freedom of Student's t for the intervals. None: the size of the noise was known,
+  /// and normal quantiles apply.
   std::optional<double> degrees_of_freedom;
-  /// Independent readings count n_eff = n / this.
+  /// n / n_eff, the number of readings per independent one.
   double readings_per_independent = 1.0;
   ReadingNoise noise;
-  double duration_s = 0.0;  ///< longest fitted stretch of time; 0 if it is not known
+  double duration_s = 0.0;  ///< longest fitted time span; 0 if unknown
   std::vector<FittedFile> data;
-  std::vector<std::string> at_bound;  ///< estimated parameters on a bound, held there
+  std::vector<std::string> at_bound;  ///< estimated parameters that are fixed on a bound
 
   /// Two-sided quantile: estimate +- this times the standard error is an interval at `level`.
   [[nodiscard]] double quantile(double at_level) const;

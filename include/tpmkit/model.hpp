@@ -16,9 +16,9 @@ namespace tpm {
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// What a model answers: one value per asked time (N or m, after the protocol's drive) and, where
-/// asked for, the derivative of each value with respect to each natural parameter. A value that the
-/// model does not predict is NaN, and so are its derivatives; the model says when that happens.
+/// Response of a model: one value per requested time (N under an imposed depth, m under a load)
+/// and, on request, its derivative with respect to each natural parameter. A value that the model
+/// does not predict is NaN, and so are its derivatives; each model documents when.
 struct Response {
   Eigen::VectorXd value;  ///< size n_times
   RowMatrix sensitivity;  ///< n_times x n_parameters, SI over SI; 0 x 0 unless asked for
@@ -40,8 +40,8 @@ struct TensionRule {
   }
 };
 
-/// The one question that tables, fits, sweeps and plans ask: how does the tissue respond to this
-/// protocol at these times?
+/// Computes how the tissue responds to a protocol at given times, for tables, fits, sweeps and
+/// plans.
 class Model {
  public:
   Model() = default;
@@ -55,15 +55,15 @@ class Model {
   [[nodiscard]] virtual std::span<const ParameterDescription> parameters() const = 0;
 
   /// @param times_s any order, each within [protocol.start_s(), protocol.end_s()]; at a jump the
-  ///        value just after it is meant
+  ///        response is that just after it
   /// @param parameters SI values in the order of parameters()
   /// Throws Error(bad_input) for parameters out of range, Error(numerical) if a solver fails.
   [[nodiscard]] virtual Response respond(const Protocol& protocol, std::span<const double> times_s,
                                          std::span<const double> parameters, Want want) const = 0;
 
   /// The same with derivatives along changes of the parameters: sensitivity is d value / d
-  /// parameters times `along` (n_parameters x any). Some models find few such columns sooner than
-  /// the derivatives by every parameter.
+  /// parameters times `along` (n_parameters x any). Some models compute a few such columns faster
+  /// than the derivatives by every parameter.
   [[nodiscard]] virtual Response respond_along(const Protocol& protocol,
                                                std::span<const double> times_s,
                                                std::span<const double> parameters,
@@ -74,12 +74,12 @@ class Model {
     return {0.0, std::numeric_limits<double>::infinity()};
   }
 
-  /// A much cheaper model of the same parameters whose best fits lie near those of this one: where
-  /// a search can begin. None if this one is cheap.
+  /// A much cheaper model with the same parameters and similar best fits, from which a search can
+  /// start. Null if this model is cheap.
   [[nodiscard]] virtual std::unique_ptr<Model> surrogate() const { return nullptr; }
 
-  /// The response to an imposed displacement is linear in this parameter while the others are held:
-  /// a search can solve for it.
+  /// True if the response to an imposed displacement is linear in this parameter with the others
+  /// fixed. A search can then solve for it.
   [[nodiscard]] virtual bool linear_in(std::size_t /*parameter*/) const { return false; }
 };
 
@@ -89,7 +89,7 @@ struct ModelOptions {
   double relative_tolerance = 1e-10;  ///< CVODES, of states and sensitivities
 };
 
-/// Makes models of the element: a role of a formulation (formulation/formulation.hpp).
+/// Makes models of the element: a role of a formulation (tpmkit/formulation.hpp).
 class ModelMaker {
  public:
   ModelMaker() = default;
@@ -99,23 +99,24 @@ class ModelMaker {
   [[nodiscard]] virtual std::unique_ptr<Model> model(const ModelOptions& options) const = 0;
 };
 
-/// The model of a formulation of the element. Throws Error(bad_input) naming those there are.
+/// The model of a formulation of the element. Throws Error(bad_input), naming the known ones, for
+/// an unknown name.
 [[nodiscard]] std::unique_ptr<Model> make_model(std::string_view name,
                                                 const ModelOptions& options = {});
 
 /// The element in closed form, the formulation "closed_form": exact for histories that are linear
-/// between knots and for a constant load. The component `core` is enough for it.
+/// between knots and for a constant load. It needs only the component `core`.
 [[nodiscard]] std::unique_ptr<Model> make_closed_form(const TensionRule& tension = {});
 
-/// Limits of the model in the paper that a run has passed (text, one line each): indentation over
-/// 10 mm (validity), over 12 mm (damage), a lateral bond turned by more than pi/6.
+/// Limits of the paper's model that a run has passed, one line of text each: indentation above 10
+/// mm (validity) or 12 mm (damage), a lateral bond turned by more than pi/6.
 /// @param spacing_m of lateral neighbours, > 0
 [[nodiscard]] std::vector<std::string> validity_flags(double spacing_m, double peak_depth_m);
 
 /// Throws Error(bad_input) unless every time lies in the protocol.
 void require_times_within(const Protocol& protocol, std::span<const double> times_s);
 
-/// Indices of the times in rising order; equal times keep theirs.
+/// Indices of the times in rising order; equal times keep their order.
 [[nodiscard]] std::vector<std::size_t> rising_order(std::span<const double> times_s);
 
 }  // namespace tpm

@@ -11,19 +11,19 @@ namespace tpm {
 /// One column per sphere, m.
 using Positions = Eigen::Matrix3Xd;
 
-/// Where the spheres of an organ lie before anything is loaded: geometry only, no stiffness.
+/// Positions of the spheres of an unloaded organ: geometry only, no stiffness.
 ///
 /// Spheres are numbered from 1 in files and messages ("sphere 71", as the paper does) and from 0 in
 /// memory. The numbering is part of the organ: it is the same on every run.
 struct Organ {
-  std::string name;         ///< for titles and messages
-  Positions position;       ///< m
-  Eigen::Matrix3Xd normal;  ///< outward unit normal of the layer that each sphere lies in
-  std::vector<int> layer;   ///< 0: outermost
-  double radius = 0.0;      ///< of each sphere, m
-  double spacing = 0.0;     ///< x, nominal distance between neighbours, m
-  std::optional<std::size_t> contact;  ///< the sphere that the probe meets, if one is singled out
-  /// What the shape takes for granted, one sentence each ("coordinates are in metres").
+  std::string name;                    ///< for titles and messages
+  Positions position;                  ///< m
+  Eigen::Matrix3Xd normal;             ///< outward unit normal of each sphere's layer
+  std::vector<int> layer;              ///< 0: outermost
+  double radius = 0.0;                 ///< of each sphere, m
+  double spacing = 0.0;                ///< x, nominal distance between neighbours, m
+  std::optional<std::size_t> contact;  ///< the sphere that the probe meets, if one is chosen
+  /// Assumptions of the shape, one sentence each ("coordinates are in metres").
   std::vector<std::string> assumptions;
 
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(position.cols()); }

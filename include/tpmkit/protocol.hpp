@@ -6,7 +6,7 @@
 
 namespace tpm {
 
-/// What the experiment imposes; the response is the other one.
+/// The imposed quantity; the response is the other one.
 enum class Drive {
   displacement,  ///< indentation depth in m; the response is the contact force in N
   force,         ///< load in N; the response is the indentation depth in m
@@ -24,8 +24,8 @@ class Protocol {
  public:
   /// Throws Error(bad_input) unless there is at least one knot, all finite, times not decreasing
   /// and no more than two knots at one time.
-  /// @param holds_forever the last value is kept for ever: times up to and including infinity may
-  ///        be asked for, and infinity means full relaxation
+  /// @param holds_forever the last value remains for ever. Times up to and including infinity are
+  ///        allowed; infinity means full relaxation
   Protocol(Drive drive, std::vector<Knot> knots, std::string name = "history",
            bool holds_forever = false);
 
@@ -42,8 +42,8 @@ class Protocol {
   /// The same history with every value times a factor.
   [[nodiscard]] Protocol scaled(double factor) const;
 
-  /// The first value was held for ever before the first knot, so that everything has relaxed under
-  /// it (a preload), instead of a jump from 0.
+  /// True if the tissue is in equilibrium with the first value at the first knot (a preload),
+  /// instead of jumping to it from 0.
   [[nodiscard]] bool relaxed_at_start() const noexcept { return relaxed_at_start_; }
   void set_relaxed_at_start(bool relaxed) noexcept { relaxed_at_start_ = relaxed; }
 
@@ -55,8 +55,8 @@ class Protocol {
   bool relaxed_at_start_ = false;
 };
 
-/// The imposed value at a time from the first knot on; at a jump the one after it, beyond the last
-/// knot the last one.
+/// The imposed value at a time not before the first knot. At a jump it is the value after the jump,
+/// beyond the last knot the last value.
 [[nodiscard]] double value_at(const Protocol& protocol, double time_s);
 
 /// The history up to a finite time from the first knot on, all jumps at that time included.

@@ -14,8 +14,8 @@
 
 namespace tpm {
 
-/// A tissue and what is done to it, as a scene file states it (docs/simulation_files.md), with the
-/// network that is run. Copies share one scene, which never changes; several threads may use it.
+/// A tissue, its contacts and loads, and its network, from a scene file (docs/simulation_files.md).
+/// Copies share one immutable scene; several threads may use it.
 ///
 ///     const Scene scene("liver_fig3.json");
 ///     const Trajectory answer = scene.run({0.0, 0.5, 1.0});   // forces in N
@@ -26,35 +26,35 @@ class Scene {
   /// The same from the text of a scene.
   /// @param folder that paths in the scene are relative to
   [[nodiscard]] static Scene parse(std::string_view json, const std::filesystem::path& folder = {});
-  /// Shows a SceneRunner what it is asked to run. Both must outlive this object and its copies.
+  /// View of a scene for a SceneRunner. Both arguments must outlive this object and its copies.
   Scene(const ExperimentScene& scene, const RunNetwork& network);
 
   [[nodiscard]] const std::string& title() const;
   /// The spheres at rest, without tools.
   [[nodiscard]] const Organ& organ() const;
   [[nodiscard]] std::size_t bonds() const;
-  /// What is imposed over time.
+  /// Imposed depth or load over time.
   [[nodiscard]] const Protocol& protocol() const;
-  /// The sphere that is driven or that the tool meets first, from 0.
+  /// Index, from 0, of the driven sphere or of the sphere that the tool meets first.
   [[nodiscard]] std::size_t contact() const;
-  /// Of the push there, a unit vector into the tissue.
+  /// Direction of the push there, a unit vector into the tissue.
   [[nodiscard]] const Eigen::Vector3d& direction() const;
   /// Name of the formulation that runs it.
   [[nodiscard]] const std::string& formulation() const;
   /// The element of a tissue of one material with one linear branch. Throws Error(bad_input) for
   /// another tissue.
   [[nodiscard]] BondElement element() const;
-  /// Force per depth at the contact for small depths, N/m, before anything has relaxed. Throws
-  /// Error(bad_input) where the contact cannot move.
+  /// Instantaneous stiffness of the contact for small depths, N/m. Throws Error(bad_input) if the
+  /// contact cannot move.
   [[nodiscard]] double instantaneous_stiffness_N_per_m() const;
-  /// The same after everything has relaxed.
+  /// Equilibrium stiffness of the contact, N/m. Throws as above.
   [[nodiscard]] double equilibrium_stiffness_N_per_m() const;
 
-  /// The answer of the formulation at some times: forces in N under an imposed depth, depths in m
-  /// under a load.
+  /// The response at given times: forces in N under an imposed depth, depths in m under a load.
   /// @param times_s rising, within the protocol
   /// @param with_field also the displacements of all spheres, where the formulation knows them
-  /// Throws Error(bad_input) for what the formulation cannot do, Error(numerical) where it fails.
+  /// Throws Error(bad_input) beyond the capabilities of the formulation, Error(numerical) if it
+  /// fails.
   [[nodiscard]] Trajectory run(const std::vector<double>& times_s, bool with_field = false) const;
   /// Runs the scene and writes the result as HDF5, with a file beside it that ParaView opens.
   /// Throws as run() does, and Error(environment) where the file cannot be written.

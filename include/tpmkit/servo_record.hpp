@@ -9,26 +9,26 @@ namespace tpm {
 /// Why a session ended.
 enum class StopCause : std::int32_t {
   none,
-  finished,  ///< the plan came to its end
+  finished,  ///< all phases were done
   signal,
   exception,
   communication,  ///< a call of the device failed
   unplugged,
-  watchdog,  ///< the device cut its forces, as the next four
+  watchdog,  ///< the device cut its forces, as for the next four
   velocity,
   button,
   software,
   dead_man,
-  forces_off,  ///< the same for a reason that no list has
+  forces_off,  ///< the same for an unlisted reason
   position_not_finite,
   force_not_finite,
   overrun_storm,  ///< too many cycles were late
   hang,           ///< a cycle did not end
-  not_in_place,   ///< the operator did not bring the tool to where a session can begin
+  not_in_place,   ///< the tool was not brought to a valid start position in time
   untrusted,      ///< the model did not trust its forces for too long
-  energy,         ///< what was rendered gave the hand energy that the tissue did not have
-  oscillation,    ///< the force went up and down by itself
-  position_jump,  ///< the device read a place that no hand reaches so soon
+  energy,         ///< the rendering delivered energy to the hand that the tissue did not store
+  oscillation,    ///< the force oscillated without motion of the hand
+  position_jump,  ///< the device reported a motion faster than any hand
 };
 
 [[nodiscard]] std::string_view word_of(StopCause cause);
@@ -42,35 +42,35 @@ enum ServoFlag : std::uint32_t {
   kSlipping = 1U << 4U,   ///< the model's tool slipped, because the force rose faster than allowed
   kRampingIn = 1U << 5U,  ///< the same, because forces are still growing to their limit
   kDamped = 1U << 6U,     ///< by the passivity controller
-  kBeyondModel = 1U << 7U,  ///< the model does not trust its answer
+  kBeyondModel = 1U << 7U,  ///< the model does not trust its force
   kLate = 1U << 8U,         ///< woke after the next deadline
   // Before the session begins (StartGate); the rows have phase -1.
   kWaiting = 1U << 9U,       ///< for the operator; forces are zero
   kOutOfReach = 1U << 10U,   ///< the tool is outside the workspace
   kInTissue = 1U << 11U,     ///< or too close to it
   kMoving = 1U << 12U,       ///< the tool is not at rest
-  kUnconfirmed = 1U << 13U,  ///< all is in place, and the operator has not said so
+  kUnconfirmed = 1U << 13U,  ///< everything is in place but not confirmed
 };
 
-/// One cycle of the servo loop. Plain data, written as it stands. Depths are along the push, from
-/// the surface at rest, positive into the tissue. The row of a stop holds what was known last; its
-/// command is zero.
+/// One cycle of the servo loop. Plain data, written to the recording as it is. Depths are along the
+/// push, from the surface at rest, positive into the tissue. The row of a stop has the last known
+/// values and a command of zero.
 struct ServoRecord {
   std::uint64_t cycle = 0;       ///< periods since the start, missed ones included
   double position_m[3] = {};     ///< as the device read it
   double tool_depth_m = 0.0;     ///< of the tool, negative in the air
-  double surface_depth_m = 0.0;  ///< of the tissue, given to the model; in space that of the tool
-  double model_force_N = 0.0;    ///< of the tissue against the push, after one-sidedness, whether
-                                 ///< trusted or not
-  double model_error_N = 0.0;    ///< as the model estimates
+  double surface_depth_m = 0.0;  ///< of the tissue, input of the model; in space that of the tool
+  double model_force_N = 0.0;    ///< of the tissue against the push, one-sided, whether trusted
+                                 ///< or not
+  double model_error_N = 0.0;    ///< error estimate of the model
   double commanded_N[3] = {};    ///< sent to the device, on the hand
-  double observed_J = 0.0;       ///< work of the hand on what is rendered, since the start
-  double leak_J = 0.0;           ///< what holding the force within periods has given away so far
+  double observed_J = 0.0;       ///< work of the hand on the rendering since the start
+  double leak_J = 0.0;           ///< energy lost so far by a constant force within periods
   float woke_late_s = 0.0F;      ///< after the deadline; 0 in virtual time
   float busy_s = 0.0F;           ///< the cycle's work; 0 in virtual time
   std::uint32_t flags = 0;       ///< ServoFlag
   std::int32_t phase = 0;        ///< -1 before the session begins
-  std::int32_t missed = 0;       ///< periods before this one that went by without a command
+  std::int32_t missed = 0;       ///< periods without a command before this one
   StopCause stop = StopCause::none;
   float gripper_m = std::numeric_limits<float>::quiet_NaN();  ///< opening; NaN: there is none
   std::uint32_t buttons = 0;  ///< of the device, a bit for each that is pressed
@@ -78,7 +78,7 @@ struct ServoRecord {
 
 static_assert(sizeof(ServoRecord) == 136);
 
-/// Of a row in recordings of the first format, which know neither gripper nor buttons.
+/// Size of a row in recordings of the first format, which lack gripper and buttons.
 inline constexpr std::size_t kFirstRowBytes = 128;
 static_assert(offsetof(ServoRecord, gripper_m) == kFirstRowBytes);
 

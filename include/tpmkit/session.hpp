@@ -13,64 +13,63 @@
 
 namespace tpm {
 
-struct HilSession;  // a session as it was read
+struct HilSession;  // the content of a session file
 
-/// How a session is run.
+/// Options of a session run.
 struct SessionRequest {
-  std::filesystem::path recording;  ///< every period of the session is written there
-  /// On the clock; else in virtual time: as fast as it goes, the same bits each time.
+  std::filesystem::path recording;  ///< file for the records of all periods
+  /// Real time; otherwise virtual time, as fast as possible with the same bits on each run.
   bool real_time = false;
   RealTimeWish wish = RealTimeWish::ignore;
-  /// Whose limits of force, stiffness and delay apply: a kind that `tpm hil devices` lists.
+  /// Device kind whose limits of force, stiffness and delay apply (`tpm hil devices` lists them).
   std::string limits = "omega7";
   bool may_move = false;              ///< the device may move by itself to initialise
   std::function<bool()> interrupted;  ///< true ends the session with the cause `signal`
-  /// Sees every record, on the thread that writes them.
+  /// Called with every record, on the thread that writes them.
   std::function<void(const ServoRecord&)> watcher;
 };
 
-/// How a session went.
+/// Result of a session.
 struct SessionSummary {
   DeviceIdentity device;
-  std::string model;      ///< what was stepped, for people
+  std::string model;      ///< description of the model
   std::string rendering;  ///< passive or stable, one line
   ServoOutcome outcome;
 };
 
-/// What a recording commanded against the reference computed from its motion.
+/// Comparison of the commanded forces of a recording with the reference for its motion.
 struct SessionCheck {
   std::string reference;            ///< in words
-  std::size_t instants = 0;         ///< that were compared
+  std::size_t instants = 0;         ///< number of compared instants
   double rms_N = 0.0, max_N = 0.0;  ///< commanded less reference
   double peak_N = 0.0;              ///< largest force of the reference
-  double reference_error_N = 0.0;   ///< of the reference, as it estimates
+  double reference_error_N = 0.0;   ///< error estimate of the reference
 };
 
 /// A session with a haptic device: tissue, loop and phases (schemas/hil.schema.json,
-/// docs/haptics.md). Copies share one session, which never changes.
+/// docs/haptics.md). Copies share one immutable session.
 class Session {
  public:
   /// Reads a session. Throws Error(bad_input) with the key.
-  /// @param law a law file that takes the place of the session's model; none if empty
+  /// @param law a law file that replaces the session's model; none if empty
   explicit Session(const std::filesystem::path& file, const std::filesystem::path& law = {});
 
   [[nodiscard]] const std::string& title() const;
   [[nodiscard]] double duration_s() const;
-  /// What the session states of its loop: period, push, limits, start gate.
+  /// Settings of the loop: period, push, limits, start gate.
   [[nodiscard]] const SessionServo& servo() const;
 
-  /// The tissue as the loop steps it, at rest. For a loop of one's own; one thread steps it.
-  /// Throws Error(bad_input) if the scene is not one that the model can stand for,
-  /// Error(answer_is_no) if a planned model is not accurate and fast enough.
+  /// The model of the tissue, at rest, for your own loop. One thread may step it.
+  /// Throws Error(bad_input) if the model cannot represent the scene, Error(answer_is_no) if no
+  /// planned model is accurate and fast enough.
   [[nodiscard]] std::shared_ptr<ContactModel> contact() const;
 
-  /// The device that the library simulates, with a hand that follows the session's phases.
+  /// A simulated device whose operator follows the phases of the session.
   [[nodiscard]] std::shared_ptr<HapticDevice> simulated_device() const;
 
-  /// Runs the session on a device and records it. A rendering that would be unstable is refused;
-  /// forces begin when the tool is in place.
-  /// Throws Error(answer_is_no) for a rendering that is refused, Error(environment) before the loop
-  /// begins; what happens later is in the outcome.
+  /// Runs the session on a device and records it. Forces begin when the tool is in place.
+  /// Throws Error(answer_is_no) if the rendering would be unstable, Error(environment) if the
+  /// device or a file fails before the loop begins. Later failures are reported in the outcome.
   SessionSummary run(const std::shared_ptr<HapticDevice>& device,
                      const SessionRequest& request) const;
 
@@ -79,7 +78,7 @@ class Session {
 };
 
 /// Recomputes a recorded session with its reference, the full network or the law itself, and
-/// compares. Throws Error(bad_input) for a recording that is empty or damaged beyond use.
+/// compares the forces. Throws Error(bad_input) if the recording is empty or unreadable.
 [[nodiscard]] SessionCheck verify_session(const std::filesystem::path& recording);
 
 }  // namespace tpm

@@ -10,12 +10,12 @@
 
 namespace tpm {
 
-struct ExperimentScene;  // a scene as it was read; Scene (tpmkit/scene.hpp) shows what is in it
-struct RunNetwork;       // the network that it is run on
+struct ExperimentScene;  // the content of a scene file; Scene (tpmkit/scene.hpp) has accessors
+struct RunNetwork;       // the network of the scene
 
 /// Limits of the model that a run can pass.
 enum class ValidityLimit : std::size_t {
-  indentation,  ///< beyond 10 mm: the paper vouches for no more
+  indentation,  ///< beyond 10 mm, the range of the paper
   damage,       ///< beyond 12 mm: liver is damaged
   turning,      ///< a lateral bond has turned by more than 30 degrees from rest
 };
@@ -24,13 +24,13 @@ inline constexpr std::size_t kValidityLimits = 3;
 [[nodiscard]] std::string_view key_of(ValidityLimit limit);
 [[nodiscard]] std::string_view words_of(ValidityLimit limit);
 
-/// What a run has passed of one limit.
+/// When and where a run passed one limit.
 struct ValidityBreach {
   std::optional<double> first_time_s;  ///< none: never
-  std::vector<std::size_t> spheres;    ///< that were ever beyond it, rising, from 0
+  std::vector<std::size_t> spheres;    ///< indices from 0 of the spheres that passed it, rising
 };
 
-/// What a run has passed so far.
+/// Limits that a run has passed so far.
 struct Validity {
   std::array<ValidityBreach, kValidityLimits> breach;
   double deepest_m = 0.0;        ///< largest indentation of any sphere
@@ -42,18 +42,18 @@ struct Validity {
   [[nodiscard]] bool whole() const;
 };
 
-/// How a scene answers over its protocol.
+/// Response of a scene over its protocol.
 struct Trajectory {
   Eigen::VectorXd response;                    ///< N or m, at each time
   std::vector<Eigen::Matrix3Xd> displacement;  ///< of all spheres, m, at each time; if asked for
-  Validity validity;  ///< of networks without masses: limits passed at the times asked for
+  Validity validity;  ///< for networks without masses: limits passed at the requested times
   OperationCount work;
   double steps = 0.0;
   double error_estimate = 0.0;  ///< the formulation's own, N or m; 0 where it has none
 };
 
-/// Answers scenes at given times: the role of a formulation that runs scenes and sweeps
-/// (tpmkit/formulation.hpp). Scene(scene, network) shows what it is asked.
+/// Role of a formulation that runs scenes and sweeps (tpmkit/formulation.hpp). Scene(scene,
+/// network) gives access to its arguments.
 class SceneRunner {
  public:
   SceneRunner() = default;
@@ -65,8 +65,8 @@ class SceneRunner {
   /// @param network network_to_run(scene)
   /// @param times_s rising, within the protocol
   /// @param with_field fill Trajectory::displacement; only of formulations with that capability
-  /// Throws Error(numerical) where the formulation fails, Error(bad_input) for what its
-  /// capabilities do not say.
+  /// Throws Error(numerical) if the formulation fails, Error(bad_input) for a request beyond its
+  /// capabilities.
   [[nodiscard]] virtual Trajectory run(const ExperimentScene& scene, const RunNetwork& network,
                                        const std::vector<double>& times_s,
                                        bool with_field) const = 0;

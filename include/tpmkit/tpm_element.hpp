@@ -48,7 +48,7 @@ struct TpmParameters {
   operator BondElement() const { return bonds(); }
 };
 
-/// Name, dimension and order of the parameters wherever they stand in a vector.
+/// Name, dimension and meaning of a parameter of a vector.
 struct ParameterDescription {
   std::string_view name;
   Dimension dimension;
@@ -73,15 +73,14 @@ using TpmVector = std::array<double, kTpmParameterCount>;
 [[nodiscard]] TpmParameters from_vector(const TpmVector& v);
 
 /// The constants of a bond element with one linear branch, as to_vector(). Throws Error(bad_input)
-/// for another, and for one that does not relax but is elastic.
+/// for other elements, including elastic ones.
 [[nodiscard]] TpmVector element_constants(const BondElement& element);
 
 /// Throws Error(bad_input) naming the first parameter outside the range given at TpmParameters.
 void require_valid(const TpmParameters& p, std::string_view where);
 
-/// Eq. 11 at t = 0+ and t -> infinity, that is Eqs. 15 and 16, and the values between: the force
-/// after a step of depth e0, N.
-/// @param lambda1 Pa, held constant as in the paper
+/// Force at a time after a step of depth, N (Eq. 11; at t = 0+ Eq. 15, at t -> infinity Eq. 16).
+/// @param lambda1 Pa, constant as in the paper
 [[nodiscard]] double step_relaxation_force_N(const TpmParameters& p, double lambda1, double depth_m,
                                              double time_s);
 

@@ -5,8 +5,8 @@
 
 namespace tpm {
 
-/// The physical dimensions the project speaks of. Every number inside is SI; units exist only at
-/// the edges (files, tables, messages) and are converted here and nowhere else.
+/// Physical dimensions. All numbers inside the library are SI; other units exist only in files,
+/// tables and messages and are converted here only.
 enum class Dimension {
   dimensionless,
   time,        // s
@@ -49,7 +49,7 @@ struct Unit {
 /// The SI unit symbol of a dimension ("" for dimensionless).
 [[nodiscard]] std::string_view si_symbol(Dimension dimension) noexcept;
 
-/// The unit in which people read such numbers of soft tissue: mm, N, kPa, s, Hz; else the SI unit.
+/// The usual unit for soft tissue: mm, N, kPa, s, Hz; otherwise the SI unit.
 [[nodiscard]] Unit shown_unit(Dimension dimension);
 
 /// The name in words ("length", "viscosity").
@@ -60,11 +60,11 @@ struct Unit {
 [[nodiscard]] double parse_quantity(std::string_view text, Dimension expected,
                                     std::string_view where);
 
-/// One finite decimal number, all of the text, point as decimal sign, locale-independent.
-/// Throws Error(bad_input) (also for nan, inf and overflow such as 1e400).
+/// Reads the whole text as one finite decimal number with a decimal point, whatever the locale.
+/// Throws Error(bad_input), also for nan, inf and overflow such as 1e400.
 [[nodiscard]] double parse_number(std::string_view text, std::string_view where);
 
-/// As parse_number; none where that throws.
+/// As parse_number; none if that would throw.
 [[nodiscard]] std::optional<double> find_number(std::string_view text) noexcept;
 
 }  // namespace tpm

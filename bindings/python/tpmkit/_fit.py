@@ -160,7 +160,7 @@ class Fit:
         return self._core.write(os.fspath(folder))
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as `tpm fit --format json` writes it (keys in docs/fit_files.md)."""
+        """Everything, as `tpm fit --format json` writes it (keys in docs/fit_results.md)."""
         return json.loads(self._core.to_json())
 
     def __str__(self) -> str:

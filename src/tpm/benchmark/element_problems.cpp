@@ -86,8 +86,8 @@ PosedBond ramped_bond(double eta1_Pa_s) {
                     with_moments_after_kinks(times_every(0.5, 31.0), protocol));
 }
 
-/// The bond with mass under a load put on at once: depth, speed, and y, which follows the depth.
-/// Written down once more here, away from the methods that it judges.
+/// The bond with mass under a suddenly applied load: depth, speed, and y, which follows the depth.
+/// Written down once more here, away from the methods that it checks.
 Eigen::VectorXd integrated_depth(const PosedBond& bond, double load_N) {
   using State = std::array<double, 3>;
   const BondElement& p = bond.material;

@@ -14,7 +14,7 @@ inline constexpr double kPaperEta1_Pa_s = 5.0, kPaperSprings_Pa = 24e3;
 [[nodiscard]] BenchmarkProblem bond_fitted_problem();
 /// The star under a constant load.
 [[nodiscard]] BenchmarkProblem star_creep_problem();
-/// One sphere with mass under a load put on at once.
+/// One sphere with mass under a suddenly applied load.
 [[nodiscard]] BenchmarkProblem bond_mass_problem();
 
 }  // namespace tpm

@@ -39,7 +39,7 @@ Tissue liver(double eta1_Pa_s = kPaperEta1_Pa_s) {
   return tissue;
 }
 
-/// The setting of a rule that the collocation is held against, and how far off it may be.
+/// The setting of a rule that the collocation is compared with, and how far off it may be.
 struct Referee {
   StepRule rule;  ///< an adaptive one
   double tolerance;

@@ -24,7 +24,7 @@ struct PosedNetwork {
   double damping_ratio = 0.0;
 };
 
-/// The star of four spheres as a driven network: B guided along its normal, A, C and D held.
+/// The star of four spheres as a driven network: B guided along its normal, A, C and D fixed.
 [[nodiscard]] DrivenNetwork driven_star(const BondElement& material);
 
 /// 0, spacing, 2 spacing, ... up to the end, which is a multiple of the spacing.

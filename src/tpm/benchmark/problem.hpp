@@ -48,24 +48,24 @@ struct BenchmarkSetting {
 
 /// An answer that others are compared with.
 struct BenchmarkAnswer {
-  std::string method;  ///< whose word a setting of the same method carries
+  std::string method;  ///< its own settings are compared with the other answer
   std::string words;   ///< how it was found
   Eigen::VectorXd response;
 };
 
-/// What is taken for the truth, and how well it is known.
+/// The reference and its cross-check.
 struct BenchmarkReference {
   BenchmarkAnswer judge;
-  BenchmarkAnswer second;  ///< found another way; it judges the judge's own method
-  bool exact = false;      ///< the judge is a closed form
+  BenchmarkAnswer second;  ///< by another method; reference for the settings of the first
+  bool exact = false;      ///< the reference is a closed form
   int components = 1;      ///< of a response at a time: numbers that stand in a row, a vector
-  double peak = 0.0;       ///< largest absolute response of the judge, in the problem's unit
+  double peak = 0.0;       ///< largest absolute response of the reference, in the problem's unit
   double agreement = 0.0;  ///< largest difference of the two, in parts of the peak
   double floor = 0.0;      ///< errors below this, in parts of the peak, cannot be told
 
   /// The floor of a part of the response by itself, not above that of the whole.
   [[nodiscard]] double floor_of(const AnsweredPart& part) const;
-  /// The answer that settings of a method are compared with: no method is its own judge.
+  /// The answer that settings of a method are compared with: no method is its own reference.
   [[nodiscard]] const Eigen::VectorXd& response_for(std::string_view method) const {
     return method == judge.method ? second.response : judge.response;
   }
@@ -78,10 +78,10 @@ struct BenchmarkReference {
 /// What an answer of a closed form is good for: rounding.
 inline constexpr double kExactFloor = 1e-14;
 
-/// Puts two answers beside each other. The floor is ten times their difference, so that they agree
-/// to a tenth of every error that is told; of a closed form kExactFloor.
-/// @param worst_floor the largest floor to be accepted, in parts of the peak; for an exact judge
-///   ten times the difference is held against it too
+/// Compares two answers. The floor is ten times their difference, so that they agree to a tenth of
+/// every error that is reported; of a closed form it is kExactFloor.
+/// @param worst_floor the largest floor to be accepted, in parts of the peak; for an exact
+///   reference ten times the difference must not exceed it either
 /// Throws Error(numerical) with `where` if it is larger, if the answers are not finite or differ in
 /// size, or if both come from one method.
 [[nodiscard]] BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer second,

@@ -77,7 +77,7 @@ BenchmarkTimes quartiles(std::vector<double> taken, long runs_per_repeat) {
           quantile_of_sorted(taken, 0.75), taken.front()};
 }
 
-/// @param once_s what the run took when it was made to be judged
+/// @param once_s what the run took when it was made to be compared
 void time_runs(const BenchmarkSetting& setting, double once_s, const BenchmarkOptions& options,
                BenchmarkPoint& point) {
   if (point.failed()) {

@@ -38,7 +38,7 @@ struct ServoAnswer {
   std::vector<Eigen::VectorXd> claimed_N;
 };
 
-/// One organ, its motions and relaxation times, and the truth about them, found when first asked
+/// One organ, its motions and relaxation times, and the reference for them, found when first asked
 /// for.
 class ServoCase {
  public:

@@ -10,7 +10,7 @@ namespace tpm {
 [[nodiscard]] BenchmarkProblem servo_normal_problem();
 /// Sideways to 2 mm, in circles, and at random in space; forces, and positions of all spheres.
 [[nodiscard]] BenchmarkProblem servo_space_problem();
-/// The same with the organ's inner layer held.
+/// The same with the organ's inner layer fixed.
 [[nodiscard]] BenchmarkProblem servo_inner_problem();
 
 }  // namespace tpm

@@ -25,9 +25,9 @@ namespace tpm {
 struct ProtocolChoice {
   enum class Kind {
     ramp_hold,    ///< to each datum's depth at `rate`, then held; times count from the ramp's end
-    step_hold,    ///< at once to each datum's depth, then held; times count from the step
+    step_hold,    ///< jump to each datum's depth, then constant; times count from the step
     static_,      ///< infinitely slow: the equilibrium force at each depth
-    creep,        ///< each datum's load applied at once and held; times count from then
+    creep,        ///< each datum's load applied suddenly and then constant; times count from then
     measured,     ///< the recording's own displacement history
     oscillation,  ///< small oscillations of the spectrum's frequencies, about `operating_depth`
   };

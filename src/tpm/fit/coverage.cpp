@@ -26,7 +26,7 @@ void refuse_what_cannot_be_simulated(const FitConfig& config, const ExperimentRe
   }
 }
 
-/// A datum as the declared noise would scatter it about the truth.
+/// A datum as the declared noise would scatter it about the true value.
 double simulated(const ExperimentResiduals& function, std::size_t datum, double truth,
                  std::span<const double> natural, Random& random) {
   const std::size_t choice = function.data()[datum].choice;

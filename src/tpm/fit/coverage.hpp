@@ -8,7 +8,7 @@
 
 namespace tpm {
 
-/// How often the intervals of one parameter held the true value.
+/// How often the intervals of one parameter contained the true value.
 struct ParameterCoverage {
   std::string name;
   int covered = 0;
@@ -24,10 +24,10 @@ struct CoverageResult {
   std::vector<ParameterCoverage> parameters;
 };
 
-/// Simulates data sets from the configuration with its start values as the truth and its declared
-/// noise, fits each with profiles, and counts. Depths, loads and times are those of the data sets;
-/// their measured values are not used. Throws Error(bad_input) for bands (a band has no noise model
-/// to simulate) and for a robust loss (whose deviance has no chi-square distribution).
+/// Simulates data sets from the configuration with its start values as the true values and its
+/// declared noise, fits each with profiles, and counts. Depths, loads and times are those of the
+/// data sets; their measured values are not used. Throws Error(bad_input) for bands (a band has no
+/// noise model to simulate) and for a robust loss (whose deviance has no chi-square distribution).
 [[nodiscard]] CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t seed);
 
 [[nodiscard]] Json to_json(const CoverageResult& result);

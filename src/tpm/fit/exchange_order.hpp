@@ -27,7 +27,7 @@ class ExchangeOrder {
   /// True if the keys rise, equal ones included.
   [[nodiscard]] bool is_sorted(std::span<const double> natural) const;
 
-  /// Bounds with which a parameter that is held at a value keeps its place: keys before it stay
+  /// Bounds with which a parameter that is fixed at a value keeps its place: keys before it stay
   /// below, keys behind it above. Other parameters than keys change nothing.
   [[nodiscard]] std::vector<FitParameter> bounds_around(std::span<const FitParameter> parameters,
                                                         std::size_t held, double value) const;

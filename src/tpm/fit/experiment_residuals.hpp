@@ -50,7 +50,7 @@ class ExperimentResiduals final : public ResidualFunction {
   /// The same experiments, with data that can be replaced apart from these.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> copy() const;
   /// A copy with at most about `most` samples of each recording, evenly taken from the history and
-  /// from the response: to look for starts, not to judge.
+  /// from the response: for the search of starts only.
   [[nodiscard]] std::unique_ptr<ExperimentResiduals> thinned(std::size_t most) const;
 
   /// Scale of the noise law of a value, given the model's answer to it.

@@ -144,7 +144,7 @@ using InflationRule = std::function<double(std::span<const double>)>;
                                       StartKind kind = StartKind::anywhere,
                                       const InflationRule& inflation = {});
 
-/// Machine-readable result, keys in docs/fit_files.md, numbers rounded to 6 significant digits so
+/// Machine-readable result, keys in docs/fit_results.md, numbers rounded to 6 significant digits so
 /// that they agree between machines.
 [[nodiscard]] Json to_json(const FitResult& result);
 

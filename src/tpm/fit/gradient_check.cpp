@@ -18,7 +18,7 @@ namespace {
 constexpr std::array kSteps{3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7};
 /// From this step down, what finite differences differ by is rounding or noise, not truncation.
 constexpr double kNoiseStep = 1e-4;
-/// A residual's derivative is judged against its own size plus this share of the column's largest,
+/// A residual's derivative is compared with its own size plus this share of the column's largest,
 /// so that derivatives that pass through zero do not count as infinitely wrong.
 constexpr double kFloorOfColumn = 1e-3;
 /// Derivatives below this share of the largest residual drown in rounding.

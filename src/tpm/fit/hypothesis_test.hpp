@@ -5,7 +5,7 @@
 
 namespace tpm {
 
-/// Fits again with the hypothesis' parameters held, from the best fit and ten other starts, and
+/// Fits again with the hypothesis' parameters fixed, from the best fit and ten other starts, and
 /// asks whether the rise of the deviance excludes it. Throws Error(numerical) if the model cannot
 /// be evaluated there.
 [[nodiscard]] HypothesisResult test_hypothesis(const ExperimentResiduals& function,

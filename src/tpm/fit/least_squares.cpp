@@ -155,7 +155,7 @@ void snap_to_bounds(std::span<const FitParameter> parameters, const FixedMask& p
   }
 }
 
-/// Gauss-Newton steps from the end of a descent: a descent judges by the sum of squares, which is
+/// Gauss-Newton steps from the end of a descent: a descent decides by the sum of squares, which is
 /// flat to rounding while the parameters still have half their digits to gain. Stops when steps no
 /// longer shrink, leave the bounds or raise the sum of squares beyond rounding.
 void polish(const ResidualFunction& function, std::span<const FitParameter> parameters,
@@ -211,7 +211,7 @@ Minimum minimise(const ResidualFunction& function, std::span<const FitParameter>
     minimum.natural[i] = std::clamp(minimum.natural[i], parameters[i].lower, parameters[i].upper);
   }
   // Ceres cuts each step at the bounds, which makes the other parameters creep while one of them
-  // presses against its bound. So the pressed ones are held and the rest is solved again, until
+  // presses against its bound. So the pressed ones are fixed and the rest is solved again, until
   // the set of pressed parameters stays the same.
   FixedMask held(parameters.size(), false);
   std::vector<std::size_t> free;

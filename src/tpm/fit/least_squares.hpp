@@ -40,7 +40,7 @@ class ResidualFunction {
     return evaluate(natural, residual, &root);
   }
 
-  /// Whether the residuals are linear in a parameter while the others are held: a search can solve
+  /// Whether the residuals are linear in a parameter while the others are fixed: a search can solve
   /// for it.
   [[nodiscard]] virtual bool linear_in(std::size_t /*parameter*/) const { return false; }
 

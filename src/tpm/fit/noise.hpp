@@ -6,7 +6,7 @@
 
 namespace tpm {
 
-/// How a reading scatters about the truth. f is the model's answer, y the datum.
+/// How a reading scatters about the true value. f is the model's answer, y the datum.
 enum class NoiseKind {
   relative_to_datum,  ///< normal, sigma = b |y|
   absolute,           ///< normal, sigma = a

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kMostSteps = 60;
 constexpr double kSmallGain = 1e-6;  // of the mean squared residual
-/// The same with parameters held: points of a profile, which rises by more than 1.
+/// The same with parameters fixed: points of a profile, which rises by more than 1.
 constexpr double kSmallHeldGain = 1e-4;
 constexpr double kFirstPull = 0.02;  // of the residuals' own curvature
 constexpr double kRaise = 8.0;

@@ -50,7 +50,7 @@ struct Covariance {
                                            std::span<const FitParameter> parameters,
                                            const Minimum& minimum, const Threshold& threshold);
 
-/// A point of a likelihood profile: one parameter held, the others re-optimised.
+/// A point of a likelihood profile: one parameter fixed, the others re-optimised.
 struct ProfilePoint {
   double natural;  ///< SI
   double deviance;
@@ -109,9 +109,9 @@ struct Profile {
                                          std::span<const Minimum> minima, std::size_t index,
                                          const Covariance& covariance, const Threshold& threshold);
 
-/// One point of that profile: the least deviance with one parameter held at a value. The value is
+/// One point of that profile: the least deviance with one parameter fixed at a value. The value is
 /// in the confidence set if it rises by no more than the threshold, so that one point tells whether
-/// an interval holds a known truth.
+/// an interval contains a known true value.
 /// @param starts natural values of all parameters, from which the others are searched
 /// @return infinity if no search ended in a usable point
 [[nodiscard]] double profile_deviance(const ResidualFunction& function,

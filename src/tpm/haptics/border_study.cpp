@@ -80,7 +80,8 @@ void find_shortest(BorderStudy& study) {
 void run_impact(const RenderedContact& contact, const PlantSettings& plant, RiseLimit limit,
                 ImpactPoint& point) {
   constexpr double kDepth_m = 4e-3, kBefore_m = 2e-3, kHeld_s = 5.0, kJudged_s = 0.5;
-  constexpr double kAtRest_m = 1e-4;  // ten steps of the encoder, which a held force cannot settle
+  // Ten steps of the encoder, within which a constant force cannot settle.
+  constexpr double kAtRest_m = 1e-4;
   const double period_s = contact.period_s, speed = point.speed_m_per_s;
   const double pressed_s = (kDepth_m + kBefore_m) / speed, end_s = pressed_s + kHeld_s;
   PlantSettings settings = plant;

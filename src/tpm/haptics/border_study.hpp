@@ -58,7 +58,7 @@ struct DeviceCorner {
 struct BorderStudy {
   PlantSettings plant;
   double relaxation_time_s = 0.01;          ///< where rate, delay and friction vary
-  double stiffness_N_per_m = 300.0;         ///< at once, where the relaxation time varies
+  double stiffness_N_per_m = 300.0;         ///< instantaneous, where the relaxation time varies
   std::vector<BorderPoint> passive;         ///< largest instantaneous stiffness, N/m
   std::vector<BorderPoint> stable;          ///< the same, of device and arm together
   std::vector<RulePoint> rules;             ///< at 1 kHz

@@ -9,7 +9,7 @@ namespace tpm {
 enum class ElementRule {
   exact,          ///< under linear motion; stable for every relaxation time
   forward_euler,  ///< diverges for periods above twice the relaxation time
-  mass_spring,    ///< no relaxing spring: the relaxed stiffness and a dashpot, the MSM of the paper
+  mass_spring,    ///< no relaxing spring: equilibrium stiffness and a dashpot, the MSM of the paper
 };
 
 /// One sphere on an element with one branch: the four-sphere star, guided along its normal.

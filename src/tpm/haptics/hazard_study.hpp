@@ -24,7 +24,7 @@ struct HazardRow {
   bool within = false;  ///< what HazardBounds state
 };
 
-/// What the rows are held against.
+/// What the rows are compared with.
 struct HazardBounds {
   double force_N = 8.0;           ///< the session's limit
   double rise_N = 0.4;            ///< the same of a period, 400 N/s at 1 kHz

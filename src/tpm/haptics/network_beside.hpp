@@ -8,7 +8,7 @@
 
 namespace tpm {
 
-/// Tangent stiffness at a contact, by its depth: at once, of a tissue that has relaxed there.
+/// Tangent stiffness at a contact, by its depth: instantaneous, of a tissue that has relaxed there.
 class StiffnessByDepth {
  public:
   /// Arguments as of ServoNetwork. Throws Error(numerical) where the tissue buckles.

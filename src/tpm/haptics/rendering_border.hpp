@@ -25,7 +25,7 @@ struct RenderedContact {
 
 /// Friction that a device needs for the contact to be passive, N s/m, measured: the contact is
 /// moved in sinusoids up to the Nyquist frequency, straight between samples, which is the motion in
-/// which friction takes least; the force is held. Infinite if the rendering diverges.
+/// which friction takes least; the force is constant. Infinite if the rendering diverges.
 [[nodiscard]] double measured_passive_damping(const RenderedContact& contact);
 
 /// The same by the condition of Colgate and Schenkel (1997) with the discrete transfer function of

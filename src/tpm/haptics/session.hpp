@@ -125,7 +125,7 @@ struct LoopModel {
   std::string name;                                 ///< for people
   std::string error_bound;         ///< what is known of its distance from the reference, in words
   Json plan;                       ///< null, or what a plan was asked for, considered and picked
-  double stiffness_N_per_m = 0.0;  ///< at once, at rest, along the push; of a law at its deepest
+  double stiffness_N_per_m = 0.0;  ///< instantaneous, along the push; of a law at its deepest
   std::vector<double> relaxation_times_s;  ///< rising; empty: nothing relaxes
   TissueShape shape;
 };

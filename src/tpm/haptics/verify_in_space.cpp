@@ -73,7 +73,7 @@ std::vector<std::optional<Eigen::Vector3d>> forces_on_ball(const SurfaceScene& s
 }
 
 /// The network under the ball again, by an integrator of its own, from the instant before it is
-/// touched: nothing is remembered until then.
+/// touched: the viscous state is zero until then.
 /// @param reference forces at the places after the first
 void ask_cvode_in_space(Verification& v, const SurfaceScene& surface,
                         const std::vector<BallPlace>& places,

@@ -51,7 +51,7 @@ class ContactHistory {
   /// @param peak_depth largest depth (or expected depth) of the history, for the tolerances
   ContactHistory(const LawAtParameters& law, double peak_depth, Want want);
 
-  /// The drive (depth before subtraction of `contact`) was held for ever.
+  /// The drive (depth before subtraction of `contact`) was constant for ever.
   void rest_at_drive(double drive);
   /// An instantaneous change of the drive.
   void jump_to_drive(double drive);
@@ -59,7 +59,7 @@ class ContactHistory {
   /// @param time_scale largest time of the history: steps that differ by its rounding are equal
   void move_drive(double from, double to, double h, double time_scale);
 
-  /// The load (offset included) was held for ever.
+  /// The load (offset included) was constant for ever.
   void rest_at_load(double load);
   /// An instantaneous change of the load.
   void jump_to_load(double load);

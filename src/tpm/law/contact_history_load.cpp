@@ -24,7 +24,7 @@ void ContactHistory::rest_at_load(double load) {
 
 void ContactHistory::jump_to_load(double load) {
   carry_all_slopes();
-  // A dashpot does not give way at once.
+  // A dashpot does not move instantaneously.
   if (law_.memory.dashpot > 0.0) return;
   now_ = surface_under(load - law_.offset, balance_at_once(), true);
   v_rate_ = 0.0;

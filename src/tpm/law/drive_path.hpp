@@ -15,7 +15,7 @@ struct DriveStep {
 /// An imposed history without jumps, cut at its knots and at the asked times.
 struct DrivePath {
   double start = 0.0;     ///< drive before the first step
-  bool relaxed = false;   ///< it was held for ever, instead of a jump from rest
+  bool relaxed = false;   ///< it was constant for ever, instead of a jump from rest
   double time_scale = 0;  ///< largest time: steps that differ by its rounding are equal
   std::vector<DriveStep> steps;
   std::vector<std::size_t> steps_before;  ///< of each asked time

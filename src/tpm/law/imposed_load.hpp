@@ -27,7 +27,7 @@ class LoadedSurface {
 
   LoadedSurface(const LawAtParameters& law, Want want);
 
-  /// The load (offset included) was held for ever.
+  /// The load (offset included) was constant for ever.
   void rest_at(double load);
   /// An instantaneous change of the load.
   void jump_to(double load);

@@ -17,7 +17,7 @@ struct KernelAtParameters {
                                            const std::vector<LawParameter>& table,
                                            std::span<const double> values);
 
-/// A load imposed at once and kept that elastic tension helps to carry.
+/// A load imposed suddenly and then constant that elastic tension helps to carry.
 [[nodiscard]] std::optional<Response> respond_to_kept_load(const LawAtParameters& law,
                                                            const Protocol& protocol,
                                                            std::span<const double> times_s,

@@ -74,7 +74,8 @@ struct GridColumn {
   double dashpot_s;
 };
 
-/// Adds one fractional element to a memory: `unit` times its stiffness, and the derivatives.
+/// Adds one fractional element to a relaxation function: `unit` times its stiffness, and the
+/// derivatives.
 void add_element(Memory& m, const GridColumn& unit, std::initializer_list<GridColumn> slopes,
                  const FastPair* fast) {
   /// `total` is what the coefficients add up to at time 0

@@ -32,14 +32,15 @@ struct Memory {
   [[nodiscard]] double instant() const { return constant + stiffness.sum(); }
 };
 
-/// Memory of a law with branches. The parameters it refers to are those of the parallel form:
-/// k_inf (if solid), k_1.., tau_1...
+/// Relaxation function of a law with branches. The parameters it refers to are those of the
+/// parallel form: k_inf (if solid), k_1.., tau_1...
 [[nodiscard]] Memory branch_memory(bool solid, int branches, std::span<const double> parallel);
 
-/// Memory of a fractional law on the fixed rates of a window. What the window does not see is kept
-/// too: slow rates as a branch that relaxes only under infinite time, so that `constant` is what
-/// remains in the end; for E_alpha the fast rates as two branches with their stiffness and
-/// viscosity, so that G(0) is exact; for spring-pots, infinitely stiff at once, as the dashpot.
+/// Relaxation function of a fractional law on the fixed rates of a window. What the window does not
+/// see is kept too: slow rates as a branch that relaxes only under infinite time, so that
+/// `constant` is what remains in the end; for E_alpha the fast rates as two branches with their
+/// stiffness and viscosity, so that G(0) is exact; for spring-pots, with infinite instantaneous
+/// stiffness, as the dashpot.
 /// @param values those of law_parameters: [k_inf], k1, [k2], [tau1], alpha, [beta]
 /// Throws Error(bad_input) for a law that is not fractional, or as FractionalMemory.
 [[nodiscard]] Memory fractional_memory(Fractional law, std::span<const double> values,

@@ -33,7 +33,7 @@ class CreepSteps {
  public:
   CreepSteps(const LawAtParameters& law, double load, Want want);
 
-  /// The load presses on a surface that gives way.
+  /// The load presses on a compliant surface.
   [[nodiscard]] bool begins() const { return load_ > 0.0 && (u_ > 0.0 || slow_start_); }
   /// The first step to try, if `end` is the time that is asked for.
   [[nodiscard]] double first_step(double end) const;
@@ -56,7 +56,7 @@ class CreepSteps {
 
   const LawAtParameters& law_;
   bool want_slopes_;
-  bool slow_start_;  ///< a dashpot does not give way at once: the depth begins at 0
+  bool slow_start_;  ///< a dashpot does not move instantaneously: the depth begins at 0
   double load_;      ///< L
   double h_ = 0.0;   ///< of the last attempt
   double v_ = 0.0, u_ = 0.0;
@@ -279,7 +279,7 @@ void CreepSteps::answer(double c, Response& response, Eigen::Index row) const {
   if (!want_slopes_) return;
   const KernelShape::Values k = law_.kernel.at(u);
   Eigen::RowVectorXd by = Eigen::RowVectorXd::Zero(law_.parameter_count);
-  if (u > 0.0) {  // a dashpot that has not begun to give way stays at 0 whatever the parameters
+  if (u > 0.0) {  // a dashpot that has not begun to move stays at 0 whatever the parameters
     by = at.transpose() * course_by_;
     by -= kernel_slopes(k).matrix().transpose();
     by /= k.slope;

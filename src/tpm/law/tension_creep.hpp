@@ -6,8 +6,8 @@
 
 namespace tpm {
 
-/// The depth under a load that is imposed at once and kept, where elastic tension helps to carry
-/// it, which leaves no closed form:
+/// The depth under a load that is imposed suddenly and then constant, where elastic tension helps
+/// to carry it, which leaves no closed form:
 ///
 ///     A V(u) + k_tension T(u) = L + sum k_j w_j,   dw_j/dt = (V - w_j)/tau_j,   A = k_inf + sum
 ///     k_j

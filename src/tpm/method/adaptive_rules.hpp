@@ -23,8 +23,9 @@ class AdaptiveRule {
 };
 
 /// Adams: functional iteration, without a matrix. BDF: Newton with the matrix of the problem. IDA:
-/// BDF on the differential-algebraic problem of positions and memory where there are no masses.
-/// None for a rule with given steps, and for a system without a role that the rule needs.
+/// BDF on the differential-algebraic problem of positions and viscous elongations where there are
+/// no masses. None for a rule with given steps, and for a system without a role that the rule
+/// needs.
 /// @param system must live as long as the rule
 [[nodiscard]] std::unique_ptr<AdaptiveRule> adaptive_rule(StepSystem& system,
                                                           const MethodSettings& settings);

@@ -15,7 +15,7 @@ struct BallPlace {
 /// The network of BallOnNetwork under the same ball by other means: CVODE (Adams, functional
 /// iteration: viscous elongations change no faster than bonds relax) integrates it with an error
 /// control of its own, the free spheres balanced by ImplicitBalance at each evaluation.
-/// @param places at rising times, straight and even between them; nothing is remembered at the
+/// @param places at rising times, straight and even between them; the viscous state is zero at the
 /// first
 /// @param tolerance of the viscous elongations, in parts of the ball's reach, > 0
 /// @returns force of the tissue on the ball at each place, N

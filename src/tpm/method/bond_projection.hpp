@@ -7,7 +7,7 @@
 
 namespace tpm {
 
-/// Bonds with memory as compliant constraints (Macklin, Mueller, Chentanez: XPBD, 2016). The
+/// Bonds with viscous state as compliant constraints (Macklin, Mueller, Chentanez: XPBD, 2016). The
 /// viscous elongation at the end of a step is y = offset + relaxation_factor V(l), so that it pulls
 /// with N = (k - g) u(l) + g ((1 - relaxation_factor) V(l) - offset): where it is linear, a
 /// constraint on l of compliance 1/(k - relaxation_factor g) about a rest elongation, and else a
@@ -15,7 +15,7 @@ namespace tpm {
 /// stiffness in.
 class BondProjection {
  public:
-  /// @param bonds, freedom must live as long as this; contacts with tools are not projected
+  /// @param bonds, constraints must live as long as this; contacts with tools are not projected
   BondProjection(const BondSystem& bonds, const Constraints& constraints);
 
   /// Multipliers start at 0.

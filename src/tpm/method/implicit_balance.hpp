@@ -19,7 +19,7 @@ struct SphereAnchors {
 /// anchors has to be positive definite.
 class ImplicitBalance {
  public:
-  /// @param bonds, freedom, work must live as long as this
+  /// @param bonds, constraints, work must live as long as this
   ImplicitBalance(const BondSystem& bonds, const Constraints& constraints, MethodWork& work);
 
   /// @param position start, with what is imposed in place; the balance if `completed`

@@ -117,7 +117,8 @@ class MethodDriver {
                                                        : MethodEnd::completed;
   }
 
-  /// Forces that cannot be balanced because a memory has run away are not the tissue's failure.
+  /// Forces that cannot be balanced because the viscous elongations have diverged are not the
+  /// tissue's failure.
   [[nodiscard]] MethodEnd cause(MethodEnd end, const Vector& state) const {
     const Eigen::Index m = system_.viscous();
     const auto reach = kBeyondReach / kDivergedTimes * bound_.tail(m).array();

@@ -124,7 +124,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     const double peak = protocol.peak();
     if (tissue_.depth_driven()) return peak;
     const double relaxed = std::abs(tissue_.linear_response(tissue_.at_rest(0.0), peak));
-    // What flows has no end: it is judged by what it does at once and how long it lasts.
+    // A fluid has no equilibrium: use its instantaneous response and the duration.
     const TissueState rest = tissue_.at_rest(0.0);
     if (!tissue_.equilibrium().factorise(rest.position, rest.memory())) return relaxed;
     const double instantaneous = std::abs(tissue_.unit_field(rest, rest.memory()).stiffness) * peak;

@@ -53,9 +53,9 @@ class StepSystem {
   /// The size that each part of a state may be expected to have, for tolerances and divergence.
   [[nodiscard]] virtual Vector scales() const = 0;
 
-  /// The state at rest, or with everything relaxed under `first` if it is held for ever before.
+  /// The state at rest, or with everything relaxed under `first` if it is constant for ever before.
   [[nodiscard]] virtual MethodEnd start(const Knot& first, bool relaxed, Vector& state) = 0;
-  /// What is imposed goes to another value at once, y kept: positions without masses follow.
+  /// What is imposed jumps to another value, y constant: positions without masses follow.
   [[nodiscard]] virtual MethodEnd jump(double imposed, const ConstVector& state) = 0;
   /// Contact force, N, or depth, m.
   [[nodiscard]] virtual MethodEnd response(double time_s, const ConstVector& state,

@@ -92,7 +92,7 @@ bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const BondMemory& mem
   constexpr int kMostParts = 64;
   const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, network_.position.cols());
   const Eigen::Vector3d from = network_.position.rightCols<1>();
-  // A place too far for one search is approached along a line, under the same memory.
+  // A place too far for one search is approached along a line, under the same viscous state.
   for (int parts = 1; parts <= kMostParts; parts *= 4) {
     Positions next = network_.position;
     bool found = true;

@@ -44,7 +44,7 @@ struct NetworkUnderBall {
                    const Constraints& organ_freedom, const BallTool& ball);
 
   BondSystem bonds;         ///< with the contacts of the ball
-  Constraints constraints;  ///< the ball is held where it is put
+  Constraints constraints;  ///< the ball is fixed where it is put
   Positions position;       ///< of all spheres at rest, then of the ball
 };
 
@@ -53,7 +53,7 @@ struct NetworkUnderBall {
 /// remembered is advanced exactly. The error falls with the square of the step.
 class BallOnNetwork {
  public:
-  /// @param bonds, freedom of the organ, without tools
+  /// @param bonds, constraints of the organ, without tools
   /// @param tolerance_N of the force left on each sphere
   /// Throws Error(bad_input) for a ball without radius or stiffness.
   BallOnNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,

@@ -125,7 +125,7 @@ class BondSystem {
   /// The mean viscous elongation y of each bond.
   /// @param viscous m_j by (bond, branch)
   [[nodiscard]] Eigen::VectorXd mean_viscous(const Eigen::MatrixXd& viscous) const;
-  /// The memory with mean viscous elongations y at this instant, of which a share follows.
+  /// The viscous state with mean viscous elongations y at this instant, of which a share follows.
   [[nodiscard]] BondMemory memory_at(const Eigen::VectorXd& y, const Eigen::VectorXd& followed,
                                      RelaxationFactor relaxation_factor,
                                      std::span<const char> closed = {}) const;
@@ -177,7 +177,7 @@ class BondSystem {
   [[nodiscard]] const BlockPattern& pattern() const { return graph().pattern; }
   [[nodiscard]] BlockPattern::Place place(std::size_t bond) const { return graph().place[bond]; }
 
-  /// The same without the bonds of some spheres, for factorisations: what is held has no part in
+  /// The same without the bonds of some spheres, for factorisations: fixed ones have no part in
   /// them.
   struct PartGraph {
     BlockPattern pattern;  ///< of all spheres; those left out have no neighbours

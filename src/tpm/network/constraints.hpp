@@ -7,22 +7,22 @@
 
 namespace tpm {
 
-/// In which directions each sphere may follow the forces on it. Where it may not, it stands still
-/// or moves as something outside decides, and the force there is a reaction.
+/// Free directions of each sphere. In the other directions it is fixed or moves as imposed, and the
+/// force there is a reaction.
 class Constraints {
  public:
   /// All spheres free.
   explicit Constraints(std::size_t spheres);
 
-  /// With more spheres after those there are, all free.
+  /// A copy with more spheres at the end, all free.
   [[nodiscard]] Constraints extended(std::size_t more) const;
 
-  /// That of the first spheres alone.
+  /// The constraints of the first spheres.
   [[nodiscard]] Constraints first(std::size_t spheres) const;
 
-  /// Nothing is free any more.
+  /// Fixes the sphere.
   void hold(std::size_t sphere);
-  /// Only the motion along a unit direction stays free.
+  /// Leaves only the motion along a unit direction free.
   void guide(std::size_t sphere, const Eigen::Vector3d& direction);
   /// The motion along a unit direction is imposed from outside. On a guided sphere it is the
   /// direction of the guide.

@@ -3,10 +3,10 @@
 
 namespace tpm {
 
-/// Resistance to a small displacement of one sphere while all others are held, N/m.
+/// Resistance to a small displacement of one sphere while all others are fixed, N/m.
 struct HeldStiffness {
-  double instantaneous = 0.0;  ///< before anything has relaxed
-  double relaxed = 0.0;        ///< after everything has
+  double instantaneous = 0.0;  ///< before the bonds relax
+  double relaxed = 0.0;        ///< at equilibrium
 };
 
 /// @param rest the positions at which every bond has its rest length

@@ -18,7 +18,7 @@ struct PressedTool {
 struct DrivenNetwork {
   BondSystem bonds;         ///< with the contacts
   Positions rest;           ///< of spheres, then tools
-  Constraints constraints;  ///< a tool that is driven is guided, one that stands still is held
+  Constraints constraints;  ///< a tool that is driven is guided, one that stands still is fixed
   Probes probes;
   std::vector<PressedTool> tools;
 
@@ -28,7 +28,7 @@ struct DrivenNetwork {
   }
 };
 
-/// @param bonds, freedom of the organ
+/// @param bonds, constraints of the organ
 /// @param driven spheres that are driven themselves
 /// Throws Error(bad_input) if nothing is driven.
 [[nodiscard]] DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,

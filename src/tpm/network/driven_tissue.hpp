@@ -72,14 +72,14 @@ class DrivenTissue {
     Eigen::Matrix3Xd judge;
     double stiffness = 0.0;  ///< work of `judge`: N/m under an imposed depth, m/N under a load
   };
-  /// From the last factorisation, which was at this state and memory.
+  /// From the last factorisation, which was at this state and viscous state.
   [[nodiscard]] UnitField unit_field(const TissueState& state, const BondMemory& memory) const;
   [[nodiscard]] double adjoint_sign() const { return depth_driven() ? -1.0 : 1.0; }
 
   /// Force on what is driven per displacement along the probe while all else stands still, N/m.
   [[nodiscard]] double held_stiffness(const Positions& position, const BondMemory& memory) const;
 
-  /// Size of the response to a peak of what is imposed, with the relaxed stiffness at rest.
+  /// Size of the response to a peak of what is imposed, with the equilibrium stiffness at rest.
   [[nodiscard]] double linear_response(const TissueState& rest, double peak);
 
   /// Force on the tissue, N (or impulse, N s), given what the tissue does to what is driven: summed

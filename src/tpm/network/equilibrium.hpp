@@ -53,7 +53,7 @@ struct SolverChoice {
 /// looked at itself. Iterative: as LargeEquilibrium.
 class Equilibrium {
  public:
-  /// @param bonds, freedom must live as long as this
+  /// @param bonds, constraints must live as long as this
   Equilibrium(const BondSystem& bonds, const Constraints& constraints,
               EquilibriumOptions options = {});
   ~Equilibrium();

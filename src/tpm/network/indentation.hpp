@@ -12,7 +12,7 @@ struct PatchIndentation {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector into the tissue
   double depth_m = 0.002;
   int strides = 1;                 ///< equal parts of the depth, >= 1
-  double relaxation_factor = 0.0;  ///< 0: at once, 1: relaxed; see BondMemory
+  double relaxation_factor = 0.0;  ///< 0: instantaneous, 1: equilibrium; see BondMemory
   double tolerance_N = 1e-9;       ///< of the force left on each free sphere
 };
 
@@ -51,7 +51,7 @@ class LargeEquilibrium;
 
 /// Force of a glued punch per depth at rest, to first order, N/m: u^T K u of the displacements
 /// under a motion of 1 of the patch, so that an error of u counts by its square.
-/// @param patch spheres that are held in the freedom of the solver
+/// @param patch spheres that are fixed in the constraints of the solver
 /// @param relaxation_factor see BondMemory
 /// @param tolerance of LargeEquilibrium::solve
 /// Throws Error(numerical) if the stiffness is not positive definite or the solution fails.
@@ -62,7 +62,7 @@ class LargeEquilibrium;
 
 /// Pushes the patch to its depth, stride by stride: in each the free spheres follow to first order,
 /// then they find their balance.
-/// @param freedom in which the patch is held already
+/// @param constraints in which the patch is fixed already
 /// Throws Error(bad_input) for an empty patch or numbers out of range, Error(numerical) where the
 /// stiffness is not positive definite, at the balance or on the way to it, or no balance is found;
 /// the message tells the depth.

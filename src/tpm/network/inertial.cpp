@@ -45,7 +45,7 @@ Inertia inertia_of(const BondSystem& bonds, const Eigen::VectorXd& mass, const L
   return inertia;
 }
 
-/// The knots up to the last time asked for, where the last value is held for ever.
+/// The knots up to the last time asked for, where the last value is constant for ever.
 std::vector<Knot> finite_knots(const Protocol& protocol, std::span<const double> times_s) {
   std::vector<Knot> knots(protocol.knots().begin(), protocol.knots().end());
   double latest = knots.back().time_s;

@@ -114,7 +114,7 @@ struct InertialRun {
 /// See docs/inertial.md.
 class Inertial {
  public:
-  /// @param freedom of the network without the probe: what is held and guided
+  /// @param constraints of the network without the probe: fixed and guided spheres
   /// @param mass_kg one per sphere, > 0
   /// @param bonds must live as long as this
   /// Throws Error(bad_input) for options out of range, masses that are not positive, a probe that

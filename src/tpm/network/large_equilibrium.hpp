@@ -41,7 +41,7 @@ struct LargeEquilibriumWork {
 /// any. A search whose probe does not come to an end has not converged.
 class LargeEquilibrium {
  public:
-  /// @param bonds, freedom must live as long as this
+  /// @param bonds, constraints must live as long as this
   /// @param rest positions of the spheres, m: whence the rigid motions of the multigrid
   /// Throws Error(bad_input) if a solution is allowed no iteration.
   LargeEquilibrium(const BondSystem& bonds, const Constraints& constraints, const Positions& rest,

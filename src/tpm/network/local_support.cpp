@@ -44,7 +44,7 @@ class BondsOfSpheres {
   std::vector<std::vector<End>> of_;
 };
 
-/// The stiffness of a sphere and its neighbours, all others held, on their free coordinates.
+/// The stiffness of a sphere and its neighbours, all others fixed, on their free coordinates.
 /// @param place scratch: -1 for every sphere, before and after
 Eigen::MatrixXd patch_stiffness(const BondsOfSpheres& bonds, const Constraints& constraints,
                                 const std::vector<std::size_t>& patch, std::vector<Index>& place) {

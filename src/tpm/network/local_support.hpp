@@ -12,7 +12,7 @@ namespace tpm {
 inline constexpr double kLooseSupport = 0.05;
 
 /// How well its surroundings carry each sphere: its stiffness along its normal at rest with all but
-/// its bonded neighbours held, over that with the neighbours held too. 1 for a sphere that cannot
+/// its bonded neighbours fixed, over that with the neighbours fixed too. 1 for a sphere that cannot
 /// move along its normal; 0 where nothing resists. Unlike the lowest eigenvalue of the network it
 /// does not fall with the number of spheres, and so tells a near mechanism (a shell whose curvature
 /// alone resists, docs/notation.md) from a large organ that bends.

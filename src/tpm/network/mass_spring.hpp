@@ -10,7 +10,7 @@ enum class SpringRule {
   equal,           ///< one stiffness for all: the textbook's model
 };
 
-/// Force per depth at the probe for small depths, N/m, after everything has relaxed
+/// Force per depth at the probe for small depths, N/m, at equilibrium
 /// (relaxation_factor = 1) or before anything has (0). Throws Error(bad_input) for a probe that
 /// cannot move or a network with zero-energy modes.
 [[nodiscard]] double contact_stiffness_N_per_m(const BondSystem& bonds, const Positions& rest,
@@ -22,7 +22,7 @@ enum class SpringRule {
 /// spheres', the dampers those of InertialOptions with stiffness_share = 1: one beside each spring.
 [[nodiscard]] Network msm_network(const Network& network, SpringRule rule);
 
-/// The elastic material with which the springs of an msm_network, held and pushed alike, meet a
+/// The elastic material with which the springs of an msm_network, fixed and pushed alike, meet a
 /// small depth with the given stiffness.
 /// @param stiffness_N_per_m > 0, as contact_stiffness_N_per_m gives it for the tissue
 /// Throws Error(bad_input) as contact_stiffness_N_per_m does, and for a stiffness that is not > 0.

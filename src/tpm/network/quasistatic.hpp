@@ -130,7 +130,7 @@ struct QuasiStaticRun {
 class QuasiStatic {
  public:
   /// @param rest of spheres and tools
-  /// @param freedom of the network without the probe: what is held and guided
+  /// @param constraints of the network without the probe: fixed and guided spheres
   /// @param bonds must live as long as this
   /// Throws Error(bad_input) for options out of range or a probe that cannot move.
   QuasiStatic(const BondSystem& bonds, Positions rest, Constraints constraints, Probes probes,

@@ -315,7 +315,7 @@ void StageBalance::predict(const TissueState& state, double h, double rate) {
     // From where the step before began to each stage, less the way to where this one begins.
     x_.noalias() = shape * last_path_;
     x_.rowwise() -= last_path_.row(stages_ - 1).eval();
-    // Only what is free moves: rounding would make held spheres drift.
+    // Only what is free moves: rounding would make fixed spheres drift.
     tissue_.constraints().project(x_);
     x_.rowwise() += start_;
   } else {

@@ -73,9 +73,9 @@ class StageBalance {
   void set_unit_response(double response) { unit_response_ = std::abs(response); }
   [[nodiscard]] const QuasiStaticWork& work() const { return work_; }
 
-  /// An equilibrium at another imposed value, at once or relaxed; the state moves if it is done.
-  /// One that gives way to a load by far, or by much more than the stiffness says, is not taken: it
-  /// may lie behind an instability, and the load has to be changed in smaller steps.
+  /// An equilibrium at another imposed value, with y constant or relaxed; the state moves if it is
+  /// found. Rejects an equilibrium that moved much farther than the tangent stiffness
+  /// predicts: the load step may have jumped over an instability and has to be smaller.
   [[nodiscard]] TissueMove move(TissueState& state, double imposed, bool relaxed, double tolerance);
 
   /// Balances a step of length h in which the imposed value moves at `rate`; see accept().

@@ -4,10 +4,10 @@
 namespace tpm {
 
 /// The stiffness matrix of what is free, for factorisations: P K P + s (1 - P) as
-/// Constraints::constrain makes it, without the blocks of spheres that are held.
+/// Constraints::constrain makes it, without the blocks of spheres that are fixed.
 class StiffnessBlocks {
  public:
-  /// @param bonds, freedom must live as long as this
+  /// @param bonds, constraints must live as long as this
   StiffnessBlocks(const BondSystem& bonds, const Constraints& constraints);
 
   /// The matrix at a position; the one before is overwritten.

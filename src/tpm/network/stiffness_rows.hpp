@@ -5,10 +5,10 @@
 namespace tpm {
 
 /// The stiffness matrix of what is free, by rows, for solvers that iterate: P K P + s (1 - P) as
-/// Constraints::constrain makes it, without the blocks between spheres of which one is held.
+/// Constraints::constrain makes it, without the blocks between spheres of which one is fixed.
 class StiffnessRows {
  public:
-  /// @param bonds, freedom must live as long as this
+  /// @param bonds, constraints must live as long as this
   StiffnessRows(const BondSystem& bonds, const Constraints& constraints);
 
   /// The matrix at a position; the one before is overwritten.

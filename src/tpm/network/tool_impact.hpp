@@ -20,8 +20,9 @@ struct TouchingPair {
 ///     v+ = v + M^-1 J' p,    p >= 0,    J v+ >= 0,    p . J v+ = 0,
 ///
 /// so that the kinetic energy falls, by 1/2 m_eff (approach speed)^2 for one pair alone. Momentum
-/// is kept but for what is held, guided or imposed. Found by successive impulses (Gauss-Seidel).
-/// @param freedom what is not free in it has no velocity to lose: it acts as an infinite mass
+/// is kept but for what is fixed, guided or imposed. Found by successive impulses (Gauss-Seidel).
+/// @param constraints what they do not leave free has no velocity to lose: it acts as an infinite
+/// mass
 /// @param mass_kg of each column, > 0
 /// @param velocity of each column, m/s; changed
 /// @returns impulse of each pair, N s, >= 0: on the tool along the normal, on the sphere against

@@ -41,7 +41,7 @@ double time_of(const std::function<void()>& work) {
   return least / times;
 }
 
-/// The paper's liver with its far half held: what the operations of networks are tried on.
+/// The paper's liver with its far half fixed: what the operations of networks are tried on.
 class Bench {
  public:
   Bench()

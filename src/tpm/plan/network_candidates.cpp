@@ -11,7 +11,7 @@
 namespace tpm {
 namespace {
 
-/// The network of a scene with deeper layers held, or as it is.
+/// The network of a scene with deeper layers fixed, or as it is.
 class LayeredCandidate : public PlanModel {
  public:
   /// @param layers that move; 0: all

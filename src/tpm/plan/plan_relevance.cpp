@@ -15,7 +15,7 @@ constexpr double kServoShare = 0.5;    // of a period: what else happens in it n
 constexpr double kAffordable = 1.2e6;  // steps times spheres of a run with masses
 constexpr double kInertiaTolerance = 1e-4;
 
-/// The tissue as the truth has it, changed in one part.
+/// The tissue of the reference with one part changed.
 Trajectory answer_of(const PlanScene& scene, const PlanSurrogate& like) {
   const PlanSurrogate changed(scene, like.measure(), false);
   QuasiStaticOptions options;

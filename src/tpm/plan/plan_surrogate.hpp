@@ -7,7 +7,7 @@
 
 namespace tpm {
 
-/// The static force of a contact over its depths: relaxed, and what relaxes of it.
+/// The static force of a contact over its depths: at equilibrium, and the relaxing part.
 struct ContactCurves {
   DepthCurve relaxed, relaxing;
 };

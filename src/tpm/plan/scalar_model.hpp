@@ -27,9 +27,9 @@ struct ScalarBranch {
 ///
 ///     F = R(u) + sum_i share_i (B(u) - w_i),   dw_i/dt = (B(u) - w_i)/tau_i
 ///
-/// where R is the relaxed force and B what relaxes of the force at once. Over a step B(u) is taken
-/// as linear in time, under which the w_i are advanced exactly. With B rising and the shares not
-/// negative it is passive (docs/notation.md, passivity, with W = B).
+/// where R is the relaxed force and B the relaxing part of the instantaneous force. Over a step
+/// B(u) is taken as linear in time, under which the w_i are advanced exactly. With B rising and the
+/// shares not negative it is passive (docs/notation.md, passivity, with W = B).
 class ScalarModel {
  public:
   /// @param period_s of a step, > 0

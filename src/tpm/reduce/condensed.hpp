@@ -24,10 +24,10 @@ struct CondensedMemory {
   double spread_J = 0.0;  ///< energy stored in the differences of the branches from their mean
 };
 
-/// A network whose bonds relax alike seen from one contact sphere (docs/reduction.md): the memory
-/// of all bonds is held on that of the relaxed equilibrium under a fictitious displacement w of
-/// the contact, and one linear mode q more for each direction. Each branch has a w and a q of its
-/// own (CondensedBranches).
+/// A network whose bonds relax alike seen from one contact sphere (docs/reduction_method.md): the
+/// viscous state of all bonds is held on that of the equilibrium under a fictitious displacement w
+/// of the contact, and one linear mode q more for each direction. Each branch has a w and a q of
+/// its own (CondensedBranches).
 class CondensedContact final : public ContactModel {
  public:
   /// Of a fit found by build_condensed().
@@ -51,15 +51,15 @@ class CondensedContact final : public ContactModel {
 
   [[nodiscard]] const std::vector<CondensedBranch>& branches() const noexcept { return branches_; }
   [[nodiscard]] CondensedMemory memory() const noexcept;
-  /// Energy stored with the contact at a displacement and a memory, J: the force of step() is minus
-  /// its gradient by the displacement.
+  /// Energy stored with the contact at a displacement and a viscous state, J: the force of step()
+  /// is minus its gradient by the displacement.
   [[nodiscard]] double stored_energy_J(const Eigen::Vector3d& displacement_m,
                                        const CondensedMemory& memory) const noexcept;
-  /// Force on what is in contact, N, with a memory.
+  /// Force on what is in contact, N, with a viscous state.
   [[nodiscard]] Eigen::Vector3d force_N(const Eigen::Vector3d& displacement_m,
                                         const CondensedMemory& memory) const noexcept;
-  /// Within a step the contact moves straight, and the memory relaxes while it is at this share of
-  /// the way (docs/reduction.md), 0.5 to 1.
+  /// Within a step the contact moves straight, and the viscous state relaxes while it is at this
+  /// share of the way (docs/reduction_method.md), 0.5 to 1.
   [[nodiscard]] double resting_share() const noexcept {
     return several() ? of_branches_.resting_share() : rates_.resting_share;
   }
@@ -83,8 +83,8 @@ class CondensedContact final : public ContactModel {
 };
 
 /// Balances the network at some 150 places and fits.
-/// @param bonds, rest, freedom of the network; tools are not supported
-/// @param contact from 0; it is held here, whatever `freedom` says of it
+/// @param bonds, rest, constraints of the network; tools are not supported
+/// @param contact from 0; it is fixed, whatever `constraints` say of it
 /// @param into_tissue unit vector
 /// Throws Error(bad_input) for options out of range, a contact that does not exist or tools, bonds
 /// that do not relax alike or do not relax, and branches on a kernel;

@@ -113,7 +113,8 @@ CondensedBranches::CondensedBranches(const CondensedFit& fit,
   const SymmetricModes of_w = symmetric_modes(fit.mean_energy, fit.mean_metric);
   const Eigen::VectorXd one = Eigen::VectorXd::Ones(n);
   const auto decay = [](double y) { return -std::expm1(-y); };
-  // Of a linear tissue that moves straight the mean memory ends where it should (condensed.cpp).
+  // Of a linear tissue that moves straight the mean viscous state ends where it should
+  // (condensed.cpp).
   const BranchMode middle(of_w.values.mean(), branches, period_s);
   resting_share_ =
       (1.0 - share.dot(middle.of(first_phi) * one)) / share.dot(middle.of(decay) * one);

@@ -13,27 +13,28 @@ struct CondensedBranch {
   double relaxation_time_s = 0.0;  ///< > 0
 };
 
-/// Modes of the linear motion of a condensed memory (w, q) with the contact at rest, one relaxation
-/// time: d xi_k/dt = -rate_k xi_k/tau with xi = left (w, q), (w, q) = right xi.
+/// Modes of the linear motion of a condensed viscous state (w, q) with the contact at rest, one
+/// relaxation time: d xi_k/dt = -rate_k xi_k/tau with xi = left (w, q), (w, q) = right xi.
 struct CondensedModes {
   Eigen::Matrix<double, 6, 1> rate;
   Eigen::Matrix<double, 6, 6> left, right;
 };
 [[nodiscard]] CondensedModes condensed_modes(const CondensedFit& fit);
 
-/// The memory of a condensed network with several branches. The mean memory of the bonds is y(w) +
-/// P q, w = sum gamma_j w_j and q alike, so that force and field are those of one branch. The
-/// memory of branch j differs from it by C a_j along y(w) and by p_j along P:
+/// The viscous state of a condensed network with several branches. The mean viscous elongation of
+/// the bonds is y(w) + P q, w = sum gamma_j w_j and q alike, so that force and field are those of
+/// one branch. The viscous state of branch j differs from it by C a_j along y(w) and by p_j along
+/// P:
 ///
 ///     tau_j d(w_j)/dt = v_w(u, w, q) - C a_j,      tau_j dq_j/dt = v_q(u, w, q) - p_j
 ///
 /// with v the motion of one branch of relaxation time 1 and C C' = M^-1, M = J' g J the metric of
-/// the memory at w (Cholesky). The stored energy is
+/// the viscous state at w (Cholesky). The stored energy is
 ///
 ///     S = Psi(u, w) - z' N q + q' G q/2 + sum gamma_j (|a_j|^2 + p_j' N p_j)/2
 ///
 /// a_j keeps its value while w, and with it C, moves: so dS/dt = work - sum gamma_j |C^-1 (v_w -
-/// C a_j)|^2/tau_j - (terms of q), without derivatives of M (docs/reduction.md).
+/// C a_j)|^2/tau_j - (terms of q), without derivatives of M (docs/reduction_method.md).
 ///
 /// A step is linear in the difference from the motion's linear part, which is solved exactly for
 /// all branches together. No call allocates but the constructor.
@@ -49,7 +50,7 @@ class CondensedBranches {
   void step(CondensedState& state, const double* to) noexcept;
   /// Stored in the differences of the branches, J.
   [[nodiscard]] double spread_J() const noexcept { return spread_J_; }
-  /// Where the contact is, of its way in a step, while the memory relaxes, 0.5 to 1.
+  /// Where the contact is, of its way in a step, while the viscous state relaxes, 0.5 to 1.
   [[nodiscard]] double resting_share() const noexcept { return resting_share_; }
   /// Root of the mean square of q over the branches, m.
   [[nodiscard]] Eigen::Vector3d second_m(const CondensedState& state) const noexcept;

@@ -5,8 +5,8 @@
 
 namespace tpm {
 
-/// What the memory's motion needs, as polynomials of w: symmetric matrices in the axes of the
-/// contact.
+/// What the motion of the viscous state needs, as polynomials of w: symmetric matrices in the axes
+/// of the contact.
 class CondensedMatrices {
  public:
   /// Powers of the depth up to 4, each tangent times those up to 2, products of the tangents.

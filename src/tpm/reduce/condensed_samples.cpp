@@ -153,12 +153,13 @@ CondensedMetric CondensedSampler::relax_at(const Eigen::Vector3d& w_m) {
   const Moves second =
       held - memory_moves_ * found.metric.llt().solve(memory_moves_.transpose() * g * held);
   found.second_metric = second.transpose() * g * second;
-  // The reduced energy of a change dy of the memory is dy' (g - g S g) dy / 2, S g dy = B K^-1 B' g
-  // dy what the elongations answer to it: found as the displacement under the forces of -g dy.
+  // The reduced energy of a change dy of the viscous state is dy' (g - g S g) dy / 2, S g dy = B
+  // K^-1 B' g dy what the elongations answer to it: found as the displacement under the forces of
+  // -g dy.
   Moves answer(second.rows(), 3);
   found.second_moves.resize(rest_.size(), 3);
   for (Eigen::Index k = 0; k < 3; ++k) {
-    // add_forces is affine in the memory: the forces of dy alone are a difference.
+    // add_forces is affine in the viscous state: the forces of dy alone are a difference.
     Eigen::Matrix3Xd with = no_load_;
     Eigen::Matrix3Xd without = no_load_;
     bonds_.add_forces(latest_.position, {memory_.offset + second.col(k), 0.0}, with);

@@ -25,32 +25,32 @@ struct CondensedSample {
   Eigen::Matrix<double, Eigen::Dynamic, 3> moves;    ///< d position (3 per sphere) / du
 };
 
-/// What the memory costs at a fictitious displacement w, all per relaxation time: with y the
-/// memory of all bonds, J = dy/dw, g the relaxing stiffness of the bonds and L = dl/du at u = w,
-/// the part of L that is not in the span of J is P = L - J (J' g J)^-1 J' g L.
+/// What the viscous state costs at a fictitious displacement w, all per relaxation time: with y the
+/// viscous elongations of all bonds, J = dy/dw, g the relaxing stiffness of the bonds and L = dl/du
+/// at u = w, the part of L that is not in the span of J is P = L - J (J' g J)^-1 J' g L.
 struct CondensedMetric {
   Eigen::Vector3d w_m = Eigen::Vector3d::Zero();
   Eigen::Matrix3d metric = Eigen::Matrix3d::Zero();         ///< J' g J, N/m
   Eigen::Matrix3d second_metric = Eigen::Matrix3d::Zero();  ///< P' g P, N/m
   Eigen::Matrix3d second_energy = Eigen::Matrix3d::Zero();  ///< of P in the reduced energy, N/m
-  /// How all positions (3 per sphere) answer to viscous elongations along P, the contact held.
+  /// How all positions (3 per sphere) answer to viscous elongations along P, the contact fixed.
   Eigen::Matrix<double, Eigen::Dynamic, 3> second_moves;
 };
 
 /// Finds samples by balancing the network, from place to place.
 class CondensedSampler {
  public:
-  /// @param bonds, freedom must live as long as this; the contact is held by `freedom`
+  /// @param bonds, constraints must live as long as this; the contact is fixed by `constraints`
   /// @param stride_m longest way of the contact from one equilibrium to the next
   CondensedSampler(const BondSystem& bonds, Positions rest, const Constraints& constraints,
                    std::size_t contact, double stride_m);
 
-  /// Goes to the relaxed equilibrium under another fictitious displacement.
+  /// Goes to the equilibrium under another fictitious displacement.
   /// Throws Error(numerical) where the tissue buckles or no equilibrium is found.
   [[nodiscard]] CondensedMetric relax_at(const Eigen::Vector3d& w_m);
 
-  /// With the memory of the latest relax_at(), the contact at u: from the latest sample, or from
-  /// the relaxed equilibrium if that is nearer. Throws as relax_at().
+  /// With the viscous state of the latest relax_at(), the contact at u: from the latest sample, or
+  /// from the equilibrium if that is nearer. Throws as relax_at().
   [[nodiscard]] CondensedSample sample_at(const Eigen::Vector3d& u_m);
 
   /// Factorisations so far.

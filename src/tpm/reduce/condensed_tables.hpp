@@ -43,22 +43,22 @@ struct alignas(32) CondensedState {
   // NOLINTBEGIN(*-avoid-c-arrays)
   double memory[8] = {};                                  ///< w (3), 0, q (3), 0; m
   double matrices[CondensedTables::kMatrixEntries] = {};  ///< at w
-  double pending[8] = {};                                 ///< to be added to the memory; m
+  double pending[8] = {};                                 ///< to be added to the viscous state; m
   double u[4] = {};                                       ///< m
   double force[4] = {};                                   ///< on what is in contact, N
   double second_force[4] = {};                            ///< the part of q in it, N
-  bool kept = false;                                      ///< the latest step left the memory
+  bool kept = false;  ///< the latest step did not change the viscous state
   // NOLINTEND(*-avoid-c-arrays)
 };
 
-/// Sets what follows from the memory: for the start.
+/// Sets what follows from the viscous state: for the start.
 void settle_condensed(const CondensedTables& tables, CondensedState& state) noexcept;
 
 /// One step to state.u -> to (m, in the axes of the contact).
 void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
                     CondensedState& state, const double* to) noexcept;
 
-/// What a memory does with the contact at u.
+/// What a viscous state does with the contact at u.
 struct alignas(32) CondensedPull {
   // NOLINTBEGIN(*-avoid-c-arrays)
   double velocity[8] = {};  ///< of w (3), 0, q (3), 0 per relaxation time, m
@@ -74,8 +74,8 @@ void pull_condensed(const CondensedTables& tables, const CondensedRates& rates, 
 void matrices_of_condensed(const CondensedTables& tables, const double* w,
                            double* matrices) noexcept;
 
-/// Linear modes of the memory, and what the branches of a step need beside them. Vectors of modes
-/// and of memories have 8 numbers, 3 and a 0 twice.
+/// Linear modes of the viscous state, and what the branches of a step need beside them. Vectors of
+/// modes and of states have 8 numbers, 3 and a 0 twice.
 struct alignas(32) CondensedModeTables {
   // NOLINTBEGIN(*-avoid-c-arrays)
   double left[6][8] = {}, right[6][8] = {};  ///< columns: of w and q; of the modes
@@ -110,7 +110,7 @@ void advance_condensed(const CondensedModeTables& modes, const CondensedBranchAr
                        const double* velocity, const double* way, const double* frame,
                        CondensedAdvance& result) noexcept;
 
-/// Energy and force with the contact at u, whatever was remembered.
+/// Energy and force with the contact at u, whatever the viscous state.
 struct CondensedValue {
   double energy_J = 0.0;
   Eigen::Vector3d force_N = Eigen::Vector3d::Zero();  ///< minus its gradient by u

@@ -40,7 +40,7 @@ class PushedSpheres {
 /// models are built from.
 class PushedContact {
  public:
-  /// @param freedom of the tissue without the probe
+  /// @param constraints of the tissue without the probe
   /// @param contact spheres that are free
   /// Throws Error(bad_input) for tools among the bonds, a contact that is not free, or bonds that
   /// do not have their rest length.
@@ -51,7 +51,7 @@ class PushedContact {
 
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Positions& rest() const { return rest_; }
-  /// With the contact held.
+  /// With the contact fixed.
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
   [[nodiscard]] const PushedSpheres& contact() const { return contact_; }
 

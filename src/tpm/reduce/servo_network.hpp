@@ -31,7 +31,7 @@ struct ServoNetworkOptions {
 /// leaves the model so until reset().
 class ServoNetwork final : public ContactModel {
  public:
-  /// @param freedom of the tissue without the probe
+  /// @param constraints of the tissue without the probe
   /// @param contact a sphere that is free
   /// @param into_tissue unit vector
   /// Throws Error(bad_input) for options out of range and tissues that PushedContact refuses,
@@ -82,11 +82,11 @@ class ServoNetwork final : public ContactModel {
   ServoNetworkOptions options_;
   Eigen::Vector3d into_;
   ServoWeights weights_;
-  std::unique_ptr<ServoStiffness> spheres_;  ///< with the contact held
+  std::unique_ptr<ServoStiffness> spheres_;  ///< with the contact fixed
   std::size_t contact_ = 0;                  ///< its column
   ServoBonds at_contact_, elsewhere_;
   std::vector<Field> fields_;  ///< at even depths from rest on
-  Field remembering_;          ///< what forces left do through what is remembered of the places
+  Field remembering_;          ///< what residual forces do through the viscous state
   std::unique_ptr<StepError> step_error_;
   Eigen::Matrix3d instantaneous_, relaxed_;
 
@@ -94,7 +94,7 @@ class ServoNetwork final : public ContactModel {
   ContactAnswer answer_;
   double rounding_ = 0.0;  ///< of forces, in parts of the largest
   double largest_N_ = 0.0, held_error_N_ = 0.0;
-  /// Force from what is remembered of places that were not balanced, and its source, N.
+  /// Force from the viscous state of positions out of equilibrium, and its source, N.
   Eigen::Vector3d viscous_error_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> branch_error_;  ///< of each branch, where there are several
   Eigen::Vector3d viscous_source_ = Eigen::Vector3d::Zero();

@@ -13,10 +13,10 @@ namespace tpm {
 class ServoStiffness {
  public:
   /// @param rest places by which the order is chosen
-  /// @param freedom what is held does not move
+  /// @param constraints fixed spheres do not move
   ServoStiffness(const BondSystem& bonds, const Positions& rest, const Constraints& constraints);
 
-  /// To be called before solve(), with bonds and freedom as before. False if the tissue is not
+  /// To be called before solve(), with bonds and constraints as before. False if the tissue is not
   /// stiff there.
   [[nodiscard]] bool factorise(const BondSystem& bonds, const Constraints& constraints,
                                const Positions& position, const BondMemory& memory, bool portable);

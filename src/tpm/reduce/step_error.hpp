@@ -9,7 +9,7 @@ namespace tpm {
 /// model is advanced both ways, exactly and as the network is; the forces differ by the estimate.
 class StepError {
  public:
-  /// @param position, relaxed equilibrium about which the network is linearised
+  /// @param position, equilibrium about which the network is linearised
   StepError(PushedContact& tissue, const Positions& position, double relaxed, double period_s);
 
   void reset() noexcept;

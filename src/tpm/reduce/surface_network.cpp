@@ -100,7 +100,7 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   add_surface();
   find_stiffness(bonds, constraints);
   // An elongation that bends by b between periods lies b v (1 - v)/2 off the line, v from the end;
-  // what it leaves in the memory is the integral of that over exp(-z v) z dv.
+  // what it leaves in the viscous state is the integral of that over exp(-z v) z dv.
   const double lasting =
       instantaneous_.norm() > 0.0 ? relaxed_.norm() / instantaneous_.norm() : 1.0;
   // Not all of a bond relaxes: all of its force is taken.

@@ -29,13 +29,13 @@ struct SurfaceNetworkOptions {
 ///
 /// Its error estimate is by how much it had to be corrected, and what it costs to take elongations
 /// as linear within a period: they curve about as the forces on the touched spheres do from period
-/// to period, and what that leaves in the bonds' memory fades as the contact relaxes.
+/// to period, and what that leaves in the viscous state of the bonds fades as the contact relaxes.
 class SurfaceNetwork final : public ContactModel {
  public:
   /// The most spheres touched, or nearly so, at a time.
   static constexpr int kMostTouched = 12;
 
-  /// @param freedom of the tissue
+  /// @param constraints of the tissue
   /// Throws Error(bad_input) for options out of range, bonds that do not have their rest length, a
   /// ball without radius or stiffness or one that has come into a sphere at its start,
   /// Error(numerical) for a tissue that is not stiff.

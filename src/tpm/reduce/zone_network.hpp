@@ -30,8 +30,8 @@ struct ZoneNetworkOptions {
 /// The spheres outside follow those at the edge of the zone as they do in a step of the linear
 /// tissue, and have a few displacements of their own beside that: those by which the fields of the
 /// contact, instantaneous and relaxed, differ from it. On these the linear tissue is projected
-/// symmetrically, its viscous part with the same memory as every bond has, so that it stores and
-/// dissipates as a tissue does (docs/reduction_servo.md).
+/// symmetrically, its viscous part with the same viscous state as every bond has, so that it stores
+/// and dissipates as a tissue does (docs/reduction_servo.md).
 ///
 /// `error_N` is the sum of what the linear surroundings cost, measured when the model is built: the
 /// zone is compared with the quasi-static network along motions on the normal and at equilibria
@@ -63,8 +63,8 @@ class ZoneNetwork final : public ContactModel {
   [[nodiscard]] std::size_t zone_spheres() const noexcept { return zone_.size(); }
   /// Displacements of the surroundings beside those that follow the edge.
   [[nodiscard]] Eigen::Index own_displacements() const noexcept { return own_; }
-  /// The least eigenvalue of the relaxed stiffness of the surroundings before negative ones were
-  /// taken out, over the largest.
+  /// The least eigenvalue of the equilibrium stiffness of the surroundings before negative ones
+  /// were taken out, over the largest.
   [[nodiscard]] double softest() const noexcept { return softest_; }
 
  private:

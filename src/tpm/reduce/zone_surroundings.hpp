@@ -5,7 +5,7 @@
 
 namespace tpm {
 
-/// Some bonds of a tissue as linear springs with memory, about an equilibrium.
+/// Some bonds of a tissue as linear springs with viscous state, about an equilibrium.
 class LinearBonds {
  public:
   /// @param chosen one entry a bond: it takes part

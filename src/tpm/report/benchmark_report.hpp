@@ -21,7 +21,7 @@ struct BenchmarkRecord {
 /// of wall time are left out, and two runs give the same bytes.
 [[nodiscard]] std::string benchmark_csv(const BenchmarkResult& result, bool timing);
 
-/// The same for a program (docs/benchmark.md lists the keys).
+/// The same for a program (docs/benchmark_files.md lists the keys).
 [[nodiscard]] Json to_json(const BenchmarkRecord& record);
 
 /// Reads what to_json wrote, for a run that goes on from it: of references only words and numbers

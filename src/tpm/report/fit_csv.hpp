@@ -28,7 +28,7 @@ namespace tpm {
 /// Each pooled parameter.
 [[nodiscard]] std::string pooled_csv(const SpecimenStudy& study);
 
-/// How often intervals hold the truth: each parameter of a configuration.
+/// How often intervals contain the true value: each parameter of a configuration.
 [[nodiscard]] std::string coverage_csv(const CoverageResult& result);
 /// How often a law was returned from its own data: each law and margin.
 [[nodiscard]] std::string recovery_csv(std::span<const RecoveryResult> results);

@@ -7,7 +7,7 @@
 
 namespace tpm {
 
-/// A plan, as docs/plan_method.md describes the keys.
+/// A plan, as docs/plan_results.md describes the keys.
 [[nodiscard]] Json plan_json(const Plan& plan);
 [[nodiscard]] std::string plan_text(const Plan& plan);
 

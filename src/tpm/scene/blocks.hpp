@@ -10,7 +10,7 @@ namespace tpm {
 struct OrganBlock {
   Organ organ;
   bool star = false;   ///< the four spheres of the element: bonds, anchors and guide are its own
-  bool liver = false;  ///< has a far side that is held unless the scene says otherwise
+  bool liver = false;  ///< has a far side that is fixed unless the scene says otherwise
 };
 
 /// Block `organ`.

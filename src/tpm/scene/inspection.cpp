@@ -56,7 +56,7 @@ NetworkInspection inspect(const Tissue& tissue) {
   const BondLaw star_bond = tissue.materials.materials.front().radial_law();
   const HeldStiffness star{star_bond.instantaneous_N_per_m(), star_bond.equilibrium_N_per_m()};
   result.contact_over_star = HeldStiffness{held.instantaneous / star.instantaneous, 0.0};
-  // A material that relaxes to nothing has no relaxed stiffness to compare.
+  // A material that relaxes to nothing has no equilibrium stiffness to compare.
   if (star.relaxed > 0.0) result.contact_over_star->relaxed = held.relaxed / star.relaxed;
   return result;
 }

@@ -21,7 +21,7 @@ struct NetworkInspection {
   /// Bond sums (network.hpp) over the spheres that are not the contact and have such bonds; under
   /// the rule `normalised` they would be 1 and 2, were an exact scaling possible.
   Spread radial_sum, lateral_sum;
-  /// Of the contact along its normal, its neighbours held, over that of the star.
+  /// Of the contact along its normal, its neighbours fixed, over that of the star.
   std::optional<HeldStiffness> contact_over_star;
 };
 

@@ -90,7 +90,7 @@ Lattice lattice_of(const Json& block, Lattice usual, const DocumentPlace& place)
                     place.key("lattice").where);
 }
 
-/// What a function of the network's floor returns; its errors get the place of the block.
+/// What a function of the folder `network` returns; its errors get the place of the block.
 template <class Make>
 Organ made(const DocumentPlace& place, Make&& make) {
   try {

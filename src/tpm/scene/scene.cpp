@@ -27,7 +27,7 @@ Network joined(OrganBlock block, const NetworkOptions& options, const std::strin
   return join(std::move(block.organ), kElement, options, where);
 }
 
-/// What is held if the scene does not say.
+/// What is fixed if the scene does not say.
 Json usual_anchors(bool star, bool liver) {
   if (star) return Json::array({{{"kind", "spheres"}, {"spheres", {1, 3, 4}}}});
   if (liver) return Json::array({{{"kind", "far_side"}}});

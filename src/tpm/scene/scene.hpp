@@ -19,7 +19,7 @@ struct Guide {
   Eigen::Vector3d direction;  ///< unit vector
 };
 
-/// What a scene says about the tissue: spheres, bonds, material, and what is held.
+/// What a scene says about the tissue: spheres, bonds, material, and constraints.
 struct Tissue {
   std::string title;
   bool liver = false;  ///< x is to the patient's right, y up, z to the back
@@ -29,7 +29,7 @@ struct Tissue {
   /// The first material is stated by the constants E1, E2 and eta1 of the paper's element: fits
   /// address it by these names.
   bool by_constants = false;
-  std::vector<std::size_t> anchors;       ///< held spheres, rising, from 0
+  std::vector<std::size_t> anchors;       ///< fixed spheres, rising, from 0
   std::vector<std::string> anchor_words;  ///< one entry per anchor block, for people
   std::vector<Guide> guides;
   std::vector<std::string>

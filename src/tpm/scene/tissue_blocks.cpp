@@ -18,7 +18,7 @@ constexpr std::array<Word<LateralBond>, 3> kLateralWords{{{LateralBond::elastic,
                                                           {LateralBond::tension_only, "rope"},
                                                           {LateralBond::relaxing, "relaxing"}}};
 
-/// The part of the organ's depth along the probe's axis that is held at its far side.
+/// The part of the organ's depth along the probe's axis that is fixed at its far side.
 constexpr double kFarSide = 0.3;
 
 template <class Words, class Value>

@@ -21,7 +21,7 @@ struct RunNetwork {
   }
 };
 
-/// The mass-spring model is matched to the tissue's relaxed stiffness under the probe.
+/// The mass-spring model is matched to the tissue's equilibrium stiffness under the probe.
 /// Throws as msm_material does.
 [[nodiscard]] RunNetwork network_to_run(const ExperimentScene& scene);
 

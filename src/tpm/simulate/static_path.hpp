@@ -3,8 +3,8 @@
 
 namespace tpm {
 
-/// The relaxed equilibria of a network along what is imposed, followed in strides over which the
-/// driven sphere moves by no more than a twentieth of the spacing, so that no instability is
+/// The fully relaxed equilibria of a network along what is imposed, followed in strides over which
+/// the driven sphere moves by no more than a twentieth of the spacing, so that no instability is
 /// stepped over.
 class StaticPath {
  public:

@@ -31,7 +31,7 @@ struct GridLevel {
 class Multigrid final : public Preconditioner {
  public:
   /// @param matrix must live as long as this
-  /// @param modes of every node; zero where a node is held
+  /// @param modes of every node; zero where a node is fixed
   Multigrid(const BlockRows<3, 3>& matrix, const RigidModes<3>& modes);
 
   /// Keeps all levels below the finest, whose sweeps follow the matrix as it is now: with z = M^-1

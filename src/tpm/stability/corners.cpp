@@ -42,8 +42,8 @@ StabilityClass all_hold(StepRule) {
   return StabilityClass::holds;
 }
 
-/// What theory says of a memory that starts at once: explicit rules beyond their limit diverge, and
-/// the rules that do not damp what is fast let it ring.
+/// What theory says of a viscous state that starts without delay: explicit rules beyond their limit
+/// diverge, and the rules that do not damp what is fast let it ring.
 Expect of_theory(const LinearElement& linear, double step_s, double steps) {
   return [=](StepRule rule) {
     const auto limit = stable_step_s(rule, linear);
@@ -199,7 +199,7 @@ struct CornerStar {
 };
 
 /// The guided star under a rising depth: its bond to the partner is |L0 - depth| long, and its
-/// memory is the closed form in pieces of that, linear in time.
+/// viscous state is the closed form in pieces of that, linear in time.
 double star_force_N(const BondElement& p, double rate, double time_s) {
   constexpr double kLength_m = 0.020;
   const double tau = p.relaxation_time_s();

@@ -1,5 +1,5 @@
 #pragma once
-// The problems of the study, each with a truth that no step rule has made.
+// The problems of the study, each with a reference that no step rule computed.
 #include <memory>
 #include <vector>
 
@@ -27,7 +27,7 @@ struct JudgedProblem {
 inline constexpr double kStudySteps = 300.0;
 inline constexpr int kJudgedSteps = 32;
 
-/// The element without mass; the closed form is the truth. With frozen tension (E' = 0) any
+/// The element without mass; the closed form is the reference. With frozen tension (E' = 0) any
 /// history of loads, else constant ones.
 [[nodiscard]] JudgedProblem judged_rest(const BondElement& p, const Protocol& protocol,
                                         double step_s);
@@ -39,7 +39,7 @@ inline constexpr int kJudgedSteps = 32;
 /// kg, of a sphere of 10 mm radius and 1060 kg/m^3.
 inline constexpr double kSphereMass_kg = 1060.0 * 4.0 / 3.0 * 3.14159265358979 * 1e-6;
 
-/// A liver of few spheres, two layers, its far side held.
+/// A liver of few spheres, two layers, its far side fixed.
 struct StudyOrgan {
   StudyOrgan(const BondElement& p, std::size_t spheres);
   StudyOrgan(const StudyOrgan&) = delete;

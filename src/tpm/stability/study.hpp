@@ -29,7 +29,7 @@ struct StabilityMap {
 
 /// A limit found by bisection beside that of theory.
 struct StabilityLimit {
-  std::string problem;  ///< with what is held of a network
+  std::string problem;  ///< with the fixed part of a network
   StepRule rule = StepRule::forward_euler;
   std::string theory;  ///< its formula
   double theory_s = 0.0;

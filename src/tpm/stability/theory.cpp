@@ -32,7 +32,7 @@ Matrix amplification(StepRule rule, const LinearElement& e, double h) {
   if (rule == StepRule::rk4) {
     return one + a * (one + a / 2 * (one + a / 3 * (one + a / 4)));
   }
-  // Semi-implicit Euler: velocity, then position, then memory.
+  // Semi-implicit Euler: velocity, then position, then viscous elongation.
   const double held = 1.0 + h * e.drag_per_s;
   Matrix velocity = one;
   velocity.row(1) << -h * e.stiffness_N_per_m / e.mass_kg / held, 1.0 / held,

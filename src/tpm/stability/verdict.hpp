@@ -1,5 +1,5 @@
 #pragma once
-// What became of a run, against the truth.
+// Classification of a run by comparison with the reference.
 #include <array>
 #include <string>
 #include <string_view>
@@ -11,7 +11,7 @@ namespace tpm {
 /// How a run is classified.
 enum class StabilityClass {
   holds,               ///< the steady state within kHoldsWithin of the peak
-  oscillates,          ///< about the truth, from step to step or slowly, without growing
+  oscillates,          ///< about the reference, from step to step or slowly, without growing
   wrong_steady_state,  ///< calm, and somewhere else
   energy_grew,         ///< a motion gains: not beyond all bounds yet
   diverged,
@@ -49,8 +49,8 @@ struct StabilityVerdict {
   std::string reason;  ///< in words, where the run did not complete
 };
 
-/// Judges the responses at times one step apart at the end of a run.
-/// @param truth at the same times
+/// Classifies the responses at times one step apart at the end of a run.
+/// @param reference at the same times
 /// @param peak size of the response that the error is relative to, > 0
 /// @param moves spheres have mass
 [[nodiscard]] StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& reference,

@@ -14,7 +14,7 @@
 namespace tpm {
 namespace {
 
-constexpr double kTighterRun = 0.01;   // of the scene's tolerance: what its runs are held against
+constexpr double kTighterRun = 0.01;   // of the scene's tolerance: what its runs are compared with
 constexpr double kInertialRun = 1e-6;  // of a step, of the run with masses
 constexpr int kTimesPerPiece = 160, kMostBudgetTimes = 600;
 

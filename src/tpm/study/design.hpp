@@ -140,7 +140,7 @@ struct ExpectedParameter {
 /// What a set of experiments would tell.
 struct Expectation {
   std::vector<ExpectedParameter> parameters;
-  double score = 0.0;              ///< of the goal; infinite if something needed stays unknown
+  double score = 0.0;              ///< of the criterion; infinite if something needed stays unknown
   double effective_samples = 0.0;  ///< all recordings and previous ones
   [[nodiscard]] bool all_identified() const;
 };
@@ -191,7 +191,7 @@ struct CheckedParameter {
   double ratio_error = 0.0;  ///< sampling error of the ratio, ratio / sqrt(2 (sets - 1))
   double bias = 0.0;         ///< mean error in predicted standard errors
   double bias_error = 0.0;   ///< its sampling error
-  int covered = 0;           ///< estimates whose expected interval holds the truth
+  int covered = 0;           ///< estimates whose expected interval contains the true value
   bool agrees = true;        ///< ratio within 3 sampling errors of 1, and bias of 0
 };
 
@@ -206,9 +206,9 @@ struct DesignCheck {
 };
 
 /// Simulates the experiment (and the previous ones) `sets` (>= 10) times, correlated as declared,
-/// fits each from the truth and compares the spread of the estimates with the prediction, which
-/// here leaves out what is known beforehand. Deterministic in the seed.
-/// Throws Error(bad_input) for too few sets, Error(numerical) if fewer than half can be fitted.
+/// fits each from the true values and compares the spread of the estimates with the prediction,
+/// which here leaves out what is known beforehand. Deterministic in the seed. Throws
+/// Error(bad_input) for too few sets, Error(numerical) if fewer than half can be fitted.
 [[nodiscard]] DesignCheck check_design(const DesignProblem& problem,
                                        const PlannedExperiment& experiment, int sets,
                                        std::uint64_t seed);

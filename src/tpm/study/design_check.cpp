@@ -61,7 +61,8 @@ CheckedParameter checked(const ExpectedParameter& expected, const FitParameter& 
   result.ratio_error = result.ratio / std::sqrt(2.0 * (n - 1.0));
   result.bias = mean / result.predicted;
   result.bias_error = result.ratio / std::sqrt(n);
-  // The interval is symmetric in theta: it holds the truth as often as the truth's holds it.
+  // The interval is symmetric in theta: it contains the true value as often as an
+  // interval about the true value contains the estimate.
   const double theta = parameter.theta(parameter.start);
   const auto reach = [&](const std::optional<double>& limit) {
     return limit ? std::abs(parameter.theta(*limit) - theta)

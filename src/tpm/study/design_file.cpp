@@ -127,7 +127,7 @@ FitConfig parse_model(const Json& document, std::string_view where) {
   if (config.law && config.law->drive != Quantity::indentation_depth) {
     throw bad_input(key_of(where, "law/drive"), "a stretched strip", "indentation_depth");
   }
-  // The search of a simulated fit begins at the truth.
+  // The search of a simulated fit begins at the true values.
   config.starts = 1;
   config.profiles = false;
   return config;

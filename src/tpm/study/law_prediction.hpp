@@ -17,7 +17,7 @@ namespace tpm {
 enum class Placement {
   surface,  ///< 0: the depth counts from the surface and the sensor has no zero error
   fitted,   ///< those of the fit, with their uncertainty: the same recording goes on
-  own,      ///< found for the given recording, the material held: another recording
+  own,      ///< found for the given recording, the material fixed: another recording
 };
 
 /// "surface", "fitted", "own".

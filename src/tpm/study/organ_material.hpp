@@ -33,7 +33,7 @@ struct MaterialMotion {
 
 /// The motion of a recording's ramp and hold, in as few straight pieces as keep it within 0.2 % of
 /// its depth. Contact and offset are those of the law if it was fitted to this recording alone;
-/// else they are found for it, the law held.
+/// else they are found for it, the law fixed.
 [[nodiscard]] MaterialMotion motion_of_recording(const LawFile& law,
                                                  const PreparedRecording& recording);
 /// @param times_s rising, within the protocol

@@ -135,7 +135,7 @@ class ShortWalk {
     return std::isfinite(point.cost()) && point.jacobian.allFinite();
   }
 
-  /// A damped Gauss-Newton step within the bounds, the profiled parameter held.
+  /// A damped Gauss-Newton step within the bounds, the profiled parameter fixed.
   [[nodiscard]] ProfiledPoint step_from(const ProfiledPoint& here, double damping) const {
     const Eigen::VectorXd gradient = here.jacobian.transpose() * here.residual;
     std::vector<Eigen::Index> free;

@@ -31,7 +31,7 @@ void add_hold(std::vector<double>& times_s, double from_s, double length_s) {
   }
 }
 
-/// Forces after everything has relaxed, each depth from rest.
+/// Forces at equilibrium, each depth from rest.
 void answer_static(const Model& model, const StudyCondition& c, const TpmVector& parameters,
                    StudyCurve& curve) {
   const auto force = [&](double depth_m) {

@@ -24,7 +24,7 @@ struct StudyFit {
   [[nodiscard]] std::optional<ProtocolChoice::Kind> experiment() const;
 };
 
-/// What all tissues are compared at: the first tissue's fit, with parameters held if so wished.
+/// What all tissues are compared at: the first tissue's fit, with parameters fixed if so wished.
 struct StudyMaterial {
   std::string name;
   std::size_t fit = 0;  ///< place in OrganStudyConfig::fits

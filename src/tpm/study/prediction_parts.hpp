@@ -50,7 +50,7 @@ void fill_prediction(LawPrediction& p, const Model& model, const LawFile& law,
 /// Throws Error(bad_input) if a recording does not have the drive and the response of a law.
 void require_quantities_of(const LawFile& law, const PreparedRecording& recording);
 
-/// Contact and offset of a recording for a held material, and which parameters those are.
+/// Contact and offset of a recording for a fixed material, and which parameters those are.
 struct OwnPlacement {
   std::vector<double> values;      ///< of the whole law
   std::vector<std::size_t> place;  ///< of what was found

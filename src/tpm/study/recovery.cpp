@@ -58,7 +58,7 @@ Recording scattered(const Trials& trials, Random& random) {
   return recording;
 }
 
-/// Whether the fitted curve stays within one sigma of the truth over the whole record.
+/// Whether the fitted curve stays within one sigma of the true curve over the whole record.
 bool predicts_the_truth(const FitResult& fit, const Trials& trials) {
   const std::vector<double>& predicted = fit.recordings.front().predicted;
   return std::equal(
@@ -91,7 +91,7 @@ void count_choice(const Selection& selection, const Trials& trials, ChoiceCount&
   if (name != truth) ++count.reasons[reason_against(*generating, count.margin)];
 }
 
-/// The residuals of the generating law, with the reference depth of the truth so that its
+/// The residuals of the generating law, with the reference depth of the true law so that its
 /// parameters mean the same.
 ExperimentResiduals generating_residuals(const PreparedRecording& recording, const Trials& trials,
                                          SetupOptions setup) {
@@ -102,8 +102,8 @@ ExperimentResiduals generating_residuals(const PreparedRecording& recording, con
   return {config, data_sets(one)};
 }
 
-/// The estimated parameters at the truth; the nuisance ones, which belong to the simulated test,
-/// are 0 there.
+/// The estimated parameters at the true values; the nuisance ones, which belong to the simulated
+/// test, are 0 there.
 std::vector<double> estimated_truth(const FitResult& fit, const Trials& trials) {
   const LawModel model(trials.law);
   std::vector<double> natural;
@@ -113,7 +113,7 @@ std::vector<double> estimated_truth(const FitResult& fit, const Trials& trials) 
   return natural;
 }
 
-/// Counts which profile-likelihood intervals hold the truth.
+/// Counts which profile-likelihood intervals contain the true value.
 void count_intervals(const ExperimentResiduals& function, const Trials& trials,
                      RecoveryResult& result) {
   const FitResult fit = fit_experiments(function);

@@ -37,7 +37,7 @@ struct RecoveryOptions {
   int trials = 200;     ///< >= 1
   std::uint64_t seed = 0;
   SelectionOptions selection;  ///< held-out predictions and profiles are left out
-  /// Margins of BIC that judge the same fits; empty: that of `selection` alone.
+  /// Margins of BIC applied to the same fits; empty: that of `selection` alone.
   std::vector<double> margins;
 };
 
@@ -45,9 +45,10 @@ struct RecoveryOptions {
 struct ChoiceCount {
   double margin = 0.0;
   int trials = 0;
-  int returned = 0;    ///< the generating law
-  int equivalent = 0;  ///< another whose prediction is within one sigma of the truth everywhere
-  int larger = 0;      ///< one with more estimated parameters than the generating law
+  int returned = 0;  ///< the generating law
+  int equivalent =
+      0;           ///< another whose prediction is within one sigma of the true curve everywhere
+  int larger = 0;  ///< one with more estimated parameters than the generating law
   std::map<std::string, int> chosen;   ///< how often each law was returned
   std::map<std::string, int> reasons;  ///< why the generating law was not
 
@@ -57,7 +58,7 @@ struct ChoiceCount {
 };
 
 /// How often select_law returned the law that generated the data, and how often the intervals of
-/// that law's own fit held the truth.
+/// that law's own fit contained the true value.
 struct RecoveryResult {
   LawSpec law;
   std::vector<double> truth;  ///< SI, in the order of law_parameters()
@@ -65,7 +66,8 @@ struct RecoveryResult {
   std::uint64_t seed = 0;
   int trials = 0;
   int failed = 0;  ///< neither fitted nor selected: counts as wrong
-  int missed = 0;  ///< the generating law's fit ended above the deviance of a point near the truth
+  int missed =
+      0;  ///< the generating law's fit ended above the deviance of a point near the true values
   std::vector<ChoiceCount> choices;           ///< one for each margin, in the order given
   std::vector<ParameterCoverage> parameters;  ///< of the material, 95 % intervals
 
@@ -73,9 +75,9 @@ struct RecoveryResult {
   [[nodiscard]] bool fulfilled() const;
 };
 
-/// Simulates recordings with independent normal noise, selects, and counts. An interval holds the
-/// truth if the deviance, minimised with the parameter held there, rises by no more than the
-/// threshold: the profile-likelihood intervals of tpm fit, without the walk to their limits.
+/// Simulates recordings with independent normal noise, selects, and counts. An interval contains
+/// the true value if the deviance, minimised with the parameter fixed there, rises by no more than
+/// the threshold: the profile-likelihood intervals of tpm fit, without the walk to their limits.
 [[nodiscard]] RecoveryResult recover(const LawSpec& law, std::span<const double> truth,
                                      const RecoveryOptions& options);
 

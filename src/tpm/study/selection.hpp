@@ -78,7 +78,7 @@ struct Selection {
 /// samples of n_eff effective ones, -2 ln L = n_eff ln(RSS/n).
 ///
 /// Held-out error: with several recordings each in turn is predicted from the others (its own
-/// nuisance parameters refitted, the material held); with one the second half of its hold is
+/// nuisance parameters refitted, the material fixed); with one the second half of its hold is
 /// predicted from the rest.
 [[nodiscard]] Selection select_law(std::span<const PreparedRecording> recordings,
                                    const SelectionOptions& options);

@@ -29,7 +29,7 @@ struct SweepConvergence {
 /// @param axis none: the last
 /// @param size formula of the axis' parameters; empty: the parameter of the axis itself
 /// @param held places on the other axes
-/// Throws Error(bad_input) if the axis itself is held, for curves, axes of samples, sizes that are
+/// Throws Error(bad_input) if the axis itself is fixed, for curves, axes of samples, sizes that are
 /// not above 0 or coincide, and fewer than three places with a number.
 [[nodiscard]] SweepConvergence convergence_of(const SweepReader& sweep, const std::string& variable,
                                               const std::optional<std::string>& axis,

@@ -25,14 +25,14 @@ struct ReadVariable {
   std::vector<double> times_s;  ///< of a curve
 };
 
-/// Where another axis is held.
+/// Where another axis is fixed.
 struct HeldValue {
   std::string axis;
   double value = 0.0;  ///< SI
   std::string unit;
 };
 
-/// A place on each axis that is held, by name.
+/// A place on each axis that is fixed, by name.
 using HeldPlaces = std::vector<std::pair<std::string, std::uint64_t>>;
 
 /// Reads what write_sweep has written, a piece at a time. Everything throws Error(bad_input).
@@ -61,7 +61,7 @@ class SweepReader {
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> models() const;
   [[nodiscard]] std::string choice_of_models() const;
 
-  /// A number over one or two axes, the others held at a place each (the first, if not said).
+  /// A number over one or two axes, the others fixed at a place each (the first, if not said).
   /// @param rows, columns names of axes; no rows: one row
   [[nodiscard]] std::vector<double> slice(const std::string& variable,
                                           const std::optional<std::string>& rows,
@@ -83,8 +83,8 @@ class SweepReader {
   std::vector<ReadVariable> variables_;
 };
 
-/// Where all axes but one are held (at the first place, if not said).
-/// Throws Error(bad_input) naming `--at` if that one is held too.
+/// Where all axes but one are fixed (at the first place, if not said).
+/// Throws Error(bad_input) naming `--at` if that one is fixed too.
 [[nodiscard]] std::vector<HeldValue> other_places(const SweepReader& sweep, const ReadAxis& along,
                                                   const HeldPlaces& held);
 

@@ -1,4 +1,4 @@
-// The worked example of docs/architecture.md, "Adding a formulation": one file, and nothing else.
+// The worked example of docs/adding.md, "A formulation": one file, and nothing else.
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/simulate/scene_runner.hpp"
 
