@@ -83,24 +83,28 @@ function(tpm_floors suffix flags)
   set(TPM_FLOOR_OBJECTS ${objects} PARENT_SCOPE)
 endfunction()
 
-# tpm_list(LIST FUNCTION HEADER TYPE NOUN FILE...): writes a source in which FUNCTION lists the objects of files. A file
-# NAME.cpp defines the function NAME_NOUN(), which returns TYPEs, a span of pointers to const TYPE.
-function(tpm_list list function header type noun)
+# tpm_list(LIST FUNCTION HEADER TYPE NAMESPACE NOUN FILE...): writes a source in which FUNCTION lists the objects of files.
+# A file NAME.cpp defines the function NAMESPACE::NAME_NOUN(), which returns TYPEs, a span of pointers to const TYPE.
+function(tpm_list list function header type namespace noun)
   set(declared "")
   set(called "")
   foreach(source IN LISTS ARGN)
     get_filename_component(name ${source} NAME_WE)
     string(APPEND declared "${type}s ${name}_${noun}();\n")
-    list(APPEND called "${name}_${noun}()")
+    list(APPEND called "${namespace}::${name}_${noun}()")
   endforeach()
   list(JOIN called ", " called)
   file(CONFIGURE OUTPUT ${list} @ONLY CONTENT [[
 // Written by the build.
 #include "@header@"
 
-namespace tpm {
+namespace @namespace@ {
 
 @declared@
+}  // namespace @namespace@
+
+namespace tpm {
+
 @type@s @function@() {
   static const std::vector<const @type@*> all = joined({@called@});
   return all;
@@ -111,10 +115,10 @@ namespace tpm {
 endfunction()
 # Of formulations: NAME_formulations(); of the shapes of materials: NAME_elongation_shapes().
 function(tpm_formulation_list list function)
-  tpm_list(${list} ${function} tpmkit/formulation.hpp Formulation formulations ${ARGN})
+  tpm_list(${list} ${function} tpmkit/formulation.hpp Formulation tpm::organ formulations ${ARGN})
 endfunction()
 function(tpm_shape_list list function)
-  tpm_list(${list} ${function} tpmkit/elongation_function.hpp ElongationShape elongation_shapes ${ARGN})
+  tpm_list(${list} ${function} tpmkit/elongation_function.hpp ElongationShape tpm elongation_shapes ${ARGN})
 endfunction()
 
 # tpm_shipped(SOURCE HEADER TYPE NOUN): writes a source in which NOUN() answers what is shipped.

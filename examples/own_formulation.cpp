@@ -10,17 +10,18 @@
 #include <tpmkit/formulation.hpp>
 #include <tpmkit/scene.hpp>
 
+using namespace tpm::organ;
+
 /// F = K D with the equilibrium stiffness K of the contact at rest.
-class Spring final : public tpm::Formulation, public tpm::SceneRunner {
+class Spring final : public tpm::Formulation, public SceneRunner {
  public:
   using Formulation::Formulation;
-  [[nodiscard]] tpm::Trajectory run(const tpm::ExperimentScene& asked,
-                                    const tpm::RunNetwork& network,
-                                    const std::vector<double>& times_s,
-                                    bool /*with_field*/) const override {
-    const tpm::Scene scene(asked, network);
+  [[nodiscard]] Trajectory run(const ExperimentScene& asked, const RunNetwork& network,
+                               const std::vector<double>& times_s,
+                               bool /*with_field*/) const override {
+    const Scene scene(asked, network);
     const double stiffness = scene.equilibrium_stiffness_N_per_m();
-    tpm::Trajectory answer;
+    Trajectory answer;
     answer.response.resize(static_cast<Eigen::Index>(times_s.size()));
     for (std::size_t i = 0; i < times_s.size(); ++i) {
       answer.response[static_cast<Eigen::Index>(i)] =
@@ -52,7 +53,7 @@ int main() try {
   for (const std::string name : {"quasi_static", "spring"}) {
     std::string text = kBlock;
     text.replace(text.find("FORMULATION"), 11, name);
-    const tpm::Trajectory answer = tpm::Scene::parse(text).run({1.0, 2.0, 10.0});
+    const Trajectory answer = Scene::parse(text).run({1.0, 2.0, 10.0});
     std::printf("%-12s 2 mm: %.4f N, 4 mm: %.4f N, held: %.4f N\n", name.c_str(),
                 answer.response[0], answer.response[1], answer.response[2]);
   }

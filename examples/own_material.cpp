@@ -24,7 +24,7 @@ const std::string kBlock = R"({
 void run(const std::string& name, const std::string& material) {
   std::string text = kBlock;
   text.replace(text.find("MATERIAL"), 8, material);
-  const tpm::Trajectory answer = tpm::Scene::parse(text).run({2.0, 4.0, 32.0});
+  const tpm::organ::Trajectory answer = tpm::organ::Scene::parse(text).run({2.0, 4.0, 32.0});
   std::printf("%-8s peak %.4f N, after 2 s %.4f N, after 30 s %.4f N\n", name.c_str(),
               answer.response[0], answer.response[1], answer.response[2]);
 }

@@ -20,7 +20,7 @@
 
 int main(int argc, char** argv) try {
   if (argc < 2) throw tpm::Error(tpm::ExitCode::usage, "run_scene", "no scene", "run_scene FILE");
-  const tpm::Scene scene{std::filesystem::path(argv[1])};
+  const tpm::organ::Scene scene{std::filesystem::path(argv[1])};
   std::printf("%s\n%zu spheres, %zu bonds, driven at sphere %zu by %s\n", scene.title().c_str(),
               scene.organ().size(), scene.bonds(), scene.contact() + 1,
               scene.formulation().c_str());
@@ -29,7 +29,7 @@ int main(int argc, char** argv) try {
   const double start_s = scene.protocol().start_s(), end_s = scene.protocol().end_s();
   std::vector<double> times_s;
   for (int i = 0; i <= 4; ++i) times_s.push_back(start_s + i * (end_s - start_s) / 4.0);
-  const tpm::Trajectory answer = scene.run(times_s, true);
+  const tpm::organ::Trajectory answer = scene.run(times_s, true);
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     const Eigen::RowVectorXd moved_m = answer.displacement[i].colwise().norm();
     std::printf("%5.1f s: imposed %.4g, response %.4f, %ld spheres moved by more than 0.1 mm\n",

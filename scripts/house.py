@@ -20,7 +20,7 @@ from collections import Counter
 from pathlib import Path
 
 CODE = (".cpp", ".hpp", ".h", ".c", ".inc")
-DECLARATION = re.compile(r"(?:template <.*?> ?)?(?:class|struct|enum class|enum|using|concept) (?:\[\[\w+\]\] )?(\w+)")
+DECLARATION = re.compile(r"(?:template <.*?> ?)?(?:class|struct|enum class|enum|using(?! namespace)|concept) (?:\[\[\w+\]\] )?(\w+)")
 FUNCTION = re.compile(r"(?:inline |constexpr |\[\[nodiscard\]\] |static |extern )*[\w:<>,&*\s]+?[ &*](\w+)\(")
 CONSTANT = re.compile(r"(?:inline )?constexpr [\w:<>, ]+ (\w+)(?:\[\d*\])? ?[={]")
 

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "command.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/law/law_export.hpp"
 #include "tpm/scene/organ_export.hpp"
 #include "tpm/store/json.hpp"

@@ -39,7 +39,7 @@ double parse_order(const std::string& text) {
 
 Json to_json(const std::vector<RecoveryResult>& results) {
   Json list = Json::array();
-  for (const RecoveryResult& result : results) list.push_back(tpm::to_json(result));
+  for (const RecoveryResult& result : results) list.push_back(tpm::study::to_json(result));
   return Json{{"laws", std::move(list)}};
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "command.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/law/law_json.hpp"
 #include "tpm/report/table_document.hpp"

@@ -8,6 +8,7 @@
 
 #include "command.hpp"
 #include "interrupt_watch.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/report/run_record.hpp"

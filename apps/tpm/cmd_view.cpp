@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "command.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/core/progress.hpp"
 #include "tpm/report/view_file.hpp"
 #include "tpm/store/file.hpp"

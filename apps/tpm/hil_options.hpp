@@ -1,5 +1,6 @@
 #pragma once
 #include "command.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/session_run.hpp"
 
 namespace tpm::app {

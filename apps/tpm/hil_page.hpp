@@ -2,6 +2,7 @@
 #include <memory>
 #include <string>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/live_view.hpp"
 #include "tpm/haptics/page_server.hpp"
 #include "tpm/haptics/session_run.hpp"

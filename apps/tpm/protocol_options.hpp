@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/scene/protocol_file.hpp"
 
 namespace tpm::app {

@@ -14,15 +14,15 @@
 #include "tpmkit/version.hpp"
 
 struct tpm_haptics_contact {
-  tpm_haptics_contact(const char* file, const tpm::LoopContactOptions& options)
+  tpm_haptics_contact(const char* file, const tpm::haptics::LoopContactOptions& options)
       : contact(file, options) {}
-  tpm::LoopContact contact;
+  tpm::haptics::LoopContact contact;
 };
 
 namespace {
 
-using tpm::ServoFlag;
-using tpm::StopCause;
+using tpm::haptics::ServoFlag;
+using tpm::haptics::StopCause;
 
 void say(char* message, std::size_t room, std::string_view text) noexcept {
   if (message == nullptr || room == 0) return;
@@ -77,15 +77,15 @@ int cause_of(StopCause cause) noexcept {
 
 std::uint32_t flags_of(std::uint32_t row) noexcept {
   constexpr std::pair<std::uint32_t, std::uint32_t> kSame[] = {
-      {tpm::kTouching, TPM_HAPTICS_TOUCHING},
-      {tpm::kForceLimited | tpm::kRampingIn, TPM_HAPTICS_FORCE_LIMITED},
-      {tpm::kSlipping, TPM_HAPTICS_SLIPPING},
-      {tpm::kDamped, TPM_HAPTICS_DAMPED},
-      {tpm::kBeyondModel, TPM_HAPTICS_BEYOND_MODEL},
-      {tpm::kWaiting, TPM_HAPTICS_WAITING},
-      {tpm::kOutOfReach, TPM_HAPTICS_OUT_OF_REACH},
-      {tpm::kInTissue, TPM_HAPTICS_IN_TISSUE},
-      {tpm::kMoving, TPM_HAPTICS_MOVING}};
+      {tpm::haptics::kTouching, TPM_HAPTICS_TOUCHING},
+      {tpm::haptics::kForceLimited | tpm::haptics::kRampingIn, TPM_HAPTICS_FORCE_LIMITED},
+      {tpm::haptics::kSlipping, TPM_HAPTICS_SLIPPING},
+      {tpm::haptics::kDamped, TPM_HAPTICS_DAMPED},
+      {tpm::haptics::kBeyondModel, TPM_HAPTICS_BEYOND_MODEL},
+      {tpm::haptics::kWaiting, TPM_HAPTICS_WAITING},
+      {tpm::haptics::kOutOfReach, TPM_HAPTICS_OUT_OF_REACH},
+      {tpm::haptics::kInTissue, TPM_HAPTICS_IN_TISSUE},
+      {tpm::haptics::kMoving, TPM_HAPTICS_MOVING}};
   std::uint32_t flags = 0;
   for (const auto& [servo, ours] : kSame) {
     if ((row & servo) != 0) flags |= ours;
@@ -98,8 +98,8 @@ void copy_text(std::string_view text, char (&to)[N]) noexcept {
   say(to, N, text);
 }
 
-tpm::LoopContactOptions options_of(const tpm_haptics_options* given) {
-  tpm::LoopContactOptions options;
+tpm::haptics::LoopContactOptions options_of(const tpm_haptics_options* given) {
+  tpm::haptics::LoopContactOptions options;
   if (given == nullptr) return options;
   // An option that this library does not know yet must not be ignored.
   if (!known(*given, sizeof(tpm_haptics_options)) || given->version > TPM_HAPTICS_VERSION) {
@@ -179,9 +179,9 @@ int tpm_haptics_reset(tpm_haptics_contact* contact) {
 int tpm_haptics_get_info(const tpm_haptics_contact* contact, tpm_haptics_info* info) {
   if (contact == nullptr || info == nullptr || !known(*info, sizeof *info))
     return TPM_HAPTICS_USAGE;
-  const tpm::LoopContact& c = contact->contact;
-  const tpm::SessionServo& servo = c.session().servo;
-  const tpm::TissueShape& shape = c.loop().shape;
+  const tpm::haptics::LoopContact& c = contact->contact;
+  const tpm::haptics::SessionServo& servo = c.session().servo;
+  const tpm::haptics::TissueShape& shape = c.loop().shape;
   tpm_haptics_info filled = TPM_HAPTICS_INFO_INIT;
   filled.period_s = c.period_s();
   filled.stiffness_N_per_m = c.rendering().stiffness_N_per_m;
@@ -204,7 +204,7 @@ int tpm_haptics_get_state(tpm_haptics_contact* contact, tpm_haptics_state* state
   if (contact == nullptr || state == nullptr || !known(*state, sizeof *state)) {
     return TPM_HAPTICS_USAGE;
   }
-  const tpm::LoopContactState newest = contact->contact.state();
+  const tpm::haptics::LoopContactState newest = contact->contact.state();
   tpm_haptics_state filled = TPM_HAPTICS_STATE_INIT;
   filled.time_s = newest.time_s;
   std::copy_n(newest.row.position_m, 3, filled.position_m);

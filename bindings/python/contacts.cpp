@@ -1,5 +1,6 @@
 // Contacts stepped from Python, and recordings of haptic sessions.
 #include "binding.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/loop_contact.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/session_run.hpp"

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Why a device switched its forces off. Values are those of the Force Dimension status.
 enum class ForcesOff : std::int32_t {
@@ -128,4 +128,4 @@ class HapticDevice {
   virtual void cut_forces() noexcept = 0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

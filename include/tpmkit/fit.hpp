@@ -9,7 +9,7 @@
 
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// What the data say about one parameter.
 enum class Verdict {
@@ -70,4 +70,4 @@ struct FitRequest {
 [[nodiscard]] FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
                                         const FitRequest& request = {});
 
-}  // namespace tpm
+}  // namespace tpm::fit

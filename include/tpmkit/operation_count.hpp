@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Kinds of operations.
 enum class Operation : std::size_t {
@@ -48,4 +48,4 @@ class OperationCount {
   std::array<double, kOperations> n_{};
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// One column per sphere, m.
 using Positions = Eigen::Matrix3Xd;
@@ -52,4 +52,4 @@ struct NearestDistances {
 /// One entry a layer, outermost first. The organ has at least two spheres.
 [[nodiscard]] std::vector<NearestDistances> nearest_distances(const Organ& organ);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -12,7 +12,7 @@
 #include "tpmkit/protocol.hpp"
 #include "tpmkit/simulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A tissue, its contacts and loads, and its network, from a scene file (docs/simulation_files.md).
 /// Copies share one immutable scene; several threads may use it.
@@ -69,4 +69,4 @@ class Scene {
   std::shared_ptr<const RunNetwork> network_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -12,7 +12,7 @@
 #include "tpmkit/device.hpp"
 #include "tpmkit/servo_record.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Conditions on the tool before a session begins.
 struct StartGateSettings {
@@ -143,4 +143,4 @@ struct RealTimeOptions {
                                             const ServoSettings& settings, const RecordSink& sink,
                                             const RealTimeOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 #include <limits>
 #include <string_view>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Why a session ended.
 enum class StopCause : std::int32_t {
@@ -82,4 +82,4 @@ static_assert(sizeof(ServoRecord) == 136);
 inline constexpr std::size_t kFirstRowBytes = 128;
 static_assert(offsetof(ServoRecord, gripper_m) == kFirstRowBytes);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

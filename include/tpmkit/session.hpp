@@ -11,7 +11,7 @@
 #include "tpmkit/device.hpp"
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 struct HilSession;  // the content of a session file
 
@@ -81,4 +81,4 @@ class Session {
 /// compares the forces. Throws Error(bad_input) if the recording is empty or unreadable.
 [[nodiscard]] SessionCheck verify_session(const std::filesystem::path& recording);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -8,7 +8,7 @@
 
 #include "tpmkit/operation_count.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 struct ExperimentScene;  // the content of a scene file; Scene (tpmkit/scene.hpp) has accessors
 struct RunNetwork;       // the network of the scene
@@ -72,4 +72,4 @@ class SceneRunner {
                                        bool with_field) const = 0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -15,6 +15,9 @@
 #include "tpm/store/json.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::study;
+using namespace tpm::report;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;
 

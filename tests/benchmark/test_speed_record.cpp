@@ -7,6 +7,8 @@
 #include "tpm/store/file.hpp"
 
 using namespace tpm;
+using namespace tpm::study;
+using namespace tpm::report;
 using Catch::Matchers::Contains;
 using test::refusal_of;
 using test::TempFolder;

@@ -16,10 +16,10 @@ int main() {
     file << t << "," << depth_mm << "," << 100.0 * depth_mm * 1e-3 + 50.0 * relaxing << "\n";
   }
   file.close();
-  tpm::FitRequest request;
+  tpm::fit::FitRequest request;
   request.law = "linear-1";
   request.starts = 5;
-  const tpm::FitSummary fit = tpm::fit_recordings({"made.csv"}, request);
+  const tpm::fit::FitSummary fit = tpm::fit::fit_recordings({"made.csv"}, request);
   const double expected[] = {100.0, 50.0, 2.0};
   bool right = fit.law.has_value();
   for (std::size_t i = 0; i < 3; ++i) {

@@ -12,12 +12,12 @@ int main() {
       "parameters": {"k_inf_N_per_m": 60, "k1_N_per_m": 60, "tau1_s": 0.5}}},
     "indentations": {"depths": ["2 mm"], "rates": ["2 mm/s"], "hold": "1 s", "rest": "1 s"}
   })";
-  const tpm::Session session("session.json");
-  tpm::SessionRequest request;
+  const tpm::haptics::Session session("session.json");
+  tpm::haptics::SessionRequest request;
   request.recording = "session.tpmrec";
-  const tpm::SessionSummary run = session.run(session.simulated_device(), request);
-  const tpm::SessionCheck check = tpm::verify_session(request.recording);
+  const tpm::haptics::SessionSummary run = session.run(session.simulated_device(), request);
+  const tpm::haptics::SessionCheck check = tpm::haptics::verify_session(request.recording);
   std::printf("%s, %.1e N of %.3f N\n", run.model.c_str(), check.rms_N, check.peak_N);
-  const bool ended = run.outcome.cause == tpm::StopCause::finished;
+  const bool ended = run.outcome.cause == tpm::haptics::StopCause::finished;
   return ended && check.instants > 100 && check.rms_N < 1e-3 * check.peak_N ? 0 : 1;
 }

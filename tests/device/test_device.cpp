@@ -6,7 +6,7 @@
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::WithinAbs;
@@ -167,4 +167,4 @@ TEST_CASE("A replay gives its motion and then ends") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

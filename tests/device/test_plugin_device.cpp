@@ -18,7 +18,7 @@ extern "C" const char* __lsan_default_suppressions() {
   return "leak:_dl_map_object_deps\nleak:add_name_to_object\n";
 }
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -126,4 +126,4 @@ TEST_CASE("What is wrong with a plugin is told in one line") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -20,7 +20,7 @@
 #include "tpm/store/hdf5.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -435,4 +435,4 @@ TEST_CASE("A recording of the stand-in behind a network is labelled as simulated
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

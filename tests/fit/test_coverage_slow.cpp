@@ -6,6 +6,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
 
 namespace {
 

@@ -17,6 +17,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 

@@ -15,7 +15,8 @@
 #include "tpm/store/json.hpp"
 #include "tpm/study/fitted_scene.hpp"
 
-namespace tpm {
+namespace tpm::fit {
+using namespace study;
 namespace {
 
 /// A fit of the paper's relaxation table with a star of four spheres.
@@ -134,4 +135,4 @@ TEST_CASE("an organ follows a measured motion in straight pieces, nearly as it d
   CHECK(std::count_if(fit.flags.begin(), fit.flags.end(), stated) == 1);
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

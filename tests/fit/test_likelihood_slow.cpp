@@ -18,6 +18,7 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
 using Catch::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -9,6 +9,7 @@
 #include "tpm/fit/fit.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
 using Catch::Matchers::WithinRel;
 
 namespace {

@@ -6,6 +6,8 @@
 #include "tpm/scene/organ_model.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::fit;
 using Catch::Matchers::WithinRel;
 
 namespace {

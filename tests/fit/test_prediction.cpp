@@ -14,7 +14,8 @@
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::fit {
+using namespace study;
 namespace {
 
 using Catch::Matchers::Contains;
@@ -219,4 +220,4 @@ TEST_CASE("a protocol is read from the blocks of a scene, its other blocks unsee
   CHECK(times == std::vector<double>{0.0, 2.0, 4.0, 8.0, 12.0});
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -3,7 +3,7 @@
 
 #include "coverage_studies.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 TEST_CASE("bands hold held-out readings and the truth as often as they say") {
   constexpr int kSimulations = 300;
@@ -18,4 +18,4 @@ TEST_CASE("bands hold held-out readings and the truth as often as they say") {
   CHECK(c.all_readings < 0.97);
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -24,6 +24,8 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
+using namespace tpm::study;
 using namespace tpm::test;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

@@ -9,6 +9,7 @@
 #include "tpm/fit/coverage.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
 using namespace tpm::test;
 using Catch::Matchers::WithinRel;
 

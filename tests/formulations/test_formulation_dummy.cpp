@@ -9,6 +9,8 @@
 #include "tpm/store/file.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::study;
 using test::answer_of;
 using test::names;
 using test::TempFolder;

@@ -10,6 +10,8 @@
 #include "tpm/store/file.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::haptics;
 using Catch::Matchers::Contains;
 using test::experiment;
 using test::refusal_of;

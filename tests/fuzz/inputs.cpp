@@ -34,6 +34,10 @@
 #include "tpmkit/units.hpp"
 
 namespace tpm::fuzz {
+using namespace organ;
+using namespace fit;
+using namespace haptics;
+using namespace study;
 namespace {
 
 using Path = std::filesystem::path;

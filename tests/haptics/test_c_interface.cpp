@@ -18,7 +18,7 @@
 #include "tpmkit/haptics.h"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -345,4 +345,4 @@ TEST_CASE("The library shows the calls of its header, versioned, and nothing els
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

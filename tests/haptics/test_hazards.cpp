@@ -9,7 +9,8 @@
 #include "tpm/report/border_report.hpp"
 #include "tpm/report/hazard_report.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
+using namespace report;
 namespace {
 
 TEST_CASE("No hazard leaves its bounds, and nothing that is passive is refused") {
@@ -59,4 +60,4 @@ TEST_CASE("Up to what a session is allowed, impacts come to rest whatever limits
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

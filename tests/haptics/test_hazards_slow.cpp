@@ -5,7 +5,8 @@
 
 #include "tpm/report/hazard_report.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
+using namespace report;
 namespace {
 
 TEST_CASE("On the clock, too, every hazard ends as it should, and in time") {
@@ -29,4 +30,4 @@ TEST_CASE("On the clock, too, every hazard ends as it should, and in time") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

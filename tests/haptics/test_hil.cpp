@@ -14,7 +14,8 @@
 #include "tpm/store/hdf5.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
+using namespace report;
 namespace {
 
 using Catch::Matchers::Contains;
@@ -369,4 +370,4 @@ TEST_CASE("Device and arm are stable up to the stiffness that the spectral radiu
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -16,7 +16,7 @@
 #include "tpm/haptics/verify.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 TEST_CASE("kill -9 at random moments: every recording opens and verifies up to the last second") {
   const test::TempFolder folder;
@@ -66,4 +66,4 @@ TEST_CASE("kill -9 at random moments: every recording opens and verifies up to t
   CHECK(written_late <= 5);
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

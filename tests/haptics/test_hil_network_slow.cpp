@@ -15,7 +15,8 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
+using namespace report;
 namespace {
 
 using Catch::Matchers::Contains;
@@ -214,4 +215,4 @@ TEST_CASE("A network beside the loop is for tissues that relax slowly") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

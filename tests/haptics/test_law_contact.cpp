@@ -16,7 +16,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -283,4 +283,4 @@ TEST_CASE("A motion and a law named in a call stand beside the caller, not besid
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

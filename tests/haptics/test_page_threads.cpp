@@ -15,7 +15,7 @@
 // After Eigen: it brings <resolv.h> along, whose macros have the names of Eigen's parameters.
 #include <httplib.h>
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -290,4 +290,4 @@ TEST_CASE("A session on the clock is served while it runs, to friends and others
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -10,6 +10,8 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::fit;
 using Catch::Matchers::WithinRel;
 
 namespace {

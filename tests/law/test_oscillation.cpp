@@ -15,6 +15,9 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
+using namespace tpm::study;
+using namespace tpm::report;
 using Catch::Contains;
 using Catch::Matchers::WithinRel;
 

@@ -10,6 +10,7 @@
 #include "tpm/store/file.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using Catch::Matchers::WithinRel;
 using test::answer_of;
 using test::TempFolder;

@@ -12,6 +12,9 @@
 #include "tpm/sweep/cell_model.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::fit;
+using namespace tpm::study;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 

@@ -16,6 +16,9 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::haptics;
+using namespace tpm::study;
 
 namespace {
 

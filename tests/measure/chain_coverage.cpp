@@ -11,6 +11,7 @@
 namespace {
 
 using namespace tpm;
+using namespace tpm::study;
 
 void predict(int simulations, std::uint64_t seed) {
   fmt::print(

@@ -29,6 +29,7 @@
 #include "tpm/network/stiffness_blocks.hpp"
 #else
 namespace tpm {
+namespace organ {}
 /// The whole stiffness matrix.
 class StiffnessBlocks {
  public:
@@ -51,6 +52,7 @@ class StiffnessBlocks {
 #endif
 
 using namespace tpm;
+using namespace tpm::organ;
 
 namespace {
 

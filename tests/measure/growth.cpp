@@ -29,6 +29,8 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::report;
 
 namespace {
 

@@ -18,6 +18,8 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::haptics;
 
 namespace {
 

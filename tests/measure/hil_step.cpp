@@ -19,6 +19,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::haptics;
 
 namespace {
 

@@ -16,6 +16,7 @@
 #include "written_out_network.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm_test;
 using tpm::testing::OrganScene;
 

@@ -11,6 +11,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 
 int main() {
   const tpm::testing::OrganScene scene(paper_liver());

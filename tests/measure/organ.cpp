@@ -8,6 +8,7 @@
 #include "tpm/network/liver.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 
 namespace {
 

@@ -23,6 +23,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::haptics;
 using namespace std::chrono_literals;
 using test::RawClient;
 

@@ -14,6 +14,7 @@
 #include "tpm/scene/scene.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 
 namespace {
 

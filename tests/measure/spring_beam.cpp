@@ -20,6 +20,7 @@
 #include "tpm/store/json.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 
 namespace {
 

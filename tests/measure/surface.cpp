@@ -19,6 +19,8 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::haptics;
 
 namespace {
 

@@ -10,6 +10,7 @@
 #include "written_out_network.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm_test;
 using Catch::Matchers::WithinAbs;
 using tpm::testing::OrganScene;

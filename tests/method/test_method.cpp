@@ -7,6 +7,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm_test;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

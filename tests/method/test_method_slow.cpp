@@ -8,6 +8,8 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::study;
 using namespace tpm_test;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -13,6 +13,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 using tpm_test::even_times;

@@ -10,6 +10,8 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::fit;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 using tpm_test::judged;

@@ -9,6 +9,7 @@
 #include "tpmkit/model.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm_test;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -6,6 +6,7 @@
 #include "tpm/network/liver.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 
 namespace {
 

@@ -15,7 +15,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Catch::Matchers::WithinAbs;
@@ -362,4 +362,4 @@ TEST_CASE("The smallest turn takes one direction onto another, opposite ones too
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::organ

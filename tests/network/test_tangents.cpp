@@ -9,6 +9,7 @@
 #include "tpmkit/model.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using tpm::testing::OrganScene;
 using tpm_test::even_times;
 using tpm_test::Star;

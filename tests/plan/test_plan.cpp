@@ -12,6 +12,8 @@
 #include "tpm/store/hdf5.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::report;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

@@ -8,6 +8,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 
 namespace {
 

@@ -3,6 +3,8 @@
 
 - every folder of src/tpm stands in one room, and a room includes only rooms above it in the table;
 - every function of a flow is declared in its header, and the source named includes that header and calls it;
+- every file of a folder opens the namespace that the page states for its room, and src/tpm/core/namespaces.hpp lets
+  it see the namespaces that the page states;
 - docs/library.md lists every public header, with a folder that includes it or one that another public header includes;
 - docs/figures/rooms.svg is what scripts/draw_rooms.py draws of all that.
 
@@ -31,6 +33,28 @@ def faults_of_rooms(page):
         a, b = room_of.get(here), room_of.get(there)
         if a and b and order.index(b) > order.index(a):
             yield f"{file.relative_to(root)}: includes {there}, of the room {b}, from the room {a}"
+
+
+def faults_of_namespaces(page):
+    room_of = {folder: room for room, folders in rooms.rooms_of(page).items() for folder in folders}
+    rows = rooms.rows_after(page, "| namespace |")
+    space_of = {room: row[0].strip("`") for row in rows for room in row[1].split(", ")}
+    for room in sorted(set(room_of.values()) - set(space_of)):
+        yield f"docs/architecture.md: the room {room} has no namespace"
+    directives = (root / "src/tpm/core/namespaces.hpp").read_text(encoding="utf-8")
+    for space, _, sees, *_ in rows:
+        space = space.strip("`")
+        opened = re.search(rf"^namespace {space} \{{(.*?)\}}", directives, re.M | re.S)
+        given = re.findall(r"using namespace (\w+);", opened.group(1)) if opened else []
+        if [f"`tpm::{name}`" for name in given] != ([s for s in sees.split(", ") if s]):
+            yield f"src/tpm/core/namespaces.hpp: {space} sees {given}; docs/architecture.md says {sees or 'none'}"
+    for file in sorted((root / "src/tpm").glob("*/*.[ch]pp")):
+        space = "tpm::report" if file.parent.name == "report" else space_of.get(room_of.get(file.parent.name, ""))
+        if space is None or file.parent.name == "library" or file.name == "namespaces.hpp":
+            continue
+        for opened in re.findall(r"^namespace (tpm[\w:]*) \{", file.read_text(encoding="utf-8"), re.M):
+            if opened != space and opened != "tpm::sundials":
+                yield f"{file.relative_to(root)}: opens {opened}; files of {file.parent.name} stand in {space}"
 
 
 def faults_of_flows(page):
@@ -79,7 +103,7 @@ def faults_of_headers():
 
 def main():
     page = (root / "docs/architecture.md").read_text(encoding="utf-8")
-    faults = [*faults_of_rooms(page), *faults_of_flows(page), *faults_of_headers()]
+    faults = [*faults_of_rooms(page), *faults_of_namespaces(page), *faults_of_flows(page), *faults_of_headers()]
     drawn = root / "docs/figures/rooms.svg"
     if not faults and (not drawn.exists() or drawn.read_text(encoding="utf-8") != rooms.drawing(root)):
         faults.append("docs/figures/rooms.svg: not what is drawn now; python3 scripts/draw_rooms.py > docs/figures/rooms.svg")

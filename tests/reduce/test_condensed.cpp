@@ -7,6 +7,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm::testing;
 
 namespace {
@@ -29,24 +30,24 @@ struct SmallOrgan {
   }
 };
 
-const SmallOrgan& organ() {
+const SmallOrgan& small_organ() {
   static const SmallOrgan small;
   return small;
 }
 const CondensedContact& built() {
-  static const CondensedContact contact = organ().build(0.1);
+  static const CondensedContact contact = small_organ().build(0.1);
   return contact;
 }
 
 /// In, a turn with a shift aside, a hold, and half out again: 200 steps.
 Eigen::Vector3d path(int step) {
   const double t = 0.005 * step;
-  const Eigen::Vector3d across = organ().into.unitOrthogonal();
+  const Eigen::Vector3d across = small_organ().into.unitOrthogonal();
   const double depth = t < 0.3 ? t / 0.3 : t < 0.7 ? 1.0 : 1.0 - 0.5 * (t - 0.7) / 0.3;
   const double aside = t < 0.2 ? 0.0 : t < 0.5 ? (t - 0.2) / 0.3 : 1.0 - (t - 0.5);
-  return 4e-3 * depth * organ().into +
+  return 4e-3 * depth * small_organ().into +
          1e-3 * aside *
-             (std::cos(6.0 * t) * across + std::sin(6.0 * t) * organ().into.cross(across));
+             (std::cos(6.0 * t) * across + std::sin(6.0 * t) * small_organ().into.cross(across));
 }
 
 }  // namespace
@@ -54,9 +55,9 @@ Eigen::Vector3d path(int step) {
 TEST_CASE("a condensed contact follows the full network, force and field", "[condensed][heavy]") {
   const double tau = GENERATE(2e-4, 0.02, 0.2, 50.0);
   CAPTURE(tau);
-  const BondSystem bonds = organ().bonds(tau);
-  ContactPath full(bonds, organ().tissue.network.organ.position, organ().tissue.constraints(),
-                   organ().contact);
+  const BondSystem bonds = small_organ().bonds(tau);
+  ContactPath full(bonds, small_organ().tissue.network.organ.position,
+                   small_organ().tissue.constraints(), small_organ().contact);
   CondensedContact contact = built().with_relaxation_time(tau);
   double force_peak = 0.0, force_error = 0.0, field_peak = 0.0, field_error = 0.0;
   Eigen::Matrix3Xd field(3, contact.spheres());
@@ -98,7 +99,7 @@ TEST_CASE("a condensed contact starts with the stiffness of the network", "[cond
 
 TEST_CASE("another relaxation time needs no new solutions", "[condensed][heavy]") {
   CondensedContact rescaled = built().with_relaxation_time(0.02);
-  CondensedContact anew = organ().build(0.02);
+  CondensedContact anew = small_organ().build(0.02);
   for (int i = 1; i <= 200; ++i) {
     REQUIRE(rescaled.step(path(i)).force_N == anew.step(path(i)).force_N);
   }
@@ -120,7 +121,7 @@ TEST_CASE("a condensed contact creates no energy", "[condensed][heavy]") {
   CAPTURE(tau);
   CondensedContact contact = built().with_relaxation_time(tau);
   const EnergyAccount account =
-      account_of_random_motion(contact, organ().into, organ().options, 20000, 7);
+      account_of_random_motion(contact, small_organ().into, small_organ().options, 20000, 7);
   CHECK(account.created_J < 1e-13 * account.highest_J);
   CHECK(account.least_J > -1e-13 * account.highest_J);
   CHECK(account.supplied_J > 0.05 * account.highest_J);
@@ -128,24 +129,26 @@ TEST_CASE("a condensed contact creates no energy", "[condensed][heavy]") {
 
 TEST_CASE("beyond its range a condensed contact says so", "[condensed]") {
   CondensedContact contact = built();
-  CHECK(contact.step(4e-3 * organ().into).trusted);
-  CHECK_FALSE(contact.step(4.5e-3 * organ().into).trusted);
-  CHECK_FALSE(contact.step(2e-3 * organ().into + 1.2e-3 * organ().into.unitOrthogonal()).trusted);
-  CHECK_FALSE(contact.step(-0.5e-3 * organ().into).trusted);
+  CHECK(contact.step(4e-3 * small_organ().into).trusted);
+  CHECK_FALSE(contact.step(4.5e-3 * small_organ().into).trusted);
+  CHECK_FALSE(contact.step(2e-3 * small_organ().into + 1.2e-3 * small_organ().into.unitOrthogonal())
+                  .trusted);
+  CHECK_FALSE(contact.step(-0.5e-3 * small_organ().into).trusted);
 }
 
 TEST_CASE("what cannot be condensed is refused", "[condensed]") {
-  const BondSystem bonds = organ().bonds(0.1);
+  const BondSystem bonds = small_organ().bonds(0.1);
   const auto build = [&](const CondensedOptions& options, const Eigen::Vector3d& into,
                          std::size_t contact) {
-    return build_condensed(bonds, organ().tissue.network.organ.position,
-                           organ().tissue.constraints(), contact, into, options);
+    return build_condensed(bonds, small_organ().tissue.network.organ.position,
+                           small_organ().tissue.constraints(), contact, into, options);
   };
-  CHECK_THROWS_AS(build({0.0, 1e-3, 1e-3}, organ().into, organ().contact), Error);
-  CHECK_THROWS_AS(build({4e-3, -1.0, 1e-3}, organ().into, organ().contact), Error);
-  CHECK_THROWS_AS(build({4e-3, 1e-3, 0.0}, organ().into, organ().contact), Error);
-  CHECK_THROWS_AS(build({4e-3, 1e-3, 1e-3}, 2.0 * organ().into, organ().contact), Error);
-  CHECK_THROWS_AS(build({4e-3, 1e-3, 1e-3}, organ().into, 60), Error);
+  CHECK_THROWS_AS(build({0.0, 1e-3, 1e-3}, small_organ().into, small_organ().contact), Error);
+  CHECK_THROWS_AS(build({4e-3, -1.0, 1e-3}, small_organ().into, small_organ().contact), Error);
+  CHECK_THROWS_AS(build({4e-3, 1e-3, 0.0}, small_organ().into, small_organ().contact), Error);
+  CHECK_THROWS_AS(build({4e-3, 1e-3, 1e-3}, 2.0 * small_organ().into, small_organ().contact),
+                  Error);
+  CHECK_THROWS_AS(build({4e-3, 1e-3, 1e-3}, small_organ().into, 60), Error);
   CHECK_THROWS_AS(built().with_relaxation_time(0.0), Error);
   CHECK_THROWS_AS(built().with_period(-1.0), Error);
 }

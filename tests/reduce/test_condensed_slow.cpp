@@ -6,6 +6,7 @@
 #include "tpm/scene/scene.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using namespace tpm::testing;
 
 namespace {

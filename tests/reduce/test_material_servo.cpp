@@ -15,6 +15,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using tpm::testing::OrganScene;
 
 namespace {

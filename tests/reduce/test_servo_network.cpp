@@ -14,6 +14,8 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::study;
 using tpm::testing::OrganScene;
 
 namespace {

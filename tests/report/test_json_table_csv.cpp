@@ -4,6 +4,7 @@
 #include "tpm/report/json_table_csv.hpp"
 
 using namespace tpm;
+using namespace tpm::report;
 
 TEST_CASE("A table of JSON keeps its keys, and the units within, as CSV", "[csv]") {
   const Json rows = Json::parse(R"([

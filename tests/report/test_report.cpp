@@ -7,6 +7,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::report;
 using Catch::Matchers::Contains;
 
 namespace {

@@ -13,6 +13,7 @@
 #include "tpm/store/file.hpp"
 
 using namespace tpm;
+using namespace tpm::report;
 namespace fs = std::filesystem;
 
 namespace {

@@ -15,6 +15,9 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::haptics;
+using namespace tpm::report;
 using Catch::Matchers::Contains;
 using test::TempFolder;
 

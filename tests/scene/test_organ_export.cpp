@@ -10,7 +10,7 @@
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/scene/organ_export.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -291,4 +291,4 @@ TEST_CASE("ropes and guides reach the engines that know them") {
              Contains("density 0 kg/m3"));
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

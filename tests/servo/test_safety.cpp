@@ -14,7 +14,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -575,4 +575,4 @@ TEST_CASE("The row of the end holds what was known last, and no command") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

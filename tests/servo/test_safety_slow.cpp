@@ -10,7 +10,7 @@
 #include "tpmkit/servo_loop.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 /// A hand that goes to random places at random speeds, over the surface and into it, and now and
@@ -81,4 +81,4 @@ TEST_CASE("No motion of a million of passive set-ups is stopped") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -16,7 +16,7 @@
 #include "tpmkit/servo_loop.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using Catch::Matchers::WithinAbs;
@@ -440,4 +440,4 @@ TEST_CASE("A sink that fails stops the session safely, with the cause") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

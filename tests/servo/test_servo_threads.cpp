@@ -20,7 +20,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using namespace std::chrono_literals;
@@ -365,4 +365,4 @@ TEST_CASE("The jitter check says no where a session with the same limits would h
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -10,6 +10,7 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 using test::experiment;

@@ -17,6 +17,8 @@
 #include "tpmkit/version.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::report;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using test::run_of;

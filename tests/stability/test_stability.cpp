@@ -5,6 +5,8 @@
 #include "tpm/stability/study.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::study;
 
 TEST_CASE("what is above the limit of a step rule fails, and what is below does not", "[heavy]") {
   std::size_t cells = 0;

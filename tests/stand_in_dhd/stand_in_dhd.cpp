@@ -38,8 +38,8 @@ struct Fault {
 };
 
 struct StandIn {
-  tpm::PlantSettings plant_settings;
-  std::unique_ptr<tpm::VirtualPlant> plant;
+  tpm::haptics::PlantSettings plant_settings;
+  std::unique_ptr<tpm::haptics::VirtualPlant> plant;
   std::string operator_file, events_file;
   std::vector<Fault> faults;
   int version = 3, com_mode = 0, entries = 17, devices = 1, type = 35;
@@ -187,9 +187,9 @@ int dhdOpenID(char index) {
   if (index >= s.devices) return failed(15);
   if (s.index >= 0) return failed(20);
   s.index = std::max<int>(index, 0);
-  tpm::OperatorScript script;
-  if (!s.operator_file.empty()) script = tpm::read_operator_script(s.operator_file);
-  s.plant = std::make_unique<tpm::VirtualPlant>(s.plant_settings, std::move(script));
+  tpm::haptics::OperatorScript script;
+  if (!s.operator_file.empty()) script = tpm::haptics::read_operator_script(s.operator_file);
+  s.plant = std::make_unique<tpm::haptics::VirtualPlant>(s.plant_settings, std::move(script));
   if (s.wait > 0) s.plant->await();
   event("open");
   return s.index;

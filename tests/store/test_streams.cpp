@@ -18,6 +18,7 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm {
+using namespace report;
 namespace {
 
 using Catch::Matchers::Contains;

@@ -9,6 +9,8 @@
 #include "tpmkit/error.hpp"
 
 using namespace tpm;
+using namespace tpm::study;
+using namespace tpm::report;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;

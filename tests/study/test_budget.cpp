@@ -12,7 +12,7 @@
 #include "tpm/study/law_prediction.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -184,4 +184,4 @@ TEST_CASE("laws and devices that no budget is made for are refused") {
              Contains("a protocol of loads"));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

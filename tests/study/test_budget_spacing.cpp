@@ -7,7 +7,7 @@
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpm/study/error_budget.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -70,4 +70,4 @@ TEST_CASE("a finer scene of another material is refused") {
              Contains("a smaller one"));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

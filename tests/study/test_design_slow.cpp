@@ -4,6 +4,7 @@
 #include "tpm/study/design.hpp"
 
 using namespace tpm;
+using namespace tpm::study;
 
 namespace {
 

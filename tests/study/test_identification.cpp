@@ -11,7 +11,7 @@
 #include "tpm/study/identification.hpp"
 #include "tpm/study/identified_loop.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -310,4 +310,4 @@ TEST_CASE("laws that are identified are handed to the loop") {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

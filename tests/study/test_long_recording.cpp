@@ -8,6 +8,8 @@
 #include "tpm/study/selection.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
+using namespace tpm::study;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinRel;
 

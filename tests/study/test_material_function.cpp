@@ -12,7 +12,7 @@
 #include "tpm/store/file.hpp"
 #include "tpm/study/material_function.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -169,4 +169,4 @@ TEST_CASE(
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::study

@@ -9,7 +9,7 @@
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpm/study/organ_material.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -97,4 +97,4 @@ TEST_CASE("laws, motions and scenes that no organ can take are refused") {
              Contains("does not press"));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

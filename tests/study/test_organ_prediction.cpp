@@ -12,7 +12,7 @@
 #include "tpm/store/file.hpp"
 #include "tpm/study/organ_prediction.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -199,4 +199,4 @@ TEST_CASE("an organ under a load has no contact and offset") {
              Contains("under a load with a contact point"));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

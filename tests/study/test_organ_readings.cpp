@@ -9,7 +9,7 @@
 #include "tpm/study/organ_profile.hpp"
 #include "tpm/study/organ_readings.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Catch::Matchers::Contains;
@@ -233,4 +233,4 @@ TEST_CASE("intervals of readings need a recording") {
              Contains("intervals of readings along a protocol"));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

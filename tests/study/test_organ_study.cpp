@@ -11,6 +11,8 @@
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
+using namespace tpm::study;
 using namespace tpm::test;
 using Catch::Matchers::Contains;
 using Catch::Matchers::WithinAbs;

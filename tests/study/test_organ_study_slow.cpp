@@ -6,6 +6,9 @@
 #include "tpm/study/organ_study.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::fit;
+using namespace tpm::study;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 namespace fs = std::filesystem;

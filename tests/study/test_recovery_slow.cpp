@@ -6,6 +6,8 @@
 #include "tpm/study/recovery.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
+using namespace tpm::study;
 
 namespace {
 

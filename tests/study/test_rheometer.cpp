@@ -19,6 +19,8 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
+using namespace tpm::study;
 using Catch::Matchers::Contains;
 using Catch::Matchers::StartsWith;
 using Catch::Matchers::WithinAbs;

@@ -3,7 +3,7 @@
 
 #include "sensitivity_problems.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr std::uint64_t kRepetitions = 1000;
@@ -44,4 +44,4 @@ TEST_CASE("Intervals of Sobol indices hold the truth in 95 of 100 studies") {
 }
 
 }  // namespace
-}  // namespace tpm
+}  // namespace tpm::study

@@ -11,6 +11,8 @@
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;
+using namespace tpm::fit;
+using namespace tpm::study;
 
 namespace {
 

@@ -9,6 +9,7 @@
 #include "tpm/reduce/condensed.hpp"
 
 namespace tpm::testing {
+using namespace organ;
 
 struct EnergyAccount {
   double created_J = 0.0;   ///< the most in one step: change of the stored energy less the work

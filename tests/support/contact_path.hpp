@@ -6,6 +6,7 @@
 #include "tpm/solve/relaxation_filter.hpp"
 
 namespace tpm::testing {
+using namespace organ;
 
 /// Elongations are taken as linear over a step, under which every memory is advanced exactly:
 /// second order in the step.

@@ -15,6 +15,8 @@
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::test {
+using namespace fit;
+using namespace study;
 
 /// Successes of independent trials.
 struct Count {

@@ -12,6 +12,7 @@
 #include "tpmkit/servo_loop.hpp"
 
 namespace tpm::test {
+using namespace haptics;
 
 /// Positions of one round of a motion along -z, repeated: to a depth and back, held, the second
 /// half in the air. Encoder steps as of an Omega.7.

@@ -16,6 +16,8 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::test {
+using namespace organ;
+using namespace haptics;
 namespace {
 
 using Broken = std::vector<BrokenWord>;

@@ -4,6 +4,7 @@
 #include "tpm/haptics/session.hpp"
 
 namespace tpm::test {
+using namespace haptics;
 
 /// A short session on the paper's star: one indentation to 4 mm and one load.
 inline Json short_session() {

@@ -9,7 +9,7 @@
 #include "tpm/network/liver_surface.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A network that stands on its far side while a patch is pushed along a direction.
 struct IndentedScene {
@@ -57,4 +57,4 @@ inline void compare_solvers(IndentedScene scene) {
   CHECK(b.imbalance_N < 1e-10 * b.force_N);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

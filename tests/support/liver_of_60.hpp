@@ -5,6 +5,7 @@
 #include "tpmkit/protocol.hpp"
 
 namespace tpm::testing {
+using namespace study;
 
 inline Json liver_of_60() {
   return Json::parse(R"({"organ": {"kind": "liver", "count": 60, "spacing": "20 mm"},

@@ -11,6 +11,7 @@
 #include "tpm/network/triangle_mesh.hpp"
 
 namespace tpm::test {
+using namespace organ;
 
 using Triangles = std::vector<Eigen::Vector3i>;
 

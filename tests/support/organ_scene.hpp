@@ -8,6 +8,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::testing {
+using namespace organ;
 
 struct OrganScene {
   /// @param far_share spheres of the outer layer further than this share of the organ's extent

@@ -10,7 +10,7 @@
 #include "tpm/network/equilibrium.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Voigt = Eigen::Matrix<double, 6, 1>;
@@ -235,4 +235,4 @@ PlateTest plate_test(const Network& block, const BondSystem& bonds, double relax
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/network/bond_system.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Stress per strain, Pa, in Voigt's order xx, yy, zz, yz, xz, xy with engineering shear strains.
 using Elasticity = Eigen::Matrix<double, 6, 6>;
@@ -76,4 +76,4 @@ struct PlateTest {
 [[nodiscard]] PlateTest plate_test(const Network& block, const BondSystem& bonds,
                                    double relaxation_factor);
 
-}  // namespace tpm
+}  // namespace tpm::organ

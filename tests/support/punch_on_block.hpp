@@ -7,7 +7,7 @@
 #include "tpm/network/simple_organs.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 enum class PunchShape { square, round };
 
@@ -65,4 +65,4 @@ inline double polynomial_limit(double coarse, double middle, double fine) {
   return (8.0 * fine - 6.0 * middle + coarse) / 3.0;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

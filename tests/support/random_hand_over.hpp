@@ -9,6 +9,7 @@
 #include "tpm/haptics/law_handover.hpp"
 
 namespace tpm::test {
+using namespace haptics;
 
 inline LawFile random_law(Random& random) {
   static const std::vector<std::string> names{

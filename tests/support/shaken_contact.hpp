@@ -6,6 +6,7 @@
 #include "tpmkit/tpm_element.hpp"
 
 namespace tpm::test {
+using namespace haptics;
 
 /// A device that is wherever a test puts it.
 class Puppet final : public HapticDevice {

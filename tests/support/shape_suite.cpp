@@ -11,6 +11,7 @@
 #include "tpmkit/error.hpp"
 
 namespace tpm::test {
+using namespace organ;
 namespace {
 
 using Broken = std::vector<std::string>;

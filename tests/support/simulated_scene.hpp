@@ -5,6 +5,7 @@
 #include "tpm/simulate/simulation.hpp"
 
 namespace tpm::test {
+using namespace organ;
 
 inline ExperimentScene experiment(const std::string& scene) {
   return parse_experiment(parse_json(scene, "scene"), "scene", {});

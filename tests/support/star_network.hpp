@@ -7,8 +7,8 @@
 namespace tpm_test {
 
 /// B between A and C at the spacing, its partner D below; only B may move.
-inline tpm::Organ star_organ(double spacing) {
-  tpm::Organ organ;
+inline tpm::organ::Organ star_organ(double spacing) {
+  tpm::organ::Organ organ;
   organ.name = "star";
   organ.position.resize(3, 4);
   organ.position << 0, -spacing, spacing, 0,  //
@@ -24,26 +24,27 @@ inline tpm::Organ star_organ(double spacing) {
 
 struct Star {
   explicit Star(const tpm::TpmParameters& p)
-      : network(tpm::join(star_organ(p.spacing_m), pairs(), {}, "star")),
+      : network(tpm::organ::join(star_organ(p.spacing_m), pairs(), {}, "star")),
         bonds(network, p),
         constraints(4) {
     constraints.guide(0, Eigen::Vector3d::UnitZ());
     for (const std::size_t i : {1, 2, 3}) constraints.hold(i);
   }
-  static const std::vector<tpm::NeighbourPair>& pairs() {
-    static const std::vector<tpm::NeighbourPair> list{{0, 1}, {0, 2}, {0, 3}};
+  static const std::vector<tpm::organ::NeighbourPair>& pairs() {
+    static const std::vector<tpm::organ::NeighbourPair> list{{0, 1}, {0, 2}, {0, 3}};
     return list;
   }
-  [[nodiscard]] tpm::QuasiStaticRun run(const tpm::Protocol& protocol,
-                                        std::span<const double> times,
-                                        tpm::QuasiStaticOptions options) const {
-    return tpm::QuasiStatic(bonds, network.organ.position, constraints, probe(), std::move(options))
+  [[nodiscard]] tpm::organ::QuasiStaticRun run(const tpm::Protocol& protocol,
+                                               std::span<const double> times,
+                                               tpm::organ::QuasiStaticOptions options) const {
+    return tpm::organ::QuasiStatic(bonds, network.organ.position, constraints, probe(),
+                                   std::move(options))
         .run(protocol, times);
   }
-  [[nodiscard]] static tpm::Probe probe() { return {0, Eigen::Vector3d::UnitZ()}; }
-  tpm::Network network;
-  tpm::BondSystem bonds;
-  tpm::Constraints constraints;
+  [[nodiscard]] static tpm::organ::Probe probe() { return {0, Eigen::Vector3d::UnitZ()}; }
+  tpm::organ::Network network;
+  tpm::organ::BondSystem bonds;
+  tpm::organ::Constraints constraints;
 };
 
 inline std::vector<double> even_times(double end, int n) {

@@ -39,11 +39,11 @@ struct WrittenBond {
 };
 
 /// The bonds of a network of one material, without using its laws.
-inline std::vector<WrittenBond> written_bonds(const tpm::Network& network,
+inline std::vector<WrittenBond> written_bonds(const tpm::organ::Network& network,
                                               const tpm::BondMaterial& m, double factor = 1.0) {
   std::vector<WrittenBond> bonds;
-  for (const tpm::Bond& joined : network.bonds) {
-    const bool radial = joined.kind == tpm::BondKind::radial;
+  for (const tpm::organ::Bond& joined : network.bonds) {
+    const bool radial = joined.kind == tpm::organ::BondKind::radial;
     const double per_Pa = factor * joined.factor * m.A0_m2 / m.l0_m;
     double whole = m.equilibrium_Pa;
     for (const auto& branch : m.branches) whole += branch.modulus_Pa;
@@ -70,8 +70,8 @@ inline std::vector<WrittenBond> written_bonds(const tpm::Network& network,
 /// Driven at one sphere by an imposed depth.
 class WrittenNetwork {
  public:
-  WrittenNetwork(const tpm::Network& network, std::vector<WrittenBond> bonds,
-                 const tpm::Constraints& constraints, const tpm::Probe& probe)
+  WrittenNetwork(const tpm::organ::Network& network, std::vector<WrittenBond> bonds,
+                 const tpm::organ::Constraints& constraints, const tpm::organ::Probe& probe)
       : rest_(network.organ.position), bonds_(std::move(bonds)), probe_(probe) {
     for (std::size_t i = 0; i < network.organ.size(); ++i) {
       Eigen::Matrix3d free = constraints.projector(i);
@@ -204,7 +204,7 @@ class WrittenNetwork {
   };
   Eigen::Matrix3Xd rest_;
   std::vector<WrittenBond> bonds_;
-  tpm::Probe probe_;
+  tpm::organ::Probe probe_;
   std::vector<Free> free_;
   std::vector<Eigen::Index> first_;
   Eigen::Index states_ = 0;

@@ -22,6 +22,8 @@
 #include "tpm/sweep/sweep_result.hpp"
 
 using namespace tpm;
+using namespace tpm::study;
+using namespace tpm::report;
 using Catch::Matchers::WithinRel;
 
 namespace {

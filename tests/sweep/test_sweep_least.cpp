@@ -12,6 +12,8 @@
 #include "tpm/sweep/sweep_reader.hpp"
 
 using namespace tpm;
+using namespace tpm::organ;
+using namespace tpm::study;
 
 namespace {
 

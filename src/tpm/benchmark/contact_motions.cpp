@@ -12,7 +12,7 @@
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kPressing_m_per_s = 0.020;
@@ -206,4 +206,4 @@ ContactMotion refined(ContactMotion motion, int pieces) {
   return motion;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

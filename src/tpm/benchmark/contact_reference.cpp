@@ -8,7 +8,7 @@
 #include "tpm/solve/relaxation_filter.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kBalance = 1e-13;  // of the stiffest bond times 1 m
@@ -186,4 +186,4 @@ Eigen::VectorXd line_reference(const TouchedTissue& tissue, const ContactMotion&
   return -solver.run(*motion.line, times).response;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -2,9 +2,10 @@
 #include <Eigen/Core>
 
 #include "tpm/benchmark/contact_motions.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/network/equilibrium.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A tissue and the sphere at which it is touched.
 struct TouchedTissue {
@@ -88,4 +89,4 @@ class FineContact {
 [[nodiscard]] Eigen::VectorXd line_reference(const TouchedTissue& tissue,
                                              const ContactMotion& motion, double tolerance);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpm/network/lowest_mode.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// One bond under a protocol, and the star of four spheres, which is the same thing.
@@ -203,4 +203,4 @@ BenchmarkProblem bond_mass_problem() {
   return problem;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -7,7 +7,7 @@
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// The scene's tissue driven at its contact sphere along the normal.
@@ -196,4 +196,4 @@ std::shared_ptr<const PosedNetwork> posed_elastic_poke() {
   return posed_moving_liver(tissue, true);
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

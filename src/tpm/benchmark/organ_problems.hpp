@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/benchmark/posed.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 // On the liver of 424 spheres of configs/liver_scene.json.
 
@@ -21,4 +21,4 @@ namespace tpm {
 [[nodiscard]] BenchmarkProblem moving_poke_problem(
     const std::shared_ptr<const PosedNetwork>& posed);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -10,7 +10,7 @@
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 PosedNetwork::PosedNetwork(DrivenNetwork driven, Protocol imposed, std::vector<double> asked_s)
     : network(std::move(driven)), protocol(std::move(imposed)), times_s(std::move(asked_s)) {}
@@ -248,4 +248,4 @@ void add(std::vector<BenchmarkSetting>& all, std::vector<BenchmarkSetting> more)
   for (BenchmarkSetting& setting : more) all.push_back(std::move(setting));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

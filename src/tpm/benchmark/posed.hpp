@@ -6,7 +6,7 @@
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpmkit/organ.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A network with what is done to it; shared by the settings that run it.
 struct PosedNetwork {
@@ -86,4 +86,4 @@ struct RuleSettings {
 /// Appends.
 void add(std::vector<BenchmarkSetting>& all, std::vector<BenchmarkSetting> more);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,9 +8,10 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/method/method.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// What one run of a setting brought.
 struct BenchmarkRun {
@@ -127,4 +128,4 @@ struct BenchmarkEntry {
 /// Throws Error(usage) with the known names for one that is not there.
 [[nodiscard]] std::vector<BenchmarkEntry> chosen_benchmarks(std::span<const std::string> names);
 
-}  // namespace tpm
+}  // namespace tpm::study

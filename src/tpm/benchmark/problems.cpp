@@ -8,7 +8,7 @@
 #include "tpm/benchmark/servo_problems.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr std::array<BenchmarkEntry, 11> kEntries{{
@@ -49,4 +49,4 @@ std::vector<BenchmarkEntry> chosen_benchmarks(std::span<const std::string> names
   return chosen;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

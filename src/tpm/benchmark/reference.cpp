@@ -6,7 +6,7 @@
 #include "tpm/benchmark/problem.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 Eigen::VectorXd sizes_of(const Eigen::VectorXd& response, int components) {
   return response.reshaped(components, response.size() / components).colwise().norm().transpose();
@@ -49,4 +49,4 @@ BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer seco
   return reference;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

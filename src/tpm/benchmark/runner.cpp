@@ -9,7 +9,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -171,4 +171,4 @@ BenchmarkResult run_benchmark(const BenchmarkProblem& problem, const BenchmarkOp
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

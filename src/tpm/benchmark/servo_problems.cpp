@@ -15,7 +15,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kServoPeriod_s = 1e-3;
@@ -464,4 +464,4 @@ BenchmarkProblem servo_inner_problem() {
        zone_model(3, kServoPeriod_s), full_model(kServoPeriod_s)});
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

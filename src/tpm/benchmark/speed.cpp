@@ -10,7 +10,7 @@
 #include "tpm/benchmark/runner.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 double processor_s() {
@@ -92,4 +92,4 @@ std::vector<SpeedRow> measure_speed(const std::vector<SpeedWork>& works,
   return rows;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

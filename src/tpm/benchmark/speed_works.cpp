@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "tpm/benchmark/speed.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/network/filling.hpp"
 #include "tpm/network/large_equilibrium.hpp"
@@ -16,7 +17,7 @@
 #include "tpmkit/bond_element.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// A liver of some spheres in two layers, or solid, that stands on its far side.
@@ -211,4 +212,4 @@ const std::vector<SpeedWork>& speed_works() {
   return works;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -5,7 +5,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 // Force and reach of the Omega.7: its data sheet. Stiffness and damping of omega, lambda and
@@ -42,4 +42,4 @@ std::vector<std::string> device_kinds() {
   return kinds;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// What may be asked of a kind of device. Numbers that nobody has measured here are marked.
 struct DeviceLimits {
@@ -34,4 +34,4 @@ struct DeviceLimits {
 /// limits (plugin_device.hpp).
 [[nodiscard]] std::vector<std::string> device_kinds();
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -1,6 +1,6 @@
 #include "tpmkit/device.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 std::string_view word_of(ForcesOff cause) {
   switch (cause) {
@@ -42,4 +42,4 @@ std::string_view word_of(DeviceLink link) {
   return "unknown";
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

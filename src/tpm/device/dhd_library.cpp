@@ -8,7 +8,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace fs = std::filesystem;
 namespace {
 
@@ -129,4 +129,4 @@ void DhdLibrary::require_version() {
   throw Error(ExitCode::environment, file_, "is version " + version_, "version 3");
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// The calls of the Force Dimension library that are used, found at run time. Own declarations of
 /// its C interface; see docs/haptics.md.
@@ -76,4 +76,4 @@ class DhdLibrary {
   std::string file_, version_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -12,7 +12,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr int kTimeGuard = 1, kMotorSaturated = 2;
@@ -399,4 +399,4 @@ std::vector<SeenDevice> seen_devices(const std::filesystem::path& library) {
   return look_around(loaded, loaded.calls().get_device_count());
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -12,7 +12,7 @@
 #include "tpmkit/device.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Which of several devices; nothing given: the only one of its kind.
 struct DeviceSelection {
@@ -77,4 +77,4 @@ class ForceDimension final : public HapticDevice {
 /// Throws Error(environment) as DhdLibrary does.
 [[nodiscard]] std::vector<SeenDevice> seen_devices(const std::filesystem::path& library);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

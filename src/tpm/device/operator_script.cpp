@@ -5,7 +5,7 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace tpm {
+namespace tpm::haptics {
 
 OperatorAim OperatorScript::at(double time_s) noexcept {
   while (now_ + 1 < pieces_.size() && time_s >= pieces_[now_].end_s) {
@@ -59,4 +59,4 @@ OperatorScript read_operator_script(const std::filesystem::path& file) {
   return OperatorScript(std::move(pieces));
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// A stretch of what an operator means to do: along one direction, and across it.
 struct OperatorPiece {
@@ -50,4 +50,4 @@ class OperatorScript {
 /// Throws std::runtime_error for a file that is not such lines.
 [[nodiscard]] OperatorScript read_operator_script(const std::filesystem::path& file);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -12,7 +12,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr const char* kPluginEntry = "tpm_device_plugin_get";
@@ -332,4 +332,4 @@ std::vector<SeenDevice> seen_devices(const DevicePlugin& plugin) {
   return devices;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

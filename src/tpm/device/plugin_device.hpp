@@ -10,7 +10,7 @@
 #include "tpmkit/device.hpp"
 #include "tpmkit/haptic_device.h"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// A shared library with haptic devices of its own (tpmkit/haptic_device.h), loaded for as long as
 /// this lives.
@@ -72,4 +72,4 @@ class PluginDevice final : public HapticDevice {
 /// The devices of a plugin, none is opened. Throws Error(environment) as DevicePlugin.
 [[nodiscard]] std::vector<SeenDevice> seen_devices(const DevicePlugin& plugin);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

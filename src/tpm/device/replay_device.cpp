@@ -2,7 +2,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 ReplayDevice::ReplayDevice(Eigen::Matrix3Xd position_m, const std::string& source)
     : position_m_(std::move(position_m)) {
@@ -22,4 +22,4 @@ DeviceAnswer ReplayDevice::read(Eigen::Vector3d& position_m) noexcept {
   return DeviceAnswer::ok;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpmkit/device.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Plays the positions of a recorded session, one a read. Forces go nowhere.
 class ReplayDevice final : public HapticDevice {
@@ -24,4 +24,4 @@ class ReplayDevice final : public HapticDevice {
   DeviceIdentity identity_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 PlantSettings limited(PlantSettings settings, const DeviceLimits& limits) {
@@ -83,4 +83,4 @@ void VirtualOmega7::cut_forces() noexcept {
   forces_on_ = false;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -5,7 +5,7 @@
 #include "tpm/device/virtual_plant.hpp"
 #include "tpmkit/device.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// A simulated Omega.7 held by a simulated arm, or another device of the list whose row says
 /// `plant`. Its time passes in advance() only.
@@ -40,4 +40,4 @@ class VirtualOmega7 final : public HapticDevice {
   std::atomic<bool> forces_on_{false};
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <unsupported/Eigen/MatrixFunctions>
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 std::string line_of(const char* format, double value) {
@@ -142,4 +142,4 @@ void VirtualPlant::advance() noexcept {
   if (velocity_m_per_s().norm() > settings_.velocity_limit_m_per_s) too_fast_ = true;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

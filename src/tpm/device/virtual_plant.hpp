@@ -7,7 +7,7 @@
 
 #include "tpm/device/operator_script.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// An operator's arm: mass, damper and spring towards where the hand means to be (one published
 /// fit), and the eye that moves that place while the depth shown is not the depth wanted.
@@ -95,4 +95,4 @@ class VirtualPlant {
   bool forces_on_ = true, watchdog_tripped_ = false, too_fast_ = false;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -7,7 +7,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr double kMostPhi = 0.999;
@@ -126,4 +126,4 @@ double satterthwaite_degrees(const AutoregressionEstimate& estimate, Eigen::Inde
   return std::max(2.0 / variance, 1.0);
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Noise whose neighbours are correlated: stationary, normal, with the correlation
 ///
@@ -67,4 +67,4 @@ struct AutoregressionEstimate {
 [[nodiscard]] double satterthwaite_degrees(const AutoregressionEstimate& estimate,
                                            Eigen::Index column, Eigen::Index n, Eigen::Index p);
 
-}  // namespace tpm
+}  // namespace tpm::fit

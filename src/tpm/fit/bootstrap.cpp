@@ -12,7 +12,7 @@
 #include "tpm/fit/correlation.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr std::size_t kJackknifeGroups = 50;
@@ -119,8 +119,9 @@ class Resampler {
       parts.push_back(std::span<const double>(z_).subspan(r.first, r.length));
       longest = std::max(longest, r.length);
     }
-    block_ = wanted > 0 ? wanted
-                        : tpm::block_length(residual_correlation(parts).integrated_time, z_.size());
+    block_ = wanted > 0
+                 ? wanted
+                 : tpm::fit::block_length(residual_correlation(parts).integrated_time, z_.size());
     block_ = std::min(block_, longest);
     for (const Stretch& r : recordings_) {
       for (std::size_t i = 0; i + block_ <= r.length; ++i) block_starts_.push_back(r.first + i);
@@ -319,4 +320,4 @@ BootstrapResult bootstrap(const Refittable& fit, std::span<const FitParameter> p
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -8,7 +8,7 @@
 
 #include "tpm/fit/least_squares.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// A fit that can be repeated on other data. The caller knows how its data are made.
 class Refittable {
@@ -89,4 +89,4 @@ struct BootstrapResult {
                                         std::span<const FitParameter> parameters,
                                         const Minimum& minimum, const BootstrapOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 bool is_nuisance(const FitConfig& config, std::size_t parameter) {
   const EstimatedParameter& p = config.parameters[parameter];
@@ -206,4 +206,4 @@ void mark_conditions(FitResult& result, const ResidualFunction& function) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

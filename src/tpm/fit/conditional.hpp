@@ -3,7 +3,7 @@
 
 #include "tpm/fit/fit.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Whether an estimated parameter belongs to the recordings or their noise (contact point, zero
 /// error, size of the noise) and not to the material.
@@ -22,4 +22,4 @@ namespace tpm {
 /// moved by the width of its bounds (linearised).
 void mark_conditions(FitResult& result, const ResidualFunction& function);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -12,7 +12,7 @@
 #include "tpmkit/law_model.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 namespace {
 
@@ -90,7 +90,7 @@ bool Target::applies_to(std::size_t choice) const {
 std::unique_ptr<Model> make_model(const FitConfig& config) {
   if (config.law) return std::make_unique<LawModel>(*config.law);
   if (config.organ) return std::make_unique<OrganModel>(config.organ);
-  return make_model(config.model, {config.tension, 1e-10});
+  return tpm::make_model(config.model, {config.tension, 1e-10});
 }
 
 std::vector<double> model_parameters(const FitConfig& config, std::span<const double> natural,
@@ -185,4 +185,4 @@ FitConfig read_fit_config(const std::filesystem::path& path) {
   return parse_fit_config(read_json(path), path.string(), path.parent_path());
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

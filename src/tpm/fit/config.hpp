@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/curve/import.hpp"
 #include "tpm/fit/bootstrap.hpp"
 #include "tpm/fit/noise.hpp"
@@ -19,7 +20,7 @@
 #include "tpmkit/law.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// How the readings of a data set were imposed.
 struct ProtocolChoice {
@@ -147,4 +148,4 @@ struct FitConfig {
 [[nodiscard]] FitConfig parse_fit_config(const Json& document, std::string_view where,
                                          const std::filesystem::path& folder = {});
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -175,4 +175,4 @@ bool Selector::matches(const Datum& datum) const {
   return !label || datum.label == *label;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include "tpm/fit/config_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr std::string_view kEstimated = "estimated";
@@ -126,4 +126,4 @@ void name_noise_parameters(FitConfig& config) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -12,7 +12,7 @@
 #include "tpmkit/law_model.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 std::size_t parse_target(std::string_view name, const Model& model, const DocumentPlace& place) {
@@ -245,4 +245,4 @@ void parse_hypotheses(const Json& list, FitConfig& config, const DocumentPlace& 
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

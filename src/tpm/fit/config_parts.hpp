@@ -7,7 +7,7 @@
 #include "tpm/fit/config.hpp"
 #include "tpm/store/document_place.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// The dimension of the readings of a data set, and so of a in sigma = a + b |model|.
 [[nodiscard]] Dimension reading_dimension(const FitConfig& config, const DataChoice& data);
@@ -39,4 +39,4 @@ void require_each_set_once(const FitConfig& config, const Model& model, const Js
 /// "hypotheses".
 void parse_hypotheses(const Json& list, FitConfig& config, const DocumentPlace& place);
 
-}  // namespace tpm
+}  // namespace tpm::fit

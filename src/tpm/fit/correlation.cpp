@@ -12,7 +12,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr double kSignificance = 0.01;
@@ -140,4 +140,4 @@ std::size_t block_length(double integrated_time, std::size_t n) {
   return static_cast<std::size_t>(std::clamp(std::ceil(length), 1.0, static_cast<double>(longest)));
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace tpm {
+namespace tpm::fit {
 
 /// How far neighbouring residuals repeat each other. A dense recording holds fewer independent
 /// readings than samples; intervals that ignore this are too short.
@@ -41,4 +41,4 @@ struct Correlation {
 /// order with this integrated time: (1.5 n)^(1/3) ((tau - 1/tau) / 2)^(2/3), within 1 .. n / 2.
 [[nodiscard]] std::size_t block_length(double integrated_time, std::size_t n);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -13,7 +13,7 @@
 #include "tpm/fit/starts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 void refuse_what_cannot_be_simulated(const FitConfig& config, const ExperimentResiduals& function) {
@@ -132,4 +132,4 @@ std::string to_terminal_text(const CoverageResult& result) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

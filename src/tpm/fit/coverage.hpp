@@ -6,7 +6,7 @@
 #include "tpm/fit/config.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// How often the intervals of one parameter contained the true value.
 struct ParameterCoverage {
@@ -36,4 +36,4 @@ struct CoverageResult {
 /// Probability, under Binomial(n, p), of a count at most as likely as `k` (exact, two-sided).
 [[nodiscard]] double binomial_test(int k, int n, double p);
 
-}  // namespace tpm
+}  // namespace tpm::fit

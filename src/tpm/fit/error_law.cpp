@@ -13,7 +13,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr auto kShapes = std::to_array<Word<ErrorShape>>({{ErrorShape::normal, "normal"},
@@ -171,4 +171,4 @@ double scattered(const ErrorLaw& law, double f, double sigma, double z) {
   return f + sigma * z;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -3,7 +3,7 @@
 
 #include "tpm/core/random.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Shape of the standardised error z.
 enum class ErrorShape {
@@ -70,4 +70,4 @@ struct ShapedResidual {
 [[nodiscard]] double transformed(ErrorScale scale, double f);
 [[nodiscard]] double transformed_slope(ErrorScale scale, double f);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 
 #include "tpm/fit/noise.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// sigma and its derivatives; empty if it is not a positive number.
@@ -56,4 +56,4 @@ std::optional<NoiseResidual> noise_information(const ErrorLaw& law, const Estima
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

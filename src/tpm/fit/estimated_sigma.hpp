@@ -3,7 +3,7 @@
 
 #include "tpm/fit/error_law.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// sigma = a + b |f| with a, b or both among the estimated parameters. sigma is the law's scale, on
 /// the law's scale: for `ln` and `log10` a is dimensionless, and b is 1 / unit of f.
@@ -44,4 +44,4 @@ struct NoiseResidual {
                                                              const EstimatedSigma& sigma, double f,
                                                              double a, double b);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -8,7 +8,7 @@
 
 #include "tpm/fit/config.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Relative difference below which two keys count as equal.
@@ -113,4 +113,4 @@ std::vector<FitParameter> ExchangeOrder::bounds_around(std::span<const FitParame
   return bounded;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

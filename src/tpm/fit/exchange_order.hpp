@@ -5,7 +5,7 @@
 
 #include "tpm/fit/parameter.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 struct FitConfig;
 
@@ -41,4 +41,4 @@ class ExchangeOrder {
   std::vector<Part> parts_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -13,7 +13,7 @@
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -312,4 +312,4 @@ std::string datum_label(const FitDatum& datum) {
   return datum.label.empty() ? fmt::format("t = {:.6g} s", datum.time_s) : datum.label;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

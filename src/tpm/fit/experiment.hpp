@@ -7,7 +7,7 @@
 #include "tpm/fit/config.hpp"
 #include "tpm/fit/oscillation.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// One reading as the fit sees it.
 struct FitDatum {
@@ -68,4 +68,4 @@ struct ExperimentSet {
 [[nodiscard]] double value_sigma(const DataChoice& data, double value, std::optional<double> row_sd,
                                  const std::string& where);
 
-}  // namespace tpm
+}  // namespace tpm::fit

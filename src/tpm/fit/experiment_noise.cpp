@@ -8,7 +8,7 @@
 #include "tpm/fit/experiment_residuals.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 std::optional<std::size_t> ExperimentResiduals::parameter_place(const std::string& name) const {
   for (std::size_t i = 0; i < config_.parameters.size() && !name.empty(); ++i) {
@@ -181,4 +181,4 @@ void ExperimentResiduals::set_value(std::size_t datum, double value) {
   set_plain_value(datum);
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

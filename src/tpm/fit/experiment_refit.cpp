@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr auto kResamplings =
@@ -101,4 +101,4 @@ BootstrapResult bootstrap_experiments(const ExperimentResiduals& function,
   return bootstrap(ExperimentRefit(function), parameters, minimum, options);
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

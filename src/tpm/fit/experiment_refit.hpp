@@ -2,7 +2,7 @@
 #include "tpm/fit/bootstrap.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// The refits of a configuration for bootstrap(). A reading is a fitted value, a recording one data
 /// set of the configuration; bands stay in every refit as they are.
@@ -36,4 +36,4 @@ class ExperimentRefit final : public Refittable {
 [[nodiscard]] Resampling parse_resampling(std::string_view text, std::string_view where);
 [[nodiscard]] std::string_view resampling_name(Resampling resampling) noexcept;
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -6,7 +6,7 @@
 #include "tpm/core/interrupted.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 ExperimentResiduals::ExperimentResiduals(const FitConfig& config)
     : ExperimentResiduals(config, load_data(config)) {}
@@ -383,4 +383,4 @@ std::unique_ptr<ExperimentResiduals> ExperimentResiduals::copy() const {
   return other;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

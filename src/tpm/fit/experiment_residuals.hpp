@@ -8,7 +8,7 @@
 #include "tpm/fit/experiment.hpp"
 #include "tpm/fit/least_squares.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// The residuals of a configuration: experiments asked of the model, compared with data.
 class ExperimentResiduals final : public ResidualFunction {
@@ -145,4 +145,4 @@ class ExperimentResiduals final : public ResidualFunction {
   double offset_ = 0.0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::fit

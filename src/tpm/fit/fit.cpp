@@ -10,7 +10,7 @@
 #include "tpm/fit/starts.hpp"
 #include "tpm/fit/unpredicted.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr Eigen::Index kMostSearched = 20'000;   // residuals that many starts are followed with
@@ -151,4 +151,4 @@ FitResult fit_experiments(const ExperimentResiduals& function) {
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

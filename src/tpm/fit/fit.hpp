@@ -16,7 +16,7 @@
 #include "tpm/store/json.hpp"
 #include "tpmkit/fit.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Symmetric limits, SI.
 struct Limits {
@@ -154,4 +154,4 @@ using InflationRule = std::function<double(std::span<const double>)>;
 /// "12.3 kPa": a value in the parameter's own unit, 4 significant digits.
 [[nodiscard]] std::string in_unit(const FitParameter& parameter, double natural);
 
-}  // namespace tpm
+}  // namespace tpm::fit

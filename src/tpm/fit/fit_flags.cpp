@@ -9,7 +9,7 @@
 #include "tpm/protocol/straight_pieces.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Fitted values further from the model than noise goes, in standard deviations.
@@ -134,4 +134,4 @@ void add_flags(FitResult& result, const ExperimentResiduals& function) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

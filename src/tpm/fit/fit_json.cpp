@@ -8,7 +8,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/verdict.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Result numbers carry this many significant digits.
@@ -327,4 +327,4 @@ Json to_json(const FitResult& result) {
   return j;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr Eigen::Index kMostProfiled = 20'000;  // residuals that profiles are walked with
@@ -246,4 +246,4 @@ FitResult fit_residuals(const ResidualFunction& function, std::vector<FitParamet
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

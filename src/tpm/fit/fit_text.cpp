@@ -7,7 +7,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/verdict.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 std::string interval_text(const ParameterResult& p) {
@@ -162,4 +162,4 @@ std::string to_terminal_text(const FitResult& result) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

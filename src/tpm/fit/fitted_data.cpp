@@ -6,7 +6,7 @@
 
 #include "tpm/fit/prediction.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Standard deviation of a new reading about the model's answer, on the scale of the data.
@@ -197,4 +197,4 @@ void fill_data(FitResult& result, const ExperimentResiduals& function,
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 
 #include "tpm/fit/fit.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Autocorrelation of the residuals over all recordings, in the order of measurement; none without
 /// a recording. Readings of tables are independent and not in it.
@@ -21,4 +21,4 @@ namespace tpm {
 void fill_data(FitResult& result, const ExperimentResiduals& function,
                std::span<const FitParameter> parameters, const Threshold& threshold);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -7,7 +7,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// What a law has been asked about: the largest depth beyond the contact point, and for how long.
@@ -246,4 +246,4 @@ LawFile fitted_law(const FitResult& fit) {
   return law;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Why a fit of this configuration has no law file: it fits an organ, or the paper's element with
 /// a tension frozen at one value. Empty if it has one.
@@ -23,4 +23,4 @@ namespace tpm {
 /// all parameters. Throws Error(bad_input) with no_law_because().
 [[nodiscard]] LawFile fitted_law(const FitResult& fit);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -11,7 +11,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Half decades: where truncation is of second order it falls tenfold from step to step.
@@ -295,4 +295,4 @@ std::string to_terminal_text(const GradientCheck& check) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -7,7 +7,7 @@
 #include "tpm/fit/least_squares.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 enum class GradientVerdict {
   agrees,     ///< with finite differences to the tolerance, or to the differences' own error
@@ -64,4 +64,4 @@ struct GradientCheck {
 [[nodiscard]] Json to_json(const GradientCheck& check);
 [[nodiscard]] std::string to_terminal_text(const GradientCheck& check);
 
-}  // namespace tpm
+}  // namespace tpm::fit

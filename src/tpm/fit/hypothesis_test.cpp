@@ -7,7 +7,7 @@
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 namespace {
 
@@ -59,4 +59,4 @@ HypothesisResult test_hypothesis(const ExperimentResiduals& function, const FitR
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -3,7 +3,7 @@
 
 #include "tpm/fit/fit.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Fits again with the hypothesis' parameters fixed, from the best fit and ten other starts, and
 /// asks whether the rise of the deviance excludes it. Throws Error(numerical) if the model cannot
@@ -14,4 +14,4 @@ namespace tpm {
                                                const Hypothesis& hypothesis,
                                                const Threshold& threshold);
 
-}  // namespace tpm
+}  // namespace tpm::fit

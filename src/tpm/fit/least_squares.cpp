@@ -12,7 +12,7 @@
 #include "tpm/core/random.hpp"
 #include "tpm/fit/surrogate_minimum.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Ceres reports refused steps through glog on standard error; the caller hears of them through
@@ -268,4 +268,4 @@ std::vector<std::vector<double>> latin_hypercube_starts(std::span<const FitParam
   return starts;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

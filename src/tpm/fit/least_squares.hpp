@@ -9,7 +9,7 @@
 #include "tpm/fit/parameter.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Weighted residuals of everything that is fitted, with exact derivatives. Their sum of squares
 /// less offset() is the deviance: -2 ln L up to a constant that no parameter moves.
@@ -99,4 +99,4 @@ enum class FirstStep { bold, cautious };
 [[nodiscard]] std::vector<std::vector<double>> latin_hypercube_starts(
     std::span<const FitParameter> parameters, std::size_t count, std::uint64_t seed);
 
-}  // namespace tpm
+}  // namespace tpm::fit

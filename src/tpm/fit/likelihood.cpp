@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Sum of the squared standardised residuals of values over their number.
@@ -58,4 +58,4 @@ std::optional<Likelihood> likelihood_at(const ExperimentResiduals& function,
                               static_cast<int>(natural.size()) + (scale_known ? 0 : 1));
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

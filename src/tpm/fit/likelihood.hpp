@@ -4,7 +4,7 @@
 
 #include "tpm/fit/experiment_residuals.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// -2 ln L with all constants, and the criteria made of it: smaller is better, between fits to the
 /// same readings, also under different noise distributions and scales.
@@ -29,4 +29,4 @@ struct Likelihood {
 [[nodiscard]] std::optional<Likelihood> likelihood_at(const ExperimentResiduals& function,
                                                       std::span<const double> natural);
 
-}  // namespace tpm
+}  // namespace tpm::fit

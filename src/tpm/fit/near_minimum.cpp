@@ -7,7 +7,7 @@
 #include "tpm/fit/starts.hpp"
 #include "tpm/fit/surrogate_minimum.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr double kFirstDamping = 1e-4;
@@ -281,4 +281,4 @@ Minimum minimise_near(const ResidualFunction& function, std::span<const FitParam
   return search.end();
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -10,7 +10,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr auto kNoiseKinds = std::to_array<Word<NoiseKind>>({
@@ -161,4 +161,4 @@ void apply_loss(const RobustLoss& loss, DatumResidual& residual) {
   residual.r = root;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 
 #include "tpm/fit/error_law.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// How a reading scatters about the true value. f is the model's answer, y the datum.
 enum class NoiseKind {
@@ -86,4 +86,4 @@ void apply_shape(const ErrorLaw& law, DatumResidual& residual);
 /// Applies the loss to r and d_r.
 void apply_loss(const RobustLoss& loss, DatumResidual& residual);
 
-}  // namespace tpm
+}  // namespace tpm::fit

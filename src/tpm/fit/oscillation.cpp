@@ -5,7 +5,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/frequency_response.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Factor from the readings to what the law answers.
@@ -72,4 +72,4 @@ std::string oscillation_label(Quantity quantity, double frequency_Hz) {
   return fmt::format("{} at {:.6g} Hz", quantity_short_name(quantity), frequency_Hz);
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -10,7 +10,7 @@
 #include "tpmkit/law.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Small oscillations of a law about a depth, and what is read of them.
 struct Oscillation {
@@ -44,4 +44,4 @@ struct Oscillation {
 /// "storage at 1.2 Hz", "loss at 1.2 Hz".
 [[nodiscard]] std::string oscillation_label(Quantity quantity, double frequency_Hz);
 
-}  // namespace tpm
+}  // namespace tpm::fit

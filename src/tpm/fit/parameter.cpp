@@ -10,7 +10,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr auto kScales = std::to_array<Word<Scale>>(
@@ -105,4 +105,4 @@ void require_valid(const FitParameter& p, std::string_view where) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// The coordinate theta in which a parameter is searched, differentiated and profiled.
 enum class Scale {
@@ -43,4 +43,4 @@ struct FitParameter {
 /// Throws Error(bad_input) naming the parameter if its bounds, start and scale do not agree.
 void require_valid(const FitParameter& parameter, std::string_view where);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -6,7 +6,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Multiplier of the standard error for `constrained` linear functions at once.
@@ -81,4 +81,4 @@ PredictionBands prediction_bands(const Eigen::VectorXd& predicted, const RowMatr
   return bands;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

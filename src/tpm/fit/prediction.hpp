@@ -4,7 +4,7 @@
 
 #include "tpm/fit/uncertainty.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Standard error of each prediction from the parameters' covariance (delta method); empty if the
 /// covariance is not of full rank. Parameters at a bound add nothing.
@@ -46,4 +46,4 @@ struct PredictionBands {
                                                const Eigen::VectorXd& noise_sd,
                                                BandKind kind = BandKind::pointwise);
 
-}  // namespace tpm
+}  // namespace tpm::fit

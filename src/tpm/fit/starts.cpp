@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// Starts that are followed to their end out of those that were looked at.
@@ -191,4 +191,4 @@ std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
   return starts;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include "tpm/fit/experiment_residuals.hpp"
 #include "tpm/fit/least_squares.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Where starts come from, which decides how they are followed.
 enum class StartKind {
@@ -43,4 +43,4 @@ enum class StartKind {
 [[nodiscard]] std::vector<std::vector<double>> fit_starts(const ExperimentResiduals& function,
                                                           std::span<const FitParameter> parameters);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr int kMostSteps = 60;
@@ -61,7 +61,7 @@ class CorrectedSurrogate final : public ResidualFunction {
   /// Corrects it at a point; false if the surrogate cannot be evaluated there.
   [[nodiscard]] bool correct_at(const KnownPoint& point) {
     KnownPoint own{point.natural, {}, {}, {}};
-    if (!tpm::evaluate(surrogate_, parameters_, own)) return false;
+    if (!tpm::fit::evaluate(surrogate_, parameters_, own)) return false;
     const RowMatrix slope = point.jacobian - own.jacobian;
     if (theta_.size() > 0) learn(point.theta - theta_, slope - slope_lacking_);
     theta_ = point.theta;
@@ -182,4 +182,4 @@ Minimum minimise_by_surrogate(const ResidualFunction& function, const ResidualFu
   return minimum;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/fit/least_squares.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// minimise_near() for a costly function, with a cheap one that changes much as it does. At each
 /// point the surrogate is corrected so that its residuals and their derivatives are the function's
@@ -15,4 +15,4 @@ namespace tpm {
                                             std::span<const FitParameter> parameters,
                                             std::span<const double> start, const FixedMask& fixed);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -11,7 +11,7 @@
 #include "tpm/store/delimited.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 namespace fs = std::filesystem;
@@ -311,4 +311,4 @@ FitResult run_fit(const FitProblem& problem) {
   return run_fit(problem.config, problem.data);
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

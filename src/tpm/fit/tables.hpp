@@ -4,7 +4,7 @@
 
 #include "tpm/fit/fit.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// A fit, and its data if they are in memory.
 struct FitProblem {
@@ -21,4 +21,4 @@ struct FitProblem {
 /// run_fit() of the problem.
 [[nodiscard]] FitResult run_fit(const FitProblem& problem);
 
-}  // namespace tpm
+}  // namespace tpm::fit

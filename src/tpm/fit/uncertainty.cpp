@@ -14,7 +14,7 @@
 #include "tpm/core/dense_algebra.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 double Threshold::residual_degrees() const {
   return std::max(data_count / inflation - parameter_count, 1.0);
@@ -380,4 +380,4 @@ double profile_deviance(const ResidualFunction& function, std::span<const FitPar
   return least;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -7,7 +7,7 @@
 
 #include "tpm/fit/least_squares.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// How far the deviance may rise inside a confidence set.
 struct Threshold {
@@ -119,4 +119,4 @@ struct Profile {
                                       std::span<const std::vector<double>> starts,
                                       std::size_t index, double value);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/law.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 /// The samples of a recording that are to be fitted, and those without a prediction among them.
@@ -64,4 +64,4 @@ std::optional<Error> unpredicted_window(const ExperimentResiduals& function,
   return std::nullopt;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

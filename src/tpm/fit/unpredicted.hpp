@@ -5,7 +5,7 @@
 #include "tpm/fit/experiment_residuals.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// Why no start could be evaluated: the first recording with samples in its fitted window that the
 /// law does not predict (a contact that shrinks or grows again, docs/laws.md), which of them, and
@@ -14,4 +14,4 @@ namespace tpm {
 [[nodiscard]] std::optional<Error> unpredicted_window(const ExperimentResiduals& function,
                                                       std::span<const double> natural);
 
-}  // namespace tpm
+}  // namespace tpm::fit

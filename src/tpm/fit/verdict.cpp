@@ -7,7 +7,7 @@
 
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 std::string percent(double level) {
@@ -290,4 +290,4 @@ std::string weakest_direction_words(const FitResult& result) {
   return fmt::format("the data see least: {} together; they trade off ({})", parts, strength);
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

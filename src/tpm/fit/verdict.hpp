@@ -4,7 +4,7 @@
 
 #include "tpm/fit/fit.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 
 /// From which limits the profile reached.
 [[nodiscard]] Verdict verdict_of(const ParameterResult& parameter);
@@ -35,4 +35,4 @@ namespace tpm {
 /// known_combination.
 [[nodiscard]] std::string weakest_direction_words(const FitResult& result);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -8,7 +8,7 @@
 
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::fit {
 namespace {
 
 constexpr double kSameDeviance = 1e-5;  // relative above 1: one minimum
@@ -57,4 +57,4 @@ Waterfall waterfall(std::span<const double> deviances, double margin) {
   return w;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

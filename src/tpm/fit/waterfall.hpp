@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace tpm {
+namespace tpm::fit {
 
 /// The ends of all starts in rising order: a stair with few broad steps means that the search finds
 /// the same minima again and again, a slope without steps that it gets stuck anywhere (Raue et al.,
@@ -22,4 +22,4 @@ struct Waterfall {
 /// @param deviances one per start in any order; not finite for a start that failed
 [[nodiscard]] Waterfall waterfall(std::span<const double> deviances, double margin = 0.1);
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -6,7 +6,7 @@
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// The element knows the motion of one sphere along its normal.
@@ -73,4 +73,4 @@ Formulations closed_form_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

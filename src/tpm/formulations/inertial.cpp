@@ -6,7 +6,7 @@
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/simulate/recorder.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 InertialOptions options_with_mass(const ExperimentScene& scene) {
@@ -123,4 +123,4 @@ Formulations inertial_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,8 @@
 #include "tpm/haptics/surface_scene.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
+using namespace haptics;
 namespace {
 
 class LoopContact final : public Formulation, public LoopMaker {
@@ -115,4 +116,4 @@ Formulations loop_contacts_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

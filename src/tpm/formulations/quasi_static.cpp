@@ -4,7 +4,7 @@
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/simulate/recorder.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// Every part of a quasi-static run begins with some factorisations and ends a step of time: a run
@@ -111,4 +111,4 @@ Formulations quasi_static_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,8 @@
 #include "tpm/reduce/condensed.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
+using namespace haptics;
 namespace {
 
 /// A formulation that is one or several candidates of plans, and runs scenes as one of them.
@@ -185,4 +186,4 @@ Formulations reduced_contacts_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpm/simulate/static_path.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 // A static run takes some factorisations at each stride: it iterates earlier than a quasi-static
@@ -81,4 +81,4 @@ Formulations static_equilibrium_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

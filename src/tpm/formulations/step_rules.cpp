@@ -9,7 +9,7 @@
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 class StepRuleFormulation final : public Formulation, public SceneRunner {
@@ -88,4 +88,4 @@ Formulations step_rules_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

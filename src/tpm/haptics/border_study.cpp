@@ -9,7 +9,7 @@
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/servo/servo_step.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr double kRates_Hz[] = {500.0, 1000.0, 2000.0, 4000.0};
@@ -188,4 +188,4 @@ BorderStudy study_borders(const PlantSettings& plant) {
   return study;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

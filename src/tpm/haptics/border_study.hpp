@@ -6,7 +6,7 @@
 
 #include "tpm/haptics/rendering_border.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// A border measured on the simulated device, beside what theory says of it.
 struct BorderPoint {
@@ -72,4 +72,4 @@ struct BorderStudy {
 
 [[nodiscard]] BorderStudy study_borders(const PlantSettings& plant);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -16,7 +16,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr int kMostTries = 10;
@@ -273,4 +273,4 @@ std::size_t clock_hazard_count() {
   return clock_hazards().size();
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -5,7 +5,7 @@
 
 #include "tpmkit/servo_record.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// What became of one hazard on the clock: the loop with its threads, the simulated device.
 struct ClockHazardRow {
@@ -37,4 +37,4 @@ struct ClockHazardStudy {
 /// How often `told` is called.
 [[nodiscard]] std::size_t clock_hazard_count();
 
-}  // namespace tpm
+}  // namespace tpm::haptics

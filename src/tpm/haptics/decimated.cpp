@@ -3,7 +3,7 @@
 
 #include "tpm/haptics/verify.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 /// The last sample to which a straight line from one passes all between within the tolerance: the
@@ -36,4 +36,4 @@ std::vector<std::size_t> decimated(const std::vector<double>& time,
   return kept;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

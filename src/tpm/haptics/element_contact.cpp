@@ -6,7 +6,7 @@
 #include "tpm/model/validity_limits.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 ElementContact::ElementContact(const BondElement& material, double period_s, ElementRule rule,
                                double dashpot_N_s_per_m)
@@ -60,4 +60,4 @@ Eigen::Matrix3d ElementContact::relaxed_stiffness() const noexcept {
   return stiffness;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

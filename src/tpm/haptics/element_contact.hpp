@@ -3,7 +3,7 @@
 #include "tpmkit/bond_element.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// How the relaxing spring of an element is advanced over a period.
 enum class ElementRule {
@@ -39,4 +39,4 @@ class ElementContact final : public ContactModel {
   double followed_m_ = 0.0;  ///< w: what the relaxing spring has relaxed to, dw/dt = (e - w)/tau
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

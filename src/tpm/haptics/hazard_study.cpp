@@ -11,7 +11,7 @@
 #include "tpm/haptics/session_run.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 enum class FaultKind {
@@ -492,4 +492,4 @@ std::size_t hazard_count() {
   return hazards().size();
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -5,7 +5,7 @@
 
 #include "tpmkit/servo_record.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// What became of one hazard, on the simulated device in virtual time.
 struct HazardRow {
@@ -48,4 +48,4 @@ struct HazardStudy {
 /// How often `told` is called.
 [[nodiscard]] std::size_t hazard_count();
 
-}  // namespace tpm
+}  // namespace tpm::haptics

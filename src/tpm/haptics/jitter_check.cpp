@@ -7,7 +7,7 @@
 
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 /// Nothing there: no force at any depth.
@@ -175,4 +175,4 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   return check;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

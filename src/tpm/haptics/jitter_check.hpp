@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/haptics/session_run.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// What a communication and jitter test has found.
 struct JitterCheck {
@@ -32,4 +32,4 @@ void assess(JitterCheck& check);
                                        double duration_s, RealTimeWish wish,
                                        const std::function<bool()>& interrupted = {});
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -5,7 +5,7 @@
 #include "tpmkit/contact_model.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// How a law is stepped in a loop.
 struct LawContactSettings {
@@ -77,4 +77,4 @@ class LawContact final : public ContactModel {
 /// beyond the deepest place asked for.
 [[nodiscard]] double trusted_depth_m(const LawFile& law, double deepest_m);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

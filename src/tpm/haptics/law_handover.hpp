@@ -2,7 +2,7 @@
 #include "tpm/haptics/law_contact.hpp"
 #include "tpm/law/stored_energy.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// A law in the loop and what it stores.
 struct LawInLoop {
@@ -42,4 +42,4 @@ struct HandOver {
 /// Carries out a possible hand-over; the new law then stands where the old one stood.
 void hand_over(const HandOver& decision, LawInLoop& to) noexcept;
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -7,7 +7,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 std::vector<double> law_forces_by_gauss(const LawFile& file, std::span<const double> time_s,
                                         std::span<const double> depth_m) {
@@ -75,4 +75,4 @@ std::vector<double> law_forces_by_gauss(const LawFile& file, std::span<const dou
   return forces;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// The force of a law with branches along a motion that is linear between instants, by Gauss's rule
 /// with eight points on each stretch of the integral of G dV: another way to the same number than
@@ -16,4 +16,4 @@ namespace tpm {
                                                       std::span<const double> time_s,
                                                       std::span<const double> depth_m);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

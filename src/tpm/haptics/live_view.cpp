@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/recording.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr std::size_t kMostPoints = 500;  // 20 s
@@ -324,4 +324,4 @@ std::string LiveView::state_json(std::uint64_t after) const {
   return json.dump();
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

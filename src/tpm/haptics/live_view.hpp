@@ -8,7 +8,7 @@
 #include "tpm/haptics/session.hpp"
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// What the page of a session shows (docs/haptics.md). One thread feeds it with records, in real
 /// time the one that writes them and never the servo thread; any number may ask.
@@ -75,4 +75,4 @@ class LiveView {
 /// The same before the session begins, from a row of waiting.
 [[nodiscard]] std::string instruction_of(const ServoRecord& waiting);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -14,7 +14,7 @@
 #include "tpm/servo/triple_buffer.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// The two ends of a step that the caller's loop holds: where the tool is, and the force on it.
 class CallersDevice final : public HapticDevice {
@@ -174,4 +174,4 @@ void LoopContact::positions(Eigen::Ref<Eigen::Matrix3Xd> all) noexcept {
   all = shape.rest_m + displacement_m_;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

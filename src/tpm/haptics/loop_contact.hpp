@@ -9,7 +9,7 @@
 #include "tpm/haptics/session.hpp"
 #include "tpm/servo/servo_step.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// How a contact is opened for a haptic loop of the caller's own.
 struct LoopContactOptions {
@@ -82,4 +82,4 @@ class LoopContact {
   Eigen::Vector3d drawn_at_m_ = Eigen::Vector3d::Zero();  ///< contact at the last of them
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -2,7 +2,7 @@
 #include "tpm/haptics/session.hpp"
 #include "tpmkit/formulation.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Makes what the servo loop of a session steps: a role of a formulation
 /// (formulation/formulation.hpp). Formulations with the capability `servo` and candidates for plans
@@ -28,4 +28,4 @@ class LoopMaker {
 /// none does.
 [[nodiscard]] LoopModel offered_loop(const Formulation& formulation, const HilSession& session);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

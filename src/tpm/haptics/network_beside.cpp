@@ -6,7 +6,7 @@
 
 #include "tpm/reduce/pushed_contact.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr double kBesideEvery_s = 5e-3;
@@ -139,4 +139,4 @@ ContactAnswer NetworkBeside::step(const ToolPose& tool) noexcept {
   return answer;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -3,10 +3,11 @@
 #include <thread>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/servo/triple_buffer.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Tangent stiffness at a contact, by its depth: instantaneous, of a tissue that has relaxed there.
 class StiffnessByDepth {
@@ -95,4 +96,4 @@ class NetworkBeside final : public ContactModel {
   std::thread thread_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -15,7 +15,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using PageClock = std::chrono::steady_clock;
@@ -304,4 +304,4 @@ std::string PageServer::address() const {
   return fmt::format("http://127.0.0.1:{}/", port());
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 
 #include "tpm/haptics/live_view.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Serves the page of a session on 127.0.0.1, to be read only, from threads of its own which give
 /// way to all others. What it takes from strangers is bounded: connections, bytes, time.
@@ -28,4 +28,4 @@ class PageServer {
   std::unique_ptr<Service> service_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

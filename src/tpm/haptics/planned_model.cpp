@@ -15,7 +15,7 @@
 #include "tpm/plan/plan_model.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 ContactRange range_of(const HilSession& session, double deepest_m) {
@@ -203,4 +203,4 @@ LoopModel offered_loop(const Formulation& formulation, const HilSession& session
                   fmt::format("one of {}, {}", kPlannedModel, formulations_that(for_sessions)));
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

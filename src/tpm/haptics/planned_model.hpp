@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/haptics/session.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// The model that a plan picks for a session: its deepest push at its fastest rate with its longest
 /// rest, at its rate and within its tolerance, the contact guided along the push as in the loop.
@@ -9,4 +9,4 @@ namespace tpm {
 /// Throws as make_loop_model().
 [[nodiscard]] LoopModel planned_model(const HilSession& session, const PlanningTold& told);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

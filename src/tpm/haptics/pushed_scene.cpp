@@ -7,7 +7,7 @@
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 double deepest_of(const HilSession& session) {
@@ -74,4 +74,4 @@ std::unique_ptr<ServoNetwork> PushedScene::network(double period_s) const {
                                         probe().direction, options);
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -1,9 +1,10 @@
 #pragma once
+#include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/session.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 [[nodiscard]] TissueShape shape_of(const Network& network, std::size_t contact,
                                    const Eigen::Vector3d& push);
@@ -30,4 +31,4 @@ struct PushedScene {
   double deepest_m;  ///< of the session, with some room for an operator that goes deeper
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -10,7 +10,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr const char* kFormat = "tpm hil recording 2";
@@ -175,4 +175,4 @@ std::string device_line(const HilRecording& recording) {
                      device.at("kind").get<std::string>(), mode);
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -6,7 +6,7 @@
 #include "tpm/haptics/session.hpp"
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// What a person adds to a recording. Codes, not names: the recording may be passed on. Nothing is
 /// required.
@@ -52,4 +52,4 @@ struct HilRecording {
 /// "SIMULATED DEVICE" in words that suit the recording, or what the hardware is.
 [[nodiscard]] std::string device_line(const HilRecording& recording);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -7,7 +7,7 @@
 #include "tpm/store/hdf5.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 struct FlagWord {
@@ -194,4 +194,4 @@ void export_recording(const HilRecording& recording, std::string_view sha256,
   writer.commit();
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 
 #include "tpm/haptics/recording.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Writes a recording as HDF5 (docs/haptics.md): a list for each column of its rows, with unit and
 /// meaning, the phases, and what stands before and behind the rows. Throws Error(environment).
@@ -12,4 +12,4 @@ namespace tpm {
 void export_recording(const HilRecording& recording, std::string_view sha256,
                       const std::filesystem::path& file);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -9,7 +9,7 @@
 
 #include "tpm/core/dense_algebra.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -234,4 +234,4 @@ double largest_stable_stiffness(RenderedContact contact, const PlantSettings& pl
   });
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 #include "tpm/device/virtual_plant.hpp"
 #include "tpm/haptics/element_contact.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// A linear contact as it is rendered: an element without tension, at rest.
 struct RenderedContact {
@@ -62,4 +62,4 @@ enum class BorderBy { measurement, prediction };
 [[nodiscard]] double largest_stable_stiffness(RenderedContact contact, const PlantSettings& plant,
                                               BorderBy by);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -9,7 +9,7 @@
 #include "tpm/device/device_limits.hpp"
 #include "tpm/haptics/rendering_border.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr double kAtLoads_m = 0.010;
@@ -180,4 +180,4 @@ Json to_json(const RenderingCheck& check) {
           {"warnings", check.warnings}};
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

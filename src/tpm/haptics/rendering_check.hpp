@@ -4,7 +4,7 @@
 
 #include "tpm/haptics/session.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Can this tissue be rendered on this device? Found before a session begins.
 struct RenderingCheck {
@@ -55,4 +55,4 @@ struct RenderingCheck {
 
 [[nodiscard]] Json to_json(const RenderingCheck& check);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -17,7 +17,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 double in_range(const Json& block, const char* key, Dimension dimension, double usual, double least,
@@ -439,4 +439,4 @@ HilSession read_session(const std::filesystem::path& file, const SessionChanges&
   return session;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -17,7 +17,7 @@
 #include "tpmkit/device.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// A stretch of a session.
 enum class SessionPhaseKind {
@@ -140,4 +140,4 @@ inline constexpr std::size_t kPlanningSteps = 5;
 [[nodiscard]] LoopModel make_loop_model(const HilSession& session, bool threads = false,
                                         const PlanningTold& told = {});
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -1,9 +1,10 @@
+#include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/loop_maker.hpp"
 #include "tpm/haptics/planned_model.hpp"
 #include "tpm/network/material_refusal.hpp"
 #include "tpm/plan/plan_model.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 /// Throws Error(bad_input) that names the formulations of sessions that can, unless this one takes
@@ -50,4 +51,4 @@ LoopModel make_loop_model(const HilSession& session, bool threads, const Plannin
   return loop;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

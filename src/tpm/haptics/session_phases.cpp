@@ -10,7 +10,7 @@
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr double kClearance_m = 0.002;  // in the air, before and after each touch
@@ -223,4 +223,4 @@ std::vector<SessionPhase> parse_phases(const Json& session, const DocumentPlace&
   return list.take();
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

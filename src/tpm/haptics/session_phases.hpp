@@ -2,7 +2,7 @@
 #include "tpm/haptics/session.hpp"
 #include "tpm/store/document_place.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Puts the motion itself in place of the name of a recording in the block `motion`: depths from
 /// the law's contact point on, evenly spaced in time, linear between the samples of the recording;
@@ -16,4 +16,4 @@ void embed_motion(Json& session, const LawFile& law, double period_s,
 [[nodiscard]] std::vector<SessionPhase> parse_phases(const Json& session,
                                                      const DocumentPlace& place);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

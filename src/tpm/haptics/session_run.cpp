@@ -11,7 +11,7 @@
 #include "tpm/store/row_log.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr std::int64_t kPassOnEvery_ns = 50'000'000;
@@ -176,4 +176,4 @@ SessionRun run_session_on(const HilSession& session, const std::shared_ptr<Hapti
   return run_on(session, choice, limits, options, [&] { return device; });
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -6,7 +6,7 @@
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/rendering_check.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Which device, and what it may do.
 struct DeviceChoice {
@@ -77,4 +77,4 @@ struct DevicePermissions {
 [[nodiscard]] SessionRun run_session(const HilSession& session, const DeviceChoice& device,
                                      const SessionRunOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

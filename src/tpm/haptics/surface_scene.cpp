@@ -10,7 +10,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/reduce/surface_network.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 /// Depth of an organ's surface along a straight way across the push, from where a ball touches it.
@@ -113,4 +113,4 @@ LoopModel surface_model(const HilSession& session) {
   return loop;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -2,7 +2,7 @@
 #include "tpm/haptics/pushed_scene.hpp"
 #include "tpm/network/ball_on_network.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// The scene of a session with a ball on its surface.
 struct SurfaceScene {
@@ -23,4 +23,4 @@ void follow_surface(HilSession& session);
 /// The model of a session of the kind `surface`; its stiffness is still to come.
 [[nodiscard]] LoopModel surface_model(const HilSession& session);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -8,7 +8,7 @@
 #include "tpm/haptics/verify_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 void FidelitySum::add(double commanded_N, double reference_N) {
   add_error(commanded_N - reference_N, reference_N);
@@ -147,4 +147,4 @@ Verification verify(const HilRecording& recording, const VerifyOptions& options)
   return verify_along_push(recording, options);
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -5,7 +5,7 @@
 
 #include "tpm/haptics/recording.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 struct VerifyOptions {
   double motion_tolerance_m = 5e-6;  ///< of the decimated motion, > 0; not of a ball in space
@@ -97,4 +97,4 @@ struct Verification {
 /// can be compared.
 [[nodiscard]] Verification verify(const HilRecording& recording, const VerifyOptions& options = {});
 
-}  // namespace tpm
+}  // namespace tpm::haptics

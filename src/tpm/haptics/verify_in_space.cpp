@@ -9,7 +9,7 @@
 #include "tpm/method/ball_by_cvode.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 /// In the coordinates of the scene.
@@ -156,4 +156,4 @@ Verification verify_in_space(const HilRecording& recording, const VerifyOptions&
   return v;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

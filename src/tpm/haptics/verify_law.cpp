@@ -8,7 +8,7 @@
 #include "tpm/haptics/verify_parts.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 /// Depth of the model's tool: of a tool that touches that of the surface, slip included.
@@ -116,4 +116,4 @@ Verification verify_law(const HilRecording& recording, const VerifyOptions& opti
   return v;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -13,7 +13,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 struct Motion {
@@ -256,4 +256,4 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   return v;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -7,7 +7,7 @@
 
 #include "tpm/haptics/verify.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// In place of a force of the reference where it has no equilibrium.
 inline constexpr double kNoReference = std::numeric_limits<double>::quiet_NaN();
@@ -64,4 +64,4 @@ void leave_out_what_has_no_reference(Verification& v);
                                            const VerifyOptions& options);
 [[nodiscard]] Verification verify_law(const HilRecording& recording, const VerifyOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::haptics

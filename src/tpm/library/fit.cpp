@@ -5,7 +5,8 @@
 #include "tpm/fit/tables.hpp"
 #include "tpm/study/selection.hpp"
 
-namespace tpm {
+namespace tpm::fit {
+using namespace study;
 namespace {
 
 FitSummary summary_of(const FitResult& fit) {
@@ -62,4 +63,4 @@ FitSummary fit_recordings(const std::vector<std::filesystem::path>& files,
   return summary;
 }
 
-}  // namespace tpm
+}  // namespace tpm::fit

@@ -5,7 +5,7 @@
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 Scene::Scene(std::shared_ptr<const ExperimentScene> scene,
              std::shared_ptr<const RunNetwork> network)
@@ -78,8 +78,8 @@ Trajectory Scene::run(const std::vector<double>& times_s, bool with_field) const
 
 std::vector<std::filesystem::path> Scene::simulate(const std::filesystem::path& result) const {
   (void)Hdf5Writer(result);  // before a long run, not after it: can the result be written?
-  const SimulationRun run = tpm::simulate(*scene_, *network_);
+  const SimulationRun run = tpm::organ::simulate(*scene_, *network_);
   return {result, write_simulation(*scene_, *network_, run, result)};
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 Session::Session(const std::filesystem::path& file, const std::filesystem::path& law)
     : session_(std::make_shared<const HilSession>(read_session(file, {.law = law, .motion = {}}))) {
@@ -56,4 +56,4 @@ SessionCheck verify_session(const std::filesystem::path& recording) {
           .reference_error_N = check.reference_error_N};
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -8,7 +8,7 @@
 
 #include "tpm/solve/sundials.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using sundials::check;
@@ -398,4 +398,4 @@ std::unique_ptr<AdaptiveRule> adaptive_rule(StepSystem& system, const MethodSett
   return std::make_unique<CvodeRule>(*newton, settings);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

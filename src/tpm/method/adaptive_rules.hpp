@@ -2,7 +2,7 @@
 // The rules that choose their steps: CVODE and IDA.
 #include "tpm/method/step_system.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// An integrator with error control that is restarted wherever the equations change.
 class AdaptiveRule {
@@ -30,4 +30,4 @@ class AdaptiveRule {
 [[nodiscard]] std::unique_ptr<AdaptiveRule> adaptive_rule(StepSystem& system,
                                                           const MethodSettings& settings);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -13,7 +13,7 @@
 #include "tpm/solve/sundials.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using StateView = Eigen::Map<Eigen::VectorXd>;
@@ -147,4 +147,4 @@ std::vector<Eigen::Vector3d> ball_forces_by_cvode(const BondSystem& bonds, const
   return forces;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/network/ball_on_network.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Where the centre of a ball is at an instant.
 struct BallPlace {
@@ -25,4 +25,4 @@ struct BallPlace {
     const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
     const BallTool& ball, std::span<const BallPlace> places, double tolerance);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,6 +1,6 @@
 #include "tpm/method/bond_projection.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 BondProjection::BondProjection(const BondSystem& bonds, const Constraints& constraints)
     : bonds_(bonds),
@@ -38,4 +38,4 @@ void BondProjection::sweep(Positions& position, const BondMemory& memory,
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

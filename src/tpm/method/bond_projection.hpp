@@ -5,7 +5,7 @@
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/constraints.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Bonds with viscous state as compliant constraints (Macklin, Mueller, Chentanez: XPBD, 2016). The
 /// viscous elongation at the end of a step is y = offset + relaxation_factor V(l), so that it pulls
@@ -36,4 +36,4 @@ class BondProjection {
   Eigen::VectorXd tension_;  ///< N
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 #include "tpm/method/step_system.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kDepthGrain = 4.0 * std::numeric_limits<double>::epsilon();
@@ -339,4 +339,4 @@ std::unique_ptr<StepSystem> element_system(const BondElement& material, const Pr
   return std::make_unique<ElementSystem>(material, protocol, mass);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

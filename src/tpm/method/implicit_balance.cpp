@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kMostNewtonSteps = 60;
@@ -152,4 +152,4 @@ MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

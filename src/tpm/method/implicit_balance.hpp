@@ -5,7 +5,7 @@
 #include "tpm/method/method.hpp"
 #include "tpm/network/equilibrium.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A spring on each sphere that draws it to a place: what inertia is in an implicit stage.
 struct SphereAnchors {
@@ -66,4 +66,4 @@ class ImplicitBalance {
   Eigen::Matrix3Xd force_, step_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -11,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Vector = Eigen::VectorXd;
@@ -390,4 +390,4 @@ std::unique_ptr<MethodProblem> network_problem(const DrivenNetwork& network, Pro
   return std::make_unique<NetworkProblem>(network, std::move(protocol), std::move(mass));
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

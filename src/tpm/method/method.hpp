@@ -12,7 +12,7 @@
 #include "tpmkit/bond_element.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A rule by which a motion is advanced.
 enum class StepRule {
@@ -134,4 +134,4 @@ class MethodProblem {
                                                              Protocol protocol,
                                                              std::optional<MethodMasses> mass = {});
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -12,7 +12,7 @@
 #include "tpm/network/lowest_mode.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Spheres = Eigen::Map<Eigen::Matrix3Xd>;
@@ -482,4 +482,4 @@ std::unique_ptr<StepSystem> network_system(const DrivenNetwork& network, const P
   return std::make_unique<RestingNetwork>(network, protocol);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 
 #include "tpm/solve/relaxation_filter.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 ImplicitStage ImplicitStage::of(Eigen::VectorXd known, double c,
                                 const Eigen::VectorXd& relaxation_times_s) {
@@ -299,4 +299,4 @@ std::unique_ptr<FixedRule> fixed_rule(StepSystem& system, const MethodSettings& 
   return nullptr;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

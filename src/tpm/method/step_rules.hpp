@@ -2,7 +2,7 @@
 // The rules with given steps, written once for elements and networks.
 #include "tpm/method/step_system.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// One rule with given steps on a system. Orders are those of kStepRules.
 class FixedRule {
@@ -23,4 +23,4 @@ class FixedRule {
 [[nodiscard]] std::unique_ptr<FixedRule> fixed_rule(StepSystem& system,
                                                     const MethodSettings& settings);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -2,7 +2,7 @@
 // What a step rule sees of a problem: states, their rates, and implicit stages.
 #include "tpm/method/method.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// An implicit stage of a step, the velocities and the viscous elongations eliminated:
 ///
@@ -148,4 +148,4 @@ template <>
                                                          const Protocol& protocol,
                                                          const std::optional<MethodMasses>& mass);
 
-}  // namespace tpm
+}  // namespace tpm::organ

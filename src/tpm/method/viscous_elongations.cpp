@@ -1,6 +1,6 @@
 #include "tpm/method/viscous_elongations.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 ViscousElongations::ViscousElongations(const BondSystem& bonds)
     : of_law_(bonds.laws().size()), all_bonds_(static_cast<Eigen::Index>(bonds.size())) {
@@ -45,4 +45,4 @@ void ViscousElongations::spread(const Vector& of_bond, Vector& of_y) const {
   for (const One& one : ones_) of_y[k++] = of_bond[static_cast<Eigen::Index>(one.bond)];
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 
 #include "tpm/network/bond_system.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The viscous elongations m_j of a network as one vector y: bond by bond of those that relax, the
 /// branches of a bond one after the other.
@@ -42,4 +42,4 @@ class ViscousElongations {
   Vector times_s_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -10,7 +10,7 @@
 #include "tpm/solve/relaxation_filter.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 BondSystem with_ball(const BondSystem& bonds, const BallTool& ball) {
@@ -140,4 +140,4 @@ double BallOnNetwork::dissipation_W() const {
   return network_.bonds.dissipation_W(network_.position, viscous_);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/network/equilibrium.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A rigid ball without friction that pushes spheres of an organ away and does not hold them. Each
 /// sphere that it overlaps is pushed along the line of centres; the pair stores k/2 overlap^2.
@@ -82,4 +82,4 @@ class BallOnNetwork {
   Eigen::VectorXd elongation_, viscous_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,7 @@
 #include "tpm/network/material_refusal.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kPartsKept = 4;
@@ -441,4 +441,4 @@ void require_one_linear_branch(const BondSystem& bonds, std::string_view who) {
   require_material(bonds, who, {});
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -12,7 +12,7 @@
 #include "tpm/network/viscous_law.hpp"
 #include "tpm/solve/block_ldlt.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A share of the viscous elongation that follows the elongation within a step: one number for all
 /// bonds, or one for each law of a BondSystem.
@@ -243,4 +243,4 @@ class BondSystem {
 /// @param formulation in words, such as "the condensed model"
 void require_one_linear_branch(const BondSystem& bonds, std::string_view formulation);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::organ {
 
 Constraints::Constraints(std::size_t spheres)
     : state_(spheres, State::free), projector_(spheres, Eigen::Matrix3d::Identity()) {}
@@ -89,4 +89,4 @@ void Constraints::constrain(const BondSystem& bonds, BlockMatrix& matrix) const 
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 #include "tpm/network/bond_system.hpp"
 #include "tpm/solve/lanes.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Free directions of each sphere. In the other directions it is fixed or moves as imposed, and the
 /// force there is a reaction.
@@ -53,4 +53,4 @@ class Constraints {
   std::vector<Eigen::Matrix3d> projector_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

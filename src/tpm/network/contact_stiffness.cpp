@@ -1,6 +1,6 @@
 #include "tpm/network/contact_stiffness.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 HeldStiffness held_stiffness(const BondSystem& bonds, const Positions& rest, std::size_t sphere,
                              const Eigen::Vector3d& direction) {
@@ -22,4 +22,4 @@ HeldStiffness star_stiffness(const BondMaterial& material) {
   return {material.instantaneous_Pa() * length, material.equilibrium_Pa * length};
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/network/bond_system.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Resistance to a small displacement of one sphere while all others are fixed, N/m.
 struct HeldStiffness {
@@ -18,4 +18,4 @@ struct HeldStiffness {
 /// bonds are square to the displacement).
 [[nodiscard]] HeldStiffness star_stiffness(const BondMaterial& material);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -8,7 +8,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,
                              const Constraints& constraints, std::vector<Probe> driven,
@@ -100,4 +100,4 @@ void require_expected_contacts(const DrivenNetwork& network, const Positions& po
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

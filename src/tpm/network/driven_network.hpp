@@ -5,7 +5,7 @@
 #include "tpm/network/tool.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A tool and how it takes part in what is imposed.
 struct PressedTool {
@@ -67,4 +67,4 @@ struct ToolState {
 void require_expected_contacts(const DrivenNetwork& network, const Positions& position,
                                double radius_m, double time_s);
 
-}  // namespace tpm
+}  // namespace tpm::organ

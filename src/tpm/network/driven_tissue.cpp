@@ -2,7 +2,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Constraints constraints,
                            const Probes& probes, Drive drive, EquilibriumOptions options)
@@ -197,4 +197,4 @@ double DrivenTissue::driven_mass_kg(const Eigen::VectorXd& mass_kg) const {
   return mass;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/solve/lanes.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The tissue at an instant.
 struct TissueState {
@@ -112,4 +112,4 @@ class DrivenTissue {
   Equilibrium equilibrium_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include "tpm/network/large_equilibrium.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kServes = 0.1;      // of the forces left: a factor that leaves more is made anew
@@ -121,4 +121,4 @@ EquilibriumSearch Equilibrium::find_directly(Positions& position, const BondMemo
   return search;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 #include "tpm/network/newton_balance.hpp"
 #include "tpm/network/stiffness_blocks.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 class LargeEquilibrium;
 
@@ -111,4 +111,4 @@ class Equilibrium {
   bool stable_ = false;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

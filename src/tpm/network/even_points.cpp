@@ -9,7 +9,7 @@
 #include "tpm/network/neighbours.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -120,4 +120,4 @@ void round_to_nanometres(Positions& positions) {
   positions = (positions * 1e9).array().round() / 1e9;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 #include "tpm/network/lattice.hpp"
 #include "tpm/network/surface.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What a shell of spheres is asked to be. The surface fixes the size, so one of count and spacing
 /// is free and follows from the other: an outer layer of n spheres at spacing x covers n x^2
@@ -71,4 +71,4 @@ void require_sphere_count(std::size_t count);
 /// Each coordinate rounded to a nanometre, so that numbers and output do not hang on last bits.
 void round_to_nanometres(Positions& positions);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,7 @@
 #include "tpm/network/large_equilibrium.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 // Met before the balance is reached, it may be the stride's fault.
@@ -159,4 +159,4 @@ IndentationResult indent(const BondSystem& bonds, const Constraints& constraints
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

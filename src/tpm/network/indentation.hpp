@@ -4,7 +4,7 @@
 
 #include "tpm/network/newton_balance.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A patch of spheres glued to a flat punch and pushed into a tissue at rest.
 struct PatchIndentation {
@@ -70,4 +70,4 @@ class LargeEquilibrium;
                                        const Positions& rest, const PatchIndentation& indentation,
                                        const EquilibriumFinder& finder);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -11,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 void require_valid(const InertialOptions& options) {
@@ -300,4 +300,4 @@ InertialRun Inertial::run(const Protocol& protocol, std::span<const double> time
       .go();
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/network/lowest_mode.hpp"
 #include "tpm/network/quasistatic.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// How the linear systems of CVODE's Newton iteration are solved.
 enum class NewtonSolver {
@@ -147,4 +147,4 @@ class Inertial {
   LowestMode lowest_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

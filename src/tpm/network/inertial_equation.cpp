@@ -5,7 +5,7 @@
 
 #include "tpm/network/tool_impact.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Spheres = Eigen::Map<Eigen::Matrix3Xd>;
@@ -425,4 +425,4 @@ void InertialEquation::solve(Eigen::Ref<Vector> x) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 
 #include "tpm/network/stage_balance.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Mass and damping of a network.
 struct Inertia {
@@ -150,4 +150,4 @@ class InertialEquation {
   std::vector<char> factorised_pressing_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

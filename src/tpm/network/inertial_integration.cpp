@@ -9,7 +9,7 @@
 
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using sundials::check;
@@ -218,4 +218,4 @@ InertialWork InertialIntegration::work_of_piece() const {
   return w;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/network/inertial_equation.hpp"
 #include "tpm/solve/sundials.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// One integration by CVODES (BDF, Newton), restarted wherever the equations change.
 class InertialIntegration {
@@ -50,4 +50,4 @@ class InertialIntegration {
   InertialWork before_;  ///< of the pieces that are over
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

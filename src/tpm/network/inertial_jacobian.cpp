@@ -1,7 +1,7 @@
 // The sparse Jacobian of the equations of motion.
 #include "tpm/network/inertial_equation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Triplets = std::vector<Eigen::Triplet<double, std::int64_t>>;
@@ -98,4 +98,4 @@ InertialEquation::Sparse InertialEquation::jacobian(double time_s, const ConstVe
   return matrix;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -37,4 +37,4 @@ LandingSite flatten_landing_site(const Surface& surface, Positions& outer, std::
   return site;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/network/surface.hpp"
 #include "tpmkit/organ.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Reach of a landing site around its sphere, in spacings: the default support of a network.
 inline constexpr double kLandingReach = 1.5;
@@ -25,4 +25,4 @@ struct LandingSite {
 [[nodiscard]] LandingSite flatten_landing_site(const Surface& surface, Positions& outer,
                                                std::size_t sphere, double spacing);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 
 #include "tpm/core/wide_vectors.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kSphere = std::size_t{3} * kLanes;
@@ -353,4 +353,4 @@ void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& 
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

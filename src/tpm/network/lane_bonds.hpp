@@ -5,7 +5,7 @@
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/solve/lanes.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The bonds of a system, working on several states of the network at once, over which the same
 /// contacts with tools are closed. Positions and forces have three columns per sphere; what bonds
@@ -91,4 +91,4 @@ class LaneBonds {
   std::vector<std::size_t> number_;  ///< of each in the system
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

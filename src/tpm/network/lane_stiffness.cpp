@@ -1,6 +1,6 @@
 #include "tpm/network/lane_stiffness.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kLaneTolerance = 1e-4;
@@ -34,4 +34,4 @@ void LaneStiffness::solve(LaneMatrix& x) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/network/equilibrium.hpp"
 #include "tpm/solve/lane_factor.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Solutions with the stiffness of an Equilibrium for states side by side, good to about 1e-4: to
 /// correct iterates whose residual is found in double precision. Direct: a copy of the
@@ -28,4 +28,4 @@ class LaneStiffness {
   std::optional<LaneFactor> factor_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -8,7 +8,7 @@
 #include "tpm/solve/preconditioners.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 // Eisenstat and Walker's choice 2 and its safeguard.
@@ -157,4 +157,4 @@ std::vector<std::size_t> LargeEquilibrium::level_sizes() const {
   return multigrid == nullptr ? std::vector<std::size_t>{} : multigrid->level_sizes();
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

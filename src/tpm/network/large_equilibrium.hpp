@@ -7,7 +7,7 @@
 #include "tpm/network/stiffness_rows.hpp"
 #include "tpm/solve/multigrid.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// How conjugate gradients are preconditioned.
 enum class PreconditionerKind { block_jacobi, incomplete_cholesky, multigrid };
@@ -84,4 +84,4 @@ class LargeEquilibrium {
   LargeEquilibriumWork work_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

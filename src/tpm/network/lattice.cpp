@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -48,4 +48,4 @@ double volume_per_sphere(Lattice lattice, double spacing) {
   return grid;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/core/enum_names.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Regular arrangements of spheres, by their neighbours: 6, 8 or 12 at the spacing.
 enum class Lattice { cubic, bcc, fcc };
@@ -32,4 +32,4 @@ class LatticePoints {
 /// @param spacing distance of nearest neighbours, m
 [[nodiscard]] double volume_per_sphere(Lattice lattice, double spacing);
 
-}  // namespace tpm
+}  // namespace tpm::organ

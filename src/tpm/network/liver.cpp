@@ -10,7 +10,7 @@
 #include "tpm/network/filling.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -103,4 +103,4 @@ Organ paper_liver() {
   return fill_liver({});
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 
 #include "tpm/network/liver_surface.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A liver filled with spheres. With a spacing, count and spacing decide the size, and of the shape
 /// only the proportions count: the outer layer covers n x^2 sqrt(3)/2. Without one the shape has
@@ -33,4 +33,4 @@ struct LiverRequest {
 /// fill_liver with the defaults.
 [[nodiscard]] Organ paper_liver();
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -260,4 +260,4 @@ SurfacePoint front_of_right_lobe(const LiverShape& shape, const Surface& surface
   return surface.nearest({0.5 * shape.width * (1.0 - shape.right_share), 0.0, -0.5 * shape.depth});
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

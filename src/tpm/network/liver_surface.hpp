@@ -5,7 +5,7 @@
 
 #include "tpm/network/mesh_surface.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A liver in named measures. Axes: x to the patient's right, y up, z to the back; the probe comes
 /// from the front, along +z. All lengths refer to the lobes before they are blended into each
@@ -50,4 +50,4 @@ void require_valid(const LiverShape& shape, std::string_view where);
 /// The point in the middle of the front of the right lobe, where a surgeon's probe gets at it.
 [[nodiscard]] SurfacePoint front_of_right_lobe(const LiverShape& shape, const Surface& surface);
 
-}  // namespace tpm
+}  // namespace tpm::organ

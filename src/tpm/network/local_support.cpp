@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Eigen::Index;
@@ -136,4 +136,4 @@ void require_supported(const BondSystem& bonds, const Organ& organ, const Constr
       "diagonal bonds between the layers, or a wider support");
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

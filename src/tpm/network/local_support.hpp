@@ -5,7 +5,7 @@
 #include "tpm/network/constraints.hpp"
 #include "tpm/network/network.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Below this share a sphere counts as loose. Sound networks (livers, shells and solid, blocks of
 /// every lattice; support 1.5) have 0.33 and more everywhere, a shell without diagonal bonds 0.001.
@@ -29,4 +29,4 @@ void require_supported(const BondSystem& bonds, const Organ& organ, const Constr
 /// "sphere 7", "spheres 12, 14 and 5 more"; numbers from 1.
 [[nodiscard]] std::string sphere_list(const std::vector<std::size_t>& spheres);
 
-}  // namespace tpm
+}  // namespace tpm::organ

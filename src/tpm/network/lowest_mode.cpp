@@ -9,7 +9,7 @@
 #include "tpm/network/rigidity.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kVectors = 6;  // iterated at once: the lowest converges by its gap to the 7th
@@ -136,4 +136,4 @@ LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest,
   throw Error(ExitCode::numerical, "lowest mode", "its frequency does not settle");
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

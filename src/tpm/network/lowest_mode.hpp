@@ -2,7 +2,7 @@
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/constraints.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// kg, one per sphere: a density times the volume of the spheres.
 /// @param density_kg_per_m3 > 0; 1060 is that of liver (docs/notation.md)
@@ -38,4 +38,4 @@ struct LowestMode {
                                      const Constraints& constraints,
                                      const Eigen::VectorXd& mass_kg);
 
-}  // namespace tpm
+}  // namespace tpm::organ

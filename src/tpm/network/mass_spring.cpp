@@ -8,7 +8,7 @@
 #include "tpm/network/rigidity.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 double contact_stiffness_N_per_m(const BondSystem& bonds, const Positions& rest,
                                  const Constraints& constraints, const Probe& probe,
@@ -53,4 +53,4 @@ BondMaterial msm_material(const Network& msm, const Constraints& constraints, co
   return material;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

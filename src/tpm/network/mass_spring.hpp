@@ -2,7 +2,7 @@
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/quasistatic.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Which springs the mass-spring model has.
 enum class SpringRule {
@@ -29,4 +29,4 @@ enum class SpringRule {
 [[nodiscard]] BondMaterial msm_material(const Network& msm, const Constraints& constraints,
                                         const Probe& probe, double stiffness_N_per_m);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 std::array<TangentDirection, 3> material_directions(const Network& network, double E1_Pa,
                                                     double E2_Pa, double modulus_to_stiffness_m) {
@@ -86,4 +86,4 @@ TangentDirection direction_between(const BondSystem& minus, const BondSystem& bo
   return direction;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 
 #include "tpm/network/quasistatic.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The changes of a network's bonds per Pa of the paper's E1, E2 and E', in that order: what
 /// QuasiStaticOptions::directions takes. The change of the relaxation time is part of them.
@@ -19,4 +19,4 @@ namespace tpm {
 [[nodiscard]] TangentDirection direction_between(const BondSystem& minus, const BondSystem& bonds,
                                                  const BondSystem& plus, double step);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 BondLaws::BondLaws(const Network& network, const MaterialField& field)
     : network_(network), field_(field) {
@@ -45,4 +45,4 @@ BondLaws::Found BondLaws::of(std::size_t bond) {
   return {&blend_, 1.0};
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

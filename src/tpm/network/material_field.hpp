@@ -5,7 +5,7 @@
 #include "tpm/network/network.hpp"
 #include "tpmkit/bond_material.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Which material the spheres of a network stand in. A bond between two spheres of one material and
 /// one factor has their law; between others it follows by `between`.
@@ -46,4 +46,4 @@ class BondLaws {
   BondLaw blend_;                          ///< the latest
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

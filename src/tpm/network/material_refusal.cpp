@@ -6,7 +6,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 bool relaxes_on_kernel(const BondSystem& bonds) {
@@ -73,4 +73,4 @@ void require_material(const BondSystem& bonds, std::string_view who,
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

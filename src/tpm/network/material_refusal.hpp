@@ -6,7 +6,7 @@
 #include "tpm/network/bond_system.hpp"
 #include "tpmkit/formulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// True for laws of the same branches on the same kernel.
 [[nodiscard]] bool relax_alike(const ViscousLaw& a, const ViscousLaw& b);
@@ -30,4 +30,4 @@ using MaterialNeed = bool Capabilities::*;
 void require_material(const BondSystem& bonds, std::string_view who,
                       std::initializer_list<MaterialNeed> takes);
 
-}  // namespace tpm
+}  // namespace tpm::organ

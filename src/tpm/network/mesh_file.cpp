@@ -12,7 +12,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -99,4 +99,4 @@ ClosedMesh read_closed_mesh(const std::filesystem::path& path, const Unit& unit)
   return closed_mesh(mesh, path.string());
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

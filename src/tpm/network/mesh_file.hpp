@@ -4,7 +4,7 @@
 #include "tpm/network/triangle_mesh.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Reads a closed surface from an STL (text or binary) or OBJ file; polygons are cut into
 /// triangles, and all objects of the file make one surface. Throws Error(bad_input) for another
@@ -12,4 +12,4 @@ namespace tpm {
 /// @param unit the length that a coordinate of 1 means; neither format says it
 [[nodiscard]] ClosedMesh read_closed_mesh(const std::filesystem::path& path, const Unit& unit);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -8,7 +8,7 @@
 
 #include "tpm/core/random.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -159,4 +159,4 @@ Positions MeshSurface::spread(std::size_t count, std::uint64_t seed) const {
   return points;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

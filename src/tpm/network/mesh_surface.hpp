@@ -4,7 +4,7 @@
 #include "tpm/network/surface.hpp"
 #include "tpm/network/triangle_tree.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The surface of a closed mesh. Normals are interpolated between the corners of a triangle where
 /// neighbouring triangles meet at less than 30 degrees, and keep the crease where they do not;
@@ -45,4 +45,4 @@ class MeshSurface final : public Surface {
   double volume_ = 0.0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

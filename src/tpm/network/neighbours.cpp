@@ -10,7 +10,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -77,4 +77,4 @@ std::vector<double> distances_to_nearest(const Positions& points) {
   return nearest;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

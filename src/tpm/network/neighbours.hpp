@@ -5,7 +5,7 @@
 
 #include "tpmkit/organ.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Two points nearer to each other than a support radius; first < second.
 struct NeighbourPair {
@@ -23,4 +23,4 @@ struct NeighbourPair {
 /// For every point the distance to the nearest other one, m. At least two points.
 [[nodiscard]] std::vector<double> distances_to_nearest(const Positions& points);
 
-}  // namespace tpm
+}  // namespace tpm::organ

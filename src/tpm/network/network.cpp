@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kRounding = 1e-12;  // of a lattice whose neighbours lie exactly on the support
@@ -197,4 +197,4 @@ Network build_network(Organ organ, const NetworkOptions& options, std::string_vi
   return join(std::move(organ), pairs, options, where);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 #include "tpm/network/neighbours.hpp"
 #include "tpmkit/organ.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 enum class BondKind {
   radial,   ///< between layers: the Zener element along the bond
@@ -78,4 +78,4 @@ struct BondSums {
 
 [[nodiscard]] std::vector<BondSums> bond_sums(const Network& network);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kMostNewtonSteps = 60;
@@ -60,4 +60,4 @@ EquilibriumSearch newton_balance(const BondSystem& bonds, const Constraints& con
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/network/bond_system.hpp"
 #include "tpm/network/constraints.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Where an equilibrium was looked for, and what came of it.
 struct EquilibriumSearch {
@@ -39,4 +39,4 @@ void balance_forces(const BondSystem& bonds, const Positions& position, const Bo
                                                const Eigen::Matrix3Xd& load, double tolerance_N,
                                                const TangentSolve& solve);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,7 @@
 #include "tpm/network/neighbours.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -118,4 +118,4 @@ std::vector<NearestDistances> nearest_distances(const Organ& organ) {
   return layers;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

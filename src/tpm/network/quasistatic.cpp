@@ -13,7 +13,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kStepShare = 0.1;   // of the tolerance, for one step
@@ -478,4 +478,4 @@ QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double
   return Run(bonds_, rest_, constraints_, probes_, options_, protocol, times_s, observer).go(from);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -8,7 +8,7 @@
 #include "tpm/solve/lanes.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A sphere or tool that the protocol drives, and where to.
 struct Probe {
@@ -155,4 +155,4 @@ class QuasiStatic {
   QuasiStaticOptions options_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -11,7 +11,7 @@
 #include "tpm/network/stiffness_blocks.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kZero = 1e-9;          // of the mean diagonal
@@ -108,4 +108,4 @@ void require_rigid(const BondSystem& bonds, const Positions& rest, const Constra
                   "a network without mechanisms: more bonds (a wider support) or more anchors");
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/network/constraints.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Motions of the free coordinates at rest that no bond resists, to first order.
 struct ZeroEnergyModes {
@@ -30,4 +30,4 @@ struct ZeroEnergyModes {
 void require_rigid(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
                    std::string_view where);
 
-}  // namespace tpm
+}  // namespace tpm::organ

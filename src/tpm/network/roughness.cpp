@@ -7,7 +7,7 @@
 #include "tpm/core/dense_algebra.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 double unevenness(const Organ& organ, const Eigen::Matrix3Xd& displacement, Eigen::Index sphere,
@@ -106,4 +106,4 @@ std::vector<std::size_t> spheres_at_rim(const Network& network, double angle_rad
   return rim;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 
 #include "tpm/network/network.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// For every sphere those that lateral bonds join to it.
 using LateralNeighbours = std::vector<std::vector<std::uint32_t>>;
@@ -48,4 +48,4 @@ using LateralNeighbours = std::vector<std::vector<std::uint32_t>>;
 /// other edge.
 [[nodiscard]] std::vector<std::size_t> spheres_at_rim(const Network& network, double angle_rad);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -10,7 +10,7 @@
 #include "tpm/network/neighbours.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -246,4 +246,4 @@ Organ fill_shell(const Surface& surface, const ShellRequest& request) {
   return organ;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

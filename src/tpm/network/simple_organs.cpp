@@ -7,7 +7,7 @@
 #include "tpm/network/filling.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -75,4 +75,4 @@ Organ star(double spacing, double length) {
   return organ;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

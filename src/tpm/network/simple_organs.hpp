@@ -2,7 +2,7 @@
 #include "tpm/network/lattice.hpp"
 #include "tpmkit/organ.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A cuboid of nx x ny x nz conventional cells of a lattice with all points on its faces, one
 /// corner at the origin: (nx + 1)(ny + 1)(nz + 1) spheres if cubic. Layers are the planes across z,
@@ -19,4 +19,4 @@ namespace tpm {
 /// @param length of the inter-layer bond B-D, m, above 0
 [[nodiscard]] Organ star(double spacing, double length);
 
-}  // namespace tpm
+}  // namespace tpm::organ

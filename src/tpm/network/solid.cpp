@@ -8,7 +8,7 @@
 #include "tpm/network/filling.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -224,4 +224,4 @@ Organ fill_solid(const Surface& surface, const SolidRequest& request) {
   return organ;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/network/stage_balance.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using LegendreValues = Eigen::Matrix<double, StepEnergy::kPoints + 1, 1>;
@@ -189,4 +189,4 @@ QuasiStaticEnergy StepEnergy::until(double fraction, double response) const {
   return energy;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kMostIterations = 25;
@@ -465,4 +465,4 @@ void StageBalance::accept(TissueState& state, double h, double rate) {
   see(tissue_.response(state));
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

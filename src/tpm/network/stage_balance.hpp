@@ -10,7 +10,7 @@
 #include "tpm/solve/anderson.hpp"
 #include "tpm/solve/exponential_collocation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 enum class TissueMove { done, unbalanced, unstable };
 
@@ -235,4 +235,4 @@ class StageBalance {
   LaneMatrix last_path_;  ///< displacements of its stages from its start
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/network/stage_balance.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// Where a function that is below 0 at `from` and above at `to` crosses it.
@@ -66,4 +66,4 @@ void StageBalance::change_contact(TissueState& state, std::size_t contact) {
   has_last_ = false;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kMostTangentIterations = 60;
@@ -252,4 +252,4 @@ Eigen::RowVectorXd StageTangents::response(const TissueState& state) {
   return answer;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/network/stage_balance.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Derivatives of a quasi-static run, carried from step to step: forward sensitivities of the
 /// balanced stages themselves, so that they are those of the numbers that the run answers. The
@@ -78,4 +78,4 @@ class StageTangents {
   Stages step_;  ///< those followed last
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,6 +1,6 @@
 #include "tpm/network/stiffness_blocks.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 std::shared_ptr<const BondSystem::PartGraph> moving_graph(const BondSystem& bonds,
                                                           const Constraints& constraints) {
@@ -45,4 +45,4 @@ const BlockMatrix& StiffnessBlocks::assemble(const Positions& position, const Bo
   return matrix_;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/network/constraints.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The stiffness matrix of what is free, for factorisations: P K P + s (1 - P) as
 /// Constraints::constrain makes it, without the blocks of spheres that are fixed.
@@ -25,4 +25,4 @@ class StiffnessBlocks {
 [[nodiscard]] std::shared_ptr<const BondSystem::PartGraph> moving_graph(
     const BondSystem& bonds, const Constraints& constraints);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
@@ -88,4 +88,4 @@ void StiffnessRows::constrain() {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

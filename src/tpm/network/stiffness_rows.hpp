@@ -2,7 +2,7 @@
 #include "tpm/network/constraints.hpp"
 #include "tpm/solve/block_rows.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The stiffness matrix of what is free, by rows, for solvers that iterate: P K P + s (1 - P) as
 /// Constraints::constrain makes it, without the blocks between spheres of which one is fixed.
@@ -28,4 +28,4 @@ class StiffnessRows {
   std::vector<Pair> off_diagonal_;  ///< where each bond's blocks stand; kNone where left out
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

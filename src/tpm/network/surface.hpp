@@ -6,7 +6,7 @@
 
 #include "tpmkit/organ.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A point of a surface and the outward unit normal there.
 struct SurfacePoint {
@@ -39,4 +39,4 @@ class Surface {
   [[nodiscard]] virtual double volume() const = 0;  ///< m^3
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// Where a point lies as seen along a direction from another.
@@ -66,4 +66,4 @@ double overlap_m(const Tool& tool, const Eigen::Vector3d& place, const Eigen::Ve
   return radius - along;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 
 #include "tpmkit/organ.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 enum class ToolKind {
   sphere,  ///< a ball
@@ -66,4 +66,4 @@ struct ToolContact {
 [[nodiscard]] double overlap_m(const Tool& tool, const Eigen::Vector3d& place,
                                const Eigen::Vector3d& centre, double radius);
 
-}  // namespace tpm
+}  // namespace tpm::organ

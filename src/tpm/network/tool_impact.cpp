@@ -7,7 +7,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kMostSweeps = 20'000;
@@ -66,4 +66,4 @@ Eigen::VectorXd inelastic_impact(std::span<const TouchingPair> pairs,
   throw Error(ExitCode::numerical, "tools", "the impulses of an impact do not settle");
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

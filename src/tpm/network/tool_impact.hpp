@@ -4,7 +4,7 @@
 
 #include "tpm/network/constraints.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A sphere and a tool that touch.
 struct TouchingPair {
@@ -34,4 +34,4 @@ struct TouchingPair {
                                                const Eigen::VectorXd& mass_kg,
                                                Eigen::Matrix3Xd& velocity);
 
-}  // namespace tpm
+}  // namespace tpm::organ

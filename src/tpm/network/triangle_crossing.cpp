@@ -9,7 +9,7 @@
 #include "tpm/network/triangle_mesh.hpp"
 #include "tpm/network/triangle_tree.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -141,4 +141,4 @@ Eigen::Vector2i first_crossing(const TriangleMesh& mesh) {
   return {-1, -1};
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -12,7 +12,7 @@
 #include "tpm/network/neighbours.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -284,4 +284,4 @@ ClosedMesh closed_mesh(const TriangleMesh& mesh, std::string_view where) {
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 
 #include "tpmkit/organ.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Triangles over numbered vertices; seen from outside, the corners run counter-clockwise.
 struct TriangleMesh {
@@ -43,4 +43,4 @@ struct ClosedMesh {
 /// such pair in the order of the triangles, or (-1, -1).
 [[nodiscard]] Eigen::Vector2i first_crossing(const TriangleMesh& mesh);
 
-}  // namespace tpm
+}  // namespace tpm::organ

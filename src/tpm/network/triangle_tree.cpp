@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-namespace tpm {
+namespace tpm::organ {
 
 namespace {
 
@@ -172,4 +172,4 @@ std::vector<int> TriangleTree::meeting(const Eigen::AlignedBox3d& box) const {
   return found;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 
 #include "tpm/network/triangle_mesh.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The point of a triangle nearest to a given point.
 struct TrianglePoint {
@@ -53,4 +53,4 @@ class TriangleTree {
   std::vector<Node> nodes_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

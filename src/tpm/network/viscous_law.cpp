@@ -5,7 +5,7 @@
 
 #include "tpm/network/material_refusal.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 bool alike(double a, double b) {
@@ -68,4 +68,4 @@ double ViscousLaw::equilibrium_integral(double l) const {
   return sum;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 
 #include "tpmkit/bond_law.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A bond law in parts of its stiffnesses, shared by all bonds that differ by a factor. With k the
 /// instantaneous stiffness at rest and g its relaxing part a bond pulls with
@@ -36,4 +36,4 @@ struct ViscousLaw {
   [[nodiscard]] double equilibrium_integral(double l) const;  ///< m^2
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

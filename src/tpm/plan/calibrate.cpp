@@ -19,7 +19,7 @@
 #include "tpm/solve/lane_factor.hpp"
 #include "tpmkit/bond_element.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kRepeats = 60;
@@ -254,4 +254,4 @@ OperationCosts measured_costs() {
   return costs;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -14,7 +14,7 @@
 #include "tpm/reduce/zone_network.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kParallel = 1e-9;
@@ -332,4 +332,4 @@ PlanModels servo_network_candidates() {
   return models;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -10,7 +10,7 @@
 #include "tpm/network/material_refusal.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kThetas = 9;
@@ -195,4 +195,4 @@ std::vector<ScalarBranch> fitted_branches(const ContactSpectrum& spectrum, int m
   return best.branches;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

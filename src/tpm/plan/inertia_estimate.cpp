@@ -11,7 +11,7 @@
 #include "tpm/plan/rest_answers.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kLanczosSteps = 24;
@@ -228,4 +228,4 @@ InertiaEstimate estimate_inertia(const PlanScene& scene) {
   return estimate;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

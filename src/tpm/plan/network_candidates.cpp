@@ -8,7 +8,7 @@
 #include "tpm/plan/plan_model.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// The network of a scene with deeper layers fixed, or as it is.
@@ -222,4 +222,4 @@ PlanModels inertial_candidates() {
   return models;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -10,7 +10,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr const char* kSeconds = "seconds_per_operation";
@@ -95,4 +95,4 @@ OperationCosts read_costs(const std::filesystem::path& file) {
   return costs;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

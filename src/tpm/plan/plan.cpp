@@ -13,7 +13,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
@@ -362,4 +362,4 @@ ExperimentScene contact_scene(const ExperimentScene& scene, const ContactRange& 
   return probed;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

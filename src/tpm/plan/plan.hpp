@@ -8,7 +8,7 @@
 
 #include "tpm/plan/plan_model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What a plan is asked for.
 struct PlanRequest {
@@ -138,4 +138,4 @@ struct ContactRange {
 [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> planned_contacts(
     const Plan& plan, const ExperimentScene& scene, std::span<const double> periods_s);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,7 @@
 #include "tpm/simulate/validity.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kStride = 1.5;    // between factors tried
@@ -118,4 +118,4 @@ std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate, const PlanM
           survival.first("stiffer", [&](double f) { return scene.stiffer(f); })};
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

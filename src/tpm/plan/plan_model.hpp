@@ -9,7 +9,7 @@
 #include "tpm/plan/plan_surrogate.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What a model answers a period late at most, and how fast it has to be.
 struct PlanBudget {
@@ -110,4 +110,4 @@ class PlanOffer {
 [[nodiscard]] Trajectory run_candidate_on(const PlanModel& candidate, const ExperimentScene& scene,
                                           const std::vector<double>& times_s, bool with_field);
 
-}  // namespace tpm
+}  // namespace tpm::organ

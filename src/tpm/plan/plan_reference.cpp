@@ -7,7 +7,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kTimesOfPiece = 64;
@@ -82,4 +82,4 @@ VerifiedReference verified_reference(const PlanScene& scene, const PlanMeasure& 
       fmt::format("at most {}: a looser tolerance", significant(kAgreement * tolerance, 2)));
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

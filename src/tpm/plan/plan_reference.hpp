@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/plan/plan.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The reference that a pick is verified against, and how sure it is.
 struct VerifiedReference {
@@ -19,4 +19,4 @@ struct VerifiedReference {
                                                    const PlanMeasure& measure, bool inertial,
                                                    double tolerance);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -8,7 +8,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kServoShare = 0.5;    // of a period: what else happens in it needs the rest
@@ -150,4 +150,4 @@ std::vector<PlanRelevance> plan_relevance(const PlanSurrogate& surrogate, double
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/plan/plan.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What switching inertia, the deepest moving layer, tension and viscosity off changes, each by a
 /// run of the reference's formulation without it.
@@ -23,4 +23,4 @@ namespace tpm {
                                                      const PlanBudget& budget,
                                                      const OperationCosts& costs);
 
-}  // namespace tpm
+}  // namespace tpm::organ

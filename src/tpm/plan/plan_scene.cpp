@@ -10,7 +10,7 @@
 #include "tpm/plan/rest_answers.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 ExperimentScene plannable(ExperimentScene scene) {
@@ -220,4 +220,4 @@ PlanScene PlanScene::with_layers(int layers) const {
   return PlanScene(std::move(scene));
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

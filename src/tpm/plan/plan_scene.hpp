@@ -6,7 +6,7 @@
 #include "tpm/plan/operations.hpp"
 #include "tpm/simulate/scene_runner.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Which results a tolerance is about.
 enum class PlanOutput {
@@ -93,4 +93,4 @@ class PlanScene {
   std::shared_ptr<RestAnswers> at_rest_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kSurrogateTimesOfPiece = 20;
@@ -147,4 +147,4 @@ double PlanSurrogate::claim_of(const Trajectory& model) const {
          trajectory_error(with_masses(10.0 * kTolerance), moving, measure_);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

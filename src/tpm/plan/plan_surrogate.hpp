@@ -5,7 +5,7 @@
 
 #include "tpm/plan/rest_answers.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The static force of a contact over its depths: at equilibrium, and the relaxing part.
 struct ContactCurves {
@@ -71,4 +71,4 @@ class PlanSurrogate {
 /// The tolerance of CVODES that aims at an error of the response.
 [[nodiscard]] InertialOptions inertial_options(const PlanScene& scene, double tolerance);
 
-}  // namespace tpm
+}  // namespace tpm::organ

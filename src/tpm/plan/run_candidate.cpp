@@ -4,7 +4,7 @@
 #include "tpm/plan/plan_model.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// A formulation as it runs scenes, judged by the coarse run of the network.
@@ -90,4 +90,4 @@ PlanModels plan_models(const PlanScene& scene) {
   return models;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 #include "tpm/plan/scalar_contact.hpp"
 #include "tpm/plan/scalar_run.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// What all of them share: a ScalarModel made for the scene and stepped over the protocol.
@@ -187,4 +187,4 @@ PlanModels curves_candidates() {
   return models;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

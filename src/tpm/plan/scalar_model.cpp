@@ -9,7 +9,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 double DepthCurve::operator()(double depth_m) const {
   if (force_N.empty()) {
@@ -116,4 +116,4 @@ double ScalarModel::jump_under(double load_N) {
   return depth_m_;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 DepthCurve straight_curve(double stiffness_N_per_m) {
@@ -91,4 +91,4 @@ void ScalarRun::cross(double time_s, double value) {
   value_ = value;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 #include "tpm/plan/scalar_run.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kUnitDepth_m = 1e-3;    // of the grid; the next is sqrt(2) times deeper
@@ -158,4 +158,4 @@ std::optional<SharedAnswer> SharedPlan::answer(const Protocol& protocol, double 
   return answer;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

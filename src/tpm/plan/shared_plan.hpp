@@ -8,7 +8,7 @@
 
 #include "tpm/plan/plan_surrogate.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What a shared plan answers to one protocol.
 struct SharedAnswer {
@@ -60,4 +60,4 @@ class SharedPlan {
   std::map<Place, std::vector<double>> claims_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kReferenceTolerance = 1e-5;
@@ -112,4 +112,4 @@ std::vector<ComparedMotion> compared_motions(const BondSystem& bonds, const Posi
   return motions;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 
 #include "tpm/network/quasistatic.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A motion along which a reduced model is compared with the network when it is built: to a depth,
 /// a hold, a release and a rest of one length each, in steps of one length.
@@ -45,4 +45,4 @@ struct WeightedTime {
                                                            const Probes& probes,
                                                            const ComparedMotions& asked);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -12,7 +12,7 @@
 #include "tpm/reduce/condensed_phi.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// std::hypot guards against numbers that no place in an organ has, and takes tens of nanoseconds.
@@ -194,4 +194,4 @@ void CondensedContact::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noe
   all.col(fit_->contact) = fit_->frame.axes * u;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

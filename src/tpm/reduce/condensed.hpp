@@ -7,7 +7,7 @@
 #include "tpm/reduce/condensed_branches.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What a condensed model is built for.
 struct CondensedOptions {
@@ -94,4 +94,4 @@ class CondensedContact final : public ContactModel {
                                                const Eigen::Vector3d& into_tissue,
                                                const CondensedOptions& options = {});
 
-}  // namespace tpm
+}  // namespace tpm::organ

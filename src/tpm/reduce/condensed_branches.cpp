@@ -6,7 +6,7 @@
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/reduce/condensed_phi.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 using Eigen::Index;
@@ -211,4 +211,4 @@ void CondensedBranches::step(CondensedState& state, const double* to) noexcept {
   std::copy(pull.force, pull.force + 3, state.force);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

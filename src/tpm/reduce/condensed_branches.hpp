@@ -5,7 +5,7 @@
 
 #include "tpm/reduce/condensed_fit.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// One of the branches by which all relaxing bonds of a condensed network relax.
 struct CondensedBranch {
@@ -73,4 +73,4 @@ class CondensedBranches {
   std::vector<double> lacks_, moved_, next_;  ///< of the step
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

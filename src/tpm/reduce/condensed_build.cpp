@@ -10,7 +10,7 @@
 #include "tpm/reduce/condensed_lag.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kMemories = 30;               // places of w
@@ -153,4 +153,4 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
   return model;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/wide_vectors.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::array<int, 3> kFieldDegrees{5, 4, 2};
@@ -188,4 +188,4 @@ void CondensedField::displacements(const Eigen::Vector3d& u_m, const Eigen::Vect
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 #include "tpm/reduce/condensed_monomials.hpp"
 #include "tpm/reduce/condensed_samples.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Displacements of all spheres from few modes. Their amplitudes are polynomials of u and w, and
 /// linear in q with polynomials of w. In single precision.
@@ -43,4 +43,4 @@ class CondensedField {
   std::vector<float> modes_;        ///< by groups of 16 spheres: mode by mode; m
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

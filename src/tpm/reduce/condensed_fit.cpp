@@ -4,7 +4,7 @@
 
 #include "tpm/core/dense_algebra.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::array<int, 3> kDegrees{4, 2, 0};  // in the depth, by degree in the tangents
@@ -69,4 +69,4 @@ CondensedMatrices::Values CondensedMatrices::at(const Eigen::Vector3d& w_m) cons
   return {taken(values, 0), taken(values, 6), taken(values, 12)};
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

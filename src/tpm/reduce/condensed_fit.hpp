@@ -3,7 +3,7 @@
 #include "tpm/reduce/condensed_potential.hpp"
 #include "tpm/reduce/condensed_tables.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What the motion of the viscous state needs, as polynomials of w: symmetric matrices in the axes
 /// of the contact.
@@ -57,4 +57,4 @@ struct CondensedFit {
   Eigen::Matrix3d relaxed = Eigen::Matrix3d::Zero();
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 
 #include "tpm/reduce/compared_motion.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kStepsOfRamp = 50;
@@ -49,4 +49,4 @@ double condensed_lag_error_N(const CondensedContact& model, const CondensedFit& 
   return per_lag_N;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

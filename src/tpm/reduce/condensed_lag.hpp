@@ -3,7 +3,7 @@
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/condensed_fit.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// How far the viscous state lags behind the contact and has left rest at once:
 ///
@@ -28,4 +28,4 @@ namespace tpm {
                                            const Constraints& constraints,
                                            const Eigen::Vector3d& into_tissue);
 
-}  // namespace tpm
+}  // namespace tpm::organ

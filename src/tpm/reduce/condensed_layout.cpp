@@ -3,7 +3,7 @@
 
 #include "tpm/reduce/condensed_fit.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 static_assert(kCondensedDegrees == std::array<int, 4>{7, 5, 3, 1}, "the layout of the tables");
 static_assert(CondensedMatrices::kTerms == CondensedTables::kMatrixTerms);
@@ -49,4 +49,4 @@ CondensedTables condensed_tables(const CondensedFrame& frame, const CondensedPot
   return tables;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,6 +1,6 @@
 #include "tpm/reduce/condensed_monomials.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 std::vector<CondensedExponents> condensed_monomials(std::span<const int> depth_degree) {
   std::vector<CondensedExponents> all;
@@ -46,4 +46,4 @@ double CondensedPowers::monomial(CondensedExponents e, int by, int again) const 
   return factor;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

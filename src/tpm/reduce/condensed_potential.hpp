@@ -7,7 +7,7 @@
 #include "tpm/reduce/condensed_monomials.hpp"
 #include "tpm/reduce/condensed_samples.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// How the potential is expanded, see condensed_monomials().
 inline constexpr std::array<int, 4> kCondensedDegrees{7, 5, 3, 1};
@@ -41,4 +41,4 @@ class CondensedPotential {
   double worst_N_ = 0.0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -10,7 +10,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kSampleBalance = 1e-9;  // of stiffness at the contact times the stride
@@ -200,4 +200,4 @@ CondensedSample CondensedSampler::sample_at(const Eigen::Vector3d& u_m) {
   return sample;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

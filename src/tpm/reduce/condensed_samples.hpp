@@ -4,7 +4,7 @@
 
 #include "tpm/network/equilibrium.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A network whose contact sphere stands at u while its viscous elongations are those of the
 /// equilibrium under the contact displacement w: y_b = l_b there. With
@@ -86,4 +86,4 @@ class CondensedSampler {
   int factorisations_ = 0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

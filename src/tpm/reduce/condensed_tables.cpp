@@ -1,7 +1,7 @@
 #include "tpm/reduce/condensed_tables.hpp"
 
 // NOLINTBEGIN(*-avoid-c-arrays, *-reinterpret-cast, bugprone-suspicious-include)
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 #pragma GCC diagnostic push
@@ -77,4 +77,4 @@ CondensedValue value_of_condensed(const CondensedTables& tables, const double* u
 }
 // NOLINTEND(*-avoid-c-arrays, *-reinterpret-cast, bugprone-suspicious-include)
 
-}  // namespace tpm
+}  // namespace tpm::organ

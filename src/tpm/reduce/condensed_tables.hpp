@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The polynomials of a condensed model as its step reads them. With p and s the scaled depths of
 /// u and w, and t the four scaled tangential coordinates (u, u, w, w), column (i, n) stands for
@@ -118,4 +118,4 @@ struct CondensedValue {
 [[nodiscard]] CondensedValue value_of_condensed(const CondensedTables& tables, const double* u,
                                                 const double* memory) noexcept;
 
-}  // namespace tpm
+}  // namespace tpm::organ

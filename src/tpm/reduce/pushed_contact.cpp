@@ -7,7 +7,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kStride_m = 1e-3;
@@ -133,4 +133,4 @@ ContactFields PushedContact::fields(const Positions& position, const BondMemory&
   return fields;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

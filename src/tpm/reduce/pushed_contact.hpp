@@ -6,7 +6,7 @@
 
 #include "tpm/network/equilibrium.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// How a tissue answers small displacements of its contact sphere.
 struct ContactFields {
@@ -84,4 +84,4 @@ class PushedContact {
   std::vector<Found> found_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

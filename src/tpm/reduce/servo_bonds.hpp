@@ -7,7 +7,7 @@
 
 #include "tpm/network/bond_system.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Weights of the exact update of one branch over a servo period in which elongations are linear:
 /// m_new = keep m + of_start l_old + of_end l_new.
@@ -109,4 +109,4 @@ class ServoBonds {
   bool cubic_ = false;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

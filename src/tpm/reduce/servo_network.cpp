@@ -11,7 +11,7 @@
 #include "tpm/reduce/flush_denormals.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kFieldStride_m = 2e-3;
@@ -293,4 +293,4 @@ void ServoNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcep
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 #include "tpm/reduce/step_error.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 struct ServoNetworkOptions {
   double period_s = 1e-3;        ///< > 0
@@ -102,4 +102,4 @@ class ServoNetwork final : public ContactModel {
   int balances_ = 0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,6 +1,6 @@
 #include "tpm/reduce/servo_stiffness.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 ServoStiffness::ServoStiffness(const BondSystem& bonds, const Positions& rest,
                                const Constraints& constraints)
@@ -68,4 +68,4 @@ void ServoStiffness::solve(float* four_per_sphere) noexcept {
   project(four_per_sphere);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

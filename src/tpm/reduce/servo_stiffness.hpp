@@ -6,7 +6,7 @@
 #include "tpm/reduce/servo_bonds.hpp"
 #include "tpm/solve/frontal_factor.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The spheres of a tissue in the order in which servo models keep them, and its stiffness at one
 /// position, factorised for many solutions (FrontalFactor).
@@ -46,4 +46,4 @@ class ServoStiffness {
   std::unique_ptr<FrontalFactor> factor_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/reduce/pushed_contact.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What it costs to take elongations as linear within a servo period, estimated with a small linear
 /// model of the tissue: its displacements are combinations of the fields that follow the contact at
@@ -34,4 +34,4 @@ class StepError {
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

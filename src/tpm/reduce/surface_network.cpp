@@ -14,7 +14,7 @@
 #include "tpm/solve/relaxation_filter.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kNearBy_m = 0.2e-3;  // beyond the way of the ball in a period
@@ -444,4 +444,4 @@ void SurfaceNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexc
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 #include "tpm/reduce/servo_stiffness.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 struct SurfaceNetworkOptions {
   double period_s = 1e-3;    ///< > 0
@@ -125,4 +125,4 @@ class SurfaceNetwork final : public ContactModel {
   int balances_ = 0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

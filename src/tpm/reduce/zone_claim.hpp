@@ -4,7 +4,7 @@
 
 #include "tpm/reduce/servo_bonds.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Where a contact is and was.
 struct ZonePlace {
@@ -55,4 +55,4 @@ class ZoneClaim {
   ZonePlace place_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

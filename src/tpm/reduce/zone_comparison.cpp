@@ -7,7 +7,7 @@
 #include "tpm/reduce/compared_motion.hpp"
 #include "tpm/reduce/zone_network.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// Errors under other motions than the ones compared: the rule of the plan's step candidates.
@@ -126,4 +126,4 @@ void ZoneNetwork::compare(PushedContact& tissue, const Constraints& constraints,
   reset();
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

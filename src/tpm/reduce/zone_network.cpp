@@ -7,7 +7,7 @@
 #include "tpm/reduce/flush_denormals.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kTrustedZone = 0.05;       // error over the largest force
@@ -249,4 +249,4 @@ void ZoneNetwork::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

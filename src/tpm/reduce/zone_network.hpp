@@ -11,7 +11,7 @@
 #include "tpm/solve/panel_kernels.hpp"
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 struct ZoneNetworkOptions {
   double period_s = 1e-3;           ///< > 0
@@ -126,4 +126,4 @@ class ZoneNetwork final : public ContactModel {
   double largest_N_ = 0.0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

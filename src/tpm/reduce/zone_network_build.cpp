@@ -7,7 +7,7 @@
 #include "tpm/reduce/zone_network.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kNoField = 1e-8;  // of the energy of a field: what it adds is nothing
@@ -200,4 +200,4 @@ void ZoneNetwork::set_weights(const PushedContact& tissue, const Parts& parts,
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,6 +1,6 @@
 #include "tpm/reduce/zone_surroundings.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 LinearBonds::LinearBonds(const PushedContact& tissue, const Positions& position, double relaxed,
                          const std::vector<char>& chosen)
@@ -47,4 +47,4 @@ BlockMatrix LinearBonds::matrix(double relaxation_factor) const {
   return matrix;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 
 #include "tpm/reduce/pushed_contact.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Some bonds of a tissue as linear springs with viscous state, about an equilibrium.
 class LinearBonds {
@@ -31,4 +31,4 @@ class LinearBonds {
   std::vector<Linear> linear_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

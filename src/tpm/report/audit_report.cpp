@@ -3,7 +3,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/study_report.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr std::size_t kWidth = 100;
@@ -103,4 +103,4 @@ TableDocument audit_document(const AuditReport& report) {
   return document;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

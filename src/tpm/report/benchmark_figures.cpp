@@ -7,7 +7,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/benchmark_report.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// Longest step that a servo loop of 1 kHz can use.
@@ -201,4 +201,4 @@ std::vector<Figure> benchmark_figures(const BenchmarkRecord& record) {
   return figures;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

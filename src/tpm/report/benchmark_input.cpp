@@ -9,7 +9,7 @@
 #include "tpm/store/json.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr std::array<const char*, 3> kParameters{"relaxation_time_s", "tolerance", "step_s"};
@@ -173,4 +173,4 @@ void put_result(BenchmarkRecord& record, BenchmarkResult result, Json run) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

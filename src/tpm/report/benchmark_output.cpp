@@ -7,7 +7,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/table_document.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kBenchmarkDigits = 5;
@@ -186,4 +186,4 @@ Json to_json(const BenchmarkRecord& record) {
   return json;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -12,7 +12,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr std::array<double, 4> kAims{1e-2, 1e-3, 1e-4, 1e-6};
@@ -369,4 +369,4 @@ void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path&
   write_file(folder / "report.run.json", to_text(run));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

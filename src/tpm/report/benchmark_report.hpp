@@ -8,7 +8,7 @@
 #include "tpm/report/document.hpp"
 #include "tpm/report/figure.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// What was run, and how.
 struct BenchmarkRecord {
@@ -76,4 +76,4 @@ void put_result(BenchmarkRecord& record, BenchmarkResult result, Json run);
 void write_benchmark(const BenchmarkRecord& record, const std::filesystem::path& folder,
                      const std::string& python);
 
-}  // namespace tpm
+}  // namespace tpm::report

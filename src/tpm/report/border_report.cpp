@@ -6,7 +6,7 @@
 
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kBorderDigits = 6;
@@ -358,4 +358,4 @@ std::vector<Figure> border_figures(const BorderStudy& study) {
   return {border_figure(study), rule_figure(study), impact_figure(study)};
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

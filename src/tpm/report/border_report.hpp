@@ -2,10 +2,11 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/border_study.hpp"
 #include "tpm/report/figure.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// What `tpm hil stability` shows; keys are described in docs/haptics.md.
 [[nodiscard]] Json border_json(const BorderStudy& study);
@@ -13,4 +14,4 @@ namespace tpm {
 /// The borders of passivity and of stability, and the three rules.
 [[nodiscard]] std::vector<Figure> border_figures(const BorderStudy& study);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -10,7 +10,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 std::size_t instant_of_largest_sum(const ErrorBudget& b) {
@@ -116,4 +116,4 @@ std::vector<std::string> write_budget_report(const std::filesystem::path& folder
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/error_budget.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// The waterfall: how the lines add up at the instant of the largest sum, and beside it each line's
 /// own largest with the thresholds of a hand.
@@ -17,4 +17,4 @@ namespace tpm {
 [[nodiscard]] std::vector<std::string> write_budget_report(const std::filesystem::path& folder,
                                                            const ErrorBudget& budget);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -9,7 +9,7 @@
 
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// The two things about a protocol that a figure varies.
@@ -108,4 +108,4 @@ std::vector<Figure> design_figures(const DesignResult& result) {
   return figures;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

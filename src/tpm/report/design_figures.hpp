@@ -4,7 +4,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/design.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Expected relative standard error of each parameter (one panel each): against the hold with a
 /// curve per ramp rate, and against the rate with a curve per hold. Depth (or load), sampling and
@@ -13,4 +13,4 @@ namespace tpm {
 /// out; so are candidates that leave a parameter unknown.
 [[nodiscard]] std::vector<Figure> design_figures(const DesignResult& result);
 
-}  // namespace tpm
+}  // namespace tpm::report

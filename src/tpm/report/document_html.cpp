@@ -6,7 +6,7 @@
 #include "tpm/report/document.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr std::string_view kStyle = R"css(
@@ -203,4 +203,4 @@ std::string to_html(const Document& document, const std::map<std::string, std::s
   return out + "</body>\n</html>\n";
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -2,7 +2,7 @@
 
 #include "tpm/report/document.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// Outside code, characters that Markdown would read as markup are escaped.
@@ -75,4 +75,4 @@ std::string to_markdown(const Document& document) {
   return out;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

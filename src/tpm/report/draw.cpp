@@ -17,7 +17,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// What became of a program that was run.
@@ -194,4 +194,4 @@ std::vector<std::string> write_figures(const std::filesystem::path& folder,
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 
 #include "tpm/report/figure.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// The Python interpreter that draws: $TPMKIT_PYTHON if it is set, else the first of python3 and
 /// /usr/bin/python3 that has matplotlib (a version manager's python3 often has not). Throws
@@ -45,4 +45,4 @@ void draw_network(const std::string& python, const std::filesystem::path& pictur
                                                         const std::filesystem::path& folder,
                                                         bool two);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 std::string_view kind_name(Series::Kind kind) {
@@ -151,4 +151,4 @@ Series line(std::string label, std::vector<double> x, std::vector<double> y) {
   return s;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -5,7 +5,7 @@
 
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// One thing drawn in a panel. All numbers are in the units of the panel's axes.
 struct Series {
@@ -65,4 +65,4 @@ struct Figure {
 
 [[nodiscard]] Series line(std::string label, std::vector<double> x, std::vector<double> y);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -4,7 +4,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/report/document.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 [[nodiscard]] Tone tone_of(Verdict verdict);
 
@@ -21,4 +21,4 @@ namespace tpm {
 /// @param with_sd its standard error, too, if it has one
 [[nodiscard]] std::string predicted(const FittedDatum& datum, bool with_sd);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -9,7 +9,7 @@
 #include "tpm/report/table_document.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kCells = 6;  // significant digits, as in JSON
@@ -212,4 +212,4 @@ std::vector<std::string> write_fit_csv(const std::filesystem::path& folder, cons
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

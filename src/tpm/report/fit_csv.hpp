@@ -10,7 +10,7 @@
 #include "tpm/study/specimens.hpp"
 #include "tpm/study/young_moduli.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// The tables of a fit as CSV: the same numbers as in its JSON, SI, one row for each thing, every
 /// row with the unit, the reference depth and the level that its numbers depend on.
@@ -40,4 +40,4 @@ namespace tpm {
 /// of a fit into a folder. Returns the names.
 std::vector<std::string> write_fit_csv(const std::filesystem::path& folder, const FitResult& fit);
 
-}  // namespace tpm
+}  // namespace tpm::report

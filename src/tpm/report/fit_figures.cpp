@@ -8,7 +8,7 @@
 #include "tpm/fit/uncertainty.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 Axis parameter_axis(const FitParameter& p) {
@@ -141,4 +141,4 @@ Figure sensitivity_figure(const FitStudy& study, const std::string& parameter, d
   return figure;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

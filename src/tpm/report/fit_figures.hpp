@@ -2,7 +2,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/fit_variations.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Rise of the deviance along each parameter, the others re-optimised, with the level that bounds
 /// the confidence interval. No panels if the fit was not profiled.
@@ -23,4 +23,4 @@ namespace tpm {
 /// The parameter's result; throws Error(bad_input) if the fit does not estimate it.
 [[nodiscard]] const ParameterResult& parameter_of(const FitResult& fit, const std::string& name);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -15,7 +15,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 bool is_storage(Quantity quantity) {
@@ -255,4 +255,4 @@ std::vector<std::string> write_specimen_report(const std::filesystem::path& fold
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

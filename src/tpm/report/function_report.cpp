@@ -15,7 +15,7 @@
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 std::string spaced_name(Quantity quantity) {
@@ -91,4 +91,4 @@ std::vector<std::string> write_function_report(const std::filesystem::path& fold
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

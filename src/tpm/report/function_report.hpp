@@ -6,7 +6,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/material_function.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Relaxation modulus or creep compliance over time, with the fitted law, on logarithmic axes.
 /// @param choice place in the fit's data of such readings
@@ -19,4 +19,4 @@ namespace tpm {
                                                              const MaterialFunction& function,
                                                              const Selection& selection);
 
-}  // namespace tpm
+}  // namespace tpm::report

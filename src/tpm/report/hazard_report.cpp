@@ -6,7 +6,7 @@
 
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kHazardDigits = 4;
@@ -134,4 +134,4 @@ std::string clock_hazard_text(const ClockHazardStudy& study) {
                     within, study.rows.size(), study.force_limit_N, study.most_tries);
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

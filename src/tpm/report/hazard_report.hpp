@@ -1,11 +1,12 @@
 #pragma once
 #include <string>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/clock_hazard_study.hpp"
 #include "tpm/haptics/hazard_study.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// What `tpm hil hazards` shows; keys are described in docs/haptics.md. The text is a table in
 /// Markdown.
@@ -14,4 +15,4 @@ namespace tpm {
 [[nodiscard]] Json clock_hazard_json(const ClockHazardStudy& study);
 [[nodiscard]] std::string clock_hazard_text(const ClockHazardStudy& study);
 
-}  // namespace tpm
+}  // namespace tpm::report

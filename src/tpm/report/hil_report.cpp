@@ -11,7 +11,7 @@
 #include "tpm/store/file.hpp"
 #include "tpm/study/printed_number.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr double kMostError = 0.005;  // of the session's peak force
@@ -420,4 +420,4 @@ void write_hil_report(const HilRecording& recording, const Verification& v,
   write_file(folder / "report.json", to_text(json));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

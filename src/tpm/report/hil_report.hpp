@@ -2,12 +2,13 @@
 #include <filesystem>
 #include <string>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/haptics/jitter_check.hpp"
 #include "tpm/haptics/verify.hpp"
 #include "tpm/report/document.hpp"
 #include "tpm/report/figure.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 // What each command of tpm hil shows; keys are described in docs/haptics.md.
 
@@ -37,4 +38,4 @@ struct RecordingSummary {
 void write_hil_report(const HilRecording& recording, const Verification& v,
                       const std::filesystem::path& folder, const std::string& python);
 
-}  // namespace tpm
+}  // namespace tpm::report

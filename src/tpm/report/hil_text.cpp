@@ -8,7 +8,7 @@
 #include "tpm/servo/real_time.hpp"
 #include "tpm/study/printed_number.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kHilDigits = 6;
@@ -258,4 +258,4 @@ std::string verification_text(const HilRecording& recording, const Verification&
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

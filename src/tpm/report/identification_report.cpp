@@ -10,7 +10,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr double kWidestDrawn = 3.0;  // of the estimate; wider says nothing
@@ -117,4 +117,4 @@ std::vector<std::string> write_identification_report(const std::filesystem::path
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/identification.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Half width of each parameter's interval over time, and which law was the least.
 [[nodiscard]] Figure identification_figure(const Identification& identification);
@@ -17,4 +17,4 @@ namespace tpm {
     const std::filesystem::path& folder, const Identification& identification, const LawFile& law,
     const Json& answer);
 
-}  // namespace tpm
+}  // namespace tpm::report

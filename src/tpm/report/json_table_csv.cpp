@@ -6,7 +6,7 @@
 
 #include "tpm/report/table_document.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 using FlatRow = std::map<std::string, std::string>;
@@ -86,4 +86,4 @@ std::string json_table_csv(const Json& rows, std::string_view spread) {
   return table.text();
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -4,7 +4,7 @@
 
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// A table of a JSON answer as CSV: the same numbers under the same keys, which carry the unit.
 /// One line for each row; the keys of an object within a row follow its own with an underscore
@@ -16,4 +16,4 @@ namespace tpm {
 /// for none
 [[nodiscard]] std::string json_table_csv(const Json& rows, std::string_view spread = {});
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -5,7 +5,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kNetworkDigits = 6;
@@ -133,4 +133,4 @@ Json network_picture(const Tissue& tissue) {
   return json;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -1,10 +1,11 @@
 #pragma once
 #include <string>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/scene/inspection.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// What a network is like, as docs/network_files.md describes the keys. Spheres are numbered
 /// from 1.
@@ -14,4 +15,4 @@ namespace tpm {
 /// The picture that scripts/draw_network.py draws: spheres, bonds, anchors, contact.
 [[nodiscard]] Json network_picture(const Tissue& tissue);
 
-}  // namespace tpm
+}  // namespace tpm::report

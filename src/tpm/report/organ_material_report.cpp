@@ -6,7 +6,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 Series less(const OrganMaterial& m, const char* label, std::vector<double> MaterialCourse::*force) {
@@ -124,4 +124,4 @@ std::vector<std::string> write_organ_material_report(const std::filesystem::path
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/organ_material.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Forces of law, organ and recording over time, and what the organ misses over depth.
 [[nodiscard]] Figure organ_material_figure(const OrganMaterial& result);
@@ -17,4 +17,4 @@ namespace tpm {
 [[nodiscard]] std::vector<std::string> write_organ_material_report(
     const std::filesystem::path& folder, const OrganMaterial& result);
 
-}  // namespace tpm
+}  // namespace tpm::report

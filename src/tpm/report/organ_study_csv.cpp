@@ -5,7 +5,7 @@
 #include "tpm/report/organ_study_report.hpp"
 #include "tpm/report/table_document.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -94,4 +94,4 @@ std::string fits_csv(const OrganStudy& study) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

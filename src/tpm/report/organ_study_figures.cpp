@@ -6,7 +6,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/organ_study_report.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -263,4 +263,4 @@ std::vector<Figure> organ_study_figures(const OrganStudy& study) {
   return figures;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

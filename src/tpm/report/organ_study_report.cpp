@@ -13,7 +13,7 @@
 #include "tpm/report/run_record.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -372,4 +372,4 @@ void write_organ_study(const OrganStudy& study, const std::filesystem::path& fol
   write_file(folder / "report.run.json", to_text(record));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

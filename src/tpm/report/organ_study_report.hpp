@@ -7,7 +7,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/organ_study.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Static force over depth, relaxation at every depth, the rates at one depth, and creep under
 /// every load, each for all tissues and with the data.
@@ -36,4 +36,4 @@ namespace tpm {
 void write_organ_study(const OrganStudy& study, const std::filesystem::path& folder,
                        const std::string& python, double seconds);
 
-}  // namespace tpm
+}  // namespace tpm::report

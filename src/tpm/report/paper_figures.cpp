@@ -11,7 +11,7 @@
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr double kDepth_m = 4e-3;  // Figs. 7 and 10
@@ -274,4 +274,4 @@ std::vector<Figure> paper_figures(const PaperFigureData& data) {
   return figures;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 #include "tpmkit/curve.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// A creep experiment as the paper prints it (Sec. 4.2, beside Figs. 8 and 9).
 struct PrintedCreep {
@@ -47,4 +47,4 @@ struct PaperFigureData {
 /// The paper's five in its order, and the spectrum.
 [[nodiscard]] std::vector<Figure> paper_figures(const PaperFigureData& data);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -15,7 +15,7 @@
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 namespace fs = std::filesystem;
@@ -132,4 +132,4 @@ void write_paper_report(const PaperReport& report, const fs::path& folder,
   write_file(folder / "report.run.json", to_text(record));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

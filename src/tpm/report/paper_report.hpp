@@ -12,7 +12,7 @@
 #include "tpm/study/tables.hpp"
 #include "tpmkit/curve.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Everything the report on the paper says, computed: the same input gives the same content.
 struct PaperReport {
@@ -42,4 +42,4 @@ struct PaperReport {
 void write_paper_report(const PaperReport& report, const std::filesystem::path& folder,
                         const std::string& python);
 
-}  // namespace tpm
+}  // namespace tpm::report

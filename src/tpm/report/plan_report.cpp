@@ -8,7 +8,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kPlanDigits = 6;
@@ -226,4 +226,4 @@ std::string plan_text(const Plan& plan) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

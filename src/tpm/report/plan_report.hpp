@@ -2,10 +2,11 @@
 #include <filesystem>
 #include <string>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/plan/plan.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// A plan, as docs/plan_results.md describes the keys.
 [[nodiscard]] Json plan_json(const Plan& plan);
@@ -25,4 +26,4 @@ void write_planned_run(const Plan& plan, const ExperimentScene& scene,
                        const std::vector<double>& times_s, const Trajectory& answer,
                        const std::filesystem::path& file);
 
-}  // namespace tpm
+}  // namespace tpm::report

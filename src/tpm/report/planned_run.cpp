@@ -8,7 +8,7 @@
 #include "tpm/store/hdf5.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 std::string model_words(const PlannedCandidate& c) {
@@ -93,4 +93,4 @@ void write_planned_run(const Plan& plan, const ExperimentScene& scene,
   file.commit();
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

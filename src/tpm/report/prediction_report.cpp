@@ -9,7 +9,7 @@
 #include "tpm/report/draw.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr std::size_t kMostBandPoints = 4000;  // more only make the file heavy
@@ -117,4 +117,4 @@ std::vector<std::string> write_prediction_report(const std::filesystem::path& fo
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/law_prediction.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// The mean with both bands over time, beside the recording if there is one; then prediction less
 /// measurement.
@@ -19,4 +19,4 @@ namespace tpm {
                                                                const LawPrediction& prediction,
                                                                const Json& answer);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -12,7 +12,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// More points than this only make the file heavy.
@@ -244,4 +244,4 @@ std::vector<std::string> write_recording_report(const std::filesystem::path& fol
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -7,7 +7,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/study/selection.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Response over time with the fitted law, the residuals below it, and response over drive; samples
 /// outside the window are drawn apart.
@@ -29,4 +29,4 @@ namespace tpm {
 [[nodiscard]] std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
                                                               const Selection& selection);
 
-}  // namespace tpm
+}  // namespace tpm::report

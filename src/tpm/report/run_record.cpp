@@ -11,7 +11,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// "model name : ..." of /proc/cpuinfo; "unknown" where there is none.
@@ -42,4 +42,4 @@ Json run_record(const std::map<std::string, double>& seconds) {
   return record;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -5,7 +5,7 @@
 
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// What changes from run to run and so stays out of the results: version, compiler, machine, date
 /// and wall times.
@@ -21,4 +21,4 @@ auto timed(std::map<std::string, double>& seconds, const char* part, Work work) 
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

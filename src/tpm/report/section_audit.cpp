@@ -5,10 +5,10 @@
 
 #include "tpm/report/sections.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
-Tone tone_of(AuditVerdict verdict) {
+Tone tone_of_finding(AuditVerdict verdict) {
   switch (verdict) {
     case AuditVerdict::holds:
     case AuditVerdict::holds_by_truncation:
@@ -75,7 +75,7 @@ std::vector<Cell> row(const Finding& f) {
           {f.claim},
           {f.printed},
           {f.recomputed_words()},
-          {f.verdict_words(), tone_of(f.verdict)},
+          {f.verdict_words(), tone_of_finding(f.verdict)},
           {consequence(f)}};
 }
 
@@ -97,4 +97,4 @@ void add_audit(Document& document, const PaperReport& report) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -9,7 +9,7 @@
 #include "tpm/report/sections.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 std::vector<const PointSet*> data_sets(const PaperReport& report) {
@@ -136,4 +136,4 @@ void add_assumptions(Document& document, const PaperReport& report) {
   document.bullets(std::move(items));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

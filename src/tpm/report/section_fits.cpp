@@ -8,7 +8,7 @@
 #include "tpm/report/sections.hpp"
 #include "tpm/study/printed_number.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 std::string interval(const ParameterResult& p) {
@@ -193,4 +193,4 @@ void add_fits(Document& document, const PaperReport& report) {
   document.table(held_out_table(study));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -9,7 +9,7 @@
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 Cell tables_sentence(const TablesResult& tables) {
@@ -103,4 +103,4 @@ void add_paper_figures(Document& document, const PaperReport& report) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

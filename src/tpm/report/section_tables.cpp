@@ -8,10 +8,10 @@
 #include "tpm/report/sections.hpp"
 #include "tpm/study/printed_number.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
-Tone tone_of(DigitVerdict verdict) {
+Tone tone_of_digits(DigitVerdict verdict) {
   switch (verdict) {
     case DigitVerdict::by_rounding:
     case DigitVerdict::by_truncation:
@@ -34,7 +34,7 @@ Cell printed_cell(const TableCell& cell, double unit) {
   const PrintedCell& printed = *cell.printed;
   const DigitCheck& check = printed.from_printed_lambda1.value_or(printed.from_computed_lambda1);
   return {fmt::format("{} · {} · {}", check.printed.text, computed_text(check), check.words()),
-          tone_of(check.verdict)};
+          tone_of_digits(check.verdict)};
 }
 
 Cell measured_cell(const TableCell& cell) {
@@ -124,4 +124,4 @@ void add_tables(Document& document, const PaperReport& report) {
   document.table(consistent_table(report.consistent));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -13,7 +13,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 namespace fs = std::filesystem;
@@ -156,4 +156,4 @@ std::vector<std::string> write_simulation_figures(const fs::path& folder,
   return files;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

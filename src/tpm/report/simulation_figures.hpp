@@ -3,10 +3,11 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/simulate/simulation.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// A run to be drawn; all must live as long as this.
 struct FiguredRun {
@@ -30,4 +31,4 @@ struct FiguredRun {
 std::vector<std::string> write_simulation_figures(const std::filesystem::path& folder,
                                                   const std::vector<FiguredRun>& runs);
 
-}  // namespace tpm
+}  // namespace tpm::report

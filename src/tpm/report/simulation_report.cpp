@@ -11,7 +11,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kSimulationDigits = 9;
@@ -389,4 +389,4 @@ std::string simulation_text(const ExperimentScene& scene, const RunNetwork& netw
   return text + validity_text(record.validity, depth_limits_apply(scene.tissue));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

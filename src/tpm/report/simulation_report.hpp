@@ -1,10 +1,11 @@
 #pragma once
 #include <string>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/simulate/simulation.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// What a run has shown, as docs/simulation_files.md describes the keys. Spheres are numbered
 /// from 1.
@@ -13,4 +14,4 @@ namespace tpm {
 [[nodiscard]] std::string simulation_text(const ExperimentScene& scene, const RunNetwork& network,
                                           const SimulationRun& run);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -8,7 +8,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr std::string_view kColumns =
@@ -76,4 +76,4 @@ std::string speed_text(const std::vector<SpeedRow>& rows) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -2,9 +2,10 @@
 #include <filesystem>
 
 #include "tpm/benchmark/speed.hpp"
+#include "tpm/core/namespaces.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// What the rows of one measurement have in common.
 struct SpeedOrigin {
@@ -24,4 +25,4 @@ void append_speed_record(const std::filesystem::path& file, const std::vector<Sp
 /// A table for people.
 [[nodiscard]] std::string speed_text(const std::vector<SpeedRow>& rows);
 
-}  // namespace tpm
+}  // namespace tpm::report

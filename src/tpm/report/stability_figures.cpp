@@ -4,7 +4,7 @@
 
 #include "tpm/report/stability_report.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// Maps that stand side by side.
@@ -75,4 +75,4 @@ std::vector<Figure> stability_figures(const StabilityStudy& study) {
   return figures;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -13,7 +13,7 @@
 #include "tpm/report/table_document.hpp"
 #include "tpm/store/file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 std::string number(double value) {
@@ -375,4 +375,4 @@ void write_stability(const StabilityStudy& study, const std::filesystem::path& f
   write_file(folder / "report.run.json", to_text(record));
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

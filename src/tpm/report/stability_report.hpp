@@ -7,7 +7,7 @@
 #include "tpm/report/figure.hpp"
 #include "tpm/stability/study.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// The maps of each rule, two to a figure, with the limit of theory drawn in.
 [[nodiscard]] std::vector<Figure> stability_figures(const StabilityStudy& study);
@@ -40,4 +40,4 @@ namespace tpm {
 void write_stability(const StabilityStudy& study, const std::filesystem::path& folder,
                      const std::string& python, double seconds);
 
-}  // namespace tpm
+}  // namespace tpm::report

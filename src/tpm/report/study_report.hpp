@@ -1,11 +1,12 @@
 #pragma once
 #include <string>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/report/table_document.hpp"
 #include "tpm/study/audit.hpp"
 #include "tpm/study/tables.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// The tables with printed and measured values, verdicts and the counts, one section per depth.
 /// The columns for printed and measured values are left out where no row has any.
@@ -21,4 +22,4 @@ namespace tpm {
 /// The audit as one table: claim, where, printed, recomputed, verdict, consequence.
 [[nodiscard]] TableDocument audit_document(const AuditReport& report);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 
 #include "tpm/core/text.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 using Behaviour = GridConvergence::Behaviour;
@@ -190,4 +190,4 @@ std::vector<Figure> convergence_figures(const std::vector<SweepConvergence>& all
   return figures;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

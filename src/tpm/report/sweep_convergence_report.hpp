@@ -2,10 +2,11 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/sweep/sweep_convergence.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// For each number a table over the sizes: order, extrapolated value and grid convergence index of
 /// the three sizes that end there, and a sentence on what they tell.
@@ -17,4 +18,4 @@ namespace tpm {
 [[nodiscard]] std::vector<Figure> convergence_figures(const std::vector<SweepConvergence>& all,
                                                       const std::string& title);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -10,7 +10,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr std::size_t kMostPlaces = 200;   ///< of a map along one axis
@@ -393,4 +393,4 @@ std::vector<Figure> sweep_figures(const SweepReader& sweep, const SweepFigures& 
   return figures;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -3,11 +3,12 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/report/figure.hpp"
 #include "tpm/sweep/sweep_sensitivity.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// The unit in which people read numbers of an SI unit; empty for plain numbers.
 [[nodiscard]] Unit shown_unit_of(const std::string& si_unit);
@@ -42,4 +43,4 @@ struct SweepFigures {
 [[nodiscard]] std::vector<std::pair<double, double>> pareto_front(
     std::vector<std::pair<double, double>> pairs);
 
-}  // namespace tpm
+}  // namespace tpm::report

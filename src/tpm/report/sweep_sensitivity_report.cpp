@@ -4,7 +4,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/sweep_report.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// ", at depth = 4 mm, rate = 2 mm/s"; empty if there is no other axis.
@@ -122,4 +122,4 @@ std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all
   return figures;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 #include "tpm/report/study_report.hpp"
 #include "tpm/study/printed_number.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 /// Enough for any use, and the same on machines whose last bits differ.
@@ -221,4 +221,4 @@ std::string tables_csv(const TablesResult& result) {
   return out;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -9,7 +9,7 @@
 #include "tpmkit/units.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kRunDigits = 9;
@@ -193,4 +193,4 @@ std::string formulations_text() {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -3,11 +3,12 @@
 #include <string>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// Adds what is imposed, the response, its largest and last value to a description of a run.
 void add_trajectory(Json& json, const ExperimentScene& scene, const std::vector<double>& times_s,
@@ -37,4 +38,4 @@ void write_scene_run(const ExperimentScene& scene, const std::vector<double>& ti
 [[nodiscard]] Json shapes_json();
 [[nodiscard]] std::string shapes_text();
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -9,7 +9,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 ViewPage begun_page(std::string_view kind, const std::filesystem::path& file,
                     std::string_view bytes) {
@@ -42,4 +42,4 @@ ViewPage view_file(const std::filesystem::path& file, const ViewOptions& options
                   "figures.json or the JSON answer of tpm fit");
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

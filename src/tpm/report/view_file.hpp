@@ -5,7 +5,7 @@
 
 #include "tpm/report/view_page.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 struct ViewOptions {
   /// Recompute the organ of a recorded session from its motion: recordings hold no spheres.
@@ -25,4 +25,4 @@ struct ViewOptions {
 /// make_loop_model() throw.
 [[nodiscard]] ViewPage view_file(const std::filesystem::path& file,
                                  const ViewOptions& options = {});
-}  // namespace tpm
+}  // namespace tpm::report

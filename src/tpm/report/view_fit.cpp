@@ -8,7 +8,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr int kShownDigits = 6;
@@ -221,4 +221,4 @@ ViewPage view_fit(const std::filesystem::path& file, std::string_view bytes) {
   return page;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -7,7 +7,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr std::string_view kPlaceOfData = "<!-- data -->";
@@ -87,4 +87,4 @@ std::string ViewPage::html() const {
   return page.replace(at, kPlaceOfData.size(), data);
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

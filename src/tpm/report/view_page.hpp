@@ -7,7 +7,7 @@
 
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// One self-contained HTML page that shows a file: pages/view.html with a description (JSON) and
 /// arrays of numbers in it. The page asks nothing of a network.
@@ -33,4 +33,4 @@ class ViewPage {
   std::size_t count_ = 0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -6,7 +6,7 @@
 
 #include "tpm/report/view_file.hpp"
 
-namespace tpm {
+namespace tpm::report {
 
 /// @param bytes of the file, for its hash and for text
 [[nodiscard]] ViewPage view_simulation(const std::filesystem::path& file, std::string_view bytes,
@@ -23,4 +23,4 @@ namespace tpm {
 [[nodiscard]] std::size_t shown_stride(std::size_t states, std::size_t numbers_of_one,
                                        std::size_t most);
 
-}  // namespace tpm
+}  // namespace tpm::report

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/report/view_parts.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 using Value = double (*)(const HilRecording&, const ServoRecord&);
@@ -240,4 +241,4 @@ ViewPage view_recording(const std::filesystem::path& file, std::string_view byte
   return page;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

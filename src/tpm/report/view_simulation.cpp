@@ -7,7 +7,7 @@
 #include "tpm/store/hdf5.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::report {
 namespace {
 
 constexpr const char* kExpectedResult = "a result of tpm simulate";
@@ -169,4 +169,4 @@ ViewPage view_simulation(const std::filesystem::path& path, std::string_view byt
   return page;
 }
 
-}  // namespace tpm
+}  // namespace tpm::report

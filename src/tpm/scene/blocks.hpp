@@ -4,7 +4,7 @@
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/document_place.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// What the block `organ` leads to: the spheres, and the pairs to be joined if it names them.
 struct OrganBlock {
@@ -44,4 +44,4 @@ struct AnchorBlock {
 /// Three lengths such as ["2 mm", "0 mm", "1 cm"], m.
 [[nodiscard]] Eigen::Vector3d parse_point(const Json& list, const DocumentPlace& place);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -10,7 +10,7 @@
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 const std::array<KindKeys<ContactKind>, 4>& contact_kinds() {
@@ -182,4 +182,4 @@ void require_possible(const Protocol& protocol, const std::vector<SceneContact>&
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -12,7 +12,7 @@
 #include "tpm/scene/blocks.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr auto kSpringWords = std::to_array<Word<SpringRule>>(
@@ -162,4 +162,4 @@ Outputs parse_outputs(const Json& block, const Protocol& protocol, const Documen
   return outputs;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/store/document_place.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A kind of block, and the keys that go with it.
 template <class Kind>
@@ -37,4 +37,4 @@ void require_possible(const Protocol& protocol, const std::vector<SceneContact>&
 [[nodiscard]] Outputs parse_outputs(const Json& block, const Protocol& protocol,
                                     const DocumentPlace& place);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -8,7 +8,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 double tolerance_of(const Json& scene, bool masses, const DocumentPlace& place) {
@@ -70,4 +70,4 @@ ExperimentScene read_experiment(const std::filesystem::path& scene) {
   return read;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

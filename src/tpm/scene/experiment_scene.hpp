@@ -10,7 +10,7 @@
 #include "tpmkit/formulation.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// By which formulation a network moves, with what settings, and which network.
 struct FormulationChoice {
@@ -100,4 +100,4 @@ struct ExperimentScene {
 /// The same from a file, whose bytes become the record's text.
 [[nodiscard]] ExperimentScene read_experiment(const std::filesystem::path& scene);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 Spread spread_of(const std::vector<double>& values) {
@@ -61,4 +61,4 @@ NetworkInspection inspect(const Tissue& tissue) {
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

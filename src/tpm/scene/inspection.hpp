@@ -5,7 +5,7 @@
 #include "tpm/network/contact_stiffness.hpp"
 #include "tpm/scene/scene.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Of some numbers, the least, the mean and the largest; all 0 if there are none.
 struct Spread {
@@ -27,4 +27,4 @@ struct NetworkInspection {
 
 [[nodiscard]] NetworkInspection inspect(const Tissue& tissue);
 
-}  // namespace tpm
+}  // namespace tpm::organ

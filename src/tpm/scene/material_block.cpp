@@ -11,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::array<Word<BlendRule>, 2> kBlendWords{
@@ -294,4 +294,4 @@ MaterialBlock parse_material(const Json& block, LateralBond lateral, const Organ
   return read;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace fs = std::filesystem;
 namespace {
 
@@ -109,4 +109,4 @@ fs::path write_network(const Tissue& tissue, const fs::path& path) {
   return description;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

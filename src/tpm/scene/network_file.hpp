@@ -4,7 +4,7 @@
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/hdf5.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Writes a network to an HDF5 file and beside it, under the same name with the ending .xdmf, a
 /// description that ParaView opens: the spheres as points and the bonds as lines, two blocks. Both
@@ -16,4 +16,4 @@ std::filesystem::path write_network(const Tissue& tissue, const std::filesystem:
 /// What such a file says of spheres and bonds; a file of a simulation says it too.
 void write_network_datasets(const Tissue& tissue, Hdf5Writer& file);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -13,7 +13,7 @@
 #include "tpm/scene/blocks.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 namespace fs = std::filesystem;
@@ -213,7 +213,8 @@ Organ parse_block(const Json& block, const DocumentPlace& place) {
   const auto cells = block.at("cells").get<std::array<int, 3>>();
   const double spacing = length_at(block, "spacing", place).value_or(0.020);
   const Lattice lattice = lattice_of(block, Lattice::fcc, place);
-  return made(place, [&] { return tpm::block(cells[0], cells[1], cells[2], spacing, lattice); });
+  return made(place,
+              [&] { return tpm::organ::block(cells[0], cells[1], cells[2], spacing, lattice); });
 }
 
 Organ parse_star(const Json& block, const DocumentPlace& place) {
@@ -298,4 +299,4 @@ OrganBlock parse_organ(const Json& block, const DocumentPlace& place, const fs::
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -10,7 +10,7 @@
 #include "tpm/network/lowest_mode.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 std::string coordinates(const Eigen::Vector3d& v) {
@@ -244,4 +244,4 @@ std::string export_organ(const Tissue& tissue, const OrganExportOptions& options
                                              : mjcf_document(tissue, options, mass_kg);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 
 #include "tpm/scene/scene.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The physics engines that an organ can be written for.
 enum class OrganTarget {
@@ -45,4 +45,4 @@ struct ExportedBond {
 [[nodiscard]] std::vector<std::string> organ_export_warnings(const Tissue& tissue,
                                                              const OrganExportOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -11,7 +11,7 @@
 #include "tpm/network/material_directions.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kTolerance = 1e-6;            // of the response, in parts of its largest value
@@ -235,4 +235,4 @@ std::unique_ptr<Model> OrganModel::surrogate() const {
   return make_model("closed_form");
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -6,7 +6,7 @@
 #include "tpm/scene/scene.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The quasi-static network of a scene as a model of experiments: the probe stands on the organ's
 /// contact sphere, along its inward normal. Where the scene has the paper's element, the parameters
@@ -58,4 +58,4 @@ class OrganModel final : public Model {
   Probe probe_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -7,7 +7,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 struct PlaceFunction::Impl {
   mu::Parser parser;
@@ -49,4 +49,4 @@ double PlaceFunction::at(const Eigen::Vector3d& place_m) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A formula of place, such as "1 + 4*exp(-(x^2 + y^2)/0.01^2)": x, y and z are metres, the
 /// arithmetic is muParser's (+ - * / ^, ?:, sqrt, exp, ln, abs, min, max, ...), pi is a constant.
@@ -25,4 +25,4 @@ class PlaceFunction {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 bool has_protocol(const Json& document) {
   return document.is_object() && document.contains("protocol");
@@ -41,4 +41,4 @@ std::vector<double> times_over(const Protocol& protocol, std::size_t count) {
   return times;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -5,7 +5,7 @@
 #include "tpm/store/json.hpp"
 #include "tpmkit/protocol.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A history and when its answer is asked for.
 struct ProtocolFile {
@@ -23,4 +23,4 @@ struct ProtocolFile {
 /// `count` times over a protocol, both ends and all of its corners among them.
 [[nodiscard]] std::vector<double> times_over(const Protocol& protocol, std::size_t count);
 
-}  // namespace tpm
+}  // namespace tpm::organ

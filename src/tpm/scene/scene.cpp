@@ -13,7 +13,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// Blocks of a scene that say what is done to the tissue, not what it is.
@@ -194,4 +194,4 @@ void require_loadable(const Tissue& tissue, std::size_t sphere, const Eigen::Vec
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

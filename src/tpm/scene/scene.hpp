@@ -11,7 +11,7 @@
 #include "tpm/store/json.hpp"
 #include "tpmkit/bond_element.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// A sphere that may only move along a line.
 struct Guide {
@@ -79,4 +79,4 @@ inline constexpr std::size_t kMostSpheresForModes = 20'000;
 void require_loadable(const Tissue& tissue, std::size_t sphere, const Eigen::Vector3d& direction,
                       std::string_view where);
 
-}  // namespace tpm
+}  // namespace tpm::organ

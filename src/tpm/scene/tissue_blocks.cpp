@@ -7,7 +7,7 @@
 #include "tpm/scene/blocks.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::array<Word<StiffnessRule>, 2> kRuleWords{
@@ -153,4 +153,4 @@ AnchorBlock parse_anchor(const Json& entry, const Organ& organ, const DocumentPl
   return block;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 std::string escaped(std::string_view text) {
@@ -74,4 +74,4 @@ std::string XdmfSource::lines(std::string_view position, std::size_t spheres,
          geometry(position, spheres);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -2,7 +2,7 @@
 #include <string>
 #include <string_view>
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Parts of an XDMF that points into an HDF5 file beside it.
 class XdmfSource {
@@ -34,4 +34,4 @@ class XdmfSource {
   std::string file_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

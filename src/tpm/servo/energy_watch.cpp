@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::haptics {
 
 EnergyWatch::EnergyWatch(const EnergyWatchSettings& settings)
     : settings_(settings),
@@ -38,4 +38,4 @@ void EnergyWatch::observe(const Eigen::Vector3d& sent_N, const Eigen::Vector3d& 
   most_given_J_ = std::max(most_given_J_, given_J_);
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

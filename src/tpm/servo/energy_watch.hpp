@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// What the energy watch compares, and when it has seen enough.
 struct EnergyWatchSettings {
@@ -66,4 +66,4 @@ class EnergyWatch {
   double q_J_ = 0.0, tissue_J_ = 0.0, given_J_ = 0.0, most_given_J_ = 0.0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

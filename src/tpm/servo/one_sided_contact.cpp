@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace tpm {
+namespace tpm::haptics {
 
 OneSidedContact::OneSidedContact(ContactModel& model, const Eigen::Vector3d& push)
     : model_(model),
@@ -33,4 +33,4 @@ ContactAnswer OneSidedContact::step(const ToolPose& tool) noexcept {
   return {-answer.force_N * push_, answer.error_N, answer.trusted};
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

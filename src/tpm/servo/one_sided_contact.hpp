@@ -1,7 +1,7 @@
 #pragma once
 #include "tpmkit/contact_model.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// A tool without friction on a contact model: it pushes and never pulls. When the force reaches
 /// zero the surface lets go and recovers by itself, kept free of force by one Newton step a period;
@@ -54,4 +54,4 @@ class OneSidedContact final : public ContactModel {
   bool touching_ = false;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::haptics {
 
 void OscillationWatch::observe(double force_N, int periods) noexcept {
   now_ += static_cast<std::uint64_t>(periods);
@@ -61,4 +61,4 @@ bool OscillationWatch::fast() const noexcept {
   return late_N > 0.7 * early_N;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -2,7 +2,7 @@
 #include <array>
 #include <cstdint>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// When a force that goes up and down is taken for an oscillation of the loop.
 struct OscillationWatchSettings {
@@ -49,4 +49,4 @@ class OscillationWatch {
   bool rising_ = true, found_ = false;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace tpm {
+namespace tpm::haptics {
 
 void PassivityControl::observe(const Eigen::Vector3d& held_N,
                                const Eigen::Vector3d& moved_m) noexcept {
@@ -20,4 +20,4 @@ Eigen::Vector3d PassivityControl::damping_N(const Eigen::Vector3d& moved_m,
   return -damping / period_s_ * moved_m;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

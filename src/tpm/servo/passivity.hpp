@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Counts the work that the hand does on what is rendered, and adds damping while the rendering has
 /// given the hand energy that its tissue did not have (EnergyWatch), so that it is taken back
@@ -27,4 +27,4 @@ class PassivityControl {
   double observed_J_ = 0.0;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

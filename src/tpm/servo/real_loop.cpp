@@ -11,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 using namespace std::chrono_literals;
@@ -248,4 +248,4 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
   return outcome;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

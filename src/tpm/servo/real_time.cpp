@@ -16,7 +16,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
@@ -113,4 +113,4 @@ double TimeHistogram::quantile_s(double share) const {
   return max_s();
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

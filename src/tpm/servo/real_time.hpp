@@ -4,7 +4,7 @@
 
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// CLOCK_MONOTONIC, ns.
 [[nodiscard]] std::int64_t now_ns() noexcept;
@@ -34,4 +34,4 @@ class AboveRealTime {
 /// Kernel, processor and number of cores, one line.
 [[nodiscard]] std::string host_line();
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr std::size_t kLateWindow = 1000;
@@ -463,4 +463,4 @@ void ServoStep::stop(StopCause cause) noexcept {
   device_.stop();
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

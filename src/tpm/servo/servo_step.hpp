@@ -10,7 +10,7 @@
 #include "tpm/servo/start_gate.hpp"
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// One cycle of the loop: read, model, limits, passivity, write. Neither allocates nor locks nor
 /// throws.
@@ -123,4 +123,4 @@ class ServoStep {
   StopCause cause_ = StopCause::none;
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 
 #include "tpmkit/servo_record.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 std::uint64_t gate_periods(double time_s, double period_s) noexcept {
@@ -35,4 +35,4 @@ std::uint32_t StartGate::see(const Eigen::Vector3d& position_m, double depth_m, 
   return pressed || said ? 0 : static_cast<std::uint32_t>(kUnconfirmed);
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -4,7 +4,7 @@
 
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Watches the tool before a session: forces stay at zero until it is in free air, inside the
 /// workspace and at rest. Neither allocates nor throws.
@@ -31,4 +31,4 @@ class StartGate {
   Eigen::Vector3d anchor_m_ = Eigen::Vector3d::Zero();
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

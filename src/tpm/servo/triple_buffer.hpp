@@ -3,7 +3,7 @@
 #include <atomic>
 #include <cstdint>
 
-namespace tpm {
+namespace tpm::haptics {
 
 /// Hands the newest value from one thread to one other. Neither ever waits, and no value is seen
 /// half written: the writer, the reader and the hand-over have a slot each.
@@ -30,4 +30,4 @@ class TripleBuffer {
   std::atomic<std::uint32_t> middle_{2};
 };
 
-}  // namespace tpm
+}  // namespace tpm::haptics

@@ -3,7 +3,7 @@
 #include "tpm/servo/servo_step.hpp"
 #include "tpmkit/servo_loop.hpp"
 
-namespace tpm {
+namespace tpm::haptics {
 namespace {
 
 constexpr std::uint64_t kAskEvery = 1024;
@@ -41,4 +41,4 @@ ServoOutcome run_in_virtual_time(HapticDevice& device, ContactModel& model,
   return outcome;
 }
 
-}  // namespace tpm
+}  // namespace tpm::haptics

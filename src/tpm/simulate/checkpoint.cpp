@@ -10,7 +10,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace fs = std::filesystem;
 namespace {
 
@@ -264,4 +264,4 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
   return checkpoint;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

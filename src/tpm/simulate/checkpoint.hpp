@@ -3,7 +3,7 @@
 
 #include "tpm/simulate/simulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Where a run stands.
 struct Checkpoint {
@@ -26,4 +26,4 @@ void write_checkpoint(const std::filesystem::path& path, const std::string& iden
     const std::filesystem::path& path, const std::string& identity,
     const std::function<void(const std::string&)>& note);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -8,7 +8,7 @@
 #include "tpm/simulate/checkpoint.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr int kWatched = 200;  // parts of the protocol's time
@@ -146,4 +146,4 @@ PartOfProtocol::PartOfProtocol(const ExperimentScene& scene, double end_s)
   tolerance = std::min(tolerance, 0.1);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

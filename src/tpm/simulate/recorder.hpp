@@ -4,7 +4,7 @@
 
 #include "tpm/simulate/simulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The times at which a run is watched: those of the outputs, 200 even parts of the protocol, and
 /// its corners; rising. The same whatever is written, so that limits are dated alike.
@@ -99,4 +99,4 @@ struct PartOfProtocol {
   double tolerance;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

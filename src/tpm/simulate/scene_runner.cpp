@@ -5,7 +5,7 @@
 #include "tpm/network/material_refusal.hpp"
 #include "tpm/network/stiffness_blocks.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 bool jumps(const Protocol& protocol) {
@@ -136,4 +136,4 @@ Trajectory run_scene(const ExperimentScene& scene, const std::vector<double>& ti
   return entry.as<SceneRunner>()->run(scene, network_to_run(scene), times_s, with_field);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 #include "tpm/simulate/simulation.hpp"
 #include "tpmkit/simulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Shows whole states of the network, and goes on from checkpoints.
 class StateRunner {
@@ -39,4 +39,4 @@ void require_runnable(const ExperimentScene& scene);
 [[nodiscard]] Trajectory run_scene(const ExperimentScene& scene, const std::vector<double>& times_s,
                                    bool with_field);
 
-}  // namespace tpm
+}  // namespace tpm::organ

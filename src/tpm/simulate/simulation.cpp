@@ -7,7 +7,7 @@
 #include "tpm/simulate/scene_runner.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// A network with the contacts of a scene; tools in their order.
@@ -74,4 +74,4 @@ SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,
       ->simulate(scene, network, controls);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

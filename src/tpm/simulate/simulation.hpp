@@ -7,7 +7,7 @@
 #include "tpm/scene/experiment_scene.hpp"
 #include "tpm/simulate/validity.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The network that is run: the tissue, or the mass-spring model that takes its place, with what
 /// touches it.
@@ -99,4 +99,4 @@ struct SimulationRun {
 [[nodiscard]] SimulationRun simulate(const ExperimentScene& scene, const RunNetwork& network,
                                      const SimulationControls& controls = {});
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -13,7 +13,7 @@
 #include "tpm/store/file.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace fs = std::filesystem;
 namespace {
 
@@ -292,4 +292,4 @@ fs::path write_simulation(const ExperimentScene& scene, const RunNetwork& networ
   return description;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

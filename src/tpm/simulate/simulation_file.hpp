@@ -3,7 +3,7 @@
 
 #include "tpm/simulate/simulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Writes a result to an HDF5 file and beside it, under the same name with the ending .xdmf, a
 /// description that ParaView opens as a network in motion. Both appear whole or not at all; the
@@ -13,4 +13,4 @@ namespace tpm {
 std::filesystem::path write_simulation(const ExperimentScene& scene, const RunNetwork& network,
                                        const SimulationRun& run, const std::filesystem::path& path);
 
-}  // namespace tpm
+}  // namespace tpm::organ

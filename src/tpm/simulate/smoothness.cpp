@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace tpm {
+namespace tpm::organ {
 
 SmoothnessProbe::SmoothnessProbe(const ExperimentScene& scene)
     : network_(scene.tissue.network),
@@ -27,4 +27,4 @@ std::optional<Smoothness> smoothness_of(const ExperimentScene& scene, const Posi
   return SmoothnessProbe(scene).at(position);
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/network/roughness.hpp"
 #include "tpm/scene/experiment_scene.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// How rough a deformation is (network/roughness.hpp), where the paper's Fig. 3 is looked at.
 struct Smoothness {
@@ -35,4 +35,4 @@ class SmoothnessProbe {
 [[nodiscard]] std::optional<Smoothness> smoothness_of(const ExperimentScene& scene,
                                                       const Positions& position);
 
-}  // namespace tpm
+}  // namespace tpm::organ

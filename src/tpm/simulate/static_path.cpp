@@ -8,7 +8,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kLongestMove = 0.05;    // of the spacing, of the driven sphere in one stride
@@ -91,4 +91,4 @@ QuasiStaticState StaticPath::move_to(double imposed, double time_s) {
           state_.position, state_.viscous, QuasiStaticEnergy{stored_J, 0.0, stored_J}};
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -1,7 +1,7 @@
 #pragma once
 #include "tpm/network/driven_tissue.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// The fully relaxed equilibria of a network along what is imposed, followed in strides over which
 /// the driven sphere moves by no more than a twentieth of the spacing, so that no instability is
@@ -36,4 +36,4 @@ class StaticPath {
   bool unstable_ = false;  ///< the latest stride failed by a stiffness that is not positive
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

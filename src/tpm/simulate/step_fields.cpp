@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::organ {
 std::vector<double> list_of(const Eigen::MatrixXd& numbers) {
   return {numbers.data(), numbers.data() + numbers.size()};
 }
@@ -68,4 +68,4 @@ Eigen::Matrix3Xd displacements_m(const RunNetwork& network, const QuasiStaticSta
   return network.spheres(state.position) - network.network.organ.position;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 
 #include "tpm/simulate/simulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Numbers that files give for each sphere or bond.
 struct StepField {
@@ -42,4 +42,4 @@ struct StepFields {
 [[nodiscard]] Eigen::Matrix3Xd displacements_m(const RunNetwork& network,
                                                const QuasiStaticState& state);
 
-}  // namespace tpm
+}  // namespace tpm::organ

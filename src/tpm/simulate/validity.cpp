@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr double kRounding_m = 1e-9;  // a depth of 12 mm that was asked for is not above 12 mm
@@ -126,4 +126,4 @@ void ValidityWatch::see(double time_s, const Positions& position) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

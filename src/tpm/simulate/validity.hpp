@@ -8,7 +8,7 @@
 #include "tpm/scene/scene.hpp"
 #include "tpmkit/simulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// True for the paper's element and for a liver of a size like the paper's: 10 and 12 mm are depths
 /// of such a liver. They say nothing about an organ of another shape or size.
@@ -44,4 +44,4 @@ class ValidityWatch {
   Validity seen_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -4,7 +4,7 @@
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 constexpr std::uint8_t kVtkLine = 3;
@@ -132,4 +132,4 @@ void write_vtkhdf(const ExperimentScene& scene, const RunNetwork& network, const
   file.commit();
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -3,7 +3,7 @@
 
 #include "tpm/simulate/simulation.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 
 /// Writes the outputs of a run as VTKHDF 2.0 (the file format of VTK from 9.3 and ParaView from
 /// 5.12 on): one unstructured grid in motion, the spheres its points and the bonds its lines, with
@@ -12,4 +12,4 @@ namespace tpm {
 void write_vtkhdf(const ExperimentScene& scene, const RunNetwork& network, const SimulationRun& run,
                   const std::filesystem::path& path);
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -9,7 +9,7 @@
 #include "tpm/stability/judged_problem.hpp"
 #include "tpm/stability/study.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Expect = std::function<StabilityClass(StepRule)>;
@@ -311,4 +311,4 @@ std::vector<StabilityCorner> stability_corners() {
   return corners;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -7,7 +7,7 @@
 #include "tpm/network/liver.hpp"
 #include "tpm/stability/study.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 namespace {
 
@@ -100,4 +100,4 @@ std::string study_organ_words() {
 StudyOrgan::StudyOrgan(const BondElement& p, std::size_t spheres)
     : network(small_liver(spheres)), bonds(network, p), driven(pushed(network, bonds)) {}
 
-}  // namespace tpm
+}  // namespace tpm::study

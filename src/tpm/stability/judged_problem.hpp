@@ -8,7 +8,7 @@
 #include "tpm/stability/theory.hpp"
 #include "tpm/stability/verdict.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 struct JudgedProblem {
   std::unique_ptr<MethodProblem> problem;
@@ -50,4 +50,4 @@ struct StudyOrgan {
   DrivenNetwork driven;
 };
 
-}  // namespace tpm
+}  // namespace tpm::study

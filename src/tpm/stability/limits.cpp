@@ -12,7 +12,7 @@
 #include "tpm/stability/study.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kShare = 0.005;  // to which a limit is bisected: less than 1 %
@@ -262,4 +262,4 @@ StabilityStudy run_stability_study(int along, const StabilityParts& parts) {
   return study;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

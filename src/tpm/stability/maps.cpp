@@ -7,7 +7,7 @@
 #include "tpm/stability/judged_problem.hpp"
 #include "tpm/stability/study.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// So many values from `first` to `last`, evenly in the logarithm.
@@ -194,4 +194,4 @@ std::vector<StabilityMap> stability_maps(int along) {
   return maps;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

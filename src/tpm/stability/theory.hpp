@@ -3,9 +3,10 @@
 #include <optional>
 #include <span>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/method/method.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// The element about a depth, linear: force k e - g y under a load, with or without a mass.
 struct LinearElement {
@@ -29,4 +30,4 @@ struct LinearElement {
 [[nodiscard]] Eigen::VectorXd linear_motion_m(const LinearElement& element, double load_N,
                                               std::span<const double> times_s);
 
-}  // namespace tpm
+}  // namespace tpm::study

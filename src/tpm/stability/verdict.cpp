@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kGrows = 1.1;  // of the largest difference, from the first half to the second
@@ -56,4 +56,4 @@ StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& referenc
   return verdict;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

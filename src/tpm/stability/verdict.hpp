@@ -4,9 +4,10 @@
 #include <string>
 #include <string_view>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/method/method.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// How a run is classified.
 enum class StabilityClass {
@@ -56,4 +57,4 @@ struct StabilityVerdict {
 [[nodiscard]] StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& reference,
                                          double peak, bool moves);
 
-}  // namespace tpm
+}  // namespace tpm::study

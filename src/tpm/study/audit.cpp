@@ -11,7 +11,7 @@
 #include "tpm/study/audit_kinds.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 struct ClaimKind {
@@ -167,4 +167,4 @@ AuditReport run_audit(const Json& claims, std::string_view file) {
   return report;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

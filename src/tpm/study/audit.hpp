@@ -5,7 +5,7 @@
 
 #include "tpm/study/claims.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// Whether what the paper prints stands up to recomputing it.
 enum class AuditVerdict {
@@ -104,4 +104,4 @@ struct AuditReport {
 /// docs/json_tables_audit.md lists the keys.
 [[nodiscard]] Json to_json(const AuditReport& report);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -1,6 +1,6 @@
 #include "tpm/study/audit.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 Json optional_number(const std::optional<double>& value) {
@@ -89,4 +89,4 @@ Json to_json(const AuditReport& report) {
   return json;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

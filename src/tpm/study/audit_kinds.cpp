@@ -10,7 +10,7 @@
 #include "tpm/study/cause_search.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// The inputs that the cause search may change: those named in `search`, else all.
@@ -252,4 +252,4 @@ void check_dimension(const ClaimReader& claim, Finding& finding) {
   finding.verdict = same ? AuditVerdict::holds : AuditVerdict::contradicted;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

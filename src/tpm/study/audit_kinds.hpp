@@ -4,7 +4,7 @@
 #include "tpm/study/claim_reader.hpp"
 #include "tpm/study/printed_number.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// Each fills the verdict and the numbers of a finding from one claim; id, kind and quote are
 /// there already. All throw Error(bad_input) naming the claim.
@@ -38,4 +38,4 @@ void check_misfit(const ClaimReader& claim, Finding& finding);
 /// "0.613 N"; just the number if the unit is 1.
 [[nodiscard]] std::string with_unit(std::string_view number, const Unit& unit);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// One row of a table that a claim speaks of, with a name for it.
@@ -195,4 +195,4 @@ void check_misfit(const ClaimReader& claim, Finding& finding) {
       squared / (sigma * sigma) <= limit ? AuditVerdict::holds : AuditVerdict::contradicted;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -11,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 std::vector<double> to_vector(const Eigen::VectorXd& values) {
@@ -221,4 +221,4 @@ ErrorBudget contact_budget(const LawFile& law, const PreparedRecording& recordin
   return budget;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

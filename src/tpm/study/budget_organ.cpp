@@ -11,7 +11,7 @@
 #include "tpm/study/budget_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kTighterRun = 0.01;   // of the scene's tolerance: what its runs are compared with
@@ -176,4 +176,4 @@ ErrorBudget organ_budget(const std::optional<LawFile>& law, const ExperimentScen
   return budget;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -5,7 +5,7 @@
 #include "tpm/plan/perception.hpp"
 #include "tpm/study/error_budget.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kStoredDigits6 = 6;
@@ -118,4 +118,4 @@ std::string to_csv(const ErrorBudget& b) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

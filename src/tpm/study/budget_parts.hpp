@@ -5,7 +5,7 @@
 #include "tpm/study/error_budget.hpp"
 #include "tpm/study/law_prediction.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// The law without the recording's contact point and offset.
 [[nodiscard]] LawFile at_surface(const LawFile& law);
@@ -46,4 +46,4 @@ void add_random_part(ErrorBudget& budget, const LawPrediction& prediction);
 void add_random_part(ErrorBudget& budget, const LawFile& law, const Protocol& motion,
                      const BudgetOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -12,7 +12,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 std::string with_unit(const std::string& number, const Unit& unit) {
@@ -197,4 +197,4 @@ std::vector<AuditCause> search_causes(const ClaimReader& reader, const ClaimValu
   return causes;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

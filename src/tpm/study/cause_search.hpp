@@ -6,7 +6,7 @@
 #include "tpm/study/claim_reader.hpp"
 #include "tpm/study/printed_number.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// Asks which changed input would give a printed number that the formula does not give:
 ///  1. other printed values of an input, in the whole formula or in single terms of a sum (so that
@@ -22,4 +22,4 @@ namespace tpm {
                                                     const std::vector<AuditInput>& inputs,
                                                     std::size_t limit = 4);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -10,7 +10,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 ClaimReader::ClaimReader(const ClaimSet& set, const Json& claim)
     : set_(set),
@@ -176,4 +176,4 @@ std::vector<AuditInput> ClaimValue::inputs(const Scope& scope) const {
   return inputs;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -6,7 +6,7 @@
 #include "tpm/study/audit.hpp"
 #include "tpm/study/claims.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// Reads the keys of one claim and evaluates formulas in its scope. Errors name file and claim.
 class ClaimReader {
@@ -69,4 +69,4 @@ class ClaimValue {
   std::string expression_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::study

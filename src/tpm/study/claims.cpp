@@ -9,7 +9,7 @@
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 std::string text_of(const Json& object, std::string_view key) {
@@ -164,4 +164,4 @@ std::optional<double> quantity_si(std::string_view text) {
   return parse_number(text.substr(0, space), text) * unit.to_si;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpm/study/expression.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A value that the paper prints for a symbol in another place.
 struct PrintedAlternative {
@@ -80,4 +80,4 @@ struct ClaimSet {
 /// and so is a formula.
 [[nodiscard]] std::optional<double> quantity_si(std::string_view text);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kContactStep = 1.0 / 3.0;  // of contact's standard error
@@ -162,4 +162,4 @@ IntervalFactors profile_contact(const ResidualFunction& residuals, const Contact
   return factors;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -3,9 +3,10 @@
 #include <span>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/fit/least_squares.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// Widths of intervals in parts of what derivatives at the estimate say, to each side, in the order
 /// of the parameters of the search.
@@ -38,4 +39,4 @@ struct ContactWalk {
 [[nodiscard]] IntervalFactors profile_contact(const ResidualFunction& residuals,
                                               const ContactWalk& walk);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -15,7 +15,7 @@
 #include "tpm/study/design_words.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using ExperimentKind = PlannedExperiment::Kind;
@@ -412,4 +412,4 @@ PlannedFit planned_fit(const DesignProblem& problem,
   return fit;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

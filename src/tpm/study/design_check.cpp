@@ -10,7 +10,7 @@
 #include "tpm/study/design.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kFewestSets = 10;
@@ -166,4 +166,4 @@ DesignCheck check_design(const DesignProblem& problem, const PlannedExperiment& 
   return check;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -7,7 +7,7 @@
 #include "tpm/study/design.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using ExperimentKind = PlannedExperiment::Kind;
@@ -223,4 +223,4 @@ DesignProblem read_design(const std::filesystem::path& path) {
   return parse_design(read_json(path), path.string());
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpm/study/design.hpp"
 #include "tpm/study/design_words.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kDesignDigits = 6;
@@ -177,4 +177,4 @@ std::string to_terminal_text(const DesignResult& result, const DesignCheck* chec
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/fit/fit.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// One thing about a protocol that a person can turn.
@@ -181,4 +181,4 @@ std::vector<std::string> design_words(const DesignResult& result) {
   return words;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

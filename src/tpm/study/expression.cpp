@@ -10,7 +10,7 @@
 #include "tpm/study/model_functions.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kDeepestDefinition = 50;
@@ -220,4 +220,4 @@ std::vector<std::string> Evaluator::inputs(const std::string& text, const Scope&
   return {found.begin(), found.end()};
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -10,7 +10,7 @@
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr std::array kRates_m_per_s{1e-3, 2e-3, 4e-3};
@@ -129,4 +129,4 @@ Json held_out_json(const FitStudy& study) {
   return Json{{"held_out", std::move(list)}};
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

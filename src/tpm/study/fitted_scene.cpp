@@ -9,7 +9,7 @@
 #include "tpm/scene/organ_model.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kSceneDigits = 10;
@@ -123,4 +123,4 @@ std::optional<FittedScene> fitted_scene(const FitResult& fit) {
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

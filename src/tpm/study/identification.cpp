@@ -9,7 +9,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 LawSpec live_law(Kernel kernel, int branches, Tension tension) {
@@ -221,4 +221,4 @@ LawFile identified_law(const Identification& identification, const PreparedRecor
   return law;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -7,7 +7,7 @@
 #include "tpm/study/sequential_fit.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 struct IdentifyOptions {
   std::vector<LawSpec> laws;  ///< empty: live_laws()
@@ -74,4 +74,4 @@ struct Identification {
 [[nodiscard]] Json to_json(const Identification& identification);
 [[nodiscard]] std::string to_terminal_text(const Identification& identification);
 
-}  // namespace tpm
+}  // namespace tpm::study

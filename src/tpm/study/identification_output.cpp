@@ -8,7 +8,7 @@
 #include "tpm/study/identification.hpp"
 #include "tpmkit/law_file.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kStoredDigits = 6;
@@ -116,4 +116,4 @@ std::string to_terminal_text(const Identification& id) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

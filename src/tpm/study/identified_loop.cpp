@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kRoomBelow = 1.5;  // of the recording's depth: the loop never leaves it
@@ -165,4 +165,4 @@ std::string to_terminal_text(const IdentifiedLoop& loop) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -15,7 +15,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr auto kPlacementWords = std::to_array<Word<Placement>>(
@@ -354,4 +354,4 @@ LawPrediction predict_by(const Model& model, const LawFile& law, const Protocol&
   return p;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

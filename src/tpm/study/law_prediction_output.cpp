@@ -11,7 +11,7 @@
 #include "tpm/study/law_prediction.hpp"
 #include "tpm/study/selection.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kStored = 6;  // significant digits
@@ -211,4 +211,4 @@ std::string verdict_words(const PredictionVerdict& verdict, double peak) {
       significant(verdict.factor, 2));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -13,7 +13,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// What the readings tell about the sizes of a law's parameters.
@@ -301,4 +301,4 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   return s;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -5,7 +5,7 @@
 
 #include "tpm/study/selection.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// What a rheometer measures of a linear material, whatever the specimen: storage and loss over
 /// frequency, a relaxation modulus G(t) or a creep compliance J(t).
@@ -40,4 +40,4 @@ struct MaterialFunction {
 [[nodiscard]] Selection select_law(const MaterialFunction& function,
                                    const SelectionOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::study

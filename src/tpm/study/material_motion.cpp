@@ -9,7 +9,7 @@
 #include "tpm/study/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr std::size_t kMostTimes = 200;  // of a motion, that the forces are compared at
@@ -65,4 +65,4 @@ MaterialMotion motion_of_protocol(const Protocol& protocol, std::vector<double> 
   return {{}, protocol, std::move(times)};
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 double tension_modulus(double Eprime, double depth, double spacing) {
@@ -77,4 +77,4 @@ void define_model_functions(mu::Parser& parser) {
   parser.DefineFun("equilibrium_depth", equilibrium_depth);
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -4,7 +4,7 @@ namespace mu {
 class Parser;
 }
 
-namespace tpm {
+namespace tpm::study {
 
 /// Makes the element of tpm_element.hpp callable in formulas, all arguments and results SI:
 ///
@@ -19,4 +19,4 @@ namespace tpm {
 /// A call with parameters out of range throws Error(bad_input).
 void define_model_functions(mu::Parser& parser);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpm/scene/protocol_file.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kLateralRatio = 1.0;  // E' over instantaneous radial modulus: the paper's
@@ -105,4 +105,4 @@ Eigen::MatrixXd FittedBonds::along(const OrganModel& model) const {
   return changes;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -7,10 +7,11 @@
 #include <string_view>
 #include <vector>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/scene/organ_model.hpp"
 #include "tpm/store/json.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// The organ of a scene, driven at the sphere and in the direction of the scene's contact; without
 /// a contact at the organ's contact sphere.
@@ -55,4 +56,4 @@ class FittedBonds {
   bool times_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::study

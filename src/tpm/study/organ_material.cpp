@@ -15,7 +15,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kBoundFactor = 1e4;        // of moduli about their start
@@ -452,4 +452,4 @@ OrganMaterial put_on_organ(const LawFile& law, const std::vector<MaterialMotion>
   return m;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

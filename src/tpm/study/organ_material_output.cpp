@@ -9,7 +9,7 @@
 #include "tpm/study/organ_bonds.hpp"
 #include "tpm/study/organ_material_parts.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kMaterialDigits = 8;
@@ -440,4 +440,4 @@ std::string to_csv(const OrganMaterial& m) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -13,7 +13,7 @@
 #include "tpm/study/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kContactStep = 1e-3;  // of the largest depth, for the derivative by the contact
@@ -293,4 +293,4 @@ LawPrediction predict_organ(const OrganOfLaw& organ, const PreparedRecording& re
                organ);
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

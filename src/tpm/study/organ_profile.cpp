@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kEnough = 1e-3;       // of the threshold: a step that promises less is not taken
@@ -221,4 +221,4 @@ Profile short_profile(const ResidualFunction& function, std::span<const FitParam
   return profile;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

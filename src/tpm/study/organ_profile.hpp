@@ -1,10 +1,11 @@
 #pragma once
 #include <span>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/fit/least_squares.hpp"
 #include "tpm/fit/uncertainty.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// The likelihood profile of one parameter where an evaluation takes a second, not a microsecond:
 /// each side is walked in a few points, the others fitted again by damped Gauss-Newton steps until
@@ -17,4 +18,4 @@ namespace tpm {
                                     std::span<const FitParameter> parameters, const Minimum& best,
                                     std::size_t index, double half_width, double rise);
 
-}  // namespace tpm
+}  // namespace tpm::study

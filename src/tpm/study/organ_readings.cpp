@@ -12,7 +12,7 @@
 #include "tpm/study/organ_profile.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kContactDifference = 1e-3;  // of the largest depth
@@ -279,4 +279,4 @@ ReadingsFit fit_to_readings(const OrganModel& model, const FittedBonds& bonds,
   return result;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -12,7 +12,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -235,4 +235,4 @@ OrganStudy run_organ_study(const OrganStudyConfig& config) {
   return study;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -9,7 +9,7 @@
 #include "tpm/study/organ_study.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -202,4 +202,4 @@ OrganStudyConfig read_organ_study(const std::filesystem::path& path) {
   return parse_organ_study(read_json(path), path.string(), path.parent_path());
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -4,7 +4,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/study/organ_study.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Kind = ProtocolChoice::Kind;
@@ -116,4 +116,4 @@ Json to_json(const OrganStudy& study) {
   return j;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -3,7 +3,7 @@
 #include "tpm/study/law_prediction.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A linear root of a covariance: covariance = root root'. Singular ones are allowed.
 [[nodiscard]] Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance);
@@ -66,4 +66,4 @@ struct OwnPlacement {
                                                  const std::function<OwnPlacement()>& place,
                                                  const PredictionOptions& options);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// Power of ten of the last digit of the part before an exponent: -2 for "0.61", 0 for "490".
@@ -119,4 +119,4 @@ DigitCheck compare_digits(const PrintedNumber& printed, double computed) {
   return check;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

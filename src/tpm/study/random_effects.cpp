@@ -14,7 +14,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 void require_valid(std::span<const SpecimenEstimate> specimens, double level) {
@@ -222,4 +222,4 @@ RandomEffects random_effects_of_repeats(std::span<const SpecimenEstimate> repeat
   return r;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -10,7 +10,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// Adds the directions in which contact and offset of the recording move: with the material (they
@@ -178,4 +178,4 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
   return p;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -9,7 +9,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 bool is_after_the_test(PhaseKind kind) {
@@ -434,4 +434,4 @@ Json config_json(const FitConfig& config) {
   return j;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

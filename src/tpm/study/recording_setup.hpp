@@ -8,7 +8,7 @@
 #include "tpm/fit/config.hpp"
 #include "tpm/fit/experiment_residuals.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A recording ready to be fitted: what happened in it and which part is used.
 struct PreparedRecording {
@@ -69,4 +69,4 @@ struct SetupOptions {
 /// The configuration file that tpm fit reads, with the same meaning.
 [[nodiscard]] Json config_json(const FitConfig& config);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -11,7 +11,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kRequired = 0.95;  // of the trials: the right law, and none that is larger
@@ -302,4 +302,4 @@ std::string to_terminal_text(std::span<const RecoveryResult> results) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -9,7 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 LawSpec law_of(Kernel kernel, int branches, Tension tension) {
@@ -477,4 +477,4 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   return s;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/study/recording_setup.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// How well a law that was fitted to some data predicts other data.
 struct HeldOut {
@@ -136,4 +136,4 @@ struct ProtocolSpans {
 [[nodiscard]] std::vector<std::string> protocol_warnings(
     const FitResult& fit, std::span<const PreparedRecording> recordings);
 
-}  // namespace tpm
+}  // namespace tpm::study

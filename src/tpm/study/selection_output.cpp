@@ -3,7 +3,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/study/selection.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 double kept_digits(double value) {
@@ -85,4 +85,4 @@ std::string to_terminal_text(const Selection& s) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/study/selection.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// The samples after the fitted part, and those of them that the law predicts.
@@ -141,4 +141,4 @@ std::vector<std::string> protocol_warnings(const FitResult& fit,
   return warnings;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -13,7 +13,7 @@
 #include "tpm/study/whitened_prefix.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
@@ -395,4 +395,4 @@ std::optional<std::size_t> least_law(std::span<const SequentialFit> fits, double
   return std::nullopt;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

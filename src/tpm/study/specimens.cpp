@@ -11,7 +11,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// Evidence for a law over all recordings.
@@ -327,4 +327,4 @@ std::string to_terminal_text(const SpecimenStudy& study) {
   return text;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

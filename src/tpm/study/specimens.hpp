@@ -7,7 +7,7 @@
 #include "tpm/study/random_effects.hpp"
 #include "tpm/study/selection.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// One recording's own fit of the common law.
 struct SpecimenRow {
@@ -60,4 +60,4 @@ struct SpecimenStudy {
 [[nodiscard]] Json to_json(const SpecimenStudy& study);
 [[nodiscard]] std::string to_terminal_text(const SpecimenStudy& study);
 
-}  // namespace tpm
+}  // namespace tpm::study

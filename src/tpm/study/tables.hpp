@@ -7,7 +7,7 @@
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/tpm_element.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// What a table assumes about the loading.
 enum class TableMode {
@@ -104,4 +104,4 @@ struct TablesResult {
 /// docs/json_tables_audit.md lists the keys.
 [[nodiscard]] Json to_json(const TablesResult& result);
 
-}  // namespace tpm
+}  // namespace tpm::study

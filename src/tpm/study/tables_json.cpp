@@ -1,6 +1,6 @@
 #include "tpm/study/tables.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 std::string_view mode_name(TableMode mode) {
@@ -110,4 +110,4 @@ Json to_json(const TablesResult& result) {
   return json;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr double kLeastPivot = 1e-10;  // of a gram matrix with columns of length 1
@@ -131,4 +131,4 @@ std::optional<AutoregressionEstimate> improve_in_turn(WhitenedPrefix& function,
   return correlation;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

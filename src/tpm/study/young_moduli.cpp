@@ -10,7 +10,7 @@
 #include "tpm/fit/verdict.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr int kKept = 6;  // significant digits in JSON
@@ -212,4 +212,4 @@ std::optional<double> probe_exponent(const ContactGeometry& geometry) {
   return geometry.cone_half_angle_rad ? std::optional(2.0) : std::nullopt;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

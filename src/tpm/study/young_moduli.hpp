@@ -7,7 +7,7 @@
 #include "tpm/law/contact_geometry.hpp"
 #include "tpm/study/specimens.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// Young's modulus of one stiffness of a fitted law, with its interval. SI.
 struct YoungModulus {
@@ -51,4 +51,4 @@ struct YoungModuli {
                                                  const ContactGeometry& geometry);
 [[nodiscard]] std::optional<double> probe_exponent(const ContactGeometry& geometry);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -10,7 +10,7 @@
 #include "tpm/store/document_place.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// Numbers of all cells, the axis that is summed over taken out.
@@ -130,4 +130,4 @@ Json fit_from_cell(Json fit, const BestCell& cell, std::string_view where) {
   return fit;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

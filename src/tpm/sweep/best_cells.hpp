@@ -5,7 +5,7 @@
 
 #include "tpm/sweep/sweep_reader.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A parameter of a cell.
 struct CellParameter {
@@ -35,4 +35,4 @@ struct BestCell {
 /// @param where of `fit`, for messages
 [[nodiscard]] Json fit_from_cell(Json fit, const BestCell& cell, std::string_view where);
 
-}  // namespace tpm
+}  // namespace tpm::study

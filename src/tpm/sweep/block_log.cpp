@@ -16,7 +16,7 @@
 #include "tpm/store/file_roles.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "logs hold little-endian numbers");
@@ -315,4 +315,4 @@ void BlockLog::sync() {
   if (::fdatasync(file_) != 0) throw cannot_write_log(path_);
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 
 #include "tpm/sweep/cell_block.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A block as a log holds it, check sums included: made where the block was computed, so that who
 /// writes the log has nothing left to do but that.
@@ -68,4 +68,4 @@ class BlockLog {
   std::vector<std::uint64_t> place_;  ///< of each block in the file; 0: it is not there
 };
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -8,7 +8,7 @@
 
 #include "tpm/sweep/sweep.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// What became of a cell.
 enum class CellStatus : std::uint8_t { done, skipped, failed };
@@ -61,4 +61,4 @@ class CellRunner {
   std::vector<std::int64_t> counts_;
 };
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -11,7 +11,7 @@
 #include "tpm/store/json.hpp"
 #include "tpmkit/units.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// What is found for each cell under one name: a number, or a curve.
 struct SweepVariable {
@@ -98,4 +98,4 @@ class SweepModel {
 [[nodiscard]] std::shared_ptr<const SweepModel> organ_sweep_model(
     const Json& document, std::string_view where, const std::filesystem::path& folder);
 
-}  // namespace tpm
+}  // namespace tpm::study

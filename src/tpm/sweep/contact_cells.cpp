@@ -14,7 +14,7 @@
 #include "tpm/sweep/sweep_outputs.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Kind = SweepOutput::Kind;
@@ -315,4 +315,4 @@ std::shared_ptr<const SweepModel> single_contact_model(const Json& document,
   return std::make_shared<ContactModel>(std::move(setup));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

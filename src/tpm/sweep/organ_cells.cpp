@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 
+#include "tpm/core/namespaces.hpp"
 #include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_scene.hpp"
@@ -18,7 +19,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Kind = SweepOutput::Kind;
@@ -444,4 +445,4 @@ std::shared_ptr<const SweepModel> organ_sweep_model(const Json& document, std::s
   return std::make_shared<OrganSweepModel>(std::move(setup));
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -6,7 +6,7 @@
 
 #include "tpm/sweep/block_log.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A part of a sweep's blocks: those whose number leaves `index` when divided by `count`.
 struct Shard {
@@ -48,4 +48,4 @@ struct SweepRun {
 /// File of the log of a sweep whose results go into `output`.
 [[nodiscard]] std::filesystem::path log_path(const std::filesystem::path& output);
 
-}  // namespace tpm
+}  // namespace tpm::study

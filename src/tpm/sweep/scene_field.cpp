@@ -8,7 +8,7 @@
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 constexpr std::string_view kOfMaterial = "material.", kProtocol = "/protocol/",
@@ -92,4 +92,4 @@ void SceneField::set(ProtocolBlock& protocol, double value) const {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

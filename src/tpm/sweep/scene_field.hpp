@@ -6,7 +6,7 @@
 #include "tpm/store/json.hpp"
 #include "tpmkit/bond_material.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A number of a scene that a sweep sets: `material.tau2`, a parameter of the first material by its
 /// name in the table (parameters_of), or a JSON pointer to a number, such as /protocol/depth.
@@ -41,4 +41,4 @@ class SceneField {
   bool quantity_ = false, whole_ = false;
 };
 
-}  // namespace tpm
+}  // namespace tpm::study

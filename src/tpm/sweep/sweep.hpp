@@ -11,7 +11,7 @@
 #include "tpm/sweep/cell_model.hpp"
 #include "tpm/sweep/parameter_values.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// One dimension of a sweep.
 struct SweepAxis {
@@ -72,4 +72,4 @@ inline constexpr double kMostCells = 1e12;
                                 const std::filesystem::path& folder);
 [[nodiscard]] Sweep read_sweep(const std::filesystem::path& path);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -9,7 +9,7 @@
 #include "tpm/study/expression.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 void require_no_samples(const SweepReader& sweep, const ReadAxis& axis) {
@@ -84,4 +84,4 @@ SweepConvergence convergence_of(const SweepReader& sweep, const std::string& var
   return found;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -5,7 +5,7 @@
 #include "tpm/sample/grid_convergence.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// A number of a sweep over ever finer places of one axis.
 struct SweepConvergence {
@@ -35,4 +35,4 @@ struct SweepConvergence {
                                               const std::optional<std::string>& axis,
                                               const std::string& size, const HeldPlaces& held);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -15,7 +15,7 @@
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 /// "/material/E1" becomes "E1".
@@ -378,4 +378,4 @@ Sweep read_sweep(const std::filesystem::path& path) {
   return parse_sweep(read_json(path), path.string(), path.parent_path());
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -11,7 +11,7 @@
 #include "tpm/core/enum_names.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 using Kind = SweepOutput::Kind;
@@ -169,4 +169,4 @@ void require_identifier(const std::string& name, std::string_view where) {
                   "letters, digits and _, no digit first");
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

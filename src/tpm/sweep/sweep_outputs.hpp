@@ -7,7 +7,7 @@
 #include "tpm/sweep/cell_model.hpp"
 #include "tpm/sweep/parameter_values.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// Of what and when a variable is.
 struct SweepOutput {
@@ -59,4 +59,4 @@ struct CountedValues {
 /// Throws Error(bad_input) unless a text can stand for a number in an expression.
 void require_identifier(const std::string& name, std::string_view where);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -6,7 +6,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 std::string path_of(const std::string& name) {
@@ -187,4 +187,4 @@ std::vector<HeldValue> other_places(const SweepReader& sweep, const ReadAxis& al
   return others;
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

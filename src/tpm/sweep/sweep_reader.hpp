@@ -10,7 +10,7 @@
 #include "tpm/store/hdf5.hpp"
 #include "tpm/sweep/sweep_result.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// An axis of a file of results.
 struct ReadAxis {
@@ -88,4 +88,4 @@ class SweepReader {
 [[nodiscard]] std::vector<HeldValue> other_places(const SweepReader& sweep, const ReadAxis& along,
                                                   const HeldPlaces& held);
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -16,7 +16,7 @@
 #include "tpm/sweep/workers.hpp"
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 namespace {
 
 namespace fs = std::filesystem;
@@ -342,4 +342,4 @@ std::string fingerprint_of(const fs::path& file) {
   }
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -2,7 +2,7 @@
 
 #include "tpmkit/error.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& variable,
                                 const HeldPlaces& held, double level) {
@@ -21,4 +21,4 @@ SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& var
                   "{\"samples\": \"sensitivity\", \"count\": 256, \"replicates\": 16, ...}");
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

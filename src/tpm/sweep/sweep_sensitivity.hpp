@@ -4,7 +4,7 @@
 #include "tpm/sample/sensitivity.hpp"
 #include "tpm/sweep/sweep_reader.hpp"
 
-namespace tpm {
+namespace tpm::study {
 
 /// Sobol indices of a number over an axis of samples of the kind `sensitivity`.
 struct SweepSensitivity {
@@ -20,4 +20,4 @@ struct SweepSensitivity {
 [[nodiscard]] SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& variable,
                                               const HeldPlaces& held, double level = 0.95);
 
-}  // namespace tpm
+}  // namespace tpm::study

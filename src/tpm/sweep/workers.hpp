@@ -6,7 +6,7 @@
 #include <exception>
 #include <mutex>
 
-namespace tpm {
+namespace tpm::study {
 
 /// The first exception of a pipeline's filters, kept until the pipeline is through: one that left a
 /// filter would leak what waits between filters (oneTBB 2021).
@@ -49,4 +49,4 @@ void on_workers(int workers, const Work& work) {
   tbb::task_arena(workers).execute(work);
 }
 
-}  // namespace tpm
+}  // namespace tpm::study

@@ -1,7 +1,7 @@
 // A formulation that does not keep its word: the suite has to find it.
 #include "tpm/simulate/scene_runner.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// Says that it answers the star as its closed form does. It forgets the tension, pulls at rest,
@@ -43,4 +43,4 @@ Formulations broken_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ

@@ -2,7 +2,7 @@
 #include "tpm/network/mass_spring.hpp"
 #include "tpm/simulate/scene_runner.hpp"
 
-namespace tpm {
+namespace tpm::organ {
 namespace {
 
 /// The contact as an elastic spring with the network's equilibrium stiffness at rest:
@@ -43,4 +43,4 @@ Formulations dummy_formulations() {
   return all;
 }
 
-}  // namespace tpm
+}  // namespace tpm::organ
