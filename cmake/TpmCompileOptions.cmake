@@ -38,8 +38,8 @@ function(tpm_common_headers target)
 endfunction()
 
 # Files of one target are compiled together, a handful at a time: most of the compiler's time goes
-# into headers that they share. So names in unnamed namespaces are unique within a floor.
-option(TPM_TOGETHER "Compile the files of one floor together (unity build)" OFF)
+# into headers that they share. So names in unnamed namespaces are unique within a folder.
+option(TPM_TOGETHER "Compile the files of one folder together (unity build)" OFF)
 function(tpm_compile_together target)
   if(TPM_TOGETHER)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE BATCH UNITY_BUILD_BATCH_SIZE 8)

@@ -1,4 +1,4 @@
-# The components that are installed (docs/library.md): archives made of the floors of src/tpm, so that a program links
+# The components that are installed (docs/library.md): archives made of the folders of src/tpm, so that a program links
 # no more than it uses. What only the program tpm needs (reports, sweeps, benchmarks, most studies) belongs to none.
 #
 #   core     units, protocols, materials, closed form, laws          Eigen, fmt
@@ -7,14 +7,14 @@
 #   haptics  devices, servo loop, sessions                           organ
 set(TPM_COMPONENTS core organ fit haptics)
 
-# Floors as a whole.
-set(TPM_core_FLOORS material shapes)
-set(TPM_organ_FLOORS core protocol solve model law curve formulation formulations store network scene simulate method
+# Folders as a whole.
+set(TPM_core_FOLDERS material shapes)
+set(TPM_organ_FOLDERS core protocol solve model law curve formulation formulations store network scene simulate method
     reduce plan)
-set(TPM_fit_FLOORS fit)
-set(TPM_haptics_FLOORS device servo haptics)
+set(TPM_fit_FOLDERS fit)
+set(TPM_haptics_FOLDERS device servo haptics)
 
-# Sources of a floor that belong to another component than the rest of it, without ending.
+# Sources of a folder that belong to another component than the rest of it, without ending.
 set(TPM_core_OF_core dense_algebra error random text units version)
 set(TPM_core_OF_protocol protocol)
 set(TPM_core_OF_curve curve)
@@ -44,10 +44,10 @@ set(TPM_haptics_LIBRARIES tpm_httplib ${CMAKE_DL_LIBS})
 # The targets of objects that a component is made of.
 function(tpm_objects_of component list)
   set(objects)
-  foreach(floor IN LISTS TPM_FLOORS)
-    set(targets tpm_floor_${floor}_of_${component})
-    if(floor IN_LIST TPM_${component}_FLOORS)
-      list(APPEND targets tpm_floor_${floor})
+  foreach(folder IN LISTS TPM_FOLDERS)
+    set(targets tpm_folder_${folder}_of_${component})
+    if(folder IN_LIST TPM_${component}_FOLDERS)
+      list(APPEND targets tpm_folder_${folder})
     endif()
     foreach(target IN LISTS targets)
       if(TARGET ${target})
@@ -68,7 +68,7 @@ function(tpm_components)
   tpm_formulation_list(${CMAKE_BINARY_DIR}/organ_formulation_list.cpp shipped_formulations ${of_organ})
   add_library(tpm_organ_formulation_list OBJECT ${CMAKE_BINARY_DIR}/organ_formulation_list.cpp
               ${CMAKE_BINARY_DIR}/formulations.cpp)
-  tpm_floor_options(tpm_organ_formulation_list)
+  tpm_folder_options(tpm_organ_formulation_list)
   foreach(component IN LISTS TPM_COMPONENTS)
     tpm_objects_of(${component} objects)
     if(component STREQUAL core)

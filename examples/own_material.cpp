@@ -41,13 +41,13 @@ int main() try {
   own.potential = tpm::elongation_function("cubic", {5e-3});
   tpm::require_valid(own, "own material");
   const tpm::BondLaw bond = own.radial_law();
-  double at_once_N = 0.0;
+  double instantaneous_N = 0.0;
   for (const auto& spring : bond.springs)
-    at_once_N += spring.stiffness_N_per_m * spring.function.value(4e-3);
-  const double equilibrium_N = at_once_N;
+    instantaneous_N += spring.stiffness_N_per_m * spring.function.value(4e-3);
+  const double equilibrium_N = instantaneous_N;
   for (const auto& branch : bond.branches)
-    at_once_N += branch.stiffness_N_per_m * bond.kernel.value(4e-3);
-  std::printf("one bond %.4f N, at equilibrium %.4f N\n", at_once_N, equilibrium_N);
+    instantaneous_N += branch.stiffness_N_per_m * bond.kernel.value(4e-3);
+  std::printf("one bond %.4f N, at equilibrium %.4f N\n", instantaneous_N, equilibrium_N);
 } catch (const tpm::Error& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return static_cast<int>(error.code());

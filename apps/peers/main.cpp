@@ -40,7 +40,7 @@ const char* const kText =
 
 BenchmarkProblem peer_problem() {
   const auto posed = posed_elastic_poke();
-  BenchmarkProblem problem = moving_poke_problem(posed);
+  BenchmarkProblem problem = poke_with_mass_problem(posed);
   problem.name = "organ_peers";
   problem.title = "Organ with elastic bonds and masses, poked: tpm, MuJoCo and Bullet";
   problem.text = kText;

@@ -76,7 +76,7 @@ int predict(const PredictOptions& options, const Session& session) {
     if (!recording) {
       throw Error(ExitCode::usage, "--verdict", "without a recording", "it only with one");
     }
-    const PredictionVerdict verdict = judge_prediction(prediction, *recording, chosen.seed);
+    const PredictionVerdict verdict = compare_prediction(prediction, *recording, chosen.seed);
     json["verdict"] = to_json(verdict, prediction.response_dimension());
     if (!session.json()) text += verdict_words(verdict, prediction.recording->peak);
   }

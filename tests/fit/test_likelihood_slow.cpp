@@ -26,7 +26,7 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 /// Truth of the synthetic recordings: k_inf, k1 (N/m), tau1 (s), contact, offset.
-const std::vector<double> kTruth{40.0, 60.0, 5.0, 0.0, 0.0};
+const std::vector<double> kTrueValues{40.0, 60.0, 5.0, 0.0, 0.0};
 
 /// A ramp of 2 s to 4 mm and a hold to 30 s, answered by the law linear-1 and scattered by `error`
 /// (N); computed, not measured.
@@ -41,8 +41,9 @@ Recording computed_recording(const std::vector<double>& error) {
   }
   LawSpec spec;
   spec.reference = 4e-3;
-  const Response answer = LawModel(spec).respond(
-      measured_history(Drive::displacement, r.time_s, r.drive), r.time_s, kTruth, Want::values);
+  const Response answer =
+      LawModel(spec).respond(measured_history(Drive::displacement, r.time_s, r.drive), r.time_s,
+                             kTrueValues, Want::values);
   for (std::size_t i = 0; i < n; ++i) {
     r.response.push_back(answer.value[static_cast<Eigen::Index>(i)] + error[i]);
   }

@@ -76,7 +76,7 @@ void read_block_log(const Path& path) {
 }
 
 /// Puts a check sum behind the file: what was changed is read, not refused for its old one.
-void seal_again(const Path& path) {
+void sum_again(const Path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
   const bool sealed = file >= 0 && write_checksum(file, std::filesystem::file_size(path));
   if (file >= 0) ::close(file);
@@ -88,7 +88,7 @@ void read_checkpoint_file(const Path& path) {
   try {
     (void)read_checkpoint(path, "fuzz", quiet);
   } catch (const Error&) {
-    seal_again(path);
+    sum_again(path);
   }
   const std::string identity = Hdf5Reader(path).attribute("/", "checkpoint_of");
   (void)read_checkpoint(path, identity, quiet);

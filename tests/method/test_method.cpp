@@ -77,13 +77,13 @@ bool done(const MethodRun& run) {
 TEST_CASE("method: orders on the element under an imposed depth") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const Judged judged =
-      judged_element("ramp and hold", p, ramp_and_hold(0.004, 0.02, 0.2), tenths(0.4));
+      checked_element("ramp and hold", p, ramp_and_hold(0.004, 0.02, 0.2), tenths(0.4));
   check_orders(judged, 0.00125, {StepRule::exponential});
 }
 
 TEST_CASE("method: orders on the element under a load") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
-  const Judged judged = judged_element("creep", p, creep(0.3, 1.0), tenths(0.4));
+  const Judged judged = checked_element("creep", p, creep(0.3, 1.0), tenths(0.4));
   check_orders(judged, 0.00125);
 }
 
@@ -91,7 +91,7 @@ TEST_CASE("method: orders on the element with mass") {
   TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   p.Eprime_Pa = 0.0;
   // 10 Hz or so, damped enough for forward Euler.
-  const Judged judged = judged_moving_element(p, 0.03, 40.0, 0.1, tenths(0.2));
+  const Judged judged = element_with_mass(p, 0.03, 40.0, 0.1, tenths(0.2));
   check_orders(judged, 2e-5);
 }
 
@@ -165,7 +165,7 @@ TEST_CASE("method: what orders fall to where the step is far above the relaxatio
     CHECK(judged.error(StepRule::semi_implicit_euler, 0.03) > 1e-2);
   }
   SECTION("a depth at once: the memory has to catch up within a step") {
-    const Judged judged = judged_element("stiff step", p, step_and_hold(0.004, 1.0), tenths(1.0));
+    const Judged judged = checked_element("stiff step", p, step_and_hold(0.004, 1.0), tenths(1.0));
     for (const StepRule rule : {StepRule::implicit_midpoint, StepRule::newmark}) {
       CHECK_THAT(observed_order(judged, rule, 0.125), WithinAbs(0.0, 0.1));
       CHECK(judged.error(rule, 0.125) > 0.9);
@@ -244,7 +244,7 @@ TEST_CASE("method: which rules hold the paper's element at 1 kHz, and how well")
   const TpmParameters p;
   std::vector<double> times;
   for (int i = 1; i <= 60; ++i) times.push_back(1e-3 * i);
-  const Judged judged = judged_element("servo", p, ramp_and_hold(0.004, 0.1, 0.02), times);
+  const Judged judged = checked_element("servo", p, ramp_and_hold(0.004, 0.1, 0.02), times);
   for (const StepRule rule : {StepRule::forward_euler, StepRule::rk4}) {
     MethodSettings settings;
     settings.rule = rule;
@@ -263,7 +263,7 @@ TEST_CASE("method: steps end at kinks and jumps, and times between steps are ans
       {{0.0, 0.0}, {0.1, 0.002}, {0.1, 0.004}, {0.25, 0.004}, {0.25, 0.001}, {0.4, 0.003}});
   const std::vector<double> times{0.0, 0.0333, 0.0999999, 0.1, 0.17, 0.25, 0.3, 0.4};
   // Exact steps: whatever is wrong is the driver's.
-  const Judged judged = judged_element("jumps", p, jumps, times);
+  const Judged judged = checked_element("jumps", p, jumps, times);
   CHECK(judged.error(StepRule::exponential, 0.03) < 1e-13);
   CHECK(judged.error(StepRule::exponential, 10.0) < 1e-13);
   MethodSettings bdf;

@@ -165,7 +165,7 @@ TEST_CASE("creep with the true lambda1 ends where the springs balance the load")
   CHECK_THAT(CreepUnderConstantLoad(paper, 0.98).final_depth_m(), WithinAbs(10.59e-3, 5e-6));
   CHECK_THAT(CreepUnderConstantLoad(paper, 0.196).final_depth_m(), WithinAbs(2.56e-3, 5e-6));
   const CreepUnderConstantLoad creep_(paper, 0.98);
-  CHECK_THAT(creep_.depth_m(0.0), WithinRel(creep_.depth_at_once_m(), 1e-15));
+  CHECK_THAT(creep_.depth_m(0.0), WithinRel(creep_.instantaneous_depth_m(), 1e-15));
   CHECK_THAT(creep_.depth_m(1e9), WithinRel(creep_.final_depth_m(), 1e-15));
   CHECK_THAT(CreepUnderConstantLoad(paper, -0.98).depth_m(1e-4),
              WithinRel(-creep_.depth_m(1e-4), 1e-15));

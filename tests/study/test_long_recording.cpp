@@ -16,7 +16,7 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 // linear-1, SI: k_inf, k1, tau1 and offset are estimated, the contact lies at depth 0
-const std::vector<double> kTruth{80.0, 120.0, 3.0, 0.004};
+const std::vector<double> kTrueValues{80.0, 120.0, 3.0, 0.004};
 const std::vector<double> kLaw{80.0, 120.0, 3.0, 0.0, 0.004};
 constexpr std::size_t kKept = 12;  // one sample in so many stays in the thinned record
 
@@ -76,14 +76,14 @@ FitConfig config_for(const std::vector<PreparedRecording>& record) {
   return config;
 }
 
-void check_truth(const FitResult& fit) {
+void check_true_values(const FitResult& fit) {
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     const ParameterResult& p = fit.parameters[i];
-    CAPTURE(p.parameter.name, p.estimate, kTruth[i]);
+    CAPTURE(p.parameter.name, p.estimate, kTrueValues[i]);
     REQUIRE(p.lower);
     REQUIRE(p.upper);
-    CHECK(*p.lower < kTruth[i]);
-    CHECK(kTruth[i] < *p.upper);
+    CHECK(*p.lower < kTrueValues[i]);
+    CHECK(kTrueValues[i] < *p.upper);
   }
 }
 
@@ -95,7 +95,7 @@ TEST_CASE("24,000 samples give the truth, and what every twelfth of them gives")
   REQUIRE(fit.value_count > 20'000);
   REQUIRE(few.value_count < 20'000);
   CHECK_THAT(all(fit.flags), Contains("come from the covariance"));
-  check_truth(fit);
+  check_true_values(fit);
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     const ParameterResult& p = fit.parameters[i];
     const ParameterResult& q = few.parameters[i];
@@ -116,7 +116,8 @@ TEST_CASE("24,000 samples without noise give back the parameters that made them"
   const FitResult fit = fit_of(record, config_for(record));
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     CAPTURE(fit.parameters[i].parameter.name);
-    CHECK(std::abs(fit.parameters[i].estimate - kTruth[i]) < 1e-6 * std::abs(kTruth[i]) + 1e-12);
+    CHECK(std::abs(fit.parameters[i].estimate - kTrueValues[i]) <
+          1e-6 * std::abs(kTrueValues[i]) + 1e-12);
   }
 }
 
@@ -138,12 +139,12 @@ TEST_CASE("a long recording with the size of its noise among the parameters") {
   document["data"][0]["noise"] = {{"kind", "absolute"}, {"absolute", "estimated"}};
   document["starts"]["count"] = 2;
   const FitResult fit = fit_of(whole_record(), parse_fit_config(document, "test"));
-  REQUIRE(fit.parameters.size() == kTruth.size() + 1);
+  REQUIRE(fit.parameters.size() == kTrueValues.size() + 1);
   REQUIRE(fit.parameters.back().parameter.name == "sigma_a");
   CHECK_THAT(fit.parameters.back().estimate, WithinRel(fit.recordings.front().rms_residual, 1e-3));
-  for (std::size_t i = 0; i < kTruth.size(); ++i) {
+  for (std::size_t i = 0; i < kTrueValues.size(); ++i) {
     const ParameterResult& p = fit.parameters[i];
-    CAPTURE(p.parameter.name, p.estimate, kTruth[i]);
-    CHECK(std::abs(p.estimate - kTruth[i]) < 3.0 * *p.standard_error);
+    CAPTURE(p.parameter.name, p.estimate, kTrueValues[i]);
+    CHECK(std::abs(p.estimate - kTrueValues[i]) < 3.0 * *p.standard_error);
   }
 }

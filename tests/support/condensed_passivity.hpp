@@ -55,7 +55,7 @@ inline EnergyAccount account_of_random_motion(CondensedContact& contact,
     const CondensedMemory before = contact.memory();
     (void)contact.step(to);
     const CondensedMemory after = contact.memory();
-    const Eigen::Vector3d rests = at + contact.resting_share() * (to - at);
+    const Eigen::Vector3d rests = at + contact.relaxation_point() * (to - at);
     const double work =
         straight_work_J(contact, at, rests, before) + straight_work_J(contact, rests, to, after);
     const double now = contact.stored_energy_J(to, after);

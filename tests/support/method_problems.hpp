@@ -41,8 +41,8 @@ struct Judged {
   }
 };
 
-inline Judged judged_element(std::string name, const TpmParameters& p, const Protocol& protocol,
-                             std::vector<double> times) {
+inline Judged checked_element(std::string name, const TpmParameters& p, const Protocol& protocol,
+                              std::vector<double> times) {
   const ClosedForm exact{ModelOptions{}};
   Eigen::VectorXd truth = exact.respond(protocol, times, to_vector(p), Want::values).value;
   return {std::move(name), element_problem(p, protocol), std::move(times), std::move(truth)};
@@ -52,8 +52,8 @@ inline MethodMasses one_mass(double mass_kg, double drag_per_s) {
   return {Eigen::VectorXd::Constant(1, mass_kg), drag_per_s};
 }
 
-inline Judged judged_moving_element(const TpmParameters& p, double mass_kg, double drag_per_s,
-                                    double load_N, std::vector<double> times) {
+inline Judged element_with_mass(const TpmParameters& p, double mass_kg, double drag_per_s,
+                                double load_N, std::vector<double> times) {
   Eigen::VectorXd truth = loaded_oscillator(p, mass_kg, drag_per_s, load_N, times);
   return {"element with mass",
           element_problem(p, creep(load_N, times.back()), one_mass(mass_kg, drag_per_s)),

@@ -30,7 +30,7 @@ std::shared_ptr<const ExperimentScene> scene_on(const Tissue& tissue, const Prot
   return std::make_shared<ExperimentScene>(ExperimentScene{tissue, {driven}, protocol, {}, {}, {}});
 }
 
-constexpr double kMovingPoke_s = 0.2;
+constexpr double kPokeWithMass_s = 0.2;
 
 /// The paper's liver with another dashpot.
 Tissue liver(double eta1_Pa_s = kPaperEta1_Pa_s) {
@@ -80,11 +80,11 @@ BenchmarkProblem massless_problem(const Tissue& tissue, const Protocol& protocol
 std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guided) {
   constexpr double kDampingRatio = 0.1;
   constexpr double kSpacing_s = 5e-3;
-  std::vector<double> times_s = times_every(kSpacing_s, kMovingPoke_s);
+  std::vector<double> times_s = times_every(kSpacing_s, kPokeWithMass_s);
   times_s.pop_back();
   // At a kink the force jumps: it is asked for between them.
   for (double& time : times_s) time += 0.5 * kSpacing_s;
-  auto posed = posed_liver(tissue, ramp_and_hold(8e-3, 0.1, kMovingPoke_s - 0.08), times_s);
+  auto posed = posed_liver(tissue, ramp_and_hold(8e-3, 0.1, kPokeWithMass_s - 0.08), times_s);
   if (guided) {
     const Probe& probe = posed->network.probes.front();
     posed->network.constraints.guide(probe.sphere, probe.direction);
@@ -148,7 +148,7 @@ BenchmarkProblem organ_creep_problem() {
   return problem;
 }
 
-BenchmarkProblem moving_poke_problem(const std::shared_ptr<const PosedNetwork>& posed) {
+BenchmarkProblem poke_with_mass_problem(const std::shared_ptr<const PosedNetwork>& posed) {
   const std::shared_ptr<const MethodProblem> rule_problem = rules_on(posed);
   RuleSettings rules;
   rules.steps_s = {1e-2, 2.5e-3, 1e-3, 5e-4, 2.5e-4};
@@ -157,7 +157,7 @@ BenchmarkProblem moving_poke_problem(const std::shared_ptr<const PosedNetwork>& 
   rules.most_rates = 20'000;
   BenchmarkProblem problem;
   problem.response = "contact force";
-  problem.simulated_s = kMovingPoke_s;
+  problem.simulated_s = kPokeWithMass_s;
   problem.relaxation_time_s = posed->network.bonds.relaxation_time_s();
   problem.settings = rule_settings(rule_problem, posed->times_s, rules);
   add(problem.settings, collocation_settings(posed, {1e-2, 1e-4, 1e-6}));
@@ -177,7 +177,7 @@ BenchmarkProblem moving_poke_problem(const std::shared_ptr<const PosedNetwork>& 
 }
 
 BenchmarkProblem organ_poke_mass_problem() {
-  BenchmarkProblem problem = moving_poke_problem(posed_moving_liver(liver(), false));
+  BenchmarkProblem problem = poke_with_mass_problem(posed_moving_liver(liver(), false));
   problem.name = "organ_poke_mass";
   problem.title = "Organ with masses, poked at 100 mm/s";
   problem.text =

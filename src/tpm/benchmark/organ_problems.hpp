@@ -18,7 +18,7 @@ namespace tpm::study {
 /// well. Sampled between the kinks of the protocol.
 [[nodiscard]] std::shared_ptr<const PosedNetwork> posed_elastic_poke();
 /// Every method on a poke of a network with masses; to be given name, title and text.
-[[nodiscard]] BenchmarkProblem moving_poke_problem(
+[[nodiscard]] BenchmarkProblem poke_with_mass_problem(
     const std::shared_ptr<const PosedNetwork>& posed);
 
 }  // namespace tpm::study

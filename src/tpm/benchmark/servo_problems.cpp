@@ -84,7 +84,7 @@ class ServoCase {
   [[nodiscard]] double condensed_s() const { return condensed_s_; }
 
   const BenchmarkReference& truth() {
-    if (!truth_) find_truth();
+    if (!truth_) find_reference();
     return *truth_;
   }
   /// What a setting at a relaxation time answers.
@@ -150,7 +150,7 @@ class ServoCase {
     return {std::move(judge), std::move(fine)};
   }
 
-  void find_truth() {
+  void find_reference() {
     std::array<ServoAnswer, 2> found;
     std::array<std::vector<double>, 2> numbers;
     for (std::size_t tau = 0; tau < taus_s.size(); ++tau) {

@@ -79,7 +79,7 @@ void find_shortest(BorderStudy& study) {
 /// One hand against one contact, with the loop of a session.
 void run_impact(const RenderedContact& contact, const PlantSettings& plant, RiseLimit limit,
                 ImpactPoint& point) {
-  constexpr double kDepth_m = 4e-3, kBefore_m = 2e-3, kHeld_s = 5.0, kJudged_s = 0.5;
+  constexpr double kDepth_m = 4e-3, kBefore_m = 2e-3, kHeld_s = 5.0, kCompared_s = 0.5;
   // Ten steps of the encoder, within which a constant force cannot settle.
   constexpr double kAtRest_m = 1e-4;
   const double period_s = contact.period_s, speed = point.speed_m_per_s;
@@ -111,11 +111,11 @@ void run_impact(const RenderedContact& contact, const PlantSettings& plant, Rise
   ElementContact model = contact.model();
   ServoStep step(device, model, servo);
   double low_m = std::numeric_limits<double>::infinity(), high_m = -low_m;
-  const auto judged_from = static_cast<std::uint64_t>((end_s - kJudged_s) / period_s);
+  const auto compared_from = static_cast<std::uint64_t>((end_s - kCompared_s) / period_s);
   ServoRecord row;
   while (step.cycle(0, row) == StopCause::none) {
     device.advance(period_s);
-    if (row.cycle < judged_from) continue;
+    if (row.cycle < compared_from) continue;
     low_m = std::min(low_m, row.tool_depth_m);
     high_m = std::max(high_m, row.tool_depth_m);
   }

@@ -77,8 +77,8 @@ void DepthPieces::add_stretch(double from, double to, double h, int level) {
 }
 
 std::size_t DepthPieces::class_of(const DepthPiece& piece, double same) {
-  constexpr std::size_t kRemembered = 8;
-  for (std::size_t i = classes_.size(); i > 0 && i + kRemembered > classes_.size(); --i) {
+  constexpr std::size_t kHistorySteps = 8;
+  for (std::size_t i = classes_.size(); i > 0 && i + kHistorySteps > classes_.size(); --i) {
     if (fits(piece, classes_[i - 1], same)) return i - 1;
   }
   classes_.push_back({piece.h, is_curved(piece)});

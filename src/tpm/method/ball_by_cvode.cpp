@@ -28,10 +28,10 @@ struct FreeFixedPoint {
 using FixedPoint = std::unique_ptr<std::remove_pointer_t<SUNNonlinearSolver>, FreeFixedPoint>;
 
 /// The network as an equation for its viscous elongations.
-class RememberingNetwork {
+class ViscousNetwork {
  public:
-  RememberingNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
-                     const BallTool& ball, std::span<const BallPlace> places)
+  ViscousNetwork(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
+                 const BallTool& ball, std::span<const BallPlace> places)
       : network_(bonds, rest, constraints, ball),
         places_(places),
         viscous_(bonds),
@@ -105,7 +105,7 @@ class RememberingNetwork {
 extern "C" int ball_rate(sunrealtype t, N_Vector y, N_Vector y_dot, void* network) {
   auto rate = state_of(y_dot);
   // 1: another, shorter step.
-  return static_cast<RememberingNetwork*>(network)->rate(t, state_of(y), rate) ? 0 : 1;
+  return static_cast<ViscousNetwork*>(network)->rate(t, state_of(y), rate) ? 0 : 1;
 }
 
 }  // namespace
@@ -116,7 +116,7 @@ std::vector<Eigen::Vector3d> ball_forces_by_cvode(const BondSystem& bonds, const
                                                   std::span<const BallPlace> places,
                                                   double tolerance) {
   using sundials::check;
-  RememberingNetwork network(bonds, rest, constraints, ball, places);
+  ViscousNetwork network(bonds, rest, constraints, ball, places);
   std::vector<Eigen::Vector3d> forces;
   if (places.empty()) return forces;
   const sundials::Context context = sundials::make_context();

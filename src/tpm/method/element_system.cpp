@@ -9,7 +9,7 @@
 namespace tpm::organ {
 namespace {
 
-constexpr double kDepthGrain = 4.0 * std::numeric_limits<double>::epsilon();
+constexpr double kDepthResolution = 4.0 * std::numeric_limits<double>::epsilon();
 
 /// The force of the element along its normal, k e - g y + tension(e), N, where y = offset +
 /// following e.
@@ -291,7 +291,7 @@ class ElementSystem final : public StageSystem,
       const double step = slope > 0.0 ? left / slope : std::copysign(depth_scale_, left);
       if (!std::isfinite(step)) return MethodEnd::newton_failed;
       e -= step;
-      if (std::abs(step) <= kDepthGrain * std::max(std::abs(e), 1e-3 * depth_scale_)) {
+      if (std::abs(step) <= kDepthResolution * std::max(std::abs(e), 1e-3 * depth_scale_)) {
         at = e;
         return MethodEnd::completed;
       }

@@ -11,7 +11,7 @@ constexpr int kMostHalvings = 30;
 constexpr double kShareOfDepth = 1e-12;
 constexpr double kFast = 0.05;  // what a step may leave of the force for its factor to be kept
 constexpr double kNear = 1e-5;  // of the depth: Newton's steps are not checked any more
-constexpr double kForceGrain = 8.0 * std::numeric_limits<double>::epsilon();
+constexpr double kForceResolution = 8.0 * std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
@@ -45,7 +45,7 @@ double ImplicitBalance::tolerance_N(const Positions& position, double depth_m,
                                     const SphereAnchors* anchors) const {
   double stiffness = stiffest_;
   if (anchors != nullptr) stiffness += anchors->stiffness.maxCoeff();
-  return stiffness * (kShareOfDepth * depth_m + kForceGrain * position.cwiseAbs().maxCoeff());
+  return stiffness * (kShareOfDepth * depth_m + kForceResolution * position.cwiseAbs().maxCoeff());
 }
 
 bool ImplicitBalance::factorise_matrix(const Positions& position, const BondMemory& memory,

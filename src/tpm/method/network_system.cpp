@@ -135,7 +135,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
 };
 
 /// Without masses: forces balance at each instant.
-class RestingNetwork final : public NetworkSystem, public BalanceSystem {
+class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
  public:
   using NetworkSystem::NetworkSystem;
 
@@ -344,9 +344,9 @@ class RestingNetwork final : public NetworkSystem, public BalanceSystem {
 };
 
 /// With masses.
-class MovingNetwork final : public NetworkSystem {
+class NetworkWithMass final : public NetworkSystem {
  public:
-  MovingNetwork(const DrivenNetwork& network, const Protocol& protocol, const MethodMasses& mass)
+  NetworkWithMass(const DrivenNetwork& network, const Protocol& protocol, const MethodMasses& mass)
       : NetworkSystem(network, protocol),
         equation_(tissue_, rest_, Inertia{mass.mass_kg, mass.drag_per_s, {}}),
         speed_scale_(
@@ -478,8 +478,8 @@ class MovingNetwork final : public NetworkSystem {
 
 std::unique_ptr<StepSystem> network_system(const DrivenNetwork& network, const Protocol& protocol,
                                            const std::optional<MethodMasses>& mass) {
-  if (mass) return std::make_unique<MovingNetwork>(network, protocol, *mass);
-  return std::make_unique<RestingNetwork>(network, protocol);
+  if (mass) return std::make_unique<NetworkWithMass>(network, protocol, *mass);
+  return std::make_unique<MasslessNetwork>(network, protocol);
 }
 
 }  // namespace tpm::organ

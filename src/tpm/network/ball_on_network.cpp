@@ -72,9 +72,9 @@ BallTool ball_on_surface(const Organ& organ, std::size_t aim, const Eigen::Vecto
 }
 
 NetworkUnderBall::NetworkUnderBall(const BondSystem& organ_bonds, const Positions& rest,
-                                   const Constraints& organ_freedom, const BallTool& ball)
+                                   const Constraints& organ_constraints, const BallTool& ball)
     : bonds(with_ball(organ_bonds, ball)),
-      constraints(with_ball_held(organ_freedom)),
+      constraints(with_ball_held(organ_constraints)),
       position(with_ball_at(rest, ball.start_m)) {}
 
 BallOnNetwork::BallOnNetwork(const BondSystem& bonds, const Positions& rest,

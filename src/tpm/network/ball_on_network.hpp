@@ -38,10 +38,10 @@ inline constexpr double kUsualBallStiffness_N_per_m = 1e4;
 
 /// An organ with a ball: what its equilibria need.
 struct NetworkUnderBall {
-  /// @param organ_bonds, rest, organ_freedom of the organ, without tools
+  /// @param organ_bonds, rest, organ_constraints of the organ, without tools
   /// Throws Error(bad_input) for a ball without radius or stiffness.
   NetworkUnderBall(const BondSystem& organ_bonds, const Positions& rest,
-                   const Constraints& organ_freedom, const BallTool& ball);
+                   const Constraints& organ_constraints, const BallTool& ball);
 
   BondSystem bonds;         ///< with the contacts of the ball
   Constraints constraints;  ///< the ball is fixed where it is put

@@ -22,9 +22,9 @@ constexpr double kLeastMove = 1e-9;  // of a jump
 constexpr double kFirstStep = 3.0;   // after a change of rate, in the shortest relaxation times
 constexpr double kSafety = 0.8;
 constexpr int kUnlimited = std::numeric_limits<int>::max();
-constexpr double kMostGrowth = 30.0;           // from one step to the next
-constexpr double kLanded = 1.0 - 1e-6;         // of a step that was to end where a contact changes
-constexpr std::size_t kMostChangesAtOnce = 4;  // of a contact at one time
+constexpr double kMostGrowth = 30.0;    // from one step to the next
+constexpr double kLanded = 1.0 - 1e-6;  // of a step that was to end where a contact changes
+constexpr std::size_t kMostChangesTogether = 4;  // of a contact at one time
 
 /// By how much the next step may be longer. The error of smooth motion goes with a high power of
 /// the step, but behind a change of rate the motion itself calms down while steps grow: the power
@@ -262,9 +262,9 @@ class Run {
 
   void change_contact(std::size_t contact) {
     stages_.change_contact(state_, contact);
-    changes_at_once_ = state_.time_s == changed_at_s_ ? changes_at_once_ + 1 : 1;
+    changes_together_ = state_.time_s == changed_at_s_ ? changes_together_ + 1 : 1;
     changed_at_s_ = state_.time_s;
-    if (changes_at_once_ <= kMostChangesAtOnce * state_.closed.size()) return;
+    if (changes_together_ <= kMostChangesTogether * state_.closed.size()) return;
     throw failed(state_.imposed, "contacts with a tool open and close without end");
   }
 
@@ -380,7 +380,7 @@ class Run {
   };
   std::optional<Landing> landing_;
   double changed_at_s_ = -std::numeric_limits<double>::infinity();
-  std::size_t changes_at_once_ = 0;
+  std::size_t changes_together_ = 0;
   TissueState state_;
   QuasiStaticEnergy energy_;
   QuasiStaticRun result_;

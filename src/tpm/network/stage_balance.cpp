@@ -58,8 +58,8 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
   judged.push_back(0.25 * inner_.nodes().front());
   judged.push_back(0.5 * inner_.nodes().front());
   for (const double place : judged) {
-    judge_full_.push_back(full_.place(place));
-    judge_inner_.push_back(inner_.place(place));
+    full_error_places_.push_back(full_.place(place));
+    inner_error_places_.push_back(inner_.place(place));
   }
 }
 
@@ -233,17 +233,17 @@ void StageBalance::put_viscous(const Eigen::MatrixXd& viscous, TissueState& stat
 void StageBalance::set_weights(double h) {
   weights_ = weights_at(stage_places_, lane_nodes_, h);
   const std::span<const double> times = tissue_.bonds().relaxation_times_s();
-  judge_.resize(times.size());
-  const auto count = static_cast<Eigen::Index>(judge_full_.size());
+  reference_method_.resize(times.size());
+  const auto count = static_cast<Eigen::Index>(full_error_places_.size());
   for (std::size_t t = 0; t < times.size(); ++t) {
     const double z = h / times[t];
-    Judge& judge = judge_[t];
+    Judge& judge = reference_method_[t];
     judge.of_stages.setZero(count, kLanes);
     judge.of_start.resize(count);
     for (Eigen::Index i = 0; i < count; ++i) {
       const auto place = static_cast<std::size_t>(i);
-      Eigen::VectorXd difference = judge_full_[place].weights(z);
-      difference.tail(stages_) -= judge_inner_[place].weights(z);
+      Eigen::VectorXd difference = full_error_places_[place].weights(z);
+      difference.tail(stages_) -= inner_error_places_[place].weights(z);
       judge.of_start[i] = difference[0];
       judge.of_stages.row(i).head(stages_) = difference.tail(stages_).transpose();
     }
@@ -369,7 +369,7 @@ StageBalance::Balance StageBalance::balance(double tolerance) {
 }
 
 double StageBalance::error() const {
-  const auto places = static_cast<Eigen::Index>(judge_full_.size());
+  const auto places = static_cast<Eigen::Index>(full_error_places_.size());
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(places);
   Eigen::VectorXd size = sum;
   for (const LaneBonds::Group& group : bonds_.groups()) {
@@ -383,7 +383,7 @@ double StageBalance::error() const {
     mean.of_start.setZero(places);
     for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
       // Branch by branch, whose later errors do not cancel even where they do now.
-      const Judge& judge = judge_[branch.time];
+      const Judge& judge = reference_method_[branch.time];
       sum += branch.share * (judge.of_stages * aimed + judge.of_start * start_aimed).cwiseAbs();
       mean.of_stages += branch.share * judge.of_stages;
       mean.of_start += branch.share * judge.of_start;

@@ -197,7 +197,7 @@ class StageBalance {
   ExponentialCollocation inner_;  ///< through the stages alone
   Places stage_places_;           ///< of full_, where the lanes stand
   std::array<double, kLanes> lane_nodes_{};
-  Places judge_full_, judge_inner_;  ///< where the error is judged
+  Places full_error_places_, inner_error_places_;  ///< where the error is judged
   LaneStiffness factor_;
   Anderson anderson_;
   QuasiStaticWork work_;
@@ -227,8 +227,8 @@ class StageBalance {
     Eigen::Matrix<double, Eigen::Dynamic, kLanes> of_stages;  ///< by (place judged, stage)
     Eigen::VectorXd of_start;
   };
-  std::vector<Judge> judge_;  ///< of each relaxation time of the system
-  double imbalance_ = 0.0;    ///< bound of the response's error from forces left, N or m
+  std::vector<Judge> reference_method_;  ///< of each relaxation time of the system
+  double imbalance_ = 0.0;               ///< bound of the response's error from forces left, N or m
   // The step before, for the prediction of the next.
   bool has_last_ = false;
   double last_h_ = 0.0, last_rate_ = 0.0;

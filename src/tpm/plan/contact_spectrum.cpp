@@ -179,7 +179,7 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
     stiffness_of_theta.push_back(stiffness);
     const auto field =
         per_depth * unit.displacement.leftCols(scene.network().organ.position.cols());
-    if (i == 0) spectrum.field_at_once = field;
+    if (i == 0) spectrum.field_instantaneous = field;
     if (i == kThetas - 1) spectrum.field_relaxed = field;
   }
   set_rates(spectrum, branches, of_theta, stiffness_of_theta);

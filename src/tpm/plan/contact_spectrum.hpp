@@ -16,7 +16,7 @@ struct ContactSpectrum {
   double shortest_s = 0.0;                ///< relaxation time of the contact
   double longest_s = 0.0;
   /// Displacements of the spheres per unit of depth, instantaneous and relaxed.
-  Eigen::Matrix3Xd field_at_once, field_relaxed;
+  Eigen::Matrix3Xd field_instantaneous, field_relaxed;
 
   [[nodiscard]] double instantaneous() const { return stiffness_N_per_m.front(); }
   [[nodiscard]] double relaxed() const { return stiffness_N_per_m.back(); }

@@ -83,7 +83,8 @@ Trajectory ScalarCandidate::run(const PlanSurrogate& surrogate, const PlanBudget
     const double fresh = stiffness > 0.0 ? at.depth_m() - followed / stiffness : 0.0;
     const ContactSpectrum& spectrum = surrogate.spectrum();
     answer.displacement.emplace_back(spectrum.field_relaxed * at.depth_m() +
-                                     (spectrum.field_at_once - spectrum.field_relaxed) * fresh);
+                                     (spectrum.field_instantaneous - spectrum.field_relaxed) *
+                                         fresh);
   }
   answer.steps = budget.rate_Hz ? scene.duration_s() * *budget.rate_Hz : run.steps();
   answer.work = of_step(surrogate).times(answer.steps);

@@ -10,8 +10,8 @@ class ScalarContact final : public ContactModel {
  public:
   /// What is known of the contact it stands for.
   struct Range {
-    double at_once_N_per_m = 0.0, relaxed_N_per_m = 0.0;  ///< stiffness at rest
-    double deepest_m = 0.0;                               ///< answers beyond are not trusted
+    double instantaneous_N_per_m = 0.0, relaxed_N_per_m = 0.0;  ///< stiffness at rest
+    double deepest_m = 0.0;                                     ///< answers beyond are not trusted
   };
   /// @param into_tissue unit vector
   ScalarContact(ScalarModel model, const Eigen::Vector3d& into_tissue, const Range& range,
@@ -21,7 +21,7 @@ class ScalarContact final : public ContactModel {
   ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return range_.at_once_N_per_m * (into_ * into_.transpose());
+    return range_.instantaneous_N_per_m * (into_ * into_.transpose());
   }
   [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
     return range_.relaxed_N_per_m * (into_ * into_.transpose());

@@ -114,7 +114,7 @@ void CondensedContact::set_rates(double relaxation_time_s) {
   const Matrix6 left_out =
       of_rate([&](double y) { return 1.0 + std::expm1(-y) * share - first_phi(y); });
   pack(left_out.leftCols<3>(), rates_.drift);
-  rates_.resting_share = share;
+  rates_.relaxation_point = share;
 }
 
 void CondensedContact::reset() noexcept {

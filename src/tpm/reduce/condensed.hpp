@@ -60,8 +60,8 @@ class CondensedContact final : public ContactModel {
                                         const CondensedMemory& memory) const noexcept;
   /// Within a step the contact moves straight, and the viscous state relaxes while it is at this
   /// share of the way (docs/reduction_method.md), 0.5 to 1.
-  [[nodiscard]] double resting_share() const noexcept {
-    return several() ? of_branches_.resting_share() : rates_.resting_share;
+  [[nodiscard]] double relaxation_point() const noexcept {
+    return several() ? of_branches_.relaxation_point() : rates_.relaxation_point;
   }
   /// Number of steps since reset() in which the viscous state was kept because the computed update
   /// would have increased the energy.

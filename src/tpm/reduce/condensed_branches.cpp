@@ -116,7 +116,7 @@ CondensedBranches::CondensedBranches(const CondensedFit& fit,
   // Of a linear tissue that moves straight the mean viscous state ends where it should
   // (condensed.cpp).
   const BranchMode middle(of_w.values.mean(), branches, period_s);
-  resting_share_ =
+  relaxation_point_ =
       (1.0 - share.dot(middle.of(first_phi) * one)) / share.dot(middle.of(decay) * one);
 
   const auto size = kWide * branches.size();
@@ -129,7 +129,7 @@ CondensedBranches::CondensedBranches(const CondensedFit& fit,
     const BranchMode mode(modes.rate[k], branches, period_s);
     const Eigen::MatrixXd first = mode.of(first_phi);
     const Eigen::MatrixXd after = mode.of(second_phi);
-    const Eigen::VectorXd left_out = one - resting_share_ * (mode.of(decay) * one) - first * one;
+    const Eigen::VectorXd left_out = one - relaxation_point_ * (mode.of(decay) * one) - first * one;
     for (Index j = 0; j < n; ++j) {
       const std::size_t at = kWide * static_cast<std::size_t>(j) + packed(k);
       drift_[at] = left_out[j];
@@ -166,7 +166,7 @@ void CondensedBranches::step(CondensedState& state, const double* to) noexcept {
   std::array<double, 3> resting{};
   for (std::size_t k = 0; k < 3; ++k) {
     way[k] = to[k] - state.u[k];
-    resting[k] = state.u[k] + resting_share_ * way[k];
+    resting[k] = state.u[k] + relaxation_point_ * way[k];
   }
   CondensedPull pull;
   pull_condensed(*tables_, rates_, resting.data(), state.memory, state.matrices, pull);

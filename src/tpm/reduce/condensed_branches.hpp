@@ -51,7 +51,7 @@ class CondensedBranches {
   /// Stored in the differences of the branches, J.
   [[nodiscard]] double spread_J() const noexcept { return spread_J_; }
   /// Where the contact is, of its way in a step, while the viscous state relaxes, 0.5 to 1.
-  [[nodiscard]] double resting_share() const noexcept { return resting_share_; }
+  [[nodiscard]] double relaxation_point() const noexcept { return relaxation_point_; }
   /// Root of the mean square of q over the branches, m.
   [[nodiscard]] Eigen::Vector3d second_m(const CondensedState& state) const noexcept;
 
@@ -60,7 +60,7 @@ class CondensedBranches {
   CondensedRates rates_;  ///< those that do not depend on the relaxation times
   CondensedModeTables modes_;
   std::array<double, 8> mode_rate_{};
-  double resting_share_ = 1.0;
+  double relaxation_point_ = 1.0;
   // 8 numbers for each branch (CondensedBranchArrays).
   std::vector<double> share_;   ///< one number each
   std::vector<double> follow_;  ///< h phi1(h B) D^-1

@@ -34,7 +34,7 @@ struct alignas(32) CondensedRates {
   double first[6][8] = {}, second[6][8] = {}, rate[6][8] = {};  ///< columns
   double drift[3][8] = {};
   double of_second[3][4] = {};  ///< rate of q by q
-  double resting_share = 1.0;
+  double relaxation_point = 1.0;
   // NOLINTEND(*-avoid-c-arrays)
 };
 

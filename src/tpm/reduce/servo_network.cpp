@@ -23,8 +23,8 @@ constexpr double kScaleDepth_m = 1e-4;  // at which forces begin to count
 constexpr double kAside = 2.0;  // how much faster the fields change across the normal than along it
 // Rounding, of the largest force: at once, and of the viscous elongations, a step.
 constexpr double kRounding = 3e-7;
-constexpr double kRememberedRounding = 6e-9;
-constexpr double kLongestMemory = 1e3;  // steps
+constexpr double kViscousRounding = 6e-9;
+constexpr double kLongestLag = 1e3;  // steps
 constexpr std::size_t kNow = 0, kNext = 4;
 
 using Eight [[gnu::vector_size(8 * sizeof(float))]] = float;
@@ -66,7 +66,7 @@ ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest,
   relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
   branch_error_.assign(weights_.branches.size(), Eigen::Vector3d::Zero());
   const double forgotten = 1.0 - static_cast<double>(weights_.longest_kept());
-  rounding_ = kRounding + kRememberedRounding / std::max(forgotten, 1.0 / kLongestMemory);
+  rounding_ = kRounding + kViscousRounding / std::max(forgotten, 1.0 / kLongestLag);
   spheres_ = std::make_unique<ServoStiffness>(bonds, rest, tissue.constraints());
   contact_ = spheres_->column(contact);
   choose_bonds(tissue);
@@ -78,7 +78,7 @@ ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest,
   }
   const Positions frozen = tissue.at(options.frozen_depth_m * into_, relaxed);
   factorise(tissue, frozen);
-  add_remembering(tissue, frozen);
+  add_viscous_response(tissue, frozen);
   step_error_ = std::make_unique<StepError>(tissue, frozen, relaxed, options.period_s);
 }
 
@@ -135,7 +135,7 @@ void ServoNetwork::add_field(PushedContact& tissue, const Positions& position, d
   fields_.push_back(field_of(tissue.fields(position, memory).displacement, depth_m));
 }
 
-void ServoNetwork::add_remembering(PushedContact& tissue, const Positions& position) {
+void ServoNetwork::add_viscous_response(PushedContact& tissue, const Positions& position) {
   const auto relaxed = static_cast<double>(weights_.of_end);
   ContactFields fields = tissue.fields(position, tissue.memory(position, relaxed, relaxed));
   for (Eigen::Matrix3Xd& field : fields.displacement) {
@@ -148,7 +148,7 @@ void ServoNetwork::add_remembering(PushedContact& tissue, const Positions& posit
     field = instantaneous - in_the_end;
     tissue.displace(field);
   }
-  remembering_ = field_of(fields.displacement, options_.frozen_depth_m);
+  viscous_response_ = field_of(fields.displacement, options_.frozen_depth_m);
 }
 
 void ServoNetwork::reset() noexcept {
@@ -208,7 +208,8 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
   const double at = std::clamp(depth_m / stride_m, 0.0, static_cast<double>(fields_.size() - 1));
   const std::size_t low = std::min(static_cast<std::size_t>(at), fields_.size() - 2);
   const double share = at - static_cast<double>(low);
-  const auto [above, below, source] = weighed({&fields_[low], &fields_[low + 1], &remembering_});
+  const auto [above, below, source] =
+      weighed({&fields_[low], &fields_[low + 1], &viscous_response_});
   const Eigen::Vector3d change = below - above;
   source_ = source;
   const Eigen::Vector3f at_contact =
@@ -278,7 +279,7 @@ double ServoNetwork::residual_N() const noexcept {
 }
 
 BalanceWork ServoNetwork::work() const noexcept {
-  constexpr std::size_t kFields = 3;  // two depths' in the answer, and `remembering_`
+  constexpr std::size_t kFields = 3;  // two depths' in the answer, and `viscous_response_`
   constexpr std::size_t kAxes = 3, kFloats = 4;
   return {ServoBonds::kWide * (at_contact_.groups() + elsewhere_.groups()), spheres_->blocks_read(),
           kFields * kAxes * kFloats * spheres_->free().size()};

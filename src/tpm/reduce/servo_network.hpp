@@ -67,7 +67,7 @@ class ServoNetwork final : public ContactModel {
   void choose_bonds(const PushedContact& tissue);
   void factorise(PushedContact& tissue, const Positions& position);
   void add_field(PushedContact& tissue, const Positions& position, double depth_m);
-  void add_remembering(PushedContact& tissue, const Positions& position);
+  void add_viscous_response(PushedContact& tissue, const Positions& position);
   [[nodiscard]] Field field_of(const std::array<Eigen::Matrix3Xd, 3>& displacement,
                                double depth_m) const;
   /// Solves for the part of the forces that starts at `first`, and moves the free spheres.
@@ -86,7 +86,7 @@ class ServoNetwork final : public ContactModel {
   std::size_t contact_ = 0;                  ///< its column
   ServoBonds at_contact_, elsewhere_;
   std::vector<Field> fields_;  ///< at even depths from rest on
-  Field remembering_;          ///< what residual forces do through the viscous state
+  Field viscous_response_;     ///< what residual forces do through the viscous state
   std::unique_ptr<StepError> step_error_;
   Eigen::Matrix3d instantaneous_, relaxed_;
 

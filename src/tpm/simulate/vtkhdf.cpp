@@ -79,8 +79,8 @@ void write_fields(const std::vector<StepField>& fields, const std::string& where
   }
 }
 
-void write_moving_fields(const ExperimentScene& scene, const RunNetwork& network,
-                         const std::vector<QuasiStaticState>& outputs, Hdf5Writer& file) {
+void write_field_series(const ExperimentScene& scene, const RunNetwork& network,
+                        const std::vector<QuasiStaticState>& outputs, Hdf5Writer& file) {
   std::vector<double> points;
   std::vector<std::int32_t> validity;
   StepFields all;
@@ -126,7 +126,7 @@ void write_vtkhdf(const ExperimentScene& scene, const RunNetwork& network, const
   file.fixed_text_attribute("/VTKHDF", "Type", "UnstructuredGrid");
   write_topology(network.network, file);
   write_still_fields(scene.tissue, outputs.size(), file);
-  write_moving_fields(scene, network, outputs, file);
+  write_field_series(scene, network, outputs, file);
   write_steps(network.network, outputs, file);
   file.attribute("/", "scene_sha256", sha256_hex(scene.text));
   file.commit();

@@ -23,7 +23,7 @@ class CreepUnderConstantLoad {
   /// d depth / d parameter at constant time and load, in the order of kTpmParameterTable.
   [[nodiscard]] TpmVector depth_sensitivity(double time_s) const;
 
-  [[nodiscard]] double depth_at_once_m() const { return sign_ * start_; }
+  [[nodiscard]] double instantaneous_depth_m() const { return sign_ * start_; }
   [[nodiscard]] double final_depth_m() const { return sign_ * final_; }
 
  private:

@@ -14,7 +14,7 @@
 namespace tpm {
 namespace {
 
-constexpr double kFittedPerDecade = 40.0, kJudgedPerDecade = 97.0;
+constexpr double kFittedPerDecade = 40.0, kComparedPerDecade = 97.0;
 constexpr int kMostPerDecade = 12;
 constexpr double kBeyond = 10.0;  // times outside of the window, as factors
 constexpr double kSumWeight = 1e3;
@@ -75,7 +75,7 @@ FractionalBranches fitted(double alpha, double tau_s, const FractionalWindow& wi
       found.branches.push_back({share[j] / sum, times[static_cast<std::size_t>(j)]});
     }
   }
-  for (const double t : times_within(window, kJudgedPerDecade)) {
+  for (const double t : times_within(window, kComparedPerDecade)) {
     double value = found.constant;
     for (const auto& [weight, time] : found.branches) value += weight * std::exp(-t / time);
     found.error = std::max(found.error, std::abs(value - relaxation(alpha, tau_s, t)));

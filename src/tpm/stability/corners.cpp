@@ -6,7 +6,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
-#include "tpm/stability/judged_problem.hpp"
+#include "tpm/stability/checked_problem.hpp"
 #include "tpm/stability/study.hpp"
 
 namespace tpm::study {
@@ -24,7 +24,7 @@ bool same_kind(StabilityClass a, StabilityClass b) {
 }
 
 StabilityCorner tried(std::string name, std::string setup, std::string expected,
-                      const JudgedProblem& judged, double step_s, const Expect& expect) {
+                      const CheckedProblem& judged, double step_s, const Expect& expect) {
   StabilityCorner corner{std::move(name), std::move(setup), std::move(expected), {}};
   for (const StepRuleEntry& entry : kStepRules) {
     MethodSettings settings;
@@ -70,7 +70,7 @@ StabilityCorner instantaneous_depth(std::string name, const BondElement& p, doub
                significant(1e3 * depth_m, 3) + " mm at once and held for 300 steps of " +
                    significant(step_s, 3) + " s",
                std::move(expected), judged_rest(p, protocol, step_s), step_s,
-               of_theory(under_depth(p), step_s, kStudySteps - kJudgedSteps));
+               of_theory(under_depth(p), step_s, kStudySteps - kComparedSteps));
 }
 
 const char* const kByTheory =
@@ -117,12 +117,12 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
                                         "a Maxwell fluid: all hold, down to the tension"));
   maxwell.lateral_Pa = 0.0;
   const double end = kStudySteps * kStep_s;
-  JudgedProblem flow;
+  CheckedProblem flow;
   constexpr double kLoad_N = 0.05;
   flow.problem = element_problem(maxwell, creep(kLoad_N, end));
-  flow.times_s = last_steps(end, kStep_s, kJudgedSteps);
-  flow.reference.resize(kJudgedSteps);
-  for (int i = 0; i < kJudgedSteps; ++i) {
+  flow.times_s = last_steps(end, kStep_s, kComparedSteps);
+  flow.reference.resize(kComparedSteps);
+  for (int i = 0; i < kComparedSteps; ++i) {
     const double t = flow.times_s[static_cast<std::size_t>(i)];
     flow.reference[i] =
         kLoad_N / maxwell.modulus_to_stiffness_m() / maxwell.relaxing_Pa() * (1.0 + t / kTau_s);
@@ -148,9 +148,9 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
               return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::holds;
             }));
   loose.lateral_Pa = 0.0;
-  JudgedProblem nothing;
-  nothing.times_s = last_steps(end, kStep_s, kJudgedSteps);
-  nothing.reference.setZero(kJudgedSteps);
+  CheckedProblem nothing;
+  nothing.times_s = last_steps(end, kStep_s, kComparedSteps);
+  nothing.reference.setZero(kComparedSteps);
   nothing.peak = 1.0;
   nothing.problem = element_problem(loose, creep(0.05, end));
   corners.push_back(tried(
@@ -221,10 +221,10 @@ double star_force_N(const BondElement& p, double rate, double time_s) {
 }
 
 /// What the straight path of a star answers in its last steps.
-void set_star_truth(const BondElement& p, double rate, double end_s, JudgedProblem& judged) {
-  judged.times_s = last_steps(end_s, kStep_s, kJudgedSteps);
-  judged.reference.resize(kJudgedSteps);
-  for (int i = 0; i < kJudgedSteps; ++i) {
+void set_star_reference(const BondElement& p, double rate, double end_s, CheckedProblem& judged) {
+  judged.times_s = last_steps(end_s, kStep_s, kComparedSteps);
+  judged.reference.resize(kComparedSteps);
+  for (int i = 0; i < kComparedSteps; ++i) {
     judged.reference[i] = star_force_N(p, rate, judged.times_s[static_cast<std::size_t>(i)]);
   }
   judged.peak = judged.reference.cwiseAbs().maxCoeff();
@@ -235,10 +235,10 @@ StabilityCorner pushed_star(std::string name, std::string setup, std::string exp
   const BondElement p = paper_element(0.02);
   const CornerStar star(p, true);
   const double end = kStudySteps * kStep_s;
-  JudgedProblem judged;
+  CheckedProblem judged;
   judged.problem =
       network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, depth_m}}));
-  set_star_truth(p, depth_m / end, end, judged);
+  set_star_reference(p, depth_m / end, end, judged);
   return tried(std::move(name), std::move(setup), std::move(expected), judged, kStep_s, expect);
 }
 
@@ -261,10 +261,10 @@ void add_stars(std::vector<StabilityCorner>& corners) {
   const BondElement p = paper_element(0.02);
   const CornerStar star(p, false);
   const double end = kStudySteps * kStep_s;
-  JudgedProblem judged;
+  CheckedProblem judged;
   judged.problem =
       network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, 0.004}}));
-  set_star_truth(p, 0.004 / end, end, judged);
+  set_star_reference(p, 0.004 / end, end, judged);
   corners.push_back(tried("buckling", "star, B not guided, 0 to 4 mm in 300 steps",
                           "its stiffness across the plane is negative at once: buckled; XPBD "
                           "does not look and follows the straight path",
@@ -282,8 +282,8 @@ void add_masses(std::vector<StabilityCorner>& corners) {
     LinearElement linear = linear_element(p, 0.0);
     linear.mass_kg = mass;
     linear.drag_per_s = kDrag_per_s;
-    const JudgedProblem judged =
-        judged_motion(p, mass, kDrag_per_s, 0.05, kStudySteps * kStep_s, kStep_s);
+    const CheckedProblem judged =
+        problem_with_mass(p, mass, kDrag_per_s, 0.05, kStudySteps * kStep_s, kStep_s);
     corners.push_back(
         tried("mass " + significant(mass, 2) + " kg", "0.05 N at once and held, drag 20 1/s",
               mass < 1.0 ? "far above 2/omega: explicit rules grow, midpoint, Newmark and the "

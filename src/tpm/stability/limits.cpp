@@ -8,7 +8,7 @@
 #include "tpm/core/progress.hpp"
 #include "tpm/model/closed_form.hpp"
 #include "tpm/network/lowest_mode.hpp"
-#include "tpm/stability/judged_problem.hpp"
+#include "tpm/stability/checked_problem.hpp"
 #include "tpm/stability/study.hpp"
 #include "tpmkit/error.hpp"
 
@@ -202,8 +202,8 @@ ServoRow servo_row(std::string name, const MethodProblem& problem, const Eigen::
   for (const StepRuleEntry& entry : kStepRules) {
     if (entry.adaptive) continue;
     row.cells.push_back(
-        {entry.meaning, judge_run(problem.run(stepped(entry.meaning, 1.0 / rate_Hz), times),
-                                  reference, peak, false)});
+        {entry.meaning, classify_run(problem.run(stepped(entry.meaning, 1.0 / rate_Hz), times),
+                                     reference, peak, false)});
   }
   return row;
 }

@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "tpm/core/progress.hpp"
-#include "tpm/stability/judged_problem.hpp"
+#include "tpm/stability/checked_problem.hpp"
 #include "tpm/stability/study.hpp"
 
 namespace tpm::study {
@@ -24,7 +24,7 @@ std::vector<double> decades(int along, double first, double last) {
 struct MapPlan {
   std::string id, quantity, unit, problem;
   std::vector<double> x, step_s;
-  std::function<JudgedProblem(double x, double step_s)> build;
+  std::function<CheckedProblem(double x, double step_s)> build;
   std::function<LinearElement(double x)> linear;
 };
 
@@ -106,7 +106,7 @@ MapPlan in_motion(std::string id, std::string quantity, std::string unit, std::s
   plan.build = [linear = std::move(linear), material = std::move(material)](double at, double h) {
     const LinearElement e = linear(at);
     const double load = kDepth_m * (e.stiffness_N_per_m - e.relaxing_N_per_m);
-    return judged_motion(material(at), e.mass_kg, e.drag_per_s, load, kStudySteps * h, h);
+    return problem_with_mass(material(at), e.mass_kg, e.drag_per_s, load, kStudySteps * h, h);
   };
   return plan;
 }
@@ -168,7 +168,7 @@ void draw_plan(const MapPlan& plan, std::vector<StabilityMap>& maps, Progress& p
   }
   for (const double x : plan.x) {
     for (const double h : plan.step_s) {
-      const JudgedProblem judged = plan.build(x, h);
+      const CheckedProblem judged = plan.build(x, h);
       for (std::size_t i = first; i < maps.size(); ++i) {
         MethodSettings settings;
         settings.rule = maps[i].rule;

@@ -32,8 +32,8 @@ std::string_view stability_class_name(StabilityClass c) {
   return kStabilityClasses[static_cast<std::size_t>(c)].text;
 }
 
-StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& reference, double peak,
-                           bool moves) {
+StabilityVerdict classify_run(const MethodRun& run, const Eigen::VectorXd& reference, double peak,
+                              bool moves) {
   if (run.end != MethodEnd::completed) {
     return {class_of(run.end), std::numeric_limits<double>::quiet_NaN(), run.reason};
   }

@@ -54,7 +54,7 @@ struct StabilityVerdict {
 /// @param reference at the same times
 /// @param peak size of the response that the error is relative to, > 0
 /// @param moves spheres have mass
-[[nodiscard]] StabilityVerdict judge_run(const MethodRun& run, const Eigen::VectorXd& reference,
-                                         double peak, bool moves);
+[[nodiscard]] StabilityVerdict classify_run(const MethodRun& run, const Eigen::VectorXd& reference,
+                                            double peak, bool moves);
 
 }  // namespace tpm::study

@@ -22,7 +22,7 @@ static_assert(std::endian::native == std::endian::little, "seals hold little-end
 
 constexpr std::string_view kChecksumMagic = "TPMSEAL1";
 
-struct Seal {
+struct CheckSum {
   char magic[8];
   std::uint64_t size;  ///< of what is sealed
   std::uint32_t crc;
@@ -47,11 +47,11 @@ constexpr std::uint64_t kStretch = std::uint64_t{1} << 22U;
 
 /// Of a stretch of a file.
 std::optional<std::uint32_t> crc_of_stretch(int file, std::uint64_t from, std::uint64_t to) {
-  constexpr std::uint64_t kAtOnce = std::uint64_t{1} << 17U;
-  std::vector<char> bytes(static_cast<std::size_t>(std::min(to - from, kAtOnce)));
+  constexpr std::uint64_t kInstantaneous = std::uint64_t{1} << 17U;
+  std::vector<char> bytes(static_cast<std::size_t>(std::min(to - from, kInstantaneous)));
   std::uint32_t crc = 0;
   while (from < to) {
-    const std::uint64_t part = std::min(to - from, kAtOnce);
+    const std::uint64_t part = std::min(to - from, kInstantaneous);
     if (!read_checked(file, bytes.data(), part, from)) return std::nullopt;
     crc = check_sum(bytes.data(), static_cast<std::size_t>(part), crc);
     from += part;
@@ -77,7 +77,7 @@ std::optional<std::uint32_t> crc_of(int file, std::uint64_t size) {
 }  // namespace
 
 bool write_checksum(int descriptor, std::uint64_t size) {
-  Seal write_checksum{{}, size, 0, 0};
+  CheckSum write_checksum{{}, size, 0, 0};
   std::copy(kChecksumMagic.begin(), kChecksumMagic.end(), write_checksum.magic);
   const auto crc = crc_of(descriptor, size);
   if (!crc) {
@@ -95,7 +95,7 @@ ChecksumState checksum_of(int descriptor) {
   struct stat found {};
   if (::fstat(descriptor, &found) != 0) return ChecksumState::none;
   const auto size = static_cast<std::uint64_t>(found.st_size);
-  Seal write_checksum{};
+  CheckSum write_checksum{};
   if (size < sizeof write_checksum ||
       !read_checked(descriptor, &write_checksum, sizeof write_checksum,
                     size - sizeof write_checksum) ||

@@ -140,7 +140,7 @@ class Hdf5Reader {
   [[nodiscard]] Result ask(const std::string& request) const;
 
   std::filesystem::path path_;
-  ChecksumState seal_{};
+  ChecksumState check_sum_{};
   std::unique_ptr<Contained> child_;
 };
 

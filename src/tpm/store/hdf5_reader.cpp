@@ -116,8 +116,8 @@ Hdf5Reader::Hdf5Reader(fs::path path) : path_(std::move(path)) {
   try {
     note_reading(path_, file);
     require_hdf5(path_, file);
-    seal_ = checksum_of(file);
-    if (seal_ == ChecksumState::broken) {
+    check_sum_ = checksum_of(file);
+    if (check_sum_ == ChecksumState::broken) {
       throw bad_input(path_.string(), "is damaged: its check sum is another",
                       "the file as it was written");
     }
@@ -139,7 +139,7 @@ Hdf5Reader::Hdf5Reader(Hdf5Reader&&) noexcept = default;
 Hdf5Reader& Hdf5Reader::operator=(Hdf5Reader&&) noexcept = default;
 
 bool Hdf5Reader::sealed() const noexcept {
-  return seal_ == ChecksumState::whole;
+  return check_sum_ == ChecksumState::whole;
 }
 
 template <class Result>

@@ -108,9 +108,9 @@ struct PredictionVerdict {
   double factor = 2.0;
   [[nodiscard]] bool predicts() const { return rms <= factor * least_residual; }
 };
-[[nodiscard]] PredictionVerdict judge_prediction(const LawPrediction& prediction,
-                                                 const PreparedRecording& recording,
-                                                 std::uint64_t seed);
+[[nodiscard]] PredictionVerdict compare_prediction(const LawPrediction& prediction,
+                                                   const PreparedRecording& recording,
+                                                   std::uint64_t seed);
 
 [[nodiscard]] Json to_json(const LawPrediction& prediction);
 [[nodiscard]] std::string to_terminal_text(const LawPrediction& prediction);

@@ -168,8 +168,8 @@ std::string to_terminal_text(const LawPrediction& p) {
   return text;
 }
 
-PredictionVerdict judge_prediction(const LawPrediction& prediction,
-                                   const PreparedRecording& recording, std::uint64_t seed) {
+PredictionVerdict compare_prediction(const LawPrediction& prediction,
+                                     const PreparedRecording& recording, std::uint64_t seed) {
   SelectionOptions options;
   options.held_out = false;
   options.setup.profiles = false;

@@ -59,7 +59,7 @@ Recording scattered(const Trials& trials, Random& random) {
 }
 
 /// Whether the fitted curve stays within one sigma of the true curve over the whole record.
-bool predicts_the_truth(const FitResult& fit, const Trials& trials) {
+bool predicts_true_curve(const FitResult& fit, const Trials& trials) {
   const std::vector<double>& predicted = fit.recordings.front().predicted;
   return std::equal(
       predicted.begin(), predicted.end(), trials.clean.response.begin(),
@@ -83,7 +83,7 @@ void count_choice(const Selection& selection, const Trials& trials, ChoiceCount&
                    [&](const Candidate& c) { return law_name(c.law) == truth; });
   if (name == truth) {
     ++count.returned;
-  } else if (predicts_the_truth(chosen.fit, trials)) {
+  } else if (predicts_true_curve(chosen.fit, trials)) {
     ++count.equivalent;
   }
   if (generating == selection.candidates.end()) return;
@@ -104,7 +104,7 @@ ExperimentResiduals generating_residuals(const PreparedRecording& recording, con
 
 /// The estimated parameters at the true values; the nuisance ones, which belong to the simulated
 /// test, are 0 there.
-std::vector<double> estimated_truth(const FitResult& fit, const Trials& trials) {
+std::vector<double> true_estimates(const FitResult& fit, const Trials& trials) {
   const LawModel model(trials.law);
   std::vector<double> natural;
   for (const ParameterResult& p : fit.parameters) {
@@ -119,7 +119,7 @@ void count_intervals(const ExperimentResiduals& function, const Trials& trials,
   const FitResult fit = fit_experiments(function);
   std::vector<FitParameter> parameters;
   for (const ParameterResult& p : fit.parameters) parameters.push_back(p.parameter);
-  const std::vector<double> truth = estimated_truth(fit, trials);
+  const std::vector<double> truth = true_estimates(fit, trials);
   const std::vector<std::vector<double>> starts{fit.best.natural, truth};
   std::vector<double> deviance;
   for (std::size_t i = 0; i < parameters.size(); ++i) {

@@ -286,7 +286,7 @@ void hold_out(Candidate& c, std::span<const PreparedRecording> recordings,
 }
 
 /// A law predicts what it has not seen if it comes as near as the nearest law does that has.
-void judge_predictions(Selection& s, double factor) {
+void compare_predictions(Selection& s, double factor) {
   const std::size_t predictions = s.candidates.front().held_out.size();
   for (std::size_t i = 0; i < predictions; ++i) {
     double least = std::numeric_limits<double>::infinity();
@@ -459,7 +459,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
       hold_out(c, recordings, options);
       predicting.advance();
     }
-    judge_predictions(s, options.prediction_factor);
+    compare_predictions(s, options.prediction_factor);
     if (s.candidates.front().held_out.empty()) {
       s.warnings.push_back(
           fmt::format("nothing was held out: the second half of the hold has fewer than {} samples",

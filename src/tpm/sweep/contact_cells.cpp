@@ -172,7 +172,7 @@ class ContactCell final : public CellModel {
     };
     switch (output.kind) {
       case Kind::instantaneous_creep_depth:
-        found[0] = creep.depth_at_once_m();
+        found[0] = creep.instantaneous_depth_m();
         return;
       case Kind::creep_depth_at:
         found[0] = depth_at(output.time_s);

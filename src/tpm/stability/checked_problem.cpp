@@ -1,4 +1,4 @@
-#include "tpm/stability/judged_problem.hpp"
+#include "tpm/stability/checked_problem.hpp"
 
 #include <fmt/format.h>
 
@@ -16,8 +16,8 @@ constexpr double kSoft_Pa = 12e3;
 
 }  // namespace
 
-StabilityVerdict JudgedProblem::judge(const MethodSettings& settings) const {
-  return judge_run(problem->run(settings, times_s), reference, peak, moves);
+StabilityVerdict CheckedProblem::judge(const MethodSettings& settings) const {
+  return classify_run(problem->run(settings, times_s), reference, peak, moves);
 }
 
 std::vector<double> last_steps(double end_s, double step_s, int count) {
@@ -26,9 +26,9 @@ std::vector<double> last_steps(double end_s, double step_s, int count) {
   return times;
 }
 
-JudgedProblem judged_rest(const BondElement& p, const Protocol& protocol, double step_s) {
-  JudgedProblem judged;
-  judged.times_s = last_steps(protocol.end_s(), step_s, kJudgedSteps);
+CheckedProblem judged_rest(const BondElement& p, const Protocol& protocol, double step_s) {
+  CheckedProblem judged;
+  judged.times_s = last_steps(protocol.end_s(), step_s, kComparedSteps);
   ModelOptions options;
   if (p.lateral_Pa == 0.0) options.tension = TensionRule::frozen(0.0);
   const ClosedForm exact(options);
@@ -45,11 +45,11 @@ JudgedProblem judged_rest(const BondElement& p, const Protocol& protocol, double
   return judged;
 }
 
-JudgedProblem judged_motion(const BondElement& p, double mass_kg, double drag_per_s, double load_N,
-                            double end_s, double step_s) {
-  JudgedProblem judged;
+CheckedProblem problem_with_mass(const BondElement& p, double mass_kg, double drag_per_s,
+                                 double load_N, double end_s, double step_s) {
+  CheckedProblem judged;
   judged.moves = true;
-  judged.times_s = last_steps(end_s, step_s, kJudgedSteps);
+  judged.times_s = last_steps(end_s, step_s, kComparedSteps);
   LinearElement linear = linear_element(p, 0.0);
   linear.mass_kg = mass_kg;
   linear.drag_per_s = drag_per_s;

@@ -1,10 +1,10 @@
-# The floors of src/tpm, each a library of objects, so that a library can be put together of floors
-# compiled in one way and floors compiled in another.
+# The folders of src/tpm, each a library of objects, so that a library can be put together of folders
+# compiled in one way and folders compiled in another.
 set(TPM_PRIVATE_LIBRARIES tpm_ceres tpm_sundials tpm_hdf5 tpm_muparser tpm_csv tpm_deflate tpm_minizip tpm_assimp tpm_httplib
     tpm_metis OpenSSL::Crypto Threads::Threads TBB::tbb ZLIB::ZLIB ${CMAKE_DL_LIBS}
     $<$<BOOL:${TPM_MPI}>:$<LINK_ONLY:MPI::MPI_C>>)
 
-function(tpm_floor_options target)
+function(tpm_folder_options target)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
   target_link_libraries(${target} PRIVATE Eigen3::Eigen nlohmann_json::nlohmann_json fmt::fmt
                                           ${TPM_PRIVATE_LIBRARIES} tpm_header_only tpm_options)
@@ -17,9 +17,9 @@ function(tpm_floor_options target)
   target_compile_options(${target} PRIVATE -fno-semantic-interposition)
 endfunction()
 
-# tpm_floors(SUFFIX FLAGS FLOOR...): targets tpm_floor_FLOOR+SUFFIX with these flags; their objects
-# are listed in TPM_FLOOR_OBJECTS.
-function(tpm_floors suffix flags)
+# tpm_folders(SUFFIX FLAGS FOLDER...): targets tpm_folder_FOLDER+SUFFIX with these flags; their objects
+# are listed in TPM_FOLDER_OBJECTS.
+function(tpm_folders suffix flags)
   # Loops over lanes become vectors: they are marked, and nobody reads errno after a square root there.
   set_source_files_properties(${PROJECT_SOURCE_DIR}/src/tpm/network/lane_bonds.cpp
     ${PROJECT_SOURCE_DIR}/src/tpm/solve/lanes.cpp
@@ -30,7 +30,7 @@ function(tpm_floors suffix flags)
                SKIP_UNITY_BUILD_INCLUSION ON)
   set(objects)
   foreach(way fast arranging)
-    set(carrier tpm_floor_headers_${way}${suffix})
+    set(carrier tpm_folder_headers_${way}${suffix})
     set(own_flags ${flags})
     if(way STREQUAL arranging)
       list(APPEND own_flags ${TPM_ARRANGING_FLAGS})
@@ -38,28 +38,28 @@ function(tpm_floors suffix flags)
     if(TPM_COMMON_HEADERS)  # headers that most files include are read once for each way
       file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/${carrier}.cpp CONTENT "")
       add_library(${carrier} OBJECT ${CMAKE_BINARY_DIR}/${carrier}.cpp)
-      tpm_floor_options(${carrier} ${own_flags})
+      tpm_folder_options(${carrier} ${own_flags})
       tpm_common_headers(${carrier} <algorithm> <cmath> <filesystem> <map> <optional> <span> <string> <vector>
                          <Eigen/Core> <fmt/format.h>)
     endif()
-    foreach(floor IN LISTS ARGN)
-      if((floor IN_LIST TPM_ARRANGING_FLOORS AND way STREQUAL fast) OR
-         (NOT floor IN_LIST TPM_ARRANGING_FLOORS AND way STREQUAL arranging))
+    foreach(folder IN LISTS ARGN)
+      if((folder IN_LIST TPM_ARRANGING_FOLDERS AND way STREQUAL fast) OR
+         (NOT folder IN_LIST TPM_ARRANGING_FOLDERS AND way STREQUAL arranging))
         continue()
       endif()
-      file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/*.cpp)
-      foreach(component "" ${TPM_COMPONENTS})  # sources of another component than their floor's
-        set(target tpm_floor_${floor}${suffix})
+      file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/tpm/${folder}/*.cpp)
+      foreach(component "" ${TPM_COMPONENTS})  # sources of another component than their folder's
+        set(target tpm_folder_${folder}${suffix})
         set(own ${sources})
         if(component)
           string(APPEND target _of_${component})
-          set(own ${TPM_${component}_OF_${floor}})
-          list(TRANSFORM own PREPEND ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/)
+          set(own ${TPM_${component}_OF_${folder}})
+          list(TRANSFORM own PREPEND ${PROJECT_SOURCE_DIR}/src/tpm/${folder}/)
           list(TRANSFORM own APPEND .cpp)
         else()
           foreach(other IN LISTS TPM_COMPONENTS)
-            foreach(source IN LISTS TPM_${other}_OF_${floor})
-              list(REMOVE_ITEM own ${PROJECT_SOURCE_DIR}/src/tpm/${floor}/${source}.cpp)
+            foreach(source IN LISTS TPM_${other}_OF_${folder})
+              list(REMOVE_ITEM own ${PROJECT_SOURCE_DIR}/src/tpm/${folder}/${source}.cpp)
             endforeach()
           endforeach()
         endif()
@@ -67,9 +67,9 @@ function(tpm_floors suffix flags)
           continue()
         endif()
         add_library(${target} OBJECT ${own})
-        tpm_floor_options(${target} ${own_flags})
+        tpm_folder_options(${target} ${own_flags})
         tpm_compile_together(${target})
-        if(TPM_MPI AND floor STREQUAL sweep)  # only this floor speaks to other processes
+        if(TPM_MPI AND folder STREQUAL sweep)  # only this folder speaks to other processes
           target_compile_definitions(${target} PRIVATE TPM_MPI OMPI_SKIP_MPICXX MPICH_SKIP_MPICXX)
           target_link_libraries(${target} PRIVATE MPI::MPI_C)
         endif()
@@ -80,7 +80,7 @@ function(tpm_floors suffix flags)
       endforeach()
     endforeach()
   endforeach()
-  set(TPM_FLOOR_OBJECTS ${objects} PARENT_SCOPE)
+  set(TPM_FOLDER_OBJECTS ${objects} PARENT_SCOPE)
 endfunction()
 
 # tpm_list(LIST FUNCTION HEADER TYPE NAMESPACE NOUN FILE...): writes a source in which FUNCTION lists the objects of files.
@@ -137,11 +137,11 @@ namespace tpm {
 ]])
 endfunction()
 
-set(TPM_SANITIZED_FLOORS core store protocol material solve model law network curve scene simulate method
-    reduce device servo haptics sample CACHE STRING "Floors under address and undefined in sanitized twins")
+set(TPM_SANITIZED_FOLDERS core store protocol material solve model law network curve scene simulate method
+    reduce device servo haptics sample CACHE STRING "Folders under address and undefined in sanitized twins")
 
-# A twin of the library in which the floors named run under sanitizers; the others are those of
-# tpmkit. The fast tests, compiled once, run with tpmkit and with the twin. A floor's own inline
+# A twin of the library in which the folders named run under sanitizers; the others are those of
+# tpmkit. The fast tests, compiled once, run with tpmkit and with the twin. A folder's own inline
 # functions stay its own (-Bsymbolic-functions), or those of the tests would take their place.
 function(tpm_sanitized_twin twin sanitize)
   set(flags -fsanitize=${sanitize} -fno-omit-frame-pointer -fno-sanitize-recover=all -O1 -g1 -Wno-maybe-uninitialized)
@@ -149,18 +149,18 @@ function(tpm_sanitized_twin twin sanitize)
     list(APPEND flags -fno-sanitize=null,alignment,object-size,vptr -DEIGEN_MALLOC_ALREADY_ALIGNED=1)
     # for both see TpmCompileOptions.cmake
   endif()
-  tpm_floors(_${twin} "${flags}" ${ARGN})
-  set(rest ${TPM_FLOORS})
+  tpm_folders(_${twin} "${flags}" ${ARGN})
+  set(rest ${TPM_FOLDERS})
   list(REMOVE_ITEM rest ${ARGN})
-  foreach(floor IN LISTS rest)
-    foreach(target tpm_floor_${floor} tpm_floor_${floor}_of_core tpm_floor_${floor}_of_organ tpm_floor_${floor}_of_fit
-            tpm_floor_${floor}_of_haptics)
+  foreach(folder IN LISTS rest)
+    foreach(target tpm_folder_${folder} tpm_folder_${folder}_of_core tpm_folder_${folder}_of_organ tpm_folder_${folder}_of_fit
+            tpm_folder_${folder}_of_haptics)
       if(TARGET ${target})
-        list(APPEND TPM_FLOOR_OBJECTS $<TARGET_OBJECTS:${target}>)
+        list(APPEND TPM_FOLDER_OBJECTS $<TARGET_OBJECTS:${target}>)
       endif()
     endforeach()
   endforeach()
-  add_library(${twin} SHARED ${TPM_FLOOR_OBJECTS} ${TPM_LISTS})
+  add_library(${twin} SHARED ${TPM_FOLDER_OBJECTS} ${TPM_LISTS})
   set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX OUTPUT_NAME tpmkit_${twin})
   target_link_options(${twin} PUBLIC -fsanitize=${sanitize} PRIVATE -Wl,-Bsymbolic-functions)
   target_link_libraries(${twin} PRIVATE fmt::fmt ${TPM_PRIVATE_LIBRARIES})

@@ -10,7 +10,7 @@
 
 namespace tpm::study {
 
-struct JudgedProblem {
+struct CheckedProblem {
   std::unique_ptr<MethodProblem> problem;
   std::vector<double> times_s;
   Eigen::VectorXd reference;
@@ -25,16 +25,17 @@ struct JudgedProblem {
 
 /// Steps of a run of a map, and how many of them are judged.
 inline constexpr double kStudySteps = 300.0;
-inline constexpr int kJudgedSteps = 32;
+inline constexpr int kComparedSteps = 32;
 
 /// The element without mass; the closed form is the reference. With frozen tension (E' = 0) any
 /// history of loads, else constant ones.
-[[nodiscard]] JudgedProblem judged_rest(const BondElement& p, const Protocol& protocol,
-                                        double step_s);
+[[nodiscard]] CheckedProblem judged_rest(const BondElement& p, const Protocol& protocol,
+                                         double step_s);
 
 /// The element with mass and E' = 0 under a constant load from rest.
-[[nodiscard]] JudgedProblem judged_motion(const BondElement& p, double mass_kg, double drag_per_s,
-                                          double load_N, double end_s, double step_s);
+[[nodiscard]] CheckedProblem problem_with_mass(const BondElement& p, double mass_kg,
+                                               double drag_per_s, double load_N, double end_s,
+                                               double step_s);
 
 /// kg, of a sphere of 10 mm radius and 1060 kg/m^3.
 inline constexpr double kSphereMass_kg = 1060.0 * 4.0 / 3.0 * 3.14159265358979 * 1e-6;
