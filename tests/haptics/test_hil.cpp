@@ -90,6 +90,48 @@ TEST_CASE("A session by a zone takes the fewest rings that are trusted on its sl
   }
 }
 
+/// A short push on a small liver, by a patch.
+Json patch_session(const std::string& kind) {
+  const std::filesystem::path configs = std::filesystem::path(TPM_TEST_SOURCE_DIR) / "configs";
+  Json json = read_json(configs / "hil_planned.json");
+  json["model"]["kind"] = kind;
+  if (kind != "planned") json["model"].erase("tolerance");
+  json["model"]["scene"]["organ"] = {{"kind", "liver"}, {"count", 80}};
+  json["model"]["contact"] = {{"kind", "patch"}, {"radius", "45 mm"}};
+  json["indentations"] = {
+      {"depths", {"3 mm"}}, {"rates", {"8 mm/s"}}, {"hold", "0.5 s"}, {"rest", "0.5 s"}};
+  return json;
+}
+
+TEST_CASE("A patch is pushed by models that move several spheres, and verified", "[heavy]") {
+  const test::TempFolder folder;
+  for (const char* const kind : {"curves", "zone", "planned"}) {
+    const HilRecording recording = recorded(folder, patch_session(kind));
+    const Verification v = verify(recording);
+    CAPTURE(kind, v.all.max_N / v.all.peak_N);
+    CHECK(v.whole);
+    CHECK(v.all.max_N < 0.02 * v.all.peak_N);
+    CHECK(v.others.front().apart_N < 1e-4 * v.all.peak_N);
+    std::filesystem::remove_all(folder / "r");
+  }
+  Json one = patch_session("curves");
+  one["model"].erase("contact");
+  const double by_patch = make_loop_model(parsed(patch_session("curves"))).stiffness_N_per_m;
+  CHECK(by_patch > 1.5 * make_loop_model(parsed(one)).stiffness_N_per_m);
+}
+
+TEST_CASE("A patch is refused by models of one sphere, and a contact where there is none") {
+  for (const char* const kind : {"condensed", "network", "network_beside"}) {
+    CHECK_THROWS_WITH(make_loop_model(parsed(patch_session(kind))),
+                      Contains("/model/contact") && Contains("pushed at one sphere"));
+  }
+  CHECK_THROWS_WITH(parsed(patch_session("surface")),
+                    Contains("/model/contact") && Contains("is not for the kind 'surface'"));
+  CHECK_THROWS_WITH(
+      make_loop_model(parsed(with(patch_session("curves"), "/model/contact/radius", "1 m"))),
+      Contains("radius"));
+}
+
 TEST_CASE("A session of the element verifies against the network, the closed form and CVODES") {
   const test::TempFolder folder;
   const HilRecording recording = recorded(folder);

@@ -5,8 +5,10 @@
 #include "organ_scene.hpp"
 #include "tpm/benchmark/contact_reference.hpp"
 #include "tpm/network/liver.hpp"
+#include "tpm/network/quasistatic.hpp"
 #include "tpm/reduce/servo_network.hpp"
 #include "tpm/reduce/zone_network.hpp"
+#include "tpm/scene/experiment_scene.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
@@ -114,6 +116,57 @@ TEST_CASE("a zone's error falls with its rings, and the estimate follows", "[zon
   }
   CHECK(error[1] < error[0]);
   CHECK(error[1] < 0.02);
+}
+
+TEST_CASE("a zone at a patch has the force of the network on all of its spheres", "[zone][heavy]") {
+  const OrganScene& scene = small_liver();
+  const Organ& organ = scene.network.organ;
+  const BondSystem bonds(scene.network, TpmParameters{}.with_relaxation_time(0.02));
+  const Eigen::Vector3d into = scene.probe.direction;
+  SceneContact contact;
+  contact.kind = ContactKind::patch;
+  contact.probe = scene.probe;
+  contact.radius_m = 1.3 * organ.spacing;
+  const std::vector<std::size_t> patch = spheres_of(contact, organ);
+  REQUIRE(patch.size() > 3);
+
+  constexpr double kPeriod_s = 1e-3;
+  const Protocol push(Drive::displacement, {{0.0, 0.0}, {0.05, 4e-3}, {0.1, 4e-3}, {0.15, 1e-3}},
+                      "push");
+  std::vector<double> times_s;
+  for (int i = 1; i <= 150; ++i) times_s.push_back(kPeriod_s * i);
+  Constraints guided = scene.constraints;
+  std::vector<Probe> probes;
+  for (const std::size_t sphere : patch) {
+    guided.guide(sphere, into);
+    probes.push_back({sphere, into});
+  }
+  const QuasiStatic network(bonds, organ.position, guided, Probes(std::move(probes)));
+  const Eigen::VectorXd expected_N = network.run(push, times_s).response;
+  const double peak_N = expected_N.maxCoeff();
+
+  const auto worst_of = [&](const PushedSpheres& spheres, int rings, double* claim_N) {
+    ZoneNetwork zone(bonds, organ.position, scene.constraints, spheres, into, {.rings = rings});
+    double worst_N = 0.0;
+    for (std::size_t i = 0; i < times_s.size(); ++i) {
+      const ContactAnswer answer = zone.step(value_at(push, times_s[i]) * into);
+      const double force_N = -answer.force_N.dot(into);
+      worst_N = std::max(worst_N, std::abs(force_N - expected_N[static_cast<Eigen::Index>(i)]));
+      if (claim_N != nullptr) *claim_N = std::max(*claim_N, answer.error_N);
+    }
+    Eigen::Matrix3Xd all(3, zone.spheres());
+    zone.displacements(all);
+    for (const std::size_t sphere : spheres) {
+      CHECK((all.col(static_cast<Eigen::Index>(sphere)) - 1e-3 * into).norm() < 1e-9);
+    }
+    return worst_N;
+  };
+  double claim_N = 0.0;
+  const double of_whole = worst_of(PushedSpheres(patch), 50, &claim_N);
+  CHECK(of_whole < 5e-3 * peak_N);
+  CHECK(claim_N > of_whole);
+  CHECK(worst_of(PushedSpheres(patch), 2, nullptr) < 0.05 * peak_N);
+  CHECK(worst_of(scene.probe.sphere, 2, nullptr) > 0.2 * peak_N);  // one sphere feels less
 }
 
 TEST_CASE("a zone refuses what it cannot do", "[zone][heavy]") {
