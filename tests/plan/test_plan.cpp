@@ -195,8 +195,9 @@ TEST_CASE("the same plan twice, byte for byte, with every key", "[heavy]") {
   const ExperimentScene scene = star(ramp("2 mm"));
   const Json first = plan_json(make_plan(scene, whole));
   CHECK(to_text(first) == to_text(plan_json(make_plan(scene, whole))));
-  for (const char* key : {"choice", "frontier", "reference", "relevance", "changes", "margin",
-                          "needs_full_model", "masses_matter", "costs", "validity_passed"}) {
+  for (const char* key :
+       {"choice", "frontier", "reference", "relevance", "changes", "margin", "network_offline_s",
+        "needs_full_model", "masses_matter", "costs", "validity_passed"}) {
     CAPTURE(key);
     CHECK(first.contains(key));
   }
@@ -205,6 +206,23 @@ TEST_CASE("the same plan twice, byte for byte, with every key", "[heavy]") {
   CHECK(first["changes"][0]["factor"].get<double>() > 1.0);  // 10 mm is its end
   CHECK_THAT(first["changes"][0]["factor"].get<double>(), WithinRel(5.0, 0.03));
   CHECK_THAT(first["changes"][0]["breaks"].get<std::string>(), Contains("10 mm"));
+}
+
+TEST_CASE("a short offline run needs no plan, and the plan says so") {
+  PlanRequest offline;
+  offline.tolerance = 1e-3;
+  offline.relevance = offline.changes = false;
+  const ExperimentScene scene = star(ramp("2 mm"));
+  const Plan plan = make_plan(scene, offline);
+  const Json json = plan_json(plan);
+  REQUIRE(json["network_offline_s"].is_number());
+  CHECK(json["network_offline_s"].get<double>() > 0.0);
+  CHECK(json["network_offline_s"].get<double>() < 1.0);
+  CHECK_THAT(plan_text(plan), Contains("once and offline no plan is needed: collocation"));
+  offline.budget.rate_Hz = 1000.0;
+  const Plan in_loop = make_plan(scene, offline);
+  CHECK(plan_json(in_loop)["network_offline_s"].is_null());
+  CHECK_THAT(plan_text(in_loop), !Contains("no plan is needed"));
 }
 
 TEST_CASE("what a hand can feel is a tolerance") {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "tpm/core/text.hpp"
 #include "tpmkit/version.hpp"
@@ -90,6 +92,26 @@ std::string masses_note(const Plan& plan) {
   return note.empty() ? note : fmt::format(" ({})", note);
 }
 
+/// What asks for no servo and no budget of time can run the network itself: the cheapest candidate
+/// with the whole network that meets the tolerance, and how long it takes, s.
+std::optional<std::pair<std::string, double>> run_offline(const Plan& plan) {
+  if (plan.request.budget.rate_Hz || plan.request.budget.wall_s_per_s) return std::nullopt;
+  const auto runs = [](const PlannedCandidate& c) {
+    return c.accurate && c.reach == ModelReach::full && c.cost_s_per_s;
+  };
+  const auto found = std::find_if(plan.candidates.begin(), plan.candidates.end(), runs);
+  if (found == plan.candidates.end()) return std::nullopt;
+  return std::pair{found->name, *found->cost_s_per_s * plan.duration_s};
+}
+
+std::string offline_text(const Plan& plan) {
+  constexpr double kNoPlanNeeded_s = 1.0;
+  const auto offline = run_offline(plan);
+  if (!offline || offline->second > kNoPlanNeeded_s) return {};
+  return fmt::format("  once and offline no plan is needed: {}, the network, takes {}\n",
+                     offline->first, time_text(offline->second));
+}
+
 std::string choice_text(const Plan& plan) {
   if (plan.choice) {
     const PlannedCandidate& c = plan.chosen();
@@ -102,6 +124,7 @@ std::string choice_text(const Plan& plan) {
         significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
         time_text(*c.cost_s_per_s),
         c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
+    text += offline_text(plan);
     if (c.verified_response_error) {
       text += fmt::format("  nothing is claimed of the {}: verified error {}\n",
                           plan.by_depth ? "contact force" : "indentation depth",
@@ -167,6 +190,8 @@ Json plan_json(const Plan& plan) {
       plan.choice ? Json(rounded(request.tolerance / std::max(*plan.chosen().verified_error, 1e-12),
                                  kPlanDigits))
                   : Json(nullptr);
+  const auto offline = run_offline(plan);
+  json["network_offline_s"] = offline ? Json(rounded(offline->second, kPlanDigits)) : Json(nullptr);
   json["without_budget"] =
       plan.without_budget ? candidate_json(plan.candidates[*plan.without_budget]) : Json(nullptr);
   json["needs_full_model"] = plan.needs_full;
