@@ -26,7 +26,7 @@ constexpr double kForever = std::numeric_limits<double>::infinity();
 struct Tissue {
   std::string name;
   Network network;
-  TpmParameters material;
+  BondMaterial material;
 };
 
 /// Figure 3 of the paper: a load along +z on sphere 71.
@@ -40,14 +40,14 @@ class Scene {
         rim_(free_ones(spheres_at_rim(liver_, 25.0 * std::numbers::pi / 180.0))) {
     fmt::print("near the contact: {} spheres (2 steps); at the rim: {} free ones (25 degrees)\n",
                near_.size(), rim_.size());
-    const double relaxed = stiffness(liver_, {}, 1.0);
+    const double relaxed = stiffness(liver_, TpmParameters{}, 1.0);
     TpmParameters unrelaxed;
     unrelaxed.E1_Pa = 1e15;
     TpmParameters one_modulus;  // relaxed radial bonds as stiff as the lateral ones
     one_modulus.Eprime_Pa = one_modulus.relaxed_modulus_Pa();
     add_msm("MSM, factors of the bonds", SpringRule::like_the_bonds, relaxed);
     add_msm("MSM, equal springs", SpringRule::equal, relaxed);
-    tissues_.push_back({"TPM, relaxed", liver_, {}});
+    tissues_.push_back({"TPM, relaxed", liver_, TpmParameters{}});
     tissues_.push_back({"TPM, before it relaxes", liver_, unrelaxed});
     tissues_.push_back({"TPM, relaxed, E' = P2", liver_, one_modulus});
   }
@@ -71,7 +71,7 @@ class Scene {
     fmt::print("\n{} s after a load of {} N was put on, damping ratio 0.1\n", time, load);
     std::optional<Eigen::Matrix3Xd> msm;
     for (const Tissue& tissue : tissues_) {
-      const BondSystem bonds(tissue.network, tissue.materials);
+      const BondSystem bonds(tissue.network, tissue.material);
       InertialOptions options;
       options.stiffness_share = tissue.name.starts_with("MSM") ? 1.0 : 0.0;
       const InertialRun run = Inertial(bonds, liver_.organ.position, constraints_, probe_,
@@ -100,7 +100,7 @@ class Scene {
   }
 
   [[nodiscard]] Eigen::Matrix3Xd settled(const Tissue& tissue, double load) const {
-    const BondSystem bonds(tissue.network, tissue.materials);
+    const BondSystem bonds(tissue.network, tissue.material);
     const QuasiStaticRun run =
         QuasiStatic(bonds, liver_.organ.position, constraints_, probe_, {1e-6})
             .run(creep(load, kForever), std::span(&kForever, 1));
@@ -113,7 +113,7 @@ class Scene {
     const Eigen::Matrix3Xd shape = u / u.norm();
     if (!msm) msm = shape;
     fmt::print("{:<28} {:>10.3f} {:>10.4f} {:>12.5f} {:>12.5f} {:>12.1e}\n", tissue.name,
-               stiffness(tissue.network, tissue.element(), 1.0),
+               stiffness(tissue.network, tissue.material, 1.0),
                1e3 * u.col(static_cast<Eigen::Index>(probe_.sphere)).dot(probe_.direction),
                roughness(liver_, u, near_), roughness(liver_, u, rim_), (shape - *msm).norm());
   }
