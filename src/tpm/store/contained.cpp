@@ -138,7 +138,9 @@ void confine(int descriptor, int parent, bool writes, std::uint64_t memory_bytes
   ::dup2(back, kParent);
   (void)::close_range(kParent + 1, ~0U, 0);
 
-  set_limit(RLIMIT_NOFILE, kParent + 1);  // nothing else can be opened from here on
+  // Nothing else can be opened from here on; the checks of sanitizers open a pipe.
+  constexpr std::uint64_t kOfSanitizer = kSanitized ? 2 : 0;
+  set_limit(RLIMIT_NOFILE, kParent + 1 + kOfSanitizer);
   set_limit(RLIMIT_CORE, 0);
   if (writes) return;
   set_limit(RLIMIT_FSIZE, 0);
