@@ -44,6 +44,10 @@ inline std::vector<ErrorCase> simulation_error_cases() {
          "formulation": {"kind": "inertial"})")},
       {type, "one sphere driven twice", simulate,
        pushed(R"("contacts": [{"kind": "sphere"}, {"kind": "patch", "radius": "30 mm"}])")},
+      {type, "patch over an anchored sphere", simulate,
+       scene(", " + push +
+             R"(, "anchors": [{"kind": "far_side"}, {"kind": "spheres", "spheres": [70]}],
+         "contacts": [{"kind": "patch", "radius": "20 cm"}])")},
       {type, "direction without length", simulate, contact(R"("direction": [0, 0, 0])")},
       {type, "load on an anchored sphere", simulate,
        scene(R"(, "anchors": [{"kind": "far_side"}, {"kind": "spheres", "spheres": [5]}],

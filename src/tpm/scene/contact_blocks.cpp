@@ -94,6 +94,19 @@ double radius_of(const Json& contact, const Organ& organ, const DocumentPlace& p
       fmt::format("at most the extent of the organ, {} mm", significant(1e3 * extent, 4)));
 }
 
+void require_patch_free(const SceneContact& patch, const Tissue& tissue,
+                        const DocumentPlace& place) {
+  const Constraints constraints = tissue.constraints();
+  const Eigen::Vector3d& direction = patch.probe.direction;
+  for (const std::size_t sphere : spheres_of(patch, tissue.network.organ)) {
+    if ((constraints.projector(sphere) * direction - direction).norm() < 1e-9) continue;
+    throw bad_input(
+        place.key("radius").where,
+        fmt::format("the patch has sphere {}, which cannot move along the push", sphere + 1),
+        "a smaller radius, or a place away from anchors and guides");
+  }
+}
+
 }  // namespace
 
 std::string_view word_of(ContactKind kind) {
@@ -123,6 +136,7 @@ SceneContact parse_contact(const Json& block, const Tissue& tissue, const Docume
     }
   }
   require_loadable(tissue, contact.probe.sphere, contact.probe.direction, place.where);
+  if (contact.kind == ContactKind::patch) require_patch_free(contact, tissue, place);
   return contact;
 }
 
