@@ -98,7 +98,8 @@ class Planning {
     }
     if (plan_.request.changes && plan_.choice) {
       tell("what would break first");
-      plan_.changes = plan_changes(*surrogate_, model_of(plan_.chosen()), plan_.request);
+      plan_.changes = plan_changes(*surrogate_, model_of(plan_.chosen()), plan_.request,
+                                   nominal_costs().seconds_of(reference_.work));
     }
     return std::move(plan_);
   }
@@ -126,8 +127,8 @@ class Planning {
       candidate.reason = *reason;
     } else if (model.last_resort() && network_found_) {
       candidate.reason = "not tried: a coarser one meets the tolerance";
-    } else if (const auto reason = too_long_to_build(model)) {
-      candidate.reason = *reason;
+    } else if (const auto too_long = too_long_to_build(model)) {
+      candidate.reason = *too_long;
     } else if (model.has_masses() && with_masses_found_) {
       candidate.reason = "not tried: a cheaper one with masses meets the tolerance";
     } else {

@@ -67,8 +67,9 @@ struct PlanRelevance {
 /// By how much a scene can change before the pick no longer does.
 struct PlanChange {
   std::string change;            ///< "deeper, and as much faster", "faster", "stiffer"
-  std::optional<double> factor;  ///< none: not within `kMostChange`
-  std::string breaks;            ///< what breaks there
+  std::optional<double> factor;  ///< none: not up to `survived`
+  double survived = 1.0;  ///< largest factor tried at which the pick holds, at most kMostChange
+  std::string breaks;     ///< what breaks there
 };
 inline constexpr double kMostChange = 16.0;
 

@@ -14,15 +14,20 @@ namespace {
 
 constexpr double kStride = 1.5;    // between factors tried
 constexpr double kFoundTo = 1.02;  // by bisection
+constexpr double kLeastSearch_s = 1.0;
 
 /// The changes of a scene, and whether a model survives them.
 class Survival {
  public:
-  Survival(const PlanSurrogate& surrogate, const PlanModel& model, const PlanRequest& request)
+  /// @param search_s how long the search for one change may take, at nominal costs
+  Survival(const PlanSurrogate& surrogate, const PlanModel& model, const PlanRequest& request,
+           double search_s)
       : surrogate_(surrogate),
         model_(model),
         request_(request),
-        valid_(passed_limits(surrogate).empty()) {}
+        valid_(passed_limits(surrogate).empty()),
+        once_s_(std::max(nominal_costs().seconds_of(surrogate.spent()), 1e-9)),
+        most_tries_(static_cast<int>(std::ceil(search_s / once_s_))) {}
 
   /// What breaks in a changed scene; none if nothing does.
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
@@ -54,31 +59,29 @@ class Survival {
   /// The least factor at which something breaks.
   template <class Change>
   [[nodiscard]] PlanChange first(std::string name, Change&& change) const {
-    PlanChange result{std::move(name), std::nullopt, ""};
-    double good = 1.0;
-    for (double factor = kStride;; factor *= kStride) {
+    PlanChange result{std::move(name), std::nullopt, 1.0, ""};
+    int tries = 0;
+    for (double factor = kStride; !result.factor; factor *= kStride) {
+      if (result.survived == kMostChange || tries >= most_tries_) return result;
       factor = std::min(factor, kMostChange);
-      const auto broken = breaks(change(factor));
-      if (!broken) {
-        good = factor;
-        if (factor == kMostChange) return result;
-        continue;
+      ++tries;
+      if (const auto broken = breaks(change(factor))) {
+        result.factor = factor;
+        result.breaks = *broken;
+      } else {
+        result.survived = factor;
       }
-      double bad = factor;
-      result.breaks = *broken;
-      while (bad / good > kFoundTo) {
-        const double middle = std::sqrt(good * bad);
-        const auto there = breaks(change(middle));
-        if (there) {
-          bad = middle;
-          result.breaks = *there;
-        } else {
-          good = middle;
-        }
-      }
-      result.factor = bad;
-      return result;
     }
+    for (; *result.factor / result.survived > kFoundTo && tries < most_tries_; ++tries) {
+      const double middle = std::sqrt(result.survived * *result.factor);
+      if (const auto there = breaks(change(middle))) {
+        result.factor = middle;
+        result.breaks = *there;
+      } else {
+        result.survived = middle;
+      }
+    }
+    return result;
   }
 
  private:
@@ -92,6 +95,8 @@ class Survival {
   const PlanModel& model_;
   const PlanRequest& request_;
   bool valid_;
+  double once_s_;   ///< runs of the scene as it is, which each try repeats
+  int most_tries_;  ///< of one change
 };
 
 }  // namespace
@@ -107,8 +112,8 @@ std::vector<std::string> passed_limits(const PlanSurrogate& surrogate) {
 }
 
 std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate, const PlanModel& model,
-                                     const PlanRequest& request) {
-  const Survival survival(surrogate, model, request);
+                                     const PlanRequest& request, double reference_s) {
+  const Survival survival(surrogate, model, request, std::max(reference_s, kLeastSearch_s));
   const PlanScene& scene = surrogate.scene();
   return {survival.first(
               scene.by_depth() ? "deeper, and as much faster" : "the load, put on as much faster",

@@ -68,6 +68,8 @@ VerifiedReference verified_reference(const PlanScene& scene, const PlanMeasure& 
       if (apart <= kAgreement * tolerance || own <= kTightestReference) break;
     }
   }
+  reference.work += reference.trajectory.work;
+  reference.work += cross_check.work;
   reference.reference.peak = reference.trajectory.response.cwiseAbs().maxCoeff();
   if (!(reference.reference.peak > 0.0)) {
     throw bad_input("scene", "nothing is imposed, or nothing answers", "a protocol with a peak");

@@ -8,6 +8,7 @@ struct VerifiedReference {
   std::vector<double> times_s;
   Trajectory trajectory;
   PlanReference reference;
+  OperationCount work;  ///< of both
 };
 
 /// The full nonlinear network at a thousandth of the tolerance, or tighter until it and a second

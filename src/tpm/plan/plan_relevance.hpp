@@ -9,10 +9,12 @@ namespace tpm::organ {
                                                         double tolerance);
 
 /// By what factor each the scene can become deeper, faster and stiffer until the claim of a model
-/// leaves the tolerance, its cost the budget, or the scene a limit of validity.
+/// leaves the tolerance, its cost the budget, or the scene a limit of validity. A search ends early
+/// when its runs have taken, by counted operations, as long as the reference, or a second.
+/// @param reference_s what the reference and its cross-check take at nominal costs
 [[nodiscard]] std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate,
                                                    const PlanModel& model,
-                                                   const PlanRequest& request);
+                                                   const PlanRequest& request, double reference_s);
 
 /// Limits that the scene passes in its course, in words.
 [[nodiscard]] std::vector<std::string> passed_limits(const PlanSurrogate& surrogate);

@@ -137,6 +137,14 @@ const ContactCurves& PlanSurrogate::curves() const {
   return *curves_;
 }
 
+OperationCount PlanSurrogate::spent() const {
+  OperationCount work;
+  for (const auto* const runs : {&collocation_, &with_masses_}) {
+    for (const auto& [tolerance, run] : *runs) work += run.work;
+  }
+  return work;
+}
+
 double PlanSurrogate::claim_of(const Trajectory& model) const {
   if (!inertial_) {
     return kSafety * trajectory_error(model, coarse(), measure_) + coarse_error() + kRounding;

@@ -46,6 +46,9 @@ class PlanSurrogate {
   /// Curves over the depths of the coarse run.
   [[nodiscard]] const ContactCurves& curves() const;
 
+  /// What the runs of collocation() and with_masses() so far took.
+  [[nodiscard]] OperationCount spent() const;
+
   /// A bound of the error of a model without masses that answers `model` at times(): `kSafety`
   /// times its difference from the coarse run, with masses where those are asked for, and what that
   /// run may add.

@@ -57,11 +57,29 @@ Json relevance_json(const Plan& plan) {
   return list;
 }
 
+std::string change_text(const PlanChange& c) {
+  constexpr double kApart = 1.1;  // of factors that were looked for in full
+  if (!c.factor && c.survived == kMostChange) {
+    return fmt::format("  {} times {}: nothing breaks\n", shortest(kMostChange), c.change);
+  }
+  if (!c.factor) {
+    return fmt::format("  {} times {}: nothing breaks; more was not tried, it takes too long\n",
+                       significant(c.survived, 3), c.change);
+  }
+  const std::string factor = significant(*c.factor, 3);
+  if (*c.factor / c.survived <= kApart) {
+    return fmt::format("  {} times {}: {}\n", factor, c.change, c.breaks);
+  }
+  return fmt::format("  {} to {} times {}: {}\n", significant(c.survived, 3), factor, c.change,
+                     c.breaks);
+}
+
 Json changes_json(const Plan& plan) {
   Json list = Json::array();
   for (const PlanChange& c : plan.changes) {
     list.push_back({{"change", c.change},
                     {"factor", number(c.factor)},
+                    {"survived", rounded(c.survived, kPlanDigits)},
                     {"breaks", c.factor ? Json(c.breaks) : Json(nullptr)}});
   }
   return list;
@@ -237,9 +255,7 @@ std::string plan_text(const Plan& plan) {
   }
   if (!plan.changes.empty()) text += "what would break first:\n";
   for (const PlanChange& c : plan.changes) {
-    text += c.factor
-                ? fmt::format("  {} times {}: {}\n", significant(*c.factor, 3), c.change, c.breaks)
-                : fmt::format("  {} times {}: nothing breaks\n", shortest(kMostChange), c.change);
+    text += change_text(c);
   }
   if (plan.masses_left_out) {
     text += fmt::format(
