@@ -67,7 +67,7 @@ struct PlanRelevance {
 /// By how much a scene can change before the pick no longer does.
 struct PlanChange {
   std::string change;            ///< "deeper, and as much faster", "faster", "stiffer"
-  std::optional<double> factor;  ///< none: not up to `survived`
+  std::optional<double> factor;  ///< none: not within kMostChange
   double survived = 1.0;  ///< largest factor tried at which the pick holds, at most kMostChange
   std::string breaks;     ///< what breaks there
 };

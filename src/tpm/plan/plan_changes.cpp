@@ -15,6 +15,8 @@ namespace {
 constexpr double kStride = 1.5;    // between factors tried
 constexpr double kFoundTo = 1.02;  // by bisection
 constexpr double kLeastSearch_s = 1.0;
+constexpr int kLeastTries = 4;
+constexpr int kTriesByStrides = 12;  // enough for strides to the end, and to bisect one
 
 /// The changes of a scene, and whether a model survives them.
 class Survival {
@@ -27,7 +29,7 @@ class Survival {
         request_(request),
         valid_(passed_limits(surrogate).empty()),
         once_s_(std::max(nominal_costs().seconds_of(surrogate.spent()), 1e-9)),
-        most_tries_(static_cast<int>(std::ceil(search_s / once_s_))) {}
+        most_tries_(std::max(static_cast<int>(std::ceil(search_s / once_s_)), kLeastTries)) {}
 
   /// What breaks in a changed scene; none if nothing does.
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
@@ -61,8 +63,10 @@ class Survival {
   [[nodiscard]] PlanChange first(std::string name, Change&& change) const {
     PlanChange result{std::move(name), std::nullopt, 1.0, ""};
     int tries = 0;
-    for (double factor = kStride; !result.factor; factor *= kStride) {
-      if (result.survived == kMostChange || tries >= most_tries_) return result;
+    // With few tries from the end: what holds there holds, and else halves of the way tell most.
+    const double stride = most_tries_ < kTriesByStrides ? kMostChange : kStride;
+    for (double factor = stride; !result.factor; factor *= stride) {
+      if (result.survived == kMostChange) return result;
       factor = std::min(factor, kMostChange);
       ++tries;
       if (const auto broken = breaks(change(factor))) {
@@ -72,15 +76,17 @@ class Survival {
         result.survived = factor;
       }
     }
-    for (; *result.factor / result.survived > kFoundTo && tries < most_tries_; ++tries) {
-      const double middle = std::sqrt(result.survived * *result.factor);
+    double broken_at = result.factor.value_or(kMostChange);
+    for (; broken_at / result.survived > kFoundTo && tries < most_tries_; ++tries) {
+      const double middle = std::sqrt(result.survived * broken_at);
       if (const auto there = breaks(change(middle))) {
-        result.factor = middle;
+        broken_at = middle;
         result.breaks = *there;
       } else {
         result.survived = middle;
       }
     }
+    result.factor = broken_at;
     return result;
   }
 

@@ -10,7 +10,8 @@ namespace tpm::organ {
 
 /// By what factor each the scene can become deeper, faster and stiffer until the claim of a model
 /// leaves the tolerance, its cost the budget, or the scene a limit of validity. A search ends early
-/// when its runs have taken, by counted operations, as long as the reference, or a second.
+/// when its runs have taken, by counted operations, as long as the reference, or a second, but not
+/// before four tries: the factor is then between `survived` and `factor`.
 /// @param reference_s what the reference and its cross-check take at nominal costs
 [[nodiscard]] std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate,
                                                    const PlanModel& model,
