@@ -117,7 +117,9 @@ std::optional<AutoregressionEstimate> improve_in_turn(WhitenedPrefix& function,
   constexpr int kRounds = 3;
   constexpr double kSame = 0.02;  // of 1 - phi: changes widths by 2 %
   std::optional<AutoregressionEstimate> correlation;
+  std::vector<Eigen::Index> free;  // whose slopes it has
   for (int round = 0; round < kRounds; ++round) {
+    free = off_bounds(parameters, best.natural);
     correlation = correlation_near(function, parameters, best.natural, noise.step_s());
     if (!correlation) return std::nullopt;
     const double change = std::abs(correlation->phi - noise.phi());
@@ -128,7 +130,9 @@ std::optional<AutoregressionEstimate> improve_in_turn(WhitenedPrefix& function,
     if (!again.usable) break;
     best = std::move(again);
   }
-  return correlation;
+  // The last minimum may have taken a parameter to a bound, or off it.
+  if (off_bounds(parameters, best.natural) == free) return correlation;
+  return correlation_near(function, parameters, best.natural, noise.step_s());
 }
 
 }  // namespace tpm::study
