@@ -7,6 +7,7 @@
 
 #include "command.hpp"
 #include "tpm/core/quantity_text.hpp"
+#include "tpm/core/text.hpp"
 #include "tpm/report/study_report.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/tables.hpp"
@@ -81,6 +82,15 @@ TableRequest request_of(const TableOptions& options) {
   return request;
 }
 
+/// A depth far beyond what the paper indents is often a slip of the unit.
+void warn_of_depths(const TableRequest& request) {
+  constexpr double kValid_m = 10e-3, kRounding_m = 1e-9;
+  const double deepest_m = *std::max_element(request.depths_m.begin(), request.depths_m.end());
+  if (deepest_m <= kValid_m + kRounding_m) return;
+  tell_user("tpm: warning: --depths: {} mm is beyond 10 mm, where the paper's validity ends\n",
+            significant(1e3 * deepest_m, 4));
+}
+
 std::string rendered(const TablesResult& result, const std::string& format) {
   if (format == "json") return to_text(to_json(result));
   if (format == "csv") return tables_csv(result);
@@ -98,6 +108,7 @@ int run_command(const TableOptions& options) {
   check_schema(claims, "claims", name);
   const auto printed = read_printed_tables(claims, name);
   const std::string text = rendered(make_tables(request, printed), options.format);
+  warn_of_depths(request);
   deliver(text, options.output);
   return 0;
 }

@@ -52,6 +52,16 @@ TEST_CASE("Standard error that is closed or full changes no exit code") {
   }
 }
 
+TEST_CASE("Tables of depths beyond the paper's validity say so, a slip of the unit above all") {
+  const test::TempFolder folder;
+  const std::string said = folder / "said";
+  CHECK(exit_code_of("$TPM tables --depths 2mm,8m > /dev/null 2> '" + said + "'") == 0);
+  CHECK(read_file(said) ==
+        "tpm: warning: --depths: 8000 mm is beyond 10 mm, where the paper's validity ends\n");
+  CHECK(exit_code_of("$TPM tables --depths 2,10 > /dev/null 2> '" + said + "'") == 0);
+  CHECK(read_file(said).empty());
+}
+
 TEST_CASE("A message never lands in a file that took the place of a closed stream") {
   const test::TempFolder folder;
   const std::string file = folder / "tables.json";

@@ -91,7 +91,7 @@ double touch_margin(const TouchSearch& search) {
 Touch find_touch(const TouchSearch& search, std::optional<double> level) {
   constexpr double kWindow =
       3.0;  // margins above the floor: near contact the rise is nearly straight
-  constexpr double kInstantaneous = 0.02;  // of the drive's range
+  constexpr double kNoTravel = 0.02;  // of the drive's range
   const auto& [drive, response, pieces, noise, sustained] = search;
   const auto start = first_rise(pieces);
   Touch touch;
@@ -114,7 +114,7 @@ Touch find_touch(const TouchSearch& search, std::optional<double> level) {
   if (touch.index) {
     const auto [low, high] = std::minmax_element(drive.begin(), drive.end());
     touch.instantaneous =
-        drive[*touch.index] - drive[touch.motion_start] < kInstantaneous * (*high - *low);
+        drive[*touch.index] - drive[touch.motion_start] < kNoTravel * (*high - *low);
   }
   return touch;
 }

@@ -4,6 +4,7 @@
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "tpmkit/error.hpp"
 
@@ -121,6 +122,9 @@ AutoregressionEstimate estimate_autoregression(std::span<const double> time_s,
 
 double satterthwaite_degrees(const AutoregressionEstimate& estimate, Eigen::Index column,
                              Eigen::Index n, Eigen::Index p) {
+  if (column < 0 || column >= estimate.log_variance_slope.size()) {
+    throw std::logic_error("degrees of freedom of a parameter that the estimate does not have");
+  }
   const double slope = estimate.log_variance_slope[column];
   const double variance = slope * slope * estimate.phi_variance + 2.0 / static_cast<double>(n - p);
   return std::max(2.0 / variance, 1.0);

@@ -63,7 +63,8 @@ struct AutoregressionEstimate {
 
 /// Degrees of freedom of Student's t for an estimate whose variance rests on an estimated phi and
 /// an estimated size of the noise (Satterthwaite, as Kenward & Roger, Biometrics 53 (1997) 983):
-/// 2 / Var(ln v), Var(ln v) = slope^2 Var(phi) + 2/(n - p).
+/// 2 / Var(ln v), Var(ln v) = slope^2 Var(phi) + 2/(n - p). Throws std::logic_error for a column
+/// that the estimate does not have.
 [[nodiscard]] double satterthwaite_degrees(const AutoregressionEstimate& estimate,
                                            Eigen::Index column, Eigen::Index n, Eigen::Index p);
 

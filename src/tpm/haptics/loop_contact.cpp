@@ -147,7 +147,7 @@ LoopContactState LoopContact::state() noexcept {
 }
 
 void LoopContact::positions(Eigen::Ref<Eigen::Matrix3Xd> all) noexcept {
-  constexpr std::uint64_t kMostTogether = 25;  // a second
+  constexpr std::uint64_t kMostPending = 25;  // a second
   const LoopContactState newest = state();
   const TissueShape& shape = loop_.shape;
   const Eigen::Map<const Eigen::Vector3d> at_m(newest.row.position_m);
@@ -158,7 +158,7 @@ void LoopContact::positions(Eigen::Ref<Eigen::Matrix3Xd> all) noexcept {
                            : Eigen::Vector3d(shape.push * newest.row.surface_depth_m);
   }
   const auto lived = static_cast<std::uint64_t>(newest.time_s / kDrawnEvery_s);
-  const std::uint64_t due = lived > drawn_ ? std::min(lived - drawn_, kMostTogether) : 0;
+  const std::uint64_t due = lived > drawn_ ? std::min(lived - drawn_, kMostPending) : 0;
   if (shape.field && due > 0) {
     for (std::uint64_t i = 1; i <= due; ++i) {
       const double part = static_cast<double>(i) / static_cast<double>(due);

@@ -27,11 +27,11 @@ constexpr std::size_t kMostBytes = 16'384;  // of a request
 constexpr auto kTimeToAsk = 500ms;          // a browser on the same machine asks at once
 constexpr auto kTimeToAnswer = 2s;
 constexpr auto kLook = 50;  // ms between looks at whether all is over
-constexpr int kYield = 10;  // nice value of the page's threads
+constexpr int kNice = 10;   // nice value of the page's threads
 
 /// Of the calling thread: Linux keeps a nice value for each.
-void yield_s() {
-  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kYield);
+void lower_priority() {
+  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
 }
 
 /// One connection, of which so many bytes are read and which has so much time.
@@ -145,7 +145,7 @@ class BoundedQueue final : public httplib::TaskQueue {
 
  private:
   void work() {
-    yield_s();
+    lower_priority();
     for (;;) {
       std::unique_lock<std::mutex> lock(mutex_);
       more_.wait(lock, [this] { return over_ || !tasks_.empty(); });
@@ -227,7 +227,7 @@ class PageServer::Service {
     }
     answer(view);
     thread_ = std::thread([this] {
-      yield_s();
+      lower_priority();
       (void)http_->listen_after_bind();
     });
     while (!http_->is_running()) std::this_thread::sleep_for(1ms);

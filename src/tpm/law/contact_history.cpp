@@ -204,7 +204,7 @@ void ContactHistory::accept(const Point& end, double v_rate, const Slopes& v_rat
   now_ = end;
 }
 
-ContactHistory::Balance ContactHistory::balance_instantaneous() const {
+ContactHistory::Balance ContactHistory::instantaneous_balance() const {
   const Memory& m = law_.memory;
   Balance b{m.instant(), (m.stiffness.array() * w_).sum(), zero_slopes(), zero_slopes()};
   if (!want_slopes_) return b;
@@ -319,7 +319,7 @@ void ContactHistory::jump_to_drive(double drive) {
   free_ = elastic_force(now_.v, now_.u, w_, 0.0) < 0.0;
   if (!free_) return;
   carry_all_slopes();
-  now_ = surface_under(0.0, balance_instantaneous(), false);
+  now_ = surface_under(0.0, instantaneous_balance(), false);
 }
 
 void ContactHistory::move_drive(double from, double to, double h, double time_scale) {

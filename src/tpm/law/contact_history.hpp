@@ -120,7 +120,7 @@ class ContactHistory {
   void move_one(double from, double to, double h, double time_scale);
   void move_smooth(double from, double to, double h, double time_scale, int level);
   void move_piece(double from, double to, double h, double time_scale, bool curved);
-  [[nodiscard]] Balance balance_instantaneous() const;
+  [[nodiscard]] Balance instantaneous_balance() const;
   [[nodiscard]] Balance balance_over_step(double h) const;
   [[nodiscard]] Point surface_under(double load, const Balance& balance, bool loaded) const;
   /// The surface and its branches, between steps.

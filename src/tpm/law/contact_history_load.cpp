@@ -26,7 +26,7 @@ void ContactHistory::jump_to_load(double load) {
   carry_all_slopes();
   // A dashpot does not move instantaneously.
   if (law_.memory.dashpot > 0.0) return;
-  now_ = surface_under(load - law_.offset, balance_instantaneous(), true);
+  now_ = surface_under(load - law_.offset, instantaneous_balance(), true);
   v_rate_ = 0.0;
   v_rate_by_.setZero();
 }

@@ -407,7 +407,7 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
   const Prepared prepared = prepare(parameters, rates ? &*rates : nullptr);
   const LawAtParameters& law = prepared.law;
   const bool displacement = protocol.drive() == Drive::displacement;
-  if (displacement && law.memory.infinite_instantaneous) require_no_jump(protocol, law.contact);
+  if (displacement && law.memory.infinite_under_jump) require_no_jump(protocol, law.contact);
   const bool want_slopes = want == Want::values_and_sensitivity;
   Response response;
   const Stops stops = stops_for(spec_, law, protocol, times_s, want);

@@ -120,7 +120,7 @@ Memory fractional_memory(Fractional law, std::span<const double> values,
   const FastPair* fast = has_tau && !pair ? &ends : nullptr;
 
   Memory m;
-  m.infinite_instantaneous = fast == nullptr;
+  m.infinite_under_jump = fast == nullptr;
   m.rate_per_s =
       with_ends(kNever_per_s, Eigen::Map<const Eigen::VectorXd>(grid.data(), std::ssize(grid)),
                 fast != nullptr ? &end_rates : nullptr);

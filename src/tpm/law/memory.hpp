@@ -18,8 +18,8 @@ inline constexpr double kFractionalTolerance = 1e-10;
 /// with the derivatives of the coefficients by the few parameters that they depend on.
 struct Memory {
   double constant = 0.0;
-  double dashpot = 0.0;                 ///< N s/m
-  bool infinite_instantaneous = false;  ///< a spring-pot answers a jump with an infinite force
+  double dashpot = 0.0;              ///< N s/m
+  bool infinite_under_jump = false;  ///< a spring-pot answers a jump with an infinite force
   Eigen::VectorXd rate_per_s;
   Eigen::VectorXd stiffness;
   std::vector<int> rate_parameter;  ///< parameter that is 1/rate_j, or -1 if the rate is fixed

@@ -233,19 +233,19 @@ void StageBalance::put_viscous(const Eigen::MatrixXd& viscous, TissueState& stat
 void StageBalance::set_weights(double h) {
   weights_ = weights_at(stage_places_, lane_nodes_, h);
   const std::span<const double> times = tissue_.bonds().relaxation_times_s();
-  reference_method_.resize(times.size());
+  error_weights_.resize(times.size());
   const auto count = static_cast<Eigen::Index>(full_error_places_.size());
   for (std::size_t t = 0; t < times.size(); ++t) {
     const double z = h / times[t];
-    Judge& judge = reference_method_[t];
-    judge.of_stages.setZero(count, kLanes);
-    judge.of_start.resize(count);
+    ErrorWeights& weights = error_weights_[t];
+    weights.of_stages.setZero(count, kLanes);
+    weights.of_start.resize(count);
     for (Eigen::Index i = 0; i < count; ++i) {
       const auto place = static_cast<std::size_t>(i);
       Eigen::VectorXd difference = full_error_places_[place].weights(z);
       difference.tail(stages_) -= inner_error_places_[place].weights(z);
-      judge.of_start[i] = difference[0];
-      judge.of_stages.row(i).head(stages_) = difference.tail(stages_).transpose();
+      weights.of_start[i] = difference[0];
+      weights.of_stages.row(i).head(stages_) = difference.tail(stages_).transpose();
     }
   }
 }
@@ -378,15 +378,15 @@ double StageBalance::error() const {
     const auto start = begin_.followed.segment(group.first, group.count);
     const LaneVector aimed = followed * goal;
     const double start_aimed = start * goal;
-    Judge mean;
+    ErrorWeights mean;
     mean.of_stages.setZero(places, kLanes);
     mean.of_start.setZero(places);
     for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
       // Branch by branch, whose later errors do not cancel even where they do now.
-      const Judge& judge = reference_method_[branch.time];
-      sum += branch.share * (judge.of_stages * aimed + judge.of_start * start_aimed).cwiseAbs();
-      mean.of_stages += branch.share * judge.of_stages;
-      mean.of_start += branch.share * judge.of_start;
+      const ErrorWeights& weights = error_weights_[branch.time];
+      sum += branch.share * (weights.of_stages * aimed + weights.of_start * start_aimed).cwiseAbs();
+      mean.of_stages += branch.share * weights.of_stages;
+      mean.of_start += branch.share * weights.of_start;
     }
     Eigen::MatrixXd change = mean.of_stages * followed;
     change.noalias() += mean.of_start * start;

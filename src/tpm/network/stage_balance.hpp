@@ -223,12 +223,12 @@ class StageBalance {
   StepWeights weights_;
   LaneVector imposed_;
   /// What tells the two collocations apart, for one relaxation time.
-  struct Judge {
+  struct ErrorWeights {
     Eigen::Matrix<double, Eigen::Dynamic, kLanes> of_stages;  ///< by (place judged, stage)
     Eigen::VectorXd of_start;
   };
-  std::vector<Judge> reference_method_;  ///< of each relaxation time of the system
-  double imbalance_ = 0.0;               ///< bound of the response's error from forces left, N or m
+  std::vector<ErrorWeights> error_weights_;  ///< of each relaxation time of the system
+  double imbalance_ = 0.0;  ///< bound of the response's error from forces left, N or m
   // The step before, for the prediction of the next.
   bool has_last_ = false;
   double last_h_ = 0.0, last_rate_ = 0.0;

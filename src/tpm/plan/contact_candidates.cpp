@@ -44,8 +44,8 @@ PushedSpheres contact_of(const PlanScene& scene) {
 /// Of the tissue, the contact free: where it is, a ContactModel is told.
 Constraints freedom_around(const PlanScene& scene) {
   Tissue tissue = scene.scene().tissue;
-  std::erase_if(tissue.guides,
-                [&](const Guide& guide) { return contact_of(scene).has(guide.sphere); });
+  const PushedSpheres contact = contact_of(scene);
+  std::erase_if(tissue.guides, [&](const Guide& guide) { return contact.has(guide.sphere); });
   return tissue.constraints();
 }
 

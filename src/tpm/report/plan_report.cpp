@@ -58,7 +58,7 @@ Json relevance_json(const Plan& plan) {
 }
 
 std::string change_text(const PlanChange& c) {
-  constexpr double kApart = 1.1;  // of factors that were looked for in full
+  constexpr double kApart = 1.1;  // above, the search ended before the two factors met
   if (!c.factor) {
     return fmt::format("  {} times {}: nothing breaks\n", shortest(kMostChange), c.change);
   }
@@ -122,7 +122,7 @@ std::string offline_text(const Plan& plan) {
   constexpr double kNoPlanNeeded_s = 1.0;
   const auto offline = run_offline(plan);
   if (!offline || offline->second > kNoPlanNeeded_s) return {};
-  return fmt::format("  once and offline no plan is needed: {}, the network, takes {}\n",
+  return fmt::format("  one offline run needs no plan: the network itself ({}) takes {}\n",
                      offline->first, time_text(offline->second));
 }
 
