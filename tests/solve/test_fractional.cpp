@@ -476,7 +476,7 @@ TEST_CASE("weights of the Mittag-Leffler relaxation are positive where they can 
 
 TEST_CASE("bad windows and elements are named") {
   CHECK_THROWS_WITH(FractionalMemory(0.0, 1.0),
-                    "fractional memory: t_min = 0; expected a time > 0 s");
+                    "exponential sum: t_min = 0; expected a time > 0 s");
   CHECK_THROWS_WITH(FractionalMemory(1.0, 0.5), Catch::Contains("t_max = 0.5"));
   CHECK_THROWS_WITH(FractionalMemory(1.0, INFINITY), Catch::Contains("t_max = inf"));
   CHECK_THROWS_WITH(FractionalMemory(1.0, 2.0, 0.1), Catch::Contains("tolerance = 0.1"));

@@ -353,7 +353,7 @@ TEST_CASE("Indentations answer Young's modulus with its interval", "[rheometer]"
       CHECK(m.estimate < *m.upper);
       CHECK(std::abs(m.estimate - truth[i]) < 4.0 * *m.standard_error);
     }
-    CHECK(all.moduli.back().name == "E_at_once");
+    CHECK(all.moduli.back().name == "E_instantaneous");
     CHECK_THAT(to_terminal_text(all), Contains("Poisson's ratio 0.45 (given)") && Contains("kPa"));
     CHECK(all.warnings.empty());
   }

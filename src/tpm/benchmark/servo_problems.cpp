@@ -145,9 +145,9 @@ class ServoCase {
               std::move(fine)};
     }
     constexpr double kTolerance = 1e-8;
-    ContactReference judge;
-    judge.force_N = motion.direction * line_reference(touched, motion, kTolerance).transpose();
-    return {std::move(judge), std::move(fine)};
+    ContactReference first;
+    first.force_N = motion.direction * line_reference(touched, motion, kTolerance).transpose();
+    return {std::move(first), std::move(fine)};
   }
 
   void find_reference() {
@@ -190,15 +190,15 @@ class ServoCase {
     const auto vector = [](const std::vector<double>& all) {
       return Eigen::VectorXd::Map(all.data(), static_cast<Eigen::Index>(all.size())).eval();
     };
-    BenchmarkAnswer judge{
+    BenchmarkAnswer first{
         "rk4",
         "Runge-Kutta of order 4 for the viscous elongations, forces balanced at each "
         "stage to rounding",
         vector(numbers[0])};
-    if (line) judge = {"collocation", "collocation (QuasiStatic) at 1e-8", judge.response};
+    if (line) first = {"collocation", "collocation (QuasiStatic) at 1e-8", first.response};
     constexpr double kWorstFloor = 2e-4;
     truth_ = checked_reference(
-        std::move(judge),
+        std::move(first),
         {"exponential", "steps of linear elongation and steps of half their length, extrapolated",
          vector(numbers[1])},
         false, kWorstFloor, "contact models", components());

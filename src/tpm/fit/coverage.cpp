@@ -124,7 +124,7 @@ std::string to_terminal_text(const CoverageResult& result) {
                                  result.sets, result.seed, result.failed);
   for (const ParameterCoverage& p : result.parameters) {
     text += fmt::format(
-        "{:<12} {:.2f} % of the {:.4g} % intervals hold the truth (exact binomial "
+        "{:<12} {:.2f} % of the {:.4g} % intervals hold the true value (exact binomial "
         "p = {}; {} intervals open)\n",
         p.name, 100.0 * p.covered / result.sets, 100.0 * result.level, significant(p.p_value, 2),
         p.one_sided);

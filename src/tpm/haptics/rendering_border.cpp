@@ -36,11 +36,11 @@ double damping_at(const RenderedContact& contact, int cycles) {
   const int settling =
       static_cast<int>(std::ceil(25.0 * tau / contact.period_s)) + contact.delay_periods + 2;
   std::vector<double> sent(static_cast<std::size_t>(contact.delay_periods) + 1, 0.0);
-  double given_J = 0.0, moved2 = 0.0, held_N = 0.0, before_m = 0.0;
+  double delivered_J = 0.0, moved2 = 0.0, held_N = 0.0, before_m = 0.0;
   for (int i = 0; i <= settling + kSamples; ++i) {
     const double at = kAmplitude_m * std::cos(angle * i);
     if (i > settling) {
-      given_J += held_N * (at - before_m);
+      delivered_J += held_N * (at - before_m);
       moved2 += (at - before_m) * (at - before_m);
     }
     const std::size_t slot = static_cast<std::size_t>(i) % sent.size();
@@ -49,7 +49,7 @@ double damping_at(const RenderedContact& contact, int cycles) {
     held_N = sent[(static_cast<std::size_t>(i) + 1) % sent.size()];
     before_m = at;
   }
-  return given_J * contact.period_s / moved2;
+  return delivered_J * contact.period_s / moved2;
 }
 
 /// Force over displacement at 1/z.

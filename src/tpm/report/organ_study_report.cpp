@@ -136,10 +136,10 @@ double deepest_m(const OrganStudy& study, const StudyCurves& set) {
 
 void add_readings(Document& document, const OrganStudy& study, const StudyCurves& set) {
   for (const auto& [kind, caption] :
-       {std::pair{Kind::static_, "Static force, everything relaxed."},
+       {std::pair{Kind::static_, "Static force, at equilibrium."},
         std::pair{Kind::ramp_hold,
                   "Force of ramp and hold, at the end of the ramp and of the hold."},
-        std::pair{Kind::creep, "Depth of creep, at once and at the end."}}) {
+        std::pair{Kind::creep, "Depth of creep, instantaneous and at the end."}}) {
     Table table = readings_table(study, set, kind, caption);
     if (!table.rows.empty()) document.table(std::move(table));
   }

@@ -171,7 +171,7 @@ Json convergence_json(const std::vector<SweepConvergence>& all) {
     list.push_back({{"variable", c.variable},
                     {"unit", c.unit},
                     {"axis", c.axis},
-                    {"held", std::move(held)},
+                    {"fixed", std::move(held)},
                     {"size_is", c.size_text},
                     {"size", c.size},
                     {"value", c.value},

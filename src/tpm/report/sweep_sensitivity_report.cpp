@@ -100,7 +100,7 @@ Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
                     {"points", s.design.points},
                     {"replicates", s.design.replicates},
                     {"points_left_out", s.indices.left_out},
-                    {"held", held_json(s.held)},
+                    {"fixed", held_json(s.held)},
                     {"inputs", std::move(inputs)}});
   }
   return Json{{"sensitivity", std::move(list)}};

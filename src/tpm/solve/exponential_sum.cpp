@@ -25,7 +25,7 @@ struct Sloped {
 };
 
 [[noreturn]] void refuse(std::string_view what, double value, std::string_view expected) {
-  throw bad_input("fractional memory", fmt::format("{} = {}", what, shortest(value)), expected);
+  throw bad_input("exponential sum", fmt::format("{} = {}", what, shortest(value)), expected);
 }
 
 void check_alpha(double alpha) {

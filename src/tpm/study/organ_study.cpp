@@ -73,7 +73,7 @@ void answer_creep(const Model& model, const StudyCondition& c, const TpmVector& 
   curve.x.push_back(0.0);
   add_hold(curve.x, 0.0, c.duration_s);
   curve.x.back() = c.duration_s;
-  answer_in_time(model, creep(c.load_N, c.duration_s), parameters, "at once", 0, curve);
+  answer_in_time(model, creep(c.load_N, c.duration_s), parameters, "instantaneous", 0, curve);
 }
 
 StudyCurve answer(const Model& model, const StudyCondition& condition, const TpmVector& values) {

@@ -59,7 +59,7 @@ struct OrganStudyConfig {
 
 /// The response at one place of a curve.
 struct StudyReading {
-  std::string label;      ///< "peak", "end", "at once", or the depth of a static force
+  std::string label;      ///< "peak", "end", "instantaneous", or the depth of a static force
   double x = 0.0;         ///< depth, m (static), or time, s
   double response = 0.0;  ///< N, or m (creep)
   /// Over the first tissue's response at the same material, less 1; none for that tissue itself,

@@ -274,7 +274,7 @@ Json to_json(const RecoveryResult& r) {
   const LawModel model(r.law);
   for (const ParameterCoverage& p : r.parameters) {
     list.push_back({{"name", p.name},
-                    {"truth_SI", r.truth[model.index(p.name)]},
+                    {"true_SI", r.truth[model.index(p.name)]},
                     {"covered", p.covered},
                     {"binomial_p_value", rounded(p.p_value, 6)}});
   }
@@ -285,7 +285,7 @@ Json to_json(const RecoveryResult& r) {
 std::string to_terminal_text(std::span<const RecoveryResult> results) {
   std::string text = fmt::format("{:<20} {:>6} {:>6} {:>8} {:>6} {:>6} {:>6}  {}\n", "law",
                                  "margin", "trials", "returned", "equiv.", "larger", "failed",
-                                 "95 % intervals that hold the truth, % | returned instead");
+                                 "95 % intervals that hold the true value, % | returned instead");
   for (const RecoveryResult& r : results) {
     for (const ChoiceCount& c : r.choices) {
       const bool first = &c == r.choices.data();
