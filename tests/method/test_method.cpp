@@ -164,7 +164,7 @@ TEST_CASE("method: what orders fall to where the step is far above the relaxatio
     CHECK(judged.error(StepRule::exponential, 0.03) < 1e-7);
     CHECK(judged.error(StepRule::semi_implicit_euler, 0.03) > 1e-2);
   }
-  SECTION("a depth at once: the memory has to catch up within a step") {
+  SECTION("a depth step: the viscous state has to catch up within a step") {
     const Judged judged = checked_element("stiff step", p, step_and_hold(0.004, 1.0), tenths(1.0));
     for (const StepRule rule : {StepRule::implicit_midpoint, StepRule::newmark}) {
       CHECK_THAT(observed_order(judged, rule, 0.125), WithinAbs(0.0, 0.1));
@@ -183,7 +183,7 @@ TEST_CASE("method: what orders fall to where the step is far above the relaxatio
   }
 }
 
-TEST_CASE("method: stability limits of memory alone are those of theory") {
+TEST_CASE("method: stability limits of the viscous state alone are those of theory") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const auto limit = [&](StepRule rule) {
     return bisected_limit(0.01, 10.0, 2e-3,

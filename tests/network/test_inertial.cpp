@@ -177,7 +177,8 @@ TEST_CASE("the lowest mode of a block agrees with the dense eigenvalue problem")
       lowest_mode(block.bonds, block.network.organ.position, block.constraints, mass);
   const Eigen::Index n = block.network.organ.position.cols();
   Eigen::MatrixXd stiffness(3 * n, 3 * n);
-  const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(block.bonds.size())), 0.0};
+  const ViscousState none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(block.bonds.size())),
+                          0.0};
   for (Eigen::Index i = 0; i < 3 * n; ++i) {
     Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, n);
     unit.reshaped()[i] = 1.0;

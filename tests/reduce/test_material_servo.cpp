@@ -300,7 +300,7 @@ TEST_CASE("the condensed model errs with several branches as it does with one",
     CondensedContact model = condensed(bonds);
     REQUIRE(model.branches().size() == times.size());
     const double worst = worst_error(model, reference(bonds));
-    CHECK(model.kept_memories() == 0);
+    CHECK(model.kept_viscous_states() == 0);
     return worst;
   };
   for (const Case& c : std::vector<Case>{
@@ -345,9 +345,9 @@ TEST_CASE("a condensed contact of several branches creates no energy and allocat
   CHECK(account.created_J < 1e-13 * account.highest_J);
   CHECK(account.least_J > -1e-13 * account.highest_J);
   CHECK(account.supplied_J > 0.05 * account.highest_J);
-  CHECK(contact.kept_memories() < 200);
+  CHECK(contact.kept_viscous_states() < 200);
   contact.reset();
-  CHECK(contact.memory().spread_J == 0.0);
+  CHECK(contact.viscous_state().spread_J == 0.0);
   const tpm::testing::HeapWatch heap;
   for (int i = 1; i <= 300; ++i) (void)contact.step(0.5 * depth_at(i) * scene.probe.direction);
   const long calls = heap.calls();
@@ -363,7 +363,7 @@ TEST_CASE("the condensed model takes a stiffening potential and factors of place
     const BondSystem bonds(scene.network, tumour ? with_tumour(m) : MaterialField(stiffening(m)));
     CondensedContact model = condensed(bonds);
     CHECK(worst_error(model, reference(bonds)) < 1e-2);
-    CHECK(model.kept_memories() == 0);
+    CHECK(model.kept_viscous_states() == 0);
   }
 }
 

@@ -47,7 +47,7 @@ std::vector<int> counted(std::span<const std::size_t> spheres, std::size_t size)
   return is_in;
 }
 
-BondMemory at_rest(const BondSystem& bonds, double relaxation_factor) {
+ViscousState at_rest(const BondSystem& bonds, double relaxation_factor) {
   return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxation_factor};
 }
 
@@ -57,11 +57,11 @@ class LinearBlock {
   LinearBlock(const Network& network, const BondSystem& bonds, double relaxation_factor,
               Constraints constraints)
       : rest_(network.organ.position),
-        memory_(at_rest(bonds, relaxation_factor)),
+        viscous_state_(at_rest(bonds, relaxation_factor)),
         bonds_(bonds),
         constraints_(std::move(constraints)),
         equilibrium_(bonds_, constraints_) {
-    if (!equilibrium_.factorise(rest_, memory_) || !equilibrium_.is_stable()) {
+    if (!equilibrium_.factorise(rest_, viscous_state_) || !equilibrium_.is_stable()) {
       throw Error(ExitCode::numerical, "patch test", "the block has loose spheres");
     }
   }
@@ -75,13 +75,13 @@ class LinearBlock {
   /// Force of the bonds on each sphere, N per unit of the displacement.
   [[nodiscard]] Eigen::Matrix3Xd forces(const Eigen::Matrix3Xd& displacement) const {
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-    bonds_.add_stiffness_times(rest_, memory_, displacement, force);
+    bonds_.add_stiffness_times(rest_, viscous_state_, displacement, force);
     return -force;
   }
 
  private:
   const Positions& rest_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
   const BondSystem& bonds_;
   Constraints constraints_;
   Equilibrium equilibrium_;

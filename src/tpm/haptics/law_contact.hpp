@@ -54,7 +54,7 @@ class LawContact final : public ContactModel {
   }
   /// Stiffness of each branch, N/m.
   [[nodiscard]] const Eigen::VectorXd& branch_stiffness_N_per_m() const noexcept {
-    return law_.memory.stiffness;
+    return law_.relaxation.stiffness;
   }
   /// Goes on from another state: the surface at a depth, all branches relaxed to one kernel
   /// displacement. Neither allocates nor throws.

@@ -199,7 +199,7 @@ double loop_spectral_radius(const RenderedContact& contact, const PlantSettings&
   const double relaxing = scale * p.relaxing_Pa();
   const double q = contact.period_s / contact.relaxation_time_s;
   const RelaxationWeights w = relaxation_weights(q);
-  // The model steps first: it sees x, remembers w and x before.
+  // The model steps first: it sees x, its state is w and x before.
   Eigen::RowVectorXd followed = Eigen::RowVectorXd::Zero(size);
   Eigen::RowVectorXd force = Eigen::RowVectorXd::Zero(size);
   force[0] = -relaxed;

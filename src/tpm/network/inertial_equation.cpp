@@ -353,10 +353,11 @@ bool InertialEquation::factorise(double time_s, const ConstVector& state, double
   find_pressing();
   factorised_pressing_ = pressing_;
   matrix_.set_zero();
-  bonds.add_stiffness(now.position,
-                      bonds.memory_at(now.mean, followed_, relaxation_factor_over(bonds, gamma),
-                                      factorised_pressing_),
-                      matrix_);
+  bonds.add_stiffness(
+      now.position,
+      bonds.viscous_state_at(now.mean, followed_, relaxation_factor_over(bonds, gamma),
+                             factorised_pressing_),
+      matrix_);
   for (Eigen::Matrix3d& block : matrix_.diagonal) block *= gamma * gamma;
   for (Eigen::Matrix3d& block : matrix_.below) block *= gamma * gamma;
   const bool bonds_damped = inertia_.dashpot_N_s_m.size() > 0;

@@ -100,8 +100,8 @@ void LargeEquilibrium::prepare() {
   ++work_.preconditioners;
 }
 
-void LargeEquilibrium::assemble(const Positions& position, const BondMemory& memory) {
-  stiffness_.assemble(position, memory);
+void LargeEquilibrium::assemble(const Positions& position, const ViscousState& viscous_state) {
+  stiffness_.assemble(position, viscous_state);
   prepare();
 }
 
@@ -129,23 +129,23 @@ TangentAnswer LargeEquilibrium::probe() {
   return answer_of(outcome.end);
 }
 
-TangentAnswer LargeEquilibrium::solve(const Positions& position, const BondMemory& memory,
+TangentAnswer LargeEquilibrium::solve(const Positions& position, const ViscousState& viscous_state,
                                       Eigen::Matrix3Xd& vectors, double tolerance) {
-  assemble(position, memory);
+  assemble(position, viscous_state);
   return displace(vectors, tolerance);
 }
 
-EquilibriumSearch LargeEquilibrium::find(Positions& position, const BondMemory& memory,
+EquilibriumSearch LargeEquilibrium::find(Positions& position, const ViscousState& viscous_state,
                                          const Eigen::Matrix3Xd& load, double tolerance_N) {
   Forcing forcing(tolerance_N);
-  const auto step = [&](const Positions& at, const BondMemory& with, Eigen::Matrix3Xd& forces) {
+  const auto step = [&](const Positions& at, const ViscousState& with, Eigen::Matrix3Xd& forces) {
     const double residual = forces.colwise().norm().maxCoeff();
     return solve(at, with, forces, forcing.next(residual));
   };
   EquilibriumSearch search =
-      newton_balance(bonds_, constraints_, position, memory, load, tolerance_N, step);
+      newton_balance(bonds_, constraints_, position, viscous_state, load, tolerance_N, step);
   if (!search.converged || !search.stable) return search;
-  assemble(position, memory);
+  assemble(position, viscous_state);
   const TangentAnswer answer = probe();
   search.stable = answer != TangentAnswer::not_definite;
   search.converged = answer != TangentAnswer::failed;  // an equilibrium nobody judged

@@ -50,7 +50,7 @@ class Bench {
         constraints_(network_.organ.size()),
         equilibrium_(bonds_, constraints_),
         factor_(equilibrium_.pattern()),
-        memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0, {}} {
+        viscous_state_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0, {}} {
     const Eigen::RowVectorXd height = network_.organ.position.row(2);
     const double middle = height.mean();
     for (std::size_t i = 0; i < constraints_.size(); ++i) {
@@ -60,32 +60,32 @@ class Bench {
 
   [[nodiscard]] double bond_force_s() {
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest().cols());
-    return time_of([&] { bonds_.add_forces(rest(), memory_, force); }) / bonds();
+    return time_of([&] { bonds_.add_forces(rest(), viscous_state_, force); }) / bonds();
   }
 
   [[nodiscard]] double bond_stiffness_s() {
     BlockMatrix matrix(bonds_.pattern());
     return time_of([&] {
              matrix.set_zero();
-             bonds_.add_stiffness(rest(), memory_, matrix);
+             bonds_.add_stiffness(rest(), viscous_state_, matrix);
            }) /
            bonds();
   }
 
   [[nodiscard]] double factor_product_s(double stiffness_s) {
-    const double whole = time_of([&] { (void)equilibrium_.factorise(rest(), memory_); });
+    const double whole = time_of([&] { (void)equilibrium_.factorise(rest(), viscous_state_); });
     const auto products = static_cast<double>(equilibrium_.pattern().factor_products());
     return std::max(whole - stiffness_s * bonds(), 0.1 * whole) / products;
   }
 
   [[nodiscard]] double solve_block_s() {
-    (void)equilibrium_.factorise(rest(), memory_);
+    (void)equilibrium_.factorise(rest(), viscous_state_);
     Eigen::Matrix3Xd x = Eigen::Matrix3Xd::Ones(3, rest().cols());
     return time_of([&] { equilibrium_.factor()->solve(x); }) / solved_blocks();
   }
 
   [[nodiscard]] double lane_block_s() {
-    (void)equilibrium_.factorise(rest(), memory_);
+    (void)equilibrium_.factorise(rest(), viscous_state_);
     factor_.copy(*equilibrium_.factor());
     LaneMatrix x = LaneMatrix::Ones(kLanes, 3 * rest().cols());
     return time_of([&] { factor_.solve(x); }) / solved_blocks();
@@ -189,7 +189,7 @@ class Bench {
   Constraints constraints_;
   Equilibrium equilibrium_;
   LaneFactor factor_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
 };
 
 double panel_product_s() {

@@ -159,18 +159,18 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
   std::vector<double> stiffness_of_theta;
   for (int i = 0; i < kThetas; ++i) {
     const double theta = 0.5 * (1.0 - std::cos(std::numbers::pi * i / (kThetas - 1)));
-    const BondMemory memory{rest.mean, theta, rest.closed};
-    if (!tissue.equilibrium().factorise(rest.position, memory) ||
+    const ViscousState viscous_state{rest.mean, theta, rest.closed};
+    if (!tissue.equilibrium().factorise(rest.position, viscous_state) ||
         !tissue.equilibrium().is_stable()) {
       throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");
     }
-    const DrivenTissue::UnitField unit = tissue.unit_field(rest, memory);
+    const DrivenTissue::UnitField unit = tissue.unit_field(rest, viscous_state);
     double per_depth = 1.0;
     double stiffness =
         1.0 / unit.stiffness;  // under a load the work of the unit field is the compliance
     if (tissue.depth_driven()) {
       Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.position.cols());
-      driven.bonds.add_stiffness_times(rest.position, memory, unit.displacement, force);
+      driven.bonds.add_stiffness_times(rest.position, viscous_state, unit.displacement, force);
       stiffness = -tissue.response(rest.position, force);
     } else {
       per_depth = stiffness;

@@ -55,7 +55,7 @@ class ScalarModel {
 
  private:
   struct Weights {
-    double memory = 0.0, start = 0.0, end = 0.0;
+    double viscous = 0.0, start = 0.0, end = 0.0;
   };
   [[nodiscard]] double force_at(double depth_m, const std::vector<Weights>& weights) const;
   [[nodiscard]] double depth_under(double load_N, const std::vector<Weights>& weights) const;

@@ -115,12 +115,12 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
 
   CondensedSampler sampler(bonds, rest, held, contact, kStride * options.depth_m);
   std::vector<CondensedBranch> branches = condensed_branches(bonds);
-  SpreadPlaces memories(fit->frame, options, {2, 3, 5});
+  SpreadPlaces viscous_places(fit->frame, options, {2, 3, 5});
   SpreadPlaces places(fit->frame, options, {7, 11, 13});
   std::vector<CondensedMetric> metrics;
   std::vector<CondensedSample> samples;
   for (int i = 0; i < kMemories; ++i) {
-    const Eigen::Vector3d w = i == 0 ? Eigen::Vector3d::Zero() : memories.next();
+    const Eigen::Vector3d w = i == 0 ? Eigen::Vector3d::Zero() : viscous_places.next();
     const CondensedMetric metric = sampler.relax_at(w);
     const CondensedSample relaxed = sampler.sample_at(w);
     if (i == 0) {

@@ -93,8 +93,9 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   stride_ = 8 * ((stiffness_.free().size() + 1) / 2);
   change_.assign(stride_, 0.0F);
   const auto relaxed = static_cast<double>(weights_.of_end);
-  const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxed};
-  if (!stiffness_.factorise(bonds, constraints, rest, memory, options.portable)) {
+  const ViscousState viscous_state{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
+                                   relaxed};
+  if (!stiffness_.factorise(bonds, constraints, rest, viscous_state, options.portable)) {
     throw Error(ExitCode::numerical, "tissue", "it is not stiff at rest");
   }
   add_surface();
@@ -154,11 +155,11 @@ void SurfaceNetwork::find_stiffness(const BondSystem& bonds, const Constraints& 
   const Eigen::Vector3d normal = nearest->rest_m.normalized();
   Equilibrium equilibrium(bonds, constraints);
   for (const double relaxation_factor : {0.0, 1.0}) {
-    const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
-                            relaxation_factor};
+    const ViscousState viscous_state{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
+                                     relaxation_factor};
     Eigen::Matrix3Xd push = Eigen::Matrix3Xd::Zero(3, rest_.cols());
     push.col(static_cast<Eigen::Index>(sphere)) = normal;
-    if (!equilibrium.factorise(rest_, memory)) {
+    if (!equilibrium.factorise(rest_, viscous_state)) {
       throw Error(ExitCode::numerical, "tissue", "it is not stiff at rest");
     }
     equilibrium.displace(push);

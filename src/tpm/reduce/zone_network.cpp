@@ -54,8 +54,8 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest,
   require_servo_material(bonds, "the zone");
   PushedContact tissue(bonds, rest, constraints, contact);
   weights_ = servo_weights(bonds, options.period_s);
-  instantaneous_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
-  relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
+  instantaneous_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 0.0)).stiffness;
+  relaxed_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 1.0)).stiffness;
   choose_zone(tissue);
   const Parts parts = build(tissue);
   compare(tissue, constraints, parts);
