@@ -200,13 +200,13 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   add_format_option(*showing, session);
   showing->callback(
       [choice, &session] { session.run = [choice, &session] { return show(*choice, session); }; });
-  CLI::App* judging = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
-  judging->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  judging->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
-  judging->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
-  judging->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
-  add_format_option(*judging, session);
-  judging->callback([choice, &session] {
+  CLI::App* command = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
+  command->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  command->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
+  command->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
+  command->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
+  add_format_option(*command, session);
+  command->callback([choice, &session] {
     session.run = [choice, &session] { return sensitivity(*choice, session); };
   });
   CLI::App* refining = sweep.add_subcommand(

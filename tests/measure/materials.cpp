@@ -184,8 +184,8 @@ void print_servo() {
         QuasiStatic(bonds, rest, guided, scene.probe, {.tolerance = 1e-7})
             .run(ramp_and_hold(kDepth_m, kRamp * kPeriod_s, kSteps * kPeriod_s), times);
     const double peak = run.response.maxCoeff();
-    const auto judge = [&](const char* name,
-                           const std::function<std::unique_ptr<ContactModel>()>& make) {
+    const auto compare = [&](const char* name,
+                             const std::function<std::unique_ptr<ContactModel>()>& make) {
       std::unique_ptr<ContactModel> model;
       try {
         model = make();
@@ -207,17 +207,17 @@ void print_servo() {
       fmt::print("{:<30} {:<10} {:>12.2e} {:>12.2e} {:>14}\n", named.name, name, worst / peak,
                  claim / peak, fmt::format("{} of {}", over, kSteps));
     };
-    judge("full", [&] {
+    compare("full", [&] {
       return std::make_unique<ServoNetwork>(bonds, rest, scene.constraints, scene.probe.sphere,
                                             scene.probe.direction,
                                             ServoNetworkOptions{.period_s = kPeriod_s});
     });
-    judge("zone 2", [&] {
+    compare("zone 2", [&] {
       return std::make_unique<ZoneNetwork>(bonds, rest, scene.constraints, scene.probe.sphere,
                                            scene.probe.direction,
                                            ZoneNetworkOptions{.period_s = kPeriod_s, .rings = 2});
     });
-    judge("condensed", [&] {
+    compare("condensed", [&] {
       return std::make_unique<CondensedContact>(build_condensed(
           bonds, rest, scene.constraints, scene.probe.sphere, scene.probe.direction));
     });

@@ -79,13 +79,13 @@ Eigen::VectorXd reference(const BondSystem& bonds) {
       .response;
 }
 
-struct Judged {
+struct ModelErrors {
   double error, claim;  ///< the largest of a run, over the peak
 };
 
-Judged judged(ContactModel& model, const Eigen::VectorXd& expected) {
+ModelErrors errors_of(ContactModel& model, const Eigen::VectorXd& expected) {
   const Eigen::Vector3d& into = small_liver().probe.direction;
-  Judged found{0.0, 0.0};
+  ModelErrors found{0.0, 0.0};
   const double peak = expected.maxCoeff();
   for (int i = 1; i <= kSteps; ++i) {
     const ContactAnswer answer = model.step(depth_at(i) * into);
@@ -98,7 +98,7 @@ Judged judged(ContactModel& model, const Eigen::VectorXd& expected) {
 
 /// The model's largest error over the peak; it may not be above the largest that the model claims.
 double worst_error(ContactModel& model, const Eigen::VectorXd& expected) {
-  const Judged found = judged(model, expected);
+  const ModelErrors found = errors_of(model, expected);
   CHECK(found.error <= found.claim);
   return found.error;
 }
@@ -232,7 +232,7 @@ TEST_CASE("the claim of a zone follows its error, whatever the material", "[serv
     const BondSystem bonds(scene.network, field);
     ZoneNetwork zone(bonds, scene.network.organ.position, scene.constraints, scene.probe.sphere,
                      scene.probe.direction, {.period_s = kPeriod_s, .rings = 1});
-    const Judged found = judged(zone, reference(bonds));
+    const ModelErrors found = errors_of(zone, reference(bonds));
     CAPTURE(name, found.error, found.claim);
     CHECK(found.error > 5e-4);
     CHECK(found.claim >= found.error);

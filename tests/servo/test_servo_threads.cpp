@@ -292,7 +292,7 @@ TEST_CASE("A network in a thread of its own follows the loop, however late it is
   }
 }
 
-TEST_CASE("The jitter check counts and judges") {
+TEST_CASE("The jitter check counts and reports") {
   DeviceChoice device;
   HilSession session;
   session.servo.period_s = 2e-3;

@@ -1,5 +1,6 @@
 #pragma once
-// The full network along any path of one contact sphere, by small steps: a judge of contact models.
+// The full network along any path of one contact sphere, by small steps: a reference for contact
+// models.
 #include <stdexcept>
 
 #include "tpm/network/equilibrium.hpp"

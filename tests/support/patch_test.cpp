@@ -203,21 +203,21 @@ PatchTest affine_patch_test(const Network& block, const BondSystem& bonds, doubl
 
 PlateTest plate_test(const Network& block, const BondSystem& bonds, double relaxation_factor) {
   const Eigen::AlignedBox3d box = box_of(block.organ);
-  const double grain = 1e-6 * block.organ.spacing;
+  const double tolerance_m = 1e-6 * block.organ.spacing;
   Constraints constraints(block.organ.size());
   std::vector<Eigen::Index> top;
   Eigen::Matrix3Xd displacement = Eigen::Matrix3Xd::Zero(3, block.organ.position.cols());
   for (std::size_t i = 0; i < block.organ.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);
     const Eigen::Vector3d p = block.organ.position.col(column);
-    const bool is_top = p.z() > box.max().z() - grain;
-    const bool is_bottom = p.z() < box.min().z() + grain;
+    const bool is_top = p.z() > box.max().z() - tolerance_m;
+    const bool is_bottom = p.z() < box.min().z() + tolerance_m;
     if (is_top || is_bottom) constraints.impose(i, Eigen::Vector3d::UnitZ());
     // The rigid motions that smooth plates leave: one corner stands, another may only slide along
     // x.
-    if (is_bottom && p.y() < box.min().y() + grain) {
-      if (p.x() < box.min().x() + grain) constraints.hold(i);
-      if (p.x() > box.max().x() - grain) constraints.impose(i, Eigen::Vector3d::UnitY());
+    if (is_bottom && p.y() < box.min().y() + tolerance_m) {
+      if (p.x() < box.min().x() + tolerance_m) constraints.hold(i);
+      if (p.x() > box.max().x() - tolerance_m) constraints.impose(i, Eigen::Vector3d::UnitY());
     }
     if (!is_top) continue;
     displacement(2, column) = -box.sizes().z();  // a compression of 1

@@ -469,14 +469,14 @@ TEST_CASE("a sweep over a star as a network is the sweep over it in closed form"
              {"parameter": "depth", "values": ["2 mm", "8 mm"]}],
     "outputs": ["peak_force", "end_force", {"force_at": "7 s", "name": "at7"}]})");
   const auto found = all_blocks(star);
-  const auto truth = all_blocks(closed);
+  const auto expected = all_blocks(closed);
   for (std::size_t b = 0; b < found.size(); ++b) {
     for (std::size_t i = 0; i < found[b].cells(); ++i) {
       REQUIRE(found[b].status[i] == CellStatus::done);
       CHECK(found[b].error_estimate[i] <= 1e-7);
       CHECK(found[b].counts[0][i] > 0);
       for (std::size_t v = 0; v < 3; ++v) {
-        CHECK_THAT(found[b].values[v][i], WithinRel(truth[b].values[v][i], 1e-6));
+        CHECK_THAT(found[b].values[v][i], WithinRel(expected[b].values[v][i], 1e-6));
       }
     }
   }
@@ -544,10 +544,11 @@ TEST_CASE("steps of the integrator: the order of two Radau nodes is three") {
   CAPTURE(c.value, c.threes.back().order);
   CHECK(std::abs(c.threes.back().order - 3.0) < 0.2);
   // Without the block the steps follow the tolerance.
-  const double truth =
+  const double expected =
       only_block(parsed(scene + R"("axes": [{"parameter": "/tolerance", "values": [1e-12]}]})"))
           .values[0][0];
-  CHECK(std::abs(c.threes.back().extrapolated - truth) <= c.threes.back().index + 1e-10 * truth);
+  CHECK(std::abs(c.threes.back().extrapolated - expected) <=
+        c.threes.back().index + 1e-10 * expected);
 }
 
 TEST_CASE("the best cell of a sweep is where a fit goes on") {

@@ -178,7 +178,7 @@ Minimum minimise_by_surrogate(const ResidualFunction& function, const ResidualFu
   minimum.deviance = here.cost() - function.offset();
   minimum.usable = true;
   minimum.message =
-      minimum.converged ? "corrected scout: nothing left to gain" : "corrected scout: out of steps";
+      minimum.converged ? "corrected surrogate: nothing left to gain" : "corrected surrogate: out of steps";
   return minimum;
 }
 

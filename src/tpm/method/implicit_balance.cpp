@@ -133,7 +133,7 @@ MethodEnd ImplicitBalance::find(Positions& position, const ViscousState& viscous
       step_ = force_;
       displace(step_, kept.factor);
       const double slope = -force_.cwiseProduct(step_).sum();
-      // There the potential has no digits left to judge by.
+      // There the potential has no digits left to compare.
       const bool near = step_.colwise().norm().maxCoeff() <= kNear * depth_m;
       double length = 1.0;
       for (int halvings = 0; !moved; ++halvings, length *= 0.5) {

@@ -195,7 +195,7 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
     const Eigen::ArrayXd ratio = h / relaxation_times_s().array();
     const Vector relaxation_factor = ratio / (1.0 + ratio);
     const Vector offset = state.array() / (1.0 + ratio);
-    if (give_.size() == 0) set_give();
+    if (compliance_.size() == 0) set_compliance();
     set_viscous_state(offset, relaxation_factor);
     tissue_.impose(position_, imposed(t));
     tissue_.load(imposed(t), load_);
@@ -204,8 +204,8 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
       balance_forces(bonds_, position_, viscous_state_, load_, force_);
       tissue_.constraints().project(force_);
       projection_.store_tensions(position_, viscous_state_);
-      position_ += force_ * give_.asDiagonal();
-      sweep(position_, give_);
+      position_ += force_ * compliance_.asDiagonal();
+      sweep(position_, compliance_);
     }
     follow_viscous_state(offset, relaxation_factor, imposed(t), state);
     return MethodEnd::completed;
@@ -287,14 +287,14 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
   }
 
  private:
-  void set_give() {
+  void set_compliance() {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(columns());
     for (std::size_t i = 0; i < bonds_.size(); ++i) {
       const double k = bonds_.stiffness()[static_cast<Eigen::Index>(i)];
       sum[bonds_.end_a()[i]] += k;
       sum[bonds_.end_b()[i]] += k;
     }
-    give_ = (sum.array() > 0.0).select(sum.cwiseInverse(), 0.0);
+    compliance_ = (sum.array() > 0.0).select(sum.cwiseInverse(), 0.0);
   }
 
   MethodEnd balance_at(double imposed, const ConstVector& y) {
@@ -338,7 +338,7 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
   };
   Known known_;  ///< what position_ belongs to
   Vector elongation_;
-  Eigen::VectorXd give_;  ///< of XPBD, m/N
+  Eigen::VectorXd compliance_;  ///< of XPBD, m/N
   double per_y_ = 0.0;
   Positions put_, factorised_at_;
   Eigen::VectorXd kernel_slope_;  ///< V'(l) there

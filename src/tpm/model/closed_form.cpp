@@ -120,13 +120,13 @@ Response force_driven_frozen(const Protocol& protocol, std::span<const double> t
             load / instantaneous + (1.0 / finally - 1.0 / instantaneous) * branch.w;
         response.value[row] = value / scale;
         if (want == Want::values) return;
-        const double d_at_once = -(load - branch.w) / (instantaneous * instantaneous);
+        const double d_instantaneous = -(load - branch.w) / (instantaneous * instantaneous);
         const double d_finally = -branch.w / (finally * finally);
         const double d_log_T = (1.0 / finally - 1.0 / instantaneous) * branch.d_w;
         auto s = response.sensitivity.row(row);
         s[kE1] =
             (d_finally * d.relaxed_E1 + d_log_T * (d.log_tau_E - d.relaxed_E1 / finally)) / scale;
-        s[kE2] = (d_at_once + d_finally * d.relaxed_E2 +
+        s[kE2] = (d_instantaneous + d_finally * d.relaxed_E2 +
                   d_log_T * (d.log_tau_E + 1.0 / instantaneous - d.relaxed_E2 / finally)) /
                  scale;
         s[kEta1] = d_log_T * d.log_tau_eta1 / scale;

@@ -307,8 +307,8 @@ void BondSystem::tensions(const Positions& position, const ViscousState& viscous
 void BondSystem::add_forces(const Positions& position, const ViscousState& viscous_state,
                             Eigen::Matrix3Xd& force) const {
   for (std::size_t i = 0; i < size(); ++i) {
-    const Line lies = line(i, position);
-    const Eigen::Vector3d f = pull(i, lies.elongation, viscous_state).force * lies.direction;
+    const Line placed = line(i, position);
+    const Eigen::Vector3d f = pull(i, placed.elongation, viscous_state).force * placed.direction;
     force.col(end_a_[i]) += f;
     force.col(end_b_[i]) -= f;
   }
@@ -316,10 +316,10 @@ void BondSystem::add_forces(const Positions& position, const ViscousState& visco
 
 Eigen::Matrix3d BondSystem::stiffness_block(std::size_t bond, const Positions& position,
                                             const ViscousState& viscous_state) const {
-  const Line lies = line(bond, position);
-  const auto [force, slope] = pull(bond, lies.elongation, viscous_state);
-  const double across = force * lies.per_length;
-  Eigen::Matrix3d block = (slope - across) * lies.direction * lies.direction.transpose();
+  const Line placed = line(bond, position);
+  const auto [force, slope] = pull(bond, placed.elongation, viscous_state);
+  const double across = force * placed.per_length;
+  Eigen::Matrix3d block = (slope - across) * placed.direction * placed.direction.transpose();
   block.diagonal().array() += across;
   return block;
 }
@@ -356,12 +356,12 @@ void BondSystem::add_stiffness_times(const Positions& position, const ViscousSta
                                      const Eigen::Matrix3Xd& displacement,
                                      Eigen::Matrix3Xd& force) const {
   for (std::size_t i = 0; i < size(); ++i) {
-    const Line lies = line(i, position);
-    const auto [n, slope] = pull(i, lies.elongation, viscous_state);
-    const double across = n * lies.per_length;
+    const Line placed = line(i, position);
+    const auto [n, slope] = pull(i, placed.elongation, viscous_state);
+    const double across = n * placed.per_length;
     const Eigen::Vector3d apart = displacement.col(end_b_[i]) - displacement.col(end_a_[i]);
     const Eigen::Vector3d f =
-        across * apart + (slope - across) * lies.direction.dot(apart) * lies.direction;
+        across * apart + (slope - across) * placed.direction.dot(apart) * placed.direction;
     force.col(end_b_[i]) += f;
     force.col(end_a_[i]) -= f;
   }

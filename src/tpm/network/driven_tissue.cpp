@@ -143,7 +143,7 @@ DrivenTissue::UnitField DrivenTissue::unit_field(const TissueState& state,
     field.displacement = unit;
     equilibrium_.displace(field.displacement);
     field.stiffness = along(field.displacement);
-    field.judge = field.displacement;
+    field.adjoint = field.displacement;
     return field;
   }
   Eigen::Matrix3Xd pushed = Eigen::Matrix3Xd::Zero(3, rest_.cols());
@@ -152,13 +152,13 @@ DrivenTissue::UnitField DrivenTissue::unit_field(const TissueState& state,
   equilibrium_.displace(field.displacement);
   field.stiffness = -pushed.cwiseProduct(field.displacement).sum();
   field.displacement += unit;
-  field.judge = field.displacement;
+  field.adjoint = field.displacement;
   if (!pushed.isZero(0.0)) return field;
   const Eigen::Matrix3Xd push = unit_on_touched();
-  field.judge = push;
-  equilibrium_.displace(field.judge);
-  field.stiffness = 1.0 / push.cwiseProduct(field.judge).sum();
-  field.judge *= field.stiffness;
+  field.adjoint = push;
+  equilibrium_.displace(field.adjoint);
+  field.stiffness = 1.0 / push.cwiseProduct(field.adjoint).sum();
+  field.adjoint *= field.stiffness;
   return field;
 }
 

@@ -67,10 +67,10 @@ class DrivenTissue {
     /// the adjoint of the response: a force R left on the free spheres changes it by that sign
     /// times their product.
     Eigen::Matrix3Xd displacement;
-    /// By which errors are judged: `displacement`; where the probe touches nothing and its response
+    /// Weights of errors: `displacement`; where the probe touches nothing and its response
     /// is nothing, that of a unit depth imposed on the spheres that it touched first.
-    Eigen::Matrix3Xd judge;
-    double stiffness = 0.0;  ///< work of `judge`: N/m under an imposed depth, m/N under a load
+    Eigen::Matrix3Xd adjoint;
+    double stiffness = 0.0;  ///< work of `adjoint`: N/m under an imposed depth, m/N under a load
   };
   /// From the last factorisation, which was at this state and viscous state.
   [[nodiscard]] UnitField unit_field(const TissueState& state,

@@ -21,8 +21,8 @@ constexpr double kTired = 1.5;  // growth of the iterations that makes a precond
 /// How exactly the next step is worth solving.
 class Forcing {
  public:
-  explicit Forcing(double goal) : adjoint_(goal) {}
-  /// @param residual now, in the unit of the goal
+  explicit Forcing(double target) : adjoint_(target) {}
+  /// @param residual now, in the unit of the target
   double next(double residual) {
     double eta = kFirstForcing;
     if (last_residual_ > 0.0) {
@@ -31,7 +31,7 @@ class Forcing {
       const double safe = kForcingFactor * last_eta_ * last_eta_;
       if (safe > kSafeguard) eta = std::max(eta, safe);
     }
-    // Not more exactly than the goal asks for; by a good part, as norms differ.
+    // Not more exactly than the target asks for; by a good part, as norms differ.
     eta = std::max(eta, kSafeguard * kSafeguard * adjoint_ / residual);
     last_eta_ = std::clamp(eta, kLeastForcing, kFirstForcing);
     last_residual_ = residual;
@@ -148,7 +148,7 @@ EquilibriumSearch LargeEquilibrium::find(Positions& position, const ViscousState
   assemble(position, viscous_state);
   const TangentAnswer answer = probe();
   search.stable = answer != TangentAnswer::not_definite;
-  search.converged = answer != TangentAnswer::failed;  // an equilibrium nobody judged
+  search.converged = answer != TangentAnswer::failed;  // an equilibrium without an error tolerance
   return search;
 }
 

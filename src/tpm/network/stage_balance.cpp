@@ -20,7 +20,7 @@ constexpr Eigen::Index kAndersonDepth = 6;
 // place.
 constexpr double kLongestMove = 0.25;    // of a bond
 constexpr double kSnap = 2.0;            // times what the stiffness says
-constexpr double kGrains = 8.0;          // roundings of a coordinate that no balance gets below
+constexpr double kRoundings = 8.0;       // roundings of a coordinate that no balance gets below
 constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the force
 
 std::vector<double> with_start(std::vector<double> nodes) {
@@ -51,13 +51,13 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
     lane_nodes_[static_cast<std::size_t>(lane)] = node(lane);
     stage_places_.push_back(full_.place(node(lane)));
   }
-  // The error is judged where outputs are taken from: at the stages, of which the last is more
+  // The error is measured where outputs are taken from: at the stages, of which the last is more
   // accurate than the others, and before the first of them, where a step that is long against the
   // relaxation time hides how the tissue settles after a change of rate.
-  std::vector<double> judged = inner_.nodes();
-  judged.push_back(0.25 * inner_.nodes().front());
-  judged.push_back(0.5 * inner_.nodes().front());
-  for (const double place : judged) {
+  std::vector<double> compared = inner_.nodes();
+  compared.push_back(0.25 * inner_.nodes().front());
+  compared.push_back(0.5 * inner_.nodes().front());
+  for (const double place : compared) {
     full_error_places_.push_back(full_.place(place));
     inner_error_places_.push_back(inner_.place(place));
   }
@@ -283,11 +283,11 @@ bool StageBalance::refactorise(const TissueState& state,
   lane_field_ = by_coordinate(field.displacement);
   ++work_.back_solves;
   Eigen::VectorXd change;
-  tissue_.bonds().elongation_changes(state.position, field.judge, change);
+  tissue_.bonds().elongation_changes(state.position, field.adjoint, change);
   adjoint_ =
       tissue_.adjoint_sign() * bonds_.of_relaxing(change.cwiseProduct(tissue_.bonds().relaxing()));
   rounding_ =
-      kGrains * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
+      kRoundings * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
   if (tissue_.depth_driven()) rounding_ *= tissue_.held_stiffness(state.position, viscous_state);
   last_iterations_ = 0;
   return true;
@@ -373,11 +373,11 @@ double StageBalance::error() const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(places);
   Eigen::VectorXd size = sum;
   for (const LaneBonds::Group& group : bonds_.groups()) {
-    const auto goal = adjoint_.segment(group.first, group.count);
+    const auto weight = adjoint_.segment(group.first, group.count);
     const auto followed = followed_.middleCols(group.first, group.count);
     const auto start = begin_.followed.segment(group.first, group.count);
-    const LaneVector aimed = followed * goal;
-    const double start_aimed = start * goal;
+    const LaneVector aimed = followed * weight;
+    const double start_aimed = start * weight;
     ErrorWeights mean;
     mean.of_stages.setZero(places, kLanes);
     mean.of_start.setZero(places);
@@ -390,7 +390,7 @@ double StageBalance::error() const {
     }
     Eigen::MatrixXd change = mean.of_stages * followed;
     change.noalias() += mean.of_start * start;
-    size += change.cwiseAbs() * goal.cwiseAbs();
+    size += change.cwiseAbs() * weight.cwiseAbs();
   }
   return (sum + 0.1 * size).maxCoeff();
 }

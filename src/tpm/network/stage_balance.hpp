@@ -197,7 +197,7 @@ class StageBalance {
   ExponentialCollocation inner_;  ///< through the stages alone
   Places stage_places_;           ///< of full_, where the lanes stand
   std::array<double, kLanes> lane_nodes_{};
-  Places full_error_places_, inner_error_places_;  ///< where the error is judged
+  Places full_error_places_, inner_error_places_;  ///< where the error is measured
   LaneStiffness factor_;
   Anderson anderson_;
   QuasiStaticWork work_;
@@ -224,7 +224,7 @@ class StageBalance {
   LaneVector imposed_;
   /// What tells the two collocations apart, for one relaxation time.
   struct ErrorWeights {
-    Eigen::Matrix<double, Eigen::Dynamic, kLanes> of_stages;  ///< by (place judged, stage)
+    Eigen::Matrix<double, Eigen::Dynamic, kLanes> of_stages;  ///< by (place measured, stage)
     Eigen::VectorXd of_start;
   };
   std::vector<ErrorWeights> error_weights_;  ///< of each relaxation time of the system

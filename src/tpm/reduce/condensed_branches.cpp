@@ -163,13 +163,13 @@ Eigen::Vector3d CondensedBranches::second_m(const CondensedState& state) const n
 
 void CondensedBranches::step(CondensedState& state, const double* to) noexcept {
   std::array<double, 3> way{};
-  std::array<double, 3> resting{};
+  std::array<double, 3> midway{};
   for (std::size_t k = 0; k < 3; ++k) {
     way[k] = to[k] - state.u[k];
-    resting[k] = state.u[k] + relaxation_point_ * way[k];
+    midway[k] = state.u[k] + relaxation_point_ * way[k];
   }
   CondensedPull pull;
-  pull_condensed(*tables_, rates_, resting.data(), state.viscous, state.matrices, pull);
+  pull_condensed(*tables_, rates_, midway.data(), state.viscous, state.matrices, pull);
   const double before_J = pull.energy_J + spread_J_;
   CondensedAdvance advance;
   advance_condensed(modes_,
@@ -181,7 +181,7 @@ void CondensedBranches::step(CondensedState& state, const double* to) noexcept {
 
   alignas(32) std::array<double, CondensedTables::kMatrixEntries> matrices;
   matrices_of_condensed(*tables_, next.data(), matrices.data());
-  pull_condensed(*tables_, rates_, resting.data(), next.data(), matrices.data(), pull);
+  pull_condensed(*tables_, rates_, midway.data(), next.data(), matrices.data(), pull);
   state.kept = !(pull.energy_J + advance.spread_J <= before_J);
   if (state.kept) {
     std::fill(pending_.begin(), pending_.end(), 0.0);

@@ -74,7 +74,7 @@ class SurfaceNetwork final : public ContactModel {
   };
   /// A sphere in reach of the ball while forces are balanced.
   struct Near {
-    std::size_t skin;
+    std::size_t candidate;
     Eigen::Vector3d free_m;    ///< from the ball to its centre, if the ball pushed nothing
     Eigen::Vector3d pushed_N;  ///< with what the ball pushes it
   };
@@ -82,7 +82,7 @@ class SurfaceNetwork final : public ContactModel {
   void add_surface();
   void find_stiffness(const BondSystem& bonds, const Constraints& constraints);
   [[nodiscard]] Eigen::Vector3d displacement_of(std::size_t column) const noexcept;
-  [[nodiscard]] Eigen::Vector3d from_ball(const SurfaceSphere& skin) const noexcept;
+  [[nodiscard]] Eigen::Vector3d from_ball(const SurfaceSphere& candidate) const noexcept;
   /// Displacement of the first per force on the second.
   [[nodiscard]] Eigen::Matrix3d compliance(const SurfaceSphere& of,
                                            const SurfaceSphere& under) const noexcept;

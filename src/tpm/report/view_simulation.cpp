@@ -143,7 +143,8 @@ void add_origin(const Hdf5Reader& file, ViewPage& page) {
   page.fact("written by", attribute("written_by"));
   page.fact("scene's SHA-256", attribute("scene_sha256"));
   page.fact("assumptions", attribute("assumptions"));
-  if (!file.sealed()) page.fact("check sum", "none: the file was not written by tpm, or is older");
+  if (!file.has_checksum())
+    page.fact("check sum", "none: the file was not written by tpm, or is older");
   page.description["scene"] = attribute("scene");
 }
 

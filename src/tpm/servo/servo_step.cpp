@@ -305,7 +305,7 @@ Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
   return force_N;
 }
 
-StopCause ServoStep::judge_rendering(int periods) noexcept {
+StopCause ServoStep::check_rendering(int periods) noexcept {
   energy_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
   if (settings_.watch_oscillation) oscillation_.observe(sent_size_N_, periods);
   if (energy_.too_much()) return StopCause::energy;
@@ -372,7 +372,7 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   touch(missed, row);
   begun_ = true;
   if (!std::isfinite(model_N_) || !tissue_N_.allFinite()) return StopCause::force_not_finite;
-  cause = judge_rendering(missed + 1);
+  cause = check_rendering(missed + 1);
   if (cause != StopCause::none) return cause;
   cause = write(with_damping(row), row);
   count_limits(row.flags);
