@@ -85,13 +85,13 @@ TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rul
   const TpmParameters p = unequal_material();
   const Network network = build_network(paper_liver(), {}, "liver");
   const BondSystem bonds(network, p);
-  const HeldStiffness star = star_stiffness(p);
-  const HeldStiffness liver =
+  const ContactStiffness star = star_stiffness(p);
+  const ContactStiffness liver =
       held_stiffness(bonds, network.organ.position, kContact, Vector3d::UnitZ());
   CHECK_THAT(star.instantaneous, WithinRel(19e3 * 12.56e-3, 1e-12));
-  CHECK_THAT(star.relaxed, WithinRel(7e3 * 19e3 / 26e3 * 12.56e-3, 1e-12));
+  CHECK_THAT(star.equilibrium, WithinRel(7e3 * 19e3 / 26e3 * 12.56e-3, 1e-12));
   CHECK_THAT(liver.instantaneous, WithinRel(star.instantaneous, 1e-6));
-  CHECK_THAT(liver.relaxed, WithinRel(star.relaxed, 1e-6));
+  CHECK_THAT(liver.equilibrium, WithinRel(star.equilibrium, 1e-6));
 
   // The same as a force, after an indentation by 10 nm in ten picoseconds and in a second.
   const double depth = 1e-8;
@@ -102,7 +102,7 @@ TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rul
     return tissue.run(protocol, std::vector<double>{depth / rate + hold}).response(0);
   };
   CHECK_THAT(force(1e3, 0.0) / depth, WithinRel(star.instantaneous, 1e-6));
-  CHECK_THAT(force(1e-8, 1.0) / depth, WithinRel(star.relaxed, 1e-6));
+  CHECK_THAT(force(1e-8, 1.0) / depth, WithinRel(star.equilibrium, 1e-6));
 }
 
 TEST_CASE("under per_bond sphere 71 is stiffer by the sum of its bonds' squared cosines") {
@@ -112,11 +112,11 @@ TEST_CASE("under per_bond sphere 71 is stiffer by the sum of its bonds' squared 
   CHECK(sums.lateral_count == 6);
   CHECK(sums.radial_count == 7);
   const BondSystem bonds(network, p);
-  const HeldStiffness liver =
+  const ContactStiffness liver =
       held_stiffness(bonds, network.organ.position, kContact, Vector3d::UnitZ());
   const double factor = liver.instantaneous / star_stiffness(p).instantaneous;
   CHECK_THAT(factor, WithinRel(sums.radial, 1e-6));
-  CHECK_THAT(liver.relaxed / star_stiffness(p).relaxed, WithinRel(factor, 1e-6));
+  CHECK_THAT(liver.equilibrium / star_stiffness(p).equilibrium, WithinRel(factor, 1e-6));
   CHECK(factor > 3.5);
   CHECK(factor < 5.0);
 }

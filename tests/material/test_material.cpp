@@ -216,7 +216,7 @@ TEST_CASE("the paper's element is one material") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.7);
   const BondMaterial m = p.bonds();
   CHECK_THAT(m.instantaneous_Pa(), WithinRel(p.E2_Pa, 1e-15));
-  CHECK_THAT(m.equilibrium_Pa, WithinRel(p.relaxed_modulus_Pa(), 1e-15));
+  CHECK_THAT(m.equilibrium_Pa, WithinRel(p.equilibrium_modulus_Pa(), 1e-15));
   REQUIRE(m.branches.size() == 1);
   CHECK_THAT(m.branches[0].relaxation_time_s, WithinRel(0.7, 1e-15));
 }

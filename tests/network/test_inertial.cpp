@@ -116,7 +116,7 @@ TEST_CASE("a guided sphere under a small load follows the damped oscillator with
     const double load = 1e-8;
     const auto times = even_times(0.5, 25);
     const InertialRun run = inertial.run(creep(load, 0.5), times);
-    const double end = load / (p.relaxed_modulus_Pa() * p.modulus_to_stiffness_m());
+    const double end = load / (p.equilibrium_modulus_Pa() * p.modulus_to_stiffness_m());
     const Eigen::VectorXd exact = loaded_oscillator(p, kMass, drag_per_s, load, times);
     CAPTURE(eta1, run.work.steps);
     for (std::size_t i = 0; i < times.size(); ++i) {

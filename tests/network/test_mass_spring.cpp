@@ -66,7 +66,8 @@ TEST_CASE("the contact stiffness of the star is that of its radial bond") {
     return contact_stiffness_N_per_m(star.bonds, star.network.organ.position, star.constraints,
                                      Star::probe(), relaxation_factor);
   };
-  CHECK_THAT(stiffness(1.0), WithinRel(p.relaxed_modulus_Pa() * p.modulus_to_stiffness_m(), 1e-12));
+  CHECK_THAT(stiffness(1.0),
+             WithinRel(p.equilibrium_modulus_Pa() * p.modulus_to_stiffness_m(), 1e-12));
   CHECK_THAT(stiffness(0.0), WithinRel(p.E2_Pa * p.modulus_to_stiffness_m(), 1e-12));
 }
 

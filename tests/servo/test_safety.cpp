@@ -418,7 +418,7 @@ class Doubtful final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return 200.0 * Eigen::Matrix3d::Identity();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
     return instantaneous_stiffness();
   }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
@@ -531,7 +531,7 @@ class Counting final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return Eigen::Matrix3d::Identity();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
     return Eigen::Matrix3d::Identity();
   }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }

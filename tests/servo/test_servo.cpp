@@ -247,7 +247,7 @@ TEST_CASE("A force that is no number stops the session before it is sent") {
     [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
       return Eigen::Matrix3d::Identity();
     }
-    [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+    [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
       return Eigen::Matrix3d::Identity();
     }
     [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }

@@ -207,7 +207,7 @@ TEST_CASE("Whatever throws while a session runs, its threads end and the forces 
     [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
       return Eigen::Matrix3d::Identity();
     }
-    [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+    [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
       return Eigen::Matrix3d::Identity();
     }
     [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }

@@ -117,7 +117,7 @@ TEST_CASE("creep in a sweep obeys the balance at once and in the end, and the mo
   for (const auto& [i, load] : {std::pair{std::size_t{0}, 0.196}, {std::size_t{1}, 0.98}}) {
     CHECK_THAT(block.values[0][i], WithinRel(equilibrium_depth_m(p, p.E2_Pa, load), 1e-12));
     CHECK_THAT(block.values[1][i],
-               WithinRel(equilibrium_depth_m(p, p.relaxed_modulus_Pa(), load), 1e-12));
+               WithinRel(equilibrium_depth_m(p, p.equilibrium_modulus_Pa(), load), 1e-12));
     const std::array times{7.0};
     const double at7 =
         make_model("cvodes", {})->respond(creep(load, 10.0), times, v, Want::values).value[0];

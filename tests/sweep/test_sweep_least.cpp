@@ -183,12 +183,12 @@ TEST_CASE("static curves are the equilibria, at once and relaxed, also where E2 
   for (const double share : {0.1, 0.5, 1.0}) {
     const double depth = share * kDepth_m;
     CAPTURE(depth);
-    CHECK(curves.relaxed(depth) ==
+    CHECK(curves.equilibrium(depth) ==
           Approx(relaxed.move_to(depth, 0.0).response).epsilon(1e-4 / share));
     const Protocol jump(Drive::displacement, {{0.0, depth}, {1.0, depth}}, "jump");
     const std::vector<double> start{0.0};
     const Trajectory instantaneous = scene.with_protocol(jump).quasi_static({}, start, false);
-    CHECK(curves.relaxed(depth) + curves.relaxing(depth) ==
+    CHECK(curves.equilibrium(depth) + curves.relaxing(depth) ==
           Approx(instantaneous.response[0]).epsilon(1e-4 / share));
   }
 }

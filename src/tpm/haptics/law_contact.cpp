@@ -95,7 +95,7 @@ Eigen::Matrix3d LawContact::instantaneous_stiffness() const noexcept {
   return along_push(law_.relaxation.instant() + law_.relaxation.dashpot / settings_.period_s);
 }
 
-Eigen::Matrix3d LawContact::relaxed_stiffness() const noexcept {
+Eigen::Matrix3d LawContact::equilibrium_stiffness() const noexcept {
   return along_push(law_.relaxation.constant);
 }
 

@@ -42,7 +42,7 @@ class LawContact final : public ContactModel {
   /// have less above it.
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
   /// At the same depth.
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override;
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override;
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
 

@@ -2,8 +2,8 @@
 
 namespace tpm::organ {
 
-HeldStiffness held_stiffness(const BondSystem& bonds, const Positions& rest, std::size_t sphere,
-                             const Eigen::Vector3d& direction) {
+ContactStiffness held_stiffness(const BondSystem& bonds, const Positions& rest, std::size_t sphere,
+                                const Eigen::Vector3d& direction) {
   const auto column = static_cast<Eigen::Index>(sphere);
   Eigen::Matrix3Xd displacement = Eigen::Matrix3Xd::Zero(3, rest.cols());
   displacement.col(column) = direction;
@@ -17,7 +17,7 @@ HeldStiffness held_stiffness(const BondSystem& bonds, const Positions& rest, std
   return {stiffness(0.0), stiffness(1.0)};
 }
 
-HeldStiffness star_stiffness(const BondMaterial& material) {
+ContactStiffness star_stiffness(const BondMaterial& material) {
   const double length = material.modulus_to_stiffness_m();
   return {material.instantaneous_Pa() * length, material.equilibrium_Pa * length};
 }

@@ -215,10 +215,10 @@ double dense_flop_s() {
 /// A step of a scalar model with `branches` exponentials.
 double scalar_step_s(int branches) {
   std::vector<ScalarBranch> list(static_cast<std::size_t>(branches), {1.0, 10.0});
-  DepthCurve relaxed, relaxing;
-  relaxed.stiffness_N_per_m = 100.0;
+  DepthCurve equilibrium, relaxing;
+  equilibrium.stiffness_N_per_m = 100.0;
   relaxing.stiffness_N_per_m = 50.0;
-  ScalarModel model(std::move(relaxed), std::move(relaxing), std::move(list), 1e-3);
+  ScalarModel model(std::move(equilibrium), std::move(relaxing), std::move(list), 1e-3);
   double depth = 0.0;
   return time_of([&] {
     depth = depth > 1e-3 ? 0.0 : depth + 1e-6;

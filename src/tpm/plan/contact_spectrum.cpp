@@ -88,12 +88,12 @@ struct BranchFit {
 BranchFit fit_shares(const ContactSpectrum& spectrum, const std::vector<double>& times_s) {
   const auto rows = static_cast<Eigen::Index>(spectrum.per_rate_s.size());
   const auto columns = static_cast<Eigen::Index>(times_s.size());
-  const double whole = spectrum.instantaneous() - spectrum.relaxed();
+  const double whole = spectrum.instantaneous() - spectrum.equilibrium();
   Eigen::MatrixXd a(rows, columns);
   Eigen::VectorXd b(rows);
   for (Eigen::Index i = 0; i < rows; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    b[i] = (spectrum.stiffness_N_per_m[k] - spectrum.relaxed()) / whole;
+    b[i] = (spectrum.stiffness_N_per_m[k] - spectrum.equilibrium()) / whole;
     for (Eigen::Index j = 0; j < columns; ++j) {
       a(i, j) = remaining(spectrum.per_rate_s[k], times_s[static_cast<std::size_t>(j)]);
     }
@@ -187,7 +187,7 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
 }
 
 std::vector<ScalarBranch> fitted_branches(const ContactSpectrum& spectrum, int most) {
-  if (!(spectrum.instantaneous() - spectrum.relaxed() > 1e-12 * spectrum.instantaneous()))
+  if (!(spectrum.instantaneous() - spectrum.equilibrium() > 1e-12 * spectrum.instantaneous()))
     return {};
   BranchFit best;
   std::vector<double> times_s;

@@ -9,7 +9,7 @@ namespace tpm::organ {
 
 /// The static force of a contact over its depths: at equilibrium, and the relaxing part.
 struct ContactCurves {
-  DepthCurve relaxed, relaxing;
+  DepthCurve equilibrium, relaxing;
 };
 
 /// What the claims about a scene are made from: coarse runs of its network at few times, its linear

@@ -26,9 +26,9 @@ double DepthCurve::operator()(double depth_m) const {
          f[2] * s * (s - 1) * (s - 3) / 2.0 + f[3] * s * (s - 1) * (s - 2) / 6.0;
 }
 
-ScalarModel::ScalarModel(DepthCurve relaxed, DepthCurve relaxing,
+ScalarModel::ScalarModel(DepthCurve equilibrium, DepthCurve relaxing,
                          std::vector<ScalarBranch> branches, double period_s)
-    : relaxed_(std::move(relaxed)),
+    : equilibrium_(std::move(equilibrium)),
       relaxing_(std::move(relaxing)),
       branches_(std::move(branches)),
       weights_(branches_.size()),
@@ -55,7 +55,7 @@ void ScalarModel::settle(double depth_m) {
 
 double ScalarModel::force_at(double depth_m, const std::vector<Weights>& weights) const {
   const double end_N = relaxing_(depth_m);
-  double force = relaxed_(depth_m);
+  double force = equilibrium_(depth_m);
   for (std::size_t i = 0; i < branches_.size(); ++i) {
     const Weights& w = weights[i];
     const double viscous = w.viscous * viscous_[i] + w.start * start_N_ + w.end * end_N;

@@ -33,7 +33,7 @@ struct ScalarBranch {
 class ScalarModel {
  public:
   /// @param period_s of a step, > 0
-  ScalarModel(DepthCurve relaxed, DepthCurve relaxing, std::vector<ScalarBranch> branches,
+  ScalarModel(DepthCurve equilibrium, DepthCurve relaxing, std::vector<ScalarBranch> branches,
               double period_s);
 
   /// Relaxed at a depth.
@@ -61,7 +61,7 @@ class ScalarModel {
   [[nodiscard]] double depth_under(double load_N, const std::vector<Weights>& weights) const;
   void accept(double depth_m, const std::vector<Weights>& weights);
 
-  DepthCurve relaxed_, relaxing_;
+  DepthCurve equilibrium_, relaxing_;
   std::vector<ScalarBranch> branches_;
   std::vector<Weights> weights_, instantaneous_;
   std::vector<double> viscous_;

@@ -177,8 +177,8 @@ Eigen::Matrix3d CondensedContact::instantaneous_stiffness() const noexcept {
   return fit_->instantaneous;
 }
 
-Eigen::Matrix3d CondensedContact::relaxed_stiffness() const noexcept {
-  return fit_->relaxed;
+Eigen::Matrix3d CondensedContact::equilibrium_stiffness() const noexcept {
+  return fit_->equilibrium;
 }
 
 Eigen::Index CondensedContact::spheres() const noexcept {

@@ -125,7 +125,7 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
     const CondensedSample relaxed = sampler.sample_at(w);
     if (i == 0) {
       fit->instantaneous = relaxed.by_uu;
-      fit->relaxed = relaxed.by_uu + relaxed.by_wu;
+      fit->equilibrium = relaxed.by_uu + relaxed.by_wu;
     }
     const auto local = [&](const Eigen::Matrix3d& m) {
       return Eigen::Matrix3d(fit->frame.axes.transpose() * (0.5 * (m + m.transpose())) *

@@ -63,7 +63,7 @@ ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest,
   PushedContact tissue(bonds, rest, constraints, contact);
   weights_ = servo_weights(bonds, options.period_s);
   instantaneous_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 0.0)).stiffness;
-  relaxed_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 1.0)).stiffness;
+  equilibrium_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 1.0)).stiffness;
   branch_error_.assign(weights_.branches.size(), Eigen::Vector3d::Zero());
   const double forgotten = 1.0 - static_cast<double>(weights_.longest_kept());
   rounding_ = kRounding + kViscousRounding / std::max(forgotten, 1.0 / kLongestLag);
@@ -222,7 +222,7 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
       rounding_ * largest_N_;
   answer_.error_N =
       std::max(field_error_N, kHold * held_error_N_) + viscous_error_.norm() + step_error_N;
-  const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
+  const double scale_N = std::max(largest_N_, kScaleDepth_m * equilibrium_.norm());
   answer_.trusted = depth_m <= options_.deepest_m && depth_m >= -options_.deepest_m &&
                     aside_m <= options_.aside_m && answer_.error_N <= kTrusted * scale_N;
 }
@@ -233,7 +233,7 @@ ContactAnswer ServoNetwork::step(const ToolPose& tool) noexcept {
   for (Eigen::Index c = 0; c < 3; ++c) contact[c] = static_cast<float>(tool.displacement_m[c]);
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
   const double step_error_N = step_error_->advance(tool.displacement_m).norm();
-  const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
+  const double scale_N = std::max(largest_N_, kScaleDepth_m * equilibrium_.norm());
   balance(kNext);
   answer(tool.displacement_m, step_error_N);
   const double elsewhere_N = viscous_error_.norm() + step_error_N;

@@ -34,8 +34,8 @@ std::vector<ViscousLaw::Branch> branches_of(const BondSystem& bonds) {
 
 StepError::StepError(PushedContact& tissue, const Positions& position, double relaxed,
                      double period_s) {
-  const ViscousState instantaneous = tissue.viscous(position, relaxed, 0.0);
-  const ViscousState in_the_end = tissue.viscous(position, relaxed, 1.0);
+  const ViscousState instantaneous = tissue.viscous_state(position, relaxed, 0.0);
+  const ViscousState in_the_end = tissue.viscous_state(position, relaxed, 1.0);
   const ContactFields first = tissue.fields(position, instantaneous);
   const ContactFields last = tissue.fields(position, in_the_end);
   std::array<Eigen::Matrix3Xd, 6> field;

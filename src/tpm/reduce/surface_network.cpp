@@ -103,7 +103,7 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   // An elongation that bends by b between periods lies b v (1 - v)/2 off the line, v from the end;
   // what it leaves in the viscous state is the integral of that over exp(-z v) z dv.
   const double lasting =
-      instantaneous_.norm() > 0.0 ? relaxed_.norm() / instantaneous_.norm() : 1.0;
+      instantaneous_.norm() > 0.0 ? equilibrium_.norm() / instantaneous_.norm() : 1.0;
   // Not all of a bond relaxes: all of its force is taken.
   const double z = options.period_s / bonds.longest_relaxation_time_s();
   bend_kept_ = std::exp(-lasting * z);
@@ -150,7 +150,7 @@ void SurfaceNetwork::find_stiffness(const BondSystem& bonds, const Constraints& 
     sphere = ball_.touchable[i];
   }
   instantaneous_.setZero();
-  relaxed_.setZero();
+  equilibrium_.setZero();
   if (nearest == nullptr) return;
   const Eigen::Vector3d normal = nearest->rest_m.normalized();
   Equilibrium equilibrium(bonds, constraints);
@@ -164,7 +164,7 @@ void SurfaceNetwork::find_stiffness(const BondSystem& bonds, const Constraints& 
     }
     equilibrium.displace(push);
     const double compliance = normal.dot(push.col(static_cast<Eigen::Index>(sphere)));
-    (relaxation_factor > 0.0 ? relaxed_ : instantaneous_) =
+    (relaxation_factor > 0.0 ? equilibrium_ : instantaneous_) =
         normal * normal.transpose() / (compliance + 1.0 / ball_.stiffness_N_per_m);
   }
 }
@@ -395,7 +395,7 @@ void SurfaceNetwork::add_linear_error() noexcept {
 }
 
 double SurfaceNetwork::scale_N() const noexcept {
-  return std::max(largest_N_, kScaleAtDepth_m * relaxed_.norm());
+  return std::max(largest_N_, kScaleAtDepth_m * equilibrium_.norm());
 }
 
 bool SurfaceNetwork::has_fallen_in() const noexcept {

@@ -50,7 +50,9 @@ class SurfaceNetwork final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return instantaneous_;
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return equilibrium_;
+  }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return rest_.cols(); }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
 
@@ -111,7 +113,7 @@ class SurfaceNetwork final : public ContactModel {
   std::size_t stride_ = 0;
   std::vector<SurfaceSphere> surface_;
   std::vector<std::size_t> inside_;  ///< spheres that it is not to touch
-  Eigen::Matrix3d instantaneous_, relaxed_;
+  Eigen::Matrix3d instantaneous_, equilibrium_;
 
   AlignedFloats displacement_, force_, change_;
   std::array<Near, kMostTouched> near_{};

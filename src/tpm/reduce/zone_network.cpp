@@ -55,7 +55,7 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest,
   PushedContact tissue(bonds, rest, constraints, contact);
   weights_ = servo_weights(bonds, options.period_s);
   instantaneous_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 0.0)).stiffness;
-  relaxed_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 1.0)).stiffness;
+  equilibrium_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 1.0)).stiffness;
   choose_zone(tissue);
   const Parts parts = build(tissue);
   compare(tissue, constraints, parts);
@@ -216,7 +216,7 @@ ContactAnswer ZoneNetwork::step(const ToolPose& tool) noexcept {
   claim_.advance(depth_m);
   answer.error_N = claim_.at(claim_.place(), aside_m) + kUnbalanced * correction.norm() +
                    step_error_->advance(tool.displacement_m).norm();
-  const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * relaxed_.norm());
+  const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * equilibrium_.norm());
   answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&
                    answer.error_N <= kTrustedZone * scale_N;
   return answer;

@@ -51,7 +51,9 @@ class ZoneNetwork final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return instantaneous_;
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return equilibrium_;
+  }
   [[nodiscard]] Eigen::Index spheres() const noexcept override {
     return static_cast<Eigen::Index>(held_or_free_.size());
   }
@@ -106,7 +108,7 @@ class ZoneNetwork final : public ContactModel {
   std::vector<std::size_t> outside_;
   Eigen::Index own_ = 0;
   double softest_ = 0.0;
-  Eigen::Matrix3d instantaneous_, relaxed_;
+  Eigen::Matrix3d instantaneous_, equilibrium_;
 
   ServoBonds at_contact_, elsewhere_;
   Dense inverse_;   ///< of the frozen stiffness, by coordinates of zone and own displacements

@@ -63,7 +63,7 @@ Json network_json(const Tissue& tissue, const NetworkInspection& inspection) {
         {"sphere", *organ.contact + 1},
         {"stiffness_over_star_instantaneous",
          rounded(inspection.contact_over_star->instantaneous, 9)},
-        {"stiffness_over_star_equilibrium", rounded(inspection.contact_over_star->relaxed, 9)}};
+        {"stiffness_over_star_equilibrium", rounded(inspection.contact_over_star->equilibrium, 9)}};
   }
   json["assumptions"] = organ.assumptions;
   json["unused_blocks"] = tissue.unused_blocks;
@@ -98,7 +98,7 @@ std::string network_text(const Tissue& tissue, const NetworkInspection& inspecti
         "instantaneously, {} "
         "times at equilibrium\n",
         *organ.contact + 1, significant(inspection.contact_over_star->instantaneous, 7),
-        significant(inspection.contact_over_star->relaxed, 7));
+        significant(inspection.contact_over_star->equilibrium, 7));
   }
   for (const std::string& assumption : organ.assumptions) {
     text += fmt::format("assumed: {}\n", assumption);
