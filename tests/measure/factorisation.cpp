@@ -146,7 +146,7 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
   const BondSystem bonds(network, TpmParameters{});
   Constraints constraints(network.organ.size());
   for (const std::size_t i : far_side(network.organ, Eigen::Vector3d::UnitZ(), 0.060)) {
-    constraints.hold(i);
+    constraints.fix(i);
   }
   (void)lap();
   StiffnessBlocks blocks(bonds, constraints);

@@ -56,7 +56,7 @@ OrganScene liver_scene(bool inner_held) {
   if (!inner_held) return OrganScene(paper_liver());
   OrganScene scene(paper_liver(), 1.0);
   for (std::size_t i = 0; i < scene.constraints.size(); ++i) {
-    if (scene.network.organ.layer[i] == 1) scene.constraints.hold(i);
+    if (scene.network.organ.layer[i] == 1) scene.constraints.fix(i);
   }
   return scene;
 }

@@ -112,7 +112,7 @@ class Beam {
  public:
   Beam() : network_(beam()), bonds_(network_, springs()), constraints_(network_.organ.size()) {
     for (std::uint32_t k = 0; k < kAcross; ++k) {
-      for (std::uint32_t j = 0; j < kAcross; ++j) constraints_.hold(node(0, j, k));
+      for (std::uint32_t j = 0; j < kAcross; ++j) constraints_.fix(node(0, j, k));
     }
     viscous_state_.offset = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size()));
     mass_ = kMass / static_cast<double>(network_.organ.size());

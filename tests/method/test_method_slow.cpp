@@ -88,7 +88,7 @@ TEST_CASE("method on an organ: a tissue that buckles says so") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   const Star star(p);
   Constraints unguided(4);
-  for (const std::size_t i : {1, 2, 3}) unguided.hold(i);
+  for (const std::size_t i : {1, 2, 3}) unguided.fix(i);
   const DrivenNetwork network{
       star.bonds, star.network.organ.position, unguided, Probes(Star::probe()), {}};
   const auto problem = network_problem(network, ramp_and_hold(0.004, 0.02, 0.2));

@@ -40,8 +40,8 @@ struct Columns {
         constraints(network.organ.size()),
         stiffness_N_per_m(stiffness) {
     for (int i = 0; i < count; ++i) {
-      constraints.guide(top(i), Eigen::Vector3d::UnitZ());
-      constraints.hold(top(i) + 1);
+      constraints.slide(top(i), Eigen::Vector3d::UnitZ());
+      constraints.fix(top(i) + 1);
     }
     const Tool tool = tool_at(network.organ, 0, Eigen::Vector3d::UnitZ(), shape);
     driven.emplace(driven_network(bonds, network.organ, constraints, {}, {{tool, 1.0, stiffness}}));
@@ -253,7 +253,7 @@ struct Slab {
         bonds(network, material(3.0)),
         constraints(network.organ.size()) {
     for (std::size_t i = 0; i < network.organ.size(); ++i) {
-      if (network.organ.layer[i] == 2) constraints.hold(i);
+      if (network.organ.layer[i] == 2) constraints.fix(i);
     }
   }
   static constexpr std::size_t kMiddle = 14;  // of the top plane

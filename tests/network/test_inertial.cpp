@@ -47,7 +47,7 @@ struct Block {
       const auto column = static_cast<Eigen::Index>(i);
       const Eigen::Vector3d at =
           rotation.transpose() * (network.organ.position.col(column) - shift);
-      if (network.organ.layer[i] == 1 && at.x() < 0.03) constraints.hold(i);
+      if (network.organ.layer[i] == 1 && at.x() < 0.03) constraints.fix(i);
     }
   }
 

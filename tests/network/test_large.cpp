@@ -34,7 +34,7 @@ ViscousState zero_viscous_state(const BondSystem& bonds) {
 
 TEST_CASE("conjugate gradients solve what the factorisation solves") {
   IndentedScene scene(solid_liver(1500), 0.02, 0.03);
-  scene.constraints.guide(700, Eigen::Vector3d(1, 2, 2) / 3.0);  // one that is partly free
+  scene.constraints.slide(700, Eigen::Vector3d(1, 2, 2) / 3.0);  // one that is partly free
   const ViscousState viscous_state = zero_viscous_state(scene.bonds);
   Equilibrium direct(scene.bonds, scene.constraints);
   REQUIRE(direct.factorise(scene.rest(), viscous_state));
@@ -117,7 +117,7 @@ TEST_CASE("a column pressed beyond its buckling load is found unstable by both s
   const double top = column.position.row(2).maxCoeff();
   for (std::size_t i = 0; i < column.size(); ++i) {
     const double z = column.position(2, static_cast<Eigen::Index>(i));
-    if (z < 1e-9 || z > top - 1e-9) constraints.hold(i);
+    if (z < 1e-9 || z > top - 1e-9) constraints.fix(i);
   }
   const ViscousState viscous_state = zero_viscous_state(bonds);
   const Eigen::Matrix3Xd no_load = Eigen::Matrix3Xd::Zero(3, column.position.cols());
@@ -148,7 +148,7 @@ TEST_CASE("a probe with random forces finds loose spheres that the load does not
   const Network network = build_network(organ, narrow, "lattice");
   const BondSystem bonds(network, TpmParameters{});
   Constraints constraints(organ.size());
-  for (std::size_t i = 0; i < 16; ++i) constraints.hold(i);
+  for (std::size_t i = 0; i < 16; ++i) constraints.fix(i);
   LargeEquilibrium large(bonds, constraints, organ.position);
   Positions position = organ.position;
   const EquilibriumSearch search = large.find(
@@ -205,7 +205,7 @@ TEST_CASE("a quasi-static run is the same with either solver, within its toleran
   const Network network = build_network(organ, {}, "liver");
   const BondSystem bonds(network, TpmParameters{}.with_relaxation_time(0.7));
   Constraints constraints(organ.size());
-  for (const std::size_t i : far_side(organ, Eigen::Vector3d::UnitZ(), 0.02)) constraints.hold(i);
+  for (const std::size_t i : far_side(organ, Eigen::Vector3d::UnitZ(), 0.02)) constraints.fix(i);
   Eigen::Index front = 0;
   organ.position.row(2).minCoeff(&front);
   const Probe probe{static_cast<std::size_t>(front), Eigen::Vector3d::UnitZ()};

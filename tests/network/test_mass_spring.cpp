@@ -28,7 +28,7 @@ constexpr double kForever = std::numeric_limits<double>::infinity();
 /// 4 x 4 x 2 spheres, not quite on a lattice, the lower layer held.
 struct Plate {
   Plate() : network(build_network(organ(), {}, "plate")), constraints(network.organ.size()) {
-    for (std::size_t i = 16; i < 32; ++i) constraints.hold(i);
+    for (std::size_t i = 16; i < 32; ++i) constraints.fix(i);
   }
   static Organ organ() {
     Organ o = block(3, 3, 1, 0.02, Lattice::cubic);

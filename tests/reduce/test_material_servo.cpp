@@ -73,7 +73,7 @@ Eigen::VectorXd reference(const BondSystem& bonds) {
       {{0.0, 0.0}, {kRamp * kPeriod_s, kDepth_m}, {kSteps * kPeriod_s, kDepth_m}}, "ramp");
   // Models at servo rate move the contact in space: it does not yield to the side.
   Constraints guided = scene.constraints;
-  guided.guide(scene.probe.sphere, scene.probe.direction);
+  guided.slide(scene.probe.sphere, scene.probe.direction);
   return QuasiStatic(bonds, scene.network.organ.position, guided, scene.probe, {.tolerance = 1e-7})
       .run(protocol, times)
       .response;

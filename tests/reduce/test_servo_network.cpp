@@ -293,7 +293,7 @@ TEST_CASE("the servo network says when it is out of its range", "[servo]") {
       ServoNetwork(bonds, rest, scene.constraints, scene.probe.sphere, into, {.period_s = 0.0}),
       Error);
   Constraints held = scene.constraints;
-  held.hold(scene.probe.sphere);
+  held.fix(scene.probe.sphere);
   CHECK_THROWS_AS(ServoNetwork(bonds, rest, held, scene.probe.sphere, into), Error);
 }
 
@@ -306,7 +306,7 @@ TEST_CASE("a guided sphere stays on its guide in the servo network", "[servo]") 
   while (!scene.constraints.is_free(guided) || guided == scene.probe.sphere) ++guided;
   const Eigen::Vector3d along = Eigen::Vector3d(1.0, 2.0, -0.5).normalized();
   Constraints constraints = scene.constraints;
-  constraints.guide(guided, along);
+  constraints.slide(guided, along);
   ServoNetwork servo(bonds, rest, constraints, scene.probe.sphere, into);
   const ContactMotion ramp = ramp_motion(into, 4e-3, 0.05, 0.02, 1e-3);
   const Answers answers = follow(servo, ramp);

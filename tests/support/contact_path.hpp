@@ -16,7 +16,7 @@ class ContactPath {
   /// @param freedom by value: the contact is held
   ContactPath(const BondSystem& bonds, Positions rest, Constraints constraints, std::size_t contact)
       : bonds_(bonds),
-        constraints_((constraints.hold(contact), std::move(constraints))),
+        constraints_((constraints.fix(contact), std::move(constraints))),
         equilibrium_(bonds_, constraints_),
         rest_(std::move(rest)),
         position_(rest_),

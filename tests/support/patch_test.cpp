@@ -179,7 +179,7 @@ PatchTest affine_patch_test(const Network& block, const BondSystem& bonds, doubl
   const std::vector<int> is_in = counted(interior, block.organ.size());
   Constraints constraints(block.organ.size());
   for (std::size_t i = 0; i < is_in.size(); ++i) {
-    if (is_in[i] == 0) constraints.hold(i);
+    if (is_in[i] == 0) constraints.fix(i);
   }
   const LinearBlock linear(block, bonds, relaxation_factor, constraints);
   const double volume = volume_per_sphere_m3 * static_cast<double>(interior.size());
@@ -216,7 +216,7 @@ PlateTest plate_test(const Network& block, const BondSystem& bonds, double relax
     // The rigid motions that smooth plates leave: one corner stands, another may only slide along
     // x.
     if (is_bottom && p.y() < box.min().y() + tolerance_m) {
-      if (p.x() < box.min().x() + tolerance_m) constraints.hold(i);
+      if (p.x() < box.min().x() + tolerance_m) constraints.fix(i);
       if (p.x() > box.max().x() - tolerance_m) constraints.impose(i, Eigen::Vector3d::UnitY());
     }
     if (!is_top) continue;

@@ -315,9 +315,9 @@ TEST_CASE("a file of results is read back by axes, either way round, and drawn")
   CHECK(reader.tally().skipped == 12);
   CHECK(reader.tally().failed == 16);
   CHECK(reader.parameter_unit("E1") == "Pa");
-  const HeldPlaces held{{"rate", 2}};
-  const auto upright = reader.slice("end_force", "E1", "x", held);
-  const auto turned = reader.slice("end_force", "x", "E1", held);
+  const FixedPlaces fixed{{"rate", 2}};
+  const auto upright = reader.slice("end_force", "E1", "x", fixed);
+  const auto turned = reader.slice("end_force", "x", "E1", fixed);
   const auto whole = all_blocks(sweep);
   for (std::uint64_t e = 0; e < 4; ++e) {
     for (std::uint64_t x = 1; x < 5; ++x) {
@@ -329,7 +329,7 @@ TEST_CASE("a file of results is read back by axes, either way round, and drawn")
     }
   }
   SweepFigures wished;
-  wished.held = held;
+  wished.fixed = fixed;
   wished.pareto = {"share", "peak_force"};
   const auto figures = sweep_figures(reader, wished);
   REQUIRE(figures.size() == 5);
@@ -346,7 +346,7 @@ TEST_CASE("a file of results is read back by axes, either way round, and drawn")
         }).find("--at rate: the figure of") != std::string::npos);
   // Axes that are held are not drawn over unless that is asked for.
   SweepFigures along;
-  along.held = {{"x", 1}};
+  along.fixed = {{"x", 1}};
   along.variables = {"end_force"};
   CHECK(sweep_figures(reader, along)[0].panels[0].x.quantity == "E1");
   CHECK_FALSE(to_text(to_json(figures)).empty());  // it can be drawn
@@ -436,8 +436,8 @@ TEST_CASE("sensitivity of a sum: each term's share of the variance") {
       CHECK(index.high - index.low < 0.03);
     }
   }
-  REQUIRE(sum.held.size() == 1);
-  CHECK_THAT(sum.held[0].value, WithinRel(8e-3, 1e-12));
+  REQUIRE(sum.fixed.size() == 1);
+  CHECK_THAT(sum.fixed[0].value, WithinRel(8e-3, 1e-12));
   CHECK(sensitivity_text({sum}).find(", at depth = 8 mm") != std::string::npos);
   // A step's first force does not know E1.
   const SweepSensitivity peak = sensitivity_of(reader, "peak_force", {});
@@ -605,7 +605,7 @@ TEST_CASE("a damaged result is refused before HDF5 reads it, and made anew") {
 TEST_CASE("a log is written by one process at a time") {
   const test::TempFolder folder;
   const Sweep sweep = parsed(kMixed);
-  const BlockLog held(folder / "a.blocks", sweep, {});
+  const BlockLog holder(folder / "a.blocks", sweep, {});
   CHECK(test::refusal_of([&] {
           const BlockLog second(folder / "a.blocks", sweep, {});
         }).find("another tpm sweep") != std::string::npos);

@@ -17,7 +17,7 @@ constexpr int kSlow = 6;  // iterations after which a factorisation is found ane
 
 Constraints with_contact_held(const TouchedTissue& tissue) {
   Constraints constraints = tissue.constraints;
-  constraints.hold(tissue.contact);
+  constraints.fix(tissue.contact);
   return constraints;
 }
 
@@ -176,7 +176,7 @@ Eigen::VectorXd line_reference(const TouchedTissue& tissue, const ContactMotion&
                     "a motion along a line through rest");
   }
   Constraints constraints = tissue.constraints;
-  constraints.guide(tissue.contact, motion.direction);
+  constraints.slide(tissue.contact, motion.direction);
   const QuasiStatic solver(tissue.bonds, tissue.rest, constraints,
                            Probe{tissue.contact, motion.direction}, {.tolerance = tolerance});
   std::vector<double> times;

@@ -30,7 +30,7 @@ struct StandingLiver {
     const double near = rest.row(2).minCoeff();
     const double far = rest.row(2).maxCoeff();
     for (std::size_t i = 0; i < constraints.size(); ++i) {
-      if (rest(2, static_cast<Eigen::Index>(i)) > near + 0.7 * (far - near)) constraints.hold(i);
+      if (rest(2, static_cast<Eigen::Index>(i)) > near + 0.7 * (far - near)) constraints.fix(i);
     }
     right.resize(3, rest.cols());
     Random random(1);

@@ -231,7 +231,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   Constraints constraints = tissue.constraints();
   std::vector<Probe> moved;
   for (const std::size_t sphere : spheres_of(contact, tissue.network.organ)) {
-    constraints.guide(sphere, contact.probe.direction);
+    constraints.slide(sphere, contact.probe.direction);
     moved.push_back({sphere, contact.probe.direction});
   }
   const DrivenNetwork driven =

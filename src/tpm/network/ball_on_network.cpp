@@ -29,7 +29,7 @@ BondSystem with_ball(const BondSystem& bonds, const BallTool& ball) {
 
 Constraints with_ball_held(const Constraints& constraints) {
   Constraints all = constraints.extended(1);
-  all.hold(constraints.size());
+  all.fix(constraints.size());
   return all;
 }
 

@@ -24,7 +24,7 @@ void require_valid(const PatchIndentation& indentation, const Constraints& const
   if (indentation.patch.empty()) refuse("a patch without spheres", "a wider patch");
   for (const std::size_t sphere : indentation.patch) {
     if (sphere >= constraints.size() || !constraints.projector(sphere).isZero(0.0)) {
-      refuse(fmt::format("sphere {} of the patch", sphere + 1), "a sphere that is held by it");
+      refuse(fmt::format("sphere {} of the patch", sphere + 1), "a sphere that is fixed by it");
     }
   }
   if (!std::isfinite(indentation.depth_m)) {

@@ -54,7 +54,7 @@ class Bench {
     const Eigen::RowVectorXd height = network_.organ.position.row(2);
     const double middle = height.mean();
     for (std::size_t i = 0; i < constraints_.size(); ++i) {
-      if (height[static_cast<Eigen::Index>(i)] > middle) constraints_.hold(i);
+      if (height[static_cast<Eigen::Index>(i)] > middle) constraints_.fix(i);
     }
   }
 

@@ -67,7 +67,7 @@ PlanRelevance relevance_of_layers(const PlanSurrogate& surrogate) {
   if (moving < 2) {
     return {"layers", std::nullopt, false, false, "only the outer layer moves"};
   }
-  return switched_off(surrogate, "layers", fmt::format("layer {} held", moving),
+  return switched_off(surrogate, "layers", fmt::format("layer {} fixed", moving),
                       [&](const PlanScene& scene) { return scene.with_layers(moving - 1); });
 }
 

@@ -105,7 +105,7 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
                                  const CondensedOptions& options) {
   require_valid(bonds, rest, contact, into_tissue, options);
   Constraints held = constraints;
-  held.hold(contact);
+  held.fix(contact);
   const auto fit = std::make_shared<CondensedFit>();
   fit->frame = frame_of(into_tissue, options);
   fit->contact = static_cast<Eigen::Index>(contact);

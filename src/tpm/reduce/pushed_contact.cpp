@@ -22,7 +22,7 @@ Constraints with_contact_held(Constraints constraints, const PushedSpheres& cont
       throw bad_input("contact", fmt::format("sphere {} is not free", sphere + 1),
                       "a sphere that nothing holds or guides");
     }
-    constraints.hold(sphere);
+    constraints.fix(sphere);
   }
   return constraints;
 }

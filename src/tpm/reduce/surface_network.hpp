@@ -67,7 +67,7 @@ class SurfaceNetwork final : public ContactModel {
   struct SurfaceSphere {
     std::size_t column;        ///< of displacements
     Eigen::Vector3d rest_m;    ///< its centre at rest, from the ball's start
-    const float* fields;       ///< its displacements per force on it, x, y and z; null: it is held
+    const float* fields;       ///< its displacements per force on it, x, y and z; null: it is fixed
     Eigen::Vector3d pushed_N;  ///< with what the ball pushes it
     /// At the end of the last period, and its change in that.
     Eigen::Vector3d before_N = Eigen::Vector3d::Zero(), change_N = Eigen::Vector3d::Zero();

@@ -42,13 +42,13 @@ ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
     const std::uint32_t from = bonds.end_a()[b];
     const std::uint32_t to = bonds.end_b()[b];
     const ServoBonds::Choice choice{b, column_[from], column_[to]};
-    if (held_or_free_[from] == 1 || held_or_free_[to] == 1) {
+    if (zone_role_[from] == 1 || zone_role_[to] == 1) {
       linear[b] = 1;
     } else if (column_[from] == column_[to]) {
-      continue;  // within the patch, or between what is held
+      continue;  // within the patch, or between fixed spheres
     } else if (contact_.has(from) || contact_.has(to)) {
       parts.near.push_back(choice);
-    } else if (held_or_free_[from] == 2 || held_or_free_[to] == 2) {
+    } else if (zone_role_[from] == 2 || zone_role_[to] == 2) {
       parts.far.push_back(choice);
     }
   }
@@ -62,7 +62,7 @@ ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
   const Positions pressed = tissue.at(options_.linear_depth_m * into_, relaxed);
   const LinearBonds around(tissue, pressed, relaxed, linear);
   Constraints outside = tissue.constraints();
-  for (const std::size_t i : zone_) outside.hold(i);
+  for (const std::size_t i : zone_) outside.fix(i);
   BlockLdlt factor(bonds.pattern());
   {
     BlockMatrix matrix = around.matrix(relaxed);

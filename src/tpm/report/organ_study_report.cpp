@@ -296,7 +296,7 @@ void add_costs(Document& document, const OrganStudy& study) {
   document.heading(2, "What \"we ignore the displacement of the spheres A and C\" costs");
   document.paragraph(fmt::format(
       "All tissues at one material. The difference is that from '{}', whose neighbours A and C and "
-      "partner D are held.",
+      "partner D are fixed.",
       study.config.tissues.front().name));
   for (std::size_t m = 0; m < study.config.materials.size(); ++m) {
     const StudyMaterial& material = study.config.materials[m];
@@ -305,9 +305,10 @@ void add_costs(Document& document, const OrganStudy& study) {
     std::string words =
         fmt::format("{}: the fit '{}' of '{}'", element_words(set.parameters.value()),
                     study.config.fits[material.fit].name, study.config.tissues.front().name);
-    for (const auto& [name, value] : material.held.values) words += fmt::format(", {} held", name);
+    for (const auto& [name, value] : material.fixed.values)
+      words += fmt::format(", {} fixed", name);
     for (const HypothesisResult& h : study.fit(material.fit, 0).result->hypotheses) {
-      if (material.held.values.empty() || h.hypothesis.name != material.held.name) continue;
+      if (material.fixed.values.empty() || h.hypothesis.name != material.fixed.name) continue;
       words += fmt::format(" (the deviance rises by {}, p = {})", significant(h.rise, 4),
                            probability(h.p_value));
     }

@@ -79,7 +79,7 @@ DrivenNetwork pushed(const Network& network, const BondSystem& bonds) {
   Constraints constraints(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
     const double further = along[static_cast<Eigen::Index>(i)] - near;
-    if (organ.layer[i] == 0 && further > kFarShare * (along.maxCoeff() - near)) constraints.hold(i);
+    if (organ.layer[i] == 0 && further > kFarShare * (along.maxCoeff() - near)) constraints.fix(i);
   }
   return {
       bonds, organ.position, std::move(constraints), Probes(Probe{contact, direction, 1.0}), {}};

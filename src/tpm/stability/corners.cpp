@@ -187,8 +187,8 @@ struct CornerStar {
   }
   static Constraints freedom_of(bool guided) {
     Constraints constraints(4);
-    if (guided) constraints.guide(1, Eigen::Vector3d::UnitZ());
-    for (const std::size_t i : {0, 2, 3}) constraints.hold(i);
+    if (guided) constraints.slide(1, Eigen::Vector3d::UnitZ());
+    for (const std::size_t i : {0, 2, 3}) constraints.fix(i);
     return constraints;
   }
 

@@ -28,7 +28,7 @@ struct StudyFit {
 struct StudyMaterial {
   std::string name;
   std::size_t fit = 0;  ///< place in OrganStudyConfig::fits
-  Hypothesis held;      ///< no values: the fit as it is
+  Hypothesis fixed;     ///< no values: the fit as it is
 };
 
 /// One experiment of which a curve is computed, SI.

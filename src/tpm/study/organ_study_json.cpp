@@ -33,7 +33,7 @@ Json materials_json(const OrganStudy& study) {
            {"fit", study.config.fits[m.fit].name},
            {"tissue", study.config.tissues.front().name}};
     j["fixed"] = Json::array();
-    for (const auto& [name, value] : m.held.values) j["fixed"].push_back(name);
+    for (const auto& [name, value] : m.fixed.values) j["fixed"].push_back(name);
     j["parameters"] = parameters_json(study.curves[i].parameters.value());
     list.push_back(std::move(j));
   }
