@@ -32,19 +32,19 @@ class Tissue:
         with h5py.File(path, "r") as f:
             self.rest = f["spheres/position_m"][:]
             normal = f["spheres/normal"][:]
-            held = f["spheres/held"][:]
+            constraint = f["spheres/constraint"][:]
             contact = int(np.flatnonzero(f["spheres/contact"][:])[0])
             self.ends = f["bonds/ends"][:].astype(int)
             radial = f["bonds/kind"][:] == 0
             factor = f["bonds/factor"][:]
             self.length = f["bonds/rest_length_m"][:]
-        if (held == 1).any():
+        if (constraint == 1).any():
             raise SystemExit("reference: guided spheres are not known here")
         self.k = factor * STIFFNESS_M * modulus_Pa
         self.g = np.where(radial, 0.5 * self.k, 0.0)  # E1 = E2
         self.push = np.zeros((len(self.rest), 3))
         self.push[contact] = -normal[contact]
-        columns = np.eye(3 * len(self.rest))[:, np.repeat(held == 0, 3)]
+        columns = np.eye(3 * len(self.rest))[:, np.repeat(constraint == 0, 3)]
         rows = slice(3 * contact, 3 * contact + 3)
         across = np.linalg.svd(normal[contact][None])[2][1:]  # two directions beside the push
         keep = ~columns[rows].any(axis=0)

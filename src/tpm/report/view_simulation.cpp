@@ -87,8 +87,11 @@ void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::s
   organ["rest_m"] = page.put(std::span<const float>(floats(rest)));
   organ["layer"] =
       page.put(std::span<const std::uint32_t>(whole_numbers(file, path, "/spheres/layer", kAny)));
-  organ["held"] =
-      page.put(std::span<const std::uint32_t>(whole_numbers(file, path, "/spheres/held", 3)));
+  // Files of version 0.1 name it by another word.
+  const char* const constraint =
+      file.has("/spheres/constraint") ? "/spheres/constraint" : "/spheres/held";
+  organ["constraint"] =
+      page.put(std::span<const std::uint32_t>(whole_numbers(file, path, constraint, 3)));
   organ["bonds"] =
       page.put(std::span<const std::uint32_t>(whole_numbers(file, path, "/bonds/ends", spheres)));
   organ["time_s"] = page.put(std::span<const double>(shown_times));
