@@ -12,7 +12,7 @@
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/gradient_check.hpp"
-#include "tpm/fit/tables.hpp"
+#include "tpm/fit/petab.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"

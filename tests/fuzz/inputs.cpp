@@ -11,7 +11,7 @@
 #include "tpm/curve/import.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/config.hpp"
-#include "tpm/fit/tables.hpp"
+#include "tpm/fit/petab.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/session.hpp"
 #include "tpm/network/mesh_file.hpp"
@@ -80,7 +80,8 @@ void sum_again(const Path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
   const bool has_checksum = file >= 0 && write_checksum(file, std::filesystem::file_size(path));
   if (file >= 0) ::close(file);
-  if (!has_checksum) throw Error(ExitCode::environment, path.native(), "cannot be given a check sum", "room");
+  if (!has_checksum)
+    throw Error(ExitCode::environment, path.native(), "cannot be given a check sum", "room");
 }
 
 /// As it is, then with a check sum and by the scene that it names.

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "tpm/core/text.hpp"
+#include "tpm/curve/contact_onset.hpp"
 #include "tpm/curve/drive_pieces.hpp"
-#include "tpm/curve/touch.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
