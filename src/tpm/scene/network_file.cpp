@@ -38,7 +38,8 @@ void write_spheres(const Tissue& tissue, Hdf5Writer& file) {
   file.integers("/spheres/constraint", role, 1);
   file.integers("/spheres/contact", contact, 1);
   file.attribute("/spheres/layer", "meaning", "1: outermost");
-  file.attribute("/spheres/constraint", "meaning", "0: free, 1: guided along its normal, 2: anchored");
+  file.attribute("/spheres/constraint", "meaning",
+                 "0: free, 1: guided along its normal, 2: anchored");
 }
 
 void write_bonds(const Network& network, Hdf5Writer& file) {
