@@ -141,9 +141,9 @@ TEST_CASE("servo bonds pull and relax as the bonds of the network", "[servo][hea
           position(c, static_cast<Eigen::Index>(i)) += static_cast<double>(moved);
         }
       }
-      const auto expect = [&](std::size_t first, const Eigen::VectorXd& viscous) {
+      const auto expect = [&](std::size_t first, const Eigen::VectorXd& mean_viscous) {
         Eigen::Matrix3Xd exact = Eigen::Matrix3Xd::Zero(3, rest.cols());
-        bonds.add_forces(position, {viscous, 0.0}, exact);
+        bonds.add_forces(position, {mean_viscous, 0.0}, exact);
         double worst = 0.0;
         for (std::size_t i = 0; i < spheres; ++i) {
           for (std::size_t c = 0; c < 3; ++c) {
