@@ -20,7 +20,7 @@ class EmptySpace final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return Eigen::Matrix3d::Identity();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
     return Eigen::Matrix3d::Identity();
   }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
@@ -76,9 +76,9 @@ std::string fault_of(const JitterCheck& check) {
     return fmt::format("a cycle took {}, and is given up after {}", ms(o.busy.max_s()),
                        ms(check.hang_limit_s));
   }
-  if (o.counts.most_missed_at_once > check.missed_limit) {
-    return fmt::format("{} periods were missed at once, a session stops after {}",
-                       o.counts.most_missed_at_once, check.missed_limit);
+  if (o.counts.most_consecutive_missed > check.missed_limit) {
+    return fmt::format("{} consecutive periods were missed, a session stops after {}",
+                       o.counts.most_consecutive_missed, check.missed_limit);
   }
   if (o.counts.most_late > check.late_limit) {
     return fmt::format("{} cycles of 1000 were late, a session stops after {}", o.counts.most_late,

@@ -32,7 +32,7 @@ class ScalarCandidate : public PlanModel {
       const PlanSurrogate& surrogate, std::span<const double> periods_s) const override {
     constexpr double kRange = 1.05;  // as of other contact models
     const ContactSpectrum& spectrum = surrogate.spectrum();
-    const ScalarContact::Range range{spectrum.instantaneous(), spectrum.relaxed(),
+    const ScalarContact::Range range{spectrum.instantaneous(), spectrum.equilibrium(),
                                      kRange * surrogate.scene().protocol().peak()};
     std::vector<std::unique_ptr<ContactModel>> models;
     for (const double period_s : periods_s) {
@@ -130,10 +130,10 @@ class ElementCandidate final : public LinearCandidate {
     const ContactSpectrum& spectrum = surrogate.spectrum();
     const Tissue& tissue = surrogate.scene().scene().tissue;
     const BondMaterial& material = tissue.materials.materials.front();
-    DepthCurve relaxed = straight(spectrum.relaxed());
-    relaxed.tension_N_per_m = 2.0 * material.lateral_Pa * material.modulus_to_stiffness_m();
-    relaxed.spacing_m = tissue.network.organ.spacing;
-    return {std::move(relaxed), straight(spectrum.instantaneous() - spectrum.relaxed()),
+    DepthCurve equilibrium = straight(spectrum.equilibrium());
+    equilibrium.tension_N_per_m = 2.0 * material.lateral_Pa * material.modulus_to_stiffness_m();
+    equilibrium.spacing_m = tissue.network.organ.spacing;
+    return {std::move(equilibrium), straight(spectrum.instantaneous() - spectrum.equilibrium()),
             fitted_branches(spectrum, 1), 1.0};
   }
 };

@@ -16,14 +16,14 @@ DepthCurve straight_curve(double stiffness_N_per_m) {
 }  // namespace
 
 ScalarModel linear_contact(const ContactSpectrum& spectrum, int branches) {
-  return {straight_curve(spectrum.relaxed()),
-          straight_curve(spectrum.instantaneous() - spectrum.relaxed()),
+  return {straight_curve(spectrum.equilibrium()),
+          straight_curve(spectrum.instantaneous() - spectrum.equilibrium()),
           fitted_branches(spectrum, branches), 1.0};
 }
 
 ScalarModel curves_contact(const ContactCurves& curves, const ContactSpectrum& spectrum,
                            int branches) {
-  return {curves.relaxed, curves.relaxing, fitted_branches(spectrum, branches), 1.0};
+  return {curves.equilibrium, curves.relaxing, fitted_branches(spectrum, branches), 1.0};
 }
 
 ScalarRun::ScalarRun(const Protocol& protocol, ScalarModel model, double longest_step_s,
