@@ -8,7 +8,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 #include "tpm/core/random.hpp"
 #include "tpm/fit/fit.hpp"

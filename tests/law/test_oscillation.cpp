@@ -10,7 +10,6 @@
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/gradient_check.hpp"
 #include "tpm/report/fit_report.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_model.hpp"
 

@@ -8,11 +8,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/surface_scene.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::haptics;

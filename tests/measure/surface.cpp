@@ -16,7 +16,6 @@
 #include "tpm/haptics/surface_scene.hpp"
 #include "tpm/reduce/surface_network.hpp"
 #include "tpm/servo/real_time.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

@@ -6,7 +6,6 @@
 
 #include "star_network.hpp"
 #include "tpm/network/driven_network.hpp"
-#include "tpm/network/material_directions.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/simulate/static_path.hpp"
 #include "tpmkit/error.hpp"

@@ -1,6 +1,5 @@
 // Tools among spheres with mass: impacts, closed forms of a sphere on a spring, the energy, and
 // what forces tend to as contacts are made stiffer.
-#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <optional>
