@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string_view>
 #include <utility>
@@ -142,13 +143,21 @@ Json to_json(const std::vector<Figure>& figures) {
 }
 
 Series line(std::string label, std::vector<double> x, std::vector<double> y) {
-  Series s;
-  s.kind = Series::Kind::line;
-  s.label = std::move(label);
-  s.provenance = "model";
-  s.x = std::move(x);
-  s.y = std::move(y);
-  return s;
+  return {.kind = Series::Kind::line,
+          .label = std::move(label),
+          .provenance = "model",
+          .x = std::move(x),
+          .y = std::move(y)};
+}
+
+void add_if_any(Panel& panel, Series series) {
+  if (!series.x.empty()) panel.series.push_back(std::move(series));
+}
+
+std::string spaced(std::string_view name) {
+  std::string words(name);
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
 }
 
 }  // namespace tpm::report

@@ -178,10 +178,7 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
   for (const std::string& name : axis.parameters) {
     const std::vector<double> values = sweep.parameter(name);
     const Unit unit_x = shown_unit_of(sweep.parameter_unit(name));
-    Series cloud;
-    cloud.kind = Series::Kind::points;
-    cloud.label = v.name;
-    cloud.provenance = "model";
+    Series cloud{.kind = Series::Kind::points, .label = v.name, .provenance = "model"};
     for (const std::size_t i : chosen) {
       if (!std::isfinite(found[i])) continue;
       cloud.x.push_back(values[i] / unit_x.to_si);
@@ -235,10 +232,7 @@ Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const Sweep
 Figure pareto_figure(const SweepReader& sweep, const std::string& first,
                      const std::string& second) {
   std::vector<std::pair<double, double>> front;
-  Series cloud;
-  cloud.kind = Series::Kind::points;
-  cloud.label = "cells";
-  cloud.provenance = "model";
+  Series cloud{.kind = Series::Kind::points, .label = "cells", .provenance = "model"};
   const std::uint64_t stride = sweep.cells() / kMostPoints + 1;
   std::uint64_t cell = 0;
   const Unit unit_x = shown_unit_of(sweep.variable(second).unit),
