@@ -47,7 +47,7 @@ class ContactModel {
   [[nodiscard]] virtual Eigen::Index spheres() const noexcept { return 0; }
   /// Displacements of all spheres after the last step, m.
   /// @param all 3 x spheres()
-  virtual void displacements(Eigen::Ref<Eigen::Matrix3Xd> /*all*/) const noexcept {}
+  virtual void displacements([[maybe_unused]] Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {}
 };
 
 }  // namespace tpm

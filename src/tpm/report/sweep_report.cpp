@@ -22,10 +22,6 @@ std::vector<double> in_shown_unit(std::vector<double> values, const Unit& unit) 
   return values;
 }
 
-std::string named_in_unit(const std::string& name, const Unit& unit) {
-  return unit.symbol.empty() ? name : fmt::format("{} [{}]", name, unit.symbol);
-}
-
 /// At most so many numbers from 0 to count - 1, evenly, both ends among them.
 std::vector<std::size_t> some_of(std::size_t count, std::size_t most) {
   std::vector<std::size_t> chosen;
@@ -285,6 +281,10 @@ FoundRange range_of(const SweepReader& sweep, const std::string& name) {
 }
 
 }  // namespace
+
+std::string named_in_unit(const std::string& name, const Unit& unit) {
+  return unit.symbol.empty() ? name : fmt::format("{} [{}]", name, unit.symbol);
+}
 
 Unit shown_unit_of(const std::string& si_unit) {
   if (si_unit.empty()) return {"", Dimension::dimensionless, 1.0};
