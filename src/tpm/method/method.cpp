@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/method/adaptive_rules.hpp"
@@ -31,21 +32,15 @@ void require_valid(const MethodSettings& settings) {
 }
 
 std::string_view words(MethodEnd end) {
-  switch (end) {
-    case MethodEnd::completed:
-      return "";
-    case MethodEnd::diverged:
-      return "a value is not finite or grew beyond 1000 times its scale";
-    case MethodEnd::newton_failed:
-      return "Newton's method found no solution";
-    case MethodEnd::buckled:
-      return "the tangent stiffness is no longer positive definite";
-    case MethodEnd::too_much_work:
-      return "more evaluations of the forces than allowed";
-    case MethodEnd::not_applicable:
-      return "the rule has no meaning here";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<MethodEnd>>({
+      {MethodEnd::completed, ""},
+      {MethodEnd::diverged, "a value is not finite or grew beyond 1000 times its scale"},
+      {MethodEnd::newton_failed, "Newton's method found no solution"},
+      {MethodEnd::buckled, "the tangent stiffness is no longer positive definite"},
+      {MethodEnd::too_much_work, "more evaluations of the forces than allowed"},
+      {MethodEnd::not_applicable, "the rule has no meaning here"},
+  });
+  return word_for(kNames, end);
 }
 
 /// One run through the protocol.

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -14,29 +15,19 @@ namespace tpm::report {
 namespace {
 
 std::string_view kind_name(Series::Kind kind) {
-  switch (kind) {
-    case Series::Kind::line:
-      return "line";
-    case Series::Kind::points:
-      return "points";
-    case Series::Kind::band:
-      return "band";
-    case Series::Kind::bracket:
-      return "bracket";
-    case Series::Kind::mark:
-      return "mark";
-    case Series::Kind::trail:
-      return "trail";
-    case Series::Kind::failed:
-      return "failed";
-    case Series::Kind::upright:
-      return "upright";
-    case Series::Kind::level:
-      return "level";
-    case Series::Kind::heat:
-      return "heat";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<Series::Kind>>({
+      {Series::Kind::line, "line"},
+      {Series::Kind::points, "points"},
+      {Series::Kind::band, "band"},
+      {Series::Kind::bracket, "bracket"},
+      {Series::Kind::mark, "mark"},
+      {Series::Kind::trail, "trail"},
+      {Series::Kind::failed, "failed"},
+      {Series::Kind::upright, "upright"},
+      {Series::Kind::level, "level"},
+      {Series::Kind::heat, "heat"},
+  });
+  return word_for(kNames, kind);
 }
 
 /// More than a drawing shows, and the same on every machine.
