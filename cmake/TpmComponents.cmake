@@ -23,7 +23,7 @@ set(TPM_core_OF_solve cardinal_weight creep_exact exponential_collocation expone
     laplace_contour mittag_leffler nonnegative relaxation_filter relaxation_spectrum springpot_pair)
 set(TPM_core_OF_law contact_edge_force contact_geometry contact_history contact_history_load contact_retreat
     creep_weights depth_pieces drive_path frequency_response imposed_depth imposed_load kelvin_chain kept_step kernel
-    kernel_tables law law_model memory operational_stiffness prony_table relaxation stored_energy tension_creep)
+    kernel_tables law law_model operational_stiffness prony_table relaxation relaxation_sum stored_energy tension_creep)
 set(TPM_haptics_OF_formulations loop_contacts reduced_contacts)
 set(TPM_fit_OF_study material_function recording_setup selection selection_output selection_warnings)
 set(TPM_organ_OF_library scene)

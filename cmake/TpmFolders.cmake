@@ -138,18 +138,18 @@ namespace tpm {
 endfunction()
 
 set(TPM_SANITIZED_FOLDERS core store protocol material solve model law network curve scene simulate method
-    reduce device servo haptics sample CACHE STRING "Folders under address and undefined in sanitized twins")
+    reduce device servo haptics sample CACHE STRING "Folders under address and undefined in sanitized copies")
 
-# A twin of the library in which the folders named run under sanitizers; the others are those of
-# tpmkit. The fast tests, compiled once, run with tpmkit and with the twin. A folder's own inline
+# A copy of the library in which the folders named run under sanitizers; the others are those of
+# tpmkit. The fast tests, compiled once, run with tpmkit and with the copy. A folder's own inline
 # functions stay its own (-Bsymbolic-functions), or those of the tests would take their place.
-function(tpm_sanitized_twin twin sanitize)
+function(tpm_sanitized_copy copy sanitize)
   set(flags -fsanitize=${sanitize} -fno-omit-frame-pointer -fno-sanitize-recover=all -O1 -g1 -Wno-maybe-uninitialized)
   if(sanitize MATCHES "address" AND sanitize MATCHES "undefined")
     list(APPEND flags -fno-sanitize=null,alignment,object-size,vptr -DEIGEN_MALLOC_ALREADY_ALIGNED=1)
     # for both see TpmCompileOptions.cmake
   endif()
-  tpm_folders(_${twin} "${flags}" ${ARGN})
+  tpm_folders(_${copy} "${flags}" ${ARGN})
   set(rest ${TPM_FOLDERS})
   list(REMOVE_ITEM rest ${ARGN})
   foreach(folder IN LISTS rest)
@@ -160,8 +160,8 @@ function(tpm_sanitized_twin twin sanitize)
       endif()
     endforeach()
   endforeach()
-  add_library(${twin} SHARED ${TPM_FOLDER_OBJECTS} ${TPM_LISTS})
-  set_target_properties(${twin} PROPERTIES LINKER_LANGUAGE CXX OUTPUT_NAME tpmkit_${twin})
-  target_link_options(${twin} PUBLIC -fsanitize=${sanitize} PRIVATE -Wl,-Bsymbolic-functions)
-  target_link_libraries(${twin} PRIVATE fmt::fmt ${TPM_PRIVATE_LIBRARIES})
+  add_library(${copy} SHARED ${TPM_FOLDER_OBJECTS} ${TPM_LISTS})
+  set_target_properties(${copy} PROPERTIES LINKER_LANGUAGE CXX OUTPUT_NAME tpmkit_${copy})
+  target_link_options(${copy} PUBLIC -fsanitize=${sanitize} PRIVATE -Wl,-Bsymbolic-functions)
+  target_link_libraries(${copy} PRIVATE fmt::fmt ${TPM_PRIVATE_LIBRARIES})
 endfunction()

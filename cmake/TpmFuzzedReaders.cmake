@@ -10,7 +10,7 @@ set(readers_network mesh_file mesh_surface triangle_mesh)
 set(readers_scene contact_blocks experiment_blocks experiment_scene material_block organ_block place_function protocol_file scene
     tissue_blocks)
 set(readers_simulate checkpoint)
-set(readers_fit config config_data config_noise config_parameters tables)
+set(readers_fit config config_data config_noise config_parameters petab)
 set(readers_plan operations)
 set(readers_haptics recording session session_phases)
 set(readers_study audit audit_kinds audit_tables claim_reader claims design_file expression organ_study_file)

@@ -219,7 +219,7 @@ CASES = [
     Case("2", "HDF5 whose groups are links into another file", linked_outside, "$TPM data show c.h5",
          "test_hdf5_contained"),
     Case("2", "200 HDF5 files with 1 to 10 bytes changed", packed, MUTANTS, "test_hdf5_contained, fuzz: hdf5"),
-    Case("3", "22 checkpoints with one bit changed", simulation_cut, FLIPS, "test_files: sealed files"),
+    Case("3", "22 checkpoints with one bit changed", simulation_cut, FLIPS, "test_files: files with a check sum"),
     Case("4", "a disk with room for 16 kB of HDF5", files(organ__json=LIVER),
          "( ulimit -f 32; trap '' XFSZ; exec $TPM network build organ.json -o o.h5 )",
          "test_files: A disk that gets full", parts_left),

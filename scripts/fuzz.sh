@@ -64,7 +64,7 @@ reader_of() {
     jpk) echo curve/import_jpk.cpp ;;
     scene) echo scene/scene.cpp ;;
     fit) echo fit/config.cpp ;;
-    fit_tables) echo fit/tables.cpp ;;
+    fit_tables) echo fit/petab.cpp ;;
     session) echo haptics/session.cpp ;;
     sweep) echo sweep/sweep_file.cpp ;;
     design) echo study/design_file.cpp ;;

@@ -5,8 +5,8 @@
                     [--shell COUNT...] [--solid COUNT...] [--most-s S] [--most-GiB G]
     growth_chart.py draw RECORD FIGURE.svg
 
-PROGRAM is measure_factorisation of this version and of an earlier one, tests/measure/judges/cholmod_factor, and
-measure_growth for conjugate gradients with multigrid; scipy's solver is scripts/growth_judges.py. Every case is a
+PROGRAM is measure_factorisation of this version and of an earlier one, tests/measure/peers/cholmod_factor, and
+measure_growth for conjugate gradients with multigrid; scipy's solver is scripts/growth_scipy.py. Every case is a
 process of its own. One that passes the limits of time or memory is named in the record, and larger ones of
 its kind are left out. The record, a line of JSON a case, is kept: cases that it has are not run again. `draw`
 also prints the tables in Markdown.
@@ -74,16 +74,16 @@ def measure(options):
                 add(kind, count, "tpm", [options.after, kind, str(count)])
                 if options.before:
                     add(kind, count, "before", [options.before, kind, str(count)])
-                judges = {}
+                peers = {}
                 if options.cholmod:
-                    judges["cholmod"] = [options.cholmod, matrix]
-                judges["splu"] = [sys.executable, str(HERE / "growth_judges.py"), matrix]
-                wanted = [s for s in judges if (kind, s) not in stopped and not any(
+                    peers["cholmod"] = [options.cholmod, matrix]
+                peers["splu"] = [sys.executable, str(HERE / "growth_scipy.py"), matrix]
+                wanted = [s for s in peers if (kind, s) not in stopped and not any(
                     k["kind"] == kind and k["count"] == count and k["solver"] == s for k in known)]
                 if wanted and not (kind, "tpm") in stopped:
                     subprocess.run([options.after, kind, str(count), matrix], check=True, stdout=subprocess.DEVNULL)
                     for solver in wanted:
-                        add(kind, count, solver, judges[solver])
+                        add(kind, count, solver, peers[solver])
     if options.growth:
         for kind, counts in (("shell", options.shell_multigrid), ("solid", options.solid_multigrid)):
             for count in counts:

@@ -35,10 +35,11 @@ class BulletEngine final : public Engine {
       return mass > 0.0 ? 1.0 / mass : 0.0;
     };
     for (const SpringNetwork::Spring& s : n.springs) {
-      const double give = inverse(s.a) + inverse(s.b);
-      if (give == 0.0) continue;
+      const double compliance = inverse(s.a) + inverse(s.b);
+      if (compliance == 0.0) continue;
       btSoftBody::Material* material = body_->appendMaterial();
-      material->m_kLST = std::min(1.0, step_s * step_s * s.stiffness_N_per_m * give / iterations);
+      material->m_kLST =
+          std::min(1.0, step_s * step_s * s.stiffness_N_per_m * compliance / iterations);
       body_->appendLink(s.a, s.b, material);
     }
     body_->m_cfg.piterations = iterations;

@@ -11,7 +11,7 @@
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
-#include "tpm/fit/tables.hpp"
+#include "tpm/fit/petab.hpp"
 #include "tpm/law/contact_geometry.hpp"
 #include "tpm/report/fit_csv.hpp"
 #include "tpm/report/fit_report.hpp"

@@ -35,8 +35,8 @@ int show(const SweepViewChoice& choice, const Session& session) {
 }
 
 /// "rate=4 mm/s": the nearest place on that axis; one that is not the wished one is told.
-std::pair<std::string, std::uint64_t> parse_held(const std::string& text,
-                                                 const SweepReader& sweep) {
+std::pair<std::string, std::uint64_t> parse_fixed(const std::string& text,
+                                                  const SweepReader& sweep) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos) {
     throw Error(ExitCode::usage, "--at", fmt::format("'{}'", printable(text)), "AXIS=VALUE");
@@ -73,15 +73,15 @@ void draw_into(const std::string& folder, const std::vector<Figure>& figures) {
 int sensitivity(const SweepViewChoice& choice, const Session& session) {
   will_write_into(choice.figure_folder, {"figures.json"});
   const SweepReader sweep(choice.file);
-  HeldPlaces held;
-  for (const std::string& text : choice.at) held.push_back(parse_held(text, sweep));
+  FixedPlaces fixed;
+  for (const std::string& text : choice.at) fixed.push_back(parse_fixed(text, sweep));
   std::vector<SweepSensitivity> all;
   for (const ReadVariable& v : sweep.variables()) {
     const bool wished =
         choice.variables.empty()
             ? v.times_s.empty() && !v.name.starts_with("count_")
             : std::count(choice.variables.begin(), choice.variables.end(), v.name) > 0;
-    if (wished) all.push_back(sensitivity_of(sweep, v.name, held));
+    if (wished) all.push_back(sensitivity_of(sweep, v.name, fixed));
   }
   for (const std::string& name : choice.variables) static_cast<void>(sweep.variable(name));
   say("{}", session.json() ? to_text(sensitivity_json(all)) : sensitivity_text(all));
@@ -92,8 +92,8 @@ int sensitivity(const SweepViewChoice& choice, const Session& session) {
 int convergence(const SweepViewChoice& choice, const Session& session) {
   will_write_into(choice.figure_folder, {"figures.json"});
   const SweepReader sweep(choice.file);
-  HeldPlaces held;
-  for (const std::string& text : choice.at) held.push_back(parse_held(text, sweep));
+  FixedPlaces fixed;
+  for (const std::string& text : choice.at) fixed.push_back(parse_fixed(text, sweep));
   std::optional<std::string> axis;
   if (!choice.axis.empty()) axis = choice.axis;
   std::vector<std::string> names = choice.variables;
@@ -104,7 +104,7 @@ int convergence(const SweepViewChoice& choice, const Session& session) {
   std::vector<SweepConvergence> all;
   all.reserve(names.size());
   for (const std::string& name : names) {
-    all.push_back(convergence_of(sweep, name, axis, choice.size, held));
+    all.push_back(convergence_of(sweep, name, axis, choice.size, fixed));
   }
   if (session.json()) {
     say("{}", to_text(convergence_json(all)));
@@ -176,7 +176,7 @@ int plot(const SweepViewChoice& choice) {
   wished.variables = choice.variables;
   if (!choice.x.empty()) wished.x = choice.x;
   if (!choice.y.empty()) wished.y = choice.y;
-  for (const std::string& text : choice.at) wished.held.push_back(parse_held(text, sweep));
+  for (const std::string& text : choice.at) wished.fixed.push_back(parse_fixed(text, sweep));
   if (!choice.pareto.empty()) {
     const std::size_t comma = choice.pareto.find(',');
     if (comma == std::string::npos) {
@@ -198,13 +198,13 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   showing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   add_format_option(*showing, session);
   set_run(*showing, session, [choice, &session] { return show(*choice, session); });
-  CLI::App* judging = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
-  judging->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
-  judging->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
-  judging->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
-  judging->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
-  add_format_option(*judging, session);
-  set_run(*judging, session, [choice, &session] { return sensitivity(*choice, session); });
+  CLI::App* command = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
+  command->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
+  command->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
+  command->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
+  command->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
+  add_format_option(*command, session);
+  set_run(*command, session, [choice, &session] { return sensitivity(*choice, session); });
   CLI::App* refining = sweep.add_subcommand(
       "convergence", "Order, extrapolated value and grid convergence index along an axis");
   refining->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();

@@ -42,7 +42,7 @@ class ContactModel {
   /// Instantaneous tangent stiffness at rest, N/m; limits of passivity use it.
   [[nodiscard]] virtual Eigen::Matrix3d instantaneous_stiffness() const noexcept = 0;
   /// Equilibrium tangent stiffness at rest, N/m.
-  [[nodiscard]] virtual Eigen::Matrix3d relaxed_stiffness() const noexcept = 0;
+  [[nodiscard]] virtual Eigen::Matrix3d equilibrium_stiffness() const noexcept = 0;
   /// Number of spheres whose displacements displacements() writes; none unless a model says so.
   [[nodiscard]] virtual Eigen::Index spheres() const noexcept { return 0; }
   /// Displacements of all spheres after the last step, m.

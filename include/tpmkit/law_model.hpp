@@ -8,7 +8,7 @@
 
 namespace tpm {
 
-class FractionalMemory;
+class ExponentialSum;
 struct LawAtParameters;
 
 /// A law of the family as a Model for tables, fits and plans.
@@ -55,15 +55,14 @@ class LawModel final : public Model {
   /// The law at given parameters, branches in parallel form, as time steppers use it.
   /// @param rates of a fractional law, else unused
   [[nodiscard]] LawAtParameters at(std::span<const double> values,
-                                   const FractionalMemory* rates) const;
+                                   const ExponentialSum* rates) const;
   [[nodiscard]] bool linear_in(std::size_t parameter) const override;
   [[nodiscard]] std::pair<double, double> range(std::size_t parameter) const override;
 
  private:
   struct Prepared;
   /// @param rates of a fractional law, else unused
-  [[nodiscard]] Prepared prepare(std::span<const double> values,
-                                 const FractionalMemory* rates) const;
+  [[nodiscard]] Prepared prepare(std::span<const double> values, const ExponentialSum* rates) const;
   void require_no_jump(const Protocol& protocol, double contact) const;
 
   LawSpec spec_;

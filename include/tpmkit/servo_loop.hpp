@@ -72,8 +72,8 @@ struct ServoSettings : SessionServo {
 struct ServoCounts {
   std::uint64_t time_guards = 0, saturations = 0, force_limited = 0, slipped = 0, ramping_in = 0,
                 damped = 0, beyond_model = 0, late = 0, missed = 0;
-  int most_missed_at_once = 0;  ///< most periods missed between two cycles
-  int most_late = 0;            ///< most late cycles in any 1000 consecutive ones
+  int most_consecutive_missed = 0;  ///< most periods missed between two cycles
+  int most_late = 0;                ///< most late cycles in any 1000 consecutive ones
 };
 
 /// Counts times in bins of 1 us up to 50 ms. note() neither allocates nor throws.

@@ -37,7 +37,7 @@ struct TpmParameters {
     return other;
   }
   /// P2 = E1 E2 / (E1 + E2), Pa: modulus after full relaxation, without tension.
-  [[nodiscard]] double relaxed_modulus_Pa() const { return E1_Pa * E2_Pa / (E1_Pa + E2_Pa); }
+  [[nodiscard]] double equilibrium_modulus_Pa() const { return E1_Pa * E2_Pa / (E1_Pa + E2_Pa); }
   /// g = E2^2 / (E1 + E2), Pa: the part of E2 that relaxes; E2 = P2 + g.
   [[nodiscard]] double relaxing_modulus_Pa() const { return E2_Pa * E2_Pa / (E1_Pa + E2_Pa); }
   /// A0 / l0, m: turns a modulus into a stiffness.

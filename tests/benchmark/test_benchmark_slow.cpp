@@ -182,7 +182,7 @@ TEST_CASE("a reference that its second does not confirm is refused") {
   CHECK_THAT(good.agreement, WithinRel(5e-8, 1e-6));
   CHECK_THAT(good.floor, WithinRel(5e-7, 1e-6));
   CHECK(good.response_for("a") == good.second.response);
-  CHECK(good.response_for("c") == good.judge.response);
+  CHECK(good.response_for("c") == good.first.response);
   CHECK_THAT(test::refusal_of([&] { (void)check(right * (1.0 + 2e-7), "b"); }),
              Contains("reference of liver") && Contains("differ by 2e-07 of the peak"));
   CHECK_THAT(test::refusal_of([&] { (void)check(right, "a"); }), Contains("both answers"));
@@ -214,7 +214,7 @@ TEST_CASE("how a run ended decides what becomes of it") {
   CHECK(result.points[3].reason == "went away");
   CHECK(result.points[0].times.value().repeats == 7);
   CHECK(result.points[3].times.value().repeats == 1);
-  // The judge's own method is compared with the second answer.
+  // The first answer's own method is compared with the second answer.
   CHECK_THAT(result.points[4].error, WithinRel(1e-5, 1e-6));
   CHECK(result.points[4].below_floor);
   const BenchmarkStepTimes steps = result.points[0].step_times.value();

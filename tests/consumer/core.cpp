@@ -14,7 +14,7 @@ int main() {
   std::vector<double> values(law.parameters().size(), 0.0);
   const double to_stiffness = p.modulus_to_stiffness_m();
   const double reference = law.spec().reference;
-  values[law.index("k_inf")] = p.relaxed_modulus_Pa() * to_stiffness;
+  values[law.index("k_inf")] = p.equilibrium_modulus_Pa() * to_stiffness;
   values[law.index("k1")] = p.relaxing_modulus_Pa() * to_stiffness;
   values[law.index("tau1")] = p.relaxation_time_s();
   values[law.index("k_tension")] =

@@ -25,17 +25,18 @@ void require_calibrated(const FitConfig& config) {
 
 }  // namespace
 
-TEST_CASE("profile intervals hold the truth as often as they say: known absolute noise") {
+TEST_CASE("profile intervals hold the true value as often as they say: known absolute noise") {
   require_calibrated(calibration());
 }
 
-TEST_CASE("profile intervals hold the truth as often as they say: estimated noise, F thresholds") {
+TEST_CASE(
+    "profile intervals hold the true value as often as they say: estimated noise, F thresholds") {
   FitConfig config = calibration();
   config.data[0].noise.scale_known = false;
   require_calibrated(config);
 }
 
-TEST_CASE("profile intervals hold the truth as often as they say: log-normal noise") {
+TEST_CASE("profile intervals hold the true value as often as they say: log-normal noise") {
   FitConfig config = calibration();
   config.data[0].noise = {NoiseKind::log, 0.0, 0.01, true};
   require_calibrated(config);

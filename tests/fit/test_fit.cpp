@@ -132,8 +132,8 @@ TEST_CASE("derivatives of every cost function pass Ceres' gradient checker") {
 }
 
 TEST_CASE("derivatives through CVODES equal those through the closed form") {
-  // Differences of an adaptive integrator are noise, so its sensitivities are judged by the exact
-  // ones instead.
+  // Differences of an adaptive integrator are noise, so its sensitivities are compared with the
+  // exact ones instead.
   for (const char* dataset : {"evren_relaxation", "amy_creep"}) {
     FitConfig config = relaxation();
     if (std::string(dataset) == "amy_creep") {
@@ -284,10 +284,10 @@ TEST_CASE("a parameter that does nothing is flat") {
 TEST_CASE("a measured recording is fitted along its own displacement") {
   // A synthetic recording (said so in its header) made by the model itself.
   const auto folder = temporary_folder();
-  TpmParameters truth;
-  truth.E1_Pa = truth.E2_Pa = truth.Eprime_Pa = 9e3;
-  truth.eta1_Pa_s = 4e4;
-  truth.spacing_m = 0.02;
+  TpmParameters true_values;
+  true_values.E1_Pa = true_values.E2_Pa = true_values.Eprime_Pa = 9e3;
+  true_values.eta1_Pa_s = 4e4;
+  true_values.spacing_m = 0.02;
   std::vector<double> t;
   std::vector<double> u;
   for (int i = 0; i <= 200; ++i) {
@@ -296,7 +296,7 @@ TEST_CASE("a measured recording is fitted along its own displacement") {
   }
   const auto model = make_model("closed_form");
   const Response r = model->respond(measured_history(Drive::displacement, t, u), t,
-                                    to_vector(truth), Want::values);
+                                    to_vector(true_values), Want::values);
   std::string csv = "time_s,depth_mm,force_N\n";
   for (std::size_t i = 0; i < t.size(); ++i) {
     csv += fmt::format("{},{},{}\n", t[i], u[i] * 1e3, r.value[static_cast<Eigen::Index>(i)]);

@@ -114,14 +114,14 @@ TEST_CASE("an organ follows a measured motion in straight pieces, nearly as it d
   }
   CHECK(off <= kMotionWithin * *std::max_element(depth.begin(), depth.end()));
   CHECK(off > 0.0);
-  const std::vector<double> truth{8e3, 6e3};
-  const double apart = (function.predict(truth, nullptr) - force).cwiseAbs().maxCoeff();
+  const std::vector<double> true_values{8e3, 6e3};
+  const double apart = (function.predict(true_values, nullptr) - force).cwiseAbs().maxCoeff();
   CHECK(apart > 0.0);  // the pieces, not the whole
   CHECK(apart < 3.0 * kMotionWithin * force.maxCoeff());
 
   const FitResult fit = run_fit(config);
-  CHECK(fit.best.natural[0] == Approx(truth[0]).epsilon(2e-3));
-  CHECK(fit.best.natural[1] == Approx(truth[1]).epsilon(5e-3));
+  CHECK(fit.best.natural[0] == Approx(true_values[0]).epsilon(2e-3));
+  CHECK(fit.best.natural[1] == Approx(true_values[1]).epsilon(5e-3));
   REQUIRE(fit.recordings.size() == 1);
   REQUIRE(fit.recordings.front().drive.size() == depth.size());
   for (std::size_t i = 0; i < depth.size(); ++i) {

@@ -13,7 +13,7 @@
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/gradient_check.hpp"
-#include "tpm/fit/tables.hpp"
+#include "tpm/fit/petab.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
@@ -26,7 +26,7 @@ using Catch::Matchers::WithinRel;
 
 namespace {
 
-/// Truth of the synthetic recordings: k_inf, k1 (N/m), tau1 (s), contact, offset.
+/// True values of the synthetic recordings: k_inf, k1 (N/m), tau1 (s), contact, offset.
 const std::vector<double> kTrueValues{40.0, 60.0, 5.0, 0.0, 0.0};
 
 /// A ramp of 2 s to 4 mm and a hold to 30 s, answered by the law linear-1 and scattered by `error`
@@ -353,7 +353,8 @@ TEST_CASE("two equal relaxation times: the covariance is not of full rank, or sa
   CHECK(open >= 2);
 }
 
-TEST_CASE("exact data: the truth comes back, and nothing divides by the noise that is not there") {
+TEST_CASE(
+    "exact data: the true values come back, and nothing divides by the noise that is not there") {
   const std::vector<DataSet> data{DataSet(computed_recording(std::vector<double>(100, 0.0)))};
   const FitResult fit = run_fit(law_config(kKnown), data);
   CHECK_THAT(find(fit, "tau1").estimate, WithinRel(5.0, 1e-6));

@@ -48,22 +48,22 @@ class WithoutSurrogate final : public ResidualFunction {
 }  // namespace
 
 TEST_CASE("an organ's parameters come back from its own answers") {
-  const std::vector<double> truth{2.1e4, 1.4e5, 0.033};
+  const std::vector<double> true_values{2.1e4, 1.4e5, 0.033};
   ExperimentResiduals function(small_config());
-  const Eigen::VectorXd answers = function.predict(truth, nullptr);
+  const Eigen::VectorXd answers = function.predict(true_values, nullptr);
   for (std::size_t i = 0; i < function.data().size(); ++i) {
     function.set_value(i, answers[static_cast<Eigen::Index>(i)]);
   }
   const FitResult fit = fit_experiments(function);
   CHECK(fit.chi_square < 1e-6);
   CHECK(fit.starts_failed == 0);
-  for (std::size_t i = 0; i < truth.size(); ++i) {
+  for (std::size_t i = 0; i < true_values.size(); ++i) {
     CAPTURE(i);
-    CHECK_THAT(fit.best.natural[i], WithinRel(truth[i], 5e-3));
+    CHECK_THAT(fit.best.natural[i], WithinRel(true_values[i], 5e-3));
   }
 }
 
-TEST_CASE("the search that a scout leads ends where Ceres does without") {
+TEST_CASE("the search that a surrogate leads ends where Ceres does without") {
   const FitConfig config = small_config();
   const ExperimentResiduals function(config);
   const std::vector<FitParameter> parameters = fit_parameters(config);

@@ -143,7 +143,7 @@ class Decay final : public ResidualFunction {
 
 }  // namespace
 
-TEST_CASE("a search with a scout ends where one without does, and asks less") {
+TEST_CASE("a search with a surrogate ends where one without does, and asks less") {
   const std::vector<FitParameter> parameters{{"a", {}, Scale::log, 1.0, 1e-3, 1e3},
                                              {"tau", {}, Scale::log, 1.0, 1e-3, 1e3}};
   const Decay plain(0.5, nullptr);

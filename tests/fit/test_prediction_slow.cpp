@@ -5,7 +5,7 @@
 
 namespace tpm::fit {
 
-TEST_CASE("bands hold held-out readings and the truth as often as they say") {
+TEST_CASE("bands hold held-out readings and the true value as often as they say") {
   constexpr int kSimulations = 300;
   constexpr double kRejected = 1e-3;
   const auto c = test::held_out_coverage(parse_law_name("linear-1", "test"),

@@ -388,11 +388,11 @@ TEST_CASE("both parts of sigma = a + b |f| are found") {
   CHECK(m.converged);
   const Covariance c = linear_covariance(function, parameters, m, Threshold{});
   REQUIRE(c.full_rank);
-  const std::array truth{10.0, 0.5, 0.1};
+  const std::array true_values{10.0, 0.5, 0.1};
   for (std::size_t i = 0; i < 3; ++i) {
     const double sd = c.theta_sd[static_cast<Eigen::Index>(i)];
     CAPTURE(parameters[i].name, m.natural[i], sd);
-    CHECK(std::abs(std::log(m.natural[i] / truth[i])) < 3.0 * sd);
+    CHECK(std::abs(std::log(m.natural[i] / true_values[i])) < 3.0 * sd);
     CHECK(sd < 0.2);
   }
 }

@@ -1,4 +1,4 @@
-// Statistics checked by simulation: how often intervals hold the truth under correlated and
+// Statistics checked by simulation: how often intervals hold the true value under correlated and
 // heavy-tailed noise, and whether the block bootstrap sees correlation.
 #include <fmt/format.h>
 
@@ -108,7 +108,7 @@ TEST_CASE("independent noise keeps its calibration with the correlation looked a
   CHECK(binomial_test(c.inflated, kSets, 0.95) > 0.001);
 }
 
-TEST_CASE("profile intervals under Student's t and Laplace noise hold the truth") {
+TEST_CASE("profile intervals under Student's t and Laplace noise hold the true value") {
   constexpr int kSets = 1000;
   const int student = decay_coverage({ErrorShape::student_t, ErrorScale::linear, 4.0}, kSets, 4);
   print("Student's t, 4 degrees of freedom", student, kSets);
@@ -127,7 +127,7 @@ TEST_CASE("the block bootstrap sees correlation that the residual bootstrap does
         fit_line(curve_data(straight_line, kLine, 1.0, 0.1, autoregression(400, 0.6, random)));
     squares += (m.natural[1] - kLine[1]) * (m.natural[1] - kLine[1]) / kSets;
   }
-  const double truth = std::sqrt(squares);
+  const double true_sd = std::sqrt(squares);
   double blocks = 0.0;
   double single = 0.0;
   constexpr int kBootstraps = 12;
@@ -143,8 +143,8 @@ TEST_CASE("the block bootstrap sees correlation that the residual bootstrap does
     options.resampling = Resampling::blocks;
     blocks += bootstrap(refit, line_parameters(), m, options).parameters[1].standard_error;
   }
-  SUCCEED(fmt::format("SE of slope: simulated {:.4f}, blocks {:.4f}, residuals {:.4f}", truth,
+  SUCCEED(fmt::format("SE of slope: simulated {:.4f}, blocks {:.4f}, residuals {:.4f}", true_sd,
                       blocks / kBootstraps, single / kBootstraps));
-  CHECK_THAT(blocks / kBootstraps, WithinRel(truth, 0.2));
-  CHECK(single / kBootstraps < 0.6 * truth);
+  CHECK_THAT(blocks / kBootstraps, WithinRel(true_sd, 0.2));
+  CHECK(single / kBootstraps < 0.6 * true_sd);
 }

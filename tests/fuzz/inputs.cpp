@@ -11,7 +11,7 @@
 #include "tpm/curve/import.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/config.hpp"
-#include "tpm/fit/tables.hpp"
+#include "tpm/fit/petab.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/session.hpp"
 #include "tpm/network/mesh_file.hpp"
@@ -76,12 +76,13 @@ void read_block_log(const Path& path) {
 /// Puts a check sum behind the file: what was changed is read, not refused for its old one.
 void sum_again(const Path& path) {
   const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
-  const bool sealed = file >= 0 && write_checksum(file, std::filesystem::file_size(path));
+  const bool has_checksum = file >= 0 && write_checksum(file, std::filesystem::file_size(path));
   if (file >= 0) ::close(file);
-  if (!sealed) throw Error(ExitCode::environment, path.native(), "cannot be sealed", "room");
+  if (!has_checksum)
+    throw Error(ExitCode::environment, path.native(), "cannot be given a check sum", "room");
 }
 
-/// As it is, then sealed and by the scene that it names.
+/// As it is, then with a check sum and by the scene that it names.
 void read_checkpoint_file(const Path& path) {
   try {
     (void)read_checkpoint(path, "fuzz", quiet);

@@ -18,7 +18,7 @@ TEST_CASE("No hazard leaves its bounds, and nothing that is passive is refused")
   CHECK(study.rows.size() >= 40);
   CHECK(study.safe());
   for (const HazardRow& row : study.rows) {
-    CAPTURE(row.hazard, row.setting, row.refused, row.largest_force_N, row.given_J);
+    CAPTURE(row.hazard, row.setting, row.refused, row.largest_force_N, row.delivered_J);
     CHECK(row.within);
     if (row.passive) CHECK(row.refused.empty());
     CHECK(std::isfinite(row.largest_force_N));

@@ -234,7 +234,8 @@ TEST_CASE("A session over the surface verifies in all three components", "[heavy
     CHECK(phase.force.max_N < 0.005 * v.all.peak_N);
   }
   CHECK(v.reference_error_N < 0.005 * v.all.peak_N);
-  // CVODE, from the first touch to the end: as far from the reference as that is from the truth.
+  // CVODE, from the first touch to the end: as far from the reference as that is from the exact
+  // answer.
   REQUIRE(v.others.size() == 1);
   CHECK(v.others[0].start_s > 0.5);
   CHECK(v.others[0].start_s < 1.5);

@@ -176,7 +176,8 @@ TEST_CASE("Twenty minutes of one motion: nothing grows, and the end feels like t
   const Endless run = endless(test::network_session("condensed", "2.4e3 Pa s"), 600);
   CHECK(run.drift.peak_N > 0.05);
   CHECK(run.drift.late_rounds_N == 0.0);
-  // Its guard keeps a memory whose energy can no longer be told from rest (docs/reduction.md).
+  // Its guard keeps a viscous state whose energy can no longer be told from rest
+  // (docs/reduction.md).
   CHECK(run.drift.end_start_N < 5e-6 * run.drift.peak_N);
   CHECK(run.grown_bytes < 256.0 * 1024.0);
 }

@@ -98,7 +98,7 @@ TEST_CASE("the law linear-1-elastic is the paper's element", "[law]") {
     p.spacing_m = 0.005 + 0.03 * random.uniform();
     const double scale = p.modulus_to_stiffness_m();
     const double k_tension = scale * lambda1_Pa(p.Eprime_Pa, spec.reference, p.spacing_m);
-    const std::vector<double> values{scale * p.relaxed_modulus_Pa(),
+    const std::vector<double> values{scale * p.equilibrium_modulus_Pa(),
                                      scale * p.relaxing_modulus_Pa(),
                                      p.relaxation_time_s(),
                                      k_tension,

@@ -168,8 +168,8 @@ TEST_CASE("the paper's element over frequency is linear-1", "[spectrum]") {
   const auto element = element_spectrum(to_vector(p), frequency, Want::values_and_sensitivity);
   const auto law = respond_spectrum(
       parse_law_name("linear-1", "test"),
-      {{p.relaxed_modulus_Pa(), p.relaxing_modulus_Pa(), p.relaxation_time_s(), 0, 0}}, frequency,
-      {}, Want::values);
+      {{p.equilibrium_modulus_Pa(), p.relaxing_modulus_Pa(), p.relaxation_time_s(), 0, 0}},
+      frequency, {}, Want::values);
   CHECK((element.storage - law.storage).norm() < 1e-12 * law.storage.norm());
   CHECK((element.loss - law.loss).norm() < 1e-12 * law.loss.norm());
   TpmParameters more = p;

@@ -108,7 +108,7 @@ std::string relaxation_time(const std::string& name, const std::string& start = 
 const std::string kOneBranch =
     stiffness("k_inf") + ", " + stiffness("k1") + ", " + relaxation_time("tau1");
 
-/// Truth of the joint fit: k_inf, k1 (N/m), tau1 (s), contact, offset.
+/// True values of the joint fit: k_inf, k1 (N/m), tau1 (s), contact, offset.
 const std::vector<double> kFast{40.0, 60.0, 0.05, 0.0, 0.0};
 
 /// A ramp of 1 s to 2 mm and a hold to 10 s of linear-1, scattered by 1 mN, a sample each 0.25 s:
@@ -137,9 +137,9 @@ Spectrum fast_spectrum() {
 }  // namespace
 
 TEST_CASE("a spectrum gives the law back that made it, with derivatives to match") {
-  const std::vector<double> truth{40.0, 60.0, 30.0, 0.02, 1.0, 0.0, 0.0};
+  const std::vector<double> true_values{40.0, 60.0, 30.0, 0.02, 1.0, 0.0, 0.0};
   const Spectrum exact =
-      computed_spectrum(indentation_law("linear-2"), truth, log_spaced(0.02, 50.0, 12));
+      computed_spectrum(indentation_law("linear-2"), true_values, log_spaced(0.02, 50.0, 12));
   const FitConfig config = config_of(
       "linear-2", kOneBranch + ", " + stiffness("k2") + ", " + relaxation_time("tau2", "2 s"),
       entry("a", kOscillation, absolute("0.5 N/m")));
@@ -161,11 +161,11 @@ TEST_CASE("a spectrum gives the law back that made it, with derivatives to match
   CHECK_THAT(find(fit, "k_inf").estimate, WithinRel(40.0, 1e-6));
 }
 
-TEST_CASE("intervals from scattered spectra hold the truth as often as they promise") {
-  const std::vector<double> truth{40.0, 60.0, 30.0, 0.02, 1.0, 0.0, 0.0};
+TEST_CASE("intervals from scattered spectra hold the true value as often as they promise") {
+  const std::vector<double> true_values{40.0, 60.0, 30.0, 0.02, 1.0, 0.0, 0.0};
   const std::vector<std::string> names{"k_inf", "k1", "k2", "tau1", "tau2"};
   const Spectrum exact =
-      computed_spectrum(indentation_law("linear-2"), truth, log_spaced(0.02, 50.0, 12));
+      computed_spectrum(indentation_law("linear-2"), true_values, log_spaced(0.02, 50.0, 12));
   const FitConfig config =
       config_of("linear-2",
                 stiffness("k_inf", "40 N/m") + ", " + stiffness("k1", "60 N/m") + ", " +
@@ -181,7 +181,8 @@ TEST_CASE("intervals from scattered spectra hold the truth as often as they prom
     chi_square += fit.chi_square / fit.degrees_of_freedom / kSets;
     for (std::size_t i = 0; i < names.size(); ++i) {
       const ParameterResult& p = find(fit, names[i]);
-      if ((!p.lower || *p.lower <= truth[i]) && (!p.upper || truth[i] <= *p.upper)) ++held;
+      if ((!p.lower || *p.lower <= true_values[i]) && (!p.upper || true_values[i] <= *p.upper))
+        ++held;
     }
   }
   INFO("held " << held << " of " << 5 * kSets << ", chi-square per degree " << chi_square);
@@ -192,17 +193,17 @@ TEST_CASE("intervals from scattered spectra hold the truth as often as they prom
 }
 
 TEST_CASE("a fractional Kelvin-Voigt law from a power-law spectrum") {
-  const std::vector<double> truth{20.0, 35.0, 0.27, 0.0, 0.0};
-  const Spectrum s = scattered_spectrum(
-      computed_spectrum(indentation_law("linear-fkelvin_voigt"), truth, log_spaced(0.1, 100.0, 16)),
-      0.4, 3);
+  const std::vector<double> true_values{20.0, 35.0, 0.27, 0.0, 0.0};
+  const Spectrum s = scattered_spectrum(computed_spectrum(indentation_law("linear-fkelvin_voigt"),
+                                                          true_values, log_spaced(0.1, 100.0, 16)),
+                                        0.4, 3);
   const FitResult fit = run_fit(config_of("linear-fkelvin_voigt",
                                           stiffness("k_inf") + ", " + stiffness("k1") + ", " +
                                               searched("alpha", "0.5", "0.01", "0.99"),
                                           entry("a", kOscillation, absolute("0.4 N/m"))),
                                 {DataSet(s)});
   for (const auto& [name, value] :
-       {std::pair{"k_inf", truth[0]}, {"k1", truth[1]}, {"alpha", truth[2]}}) {
+       {std::pair{"k_inf", true_values[0]}, {"k1", true_values[1]}, {"alpha", true_values[2]}}) {
     const ParameterResult& p = find(fit, name);
     CAPTURE(name, p.estimate, p.standard_error.value());
     CHECK(p.verdict == Verdict::identified);
@@ -223,13 +224,13 @@ TEST_CASE("relaxation and oscillation identify together what each leaves open") 
   CHECK(find(relaxation, "k_inf").verdict == Verdict::identified);
   CHECK(find(relaxation, "k1").verdict == Verdict::lower_only);
   CHECK(find(oscillation, "k_inf").verdict == Verdict::upper_only);
-  for (const auto& [name, truth] :
+  for (const auto& [name, true_values] :
        {std::pair{"k_inf", kFast[0]}, {"k1", kFast[1]}, {"tau1", kFast[2]}}) {
     const ParameterResult& p = find(joint, name);
     CAPTURE(name, p.words);
     CHECK(p.verdict == Verdict::identified);
-    CHECK(p.lower.value() < truth);
-    CHECK(truth < p.upper.value());
+    CHECK(p.lower.value() < true_values);
+    CHECK(true_values < p.upper.value());
   }
   CHECK(joint.recordings.size() == 1);
   CHECK(joint.data.size() == 24);
@@ -247,9 +248,9 @@ TEST_CASE("the shipped example is identified, and says that it is synthetic") {
 }
 
 TEST_CASE("moduli answer an indentation law through A0/l0") {
-  const std::vector<double> truth{40.0, 60.0, 0.5, 0.0, 0.0};
+  const std::vector<double> true_values{40.0, 60.0, 0.5, 0.0, 0.0};
   const Spectrum stiff =
-      computed_spectrum(indentation_law("linear-1"), truth, log_spaced(0.05, 5.0, 8));
+      computed_spectrum(indentation_law("linear-1"), true_values, log_spaced(0.05, 5.0, 8));
   const std::string data =
       entry("a", kOscillation, absolute("0.1 kPa"), R"(, "stiffness_per_modulus": "12.56 mm")");
   const FitResult fit =
@@ -280,8 +281,8 @@ TEST_CASE("a strip's moduli, and the depth that a spectrum was taken at") {
                 "protocol": {"kind": "oscillation", "operating_depth": "0.1"}}],
       "starts": {"count": 3}})";
   const FitConfig config = parse_fit_config(parse_json(strip, "f.json"), "f.json");
-  const std::vector<double> truth{5e3, 8e3, 0.7, 2.0, 0.0, 0.0};
-  const Spectrum s = computed_spectrum(*config.law, truth, log_spaced(0.05, 5.0, 8), 0.1);
+  const std::vector<double> true_values{5e3, 8e3, 0.7, 2.0, 0.0, 0.0};
+  const Spectrum s = computed_spectrum(*config.law, true_values, log_spaced(0.05, 5.0, 8), 0.1);
   const FitResult fit = run_fit(config, {DataSet(s)});
   CHECK_THAT(find(fit, "k_inf").estimate, WithinRel(5e3, 1e-6));
   CHECK_THAT(find(fit, "tau1").estimate, WithinRel(0.7, 1e-6));
@@ -367,9 +368,9 @@ TEST_CASE("the figure of a spectrum holds its readings and the law's answer to t
 }
 
 TEST_CASE("error bars of a spectrum are those of its noise, on the readings' own scale") {
-  const std::vector<double> truth{40.0, 60.0, 0.5, 0.0, 0.0};
+  const std::vector<double> true_values{40.0, 60.0, 0.5, 0.0, 0.0};
   const Spectrum exact =
-      computed_spectrum(indentation_law("linear-1"), truth, log_spaced(0.05, 5.0, 8));
+      computed_spectrum(indentation_law("linear-1"), true_values, log_spaced(0.05, 5.0, 8));
   const auto bars = [&](const std::string& noise) {
     const FitResult fit =
         run_fit(config_of("linear-1", kOneBranch, entry("a", kOscillation, noise)), {exact});

@@ -139,7 +139,7 @@ TEST_CASE("A spring-pot with elastic tension takes as many steps however densely
           "[law]") {
   const LawModel law(parse_law_name("linear-fspringpot-elastic", "test"));
   const std::vector<double> values = values_of(law, 35.0);
-  const FractionalMemory rates(1e-6, 100.0, kFractionalTolerance);
+  const ExponentialSum rates(1e-6, 100.0, kFractionalTolerance);
   const LawAtParameters at = law.at(values, &rates);
   int for_dense = 0, for_last = 0;
   REQUIRE(creep_with_tension(at, 0.3, log_times(162, 0.01, 100.0), Want::values, &for_dense));

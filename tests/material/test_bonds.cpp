@@ -43,9 +43,9 @@ NetworkOptions with_rule(StiffnessRule rule) {
 Constraints only_contact_guided(const Network& network) {
   Constraints constraints(network.organ.size());
   for (std::size_t i = 0; i < network.organ.size(); ++i) {
-    if (i != kContact) constraints.hold(i);
+    if (i != kContact) constraints.fix(i);
   }
-  constraints.guide(kContact, Vector3d::UnitZ());
+  constraints.slide(kContact, Vector3d::UnitZ());
   return constraints;
 }
 
@@ -53,7 +53,7 @@ Constraints only_contact_guided(const Network& network) {
 Constraints inner_layer_held(const Organ& organ) {
   Constraints constraints(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
-    if (organ.layer[i] == 1) constraints.hold(i);
+    if (organ.layer[i] == 1) constraints.fix(i);
   }
   return constraints;
 }
@@ -84,13 +84,13 @@ TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rul
   const TpmParameters p = unequal_material();
   const Network network = build_network(paper_liver(), {}, "liver");
   const BondSystem bonds(network, p);
-  const HeldStiffness star = star_stiffness(p);
-  const HeldStiffness liver =
+  const ContactStiffness star = star_stiffness(p);
+  const ContactStiffness liver =
       held_stiffness(bonds, network.organ.position, kContact, Vector3d::UnitZ());
   CHECK_THAT(star.instantaneous, WithinRel(19e3 * 12.56e-3, 1e-12));
-  CHECK_THAT(star.relaxed, WithinRel(7e3 * 19e3 / 26e3 * 12.56e-3, 1e-12));
+  CHECK_THAT(star.equilibrium, WithinRel(7e3 * 19e3 / 26e3 * 12.56e-3, 1e-12));
   CHECK_THAT(liver.instantaneous, WithinRel(star.instantaneous, 1e-6));
-  CHECK_THAT(liver.relaxed, WithinRel(star.relaxed, 1e-6));
+  CHECK_THAT(liver.equilibrium, WithinRel(star.equilibrium, 1e-6));
 
   // The same as a force, after an indentation by 10 nm in ten picoseconds and in a second.
   const double depth = 1e-8;
@@ -101,7 +101,7 @@ TEST_CASE("sphere 71 among held neighbours is as stiff as the star under the rul
     return tissue.run(protocol, std::vector<double>{depth / rate + hold}).response(0);
   };
   CHECK_THAT(force(1e3, 0.0) / depth, WithinRel(star.instantaneous, 1e-6));
-  CHECK_THAT(force(1e-8, 1.0) / depth, WithinRel(star.relaxed, 1e-6));
+  CHECK_THAT(force(1e-8, 1.0) / depth, WithinRel(star.equilibrium, 1e-6));
 }
 
 TEST_CASE("under per_bond sphere 71 is stiffer by the sum of its bonds' squared cosines") {
@@ -111,11 +111,11 @@ TEST_CASE("under per_bond sphere 71 is stiffer by the sum of its bonds' squared 
   CHECK(sums.lateral_count == 6);
   CHECK(sums.radial_count == 7);
   const BondSystem bonds(network, p);
-  const HeldStiffness liver =
+  const ContactStiffness liver =
       held_stiffness(bonds, network.organ.position, kContact, Vector3d::UnitZ());
   const double factor = liver.instantaneous / star_stiffness(p).instantaneous;
   CHECK_THAT(factor, WithinRel(sums.radial, 1e-6));
-  CHECK_THAT(liver.relaxed / star_stiffness(p).relaxed, WithinRel(factor, 1e-6));
+  CHECK_THAT(liver.equilibrium / star_stiffness(p).equilibrium, WithinRel(factor, 1e-6));
   CHECK(factor > 3.5);
   CHECK(factor < 5.0);
 }
@@ -153,7 +153,7 @@ TEST_CASE("one radial bond per sphere and a free inner layer is refused, loose s
   Constraints constraints(network.organ.size());
   for (std::size_t i = 0; i < network.organ.size(); ++i) {
     if (network.organ.layer[i] == 0) CHECK(sums[i].radial_count == 1);
-    if (network.organ.position(2, static_cast<Eigen::Index>(i)) > 0.135) constraints.hold(i);
+    if (network.organ.position(2, static_cast<Eigen::Index>(i)) > 0.135) constraints.fix(i);
   }
   // Its curvature alone resists, a little: no mode is exactly free, but the contact is loose.
   const BondSystem bonds(network, TpmParameters{});
@@ -178,7 +178,7 @@ TEST_CASE("a flat plate without diagonals is an exact mechanism") {
   options.diagonals = false;
   const Network plate = build_network(block(4, 4, 1, 0.02, Lattice::cubic), options, "plate");
   Constraints constraints(plate.organ.size());
-  for (std::size_t i = 0; i < 5; ++i) constraints.hold(i);  // an edge of the top
+  for (std::size_t i = 0; i < 5; ++i) constraints.fix(i);  // an edge of the top
   const BondSystem bonds(plate, TpmParameters{});
   CHECK(zero_energy_modes(bonds, plate.organ.position, constraints).count > 20);
   CHECK(loose_spheres(local_support(bonds, plate.organ, constraints)).size() > 10);
@@ -187,8 +187,8 @@ TEST_CASE("a flat plate without diagonals is an exact mechanism") {
 TEST_CASE("the local support of the star is that of its held neighbours") {
   const Network network = build_network(star(0.02, 0.02), {}, "star");
   Constraints constraints(4);
-  constraints.guide(1, Vector3d::UnitZ());
-  for (const std::size_t i : {0, 2, 3}) constraints.hold(i);
+  constraints.slide(1, Vector3d::UnitZ());
+  for (const std::size_t i : {0, 2, 3}) constraints.fix(i);
   CHECK_THAT(local_support(BondSystem(network, TpmParameters{}), network.organ, constraints)[1],
              WithinRel(1.0, 1e-8));
 }

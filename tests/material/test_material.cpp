@@ -215,7 +215,7 @@ TEST_CASE("the paper's element is one material") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.7);
   const BondMaterial m = p.bonds();
   CHECK_THAT(m.instantaneous_Pa(), WithinRel(p.E2_Pa, 1e-15));
-  CHECK_THAT(m.equilibrium_Pa, WithinRel(p.relaxed_modulus_Pa(), 1e-15));
+  CHECK_THAT(m.equilibrium_Pa, WithinRel(p.equilibrium_modulus_Pa(), 1e-15));
   REQUIRE(m.branches.size() == 1);
   CHECK_THAT(m.branches[0].relaxation_time_s, WithinRel(0.7, 1e-15));
 }
@@ -386,15 +386,16 @@ TEST_CASE("stored energy and heat of several branches close along any motion") {
   CHECK(heat > 0.0);
   CHECK_THAT((stored(h) - stored(-h)) / (2 * h), WithinRel(power - heat, 1e-6));
   // The force is minus the gradient of potential_J, its stiffness the derivative of the force.
-  const BondMemory memory = bonds.memory_at(bonds.mean_viscous(viscous), followed, 0.37);
+  const ViscousState viscous_state =
+      bonds.viscous_state_at(bonds.mean_viscous(viscous), followed, 0.37);
   Eigen::Matrix3Xd change = Eigen::Matrix3Xd::Zero(3, rest.cols());
-  bonds.add_stiffness_times(position, memory, velocity, change);
+  bonds.add_stiffness_times(position, viscous_state, velocity, change);
   const auto potential = [&](double t) {
-    return bonds.potential_J(position + t * velocity, memory);
+    return bonds.potential_J(position + t * velocity, viscous_state);
   };
   const auto forces = [&](double t) {
     Eigen::Matrix3Xd f = Eigen::Matrix3Xd::Zero(3, rest.cols());
-    bonds.add_forces(position + t * velocity, memory, f);
+    bonds.add_forces(position + t * velocity, viscous_state, f);
     return f;
   };
   CHECK_THAT((potential(h) - potential(-h)) / (2 * h),

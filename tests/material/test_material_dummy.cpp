@@ -94,17 +94,17 @@ TEST_CASE("a fit finds the parameters of a shape in one file by their names") {
   write_file(folder / "scene.json", scene);
   const OrganModel organ(
       std::make_shared<const Tissue>(parse_tissue(parse_json(scene, "scene"), "scene", {})));
-  std::vector<double> truth = organ.own_values();
+  std::vector<double> true_values = organ.own_values();
   constexpr double kCollagen = 0.7, kUncrimped_m = 1.5e-3;
-  for (std::size_t i = 0; i < truth.size(); ++i) {
-    if (organ.parameters()[i].name == "collagen") truth[i] = kCollagen;
-    if (organ.parameters()[i].name == "uncrimped") truth[i] = kUncrimped_m;
+  for (std::size_t i = 0; i < true_values.size(); ++i) {
+    if (organ.parameters()[i].name == "collagen") true_values[i] = kCollagen;
+    if (organ.parameters()[i].name == "uncrimped") true_values[i] = kUncrimped_m;
   }
   std::string csv = "depth_mm,time_s,force_N,provenance\n";
   const std::vector<double> times{0.0, 0.3, 3.0};
   for (const double depth_mm : {1.0, 2.5, 4.0, 6.0}) {
     const Eigen::VectorXd force =
-        organ.respond(step_and_hold(1e-3 * depth_mm, 3.0), times, truth, Want::values).value;
+        organ.respond(step_and_hold(1e-3 * depth_mm, 3.0), times, true_values, Want::values).value;
     for (std::size_t i = 0; i < times.size(); ++i) {
       csv += shortest(depth_mm) + "," + shortest(times[i]) + "," +
              shortest(force[static_cast<Eigen::Index>(i)]) + ",derived\n";

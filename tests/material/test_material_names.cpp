@@ -122,19 +122,19 @@ TEST_CASE("a fit on an organ finds a parameter by its name in the table", "[heav
   const Tissue tissue = parse_tissue(scene, "scene", {});
   // Readings of the organ itself at other values than the scene's.
   const OrganModel organ(std::make_shared<const Tissue>(tissue));
-  std::vector<double> truth = organ.own_values();
+  std::vector<double> true_values = organ.own_values();
   const auto place = [&](std::string_view name) {
-    for (std::size_t i = 0; i < truth.size(); ++i) {
+    for (std::size_t i = 0; i < true_values.size(); ++i) {
       if (organ.parameters()[i].name == name) return i;
     }
     throw std::logic_error("no such parameter");
   };
   constexpr double kTau2_s = 5.5, kG1_Pa = 4.2e3;
-  truth[place("tau2")] = kTau2_s;
-  truth[place("g1")] = kG1_Pa;
+  true_values[place("tau2")] = kTau2_s;
+  true_values[place("g1")] = kG1_Pa;
   const std::vector<double> times{0.0, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0};
   const Protocol protocol = step_and_hold(3e-3, 16.0);
-  const Eigen::VectorXd force = organ.respond(protocol, times, truth, Want::values).value;
+  const Eigen::VectorXd force = organ.respond(protocol, times, true_values, Want::values).value;
   std::string csv = "depth_mm,time_s,force_N,provenance\n";
   for (std::size_t i = 0; i < times.size(); ++i) {
     csv += "3," + shortest(times[i]) + "," + shortest(force[static_cast<Eigen::Index>(i)]) +

@@ -16,7 +16,7 @@ using namespace tpm::study;
 void predict(int simulations, std::uint64_t seed) {
   fmt::print(
       "| law | noise of the peak | phi | a held-out reading in its band | exact p of 95 % | "
-      "all held-out readings | truth in the band of the mean | exact p | no covariance |\n"
+      "all held-out readings | true value in the band of the mean | exact p | no covariance |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
   const SimulatedTest test = test::even_test(20.0, 0.05);
   for (const char* name : {"linear-1", "power-1", "linear-1-elastic"}) {
@@ -35,7 +35,7 @@ void predict(int simulations, std::uint64_t seed) {
 
 void contact(int simulations, std::uint64_t seed) {
   fmt::print(
-      "| contact | parameter | interval holds the truth | exact p of 95 % |\n"
+      "| contact | parameter | interval holds the true value | exact p of 95 % |\n"
       "| --- | --- | --- | --- |\n");
   for (const Nuisance nuisance : {Nuisance::offset, Nuisance::automatic}) {
     const auto c =
@@ -52,7 +52,7 @@ void contact(int simulations, std::uint64_t seed) {
 
 void identify(int simulations, std::uint64_t seed, double only) {
   fmt::print(
-      "| law | phi | parameter | interval holds the truth | exact p of 95 % | stopped | "
+      "| law | phi | parameter | interval holds the true value | exact p of 95 % | stopped | "
       "mean stop | mean samples |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n");
   for (const double phi : {0.0, 0.9}) {
     if (only >= 0.0 && phi != only) continue;

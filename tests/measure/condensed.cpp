@@ -124,7 +124,7 @@ double quasistatic_error(const Scene& scene, const CondensedContact& built,
                          double relaxation_time_s, const NamedPath& named) {
   const BondSystem bonds = scene.bonds(relaxation_time_s);
   Constraints constraints = scene.tissue.constraints();
-  constraints.guide(scene.contact, scene.into);
+  constraints.slide(scene.contact, scene.into);
   const Path path = path_of(scene, named, built.period_s());
   std::vector<double> times;
   std::vector<std::size_t> steps;

@@ -35,9 +35,9 @@ class StiffnessBlocks {
  public:
   StiffnessBlocks(const BondSystem& bonds, const Constraints& constraints)
       : bonds_(bonds), constraints_(constraints), matrix_(bonds.pattern()) {}
-  const BlockMatrix& assemble(const Positions& position, const BondMemory& memory) {
+  const BlockMatrix& assemble(const Positions& position, const ViscousState& viscous_state) {
     matrix_.set_zero();
-    bonds_.add_stiffness(position, memory, matrix_);
+    bonds_.add_stiffness(position, viscous_state, matrix_);
     constraints_.constrain(bonds_, matrix_);
     return matrix_;
   }
@@ -88,7 +88,7 @@ Organ organ_of(const std::string& kind, std::size_t count) {
 
 /// Free coordinates are numbered in the order of the spheres.
 void write_matrix(const BondSystem& bonds, const Constraints& constraints, const Positions& rest,
-                  const BondMemory& memory, const char* path) {
+                  const ViscousState& viscous_state, const char* path) {
   std::vector<std::int32_t> number(constraints.size(), -1);
   std::int32_t free = 0;
   for (std::size_t i = 0; i < constraints.size(); ++i) {
@@ -110,7 +110,7 @@ void write_matrix(const BondSystem& bonds, const Constraints& constraints, const
   };
   std::vector<Eigen::Matrix3d> diagonal(constraints.size(), Eigen::Matrix3d::Zero());
   for (std::size_t i = 0; i < bonds.size(); ++i) {
-    const Eigen::Matrix3d block = bonds.stiffness_block(i, rest, memory);
+    const Eigen::Matrix3d block = bonds.stiffness_block(i, rest, viscous_state);
     diagonal[bonds.end_a()[i]] += block;
     diagonal[bonds.end_b()[i]] += block;
     const std::int32_t a = number[bonds.end_a()[i]];
@@ -146,19 +146,20 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
   const BondSystem bonds(network, TpmParameters{});
   Constraints constraints(network.organ.size());
   for (const std::size_t i : far_side(network.organ, Eigen::Vector3d::UnitZ(), 0.060)) {
-    constraints.hold(i);
+    constraints.fix(i);
   }
   (void)lap();
   StiffnessBlocks blocks(bonds, constraints);
   const BlockPattern& pattern = blocks.pattern();
   const double order_s = lap();
-  const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
+  const ViscousState viscous_state{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
+                                   0.0};
   BlockLdlt factor(pattern);
   (void)lap();
-  const BlockMatrix& matrix = blocks.assemble(network.organ.position, memory);
+  const BlockMatrix& matrix = blocks.assemble(network.organ.position, viscous_state);
   const double assemble_s = lap();
   if (matrix_file != nullptr) {
-    write_matrix(bonds, constraints, network.organ.position, memory, matrix_file);
+    write_matrix(bonds, constraints, network.organ.position, viscous_state, matrix_file);
   }
   (void)lap();
   const bool done = factor.factorise(matrix);
@@ -180,7 +181,7 @@ void measure(const std::string& kind, std::size_t count, const char* matrix_file
   // What is left of the forces, in parts.
   Eigen::Matrix3Xd left = Eigen::Matrix3Xd::Zero(3, x.cols());
   constraints.project(x);
-  bonds.add_stiffness_times(network.organ.position, memory, x, left);
+  bonds.add_stiffness_times(network.organ.position, viscous_state, x, left);
   constraints.project(left);
   const double residual = (left - right).norm() / right.norm();
   LaneFactor lanes(pattern);

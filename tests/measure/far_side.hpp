@@ -9,7 +9,7 @@ inline tpm::organ::Constraints held_on_the_far_side(const tpm::organ::Organ& org
   const Eigen::RowVectorXd z = organ.position.row(2);
   const double limit = z.minCoeff() + 0.6 * (z.maxCoeff() - z.minCoeff());
   for (std::size_t i = 0; i < organ.size(); ++i) {
-    if (organ.layer[i] == 0 && z[static_cast<Eigen::Index>(i)] > limit) constraints.hold(i);
+    if (organ.layer[i] == 0 && z[static_cast<Eigen::Index>(i)] > limit) constraints.fix(i);
   }
   return constraints;
 }

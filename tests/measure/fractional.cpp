@@ -29,31 +29,32 @@ struct SumErrors {
   double seconds_per_call = 0.0;
 };
 
-void add_mittag_leffler_errors(const FractionalMemory& memory, const FractionalWeights& w,
+void add_mittag_leffler_errors(const ExponentialSum& exponentials, const FractionalWeights& w,
                                double alpha, double tau, double span, SumErrors& worst) {
   const FractionalWeights slopes = by_log_tau(w);
   for (const double t : decades(1.0, span, 31)) {
     const auto raise = [](double& most, double error) { most = std::max(most, std::abs(error)); };
-    raise(worst.mittag_leffler, memory.at(w, t) - relaxation(alpha, tau, t));
-    raise(worst.slope, memory.at(slopes, t) - relaxation_by_log_tau(alpha, tau, t));
-    raise(worst.integral, (memory.integral_s(w, t) - relaxation_integral(alpha, tau, t)) / t);
+    raise(worst.mittag_leffler, exponentials.at(w, t) - relaxation(alpha, tau, t));
+    raise(worst.slope, exponentials.at(slopes, t) - relaxation_by_log_tau(alpha, tau, t));
+    raise(worst.integral, (exponentials.integral_s(w, t) - relaxation_integral(alpha, tau, t)) / t);
   }
 }
 
-SumErrors sum_errors(const FractionalMemory& memory, double span) {
+SumErrors sum_errors(const ExponentialSum& exponentials, double span) {
   SumErrors worst;
   FractionalWeights w;
   int calls = 0;
   for (const double alpha : kAlphas) {
     for (const double tau : decades(1e-3, 1e3 * span, 53)) {
-      worst.seconds_per_call += seconds([&] { memory.mittag_leffler(alpha, tau, w); });
+      worst.seconds_per_call += seconds([&] { exponentials.mittag_leffler(alpha, tau, w); });
       ++calls;
-      add_mittag_leffler_errors(memory, w, alpha, tau, span, worst);
+      add_mittag_leffler_errors(exponentials, w, alpha, tau, span, worst);
     }
     if (alpha == 1.0) continue;
-    memory.springpot(alpha, w);
+    exponentials.springpot(alpha, w);
     for (const double t : decades(1.0, span, 31)) {
-      const double error = std::abs(memory.at(w, t) - springpot(alpha, t)) / springpot(alpha, 1.0);
+      const double error =
+          std::abs(exponentials.at(w, t) - springpot(alpha, t)) / springpot(alpha, 1.0);
       worst.springpot = std::max(worst.springpot, error);
     }
   }
@@ -67,11 +68,11 @@ void print_sums() {
       "worst dM/d(ln tau)   us/call\n");
   for (const double span : {1e2, 1e4, 1e8}) {
     for (const double tolerance : {1e-6, 1e-9, 1e-11}) {
-      const FractionalMemory memory(1.0, span, tolerance);
-      const SumErrors e = sum_errors(memory, span);
+      const ExponentialSum exponentials(1.0, span, tolerance);
+      const SumErrors e = sum_errors(exponentials, span);
       fmt::print("{:6.0e} {:9.0e} {:5} {:9.1e} {:17.1e} {:18.1e} {:20.1e} {:9.1f}\n", span,
-                 tolerance, memory.rates_per_s().size(), e.mittag_leffler, e.integral, e.springpot,
-                 e.slope, 1e6 * e.seconds_per_call);
+                 tolerance, exponentials.rates_per_s().size(), e.mittag_leffler, e.integral,
+                 e.springpot, e.slope, 1e6 * e.seconds_per_call);
     }
   }
 }

@@ -101,8 +101,8 @@ void solve(const Case& c, const Network& network, Measured& m) {
   push.tolerance_N = kTolerance;
   push.patch = surface_patch(organ, organ.position.col(contact), kPatchRadius);
   Constraints constraints(organ.size());
-  for (const std::size_t i : push.patch) constraints.hold(i);
-  for (const std::size_t i : far_side(organ, push.direction, kAnchorDepth)) constraints.hold(i);
+  for (const std::size_t i : push.patch) constraints.fix(i);
+  for (const std::size_t i : far_side(organ, push.direction, kAnchorDepth)) constraints.fix(i);
   IndentationResult result;
   if (c.solver == "direct") {
     Equilibrium solver(bonds, constraints);

@@ -72,7 +72,7 @@ void run(const std::string& file, double hours, const std::filesystem::path& fol
       "{:.0f} s of rest less the first: at most {:.3g} N\n",
       drift.peak_N, settled + 1, drift.late_rounds_N, kForgotten * tau_s, drift.end_start_N);
   if (const auto* condensed = dynamic_cast<const CondensedContact*>(loop.model.get())) {
-    fmt::print("memories that the guard kept: {}\n", condensed->kept_memories());
+    fmt::print("viscous states that the guard kept: {}\n", condensed->kept_viscous_states());
   }
 }
 

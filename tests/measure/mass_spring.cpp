@@ -44,7 +44,7 @@ class Scene {
     TpmParameters unrelaxed;
     unrelaxed.E1_Pa = 1e15;
     TpmParameters one_modulus;  // relaxed radial bonds as stiff as the lateral ones
-    one_modulus.Eprime_Pa = one_modulus.relaxed_modulus_Pa();
+    one_modulus.Eprime_Pa = one_modulus.equilibrium_modulus_Pa();
     add_msm("MSM, factors of the bonds", SpringRule::like_the_bonds, relaxed);
     add_msm("MSM, equal springs", SpringRule::equal, relaxed);
     tissues_.push_back({"TPM, relaxed", liver_, TpmParameters{}});

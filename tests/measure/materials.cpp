@@ -179,13 +179,13 @@ void print_servo() {
     const BondSystem bonds(scene.network, named.field);
     // The models move the contact in space: it does not yield to the side.
     Constraints guided = scene.constraints;
-    guided.guide(scene.probe.sphere, scene.probe.direction);
+    guided.slide(scene.probe.sphere, scene.probe.direction);
     const QuasiStaticRun run =
         QuasiStatic(bonds, rest, guided, scene.probe, {.tolerance = 1e-7})
             .run(ramp_and_hold(kDepth_m, kRamp * kPeriod_s, kSteps * kPeriod_s), times);
     const double peak = run.response.maxCoeff();
-    const auto judge = [&](const char* name,
-                           const std::function<std::unique_ptr<ContactModel>()>& make) {
+    const auto compare = [&](const char* name,
+                             const std::function<std::unique_ptr<ContactModel>()>& make) {
       std::unique_ptr<ContactModel> model;
       try {
         model = make();
@@ -207,17 +207,17 @@ void print_servo() {
       fmt::print("{:<30} {:<10} {:>12.2e} {:>12.2e} {:>14}\n", named.name, name, worst / peak,
                  claim / peak, fmt::format("{} of {}", over, kSteps));
     };
-    judge("full", [&] {
+    compare("full", [&] {
       return std::make_unique<ServoNetwork>(bonds, rest, scene.constraints, scene.probe.sphere,
                                             scene.probe.direction,
                                             ServoNetworkOptions{.period_s = kPeriod_s});
     });
-    judge("zone 2", [&] {
+    compare("zone 2", [&] {
       return std::make_unique<ZoneNetwork>(bonds, rest, scene.constraints, scene.probe.sphere,
                                            scene.probe.direction,
                                            ZoneNetworkOptions{.period_s = kPeriod_s, .rings = 2});
     });
-    judge("condensed", [&] {
+    compare("condensed", [&] {
       return std::make_unique<CondensedContact>(build_condensed(
           bonds, rest, scene.constraints, scene.probe.sphere, scene.probe.direction));
     });
@@ -239,7 +239,7 @@ void print_zones() {
     if (named.field.factor.size() == 0) continue;
     const BondSystem bonds(scene.network, named.field);
     Constraints guided = scene.constraints;
-    guided.guide(scene.probe.sphere, scene.probe.direction);
+    guided.slide(scene.probe.sphere, scene.probe.direction);
     const Eigen::VectorXd expected =
         QuasiStatic(bonds, rest, guided, scene.probe, {.tolerance = 1e-7})
             .run(ramp_and_hold(kDepth_m, kSteps * kPeriod_s, kSteps * kPeriod_s + 1.0), times)
@@ -277,7 +277,7 @@ void print_lag() {
     const OrganScene scene(fill_liver(request));
     const Positions& rest = scene.network.organ.position;
     Constraints guided = scene.constraints;
-    guided.guide(scene.probe.sphere, scene.probe.direction);
+    guided.slide(scene.probe.sphere, scene.probe.direction);
     for (const double share : {0.2, 0.5, 0.9}) {
       for (const std::vector<double>& branches : {std::vector{1.0}, std::vector{0.2, 5.0}}) {
         const BondSystem bonds(scene.network, MaterialField(material_of(branches, share)));

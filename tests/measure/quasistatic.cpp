@@ -56,7 +56,7 @@ OrganScene liver_scene(bool inner_held) {
   if (!inner_held) return OrganScene(paper_liver());
   OrganScene scene(paper_liver(), 1.0);
   for (std::size_t i = 0; i < scene.constraints.size(); ++i) {
-    if (scene.network.organ.layer[i] == 1) scene.constraints.hold(i);
+    if (scene.network.organ.layer[i] == 1) scene.constraints.fix(i);
   }
   return scene;
 }
@@ -75,9 +75,9 @@ void measure(const OrganScene& scene) {
     const Positions& rest = scene.network.organ.position;
     const QuasiStatic solver(bonds, rest, scene.constraints, scene.probe,
                              {.tolerance = kTolerance});
-    const QuasiStatic judge(bonds, rest, scene.constraints, scene.probe, {.tolerance = 1e-10});
+    const QuasiStatic reference(bonds, rest, scene.constraints, scene.probe, {.tolerance = 1e-10});
     const Timed timed = timed_run(solver, protocol, times, kRepeats);
-    const QuasiStaticRun exact = judge.run(protocol, times);
+    const QuasiStaticRun exact = reference.run(protocol, times);
     const double peak = exact.response.maxCoeff();
     const QuasiStaticWork& work = timed.run.work;
     const double error = (timed.run.response - exact.response).cwiseAbs().maxCoeff() / peak;

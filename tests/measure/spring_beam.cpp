@@ -112,9 +112,9 @@ class Beam {
  public:
   Beam() : network_(beam()), bonds_(network_, springs()), constraints_(network_.organ.size()) {
     for (std::uint32_t k = 0; k < kAcross; ++k) {
-      for (std::uint32_t j = 0; j < kAcross; ++j) constraints_.hold(node(0, j, k));
+      for (std::uint32_t j = 0; j < kAcross; ++j) constraints_.fix(node(0, j, k));
     }
-    memory_.offset = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size()));
+    viscous_state_.offset = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size()));
     mass_ = kMass / static_cast<double>(network_.organ.size());
   }
 
@@ -125,17 +125,17 @@ class Beam {
   [[nodiscard]] double mass() const { return mass_; }
   [[nodiscard]] const BondSystem& bonds() const { return bonds_; }
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
-  [[nodiscard]] const BondMemory& memory() const { return memory_; }
+  [[nodiscard]] const ViscousState& viscous_state() const { return viscous_state_; }
 
   /// Springs and weight on what is free, N.
   void force(const Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& f) const {
     f.setZero(3, x.cols());
     f.row(1).setConstant(-mass_ * kGravity);
-    bonds_.add_forces(x, memory_, f);
+    bonds_.add_forces(x, viscous_state_, f);
     constraints_.project(f);
   }
   [[nodiscard]] double energy(const State& s) const {
-    return 0.5 * mass_ * s.v.squaredNorm() + bonds_.potential_J(s.x, memory_) +
+    return 0.5 * mass_ * s.v.squaredNorm() + bonds_.potential_J(s.x, viscous_state_) +
            mass_ * kGravity * s.x.row(1).sum();
   }
 
@@ -148,7 +148,7 @@ class Beam {
       constraints_.project(mode);
       mode.normalize();
       product.setZero(3, mode.cols());
-      bonds_.add_stiffness_times(network_.organ.position, memory_, mode, product);
+      bonds_.add_stiffness_times(network_.organ.position, viscous_state_, mode, product);
       eigenvalue = mode.cwiseProduct(product).sum();
       mode = product;
     }
@@ -159,7 +159,7 @@ class Beam {
   Network network_;
   BondSystem bonds_;
   Constraints constraints_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
   double mass_ = 0.0;
 };
 
@@ -172,7 +172,7 @@ class BackwardEulerGradients {
   void operator()(State& s) {
     beam_.force(s.x, r_);
     product_.setZero(3, s.x.cols());
-    beam_.bonds().add_stiffness_times(s.x, beam_.memory(), s.v, product_);
+    beam_.bonds().add_stiffness_times(s.x, beam_.viscous_state(), s.v, product_);
     r_ = kStep_s * (r_ - kStep_s * product_);
     beam_.constraints().project(r_);
     dv_.setZero(3, s.x.cols());
@@ -181,7 +181,7 @@ class BackwardEulerGradients {
     const double enough = tolerance_ * tolerance_ * rr;
     for (int i = 0; i < most_ && rr > enough; ++i, ++iterations) {
       product_.setZero();
-      beam_.bonds().add_stiffness_times(s.x, beam_.memory(), p_, product_);
+      beam_.bonds().add_stiffness_times(s.x, beam_.viscous_state(), p_, product_);
       product_ = beam_.mass() * p_ + kStep_s * kStep_s * product_;
       beam_.constraints().project(product_);
       const double curvature = p_.cwiseProduct(product_).sum();
@@ -220,11 +220,11 @@ class Factorised {
     const double h = kStep_s;
     beam_.force(s.x, r_);
     product_.setZero(3, s.x.cols());
-    beam_.bonds().add_stiffness_times(s.x, beam_.memory(), s.v, product_);
+    beam_.bonds().add_stiffness_times(s.x, beam_.viscous_state(), s.v, product_);
     r_ = h * (r_ - theta_ * h * product_);
     beam_.constraints().project(r_);
     matrix_.set_zero();
-    beam_.bonds().add_stiffness(s.x, beam_.memory(), matrix_);
+    beam_.bonds().add_stiffness(s.x, beam_.viscous_state(), matrix_);
     const double share = theta_ * theta_ * h * h;
     for (Eigen::Matrix3d& block : matrix_.below) block *= share;
     for (Eigen::Matrix3d& block : matrix_.diagonal) {

@@ -98,7 +98,7 @@ void compare(const Setup& setup, double depth_m, double angle) {
 
 /// What the estimate says and what is true, for a material that relaxes in another time: pressed to
 /// 4 mm, slid 10 mm aside and back, drawn out, each way from rest to rest, at most so fast. The
-/// truth is the full network in eight steps a period.
+/// reference is the full network in eight steps a period.
 void claim(const Setup& setup, double speed_m_per_s, double tau_s) {
   constexpr int kParts = 8;
   constexpr double kDeep_m = 4e-3, kFar_m = 10e-3;

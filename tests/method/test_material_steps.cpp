@@ -61,14 +61,14 @@ class Written {
     WrittenNetwork network(small_scene().network, std::move(written), small_scene().constraints,
                            small_scene().probe);
     const std::vector<double> forces = written_ramp(network, kDepth_m, kRamp_s, kTimes);
-    truth_ = Eigen::VectorXd::Map(forces.data(), std::ssize(forces));
+    expected_ = Eigen::VectorXd::Map(forces.data(), std::ssize(forces));
   }
 
   /// The largest difference in parts of the peak.
   [[nodiscard]] double error(const MethodSettings& settings) const {
     const MethodRun run = network_problem(driven_, ramp())->run(settings, kTimes);
     REQUIRE(run.end == MethodEnd::completed);
-    return (run.response - truth_).cwiseAbs().maxCoeff() / truth_.maxCoeff();
+    return (run.response - expected_).cwiseAbs().maxCoeff() / expected_.maxCoeff();
   }
   [[nodiscard]] double error(StepRule rule, double step_s) const {
     MethodSettings settings;
@@ -88,7 +88,7 @@ class Written {
   }
   BondSystem bonds_;
   DrivenNetwork driven_;
-  Eigen::VectorXd truth_;
+  Eigen::VectorXd expected_;
 };
 
 void check_rules(const Written& written) {

@@ -23,18 +23,19 @@ std::vector<double> tenths(double end) {
 /// Every rule with given steps at its order, every adaptive one at its tolerance.
 /// @param step_s at which first order is seen; higher orders take longer steps
 /// @param exact rules that make no error here
-void check_orders(const Judged& judged, double step_s, std::vector<StepRule> exact = {}) {
+void check_orders(const ReferenceProblem& checked, double step_s,
+                  std::vector<StepRule> exact = {}) {
   for (const StepRuleEntry& entry : kStepRules) {
-    INFO(judged.name << ", " << entry.text);
+    INFO(checked.name << ", " << entry.text);
     if (std::find(exact.begin(), exact.end(), entry.meaning) != exact.end()) {
-      CHECK(judged.error(entry.meaning, step_s) < 1e-13);
+      CHECK(checked.error(entry.meaning, step_s) < 1e-13);
     } else if (entry.adaptive) {
       MethodSettings settings;
       settings.rule = entry.meaning;
       settings.tolerance = 1e-5;
-      const double coarse = judged.error(judged.run(settings));
+      const double coarse = checked.error(checked.run(settings));
       settings.tolerance = 1e-9;
-      const double fine = judged.error(judged.run(settings));
+      const double fine = checked.error(checked.run(settings));
       CHECK(coarse < 20.0 * 1e-5);
       CHECK(fine < 20.0 * 1e-9);
     } else {
@@ -43,7 +44,7 @@ void check_orders(const Judged& judged, double step_s, std::vector<StepRule> exa
                             : entry.order == 1              ? 1.0
                             : entry.order == 2              ? 4.0
                                                             : 8.0;
-      CHECK_THAT(observed_order(judged, entry.meaning, longer * step_s),
+      CHECK_THAT(observed_order(checked, entry.meaning, longer * step_s),
                  WithinAbs(entry.order, 0.1));
     }
   }
@@ -76,23 +77,23 @@ bool done(const MethodRun& run) {
 
 TEST_CASE("method: orders on the element under an imposed depth") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
-  const Judged judged =
+  const ReferenceProblem checked =
       checked_element("ramp and hold", p, ramp_and_hold(0.004, 0.02, 0.2), tenths(0.4));
-  check_orders(judged, 0.00125, {StepRule::exponential});
+  check_orders(checked, 0.00125, {StepRule::exponential});
 }
 
 TEST_CASE("method: orders on the element under a load") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
-  const Judged judged = checked_element("creep", p, creep(0.3, 1.0), tenths(0.4));
-  check_orders(judged, 0.00125);
+  const ReferenceProblem checked = checked_element("creep", p, creep(0.3, 1.0), tenths(0.4));
+  check_orders(checked, 0.00125);
 }
 
 TEST_CASE("method: orders on the element with mass") {
   TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   p.Eprime_Pa = 0.0;
   // 10 Hz or so, damped enough for forward Euler.
-  const Judged judged = element_with_mass(p, 0.03, 40.0, 0.1, tenths(0.2));
-  check_orders(judged, 2e-5);
+  const ReferenceProblem checked = element_with_mass(p, 0.03, 40.0, 0.1, tenths(0.2));
+  check_orders(checked, 2e-5);
 }
 
 TEST_CASE("method: orders on the star") {
@@ -104,9 +105,9 @@ TEST_CASE("method: orders on the star") {
   QuasiStaticOptions options;
   options.tolerance = 1e-12;
   const std::vector<double> times = tenths(0.4);
-  const Judged judged{"star", network_problem(network, protocol), times,
-                      star.run(protocol, times, options).response};
-  check_orders(judged, 0.00125);
+  const ReferenceProblem checked{"star", network_problem(network, protocol), times,
+                                 star.run(protocol, times, options).response};
+  check_orders(checked, 0.00125);
 }
 
 TEST_CASE("method: the element and the star answer alike under every rule") {
@@ -150,40 +151,41 @@ TEST_CASE("method: what orders fall to where the step is far above the relaxatio
     const std::vector<double> times = tenths(1.0);
     ModelOptions tight;
     tight.relative_tolerance = 1e-13;
-    const Judged judged{
+    const ReferenceProblem checked{
         "stiff load", element_problem(p, protocol), times,
         CvodesElement(tight).respond(protocol, times, to_vector(p), Want::values).value};
-    const auto order = [&](StepRule rule) { return observed_order(judged, rule, 0.125 / 4.0); };
+    const auto order = [&](StepRule rule) { return observed_order(checked, rule, 0.125 / 4.0); };
     CHECK_THAT(order(StepRule::semi_implicit_euler), WithinAbs(1.0, 0.1));
     CHECK_THAT(order(StepRule::backward_euler), WithinAbs(1.0, 0.1));
     CHECK_THAT(order(StepRule::exponential), WithinAbs(1.0, 0.1));
     CHECK_THAT(order(StepRule::tr_bdf2), WithinAbs(2.0, 0.1));
     // What the kink at the start left behind is not damped.
     CHECK_THAT(order(StepRule::newmark), WithinAbs(0.0, 0.1));
-    CHECK(judged.error(StepRule::backward_euler, 0.03) < 1e-7);
-    CHECK(judged.error(StepRule::exponential, 0.03) < 1e-7);
-    CHECK(judged.error(StepRule::semi_implicit_euler, 0.03) > 1e-2);
+    CHECK(checked.error(StepRule::backward_euler, 0.03) < 1e-7);
+    CHECK(checked.error(StepRule::exponential, 0.03) < 1e-7);
+    CHECK(checked.error(StepRule::semi_implicit_euler, 0.03) > 1e-2);
   }
-  SECTION("a depth at once: the memory has to catch up within a step") {
-    const Judged judged = checked_element("stiff step", p, step_and_hold(0.004, 1.0), tenths(1.0));
+  SECTION("a depth step: the viscous state has to catch up within a step") {
+    const ReferenceProblem checked =
+        checked_element("stiff step", p, step_and_hold(0.004, 1.0), tenths(1.0));
     for (const StepRule rule : {StepRule::implicit_midpoint, StepRule::newmark}) {
-      CHECK_THAT(observed_order(judged, rule, 0.125), WithinAbs(0.0, 0.1));
-      CHECK(judged.error(rule, 0.125) > 0.9);
+      CHECK_THAT(observed_order(checked, rule, 0.125), WithinAbs(0.0, 0.1));
+      CHECK(checked.error(rule, 0.125) > 0.9);
     }
     for (const StepRule rule : {StepRule::backward_euler, StepRule::tr_bdf2, StepRule::xpbd}) {
-      CHECK(judged.error(rule, 0.0125) < 1e-9);
+      CHECK(checked.error(rule, 0.0125) < 1e-9);
     }
-    CHECK(judged.error(StepRule::exponential, 0.125) < 1e-13);
+    CHECK(checked.error(StepRule::exponential, 0.125) < 1e-13);
     for (const StepRule rule : {StepRule::forward_euler, StepRule::rk4}) {
       MethodSettings settings;
       settings.rule = rule;
       settings.step_s = 0.0125;
-      CHECK(judged.run(settings).end == MethodEnd::diverged);
+      CHECK(checked.run(settings).end == MethodEnd::diverged);
     }
   }
 }
 
-TEST_CASE("method: stability limits of memory alone are those of theory") {
+TEST_CASE("method: stability limits of the viscous state alone are those of theory") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.1);
   const auto limit = [&](StepRule rule) {
     return bisected_limit(0.01, 10.0, 2e-3,
@@ -244,16 +246,17 @@ TEST_CASE("method: which rules hold the paper's element at 1 kHz, and how well")
   const TpmParameters p;
   std::vector<double> times;
   for (int i = 1; i <= 60; ++i) times.push_back(1e-3 * i);
-  const Judged judged = checked_element("servo", p, ramp_and_hold(0.004, 0.1, 0.02), times);
+  const ReferenceProblem checked =
+      checked_element("servo", p, ramp_and_hold(0.004, 0.1, 0.02), times);
   for (const StepRule rule : {StepRule::forward_euler, StepRule::rk4}) {
     MethodSettings settings;
     settings.rule = rule;
-    CHECK(judged.run(settings).end == MethodEnd::diverged);
+    CHECK(checked.run(settings).end == MethodEnd::diverged);
   }
-  CHECK(judged.error(StepRule::backward_euler, 1e-3) < 1e-3);
-  CHECK(judged.error(StepRule::tr_bdf2, 1e-3) < 1e-3);
-  CHECK(judged.error(StepRule::implicit_midpoint, 1e-3) < 3e-3);
-  CHECK(judged.error(StepRule::exponential, 1e-3) < 1e-14);
+  CHECK(checked.error(StepRule::backward_euler, 1e-3) < 1e-3);
+  CHECK(checked.error(StepRule::tr_bdf2, 1e-3) < 1e-3);
+  CHECK(checked.error(StepRule::implicit_midpoint, 1e-3) < 3e-3);
+  CHECK(checked.error(StepRule::exponential, 1e-3) < 1e-14);
 }
 
 TEST_CASE("method: steps end at kinks and jumps, and times between steps are answered") {
@@ -263,13 +266,13 @@ TEST_CASE("method: steps end at kinks and jumps, and times between steps are ans
       {{0.0, 0.0}, {0.1, 0.002}, {0.1, 0.004}, {0.25, 0.004}, {0.25, 0.001}, {0.4, 0.003}});
   const std::vector<double> times{0.0, 0.0333, 0.0999999, 0.1, 0.17, 0.25, 0.3, 0.4};
   // Exact steps: whatever is wrong is the driver's.
-  const Judged judged = checked_element("jumps", p, jumps, times);
-  CHECK(judged.error(StepRule::exponential, 0.03) < 1e-13);
-  CHECK(judged.error(StepRule::exponential, 10.0) < 1e-13);
+  const ReferenceProblem checked = checked_element("jumps", p, jumps, times);
+  CHECK(checked.error(StepRule::exponential, 0.03) < 1e-13);
+  CHECK(checked.error(StepRule::exponential, 10.0) < 1e-13);
   MethodSettings bdf;
   bdf.rule = StepRule::cvode_bdf;
   bdf.tolerance = 1e-11;
-  CHECK(judged.error(judged.run(bdf)) < 1e-9);
+  CHECK(checked.error(checked.run(bdf)) < 1e-9);
 }
 
 TEST_CASE("method: a preload held for ever is where a run begins") {

@@ -1,4 +1,4 @@
-// The step rules on a small organ, judged by QuasiStatic and Inertial; the stability study.
+// The step rules on a small organ, compared with QuasiStatic and Inertial; the stability study.
 #include <catch2/catch.hpp>
 #include <map>
 
@@ -22,20 +22,21 @@ std::vector<double> eighths(double end) {
   return times;
 }
 
-void check_orders(const Judged& judged, const std::map<int, double>& step_s, double least_error) {
+void check_orders(const ReferenceProblem& checked, const std::map<int, double>& step_s,
+                  double least_error) {
   for (const StepRuleEntry& entry : kStepRules) {
     if (entry.meaning == StepRule::xpbd) continue;  // below
-    INFO(judged.name << ", " << entry.text);
+    INFO(checked.name << ", " << entry.text);
     if (entry.adaptive) {
       MethodSettings settings;
       settings.rule = entry.meaning;
       settings.tolerance = 1e-7;
-      CHECK(judged.error(judged.run(settings)) < std::max(100.0 * 1e-7, least_error));
+      CHECK(checked.error(checked.run(settings)) < std::max(100.0 * 1e-7, least_error));
     } else if (entry.order == 4 && least_error > 0.0) {
-      CHECK_THAT(own_order(judged, entry.meaning, step_s.at(4)), WithinAbs(4.0, 0.1));
-      CHECK(judged.error(entry.meaning, 0.5 * step_s.at(4)) < least_error);
+      CHECK_THAT(own_order(checked, entry.meaning, step_s.at(4)), WithinAbs(4.0, 0.1));
+      CHECK(checked.error(entry.meaning, 0.5 * step_s.at(4)) < least_error);
     } else {
-      CHECK_THAT(observed_order(judged, entry.meaning, step_s.at(entry.order)),
+      CHECK_THAT(observed_order(checked, entry.meaning, step_s.at(entry.order)),
                  WithinAbs(entry.order, 0.1));
     }
   }
@@ -46,47 +47,48 @@ void check_orders(const Judged& judged, const std::map<int, double>& step_s, dou
 TEST_CASE("method on an organ: orders without masses") {
   const SmallOrgan organ(TpmParameters{}.with_relaxation_time(0.1));
   const std::map<int, double> steps{{1, 0.003125}, {2, 0.0125}, {4, 0.0125}};
-  check_orders(organ.resting("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4)), steps, 0.0);
+  check_orders(organ.massless("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4)), steps, 0.0);
   const Protocol load(Drive::force, {{0.0, 0.0}, {0.2, 0.1}, {0.5, 0.1}});
-  check_orders(organ.resting("load", load, eighths(0.5)), steps, 0.0);
+  check_orders(organ.massless("load", load, eighths(0.5)), steps, 0.0);
 }
 
 TEST_CASE("method on an organ: orders with masses") {
   const SmallOrgan organ(TpmParameters{}.with_relaxation_time(0.1));
   const std::map<int, double> steps{{1, 1.25e-4}, {2, 5e-4}, {4, 5e-4}};
-  // The judge itself is good to some 1e-9.
-  check_orders(organ.moving("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4), 0.5), steps,
+  // The reference itself is good to some 1e-9.
+  check_orders(organ.with_mass("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4), 0.5), steps,
                1e-8);
 }
 
 TEST_CASE("method on an organ: XPBD lags without masses, and less the more it sweeps") {
   const SmallOrgan organ(TpmParameters{}.with_relaxation_time(0.1));
-  const Judged judged = organ.resting("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4));
+  const ReferenceProblem checked =
+      organ.massless("depth", ramp_and_hold(0.004, 0.02, 0.2), eighths(0.4));
   MethodSettings settings;
   settings.rule = StepRule::xpbd;
   settings.step_s = 1e-3;
   double before = 1.0;
   for (const int sweeps : {1, 4, 16, 64}) {
     settings.sweeps = sweeps;
-    const MethodRun run = judged.run(settings);
+    const MethodRun run = checked.run(settings);
     REQUIRE(run.end == MethodEnd::completed);
-    const double error = judged.error(run);
+    const double error = checked.error(run);
     CHECK(error < before);
     before = error;
   }
   CHECK(before < 0.01);
   settings.sweeps = 1;
   settings.step_s = 1e-5;
-  const double coarse = judged.error(judged.run(settings));
+  const double coarse = checked.error(checked.run(settings));
   settings.step_s = 0.5e-5;
-  CHECK_THAT(std::log2(coarse / judged.error(judged.run(settings))), WithinAbs(1.0, 0.1));
+  CHECK_THAT(std::log2(coarse / checked.error(checked.run(settings))), WithinAbs(1.0, 0.1));
 }
 
 TEST_CASE("method on an organ: a tissue that buckles says so") {
   const TpmParameters p = TpmParameters{}.with_relaxation_time(0.02);
   const Star star(p);
   Constraints unguided(4);
-  for (const std::size_t i : {1, 2, 3}) unguided.hold(i);
+  for (const std::size_t i : {1, 2, 3}) unguided.fix(i);
   const DrivenNetwork network{
       star.bonds, star.network.organ.position, unguided, Probes(Star::probe()), {}};
   const auto problem = network_problem(network, ramp_and_hold(0.004, 0.02, 0.2));
@@ -132,9 +134,10 @@ TEST_CASE("stability study: at servo rate the error is that on the servo's own g
       force.push_back((p.E2_Pa * depth - p.relaxing_modulus_Pa() * y + tension.value(depth)) *
                       p.modulus_to_stiffness_m());
     }
-    const Eigen::VectorXd truth = exact.respond(protocol, times, to_vector(p), Want::values).value;
+    const Eigen::VectorXd expected =
+        exact.respond(protocol, times, to_vector(p), Want::values).value;
     const Eigen::Map<const Eigen::VectorXd> found(force.data(), std::ssize(force));
-    const double error = (found - truth).cwiseAbs().maxCoeff() / truth.cwiseAbs().maxCoeff();
+    const double error = (found - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();
     if (row.rate_Hz == 1000.0) CHECK_THAT(error, WithinRel(0.00213, 0.005));
     for (const ServoCell& cell : row.cells) {
       if (cell.rule != StepRule::backward_euler) continue;

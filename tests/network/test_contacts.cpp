@@ -31,7 +31,7 @@ Tool tool_at(const Organ& organ, std::size_t sphere, const Eigen::Vector3d& dire
 }
 
 /// Columns of two spheres with one radial bond each, the lower one held, side by side along x; the
-/// top of each lower by a step than that before it. Springs with memory and nothing else.
+/// top of each lower by a step than that before it. Springs with a viscous branch and nothing else.
 struct Columns {
   Columns(int count, double step, const TpmParameters& p, double stiffness,
           ToolShape shape = {ToolKind::punch, 1.0})
@@ -40,8 +40,8 @@ struct Columns {
         constraints(network.organ.size()),
         stiffness_N_per_m(stiffness) {
     for (int i = 0; i < count; ++i) {
-      constraints.guide(top(i), Eigen::Vector3d::UnitZ());
-      constraints.hold(top(i) + 1);
+      constraints.slide(top(i), Eigen::Vector3d::UnitZ());
+      constraints.fix(top(i) + 1);
     }
     const Tool tool = tool_at(network.organ, 0, Eigen::Vector3d::UnitZ(), shape);
     driven.emplace(driven_network(bonds, network.organ, constraints, {}, {{tool, 1.0, stiffness}}));
@@ -76,8 +76,8 @@ struct Press {
     const double offset = (gain() * depth / tau - slope) / a;
     return (y - offset) * std::exp(-a * time) + offset + slope * time;
   }
-  [[nodiscard]] double force(double depth, double memory) const {
-    return c * (depth - (c * depth + g * memory) / (k + c));
+  [[nodiscard]] double force(double depth, double viscous) const {
+    return c * (depth - (c * depth + g * viscous) / (k + c));
   }
 };
 
@@ -146,7 +146,7 @@ TEST_CASE("pressing, releasing and recovering: one bond under a tool, in closed 
       force = force_released(t - 4.0);
       depth = rate - rate * (t - 4.0) - force / press.c;
     } else {
-      // Without force k l = g y, and the memory fades with what the bond keeps of it.
+      // Without force k l = g y, and the viscous elongation fades with what the bond keeps of it.
       const double keeps = press.g / press.k;
       depth = keeps * y_gone * std::exp(-(1.0 - keeps) * (t - 4.0 - gone) / press.tau);
     }
@@ -231,7 +231,7 @@ struct Slab {
         bonds(network, material(3.0)),
         constraints(network.organ.size()) {
     for (std::size_t i = 0; i < network.organ.size(); ++i) {
-      if (network.organ.layer[i] == 2) constraints.hold(i);
+      if (network.organ.layer[i] == 2) constraints.fix(i);
     }
   }
   static constexpr std::size_t kMiddle = 14;  // of the top plane

@@ -46,7 +46,7 @@ struct Block {
       const auto column = static_cast<Eigen::Index>(i);
       const Eigen::Vector3d at =
           rotation.transpose() * (network.organ.position.col(column) - shift);
-      if (network.organ.layer[i] == 1 && at.x() < 0.03) constraints.hold(i);
+      if (network.organ.layer[i] == 1 && at.x() < 0.03) constraints.fix(i);
     }
   }
 
@@ -115,7 +115,7 @@ TEST_CASE("a guided sphere under a small load follows the damped oscillator with
     const double load = 1e-8;
     const auto times = even_times(0.5, 25);
     const InertialRun run = inertial.run(creep(load, 0.5), times);
-    const double end = load / (p.relaxed_modulus_Pa() * p.modulus_to_stiffness_m());
+    const double end = load / (p.equilibrium_modulus_Pa() * p.modulus_to_stiffness_m());
     const Eigen::VectorXd exact = loaded_oscillator(p, kMass, drag_per_s, load, times);
     CAPTURE(eta1, run.work.steps);
     for (std::size_t i = 0; i < times.size(); ++i) {
@@ -176,7 +176,8 @@ TEST_CASE("the lowest mode of a block agrees with the dense eigenvalue problem")
       lowest_mode(block.bonds, block.network.organ.position, block.constraints, mass);
   const Eigen::Index n = block.network.organ.position.cols();
   Eigen::MatrixXd stiffness(3 * n, 3 * n);
-  const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(block.bonds.size())), 0.0};
+  const ViscousState none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(block.bonds.size())),
+                          0.0};
   for (Eigen::Index i = 0; i < 3 * n; ++i) {
     Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, n);
     unit.reshaped()[i] = 1.0;

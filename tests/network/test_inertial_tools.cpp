@@ -30,8 +30,8 @@ struct Springs {
         bonds(network, TpmParameters{}.with_relaxation_time(relaxation_time_s)),
         constraints(network.organ.size()) {
     for (std::size_t i = 0; i < network.organ.size(); i += 2) {
-      constraints.guide(i, Eigen::Vector3d::UnitZ());
-      constraints.hold(i + 1);
+      constraints.slide(i, Eigen::Vector3d::UnitZ());
+      constraints.fix(i + 1);
     }
     const Tool tool =
         touching_tool({ToolKind::punch, 1.0}, network.organ, 0, Eigen::Vector3d::UnitZ());
@@ -85,7 +85,7 @@ TEST_CASE("an inelastic impact leaves a common speed, or that of a tool that is 
   CHECK_THAT(velocity(2, 1), WithinRel(2.4, 1e-12));
   CHECK(velocity(0, 1) == 0.5);  // no friction
   CHECK_THAT(impulse[0], WithinRel(4.8, 1e-12));
-  constraints.hold(1);
+  constraints.fix(1);
   velocity.setZero();
   velocity(2, 1) = 4.0;
   CHECK_THAT(inelastic_impact({&pair, 1}, constraints, mass, velocity)[0], WithinRel(8.0, 1e-12));

@@ -26,7 +26,7 @@ Eigen::Matrix3Xd random_forces(const Constraints& constraints) {
   return forces;
 }
 
-BondMemory no_memory(const BondSystem& bonds) {
+ViscousState zero_viscous_state(const BondSystem& bonds) {
   return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
 }
 
@@ -34,10 +34,10 @@ BondMemory no_memory(const BondSystem& bonds) {
 
 TEST_CASE("conjugate gradients solve what the factorisation solves") {
   IndentedScene scene(solid_liver(1500), 0.02, 0.03);
-  scene.constraints.guide(700, Eigen::Vector3d(1, 2, 2) / 3.0);  // one that is partly free
-  const BondMemory memory = no_memory(scene.bonds);
+  scene.constraints.slide(700, Eigen::Vector3d(1, 2, 2) / 3.0);  // one that is partly free
+  const ViscousState viscous_state = zero_viscous_state(scene.bonds);
   Equilibrium direct(scene.bonds, scene.constraints);
-  REQUIRE(direct.factorise(scene.rest(), memory));
+  REQUIRE(direct.factorise(scene.rest(), viscous_state));
   const Eigen::Matrix3Xd forces = random_forces(scene.constraints);
   Eigen::Matrix3Xd exact = forces;
   direct.displace(exact);
@@ -47,7 +47,7 @@ TEST_CASE("conjugate gradients solve what the factorisation solves") {
     LargeEquilibrium large(scene.bonds, scene.constraints, scene.rest(), options);
     Eigen::Matrix3Xd x = forces;
     CAPTURE(entry.text);
-    REQUIRE(large.solve(scene.rest(), memory, x, 1e-12) == TangentAnswer::solved);
+    REQUIRE(large.solve(scene.rest(), viscous_state, x, 1e-12) == TangentAnswer::solved);
     CAPTURE(large.work().iterations);
     CHECK((x - exact).norm() < 1e-9 * exact.norm());
   }
@@ -56,7 +56,7 @@ TEST_CASE("conjugate gradients solve what the factorisation solves") {
 TEST_CASE("the preconditioners are symmetric") {
   const IndentedScene scene(solid_liver(1500), 0.02, 0.03);
   StiffnessRows stiffness(scene.bonds, scene.constraints);
-  const auto& matrix = stiffness.assemble(scene.rest(), no_memory(scene.bonds));
+  const auto& matrix = stiffness.assemble(scene.rest(), zero_viscous_state(scene.bonds));
   RigidModes<3> modes(scene.constraints.size());
   for (std::size_t i = 0; i < modes.size(); ++i) {
     modes[i].setZero();
@@ -94,7 +94,8 @@ TEST_CASE("multigrid needs about as many iterations for more spheres, block Jaco
     options.preconditioner = kind;
     LargeEquilibrium large(scene.bonds, scene.constraints, scene.rest(), options);
     Eigen::Matrix3Xd x = random_forces(scene.constraints);
-    REQUIRE(large.solve(scene.rest(), no_memory(scene.bonds), x, 1e-8) == TangentAnswer::solved);
+    REQUIRE(large.solve(scene.rest(), zero_viscous_state(scene.bonds), x, 1e-8) ==
+            TangentAnswer::solved);
     return large.work().iterations;
   };
   const int small = iterations(6, PreconditionerKind::multigrid);
@@ -116,9 +117,9 @@ TEST_CASE("a column pressed beyond its buckling load is found unstable by both s
   const double top = column.position.row(2).maxCoeff();
   for (std::size_t i = 0; i < column.size(); ++i) {
     const double z = column.position(2, static_cast<Eigen::Index>(i));
-    if (z < 1e-9 || z > top - 1e-9) constraints.hold(i);
+    if (z < 1e-9 || z > top - 1e-9) constraints.fix(i);
   }
-  const BondMemory memory = no_memory(bonds);
+  const ViscousState viscous_state = zero_viscous_state(bonds);
   const Eigen::Matrix3Xd no_load = Eigen::Matrix3Xd::Zero(3, column.position.cols());
   bool buckled = false;
   bool stood = false;
@@ -128,8 +129,8 @@ TEST_CASE("a column pressed beyond its buckling load is found unstable by both s
     Positions again = pressed;
     Equilibrium direct(bonds, constraints);
     LargeEquilibrium large(bonds, constraints, column.position);
-    const EquilibriumSearch a = direct.find(pressed, memory, no_load, 1e-9);
-    const EquilibriumSearch b = large.find(again, memory, no_load, 1e-9);
+    const EquilibriumSearch a = direct.find(pressed, viscous_state, no_load, 1e-9);
+    const EquilibriumSearch b = large.find(again, viscous_state, no_load, 1e-9);
     CAPTURE(compression, a.stable, b.stable, a.converged, b.converged);
     CHECK(a.stable == b.stable);
     buckled = buckled || !b.stable;
@@ -147,11 +148,11 @@ TEST_CASE("a probe with random forces finds loose spheres that the load does not
   const Network network = build_network(organ, narrow, "lattice");
   const BondSystem bonds(network, TpmParameters{});
   Constraints constraints(organ.size());
-  for (std::size_t i = 0; i < 16; ++i) constraints.hold(i);
+  for (std::size_t i = 0; i < 16; ++i) constraints.fix(i);
   LargeEquilibrium large(bonds, constraints, organ.position);
   Positions position = organ.position;
   const EquilibriumSearch search = large.find(
-      position, no_memory(bonds), Eigen::Matrix3Xd::Zero(3, organ.position.cols()), 1e-9);
+      position, zero_viscous_state(bonds), Eigen::Matrix3Xd::Zero(3, organ.position.cols()), 1e-9);
   CHECK(search.converged);
   CHECK_FALSE(search.stable);
 }
@@ -204,7 +205,7 @@ TEST_CASE("a quasi-static run is the same with either solver, within its toleran
   const Network network = build_network(organ, {}, "liver");
   const BondSystem bonds(network, TpmParameters{}.with_relaxation_time(0.7));
   Constraints constraints(organ.size());
-  for (const std::size_t i : far_side(organ, Eigen::Vector3d::UnitZ(), 0.02)) constraints.hold(i);
+  for (const std::size_t i : far_side(organ, Eigen::Vector3d::UnitZ(), 0.02)) constraints.fix(i);
   Eigen::Index front = 0;
   organ.position.row(2).minCoeff(&front);
   const Probe probe{static_cast<std::size_t>(front), Eigen::Vector3d::UnitZ()};

@@ -46,12 +46,12 @@ TEST_CASE("the unguided star is a mechanism out of its plane, and says which sph
   const Network network = join(star_organ(p.spacing_m), Star::pairs(), {}, "star");
   const BondSystem bonds(network, p);
   Constraints constraints(4);
-  for (const std::size_t i : {1, 2, 3}) constraints.hold(i);
+  for (const std::size_t i : {1, 2, 3}) constraints.fix(i);
   const ZeroEnergyModes modes = zero_energy_modes(bonds, network.organ.position, constraints);
   CHECK(modes.count == 1);
   CHECK(modes.spheres == std::vector<std::size_t>{0});
   CHECK_THROWS_WITH(require_rigid(bonds, network.organ.position, constraints, "star.json"),
                     Catch::StartsWith("star.json: 1 zero-energy mode; loose: sphere 1; expected"));
-  constraints.guide(0, Eigen::Vector3d::UnitZ());
+  constraints.slide(0, Eigen::Vector3d::UnitZ());
   CHECK(zero_energy_modes(bonds, network.organ.position, constraints).is_rigid());
 }

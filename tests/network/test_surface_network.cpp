@@ -29,7 +29,7 @@ Organ block_with_contact() {
 Constraints standing(const Organ& organ) {
   Constraints constraints(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
-    if (organ.layer[i] == 2) constraints.hold(i);
+    if (organ.layer[i] == 2) constraints.fix(i);
   }
   return constraints;
 }

@@ -57,29 +57,29 @@ const PlannedCandidate& named(const Plan& plan, const std::string& name) {
 }  // namespace
 
 TEST_CASE("a scalar model is the closed form of the paper's element under any steps") {
-  DepthCurve relaxed, relaxing;
-  relaxed.stiffness_N_per_m = 75.0;
+  DepthCurve equilibrium, relaxing;
+  equilibrium.stiffness_N_per_m = 75.0;
   relaxing.stiffness_N_per_m = 50.0;
   const double tau = 0.7, depth = 2e-3, rise = 0.5;
   for (const int steps : {1, 7, 500}) {
-    ScalarModel model(relaxed, relaxing, {{1.0, tau}}, rise / steps);
+    ScalarModel model(equilibrium, relaxing, {{1.0, tau}}, rise / steps);
     double force = 0.0;
     for (int i = 1; i <= steps; ++i) force = model.step_to(depth * i / steps);
-    // Ramp: the memory is v (t - tau (1 - exp(-t/tau))), docs/notation.md.
+    // Ramp: the viscous elongation is v (t - tau (1 - exp(-t/tau))), docs/notation.md.
     const double v = depth / rise;
-    const double memory = v * (rise - tau * -std::expm1(-rise / tau));
-    CHECK_THAT(force, WithinRel(75.0 * depth + 50.0 * (depth - memory), 1e-12));
+    const double viscous = v * (rise - tau * -std::expm1(-rise / tau));
+    CHECK_THAT(force, WithinRel(75.0 * depth + 50.0 * (depth - viscous), 1e-12));
   }
 }
 
 TEST_CASE("a scalar model under a load goes to the depth whose force it is") {
-  DepthCurve relaxed, relaxing;
-  relaxed.stiffness_N_per_m = 75.0;
-  relaxed.tension_N_per_m = 300.0;
-  relaxed.spacing_m = 0.03;
+  DepthCurve equilibrium, relaxing;
+  equilibrium.stiffness_N_per_m = 75.0;
+  equilibrium.tension_N_per_m = 300.0;
+  equilibrium.spacing_m = 0.03;
   relaxing.stiffness_N_per_m = 50.0;
-  ScalarModel by_load(relaxed, relaxing, {{0.6, 0.3}, {0.4, 1.0}}, 0.01);
-  ScalarModel by_depth(relaxed, relaxing, {{0.6, 0.3}, {0.4, 1.0}}, 0.01);
+  ScalarModel by_load(equilibrium, relaxing, {{0.6, 0.3}, {0.4, 1.0}}, 0.01);
+  ScalarModel by_depth(equilibrium, relaxing, {{0.6, 0.3}, {0.4, 1.0}}, 0.01);
   for (int i = 1; i <= 100; ++i) {
     const double load = 0.002 * i;
     CHECK_THAT(by_depth.step_to(by_load.step_under(load)), WithinRel(load, 1e-9));
@@ -89,9 +89,9 @@ TEST_CASE("a scalar model under a load goes to the depth whose force it is") {
 TEST_CASE("the spectrum of the star is its two stiffnesses and one time") {
   const PlanScene scene(star(ramp("1 mm")));
   const ContactSpectrum spectrum = contact_spectrum(scene);
-  const HeldStiffness exact = star_stiffness(scene.scene().tissue.element());
+  const ContactStiffness exact = star_stiffness(scene.scene().tissue.element());
   CHECK_THAT(spectrum.instantaneous(), WithinRel(exact.instantaneous, 1e-12));
-  CHECK_THAT(spectrum.relaxed(), WithinRel(exact.relaxed, 1e-12));
+  CHECK_THAT(spectrum.equilibrium(), WithinRel(exact.equilibrium, 1e-12));
   const auto branches = fitted_branches(spectrum, 1);
   REQUIRE(branches.size() == 1);
   CHECK_THAT(branches[0].time_s, WithinRel(0.7, 1e-9));

@@ -43,7 +43,7 @@ def check_step(output, result, time):
     at = vtk_to_numpy(spheres.GetPoints().GetData())
     assert np.array_equal(at, vtk_to_numpy(bonds.GetPoints().GetData()))
     fields = arrays(spheres.GetPointData())
-    assert {"number", "layer", "held", "contact", "displacement_m", "displacement_magnitude_m", "validity", "force_N",
+    assert {"number", "layer", "constraint", "contact", "displacement_m", "displacement_magnitude_m", "validity", "force_N",
             "largest_bond_force_N"} == set(fields), fields.keys()
     contact = result["contacts"][0]["sphere"] - 1
     assert fields["number"][contact] == contact + 1

@@ -59,7 +59,7 @@ def main():
                 assert np.array_equal(ends, result["bonds/ends"])
                 for field in set(step) - {"position_m"}:
                     assert np.array_equal(fields[field], step[field]), field
-                for field in ("number", "layer", "held"):
+                for field in ("number", "layer", "constraint"):
                     assert np.array_equal(fields[field], result["spheres"][field]), field
                 assert np.array_equal(fields["kind"], result["bonds/kind"])
     print("4 times agree")

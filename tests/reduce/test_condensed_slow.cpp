@@ -29,7 +29,7 @@ double error_of_ramp(const Liver& liver, double relaxation_time_s, double ramp_s
   const BondSystem bonds(liver.tissue.network,
                          liver.tissue.element().with_relaxation_time(relaxation_time_s));
   Constraints constraints = liver.tissue.constraints();
-  constraints.guide(liver.contact, liver.into);
+  constraints.slide(liver.contact, liver.into);
   CondensedContact contact = liver.built.with_relaxation_time(relaxation_time_s);
   std::vector<double> times;
   std::vector<double> forces;

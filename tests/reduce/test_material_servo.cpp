@@ -73,19 +73,19 @@ Eigen::VectorXd reference(const BondSystem& bonds) {
       {{0.0, 0.0}, {kRamp * kPeriod_s, kDepth_m}, {kSteps * kPeriod_s, kDepth_m}}, "ramp");
   // Models at servo rate move the contact in space: it does not yield to the side.
   Constraints guided = scene.constraints;
-  guided.guide(scene.probe.sphere, scene.probe.direction);
+  guided.slide(scene.probe.sphere, scene.probe.direction);
   return QuasiStatic(bonds, scene.network.organ.position, guided, scene.probe, {.tolerance = 1e-7})
       .run(protocol, times)
       .response;
 }
 
-struct Judged {
+struct ModelErrors {
   double error, claim;  ///< the largest of a run, over the peak
 };
 
-Judged judged(ContactModel& model, const Eigen::VectorXd& expected) {
+ModelErrors errors_of(ContactModel& model, const Eigen::VectorXd& expected) {
   const Eigen::Vector3d& into = small_liver().probe.direction;
-  Judged found{0.0, 0.0};
+  ModelErrors found{0.0, 0.0};
   const double peak = expected.maxCoeff();
   for (int i = 1; i <= kSteps; ++i) {
     const ContactAnswer answer = model.step(depth_at(i) * into);
@@ -98,7 +98,7 @@ Judged judged(ContactModel& model, const Eigen::VectorXd& expected) {
 
 /// The model's largest error over the peak; it may not be above the largest that the model claims.
 double worst_error(ContactModel& model, const Eigen::VectorXd& expected) {
-  const Judged found = judged(model, expected);
+  const ModelErrors found = errors_of(model, expected);
   CHECK(found.error <= found.claim);
   return found.error;
 }
@@ -232,7 +232,7 @@ TEST_CASE("the claim of a zone follows its error, whatever the material", "[serv
     const BondSystem bonds(scene.network, field);
     ZoneNetwork zone(bonds, scene.network.organ.position, scene.constraints, scene.probe.sphere,
                      scene.probe.direction, {.period_s = kPeriod_s, .rings = 1});
-    const Judged found = judged(zone, reference(bonds));
+    const ModelErrors found = errors_of(zone, reference(bonds));
     CAPTURE(name, found.error, found.claim);
     CHECK(found.error > 5e-4);
     CHECK(found.claim >= found.error);
@@ -300,7 +300,7 @@ TEST_CASE("the condensed model errs with several branches as it does with one",
     CondensedContact model = condensed(bonds);
     REQUIRE(model.branches().size() == times.size());
     const double worst = worst_error(model, reference(bonds));
-    CHECK(model.kept_memories() == 0);
+    CHECK(model.kept_viscous_states() == 0);
     return worst;
   };
   for (const Case& c : std::vector<Case>{
@@ -345,9 +345,9 @@ TEST_CASE("a condensed contact of several branches creates no energy and allocat
   CHECK(account.created_J < 1e-13 * account.highest_J);
   CHECK(account.least_J > -1e-13 * account.highest_J);
   CHECK(account.supplied_J > 0.05 * account.highest_J);
-  CHECK(contact.kept_memories() < 200);
+  CHECK(contact.kept_viscous_states() < 200);
   contact.reset();
-  CHECK(contact.memory().spread_J == 0.0);
+  CHECK(contact.viscous_state().spread_J == 0.0);
   const tpm::testing::HeapWatch heap;
   for (int i = 1; i <= 300; ++i) (void)contact.step(0.5 * depth_at(i) * scene.probe.direction);
   const long calls = heap.calls();
@@ -363,7 +363,7 @@ TEST_CASE("the condensed model takes a stiffening potential and factors of place
     const BondSystem bonds(scene.network, tumour ? with_tumour(m) : MaterialField(stiffening(m)));
     CondensedContact model = condensed(bonds);
     CHECK(worst_error(model, reference(bonds)) < 1e-2);
-    CHECK(model.kept_memories() == 0);
+    CHECK(model.kept_viscous_states() == 0);
   }
 }
 

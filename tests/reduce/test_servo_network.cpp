@@ -113,7 +113,7 @@ TEST_CASE("a factor in fronts solves as a dense one does", "[frontal]") {
   CHECK_FALSE(factor.factorise(diagonal, across));
 }
 
-TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][heavy]") {
+TEST_CASE("servo bonds pull and relax as the bonds of the network", "[servo][heavy]") {
   const OrganScene& scene = small_liver();
   const Positions& rest = scene.network.organ.position;
   const double z = 0.3;
@@ -141,9 +141,9 @@ TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][
           position(c, static_cast<Eigen::Index>(i)) += static_cast<double>(moved);
         }
       }
-      const auto expect = [&](std::size_t first, const Eigen::VectorXd& memory) {
+      const auto expect = [&](std::size_t first, const Eigen::VectorXd& mean_viscous) {
         Eigen::Matrix3Xd exact = Eigen::Matrix3Xd::Zero(3, rest.cols());
-        bonds.add_forces(position, {memory, 0.0}, exact);
+        bonds.add_forces(position, {mean_viscous, 0.0}, exact);
         double worst = 0.0;
         for (std::size_t i = 0; i < spheres; ++i) {
           for (std::size_t c = 0; c < 3; ++c) {
@@ -157,7 +157,7 @@ TEST_CASE("servo bonds pull and remember as the bonds of the network", "[servo][
       Eigen::VectorXd now;
       bonds.elongations(position, now);
       viscous = (w.r * viscous + w.w0 * before + w.w1 * now).eval();
-      // Advancing twice is advancing once: only what is accepted is remembered.
+      // Advancing twice is advancing once: only what is accepted changes the state.
       servo.advance(u.data(), servo_weights(bonds, z * bonds.relaxation_time_s()), force.data());
       std::fill(force.begin(), force.end(), 0.0F);
       servo.advance(u.data(), servo_weights(bonds, z * bonds.relaxation_time_s()), force.data());
@@ -293,7 +293,7 @@ TEST_CASE("the servo network says when it is out of its range", "[servo]") {
       ServoNetwork(bonds, rest, scene.constraints, scene.probe.sphere, into, {.period_s = 0.0}),
       Error);
   Constraints held = scene.constraints;
-  held.hold(scene.probe.sphere);
+  held.fix(scene.probe.sphere);
   CHECK_THROWS_AS(ServoNetwork(bonds, rest, held, scene.probe.sphere, into), Error);
 }
 
@@ -306,7 +306,7 @@ TEST_CASE("a guided sphere stays on its guide in the servo network", "[servo]") 
   while (!scene.constraints.is_free(guided) || guided == scene.probe.sphere) ++guided;
   const Eigen::Vector3d along = Eigen::Vector3d(1.0, 2.0, -0.5).normalized();
   Constraints constraints = scene.constraints;
-  constraints.guide(guided, along);
+  constraints.slide(guided, along);
   ServoNetwork servo(bonds, rest, constraints, scene.probe.sphere, into);
   const ContactMotion ramp = ramp_motion(into, 4e-3, 0.05, 0.02, 1e-3);
   const Answers answers = follow(servo, ramp);

@@ -138,7 +138,7 @@ TEST_CASE("a zone at a patch has the force of the network on all of its spheres"
   Constraints guided = scene.constraints;
   std::vector<Probe> probes;
   for (const std::size_t sphere : patch) {
-    guided.guide(sphere, into);
+    guided.slide(sphere, into);
     probes.push_back({sphere, into});
   }
   const QuasiStatic network(bonds, organ.position, guided, Probes(std::move(probes)));
@@ -179,6 +179,6 @@ TEST_CASE("a zone refuses what it cannot do", "[zone][heavy]") {
   Constraints guided = scene.constraints;
   std::size_t some = 0;
   while (!scene.constraints.is_free(some) || some == scene.probe.sphere) ++some;
-  guided.guide(some, into);
+  guided.slide(some, into);
   CHECK_THROWS_AS(ZoneNetwork(bonds, rest, guided, scene.probe.sphere, into), Error);
 }

@@ -152,6 +152,6 @@ TEST_CASE("a law is viewed without its figures, and says so") {
                    "offset_N": 0}})";
   const ViewPage page = view_file(folder / "law.json");
   CHECK(page.description.at("table").at("rows").size() == 5);
-  CHECK(page.description.at("table").at("rows").at(2) == Json({"tau1_s", "2", "held"}));
+  CHECK(page.description.at("table").at("rows").at(2) == Json({"tau1_s", "2", "fixed"}));
   CHECK_THAT(page.description.dump(), Contains("there is no figures.json beside the law"));
 }

@@ -45,7 +45,7 @@ TEST_CASE("the shipped scene is the liver of the paper, held on its far side", "
   CHECK(seen.radial_bonds + seen.lateral_bonds == tissue.network.bonds.size());
   REQUIRE(seen.contact_over_star);
   CHECK_THAT(seen.contact_over_star->instantaneous, WithinRel(1.0, 1e-6));
-  CHECK_THAT(seen.contact_over_star->relaxed, WithinRel(1.0, 1e-6));
+  CHECK_THAT(seen.contact_over_star->equilibrium, WithinRel(1.0, 1e-6));
   // The defaults say the same.
   const Tissue plain = tissue_of(R"({"organ": {"kind": "liver"}})");
   CHECK(plain.anchors == tissue.anchors);

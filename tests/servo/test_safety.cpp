@@ -46,11 +46,11 @@ TEST_CASE("An honest release gives the hand what the tissue stored, and no more"
     at = to;
   };
   for (int i = 1; i <= 2000; ++i) move(4e-6 * i);
-  const double in = watch.given_J();
+  const double in = watch.delivered_J();
   for (int i = 1; i <= 40; ++i) move(8e-3 - 2e-4 * i);
   // What is left is the leak, K dx^2 / 2 a period: 0.12 mJ of 4.8.
   const double leak = 40 * 0.5 * k * 2e-4 * 2e-4;
-  CHECK_THAT(watch.given_J() - in, WithinRel(leak, 1e-9));
+  CHECK_THAT(watch.delivered_J() - in, WithinRel(leak, 1e-9));
   CHECK_FALSE(watch.too_much());
   CHECK(watch.tissue_J() < 1e-12);
 }
@@ -59,18 +59,18 @@ TEST_CASE("Energy put in earlier is no credit for what is given away later") {
   EnergyWatch watch({.friction_N_s_per_m = 0.0, .allowance_J = 2e-3});
   // A damper takes 50 mJ of the hand, then a spring of a force that comes a quarter late gives.
   for (int i = 0; i < 1000; ++i) watch.observe({0.0, 0.0, -1.0}, {0.0, 0.0, 5e-5}, 0.0, 1);
-  CHECK(watch.given_J() == 0.0);
+  CHECK(watch.delivered_J() == 0.0);
   double given = 0.0;
   for (int periods = 0; !watch.too_much() && periods < 1000; ++periods) {
     watch.observe({0.0, 0.0, 1.0}, {0.0, 0.0, 5e-5}, 0.0, 1);
     given += 5e-5;
   }
   CHECK(given <= 2e-3 + 5e-5 + 1e-12);  // what was allowed, and one period more
-  CHECK_THAT(watch.given_J(), WithinRel(given, 1e-9));
+  CHECK_THAT(watch.delivered_J(), WithinRel(given, 1e-9));
 }
 
 TEST_CASE("A known delay is a part of what is watched, an unknown one is not seen") {
-  const auto most_given_J = [](int known) {
+  const auto most_delivered_J = [](int known) {
     constexpr int kTrue = 20;
     EnergyWatch watch({.friction_N_s_per_m = 0.1, .delay_periods = known});
     double before = 0.0;
@@ -82,11 +82,11 @@ TEST_CASE("A known delay is a part of what is watched, an unknown one is not see
       before = at;
     }
     (void)kTrue;
-    return watch.most_given_J();
+    return watch.most_delivered_J();
   };
-  CHECK(most_given_J(0) < 0.1e-3);
+  CHECK(most_delivered_J(0) < 0.1e-3);
   // A spring late by t under a sine: pi K a^2 sin(w t) a cycle, 20 ms late 0.92 mJ, 5 cycles a s.
-  CHECK(most_given_J(20) > 2e-3);
+  CHECK(most_delivered_J(20) > 2e-3);
 }
 
 TEST_CASE("A tissue that gives more than it got is found as well") {
@@ -419,7 +419,7 @@ class Doubtful final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return 200.0 * Eigen::Matrix3d::Identity();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
     return instantaneous_stiffness();
   }
 
@@ -486,15 +486,15 @@ TEST_CASE("A force in doubt gives back no more than its stiffness stored") {
   }
   const double held_N = -device.force.z();
   CHECK((row.flags & kBeyondModel) != 0);
-  double given_J = 0.0;
+  double delivered_J = 0.0;
   for (int i = 1; i <= 40; ++i) {
     const double force = -device.force.z(), before = device.at.z();
     device.at.z() -= 5e-5;
     REQUIRE(step.cycle(0, row) == StopCause::none);
-    given_J += 0.5 * (force - device.force.z()) * (before - device.at.z());
+    delivered_J += 0.5 * (force - device.force.z()) * (before - device.at.z());
   }
   CHECK(device.force.z() == 0.0);
-  CHECK(given_J <= 1.001 * held_N * held_N / (2.0 * 200.0));
+  CHECK(delivered_J <= 1.001 * held_N * held_N / (2.0 * 200.0));
 }
 
 TEST_CASE("No part of the watch allocates, also when it acts") {

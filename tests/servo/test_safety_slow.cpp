@@ -32,7 +32,7 @@ OperatorScript random_ways(Random& random, int ways, double deepest_m) {
 TEST_CASE("No motion of a million of passive set-ups is stopped") {
   constexpr int kSetUps = 1000, kWays = 1000;
   Random random(2024);
-  double most_given_J = 0.0;
+  double most_delivered_J = 0.0;
   for (int i = 0; i < kSetUps; ++i) {
     // Passive: b > K (T/2 + delay), for the largest stiffness on the way.
     const double rates[] = {500.0, 1000.0, 2000.0};
@@ -62,7 +62,7 @@ TEST_CASE("No motion of a million of passive set-ups is stopped") {
     settings.friction_N_s_per_m = plant.damping_N_s_per_m;
     settings.delay_periods = plant.delay_periods;
     settings.phase_ends = {static_cast<std::uint64_t>(script.pieces().back().end_s / period_s)};
-    double given_J = 0.0;
+    double delivered_J = 0.0;
     ServoStep step(device, model, settings);
     ServoRecord row;
     StopCause cause = StopCause::none;
@@ -70,14 +70,14 @@ TEST_CASE("No motion of a million of passive set-ups is stopped") {
       cause = step.cycle(0, row);
       device.advance(period_s);
     }
-    given_J = step.energy().most_given_J();
-    most_given_J = std::max(most_given_J, given_J);
-    CAPTURE(i, period_s, stiffness, plant.damping_N_s_per_m, tau_s, given_J, row.cycle);
+    delivered_J = step.energy().most_delivered_J();
+    most_delivered_J = std::max(most_delivered_J, delivered_J);
+    CAPTURE(i, period_s, stiffness, plant.damping_N_s_per_m, tau_s, delivered_J, row.cycle);
     INFO(word_of(cause));
     REQUIRE(cause == StopCause::finished);
   }
-  WARN("largest energy given: " << 1e3 * most_given_J << " mJ of the 2 mJ that stop a session");
-  CHECK(most_given_J < 2e-3);
+  WARN("largest energy given: " << 1e3 * most_delivered_J << " mJ of the 2 mJ that stop a session");
+  CHECK(most_delivered_J < 2e-3);
 }
 
 }  // namespace

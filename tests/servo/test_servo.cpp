@@ -105,7 +105,7 @@ TEST_CASE("The surface lets go at zero force, recovers, and is met again where i
     REQUIRE(answer.force_N >= 0.0);
   }
   CHECK_FALSE(answer.touching);
-  CHECK(answer.surface_m > 0.5e-3);  // what it remembers keeps it down
+  CHECK(answer.surface_m > 0.5e-3);  // its viscous state keeps it down
   // Free recovery: E2 (e - e1) + lambda1 e = 0, close to creep to zero with tau (E1 + E2) / E1.
   const double left = answer.surface_m;
   double elapsed = 0.0;

@@ -283,7 +283,7 @@ TEST_CASE("A network in a thread of its own follows the loop, however late it is
   }
 }
 
-TEST_CASE("The jitter check counts and judges") {
+TEST_CASE("The jitter check counts and reports") {
   DeviceChoice device;
   HilSession session;
   session.servo.period_s = 2e-3;
@@ -317,18 +317,18 @@ TEST_CASE("The jitter check says no where a session with the same limits would h
   o.cause = StopCause::finished;
   o.cycles = 40'000;
   for (int i = 0; i < 40'000; ++i) o.woke_late.note(30'000);
-  o.counts.missed = o.counts.most_missed_at_once = 3;
+  o.counts.missed = o.counts.most_consecutive_missed = 3;
   assess(check);
   CHECK(check.fit);
   CHECK(check.verdict == "fit for 4000 Hz");
   CHECK_THAT(check.advice, Catch::Contains("can do 4000 Hz; its longest stall was 0.03 ms"));
 
   // One stall of 17 ms in ten seconds: 68 periods, 0.17 % of all.
-  o.counts.missed = o.counts.most_missed_at_once = 68;
+  o.counts.missed = o.counts.most_consecutive_missed = 68;
   assess(check);
   CHECK_FALSE(check.fit);
   CHECK_THAT(check.verdict,
-             Catch::Contains("68 periods were missed at once, a session stops after 50"));
+             Catch::Contains("68 consecutive periods were missed, a session stops after 50"));
   o.woke_late.note(17'000'000);
   assess(check);
   CHECK_THAT(check.verdict,

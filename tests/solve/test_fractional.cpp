@@ -1,4 +1,4 @@
-// Fractional memory: the Mittag-Leffler function against a table in 25 digits, the exponential sums
+// Fractional laws: the Mittag-Leffler function against a table in 25 digits, the exponential sums
 // against it, weights against high-precision arithmetic, histories against exact superposition.
 #include <algorithm>
 #include <boost/multiprecision/cpp_bin_float.hpp>
@@ -238,20 +238,20 @@ TEST_CASE("sums of exponentials keep their stated error over the window") {
   for (const double span : {1e4, 1e8}) {
     const double t_min = 0.02;
     const double t_max = span * t_min;
-    const FractionalMemory memory(t_min, t_max);
-    CHECK(std::ssize(memory.rates_per_s()) <= (span < 1e5 ? 110 : 150));
-    CHECK(memory.stated_error() <= 1e-9);
+    const ExponentialSum exponentials(t_min, t_max);
+    CHECK(std::ssize(exponentials.rates_per_s()) <= (span < 1e5 ? 110 : 150));
+    CHECK(exponentials.stated_error() <= 1e-9);
     FractionalWeights w;
     for (const double alpha : kAlphas) {
       for (const double tau : decades(1e-3 * t_min, 1e3 * t_max, 12)) {
-        memory.mittag_leffler(alpha, tau, w);
+        exponentials.mittag_leffler(alpha, tau, w);
         for (const double t : decades(t_min, t_max, 14)) {
           const double exact = relaxation(alpha, tau, t);
           const double integral = relaxation_integral(alpha, tau, t);
-          worst = std::max({worst, std::abs(memory.at(w, t) - exact),
-                            std::abs(memory.integral_s(w, t) - integral) / t});
+          worst = std::max({worst, std::abs(exponentials.at(w, t) - exact),
+                            std::abs(exponentials.integral_s(w, t) - integral) / t});
           const double slope = relaxation_by_log_tau(alpha, tau, t);
-          worst_slope = std::max(worst_slope, std::abs(memory.at(by_log_tau(w), t) - slope));
+          worst_slope = std::max(worst_slope, std::abs(exponentials.at(by_log_tau(w), t) - slope));
         }
       }
     }
@@ -264,17 +264,17 @@ TEST_CASE("sums of exponentials keep their stated error over the window") {
 TEST_CASE("the sum for the spring-pot keeps its stated error over the window") {
   for (const double t_min : {1e-3, 1.0, 50.0}) {
     const double t_max = 1e6 * t_min;
-    const FractionalMemory memory(t_min, t_max);
+    const ExponentialSum exponentials(t_min, t_max);
     FractionalWeights w;
     for (const double alpha : kAlphas) {
-      memory.springpot(alpha, w);
+      exponentials.springpot(alpha, w);
       CHECK(w.weight.minCoeff() >= 0.0);
       CHECK(w.constant >= 0.0);
       const double scale = springpot(alpha, t_min);
       for (const double t : decades(t_min, t_max, 40)) {
         CAPTURE(t_min, alpha, t);
-        CHECK_THAT(memory.at(w, t), WithinAbs(springpot(alpha, t), 1e-9 * scale));
-        CHECK_THAT(memory.integral_s(w, t), WithinRel(springpot_integral(alpha, t), 1e-9));
+        CHECK_THAT(exponentials.at(w, t), WithinAbs(springpot(alpha, t), 1e-9 * scale));
+        CHECK_THAT(exponentials.integral_s(w, t), WithinRel(springpot_integral(alpha, t), 1e-9));
       }
     }
     CHECK(w.weight.maxCoeff() == 0.0);  // alpha = 1 is a dashpot of 1 s and nothing else
@@ -286,43 +286,44 @@ TEST_CASE("the sum for the spring-pot keeps its stated error over the window") {
 TEST_CASE("a wider tolerance needs fewer rates and is kept, a tighter one too") {
   std::size_t before = 0;
   for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10, 1e-12}) {
-    const FractionalMemory memory(0.1, 1e3, tolerance);
-    CHECK(memory.rates_per_s().size() > before);
-    before = memory.rates_per_s().size();
+    const ExponentialSum exponentials(0.1, 1e3, tolerance);
+    CHECK(exponentials.rates_per_s().size() > before);
+    before = exponentials.rates_per_s().size();
     FractionalWeights w;
     double worst = 0.0;
     for (const double alpha : {0.02, 0.3, 0.8, 0.98, 1.0}) {
       for (const double tau : decades(1e-3, 1e5, 17)) {
-        memory.mittag_leffler(alpha, tau, w);
+        exponentials.mittag_leffler(alpha, tau, w);
         for (const double t : decades(0.1, 1e3, 13)) {
-          worst = std::max(worst, std::abs(memory.at(w, t) - relaxation(alpha, tau, t)));
+          worst = std::max(worst, std::abs(exponentials.at(w, t) - relaxation(alpha, tau, t)));
         }
       }
     }
     CAPTURE(tolerance, worst);
-    CHECK(worst < memory.stated_error() + 2e-14);
+    CHECK(worst < exponentials.stated_error() + 2e-14);
     CHECK(worst > 1e-3 * tolerance);  // nor is it bought with needless rates
   }
 }
 
 TEST_CASE("alpha = 1 is exp, reached continuously, also with 1/tau on a rate of the grid") {
-  const FractionalMemory memory(0.1, 1e4);
-  const std::span<const double> rates = memory.rates_per_s();
+  const ExponentialSum exponentials(0.1, 1e4);
+  const std::span<const double> rates = exponentials.rates_per_s();
   FractionalWeights w;
   for (const double tau : {1e-4, 0.5, 7.0, 1.0 / rates[40], 1.0 / rates[60], 3e6}) {
-    memory.mittag_leffler(1.0, tau, w);
+    exponentials.mittag_leffler(1.0, tau, w);
     for (const double t : decades(0.1, 1e4, 30)) {
       CAPTURE(tau, t);
-      CHECK_THAT(memory.at(w, t), WithinAbs(std::exp(-t / tau), 1e-9));
-      CHECK_THAT(memory.integral_s(w, t) / t, WithinAbs(-std::expm1(-t / tau) * tau / t, 1e-9));
+      CHECK_THAT(exponentials.at(w, t), WithinAbs(std::exp(-t / tau), 1e-9));
+      CHECK_THAT(exponentials.integral_s(w, t) / t,
+                 WithinAbs(-std::expm1(-t / tau) * tau / t, 1e-9));
     }
     const FractionalWeights classical = w;
     for (const double gap : {1e-5, 1e-6, 1e-8, 1e-10, 1e-13, 1e-15}) {
       CAPTURE(tau, gap);
-      memory.mittag_leffler(1.0 - gap, tau, w);
+      exponentials.mittag_leffler(1.0 - gap, tau, w);
       CHECK(distance(w, classical, 0.1) < 30.0 * gap + 1e-12);
       for (const double t : decades(0.1, 1e4, 9)) {
-        CHECK_THAT(memory.at(w, t), WithinAbs(relaxation(1.0 - gap, tau, t), 1e-9));
+        CHECK_THAT(exponentials.at(w, t), WithinAbs(relaxation(1.0 - gap, tau, t), 1e-9));
       }
     }
   }
@@ -330,15 +331,15 @@ TEST_CASE("alpha = 1 is exp, reached continuously, also with 1/tau on a rate of 
 
 TEST_CASE("derivatives of the weights equal differences of the weights") {
   const double t_min = 0.05;
-  const FractionalMemory memory(t_min, 2e3);
+  const ExponentialSum exponentials(t_min, 2e3);
   const auto ask = [&](double alpha, double log_tau) {
     FractionalWeights w;
-    memory.mittag_leffler(alpha, std::exp(log_tau), w);
+    exponentials.mittag_leffler(alpha, std::exp(log_tau), w);
     return w;
   };
   const auto ask_springpot = [&](double alpha) {
     FractionalWeights w;
-    memory.springpot(alpha, w);
+    exponentials.springpot(alpha, w);
     return w;
   };
   const double h = 1e-4;
@@ -369,17 +370,17 @@ TEST_CASE("derivatives of the weights equal differences of the weights") {
 }
 
 TEST_CASE("at alpha = 1 the derivative by alpha is the limit from below") {
-  const FractionalMemory memory(0.05, 2e3);
+  const ExponentialSum exponentials(0.05, 2e3);
   const double h = 1e-4;
-  for (const double tau : {1e-4, 1.0, 1.1, 1.0 / memory.rates_per_s()[50], 1e5}) {
+  for (const double tau : {1e-4, 1.0, 1.1, 1.0 / exponentials.rates_per_s()[50], 1e5}) {
     FractionalWeights at;
     FractionalWeights one;
     FractionalWeights two;
     FractionalWeights four;
-    memory.mittag_leffler(1.0, tau, at);
-    memory.mittag_leffler(1.0 - h, tau, one);
-    memory.mittag_leffler(1.0 - 2 * h, tau, two);
-    memory.mittag_leffler(1.0 - 4 * h, tau, four);
+    exponentials.mittag_leffler(1.0, tau, at);
+    exponentials.mittag_leffler(1.0 - h, tau, one);
+    exponentials.mittag_leffler(1.0 - 2 * h, tau, two);
+    exponentials.mittag_leffler(1.0 - 4 * h, tau, four);
     // one-sided differences without their first two error terms
     const FractionalWeights d1 = difference(at, one, h);
     const FractionalWeights d2 = difference(at, two, 2 * h);
@@ -394,13 +395,14 @@ TEST_CASE("at alpha = 1 the derivative by alpha is the limit from below") {
   // E_alpha itself: its derivative by alpha against the accurate function
   FractionalWeights w;
   for (const double alpha : {0.1, 0.4, 0.7, 0.9, 0.98}) {
-    memory.mittag_leffler(alpha, 3.0, w);
+    exponentials.mittag_leffler(alpha, 3.0, w);
     for (const double t : {0.05, 1.0, 3.0, 20.0, 2e3}) {
       const auto slope = [&](double e) {
         return (relaxation(alpha + e, 3.0, t) - relaxation(alpha - e, 3.0, t)) / (2.0 * e);
       };
       CAPTURE(alpha, t);
-      CHECK_THAT(memory.at(by_alpha(w), t), WithinAbs((4.0 * slope(h / 2) - slope(h)) / 3.0, 1e-8));
+      CHECK_THAT(exponentials.at(by_alpha(w), t),
+                 WithinAbs((4.0 * slope(h / 2) - slope(h)) / 3.0, 1e-8));
     }
   }
 }
@@ -414,8 +416,8 @@ TEST_CASE("a random piecewise linear history agrees with exact superposition") {
     time.push_back(time.back() + t_min * std::pow(300.0, random.uniform()));
     u.push_back(random.normal());
   }
-  const FractionalMemory memory(t_min, time.back());
-  const std::span<const double> rates = memory.rates_per_s();
+  const ExponentialSum exponentials(t_min, time.back());
+  const std::span<const double> rates = exponentials.rates_per_s();
   // the states do not depend on the element: one run for all
   std::vector<std::vector<double>> state(time.size(), std::vector<double>(rates.size(), 0.0));
   double variation = 0.0;
@@ -444,47 +446,49 @@ TEST_CASE("a random piecewise linear history agrees with exact superposition") {
   for (const double alpha : {0.05, 0.5, 0.95, 1.0}) {
     const double tau = alpha == 0.5 ? 1e-3 : 0.7;
     CAPTURE(alpha);
-    memory.mittag_leffler(alpha, tau, w);
+    exponentials.mittag_leffler(alpha, tau, w);
     check(
         w, [&](double t) { return relaxation_integral(alpha, tau, t); },
-        memory.stated_error() * variation);
-    memory.springpot(alpha, w);
+        exponentials.stated_error() * variation);
+    exponentials.springpot(alpha, w);
     check(
         w, [&](double t) { return springpot_integral(alpha, t); },
-        memory.stated_error() * variation * std::pow(t_min, -alpha) + 1e-12);
+        exponentials.stated_error() * variation * std::pow(t_min, -alpha) + 1e-12);
   }
 }
 
 TEST_CASE("weights of the Mittag-Leffler relaxation are positive where they can be") {
-  const FractionalMemory memory(0.1, 1e4);
+  const ExponentialSum exponentials(0.1, 1e4);
   FractionalWeights w;
   for (const double tau : {1e-4, 0.3, 40.0, 1e6}) {
     for (const double alpha : {0.01, 0.3, 0.7, 0.9}) {
-      memory.mittag_leffler(alpha, tau, w);
+      exponentials.mittag_leffler(alpha, tau, w);
       CAPTURE(alpha, tau);
       CHECK(w.weight.minCoeff() > 0.0);
       CHECK(w.constant > 0.0);
       CHECK(w.dashpot_s > 0.0);
     }
-    memory.mittag_leffler(1.0, tau, w);
+    exponentials.mittag_leffler(1.0, tau, w);
     CHECK(w.weight.minCoeff() > -0.25);
     CHECK(w.weight.cwiseAbs().sum() < 4.0);
   }
 }
 
 TEST_CASE("bad windows and elements are named") {
-  CHECK_THROWS_WITH(FractionalMemory(0.0, 1.0),
-                    "fractional memory: t_min = 0; expected a time > 0 s");
-  CHECK_THROWS_WITH(FractionalMemory(1.0, 0.5), Catch::Contains("t_max = 0.5"));
-  CHECK_THROWS_WITH(FractionalMemory(1.0, INFINITY), Catch::Contains("t_max = inf"));
-  CHECK_THROWS_WITH(FractionalMemory(1.0, 2.0, 0.1), Catch::Contains("tolerance = 0.1"));
-  const FractionalMemory memory(1.0, 2.0);
+  CHECK_THROWS_WITH(ExponentialSum(0.0, 1.0), "exponential sum: t_min = 0; expected a time > 0 s");
+  CHECK_THROWS_WITH(ExponentialSum(1.0, 0.5), Catch::Contains("t_max = 0.5"));
+  CHECK_THROWS_WITH(ExponentialSum(1.0, INFINITY), Catch::Contains("t_max = inf"));
+  CHECK_THROWS_WITH(ExponentialSum(1.0, 2.0, 0.1), Catch::Contains("tolerance = 0.1"));
+  const ExponentialSum exponentials(1.0, 2.0);
   FractionalWeights w;
-  CHECK_THROWS_WITH(memory.mittag_leffler(0.0, 1.0, w), Catch::Contains("alpha = 0"));
-  CHECK_THROWS_WITH(memory.mittag_leffler(0.5, 0.0, w), Catch::Contains("tau = 0"));
-  CHECK_THROWS_WITH(memory.mittag_leffler(0.5, INFINITY, w), Catch::Contains("tau = inf"));
-  CHECK_THROWS_WITH(memory.springpot(1.5, w), Catch::Contains("alpha = 1.5"));
-  CHECK_THROWS_WITH(memory.springpots_in_series(1.5, 0.1, 1.0, w), Catch::Contains("alpha = 1.5"));
-  CHECK_THROWS_WITH(memory.springpots_in_series(0.5, -0.1, 1.0, w), Catch::Contains("beta = -0.1"));
-  CHECK_THROWS_WITH(memory.springpots_in_series(0.5, 0.1, 0.0, w), Catch::Contains("tau = 0"));
+  CHECK_THROWS_WITH(exponentials.mittag_leffler(0.0, 1.0, w), Catch::Contains("alpha = 0"));
+  CHECK_THROWS_WITH(exponentials.mittag_leffler(0.5, 0.0, w), Catch::Contains("tau = 0"));
+  CHECK_THROWS_WITH(exponentials.mittag_leffler(0.5, INFINITY, w), Catch::Contains("tau = inf"));
+  CHECK_THROWS_WITH(exponentials.springpot(1.5, w), Catch::Contains("alpha = 1.5"));
+  CHECK_THROWS_WITH(exponentials.springpots_in_series(1.5, 0.1, 1.0, w),
+                    Catch::Contains("alpha = 1.5"));
+  CHECK_THROWS_WITH(exponentials.springpots_in_series(0.5, -0.1, 1.0, w),
+                    Catch::Contains("beta = -0.1"));
+  CHECK_THROWS_WITH(exponentials.springpots_in_series(0.5, 0.1, 0.0, w),
+                    Catch::Contains("tau = 0"));
 }

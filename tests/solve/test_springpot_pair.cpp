@@ -59,9 +59,9 @@ FractionalWeights by_beta(const FractionalWeights& w) {
   return weights_of(w.d_weight_d_beta, w.d_constant_d_beta, w.d_dashpot_d_beta_s);
 }
 
-FractionalWeights series_weights(const FractionalMemory& memory, const Orders& o, double tau) {
+FractionalWeights series_weights(const ExponentialSum& exponentials, const Orders& o, double tau) {
   FractionalWeights w;
-  memory.springpots_in_series(o.alpha, o.beta, tau, w);
+  exponentials.springpots_in_series(o.alpha, o.beta, tau, w);
   return w;
 }
 
@@ -133,28 +133,28 @@ TEST_CASE("the contour sum of a pair is the Mittag-Leffler function", "[pair]") 
 TEST_CASE("the sum for two spring-pots keeps its stated error over the window", "[pair]") {
   const double t_min = 0.02;
   for (const double span : {1e3, 1e7}) {
-    const FractionalMemory memory(t_min, span * t_min, 1e-10);
+    const ExponentialSum exponentials(t_min, span * t_min, 1e-10);
     double worst = 0.0;
     double worst_slope = 0.0;
     for (const Orders& o : kOrders) {
       for (const double tau : decades(1e-4 * t_min, 1e4 * span * t_min, 12)) {
-        const FractionalWeights w = series_weights(memory, o, tau);
+        const FractionalWeights w = series_weights(exponentials, o, tau);
         const double scale = pair_mean(o, t_min / tau);
         for (const double t : decades(t_min, span * t_min, 14)) {
           CAPTURE(o.alpha, o.beta, tau, t);
           const PairValue exact = pair_relaxation(o.alpha, o.beta, t / tau);
-          const double off = std::abs(memory.at(w, t) - pair_modulus(o, t / tau));
-          const double mean = memory.integral_s(w, t) / t - pair_mean(o, t / tau);
+          const double off = std::abs(exponentials.at(w, t) - pair_modulus(o, t / tau));
+          const double mean = exponentials.integral_s(w, t) / t - pair_mean(o, t / tau);
           if (std::max(off, std::abs(mean)) > 1e-10 * scale) {
             FAIL_CHECK(off / scale << " " << mean / scale);
           }
           worst = std::max({worst, off / scale, std::abs(mean) / scale});
           // derivatives are of the size of G and of G ln(t/tau)
           const double steep = scale * (1.0 + std::abs(std::log(t_min / tau)));
-          worst_slope =
-              std::max({worst_slope, std::abs(memory.at(by_alpha(w), t) - exact.d_alpha) / steep,
-                        std::abs(memory.at(by_beta(w), t) - exact.d_beta) / steep,
-                        std::abs(memory.at(by_log_tau(w), t) - exact.d_x) / steep});
+          worst_slope = std::max({worst_slope,
+                                  std::abs(exponentials.at(by_alpha(w), t) - exact.d_alpha) / steep,
+                                  std::abs(exponentials.at(by_beta(w), t) - exact.d_beta) / steep,
+                                  std::abs(exponentials.at(by_log_tau(w), t) - exact.d_x) / steep});
         }
       }
     }
@@ -165,13 +165,13 @@ TEST_CASE("the sum for two spring-pots keeps its stated error over the window", 
 }
 
 TEST_CASE("derivatives of the weights of a pair equal differences", "[pair]") {
-  const FractionalMemory memory(0.05, 2e3);
+  const ExponentialSum exponentials(0.05, 2e3);
   const double h = 1e-4;
   for (const Orders& o : {Orders{0.3, 0.1}, Orders{0.6, 0.55}, Orders{0.9, 0.3}, Orders{0.97, 0.02},
                           Orders{0.999, 0.002}, Orders{0.2, 0.7}}) {
     for (const double log_tau : {-9.0, 0.0, 0.115, 3.0, 12.0}) {
       const auto ask = [&](double da, double db, double dt) {
-        return series_weights(memory, {o.alpha + da, o.beta + db}, std::exp(log_tau + dt));
+        return series_weights(exponentials, {o.alpha + da, o.beta + db}, std::exp(log_tau + dt));
       };
       /// central differences of h and h/2 without their leading error
       const auto slope = [&](double a, double b, double t) {
@@ -201,9 +201,9 @@ TEST_CASE("derivatives of the weights of a pair equal differences", "[pair]") {
 }
 
 TEST_CASE("the sum of a pair does not know which spring-pot is named first", "[pair]") {
-  const FractionalMemory memory(0.01, 1e3);
-  const FractionalWeights one = series_weights(memory, {0.8, 0.25}, 0.4);
-  const FractionalWeights other = series_weights(memory, {0.25, 0.8}, 0.4);
+  const ExponentialSum exponentials(0.01, 1e3);
+  const FractionalWeights one = series_weights(exponentials, {0.8, 0.25}, 0.4);
+  const FractionalWeights other = series_weights(exponentials, {0.25, 0.8}, 0.4);
   CHECK((one.weight - other.weight).cwiseAbs().maxCoeff() <=
         1e-14 * one.weight.cwiseAbs().maxCoeff());
   CHECK((one.d_weight_d_alpha - other.d_weight_d_beta).cwiseAbs().maxCoeff() <=

@@ -184,7 +184,8 @@ TEST_CASE("a slow ramp hides a short relaxation, and the words say so") {
 }
 
 TEST_CASE("the expected standard errors are those of a fit to such data") {
-  // Data without noise: the fit ends at the truth, and its covariance must be the predicted one.
+  // Data without noise: the fit ends at the true values, and its covariance must be the predicted
+  // one.
   for (const char* law : {"linear-1", "power-1", "linear-1-series"}) {
     Json document = decay();
     document["law"]["name"] = law;

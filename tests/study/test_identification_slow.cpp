@@ -6,7 +6,7 @@
 
 namespace tpm::study {
 
-TEST_CASE("intervals at the stopping time hold the truth as often as they say") {
+TEST_CASE("intervals at the stopping time hold the true value as often as they say") {
   constexpr int kSimulations = 120;
   constexpr double kRejected = 1e-3;
   for (const double phi : {0.0, 0.9}) {

@@ -89,7 +89,7 @@ void check_true_values(const FitResult& fit) {
 
 }  // namespace
 
-TEST_CASE("24,000 samples give the truth, and what every twelfth of them gives") {
+TEST_CASE("24,000 samples give the true values, and what every twelfth of them gives") {
   const FitResult fit = fit_of(whole_record(), config_for(whole_record()));
   const FitResult few = fit_of(thinned_record(), config_for(thinned_record()));
   REQUIRE(fit.value_count > 20'000);

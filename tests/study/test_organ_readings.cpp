@@ -69,15 +69,15 @@ struct Made {
 };
 
 OrganReadings recorded(const OrganModel& model, const FittedBonds& bonds,
-                       std::span<const double> truth, const Made& made) {
+                       std::span<const double> true_values, const Made& made) {
   constexpr double kDeepest = 3e-3, kStep_s = 0.05, kEnd_s = 6.0, kNoise = 5e-3;
   const double ramp_s = kDeepest / made.rate_m_per_s;
   const Protocol drive(Drive::displacement, {{0.0, 0.0}, {ramp_s, kDeepest}, {kEnd_s, kDeepest}});
-  OrganReadings r{drive, {}, {}, made.contact_m + 0.2e-3, 0.0};  // begins beside the truth
+  OrganReadings r{drive, {}, {}, made.contact_m + 0.2e-3, 0.0};  // begins beside the true value
   for (double t = 0.0; t < kEnd_s; t += kStep_s) r.time_s.push_back(t);
   const Response response =
       model.respond(beyond_contact(drive, made.contact_m), r.time_s,
-                    FittedBonds::values(model, bonds.material(truth)), Want::values);
+                    FittedBonds::values(model, bonds.material(true_values)), Want::values);
   Random random(made.seed);
   const double sd = kNoise * response.value.maxCoeff();
   for (const double f : response.value) {
@@ -142,11 +142,11 @@ TEST_CASE("bonds, contacts and offsets of two recordings are found from their re
   const SceneOrgan organ = organ_of_scene(star_with_branch(), "test", {});
   const FittedBonds bonds(organ.tissue->materials.materials.front(), false);
   REQUIRE(bonds.names() == std::vector<std::string>{"Einf", "g1"});
-  const std::vector<double> truth{8e3, 6e3};
+  const std::vector<double> true_values{8e3, 6e3};
   const std::vector<Made> made{{0.5e-3, 0.02, 3e-3, 3}, {0.2e-3, -0.01, 1e-3, 4}};
   std::vector<OrganReadings> recordings;
   for (const Made& each : made) {
-    recordings.push_back(recorded(*organ.model, bonds, truth, each));
+    recordings.push_back(recorded(*organ.model, bonds, true_values, each));
   }
   const std::vector<FitParameter> parameters{searched("Einf", 1e4, Scale::log, 80.0, 8e5),
                                              searched("g1", 5e3, Scale::log, 60.0, 6e5)};
@@ -165,8 +165,8 @@ TEST_CASE("bonds, contacts and offsets of two recordings are found from their re
     CHECK(value > p.estimate - 2.0 * (p.estimate - *p.lower));
     CHECK(value < p.estimate + 2.0 * (*p.upper - p.estimate));
   };
-  holds(0, truth[0]);
-  holds(1, truth[1]);
+  holds(0, true_values[0]);
+  holds(1, true_values[1]);
   for (std::size_t i = 0; i < 2; ++i) {
     holds(2 + 2 * i, made[i].contact_m);
     holds(3 + 2 * i, made[i].offset_N);
@@ -180,9 +180,9 @@ TEST_CASE("bonds, contacts and offsets of two recordings are found from their re
 TEST_CASE("after a descent from a deeper minimum nothing is left of the first one") {
   const SceneOrgan organ = organ_of_scene(star_with_branch(), "test", {});
   const FittedBonds bonds(organ.tissue->materials.materials.front(), false);
-  const std::vector<double> truth{8e3, 6e3};
+  const std::vector<double> true_values{8e3, 6e3};
   std::vector<OrganReadings> readings{
-      recorded(*organ.model, bonds, truth, {0.5e-3, 0.02, 3e-3, 3})};
+      recorded(*organ.model, bonds, true_values, {0.5e-3, 0.02, 3e-3, 3})};
   const auto fit_from = [&](double einf, double contact_m, bool profiles) {
     const std::vector<FitParameter> parameters{searched("Einf", einf, Scale::log, 80.0, 8e5),
                                                searched("g1", 5e3, Scale::log, 60.0, 6e5)};

@@ -123,7 +123,7 @@ TEST_CASE("a study says which part of its configuration is wrong") {
   study["materials"][0]["hold"] = {{"spacing", "1 mm"}};
   CHECK_THAT(refused(study), Contains("/materials/0/hold/spacing: outside the parameter's bounds"));
   study["materials"][0]["hold"] = {{"spacing", "20 mm"}, {"E", "9 kPa"}, {"eta1", "5 Pa s"}};
-  CHECK_THAT(refused(study), Contains("/materials/0/hold: all parameters are held"));
+  CHECK_THAT(refused(study), Contains("/materials/0/hold: all parameters are fixed"));
   study = star_only();
   study["materials"][1]["name"] = study["materials"][0]["name"];
   CHECK_THAT(refused(study), Contains("/materials/1/name: another material has it"));

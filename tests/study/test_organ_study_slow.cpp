@@ -87,8 +87,8 @@ FitConfig small_fit(const std::string& name) {
 
 /// Readings of the shipped data set at the same conditions, with what the model answers as values.
 PointSet answered(PointSet points, const ExperimentResiduals& function, std::size_t choice,
-                  std::span<const double> truth) {
-  const Eigen::VectorXd answers = function.predict(truth, nullptr);
+                  std::span<const double> true_values) {
+  const Eigen::VectorXd answers = function.predict(true_values, nullptr);
   std::size_t next = 0;
   for (std::size_t i = 0; i < function.data().size(); ++i) {
     if (function.data()[i].choice != choice) continue;
@@ -104,43 +104,43 @@ PointSet answered(PointSet points, const ExperimentResiduals& function, std::siz
 TEST_CASE("an organ's parameters come back from values of all three experiments at once") {
   FitConfig config = small_fit("all");
   config.profiles = false;
-  const std::vector<double> truth{2.1e4, 1.4e5, 0.028};
+  const std::vector<double> true_values{2.1e4, 1.4e5, 0.028};
   const std::vector<DataSet> shipped_data = load_data(config);
   const ExperimentResiduals function(config, shipped_data);
   std::vector<DataSet> data;
   for (std::size_t i = 0; i < shipped_data.size(); ++i) {
-    data.emplace_back(answered(std::get<PointSet>(shipped_data[i]), function, i, truth));
+    data.emplace_back(answered(std::get<PointSet>(shipped_data[i]), function, i, true_values));
   }
   const FitResult fit = run_fit(config, data);
   CHECK(fit.value_count == 14);
   CHECK(fit.chi_square < 1e-5);
-  for (std::size_t i = 0; i < truth.size(); ++i) {
+  for (std::size_t i = 0; i < true_values.size(); ++i) {
     CAPTURE(i);
-    CHECK_THAT(fit.best.natural[i], WithinRel(truth[i], 1e-2));
+    CHECK_THAT(fit.best.natural[i], WithinRel(true_values[i], 1e-2));
   }
 }
 
 TEST_CASE("static values of an organ tell E and x and say that they cannot tell eta1") {
   const FitConfig config = small_fit("static");
-  const std::vector<double> truth{2.1e4, 1.4e5, 0.020};
+  const std::vector<double> true_values{2.1e4, 1.4e5, 0.020};
   const std::vector<DataSet> shipped_data = load_data(config);
   const ExperimentResiduals function(config, shipped_data);
   const std::vector<DataSet> data{
-      answered(std::get<PointSet>(shipped_data.front()), function, 0, truth)};
+      answered(std::get<PointSet>(shipped_data.front()), function, 0, true_values)};
   const FitResult fit = run_fit(config, data);
   CHECK(fit.chi_square < 1e-5);
-  CHECK_THAT(fit.best.natural[0], WithinRel(truth[0], 0.02));
-  CHECK(fit.parameters[0].lower.value() < truth[0]);
-  CHECK(fit.parameters[0].upper.value() > truth[0]);
+  CHECK_THAT(fit.best.natural[0], WithinRel(true_values[0], 0.02));
+  CHECK(fit.parameters[0].lower.value() < true_values[0]);
+  CHECK(fit.parameters[0].upper.value() > true_values[0]);
   CHECK(fit.parameters[1].verdict == Verdict::flat);
 }
 
 TEST_CASE("bands about what an organ answers hold its parameters in their intervals") {
   const FitConfig config = small_fit("creep");
-  const std::vector<double> truth{2.1e4, 1.4e5, 0.028};
+  const std::vector<double> true_values{2.1e4, 1.4e5, 0.028};
   const std::vector<DataSet> shipped_data = load_data(config);
   const ExperimentResiduals function(config, shipped_data);
-  PointSet points = answered(std::get<PointSet>(shipped_data.front()), function, 0, truth);
+  PointSet points = answered(std::get<PointSet>(shipped_data.front()), function, 0, true_values);
   for (Datum& d : points.data) {
     d.lower = 0.95 * *d.value;
     d.upper = 1.05 * *d.value;
@@ -148,9 +148,9 @@ TEST_CASE("bands about what an organ answers hold its parameters in their interv
   }
   const FitResult fit = run_fit(config, std::vector<DataSet>{points});
   CHECK(fit.chi_square < 1e-6);
-  for (std::size_t i = 0; i < truth.size(); ++i) {
+  for (std::size_t i = 0; i < true_values.size(); ++i) {
     CAPTURE(i, fit.parameters[i].words);
-    CHECK(fit.parameters[i].lower.value_or(0.0) < truth[i]);
-    CHECK(fit.parameters[i].upper.value_or(1e12) > truth[i]);
+    CHECK(fit.parameters[i].lower.value_or(0.0) < true_values[i]);
+    CHECK(fit.parameters[i].upper.value_or(1e12) > true_values[i]);
   }
 }

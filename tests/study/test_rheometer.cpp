@@ -280,7 +280,7 @@ TEST_CASE("Branches keep their names in fits and profiles", "[rheometer]") {
     }
     throw std::runtime_error(name);
   };
-  // Each interval holds its own truth and not the other's.
+  // Each interval holds its own true value and not the other's.
   CHECK(*parameter("tau1").upper < 4.0);
   CHECK(*parameter("tau2").lower > 0.5);
   CHECK(parameter("tau1").profile.connected);
@@ -342,17 +342,17 @@ TEST_CASE("Indentations answer Young's modulus with its interval", "[rheometer]"
         run_fit(recording_config(parse_law_name(probe.law, "test"), one, setup), data_sets(one));
     const YoungModuli all = young_moduli(fit, probe.geometry, false);
     REQUIRE(all.moduli.size() == 3);
-    const double truth[] = {4000.0, 6000.0, 10000.0};
+    const double true_values[] = {4000.0, 6000.0, 10000.0};
     for (std::size_t i = 0; i < all.moduli.size(); ++i) {
       const YoungModulus& m = all.moduli[i];
       INFO(m.name << " " << m.estimate << ", " << *m.lower << " .. " << *m.upper);
       CHECK(m.unit == "Pa");
-      CHECK_THAT(m.estimate, WithinRel(truth[i], 0.03));
+      CHECK_THAT(m.estimate, WithinRel(true_values[i], 0.03));
       CHECK(*m.lower < m.estimate);
       CHECK(m.estimate < *m.upper);
-      CHECK(std::abs(m.estimate - truth[i]) < 4.0 * *m.standard_error);
+      CHECK(std::abs(m.estimate - true_values[i]) < 4.0 * *m.standard_error);
     }
-    CHECK(all.moduli.back().name == "E_at_once");
+    CHECK(all.moduli.back().name == "E_instantaneous");
     CHECK_THAT(to_terminal_text(all), Contains("Poisson's ratio 0.45 (given)") && Contains("kPa"));
     CHECK(all.warnings.empty());
   }

@@ -18,7 +18,7 @@ double p_value(std::uint64_t covered) {
   return std::min(1.0, 2.0 * std::min(below, above));
 }
 
-TEST_CASE("Intervals of Sobol indices hold the truth in 95 of 100 studies") {
+TEST_CASE("Intervals of Sobol indices hold the true value in 95 of 100 studies") {
   for (const SensitivityProblem& problem : {ishigami(), g_function()}) {
     const auto inputs = static_cast<std::size_t>(problem.inputs);
     std::vector<std::uint64_t> first(inputs, 0), total(inputs, 0);
@@ -26,8 +26,8 @@ TEST_CASE("Intervals of Sobol indices hold the truth in 95 of 100 studies") {
       const SensitivityDesign design{problem.inputs, 64, 32, seed};
       const SensitivityResult found = sobol_indices(design, outputs_of(problem, design));
       for (std::size_t i = 0; i < inputs; ++i) {
-        const auto holds = [](const IndexEstimate& e, double truth) {
-          return e.low <= truth && truth <= e.high;
+        const auto holds = [](const IndexEstimate& e, double true_value) {
+          return e.low <= true_value && true_value <= e.high;
         };
         first[i] += holds(found.inputs[i].first_order, problem.first_order[i]) ? 1 : 0;
         total[i] += holds(found.inputs[i].total, problem.total[i]) ? 1 : 0;

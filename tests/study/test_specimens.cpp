@@ -129,7 +129,7 @@ TEST_CASE("A folder's stiffnesses under a probe are Young's moduli", "[specimens
   ContactGeometry cone;
   cone.cone_half_angle_rad = std::atan(1.5);
   cone.poisson_ratio = 0.4;
-  const double truth_Pa = 100.0 / 4e-3 / (2.0 / 3.141592653589793 * 1.5 / (1.0 - 0.16));
+  const double true_Pa = 100.0 / 4e-3 / (2.0 / 3.141592653589793 * 1.5 / (1.0 - 0.16));
   SelectionOptions options = without_profiles();
   options.setup.exponent = probe_exponent(cone);
   const SpecimenStudy study = study_specimens(one_material(), law_at("power-1", 1.0), options);
@@ -141,10 +141,10 @@ TEST_CASE("A folder's stiffnesses under a probe are Young's moduli", "[specimens
   CHECK(in_the_end.name == "E_inf");
   CHECK(in_the_end.basis == "pooled");
   CHECK(in_the_end.verdict == "typical of 5 specimens");
-  CHECK_THAT(in_the_end.estimate, WithinRel(truth_Pa, 0.01));
-  CHECK(in_the_end.lower.value() < truth_Pa);
-  CHECK(in_the_end.upper.value() > truth_Pa);
-  CHECK_THAT(moduli.moduli[1].estimate, WithinRel(1.2 * truth_Pa, 0.01));
+  CHECK_THAT(in_the_end.estimate, WithinRel(true_Pa, 0.01));
+  CHECK(in_the_end.lower.value() < true_Pa);
+  CHECK(in_the_end.upper.value() > true_Pa);
+  CHECK_THAT(moduli.moduli[1].estimate, WithinRel(1.2 * true_Pa, 0.01));
 }
 
 /// A folder of two recordings, `pig`.

@@ -18,17 +18,17 @@ struct EnergyAccount {
   double supplied_J = 0.0;  ///< work over all steps less what is stored at the end
 };
 
-/// Work on the tissue while the contact moves straight and its memory stands still, J. Four points
-/// of Gauss are exact for a potential of degree 7.
+/// Work on the tissue while the contact moves straight and its viscous state stands still, J. Four
+/// points of Gauss are exact for a potential of degree 7.
 inline double straight_work_J(const CondensedContact& contact, const Eigen::Vector3d& from,
-                              const Eigen::Vector3d& to, const CondensedMemory& memory) {
+                              const Eigen::Vector3d& to, const CondensedViscousState& viscous) {
   constexpr std::array<double, 2> kPlace{0.33998104358485626, 0.86113631159405258};
   constexpr std::array<double, 2> kWeight{0.65214515486254614, 0.34785484513745386};
   double work = 0.0;
   for (std::size_t k = 0; k < 2; ++k) {
     for (const double place : {-kPlace[k], kPlace[k]}) {
       const Eigen::Vector3d at = from + 0.5 * (1.0 + place) * (to - from);
-      work -= 0.5 * kWeight[k] * contact.force_N(at, memory).dot(to - from);
+      work -= 0.5 * kWeight[k] * contact.force_N(at, viscous).dot(to - from);
     }
   }
   return work;
@@ -44,7 +44,7 @@ inline EnergyAccount account_of_random_motion(CondensedContact& contact,
   const Eigen::Vector3d other = into.cross(across);
   contact.reset();
   Eigen::Vector3d at = Eigen::Vector3d::Zero();
-  double stored = contact.stored_energy_J(at, contact.memory());
+  double stored = contact.stored_energy_J(at, contact.viscous_state());
   EnergyAccount account;
   const auto place = [&](double depth_share, double radius_share, double angle) {
     const double radius = radius_share * range.tangential_m;
@@ -52,9 +52,9 @@ inline EnergyAccount account_of_random_motion(CondensedContact& contact,
                            radius * std::sin(angle) * other);
   };
   const auto go = [&](const Eigen::Vector3d& to) {
-    const CondensedMemory before = contact.memory();
+    const CondensedViscousState before = contact.viscous_state();
     (void)contact.step(to);
-    const CondensedMemory after = contact.memory();
+    const CondensedViscousState after = contact.viscous_state();
     const Eigen::Vector3d rests = at + contact.relaxation_point() * (to - at);
     const double work =
         straight_work_J(contact, at, rests, before) + straight_work_J(contact, rests, to, after);

@@ -1,5 +1,6 @@
 #pragma once
-// The full network along any path of one contact sphere, by small steps: a judge of contact models.
+// The full network along any path of one contact sphere, by small steps: a reference for contact
+// models.
 #include <stdexcept>
 
 #include "tpm/network/equilibrium.hpp"
@@ -8,14 +9,14 @@
 namespace tpm::testing {
 using namespace organ;
 
-/// Elongations are taken as linear over a step, under which every memory is advanced exactly:
-/// second order in the step.
+/// Elongations are taken as linear over a step, under which every viscous elongation is advanced
+/// exactly: second order in the step.
 class ContactPath {
  public:
   /// @param freedom by value: the contact is held
   ContactPath(const BondSystem& bonds, Positions rest, Constraints constraints, std::size_t contact)
       : bonds_(bonds),
-        constraints_((constraints.hold(contact), std::move(constraints))),
+        constraints_((constraints.fix(contact), std::move(constraints))),
         equilibrium_(bonds_, constraints_),
         rest_(std::move(rest)),
         position_(rest_),
@@ -28,20 +29,20 @@ class ContactPath {
   /// @param displacement_m of the contact at the end of the step
   void advance(const Eigen::Vector3d& displacement_m, double step_s) {
     const RelaxationWeights k = relaxation_weights(step_s / bonds_.relaxation_time_s());
-    memory_ = {k.r * viscous_ + k.w0 * elongation_, k.w1};
+    viscous_state_ = {k.r * viscous_ + k.w0 * elongation_, k.w1};
     Positions next = 2.0 * position_ - before_;  // what moves goes on
     next.col(contact_) = rest_.col(contact_) + displacement_m;
-    EquilibriumSearch search = equilibrium_.find(next, memory_, no_load_, 1e-9);
+    EquilibriumSearch search = equilibrium_.find(next, viscous_state_, no_load_, 1e-9);
     if (!search.converged || !search.stable) {
       next = position_;
       next.col(contact_) = rest_.col(contact_) + displacement_m;
-      search = equilibrium_.find(next, memory_, no_load_, 1e-9);
+      search = equilibrium_.find(next, viscous_state_, no_load_, 1e-9);
     }
     if (!search.converged || !search.stable) throw std::runtime_error("no equilibrium");
     before_ = position_;
     position_ = next;
     bonds_.elongations(position_, elongation_);
-    viscous_ = memory_.offset + memory_.relaxation_factor(0) * elongation_;
+    viscous_ = viscous_state_.offset + viscous_state_.relaxation_factor(0) * elongation_;
   }
 
   /// Of the tissue on the contact, N.
@@ -60,7 +61,7 @@ class ContactPath {
   Eigen::Index contact_;
   Eigen::VectorXd viscous_, elongation_;
   Eigen::Matrix3Xd no_load_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
 };
 
 }  // namespace tpm::testing

@@ -1,6 +1,6 @@
 #pragma once
-// Simulated recordings whose truth is known: how often bands and intervals hold it. Shared by the
-// slow tests and by the programs that print the tables of reports/chain.
+// Simulated recordings whose true values are known: how often bands and intervals hold it. Shared
+// by the slow tests and by the programs that print the tables of reports/chain.
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 #include <optional>
@@ -60,7 +60,7 @@ inline SimulatedTest even_test(double hold_s, double interval_s) {
 
 struct HeldOutCoverage {
   Count readings;             ///< one held-out reading of each simulation, at random, in its band
-  Count means;                ///< the truth there in the band of the mean
+  Count means;                ///< the true value there in the band of the mean
   double all_readings = 0.0;  ///< share of all held-out readings that lie in their bands
   int failed = 0;
 };
@@ -71,8 +71,8 @@ inline HeldOutCoverage held_out_coverage(const LawSpec& family, const SimulatedT
                                          std::uint64_t seed) {
   LawSpec law = family;
   law.reference = test.depth_m;
-  const std::vector<double> truth = visible_parameters(law);
-  const Recording clean = simulated_recording(law, truth, test);
+  const std::vector<double> true_values = visible_parameters(law);
+  const Recording clean = simulated_recording(law, true_values, test);
   const double peak = *std::max_element(clean.response.begin(), clean.response.end());
   Random random(seed);
   HeldOutCoverage result;
@@ -115,8 +115,8 @@ inline HeldOutCoverage held_out_coverage(const LawSpec& family, const SimulatedT
   return result;
 }
 
-/// Intervals of a whole recording's fit that hold the truth, one for each material parameter: by
-/// profile likelihood, as `tpm fit` states them; a side without a limit holds everything.
+/// Intervals of a whole recording's fit that hold the true value, one for each material parameter:
+/// by profile likelihood, as `tpm fit` states them; a side without a limit holds everything.
 struct FitCoverage {
   std::vector<std::string> names;
   std::vector<Count> parameters;
@@ -129,8 +129,8 @@ inline FitCoverage fit_coverage(const LawSpec& family, const SimulatedTest& test
                                 std::uint64_t seed) {
   LawSpec law = family;
   law.reference = test.depth_m;
-  const std::vector<double> truth = visible_parameters(law);
-  const Recording clean = simulated_recording(law, truth, test);
+  const std::vector<double> true_values = visible_parameters(law);
+  const Recording clean = simulated_recording(law, true_values, test);
   const double peak = *std::max_element(clean.response.begin(), clean.response.end());
   Random random(seed);
   FitCoverage result;
@@ -151,8 +151,8 @@ inline FitCoverage fit_coverage(const LawSpec& family, const SimulatedTest& test
         result.parameters.emplace_back();
       }
       const ParameterResult& p = fit.parameters[k];
-      const bool above = p.lower.value_or(-HUGE_VAL) <= truth[k];
-      result.parameters[k].add(above && truth[k] <= p.upper.value_or(HUGE_VAL));
+      const bool above = p.lower.value_or(-HUGE_VAL) <= true_values[k];
+      result.parameters[k].add(above && true_values[k] <= p.upper.value_or(HUGE_VAL));
     }
   }
   return result;
@@ -160,7 +160,7 @@ inline FitCoverage fit_coverage(const LawSpec& family, const SimulatedTest& test
 
 struct StoppedCoverage {
   std::vector<std::string> names;
-  std::vector<Count> parameters;  ///< intervals that hold the truth at the stopping time
+  std::vector<Count> parameters;  ///< intervals that hold the true value at the stopping time
   int stopped = 0, simulations = 0;
   double mean_stop_s = 0.0, mean_samples = 0.0;
   int other_law = 0;  ///< stopped with a law that is not the one simulated
@@ -175,8 +175,8 @@ inline StoppedCoverage stopped_coverage(const LawSpec& family, const SimulatedTe
   law.reference = test.depth_m;
   options.reference = test.depth_m;
   if (options.laws.empty()) options.laws = {law};
-  const std::vector<double> truth = visible_parameters(law);
-  const Recording clean = simulated_recording(law, truth, test);
+  const std::vector<double> true_values = visible_parameters(law);
+  const Recording clean = simulated_recording(law, true_values, test);
   const double peak = *std::max_element(clean.response.begin(), clean.response.end());
   const std::vector<LawParameter> table = law_parameters(law);
   StoppedCoverage result;
@@ -203,7 +203,8 @@ inline StoppedCoverage stopped_coverage(const LawSpec& family, const SimulatedTe
     for (const SequentialParameter& p : s.estimate.parameters) {
       for (std::size_t k = 0; k < result.names.size(); ++k) {
         if (result.names[k] != table[p.place].name) continue;
-        result.parameters[k].add(truth[p.place] >= p.lower && truth[p.place] <= p.upper);
+        result.parameters[k].add(true_values[p.place] >= p.lower &&
+                                 true_values[p.place] <= p.upper);
       }
     }
   }

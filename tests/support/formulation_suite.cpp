@@ -120,11 +120,11 @@ void closed_forms(const Formulation& f, Broken& broken) {
     if (!(by_depth ? f.can().depth : f.can().load && f.can().jumps)) continue;
     ExperimentScene scene = star(*push, f);
     const std::vector<double> times = even_times(scene.protocol, 12);
-    const Eigen::VectorXd truth = exact(scene, times);
+    const Eigen::VectorXd expected = exact(scene, times);
     scene.formulation.sweeps = kSweeps;
     const auto error = [&](double step_s) {
       scene.formulation.step_s = step_s;
-      return apart(run_scene(scene, times, false).response, truth);
+      return apart(run_scene(scene, times, false).response, expected);
     };
     if (order_of(f) == 0) {
       const double found = error(1e-3);
@@ -158,11 +158,11 @@ void oscillator(const Formulation& f, Broken& broken) {
       lowest_mode(network.driven.bonds, network.driven.rest, network.driven.constraints, mass);
   const double drag = 2.0 * scene.formulation.damping_ratio * lowest.angular_frequency();
   const std::vector<double> times = even_times(scene.protocol, 10);
-  const Eigen::VectorXd truth = tpm_test::loaded_oscillator(
+  const Eigen::VectorXd expected = tpm_test::loaded_oscillator(
       element, mass[static_cast<Eigen::Index>(scene.probe().sphere)], drag, 0.05, times);
   const auto error = [&](double step_s) {
     scene.formulation.step_s = step_s;
-    return apart(run_scene(scene, times, false).response, truth);
+    return apart(run_scene(scene, times, false).response, expected);
   };
   if (order_of(f) == 0) {
     const double found = error(1e-3);
@@ -354,12 +354,12 @@ void materials(const Formulation& f, Broken& broken) {
     other.formulation.kind = "quasi_static";
     other.formulation.masses = false;
     other.formulation.tolerance = 1e-10;
-    const Eigen::VectorXd truth = run_scene(other, times, false).response;
+    const Eigen::VectorXd expected = run_scene(other, times, false).response;
     constexpr int kSweeps = 300;
     scene.formulation.sweeps = kSweeps;
     const auto error = [&](double step_s) {
       scene.formulation.step_s = step_s;
-      return apart(run_scene(scene, times, false).response, truth);
+      return apart(run_scene(scene, times, false).response, expected);
     };
     if (order_of(f) > 0) {
       constexpr double kStep_s = 0.05, kShort = 0.35;
@@ -413,14 +413,14 @@ void claims(const Formulation& f, Broken& broken) {
   const PlanSurrogate surrogate(PlanScene(scene), {}, moving);
   PlanBudget budget;
   budget.rate_Hz = 1000.0;
-  Trajectory truth;
+  Trajectory expected;
   const std::vector<double> times = even_times(scene.protocol, 40);
   if (moving) {
-    truth = surrogate.scene().inertial(inertial_options(surrogate.scene(), 1e-8), times, false);
+    expected = surrogate.scene().inertial(inertial_options(surrogate.scene(), 1e-8), times, false);
   } else {
     QuasiStaticOptions options;
     options.tolerance = 1e-9;
-    truth = surrogate.scene().quasi_static(options, times, false);
+    expected = surrogate.scene().quasi_static(options, times, false);
   }
   PlanModels all;
   if (const auto* offer = f.as<PlanOffer>()) {
@@ -432,7 +432,7 @@ void claims(const Formulation& f, Broken& broken) {
   for (const auto& candidate : all) {
     if (candidate->why_not(surrogate, budget)) continue;
     const double claimed = candidate->claim(surrogate, budget).error;
-    const double found = trajectory_error(candidate->run(surrogate, budget, times), truth, {});
+    const double found = trajectory_error(candidate->run(surrogate, budget, times), expected, {});
     check(broken, found <= claimed, "claims",
           fmt::format("{} claims {} and is {} off", candidate->name(), claimed, found));
   }

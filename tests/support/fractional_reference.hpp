@@ -1,5 +1,5 @@
 #pragma once
-// Functions that the exponential sums of fractional memory are held against.
+// Functions that the exponential sums of fractional laws are checked against.
 #include <cmath>
 #include <vector>
 

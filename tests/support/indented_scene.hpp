@@ -24,8 +24,8 @@ struct IndentedScene {
     if (body.contact) front = static_cast<Eigen::Index>(*body.contact);
     push.direction = direction;
     push.patch = surface_patch(body, body.position.col(front), patch_radius);
-    for (const std::size_t i : push.patch) constraints.hold(i);
-    for (const std::size_t i : far_side(body, direction, far_thickness)) constraints.hold(i);
+    for (const std::size_t i : push.patch) constraints.fix(i);
+    for (const std::size_t i : far_side(body, direction, far_thickness)) constraints.fix(i);
   }
   Network network;
   BondSystem bonds;

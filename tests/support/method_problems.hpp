@@ -20,18 +20,18 @@ using namespace tpm;
 using namespace tpm::organ;
 
 /// A problem with its true answers.
-struct Judged {
+struct ReferenceProblem {
   std::string name;
   std::unique_ptr<MethodProblem> problem;
   std::vector<double> times;
-  Eigen::VectorXd truth;
+  Eigen::VectorXd expected;
 
   [[nodiscard]] MethodRun run(MethodSettings settings) const {
     return problem->run(settings, times);
   }
   /// The largest difference in parts of the peak.
   [[nodiscard]] double error(const MethodRun& run) const {
-    return (run.response - truth).cwiseAbs().maxCoeff() / truth.cwiseAbs().maxCoeff();
+    return (run.response - expected).cwiseAbs().maxCoeff() / expected.cwiseAbs().maxCoeff();
   }
   [[nodiscard]] double error(StepRule rule, double step_s) const {
     MethodSettings settings;
@@ -41,23 +41,23 @@ struct Judged {
   }
 };
 
-inline Judged checked_element(std::string name, const TpmParameters& p, const Protocol& protocol,
-                              std::vector<double> times) {
+inline ReferenceProblem checked_element(std::string name, const TpmParameters& p,
+                                        const Protocol& protocol, std::vector<double> times) {
   const ClosedForm exact{ModelOptions{}};
-  Eigen::VectorXd truth = exact.respond(protocol, times, to_vector(p), Want::values).value;
-  return {std::move(name), element_problem(p, protocol), std::move(times), std::move(truth)};
+  Eigen::VectorXd expected = exact.respond(protocol, times, to_vector(p), Want::values).value;
+  return {std::move(name), element_problem(p, protocol), std::move(times), std::move(expected)};
 }
 
 inline MethodMasses one_mass(double mass_kg, double drag_per_s) {
   return {Eigen::VectorXd::Constant(1, mass_kg), drag_per_s};
 }
 
-inline Judged element_with_mass(const TpmParameters& p, double mass_kg, double drag_per_s,
-                                double load_N, std::vector<double> times) {
-  Eigen::VectorXd truth = loaded_oscillator(p, mass_kg, drag_per_s, load_N, times);
+inline ReferenceProblem element_with_mass(const TpmParameters& p, double mass_kg, double drag_per_s,
+                                          double load_N, std::vector<double> times) {
+  Eigen::VectorXd expected = loaded_oscillator(p, mass_kg, drag_per_s, load_N, times);
   return {"element with mass",
           element_problem(p, creep(load_N, times.back()), one_mass(mass_kg, drag_per_s)),
-          std::move(times), std::move(truth)};
+          std::move(times), std::move(expected)};
 }
 
 /// A small organ of two layers.
@@ -70,19 +70,20 @@ struct SmallOrgan {
   SmallOrgan(const SmallOrgan&) = delete;
   SmallOrgan& operator=(const SmallOrgan&) = delete;
 
-  [[nodiscard]] Judged resting(std::string name, const Protocol& protocol,
-                               std::vector<double> times) const {
+  [[nodiscard]] ReferenceProblem massless(std::string name, const Protocol& protocol,
+                                          std::vector<double> times) const {
     QuasiStaticOptions options;
     options.tolerance = 1e-11;
-    Eigen::VectorXd truth =
+    Eigen::VectorXd expected =
         QuasiStatic(bonds, driven.rest, driven.constraints, driven.probes, options)
             .run(protocol, times)
             .response;
-    return {std::move(name), network_problem(driven, protocol), std::move(times), std::move(truth)};
+    return {std::move(name), network_problem(driven, protocol), std::move(times),
+            std::move(expected)};
   }
 
-  [[nodiscard]] Judged moving(std::string name, const Protocol& protocol, std::vector<double> times,
-                              double damping_ratio) const {
+  [[nodiscard]] ReferenceProblem with_mass(std::string name, const Protocol& protocol,
+                                           std::vector<double> times, double damping_ratio) const {
     InertialOptions options;
     options.tolerance = 1e-11;
     options.highest_order = 5;
@@ -91,9 +92,9 @@ struct SmallOrgan {
                             options);
     MethodMasses damped = mass;
     damped.drag_per_s = 2.0 * damping_ratio * inertial.lowest().angular_frequency();
-    Eigen::VectorXd truth = inertial.run(protocol, times).response;
+    Eigen::VectorXd expected = inertial.run(protocol, times).response;
     return {std::move(name), network_problem(driven, protocol, damped), std::move(times),
-            std::move(truth)};
+            std::move(expected)};
   }
 
   static LiverRequest request(std::size_t spheres) {
@@ -109,18 +110,18 @@ struct SmallOrgan {
 };
 
 /// log2 of the error at a step over that at half of it.
-inline double observed_order(const Judged& judged, StepRule rule, double step_s) {
-  return std::log2(judged.error(rule, step_s) / judged.error(rule, 0.5 * step_s));
+inline double observed_order(const ReferenceProblem& checked, StepRule rule, double step_s) {
+  return std::log2(checked.error(rule, step_s) / checked.error(rule, 0.5 * step_s));
 }
 
-/// The same from three runs with halved steps, without a judge: for errors that are smaller than
-/// his.
-inline double own_order(const Judged& judged, StepRule rule, double step_s) {
+/// The same from three runs with halved steps, without a reference: for errors that are smaller
+/// than his.
+inline double own_order(const ReferenceProblem& checked, StepRule rule, double step_s) {
   const auto at = [&](double step) {
     MethodSettings settings;
     settings.rule = rule;
     settings.step_s = step;
-    return judged.run(settings).response;
+    return checked.run(settings).response;
   };
   const Eigen::VectorXd middle = at(0.5 * step_s);
   return std::log2((at(step_s) - middle).cwiseAbs().maxCoeff() /

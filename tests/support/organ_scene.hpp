@@ -22,7 +22,7 @@ struct OrganScene {
     for (std::size_t i = 0; i < organ.size(); ++i) {
       const double further = along[static_cast<Eigen::Index>(i)] - near;
       if (organ.layer[i] == 0 && further > far_share * (along.maxCoeff() - near))
-        constraints.hold(i);
+        constraints.fix(i);
     }
   }
 

@@ -47,7 +47,7 @@ std::vector<int> counted(std::span<const std::size_t> spheres, std::size_t size)
   return is_in;
 }
 
-BondMemory at_rest(const BondSystem& bonds, double relaxation_factor) {
+ViscousState at_rest(const BondSystem& bonds, double relaxation_factor) {
   return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxation_factor};
 }
 
@@ -57,11 +57,11 @@ class LinearBlock {
   LinearBlock(const Network& network, const BondSystem& bonds, double relaxation_factor,
               Constraints constraints)
       : rest_(network.organ.position),
-        memory_(at_rest(bonds, relaxation_factor)),
+        viscous_state_(at_rest(bonds, relaxation_factor)),
         bonds_(bonds),
         constraints_(std::move(constraints)),
         equilibrium_(bonds_, constraints_) {
-    if (!equilibrium_.factorise(rest_, memory_) || !equilibrium_.is_stable()) {
+    if (!equilibrium_.factorise(rest_, viscous_state_) || !equilibrium_.is_stable()) {
       throw Error(ExitCode::numerical, "patch test", "the block has loose spheres");
     }
   }
@@ -75,13 +75,13 @@ class LinearBlock {
   /// Force of the bonds on each sphere, N per unit of the displacement.
   [[nodiscard]] Eigen::Matrix3Xd forces(const Eigen::Matrix3Xd& displacement) const {
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-    bonds_.add_stiffness_times(rest_, memory_, displacement, force);
+    bonds_.add_stiffness_times(rest_, viscous_state_, displacement, force);
     return -force;
   }
 
  private:
   const Positions& rest_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
   const BondSystem& bonds_;
   Constraints constraints_;
   Equilibrium equilibrium_;
@@ -179,7 +179,7 @@ PatchTest affine_patch_test(const Network& block, const BondSystem& bonds, doubl
   const std::vector<int> is_in = counted(interior, block.organ.size());
   Constraints constraints(block.organ.size());
   for (std::size_t i = 0; i < is_in.size(); ++i) {
-    if (is_in[i] == 0) constraints.hold(i);
+    if (is_in[i] == 0) constraints.fix(i);
   }
   const LinearBlock linear(block, bonds, relaxation_factor, constraints);
   const double volume = volume_per_sphere_m3 * static_cast<double>(interior.size());
@@ -203,21 +203,21 @@ PatchTest affine_patch_test(const Network& block, const BondSystem& bonds, doubl
 
 PlateTest plate_test(const Network& block, const BondSystem& bonds, double relaxation_factor) {
   const Eigen::AlignedBox3d box = box_of(block.organ);
-  const double grain = 1e-6 * block.organ.spacing;
+  const double tolerance_m = 1e-6 * block.organ.spacing;
   Constraints constraints(block.organ.size());
   std::vector<Eigen::Index> top;
   Eigen::Matrix3Xd displacement = Eigen::Matrix3Xd::Zero(3, block.organ.position.cols());
   for (std::size_t i = 0; i < block.organ.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);
     const Eigen::Vector3d p = block.organ.position.col(column);
-    const bool is_top = p.z() > box.max().z() - grain;
-    const bool is_bottom = p.z() < box.min().z() + grain;
+    const bool is_top = p.z() > box.max().z() - tolerance_m;
+    const bool is_bottom = p.z() < box.min().z() + tolerance_m;
     if (is_top || is_bottom) constraints.impose(i, Eigen::Vector3d::UnitZ());
     // The rigid motions that smooth plates leave: one corner stands, another may only slide along
     // x.
-    if (is_bottom && p.y() < box.min().y() + grain) {
-      if (p.x() < box.min().x() + grain) constraints.hold(i);
-      if (p.x() > box.max().x() - grain) constraints.impose(i, Eigen::Vector3d::UnitY());
+    if (is_bottom && p.y() < box.min().y() + tolerance_m) {
+      if (p.x() < box.min().x() + tolerance_m) constraints.fix(i);
+      if (p.x() > box.max().x() - tolerance_m) constraints.impose(i, Eigen::Vector3d::UnitY());
     }
     if (!is_top) continue;
     displacement(2, column) = -box.sizes().z();  // a compression of 1

@@ -42,7 +42,7 @@ inline double punch_stiffness(const PunchOnBlock& scene, int cells) {
     const Eigen::Vector2d from_axis = p.head<2>().array() - 0.5 * scene.side_m;
     const bool below_punch = on_top && is_below(scene, from_axis);
     if (below_punch) patch.push_back(i);
-    if (below_punch || p.z() < 0.5 * x) constraints.hold(i);
+    if (below_punch || p.z() < 0.5 * x) constraints.fix(i);
   }
   LargeEquilibrium solver(bonds, constraints, network.organ.position);
   return punch_stiffness(solver, network.organ.position, patch, -Eigen::Vector3d::UnitZ(), 0.0,

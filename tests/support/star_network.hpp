@@ -27,8 +27,8 @@ struct Star {
       : network(tpm::organ::join(star_organ(p.spacing_m), pairs(), {}, "star")),
         bonds(network, p),
         constraints(4) {
-    constraints.guide(0, Eigen::Vector3d::UnitZ());
-    for (const std::size_t i : {1, 2, 3}) constraints.hold(i);
+    constraints.slide(0, Eigen::Vector3d::UnitZ());
+    for (const std::size_t i : {1, 2, 3}) constraints.fix(i);
   }
   static const std::vector<tpm::organ::NeighbourPair>& pairs() {
     static const std::vector<tpm::organ::NeighbourPair> list{{0, 1}, {0, 2}, {0, 3}};

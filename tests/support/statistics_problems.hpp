@@ -136,15 +136,15 @@ inline std::vector<double> autoregression(std::size_t n, double phi, Random& ran
   return x;
 }
 
-/// x = 0, 1/(n-1), ..., 1 times `length`; y the curve at `truth` plus sigma times `errors`.
-inline CurveData curve_data(Curve curve, std::vector<double> truth, double length, double sigma,
-                            const std::vector<double>& errors) {
+/// x = 0, 1/(n-1), ..., 1 times `length`; y the curve at `true_values` plus sigma times `errors`.
+inline CurveData curve_data(Curve curve, std::vector<double> true_values, double length,
+                            double sigma, const std::vector<double>& errors) {
   CurveData data{{}, {}, sigma, {}};
   const auto n = errors.size();
   for (std::size_t i = 0; i < n; ++i) {
     double d[2];
     data.x.push_back(length * static_cast<double>(i) / static_cast<double>(n - 1));
-    data.y.push_back(curve(data.x[i], truth, d) + sigma * errors[i]);
+    data.y.push_back(curve(data.x[i], true_values, d) + sigma * errors[i]);
   }
   return data;
 }

@@ -116,7 +116,7 @@ TEST_CASE("creep in a sweep obeys the balance at once and in the end, and the mo
   for (const auto& [i, load] : {std::pair{std::size_t{0}, 0.196}, {std::size_t{1}, 0.98}}) {
     CHECK_THAT(block.values[0][i], WithinRel(equilibrium_depth_m(p, p.E2_Pa, load), 1e-12));
     CHECK_THAT(block.values[1][i],
-               WithinRel(equilibrium_depth_m(p, p.relaxed_modulus_Pa(), load), 1e-12));
+               WithinRel(equilibrium_depth_m(p, p.equilibrium_modulus_Pa(), load), 1e-12));
     const std::array times{7.0};
     const double at7 =
         make_model("cvodes", {})->respond(creep(load, 10.0), times, v, Want::values).value[0];
@@ -314,9 +314,9 @@ TEST_CASE("a file of results is read back by axes, either way round, and drawn")
   CHECK(reader.tally().skipped == 12);
   CHECK(reader.tally().failed == 16);
   CHECK(reader.parameter_unit("E1") == "Pa");
-  const HeldPlaces held{{"rate", 2}};
-  const auto upright = reader.slice("end_force", "E1", "x", held);
-  const auto turned = reader.slice("end_force", "x", "E1", held);
+  const FixedPlaces fixed{{"rate", 2}};
+  const auto upright = reader.slice("end_force", "E1", "x", fixed);
+  const auto turned = reader.slice("end_force", "x", "E1", fixed);
   const auto whole = all_blocks(sweep);
   for (std::uint64_t e = 0; e < 4; ++e) {
     for (std::uint64_t x = 1; x < 5; ++x) {
@@ -328,7 +328,7 @@ TEST_CASE("a file of results is read back by axes, either way round, and drawn")
     }
   }
   SweepFigures wished;
-  wished.held = held;
+  wished.fixed = fixed;
   wished.pareto = {"share", "peak_force"};
   const auto figures = sweep_figures(reader, wished);
   REQUIRE(figures.size() == 5);
@@ -345,7 +345,7 @@ TEST_CASE("a file of results is read back by axes, either way round, and drawn")
         }).find("--at rate: the figure of") != std::string::npos);
   // Axes that are held are not drawn over unless that is asked for.
   SweepFigures along;
-  along.held = {{"x", 1}};
+  along.fixed = {{"x", 1}};
   along.variables = {"end_force"};
   CHECK(sweep_figures(reader, along)[0].panels[0].x.quantity == "E1");
   CHECK_FALSE(to_text(to_json(figures)).empty());  // it can be drawn
@@ -435,8 +435,8 @@ TEST_CASE("sensitivity of a sum: each term's share of the variance") {
       CHECK(index.high - index.low < 0.03);
     }
   }
-  REQUIRE(sum.held.size() == 1);
-  CHECK_THAT(sum.held[0].value, WithinRel(8e-3, 1e-12));
+  REQUIRE(sum.fixed.size() == 1);
+  CHECK_THAT(sum.fixed[0].value, WithinRel(8e-3, 1e-12));
   CHECK(sensitivity_text({sum}).find(", at depth = 8 mm") != std::string::npos);
   // A step's first force does not know E1.
   const SweepSensitivity peak = sensitivity_of(reader, "peak_force", {});
@@ -468,14 +468,14 @@ TEST_CASE("a sweep over a star as a network is the sweep over it in closed form"
              {"parameter": "depth", "values": ["2 mm", "8 mm"]}],
     "outputs": ["peak_force", "end_force", {"force_at": "7 s", "name": "at7"}]})");
   const auto found = all_blocks(star);
-  const auto truth = all_blocks(closed);
+  const auto expected = all_blocks(closed);
   for (std::size_t b = 0; b < found.size(); ++b) {
     for (std::size_t i = 0; i < found[b].cells(); ++i) {
       REQUIRE(found[b].status[i] == CellStatus::done);
       CHECK(found[b].error_estimate[i] <= 1e-7);
       CHECK(found[b].counts[0][i] > 0);
       for (std::size_t v = 0; v < 3; ++v) {
-        CHECK_THAT(found[b].values[v][i], WithinRel(truth[b].values[v][i], 1e-6));
+        CHECK_THAT(found[b].values[v][i], WithinRel(expected[b].values[v][i], 1e-6));
       }
     }
   }
@@ -543,10 +543,11 @@ TEST_CASE("steps of the integrator: the order of two Radau nodes is three") {
   CAPTURE(c.value, c.threes.back().order);
   CHECK(std::abs(c.threes.back().order - 3.0) < 0.2);
   // Without the block the steps follow the tolerance.
-  const double truth =
+  const double expected =
       only_block(parsed(scene + R"("axes": [{"parameter": "/tolerance", "values": [1e-12]}]})"))
           .values[0][0];
-  CHECK(std::abs(c.threes.back().extrapolated - truth) <= c.threes.back().index + 1e-10 * truth);
+  CHECK(std::abs(c.threes.back().extrapolated - expected) <=
+        c.threes.back().index + 1e-10 * expected);
 }
 
 TEST_CASE("the best cell of a sweep is where a fit goes on") {
@@ -603,7 +604,7 @@ TEST_CASE("a damaged result is refused before HDF5 reads it, and made anew") {
 TEST_CASE("a log is written by one process at a time") {
   const test::TempFolder folder;
   const Sweep sweep = parsed(kMixed);
-  const BlockLog held(folder / "a.blocks", sweep, {});
+  const BlockLog holder(folder / "a.blocks", sweep, {});
   CHECK(test::refusal_of([&] {
           const BlockLog second(folder / "a.blocks", sweep, {});
         }).find("another tpm sweep") != std::string::npos);

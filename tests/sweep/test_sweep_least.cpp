@@ -81,8 +81,8 @@ std::string least_result(const Sweep& sweep, const std::string& file, int worker
 }  // namespace
 
 TEST_CASE("each cell is as near to the network as its model claims", "[heavy]") {
-  const Sweep truth = parsed_block("", "1e-8");
-  CellRunner network(truth);
+  const Sweep expected = parsed_block("", "1e-8");
+  CellRunner network(expected);
   for (const char* tolerance : {"5 %", "0.5 %", "0.01 %"}) {
     const Sweep sweep = parsed_block(R"("tolerance": ")" + std::string(tolerance) + R"(", )");
     CellRunner least(sweep);
@@ -139,9 +139,9 @@ TEST_CASE("a claim holds early in a long hold too", "[heavy]") {
   // A ramp of 0.02 relaxation times; the longest of the contact are 31. Largest errors: after 0.9.
   const Json scene = creeping_liver("2 kPa", "60 kPa", "3739375 Pa s", "180.9 s");
   const Sweep sweep = over_depths(scene, "4.05 mm", "5.6 mm", "180 s", "20 %");
-  const Sweep truth = over_depths(scene, "4.05 mm", "5.6 mm", "180 s", nullptr);
+  const Sweep expected = over_depths(scene, "4.05 mm", "5.6 mm", "180 s", nullptr);
   const std::uint64_t deepest = sweep.blocks() - 1;
-  const CellBlock found = CellRunner(sweep).run(deepest), exact = CellRunner(truth).run(deepest);
+  const CellBlock found = CellRunner(sweep).run(deepest), exact = CellRunner(expected).run(deepest);
   for (std::size_t i = 0; i < found.cells(); ++i) {
     CAPTURE(i, found.error_estimate[i]);
     REQUIRE(found.status[i] == CellStatus::done);
@@ -182,12 +182,12 @@ TEST_CASE("static curves are the equilibria, at once and relaxed, also where E2 
   for (const double share : {0.1, 0.5, 1.0}) {
     const double depth = share * kDepth_m;
     CAPTURE(depth);
-    CHECK(curves.relaxed(depth) ==
+    CHECK(curves.equilibrium(depth) ==
           Approx(relaxed.move_to(depth, 0.0).response).epsilon(1e-4 / share));
     const Protocol jump(Drive::displacement, {{0.0, depth}, {1.0, depth}}, "jump");
     const std::vector<double> start{0.0};
     const Trajectory instantaneous = scene.with_protocol(jump).quasi_static({}, start, false);
-    CHECK(curves.relaxed(depth) + curves.relaxing(depth) ==
+    CHECK(curves.equilibrium(depth) + curves.relaxing(depth) ==
           Approx(instantaneous.response[0]).epsilon(1e-4 / share));
   }
 }

@@ -17,7 +17,7 @@ constexpr int kSlow = 6;  // iterations after which a factorisation is found ane
 
 Constraints with_contact_held(const TouchedTissue& tissue) {
   Constraints constraints = tissue.constraints;
-  constraints.hold(tissue.contact);
+  constraints.fix(tissue.contact);
   return constraints;
 }
 
@@ -72,14 +72,14 @@ BalancedContact::BalancedContact(const TouchedTissue& tissue)
 }
 
 Eigen::Vector3d BalancedContact::go_to(const Eigen::Vector3d& displacement_m,
-                                       const BondMemory& memory) {
+                                       const ViscousState& viscous_state) {
   const auto column = static_cast<Eigen::Index>(tissue_.contact);
   const double tolerance_N = kBalance * tissue_.bonds.stiffness().maxCoeff();
   const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, position_.cols());
   position_.col(column) = tissue_.rest.col(column) + displacement_m;
   Eigen::Matrix3Xd force;
   for (int iteration = 0;; ++iteration) {
-    equilibrium_.forces(position_, memory, load, force);
+    equilibrium_.forces(position_, viscous_state, load, force);
     Eigen::Matrix3Xd left = force;
     constraints_.project(left);
     const double residual_N = left.cwiseAbs().maxCoeff();
@@ -88,7 +88,7 @@ Eigen::Vector3d BalancedContact::go_to(const Eigen::Vector3d& displacement_m,
       throw Error(ExitCode::numerical, "contact", "the forces cannot be balanced");
     }
     if (!factorised_ || iteration % kSlow == kSlow - 1) {
-      factorised_ = equilibrium_.factorise(position_, memory);
+      factorised_ = equilibrium_.factorise(position_, viscous_state);
       if (!factorised_ || !equilibrium_.is_stable()) {
         throw Error(ExitCode::numerical, "contact", "the tissue buckles");
       }
@@ -110,10 +110,10 @@ FineContact::FineContact(const TouchedTissue& tissue, double step_s)
 }
 
 Eigen::Vector3d FineContact::step(const Eigen::Vector3d& displacement_m) {
-  const BondMemory memory{keep_ * viscous_ + of_start_ * elongation_, of_end_};
-  Eigen::Vector3d force_N = balanced_.go_to(displacement_m, memory);
+  const ViscousState viscous_state{keep_ * viscous_ + of_start_ * elongation_, of_end_};
+  Eigen::Vector3d force_N = balanced_.go_to(displacement_m, viscous_state);
   bonds_.elongations(position(), elongation_);
-  viscous_ = memory.offset + of_end_ * elongation_;
+  viscous_ = viscous_state.offset + of_end_ * elongation_;
   return force_N;
 }
 
@@ -137,15 +137,16 @@ ContactReference runge_kutta_reference(const TouchedTissue& tissue, const Contac
   const double step_s = motion.period_s / substeps;
   const double tau_s = tissue.bonds.relaxation_time_s();
   BalancedContact balanced(tissue);
-  BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tissue.bonds.size())), 0.0};
+  ViscousState viscous_state{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tissue.bonds.size())),
+                             0.0};
   Eigen::VectorXd elongation;
   const auto rate = [&](const Eigen::Vector3d& displacement_m, const Eigen::VectorXd& y) {
-    memory.offset = y;
-    balanced.go_to(displacement_m, memory);
+    viscous_state.offset = y;
+    balanced.go_to(displacement_m, viscous_state);
     tissue.bonds.elongations(balanced.position(), elongation);
     return Eigen::VectorXd((elongation - y) / tau_s);
   };
-  Eigen::VectorXd viscous = memory.offset;
+  Eigen::VectorXd viscous = viscous_state.offset;
   Record record(tissue, motion, field_every);
   Eigen::Vector3d from = Eigen::Vector3d::Zero();
   for (Eigen::Index i = 0; i < motion.steps(); ++i) {
@@ -160,8 +161,8 @@ ContactReference runge_kutta_reference(const TouchedTissue& tissue, const Contac
       const Eigen::VectorXd fourth = rate(at(1.0), viscous + step_s * third);
       viscous += step_s / 6.0 * (first + 2.0 * second + 2.0 * third + fourth);
     }
-    memory.offset = viscous;
-    const Eigen::Vector3d force_N = balanced.go_to(to, memory);
+    viscous_state.offset = viscous;
+    const Eigen::Vector3d force_N = balanced.go_to(to, viscous_state);
     record.put(i, force_N, balanced.position());
     from = to;
   }
@@ -175,7 +176,7 @@ Eigen::VectorXd line_reference(const TouchedTissue& tissue, const ContactMotion&
                     "a motion along a line through rest");
   }
   Constraints constraints = tissue.constraints;
-  constraints.guide(tissue.contact, motion.direction);
+  constraints.slide(tissue.contact, motion.direction);
   const QuasiStatic solver(tissue.bonds, tissue.rest, constraints,
                            Probe{tissue.contact, motion.direction}, {.tolerance = tolerance});
   std::vector<double> times;

@@ -34,7 +34,7 @@ class BalancedContact {
   /// Goes to a displacement of the contact, m.
   /// @returns force of the tissue on the contact, N
   /// Throws Error(numerical) if the forces cannot be balanced.
-  Eigen::Vector3d go_to(const Eigen::Vector3d& displacement_m, const BondMemory& memory);
+  Eigen::Vector3d go_to(const Eigen::Vector3d& displacement_m, const ViscousState& viscous_state);
 
   [[nodiscard]] const Positions& position() const { return position_; }
 

@@ -92,12 +92,12 @@ Eigen::VectorXd integrated_depth(const PosedBond& bond, double load_N) {
   using State = std::array<double, 3>;
   const BondElement& p = bond.material;
   const TensionLaw tension = p.tension();
-  const double at_once_Pa = p.instantaneous_Pa(), relaxing_Pa = p.relaxing_Pa();
+  const double instantaneous_Pa = p.instantaneous_Pa(), relaxing_Pa = p.relaxing_Pa();
   const double mass_kg = bond.star->mass->mass_kg[0];
   const double drag_per_s = bond.star->mass->drag_per_s;
   const auto rates = [&](const State& s, State& rate, double /*time*/) {
-    const double pull =
-        (at_once_Pa * s[0] - relaxing_Pa * s[2] + tension.value(s[0])) * p.modulus_to_stiffness_m();
+    const double pull = (instantaneous_Pa * s[0] - relaxing_Pa * s[2] + tension.value(s[0])) *
+                        p.modulus_to_stiffness_m();
     rate = {s[1], (load_N - pull) / mass_kg - drag_per_s * s[1],
             (s[0] - s[2]) / p.relaxation_time_s()};
   };

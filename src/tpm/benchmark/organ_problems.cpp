@@ -87,7 +87,7 @@ std::shared_ptr<PosedNetwork> posed_moving_liver(const Tissue& tissue, bool guid
   auto posed = posed_liver(tissue, ramp_and_hold(8e-3, 0.1, kPokeWithMass_s - 0.08), times_s);
   if (guided) {
     const Probe& probe = posed->network.probes.front();
-    posed->network.constraints.guide(probe.sphere, probe.direction);
+    posed->network.constraints.slide(probe.sphere, probe.direction);
   }
   posed->set_masses(sphere_masses_kg(tissue.network.organ), kDampingRatio);
   return posed;

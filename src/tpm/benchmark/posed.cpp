@@ -29,8 +29,8 @@ DrivenNetwork driven_star(const BondElement& material) {
   constexpr std::size_t kB = 1;  // A, B, C, D
   const Eigen::Vector3d into = -organ.normal.col(kB);
   Constraints constraints(organ.size());
-  constraints.guide(kB, into);
-  for (const std::size_t held : {0, 2, 3}) constraints.hold(held);
+  constraints.slide(kB, into);
+  for (const std::size_t held : {0, 2, 3}) constraints.fix(held);
   return driven_network(BondSystem(network, material), organ, constraints, {{kB, into, 1.0}}, {});
 }
 

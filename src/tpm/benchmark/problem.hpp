@@ -56,7 +56,7 @@ struct BenchmarkAnswer {
 
 /// The reference and its cross-check.
 struct BenchmarkReference {
-  BenchmarkAnswer judge;
+  BenchmarkAnswer first;
   BenchmarkAnswer second;  ///< by another method; reference for the settings of the first
   bool exact = false;      ///< the reference is a closed form
   int components = 1;      ///< of a response at a time: numbers that stand in a row, a vector
@@ -68,7 +68,7 @@ struct BenchmarkReference {
   [[nodiscard]] double floor_of(const AnsweredPart& part) const;
   /// The answer that settings of a method are compared with: no method is its own reference.
   [[nodiscard]] const Eigen::VectorXd& response_for(std::string_view method) const {
-    return method == judge.method ? second.response : judge.response;
+    return method == first.method ? second.response : first.response;
   }
 };
 
@@ -85,7 +85,7 @@ inline constexpr double kExactFloor = 1e-14;
 ///   reference ten times the difference must not exceed it either
 /// Throws Error(numerical) with `where` if it is larger, if the answers are not finite or differ in
 /// size, or if both come from one method.
-[[nodiscard]] BenchmarkReference checked_reference(BenchmarkAnswer judge, BenchmarkAnswer second,
+[[nodiscard]] BenchmarkReference checked_reference(BenchmarkAnswer first, BenchmarkAnswer second,
                                                    bool exact, double worst_floor,
                                                    std::string_view where, int components = 1);
 

@@ -42,8 +42,8 @@ std::optional<BenchmarkClaims> claims_of(const Eigen::VectorXd& claimed,
   return claims;
 }
 
-void judge(BenchmarkPoint& point, const BenchmarkRun& whole_run, const BenchmarkSetting& setting,
-           const BenchmarkReference& reference) {
+void compare(BenchmarkPoint& point, const BenchmarkRun& whole_run, const BenchmarkSetting& setting,
+             const BenchmarkReference& reference) {
   const MethodRun& run = whole_run.outcome;
   point.end = benchmark_end_word(run.end);
   point.reason = run.reason;
@@ -53,13 +53,13 @@ void judge(BenchmarkPoint& point, const BenchmarkRun& whole_run, const Benchmark
   if (run.end != MethodEnd::completed) return;
   const Eigen::VectorXd& whole = reference.response_for(point.method);
   const AnsweredPart part = setting.part ? setting.part() : AnsweredPart{0, whole.size()};
-  const auto truth = whole.segment(part.first, part.count);
-  if (run.response.size() != truth.size() || !run.response.allFinite()) {
+  const auto expected = whole.segment(part.first, part.count);
+  if (run.response.size() != expected.size() || !run.response.allFinite()) {
     throw Error(ExitCode::numerical, point.curve(),
                 "a run that says it completed has not answered at every time");
   }
   const Eigen::VectorXd errors =
-      sizes_of(run.response - truth, reference.components) / reference.peak;
+      sizes_of(run.response - expected, reference.components) / reference.peak;
   const double error = errors.maxCoeff();
   const double floor = setting.part ? reference.floor_of(part) : reference.floor;
   if (whole_run.claimed.size() > 0) {
@@ -122,7 +122,7 @@ BenchmarkPoint point_of(const BenchmarkSetting& setting, const BenchmarkReferenc
   const BenchmarkRun run = setting.run(false);
   const double once_s = seconds_since(start);
   point.build_s = run.build_s;
-  judge(point, run, setting, reference);
+  compare(point, run, setting, reference);
   if (options.timing) time_runs(setting, once_s, options, point);
   return point;
 }

@@ -82,9 +82,9 @@ class ServoCase {
   }
   [[nodiscard]] double condensed_s() const { return condensed_s_; }
 
-  const BenchmarkReference& truth() {
-    if (!truth_) find_reference();
-    return *truth_;
+  const BenchmarkReference& reference() {
+    if (!reference_) find_reference();
+    return *reference_;
   }
   /// What a setting at a relaxation time answers.
   [[nodiscard]] AnsweredPart part(std::size_t tau, bool positions) const {
@@ -126,7 +126,7 @@ class ServoCase {
 
   [[nodiscard]] int components() const { return line ? 1 : 3; }
 
-  /// Judge and second of one motion.
+  /// First and second reference of one motion.
   [[nodiscard]] std::array<ContactReference, 2> answers(std::size_t tau,
                                                         const ContactMotion& motion) const {
     const TouchedTissue touched{bonds(tau), rest(), constraints, contact};
@@ -144,9 +144,9 @@ class ServoCase {
               std::move(fine)};
     }
     constexpr double kTolerance = 1e-8;
-    ContactReference judge;
-    judge.force_N = motion.direction * line_reference(touched, motion, kTolerance).transpose();
-    return {std::move(judge), std::move(fine)};
+    ContactReference first;
+    first.force_N = motion.direction * line_reference(touched, motion, kTolerance).transpose();
+    return {std::move(first), std::move(fine)};
   }
 
   void find_reference() {
@@ -189,15 +189,15 @@ class ServoCase {
     const auto vector = [](const std::vector<double>& all) {
       return Eigen::VectorXd::Map(all.data(), static_cast<Eigen::Index>(all.size())).eval();
     };
-    BenchmarkAnswer judge{
+    BenchmarkAnswer first{
         "rk4",
         "Runge-Kutta of order 4 for the viscous elongations, forces balanced at each "
         "stage to rounding",
         vector(numbers[0])};
-    if (line) judge = {"collocation", "collocation (QuasiStatic) at 1e-8", judge.response};
+    if (line) first = {"collocation", "collocation (QuasiStatic) at 1e-8", first.response};
     constexpr double kWorstFloor = 2e-4;
-    truth_ = checked_reference(
-        std::move(judge),
+    reference_ = checked_reference(
+        std::move(first),
         {"exponential", "steps of linear elongation and steps of half their length, extrapolated",
          vector(numbers[1])},
         false, kWorstFloor, "contact models", components());
@@ -206,7 +206,7 @@ class ServoCase {
   std::vector<std::unique_ptr<BondSystem>> bonds_;
   std::optional<CondensedContact> condensed_;
   double condensed_s_ = 0.0;
-  std::optional<BenchmarkReference> truth_;
+  std::optional<BenchmarkReference> reference_;
   std::vector<AnsweredPart> forces_, positions_;        ///< by relaxation time
   std::vector<std::vector<double>> peaks_N_, peaks_m_;  ///< by relaxation time and motion
 };
@@ -299,7 +299,7 @@ BenchmarkSetting setting_of(const std::shared_ptr<ServoCase>& asked, std::size_t
       run.step_wall_s = step_times(*asked, *kept->model, how);
       return run;
     }
-    asked->truth();  // its peaks scale the answer
+    asked->reference();  // its peaks scale the answer
     const ServoAnswer answer = answer_of_model(*asked, *kept->model);
     run.outcome.response = asked->scaled(answer, tau, how.positions);
     if (!how.positions) run.claimed = asked->scaled_claims(answer, tau);
@@ -373,7 +373,7 @@ BenchmarkProblem servo_problem(const std::shared_ptr<ServoCase>& asked,
       problem.settings.push_back(setting_of(asked, tau, model));
     }
   }
-  problem.reference = [asked] { return asked->truth(); };
+  problem.reference = [asked] { return asked->reference(); };
   return problem;
 }
 

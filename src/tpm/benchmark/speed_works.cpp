@@ -30,7 +30,7 @@ struct StandingLiver {
     const double near = rest.row(2).minCoeff();
     const double far = rest.row(2).maxCoeff();
     for (std::size_t i = 0; i < constraints.size(); ++i) {
-      if (rest(2, static_cast<Eigen::Index>(i)) > near + 0.7 * (far - near)) constraints.hold(i);
+      if (rest(2, static_cast<Eigen::Index>(i)) > near + 0.7 * (far - near)) constraints.fix(i);
     }
     right.resize(3, rest.cols());
     Random random(1);
@@ -58,7 +58,7 @@ struct StandingLiver {
     return organ;
   }
   [[nodiscard]] const Positions& rest() const { return network.organ.position; }
-  [[nodiscard]] BondMemory memory() const {
+  [[nodiscard]] ViscousState viscous_state() const {
     return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
   }
 
@@ -78,7 +78,7 @@ std::shared_ptr<StandingLiver> standing(std::size_t count, bool solid = false) {
 struct Factorised {
   explicit Factorised(std::size_t count)
       : liver(count, false), matrix(liver.bonds.pattern()), factor(liver.bonds.pattern()) {
-    liver.bonds.add_stiffness(liver.rest(), liver.memory(), matrix);
+    liver.bonds.add_stiffness(liver.rest(), liver.viscous_state(), matrix);
     liver.constraints.constrain(liver.bonds, matrix);
     factorise();
   }
@@ -160,7 +160,8 @@ Run iterate_solid(std::size_t count) {
       std::make_shared<LargeEquilibrium>(liver->bonds, liver->constraints, liver->rest());
   return [liver, solver] {
     Eigen::Matrix3Xd x = liver->right;
-    if (solver->solve(liver->rest(), liver->memory(), x, 1e-8) == TangentAnswer::solved) return;
+    if (solver->solve(liver->rest(), liver->viscous_state(), x, 1e-8) == TangentAnswer::solved)
+      return;
     throw Error(ExitCode::numerical, "speed record", "conjugate gradients do not converge");
   };
 }

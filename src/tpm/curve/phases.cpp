@@ -8,8 +8,8 @@
 
 #include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/curve/contact_onset.hpp"
 #include "tpm/curve/drive_pieces.hpp"
-#include "tpm/curve/touch.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -200,7 +200,7 @@ class Finder {
 
   /// A force that stays constant while the depth grows was held by the machine.
   void find_creep() {
-    constexpr double kPart = 0.3;  // of the phase's time
+    constexpr double kLeastPart = 0.3;  // of the phase's time
     constexpr std::size_t kLeast = 8;
     if (!found_.contact_found) return;
     const std::vector<Phase> phases = found_.phases;
@@ -209,7 +209,7 @@ class Finder {
       const std::size_t start = start_of_constant_response(phase);
       const double part =
           (time_[phase.last] - time_[start]) / (time_[phase.last] - time_[phase.first]);
-      if (part > kPart) relabel(start, phase.last, PhaseKind::creep);
+      if (part > kLeastPart) relabel(start, phase.last, PhaseKind::creep);
     }
   }
 

@@ -27,18 +27,18 @@ void refuse_what_cannot_be_simulated(const FitConfig& config, const ExperimentRe
 }
 
 /// A datum as the declared noise would scatter it about the true value.
-double simulated(const ExperimentResiduals& function, std::size_t datum, double truth,
+double simulated(const ExperimentResiduals& function, std::size_t datum, double true_value,
                  std::span<const double> natural, Random& random) {
   const std::size_t choice = function.data()[datum].choice;
   const ErrorLaw law = error_law(function.config().data[choice].noise);
-  const double scale = function.new_noise_scale(datum, truth, natural);
-  return scattered(law, truth, scale, draw_error(law, random));
+  const double scale = function.new_noise_scale(datum, true_value, natural);
+  return scattered(law, true_value, scale, draw_error(law, random));
 }
 
 /// A profile that failed is no interval.
-bool holds(const ParameterResult& p, double truth) {
-  return p.verdict != Verdict::failed && (!p.lower || *p.lower <= truth) &&
-         (!p.upper || truth <= *p.upper);
+bool holds(const ParameterResult& p, double true_value) {
+  return p.verdict != Verdict::failed && (!p.lower || *p.lower <= true_value) &&
+         (!p.upper || true_value <= *p.upper);
 }
 
 }  // namespace
@@ -58,11 +58,11 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
   ExperimentResiduals function(config);
   refuse_what_cannot_be_simulated(config, function);
   std::vector<FitParameter> parameters;
-  std::vector<double> truth;
+  std::vector<double> true_value;
   CoverageResult result;
   for (const EstimatedParameter& p : function.config().parameters) {
     parameters.push_back(p.fit);
-    truth.push_back(p.fit.start);
+    true_value.push_back(p.fit.start);
     result.parameters.push_back({p.fit.name, 0, 0, 1.0});
   }
   Threshold threshold;
@@ -72,14 +72,14 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
   result.seed = seed;
   result.level = config.level;
 
-  const Eigen::VectorXd expected = function.predict(truth, nullptr);
+  const Eigen::VectorXd expected = function.predict(true_value, nullptr);
   Random random(seed);
   Progress progress("simulating and fitting", static_cast<std::size_t>(sets));
   for (int set = 0; set < sets; ++set) {
     for (const Experiment& experiment : function.experiments()) {
       for (const std::size_t i : experiment.data) {
         function.set_value(
-            i, simulated(function, i, expected[static_cast<Eigen::Index>(i)], truth, random));
+            i, simulated(function, i, expected[static_cast<Eigen::Index>(i)], true_value, random));
       }
     }
     ++result.sets;
@@ -89,7 +89,7 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
                                           threshold, true, start_kind(function));
       for (std::size_t i = 0; i < parameters.size(); ++i) {
         const ParameterResult& p = fit.parameters[i];
-        if (holds(p, truth[i])) ++result.parameters[i].covered;
+        if (holds(p, true_value[i])) ++result.parameters[i].covered;
         if (p.verdict != Verdict::identified) ++result.parameters[i].one_sided;
       }
     } catch (const Error& error) {
@@ -124,7 +124,7 @@ std::string to_terminal_text(const CoverageResult& result) {
                                  result.sets, result.seed, result.failed);
   for (const ParameterCoverage& p : result.parameters) {
     text += fmt::format(
-        "{:<12} {:.2f} % of the {:.4g} % intervals hold the truth (exact binomial "
+        "{:<12} {:.2f} % of the {:.4g} % intervals hold the true value (exact binomial "
         "p = {}; {} intervals open)\n",
         p.name, 100.0 * p.covered / result.sets, 100.0 * result.level, significant(p.p_value, 2),
         p.one_sided);

@@ -115,7 +115,7 @@ Vote vote(const Differences& d, double rounding) {
   return best;
 }
 
-/// Judges every residual's derivative and keeps the one that differs most for what is known of it.
+/// Checks every residual's derivative and keeps the one that differs most for what is known of it.
 ParameterGradient check_column(const std::vector<Differences>& differences,
                                const Eigen::VectorXd& analytic, const Eigen::VectorXd& residual,
                                double floor, double tolerance) {

@@ -177,8 +177,8 @@ Minimum minimise_by_surrogate(const ResidualFunction& function, const ResidualFu
   minimum.natural = here.natural;
   minimum.deviance = here.cost() - function.offset();
   minimum.usable = true;
-  minimum.message =
-      minimum.converged ? "corrected scout: nothing left to gain" : "corrected scout: out of steps";
+  minimum.message = minimum.converged ? "corrected surrogate: nothing left to gain"
+                                      : "corrected surrogate: out of steps";
   return minimum;
 }
 

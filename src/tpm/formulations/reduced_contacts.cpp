@@ -155,7 +155,7 @@ Formulations reduced_contacts_formulations() {
       element_candidates, element_model);
   static const ReducedContact curves(
       {"curves",
-       "static curves of the network, instantaneous and relaxed, with some exponentials",
+       "static curves of the network, instantaneous and at equilibrium, with some exponentials",
        without_field(kAlongPush),
        120,
        {"exponentials", "step"}},

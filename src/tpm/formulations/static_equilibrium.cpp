@@ -64,19 +64,18 @@ class StaticFormulation final : public Formulation, public SceneRunner, public S
 }  // namespace
 
 Formulations static_equilibrium_formulations() {
-  static const StaticFormulation equilibrium(
-      {"static",
-       "everything has relaxed under what is imposed at each time",
-       with_any_material({.network = true,
-                          .depth = true,
-                          .load = true,
-                          .jumps = true,
-                          .field = true,
-                          .several_contacts = true,
-                          .tools = true,
-                          .course = false}),
-       150,
-       {"solver"}});
+  static const StaticFormulation equilibrium({"static",
+                                              "the equilibrium under what is imposed at each time",
+                                              with_any_material({.network = true,
+                                                                 .depth = true,
+                                                                 .load = true,
+                                                                 .jumps = true,
+                                                                 .field = true,
+                                                                 .several_contacts = true,
+                                                                 .tools = true,
+                                                                 .course = false}),
+                                              150,
+                                              {"solver"}});
   static const std::vector<const Formulation*> all{&equilibrium};
   return all;
 }

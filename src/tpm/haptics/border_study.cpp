@@ -121,7 +121,7 @@ void run_impact(const RenderedContact& contact, const PlantSettings& plant, Rise
   }
   const auto which = static_cast<std::size_t>(limit);
   point.rests[which] = step.cause() == StopCause::finished && high_m - low_m < kAtRest_m;
-  point.given_J[which] = step.energy().most_given_J();
+  point.delivered_J[which] = step.energy().most_delivered_J();
 }
 
 void vary_impact(BorderStudy& study) {

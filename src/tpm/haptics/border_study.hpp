@@ -40,8 +40,8 @@ struct ImpactPoint {
   double share = 0.0;  ///< of the stiffness that is stable in the linear, two-sided loop
   double stiffness_N_per_m = 0.0;
   // For each of kRiseLimits:
-  bool rests[3] = {};      ///< within 5 s the tool stays within 0.1 mm
-  double given_J[3] = {};  ///< most that the rendering gave to the hand, see EnergyWatch
+  bool rests[3] = {};          ///< within 5 s the tool stays within 0.1 mm
+  double delivered_J[3] = {};  ///< most that the rendering gave to the hand, see EnergyWatch
 };
 
 /// The friction that a device needs to be passive where its maker's software ends.

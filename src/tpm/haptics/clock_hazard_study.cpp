@@ -122,8 +122,8 @@ class SlowModel final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return model_->instantaneous_stiffness();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
-    return model_->relaxed_stiffness();
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return model_->equilibrium_stiffness();
   }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return model_->spheres(); }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override {
@@ -238,11 +238,12 @@ ClockHazardRow row_of(const ClockHazard& hazard, const HilSession& session,
     const ClockRun run = run_once(hazard, session);
     scheduling = run.outcome.scheduling;
     row.cause = run.outcome.cause;
-    row.missed_at_once = run.outcome.counts.most_missed_at_once;
+    row.consecutive_missed = run.outcome.counts.most_consecutive_missed;
     row.largest_force_N = run.largest_N;
     const bool finished = row.expected == StopCause::finished;
     row.to_zero_s = finished ? 0.0 : run.to_zero_s.value_or(1e9);
-    const bool counted = !finished || row.missed_at_once + 2 >= std::lround(1e3 * hazard.lasts_s);
+    const bool counted =
+        !finished || row.consecutive_missed + 2 >= std::lround(1e3 * hazard.lasts_s);
     const bool felt = hazard.at == 0 || row.largest_force_N > 0.0;  // it came in the tissue
     row.within = row.cause == row.expected && row.to_zero_s <= row.bound_s && counted && felt &&
                  row.largest_force_N <= session.servo.force_limit_N;

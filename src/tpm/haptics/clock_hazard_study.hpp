@@ -12,7 +12,7 @@ struct ClockHazardRow {
   std::string hazard, setting;
   StopCause expected = StopCause::none;  ///< what it should end in
   StopCause cause = StopCause::none;
-  int missed_at_once = 0;        ///< most periods without a cycle
+  int consecutive_missed = 0;    ///< most periods without a cycle
   double largest_force_N = 0.0;  ///< sent
   double to_zero_s = 0.0;        ///< from the fault to forces off; of sessions that were stopped
   double bound_s = 0.0;          ///< for that

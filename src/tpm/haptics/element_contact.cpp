@@ -44,14 +44,14 @@ ContactAnswer ElementContact::step(const ToolPose& tool) noexcept {
 }
 
 Eigen::Matrix3d ElementContact::instantaneous_stiffness() const noexcept {
-  Eigen::Matrix3d stiffness = relaxed_stiffness();
+  Eigen::Matrix3d stiffness = equilibrium_stiffness();
   if (rule_ != ElementRule::mass_spring) {
     stiffness(2, 2) += relaxing_N_per_m_;
   }
   return stiffness;
 }
 
-Eigen::Matrix3d ElementContact::relaxed_stiffness() const noexcept {
+Eigen::Matrix3d ElementContact::equilibrium_stiffness() const noexcept {
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
   stiffness(2, 2) = equilibrium_N_per_m_;
   return stiffness;

@@ -129,8 +129,8 @@ class DoubtfulModel final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return model_.instantaneous_stiffness();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
-    return model_.relaxed_stiffness();
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return model_.equilibrium_stiffness();
   }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return model_.spheres(); }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override {
@@ -420,13 +420,13 @@ bool is_within(const HazardRow& row, const Hazard& hazard, const HazardBounds& b
   if (!row.refused.empty()) return !row.passive;
   const bool force = row.largest_force_N <= b.force_N * (1.0 + 1e-12);
   const bool rise = row.damped || row.largest_rise_N <= b.rise_N * (1.0 + 1e-9);
-  if (row.cause == StopCause::finished) return force && rise && row.given_J <= b.given_J;
+  if (row.cause == StopCause::finished) return force && rise && row.delivered_J <= b.delivered_J;
   const bool injected = hazard.fault.kind != FaultKind::none;
   const double stall_s = hazard.fault.kind == FaultKind::stall
                              ? 1e-3 * static_cast<double>(hazard.fault.periods)
                              : 0.0;
   const double limit_s = injected ? b.fault_to_zero_s + stall_s : b.to_zero_s;
-  return force && rise && row.given_J <= b.given_stopped_J && row.travel_m <= b.travel_m &&
+  return force && rise && row.delivered_J <= b.delivered_stopped_J && row.travel_m <= b.travel_m &&
          row.to_zero_s <= limit_s * (1.0 + 1e-9);
 }
 
@@ -456,7 +456,7 @@ HazardRow row_of(const Hazard& hazard, bool accepted, const HazardBounds& bounds
     Follower follower(hazard, servo.period_s);
     serve(step, device, hazard.fault, servo.period_s, follower);
     row.cause = step.cause();
-    row.given_J = step.energy().most_given_J();
+    row.delivered_J = step.energy().most_delivered_J();
     follower.fill(row);
   };
   try {

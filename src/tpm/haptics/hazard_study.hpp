@@ -16,7 +16,7 @@ struct HazardRow {
   StopCause cause = StopCause::none;
   double largest_force_N = 0.0;  ///< sent
   double largest_rise_N = 0.0;   ///< of the size of the force, from a period to the next
-  double given_J = 0.0;          ///< most that the rendering gave to the hand, see EnergyWatch
+  double delivered_J = 0.0;      ///< most that the rendering gave to the hand, see EnergyWatch
   /// From the fault, or else from the first touch, to zero force, s; and how far the tool went
   /// meanwhile, m. Of sessions that were stopped.
   double to_zero_s = 0.0, travel_m = 0.0;
@@ -26,12 +26,12 @@ struct HazardRow {
 
 /// What the rows are compared with.
 struct HazardBounds {
-  double force_N = 8.0;           ///< the session's limit
-  double rise_N = 0.4;            ///< the same of a period, 400 N/s at 1 kHz
-  double given_J = 2e-3;          ///< of a session that comes to its end
-  double given_stopped_J = 5e-3;  ///< of one that is stopped
-  double travel_m = 0.010;        ///< of one that is stopped
-  double to_zero_s = 1.2;         ///< the same; of an injected fault `fault_to_zero_s`
+  double force_N = 8.0;               ///< the session's limit
+  double rise_N = 0.4;                ///< the same of a period, 400 N/s at 1 kHz
+  double delivered_J = 2e-3;          ///< of a session that comes to its end
+  double delivered_stopped_J = 5e-3;  ///< of one that is stopped
+  double travel_m = 0.010;            ///< of one that is stopped
+  double to_zero_s = 1.2;             ///< the same; of an injected fault `fault_to_zero_s`
   double fault_to_zero_s = 0.01;
 };
 

@@ -57,9 +57,9 @@ std::string fault_of(const JitterCheck& check) {
     return fmt::format("a cycle took {}, and is given up after {}", ms(o.busy.max_s()),
                        ms(check.hang_limit_s));
   }
-  if (o.counts.most_missed_at_once > check.missed_limit) {
-    return fmt::format("{} periods were missed at once, a session stops after {}",
-                       o.counts.most_missed_at_once, check.missed_limit);
+  if (o.counts.most_consecutive_missed > check.missed_limit) {
+    return fmt::format("{} consecutive periods were missed, a session stops after {}",
+                       o.counts.most_consecutive_missed, check.missed_limit);
   }
   if (o.counts.most_late > check.late_limit) {
     return fmt::format("{} cycles of 1000 were late, a session stops after {}", o.counts.most_late,

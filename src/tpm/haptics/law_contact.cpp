@@ -31,7 +31,7 @@ LawAtParameters law_in_loop(const LawFile& file, const LawContactSettings& setti
   positive(settings.trusted_m, "trusted depth");
   const LawModel model(spec);
   model.require_in_range(file.values);
-  std::optional<FractionalMemory> rates;
+  std::optional<ExponentialSum> rates;
   if (spec.fractional != Fractional::none) {
     rates.emplace(settings.period_s, std::max(settings.longest_s, settings.period_s),
                   kFractionalTolerance);
@@ -45,7 +45,7 @@ LawAtParameters law_in_loop(const LawFile& file, const LawContactSettings& setti
 
 LawContact::LawContact(const LawFile& law, const LawContactSettings& settings)
     : settings_(settings), law_(law_in_loop(law, settings)) {
-  const Eigen::ArrayXd z = law_.memory.rate_per_s.array() * settings_.period_s;
+  const Eigen::ArrayXd z = law_.relaxation.rate_per_s.array() * settings_.period_s;
   decay_ = (-z).exp();
   gain_ = (z > 0.0).select(-(-z).unaryExpr([](double x) { return std::expm1(x); }) / z, 1.0);
   y_ = Eigen::VectorXd::Zero(z.size());
@@ -68,14 +68,14 @@ ContactAnswer LawContact::step(const ToolPose& tool) noexcept {
   const double kernel = law_.kernel.value(u);
   const double moved = kernel - kernel_m_;
   y_ = decay_.cwiseProduct(y_) + moved * gain_;
-  double force = law_.memory.constant * kernel + law_.memory.stiffness.dot(y_) +
-                 law_.memory.dashpot * moved / settings_.period_s;
+  double force = law_.relaxation.constant * kernel + law_.relaxation.stiffness.dot(y_) +
+                 law_.relaxation.dashpot * moved / settings_.period_s;
   if (law_.k_tension != 0.0) force += law_.k_tension * law_.tension.at(u).value;
   ContactAnswer answer;
   answer.force_N.z() = -force;
   // V is taken as linear within a period: this is how far it is from that.
   const double between = law_.kernel.value(0.5 * (std::max(depth_m_, 0.0) + u));
-  answer.error_N = law_.memory.stiffness.sum() * std::abs(between - 0.5 * (kernel + kernel_m_));
+  answer.error_N = law_.relaxation.stiffness.sum() * std::abs(between - 0.5 * (kernel + kernel_m_));
   answer.trusted = depth <= settings_.trusted_m;
   depth_m_ = depth;
   kernel_m_ = kernel;
@@ -92,20 +92,20 @@ Eigen::Matrix3d LawContact::along_push(double stiffness_N_per_m) const noexcept 
 }
 
 Eigen::Matrix3d LawContact::instantaneous_stiffness() const noexcept {
-  return along_push(law_.memory.instant() + law_.memory.dashpot / settings_.period_s);
+  return along_push(law_.relaxation.instant() + law_.relaxation.dashpot / settings_.period_s);
 }
 
-Eigen::Matrix3d LawContact::relaxed_stiffness() const noexcept {
-  return along_push(law_.memory.constant);
+Eigen::Matrix3d LawContact::equilibrium_stiffness() const noexcept {
+  return along_push(law_.relaxation.constant);
 }
 
 std::vector<double> LawContact::relaxation_times_s() const {
   // Faster ones are over within a period, slower ones do not relax in a session.
   const double shortest_s = 0.1 * settings_.period_s, longest_s = 1e6;
   double fastest_s = longest_s, slowest_s = 0.0;
-  for (Eigen::Index j = 0; j < law_.memory.rate_per_s.size(); ++j) {
-    if (!(law_.memory.stiffness[j] > 0.0) || !(law_.memory.rate_per_s[j] > 0.0)) continue;
-    const double time_s = std::clamp(1.0 / law_.memory.rate_per_s[j], shortest_s, longest_s);
+  for (Eigen::Index j = 0; j < law_.relaxation.rate_per_s.size(); ++j) {
+    if (!(law_.relaxation.stiffness[j] > 0.0) || !(law_.relaxation.rate_per_s[j] > 0.0)) continue;
+    const double time_s = std::clamp(1.0 / law_.relaxation.rate_per_s[j], shortest_s, longest_s);
     fastest_s = std::min(fastest_s, time_s);
     slowest_s = std::max(slowest_s, time_s);
   }

@@ -42,7 +42,7 @@ class LawContact final : public ContactModel {
   /// have less above it.
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
   /// At the same depth.
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override;
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override;
 
   /// Depth of the surface after the last step, m; 0 or more in contact.
   [[nodiscard]] double depth_m() const noexcept { return depth_m_; }
@@ -52,7 +52,7 @@ class LawContact final : public ContactModel {
   }
   /// Stiffness of each branch, N/m.
   [[nodiscard]] const Eigen::VectorXd& branch_stiffness_N_per_m() const noexcept {
-    return law_.memory.stiffness;
+    return law_.relaxation.stiffness;
   }
   /// Goes on from another state: the surface at a depth, all branches relaxed to one kernel
   /// displacement. Neither allocates nor throws.

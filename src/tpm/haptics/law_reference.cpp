@@ -15,11 +15,11 @@ std::vector<double> law_forces_by_gauss(const LawFile& file, std::span<const dou
     throw bad_input("law " + law_name(file.spec), "is fractional", "a law with branches");
   }
   const LawAtParameters law = LawModel(file.spec).at(file.values, nullptr);
-  const Eigen::VectorXd& rate = law.memory.rate_per_s;
+  const Eigen::VectorXd& rate = law.relaxation.rate_per_s;
   Eigen::VectorXd y = Eigen::VectorXd::Zero(rate.size());
   const auto elastic = [&](double u) {
     const double tension = law.k_tension == 0.0 ? 0.0 : law.k_tension * law.tension.at(u).value;
-    return law.memory.constant * law.kernel.value(u) + tension;
+    return law.relaxation.constant * law.kernel.value(u) + tension;
   };
   // Within [0, h] the depth goes from a to b; returns the branches at its end.
   const auto moved = [&](double a, double b, double h) {
@@ -50,11 +50,11 @@ std::vector<double> law_forces_by_gauss(const LawFile& file, std::span<const dou
       surface = std::max(tool, 0.0);
       y.setConstant(law.kernel.value(surface));
       touching = tool >= 0.0;
-      forces.push_back(touching ? elastic(surface) + law.memory.stiffness.dot(y) : 0.0);
+      forces.push_back(touching ? elastic(surface) + law.relaxation.stiffness.dot(y) : 0.0);
       continue;
     }
     const auto force_at = [&](double u) {
-      return elastic(std::max(u, 0.0)) + law.memory.stiffness.dot(moved(surface, u, h));
+      return elastic(std::max(u, 0.0)) + law.relaxation.stiffness.dot(moved(surface, u, h));
     };
     double force = force_at(tool);
     touching = force > 0.0;

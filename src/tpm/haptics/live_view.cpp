@@ -60,7 +60,7 @@ Json shape_json(const TissueShape& shape) {
                                               "recomputed every {} ms from the recorded motion",
                                               significant(1e3 * kDrawnEvery_s, 3))
                                 : std::string("the contact sphere as recorded; the others are "
-                                              "held")}};
+                                              "fixed")}};
 }
 
 }  // namespace

@@ -24,7 +24,8 @@ StiffnessByDepth::StiffnessByDepth(const BondSystem& bonds, const Positions& res
   stride_m_ = deepest_m / count;
   for (int i = 0; i <= count; ++i) {
     const Positions position = tissue.at(i * stride_m_ * into_, 1.0);
-    stiffness_.push_back(tissue.fields(position, tissue.memory(position, 1.0, 0.0)).stiffness);
+    stiffness_.push_back(
+        tissue.fields(position, tissue.viscous_state(position, 1.0, 0.0)).stiffness);
   }
 }
 

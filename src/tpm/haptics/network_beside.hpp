@@ -48,8 +48,8 @@ class NetworkBeside final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return network_->instantaneous_stiffness();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
-    return network_->relaxed_stiffness();
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return network_->equilibrium_stiffness();
   }
 
   /// Periods of the loop that the answer in use is old.

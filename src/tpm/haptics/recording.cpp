@@ -44,7 +44,7 @@ Json to_json(const ServoCounts& counts) {
           {"beyond_model", counts.beyond_model},
           {"late", counts.late},
           {"missed", counts.missed},
-          {"most_missed_at_once", counts.most_missed_at_once},
+          {"most_consecutive_missed", counts.most_consecutive_missed},
           {"most_late_of_1000", counts.most_late}};
 }
 
@@ -79,7 +79,7 @@ Json recording_header(const HilSession& session, const DeviceIdentity& device,
           {"model",
            {{"name", model.name},
             {"error_bound", model.error_bound},
-            {"stiffness_at_once_N_per_m", model.stiffness_N_per_m},
+            {"instantaneous_stiffness_N_per_m", model.stiffness_N_per_m},
             {"plan", model.plan}}},
           {"notes",
            {{"date", notes.date},

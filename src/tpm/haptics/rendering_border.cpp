@@ -36,11 +36,11 @@ double damping_at(const RenderedContact& contact, int cycles) {
   const int settling =
       static_cast<int>(std::ceil(25.0 * tau / contact.period_s)) + contact.delay_periods + 2;
   std::vector<double> sent(static_cast<std::size_t>(contact.delay_periods) + 1, 0.0);
-  double given_J = 0.0, moved2 = 0.0, held_N = 0.0, before_m = 0.0;
+  double delivered_J = 0.0, moved2 = 0.0, held_N = 0.0, before_m = 0.0;
   for (int i = 0; i <= settling + kSamples; ++i) {
     const double at = kAmplitude_m * std::cos(angle * i);
     if (i > settling) {
-      given_J += held_N * (at - before_m);
+      delivered_J += held_N * (at - before_m);
       moved2 += (at - before_m) * (at - before_m);
     }
     const std::size_t slot = static_cast<std::size_t>(i) % sent.size();
@@ -49,7 +49,7 @@ double damping_at(const RenderedContact& contact, int cycles) {
     held_N = sent[(static_cast<std::size_t>(i) + 1) % sent.size()];
     before_m = at;
   }
-  return given_J * contact.period_s / moved2;
+  return delivered_J * contact.period_s / moved2;
 }
 
 /// Force over displacement at 1/z.
@@ -159,11 +159,11 @@ double predicted_passive_damping(const RenderedContact& contact) {
   return most;
 }
 
-double exact_update_damping(double relaxed_N_per_m, double relaxing_N_per_m,
+double exact_update_damping(double equilibrium_N_per_m, double relaxing_N_per_m,
                             double relaxation_time_s, double period_s) {
   const double z = period_s / relaxation_time_s;
   const double gain = relaxing_N_per_m * -std::expm1(-z) / z;
-  return 0.5 * period_s * (relaxed_N_per_m + 2.0 * gain / (1.0 + std::exp(-z)));
+  return 0.5 * period_s * (equilibrium_N_per_m + 2.0 * gain / (1.0 + std::exp(-z)));
 }
 
 double largest_passive_stiffness(RenderedContact contact, double damping_N_s_per_m, BorderBy by) {
@@ -199,7 +199,7 @@ double loop_spectral_radius(const RenderedContact& contact, const PlantSettings&
   const double relaxing = scale * p.relaxing_Pa();
   const double q = contact.period_s / contact.relaxation_time_s;
   const RelaxationWeights w = relaxation_weights(q);
-  // The model steps first: it sees x, remembers w and x before.
+  // The model steps first: it sees x, its state is w and x before.
   Eigen::RowVectorXd followed = Eigen::RowVectorXd::Zero(size);
   Eigen::RowVectorXd force = Eigen::RowVectorXd::Zero(size);
   force[0] = -relaxed;

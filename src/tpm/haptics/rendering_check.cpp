@@ -25,15 +25,15 @@ double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth
   const ContactAnswer further = model.step(push * (depth_m + kFurther_m));
   if (!stays.trusted || !further.trusted) return 0.0;
   // What relaxes in a period is left out: it did so in the period before as well.
-  const double relaxed_N = push.dot(stays.force_N - there.force_N);
-  return (push.dot(stays.force_N - further.force_N) + relaxed_N) / kFurther_m;
+  const double equilibrium_N = push.dot(stays.force_N - there.force_N);
+  return (push.dot(stays.force_N - further.force_N) + equilibrium_N) / kFurther_m;
 }
 
 void find_stiffness(RenderingCheck& check, const HilSession& session, ContactModel& model,
                     const Eigen::Vector3d& push) {
   constexpr int kDepths = 4;
   const double at_rest = push.dot(model.instantaneous_stiffness() * push);
-  const double relaxed = push.dot(model.relaxed_stiffness() * push);
+  const double relaxed = push.dot(model.equilibrium_stiffness() * push);
   check.stiffness_N_per_m = at_rest;
   check.relaxed_share = at_rest > 0.0 ? std::clamp(relaxed / at_rest, 0.0, 1.0) : 1.0;
   const double deepest = deepest_asked_m(session, kAtLoads_m);

@@ -143,7 +143,7 @@ void add_motion(PhaseList& list, const Json& block, const DocumentPlace& place) 
     const std::string mm = significant(1e3 * first, 4);
     list.add(SessionPhaseKind::indent, fmt::format("indent to {} mm, where the motion begins", mm),
              first / kUsualRate_m_per_s, 0.0, first);
-    list.add(SessionPhaseKind::hold, fmt::format("hold {} mm until relaxed", mm),
+    list.add(SessionPhaseKind::hold, fmt::format("hold {} mm until equilibrium", mm),
              block.value("relax_s", 0.0), first, first);
   }
   list.add(SessionPhaseKind::motion, block.at("name").get<std::string>(), length_s, 0.0, 0.0);

@@ -208,6 +208,15 @@ void run_reference(Verification& v, const QuasiStatic& network, const Protocol& 
   }
 }
 
+/// Of the model, N/m. Recordings of version 0.1 name it by another key.
+double recorded_stiffness(const Json& header) {
+  const Json& model = header.at("model");
+  const char* const key = model.contains("instantaneous_stiffness_N_per_m")
+                              ? "instantaneous_stiffness_N_per_m"
+                              : "stiffness_at_once_N_per_m";
+  return model.at(key).get<double>();
+}
+
 }  // namespace
 
 Verification verify_along_push(const HilRecording& recording, const VerifyOptions& options) {
@@ -222,7 +231,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
   Constraints constraints = tissue.constraints();
   std::vector<Probe> moved;
   for (const std::size_t sphere : spheres_of(contact, tissue.network.organ)) {
-    constraints.guide(sphere, contact.probe.direction);
+    constraints.slide(sphere, contact.probe.direction);
     moved.push_back({sphere, contact.probe.direction});
   }
   const DrivenNetwork driven =
@@ -249,8 +258,7 @@ Verification verify_along_push(const HilRecording& recording, const VerifyOption
     ask_others(v, recording, motion, protocol, rows,
                element_constants(tissue.element("hil verify")), options);
   }
-  v.motion_error_N = options.motion_tolerance_m *
-                     recording.header.at("model").at("stiffness_at_once_N_per_m").get<double>();
+  v.motion_error_N = options.motion_tolerance_m * recorded_stiffness(recording.header);
   put_beside_experiment(v, recording, rows);
   leave_out_what_has_no_reference(v);
   return v;

@@ -6,22 +6,22 @@ namespace tpm {
 namespace {
 
 /// exp(-rate (t - t1)); 0 for what was met under rest, all of which has relaxed
-Eigen::ArrayXd kept(const Memory& memory, const ContactEdge& edge) {
-  if (edge.at_rest) return Eigen::ArrayXd::Zero(memory.rate_per_s.size());
-  return (-memory.rate_per_s.array() * edge.later_s).exp();
+Eigen::ArrayXd kept(const RelaxationSum& relaxation, const ContactEdge& edge) {
+  if (edge.at_rest) return Eigen::ArrayXd::Zero(relaxation.rate_per_s.size());
+  return (-relaxation.rate_per_s.array() * edge.later_s).exp();
 }
 
 }  // namespace
 
 double ContactHistory::force_within(const ContactEdge& edge) const {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   const Point met = imposed(edge.met_drive, true);
   const double viscous = (m.stiffness.array() * kept(m, edge) * (met.v - w_)).sum();
   return law_.offset + m.constant * met.v + viscous + law_.kernel.tangent(met.u).slope * edge.pull;
 }
 
 Slopes ContactHistory::force_slopes_within(const ContactEdge& edge) const {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   const Point met = imposed(edge.met_drive, true);
   const Eigen::ArrayXd decay = kept(m, edge);
   const Eigen::ArrayXd stiffness = m.stiffness.array() * decay;

@@ -20,7 +20,7 @@ ContactHistory::ContactHistory(const LawAtParameters& law, double peak_depth, Wa
       want_slopes_(want == Want::values_and_sensitivity),
       v_tolerance_(kRelativeTolerance * std::max(law.kernel.value(std::max(peak_depth, 0.0)),
                                                  std::numeric_limits<double>::min())) {
-  const Eigen::Index branches = law.memory.stiffness.size();
+  const Eigen::Index branches = law.relaxation.stiffness.size();
   w_.setZero(branches);
   w_next_ = w_;
   now_.u_by = zero_slopes();
@@ -34,7 +34,7 @@ ContactHistory::ContactHistory(const LawAtParameters& law, double peak_depth, Wa
   if (!want_slopes_) return;
   const KernelPlaces& p = law.place;
   for (int i = 0; i < law.parameter_count; ++i) {
-    const auto& rates = law.memory.rate_parameter;
+    const auto& rates = law.relaxation.rate_parameter;
     const bool of_kernel =
         i == p.exponent || i == p.tension_share || i == p.spacing || i == p.contact;
     if (of_kernel || std::find(rates.begin(), rates.end(), i) != rates.end()) carried_.push_back(i);
@@ -102,8 +102,8 @@ ContactHistory::Point ContactHistory::imposed(double drive, bool touching) const
 
 double ContactHistory::elastic_force(double v, double u, const Eigen::ArrayXd& w,
                                      double v_rate) const {
-  double force = law_.memory.constant * v + law_.memory.dashpot * v_rate;
-  force += (law_.memory.stiffness.array() * (v - w)).sum();
+  double force = law_.relaxation.constant * v + law_.relaxation.dashpot * v_rate;
+  force += (law_.relaxation.stiffness.array() * (v - w)).sum();
   if (law_.k_tension != 0.0) force += law_.k_tension * law_.tension.at(u).value;
   return force;
 }
@@ -117,7 +117,7 @@ Slopes ContactHistory::force_slopes() const {
   Slopes slopes = zero_slopes();
   slopes[law_.place.offset] = 1.0;
   if (free_) return slopes;
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   slopes += m.instant() * now_.v_by + m.dashpot * v_rate_by_ - weighted_slopes(m.stiffness.array());
   for (std::size_t q = 0; q < m.by.size(); ++q) {
     const auto column = static_cast<Eigen::Index>(q);
@@ -146,13 +146,13 @@ void ContactHistory::update_weights(double h, double time_scale, bool curved) {
   if (k.curved == curved && std::abs(h - k.h) <= same) return;
   k.h = h;
   k.curved = curved;
-  const bool fixed_rates = !weights_.each.empty() && law_.memory.rate_parameter.front() < 0;
+  const bool fixed_rates = !weights_.each.empty() && law_.relaxation.rate_parameter.front() < 0;
   if (fixed_rates && !curved && std::isfinite(h)) {
     set_line_weights(h);
     return;
   }
   for (Eigen::Index j = 0; j < w_.size(); ++j) {
-    const double z = h * law_.memory.rate_per_s[j];
+    const double z = h * law_.relaxation.rate_per_s[j];
     const QuadratureWeights one = curved ? quartic_weights(z) : line_weights(z);
     k.r[j] = one.r;
     for (std::size_t i = 0; i < one.b.size(); ++i) k.b[i][j] = one.b[i];
@@ -163,7 +163,7 @@ void ContactHistory::update_weights(double h, double time_scale, bool curved) {
 /// line_weights of all branches at once, without derivatives: the many rates of a fractional law.
 void ContactHistory::set_line_weights(double h) {
   StepWeights& k = weights_;
-  const Eigen::ArrayXd z = h * law_.memory.rate_per_s.array();
+  const Eigen::ArrayXd z = h * law_.relaxation.rate_per_s.array();
   // What is below rounding becomes 0: products with denormal numbers are slow.
   k.r = (z < 60.0).select((-z).exp(), 0.0);
   // 1 - (1 - r)/z, below 0.1 as z/2! - z^2/3! + ..., where it would cancel
@@ -179,7 +179,7 @@ void ContactHistory::step_branches(const Point& begin, std::span<const Point> mi
   const StepWeights& k = weights_;
   w_next_ = k.r * w_ + k.b.front() * begin.v + k.b.back() * end.v;
   for (std::size_t i = 0; i < middle.size(); ++i) w_next_ += k.b[i + 1] * middle[i].v;
-  const std::vector<int>& rates = law_.memory.rate_parameter;
+  const std::vector<int>& rates = law_.relaxation.rate_parameter;
   for (Eigen::Index c = 0; c < w_by_.cols(); ++c) {
     const int p = carried_[static_cast<std::size_t>(c)];
     auto next = w_by_next_.col(c);
@@ -191,7 +191,7 @@ void ContactHistory::step_branches(const Point& begin, std::span<const Point> mi
       const QuadratureWeights& d = k.each[j];
       double slope = d.d_r * w_[row] + d.d_b.front() * begin.v + d.d_b.back() * end.v;
       for (std::size_t i = 0; i < middle.size(); ++i) slope += d.d_b[i + 1] * middle[i].v;
-      next[row] += law_.memory.rate_per_s[row] * slope;
+      next[row] += law_.relaxation.rate_per_s[row] * slope;
     }
   }
 }
@@ -205,7 +205,7 @@ void ContactHistory::accept(const Point& end, double v_rate, const Slopes& v_rat
 }
 
 ContactHistory::Balance ContactHistory::instantaneous_balance() const {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   Balance b{m.instant(), (m.stiffness.array() * w_).sum(), zero_slopes(), zero_slopes()};
   if (!want_slopes_) return b;
   b.r_by = weighted_slopes(m.stiffness.array());
@@ -218,7 +218,7 @@ ContactHistory::Balance ContactHistory::instantaneous_balance() const {
 }
 
 ContactHistory::Balance ContactHistory::balance_over_step(double h) const {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   const StepWeights& k = weights_;
   const Point& begin = now_;
   const Eigen::ArrayXd kept = k.r * w_ + k.b.front() * begin.v;

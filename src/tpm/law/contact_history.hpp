@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tpm/law/kernel.hpp"
-#include "tpm/law/memory.hpp"
+#include "tpm/law/relaxation_sum.hpp"
 #include "tpm/solve/exponential_quadrature.hpp"
 #include "tpmkit/model.hpp"
 
@@ -29,7 +29,7 @@ using Slopes = Eigen::Array<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMostLaw
 
 /// A law at given parameters, ready to be stepped through a history.
 struct LawAtParameters {
-  Memory memory;
+  RelaxationSum relaxation;
   KernelShape kernel;
   TensionShape tension;
   double k_tension = 0.0;

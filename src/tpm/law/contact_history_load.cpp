@@ -9,10 +9,10 @@
 namespace tpm {
 
 void ContactHistory::rest_at_load(double load) {
-  Balance b{law_.memory.constant, 0.0, zero_slopes(), zero_slopes()};
+  Balance b{law_.relaxation.constant, 0.0, zero_slopes(), zero_slopes()};
   if (want_slopes_) {
-    for (std::size_t q = 0; q < law_.memory.by.size(); ++q) {
-      b.a_by[law_.memory.by[q]] += law_.memory.d_constant[static_cast<Eigen::Index>(q)];
+    for (std::size_t q = 0; q < law_.relaxation.by.size(); ++q) {
+      b.a_by[law_.relaxation.by[q]] += law_.relaxation.d_constant[static_cast<Eigen::Index>(q)];
     }
   }
   carry_all_slopes();
@@ -23,7 +23,7 @@ void ContactHistory::rest_at_load(double load) {
 void ContactHistory::jump_to_load(double load) {
   carry_all_slopes();
   // A dashpot does not move instantaneously.
-  if (law_.memory.dashpot > 0.0) return;
+  if (law_.relaxation.dashpot > 0.0) return;
   now_ = surface_under(load - law_.offset, instantaneous_balance(), true);
   v_rate_ = 0.0;
   v_rate_by_.setZero();
@@ -49,7 +49,7 @@ void ContactHistory::move_load(double from, double to, double h, double time_sca
 /// Solving Ordinary Differential Equations I, II.8), and n answers reach order 2 n. A dashpot,
 /// whose speed is the mean over the step, has all powers from the first on.
 std::array<double, ContactHistory::kMostSteps> ContactHistory::extrapolation(int n) const {
-  const bool symmetric = law_.memory.dashpot == 0.0;
+  const bool symmetric = law_.relaxation.dashpot == 0.0;
   std::array<double, kMostSteps> weight{};
   for (int j = 1; j <= n; ++j) {
     double product = 1.0;

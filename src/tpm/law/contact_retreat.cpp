@@ -7,7 +7,7 @@ namespace tpm {
 namespace {
 
 /// The depth u and, for each branch, h = integral of exp(-rate (t - s)) du(s): what a kernel that
-/// is a straight line would remember, without regard to the sign of its force.
+/// is a straight line would depend on, without regard to the sign of its force.
 struct StraightHistory {
   double time_s = 0.0;
   double drive = 0.0;
@@ -44,7 +44,7 @@ struct Growth {
 class EdgeFinder {
  public:
   EdgeFinder(const LawAtParameters& law, bool want_slopes) : law_(law), want_slopes_(want_slopes) {
-    now_.h.setZero(law.memory.stiffness.size());
+    now_.h.setZero(law.relaxation.stiffness.size());
     if (!want_slopes) return;
     now_.by_rate = now_.h;
     now_.by_contact = now_.h;
@@ -144,7 +144,7 @@ class EdgeFinder {
         s.h[j] += du;
         continue;
       }
-      const double z = step * law_.memory.rate_per_s[j];
+      const double z = step * law_.relaxation.rate_per_s[j];
       const double r = std::exp(-z);
       const MeanDecay mean = std::isinf(step) ? MeanDecay{0.0, 0.0} : mean_decay(z);
       s.h[j] = r * from.h[j] + du * mean.value;
@@ -173,18 +173,18 @@ class EdgeFinder {
   [[nodiscard]] Eigen::ArrayXd kept(const Growth& part, const StraightHistory& met) const {
     const double later = now_.time_s - met.time_s;
     if (part.at_rest) return Eigen::ArrayXd::Zero(met.h.size());
-    return (-law_.memory.rate_per_s.array() * later).exp();
+    return (-law_.relaxation.rate_per_s.array() * later).exp();
   }
 
   /// The integral of G(t - s) du(s) from the moment at which u was met to now; falls with u.
   [[nodiscard]] double pull(const Growth& part, double u) const {
     const StraightHistory met = at(part, u);
-    const auto k = law_.memory.stiffness.array();
-    return law_.memory.constant * (now_.u - u) + (k * (now_.h - kept(part, met) * met.h)).sum();
+    const auto k = law_.relaxation.stiffness.array();
+    return law_.relaxation.constant * (now_.u - u) + (k * (now_.h - kept(part, met) * met.h)).sum();
   }
 
   [[nodiscard]] Slopes pull_by(const Growth& part, const StraightHistory& met) const {
-    const Memory& m = law_.memory;
+    const RelaxationSum& m = law_.relaxation;
     const Eigen::ArrayXd decay = kept(part, met);
     const double later = now_.time_s - met.time_s;
     const auto k = m.stiffness.array();
@@ -218,8 +218,8 @@ class EdgeFinder {
     for (int i = 0; i < 100; ++i) {
       const double p = pull(part, u);
       (p > 0.0 ? low : high) = u;
-      const double g =
-          law_.memory.constant + (law_.memory.stiffness.array() * kept(part, at(part, u))).sum();
+      const double g = law_.relaxation.constant +
+                       (law_.relaxation.stiffness.array() * kept(part, at(part, u))).sum();
       double next = u + p / g;
       if (!(next > low && next < high)) next = 0.5 * (low + high);
       const bool close = std::abs(next - u) <= kClose * largest_;

@@ -18,7 +18,7 @@ std::vector<double> begin_and_radau_nodes() {
 }
 
 double lattice_step() {
-  static const double step = FractionalMemory::log_step_for(kFractionalTolerance);
+  static const double step = ExponentialSum::log_step_for(kFractionalTolerance);
   return step;
 }
 
@@ -47,7 +47,7 @@ const LatticeWeights& lattice_weights() {
 
 constexpr long kOffLattice = std::numeric_limits<long>::min();
 
-/// The place of a fixed rate on the lattice of FractionalMemory, if it has one.
+/// The place of a fixed rate on the lattice of ExponentialSum, if it has one.
 long lattice_place(double rate_per_s) {
   constexpr double kRounding = 1e-9;
   constexpr double kFarthest = 1e4;
@@ -92,14 +92,14 @@ double on_creep_lattice(double h) {
   return std::exp(std::floor(std::log(h) / lattice_step()) * lattice_step());
 }
 
-CreepWeights::CreepWeights(const Memory& memory) : memory_(memory) {
-  const auto count = static_cast<std::size_t>(memory.stiffness.size());
+CreepWeights::CreepWeights(const RelaxationSum& relaxation) : relaxation_(relaxation) {
+  const auto count = static_cast<std::size_t>(relaxation.stiffness.size());
   own_.resize(count);
   weights_.resize(count);
   lattice_.assign(count, kOffLattice);
   for (std::size_t j = 0; j < count; ++j) {
-    if (memory.rate_parameter[j] >= 0) continue;
-    lattice_[j] = lattice_place(memory.rate_per_s[static_cast<Eigen::Index>(j)]);
+    if (relaxation.rate_parameter[j] >= 0) continue;
+    lattice_[j] = lattice_place(relaxation.rate_per_s[static_cast<Eigen::Index>(j)]);
   }
 }
 
@@ -112,14 +112,14 @@ void CreepWeights::set_step(double h) {
       weights_[j] = &lattice_weights().at(lattice_[j] + step);
       continue;
     }
-    own_[j] = creep_rule().weights(h * memory_.rate_per_s[static_cast<Eigen::Index>(j)]);
+    own_[j] = creep_rule().weights(h * relaxation_.rate_per_s[static_cast<Eigen::Index>(j)]);
     weights_[j] = &own_[j];
   }
 }
 
 double CreepWeights::lag_by_z(Eigen::Index branch, Eigen::Index node, const CreepCourse& course,
                               double carried) const {
-  const double z = h_ * memory_.rate_per_s[branch];
+  const double z = h_ * relaxation_.rate_per_s[branch];
   const Place& at = creep_rule().place[static_cast<std::size_t>(node)];
   // w = weights' course + decay w(0), and w(0) = -carried.
   return -at.weight_slopes(z).dot(course) - at.fraction() * (*this)[branch].decay[node] * carried;

@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "tpm/law/memory.hpp"
+#include "tpm/law/relaxation_sum.hpp"
 #include "tpm/solve/exponential_collocation.hpp"
 
 namespace tpm {
@@ -48,8 +48,8 @@ struct CreepRule {
 /// The weights of all branches of a law for one step.
 class CreepWeights {
  public:
-  /// @param memory must outlive this
-  explicit CreepWeights(const Memory& memory);
+  /// @param relaxation must outlive this
+  explicit CreepWeights(const RelaxationSum& relaxation);
 
   void set_step(double h);
   [[nodiscard]] const BranchWeights& operator[](Eigen::Index branch) const {
@@ -61,7 +61,7 @@ class CreepWeights {
                                 double carried) const;
 
  private:
-  const Memory& memory_;
+  const RelaxationSum& relaxation_;
   double h_ = 0.0;
   std::vector<long> lattice_;  ///< place of each rate on the lattice
   std::vector<BranchWeights> own_;

@@ -116,7 +116,7 @@ ForceHistory::ForceHistory(const LawAtParameters& law, const DepthPieces& pieces
       tables_(law, pieces, path.start - law.contact, want),
       w_(pieces.count() + 1),
       other_(pieces.count() + 1) {
-  force = law.memory.constant * tables_.end.col(0);
+  force = law.relaxation.constant * tables_.end.col(0);
   if (want_slopes_) {
     by.setZero(force.size(), law.parameter_count);
     add_elastic();
@@ -126,7 +126,7 @@ ForceHistory::ForceHistory(const LawAtParameters& law, const DepthPieces& pieces
 }
 
 void ForceHistory::add_elastic() {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   by.col(law_.place.offset).setOnes();
   for (std::size_t c = 0; c < tables_.parameters().size(); ++c) {
     by.col(tables_.parameters()[c]) +=
@@ -139,7 +139,7 @@ void ForceHistory::add_elastic() {
 }
 
 void ForceHistory::add_branches(const DepthPieces& pieces, bool relaxed) {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   BranchStates states(pieces, tables_);
   for (Eigen::Index j = 0; j < m.stiffness.size(); ++j) {
     states.set_rate(m.rate_per_s[j]);
@@ -152,7 +152,7 @@ void ForceHistory::add_branches(const DepthPieces& pieces, bool relaxed) {
 
 /// w_ holds the states of the branch, other_ V less these.
 void ForceHistory::add_branch_slopes(Eigen::Index branch, BranchStates& states, bool relaxed) {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   for (std::size_t q = 0; q < m.by.size(); ++q) {
     const double d = m.d_stiffness(branch, static_cast<Eigen::Index>(q));
     if (d != 0.0) by.col(m.by[q]) += d * other_;

@@ -68,23 +68,23 @@ Eigen::MatrixXd orthogonal_columns(Eigen::MatrixXd& f) {
 }  // namespace
 
 bool LoadedSurface::answers(const LawAtParameters& law) {
-  const auto& rates = law.memory.rate_parameter;
+  const auto& rates = law.relaxation.rate_parameter;
   const bool fixed_rates = std::find(rates.begin(), rates.end(), -1) != rates.end();
-  return law.place.k_tension < 0 && !fixed_rates && law.memory.dashpot == 0.0 &&
-         law.memory.instant() > 0.0;
+  return law.place.k_tension < 0 && !fixed_rates && law.relaxation.dashpot == 0.0 &&
+         law.relaxation.instant() > 0.0;
 }
 
 LoadedSurface::LoadedSurface(const LawAtParameters& law, Want want)
     : law_(law),
       want_slopes_(want == Want::values_and_sensitivity),
-      sum_(law.memory.instant()),
-      stiffness_(law.memory.stiffness.cwiseMax(kLeastShare * sum_)),
-      rate_(law.memory.rate_per_s),
+      sum_(law.relaxation.instant()),
+      stiffness_(law.relaxation.stiffness.cwiseMax(kLeastShare * sum_)),
+      rate_(law.relaxation.rate_per_s),
       q_(stiffness_.cwiseProduct(rate_).cwiseSqrt()) {
   const Eigen::Index n = rate_.size();
   // -K = F'F with F = (1 - b p p') sqrt(rates), p = q/sqrt(A rates), b p'p = 1 - sqrt(1 - p'p).
   const Eigen::VectorXd p = stiffness_.cwiseSqrt() / std::sqrt(sum_);
-  const double rest = std::sqrt(std::max(law.memory.constant, 0.0) / sum_);
+  const double rest = std::sqrt(std::max(law.relaxation.constant, 0.0) / sum_);
   Eigen::MatrixXd f = Eigen::MatrixXd::Identity(n, n);
   if (n > 0) f -= p * p.transpose() * ((1.0 - rest) / p.squaredNorm());
   f = f * rate_.cwiseSqrt().asDiagonal();
@@ -92,7 +92,7 @@ LoadedSurface::LoadedSurface(const LawAtParameters& law, Want want)
   eigenvalue_ = -f.colwise().squaredNorm().transpose();
   weight_ = eigenvector_.transpose() * q_;
   // What has no plateau flows: rounding must not make it relax.
-  if (n > 0 && law.memory.constant == 0.0) {
+  if (n > 0 && law.relaxation.constant == 0.0) {
     Eigen::Index slowest = 0;
     eigenvalue_.maxCoeff(&slowest);
     eigenvalue_[slowest] = 0.0;
@@ -103,7 +103,7 @@ LoadedSurface::LoadedSurface(const LawAtParameters& law, Want want)
   }
   moments_.resize(static_cast<std::size_t>(n));
   if (!want_slopes_) return;
-  const Memory& m = law.memory;
+  const RelaxationSum& m = law.relaxation;
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(n);
   for (std::size_t i = 0; i < m.by.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);
@@ -164,7 +164,7 @@ void LoadedSurface::rest_at(double load) {
     arrive(carried);
     return;
   }
-  if (!(law_.memory.constant > 0.0)) {
+  if (!(law_.relaxation.constant > 0.0)) {
     in_contact_ = false;  // it has sunk for ever
     return;
   }

@@ -221,7 +221,7 @@ std::vector<LawParameter> law_parameters(const LawSpec& spec) {
     if (pair) add_order("beta", "order of the second spring-pot, the smaller one", 0.0);
   };
   if (spec.form == BranchForm::series) {
-    add_stiffness("k0", "stiffness at once", false);
+    add_stiffness("k0", "instantaneous stiffness", false);
     for (int i = 1; i <= spec.branches; ++i) {
       add_stiffness(fmt::format("kc{}", i), "spring of a unit of the Kelvin chain", false);
     }

@@ -99,8 +99,9 @@ std::vector<std::string> remarks_of(const LawFile& law, const PronyTable& table,
   std::vector<std::string> lines{fmt::format("law {}: {}; parameters {}", law_name(law.spec),
                                              law_words(law.spec), provenance_name(law.provenance))};
   const std::string_view unit = law.spec.response == Quantity::stress ? "Pa" : "N/m";
-  lines.push_back(fmt::format("stiffness at once {} {}, in the end {} {}", digits(table.instant),
-                              unit, digits(table.instant * table.long_share), unit));
+  lines.push_back(fmt::format("instantaneous stiffness {} {}, in the end {} {}",
+                              digits(table.instant), unit, digits(table.instant * table.long_share),
+                              unit));
   if (table.fitted) {
     lines.push_back(fmt::format(
         "fitted to the fractional law from {} s to {} s: largest relative "

@@ -50,8 +50,8 @@ TimeWindow window_of(const Protocol& protocol, std::span<const double> times_s) 
 
 /// The rates of a fractional law for a question. Where the depth is curved within a step (a kernel
 /// that is no straight line, creep under a load that jumps) the window begins earlier.
-FractionalMemory rates_for(const LawSpec& spec, const Protocol& protocol,
-                           std::span<const double> times_s) {
+ExponentialSum rates_for(const LawSpec& spec, const Protocol& protocol,
+                         std::span<const double> times_s) {
   const TimeWindow window = window_of(protocol, times_s);
   double earlier = 1.0;
   if (spec.kernel != Kernel::linear || spec.tension == Tension::relaxing) earlier = 1e-2;
@@ -267,7 +267,7 @@ std::optional<Response> respond_to_load(const LawSpec& spec, const LawAtParamete
 /// with; nothing where it is otherwise.
 std::optional<Response> respond_quickly(const LawAtParameters& law, const Protocol& protocol,
                                         std::span<const double> times_s, Want want) {
-  const auto& rates = law.memory.rate_parameter;
+  const auto& rates = law.relaxation.rate_parameter;
   const bool fixed_rates = std::find(rates.begin(), rates.end(), -1) != rates.end();
   if (protocol.drive() != Drive::displacement || fixed_rates) return std::nullopt;
   const auto path = drive_path(protocol, times_s);
@@ -355,7 +355,7 @@ void LawModel::require_no_jump(const Protocol& protocol, double contact) const {
 }
 
 LawModel::Prepared LawModel::prepare(std::span<const double> values,
-                                     const FractionalMemory* rates) const {
+                                     const ExponentialSum* rates) const {
   const KernelAtParameters at = kernel_at(spec_, parameters_, values);
   Prepared prepared{{{},
                      at.kernel,
@@ -379,17 +379,17 @@ LawModel::Prepared LawModel::prepare(std::span<const double> values,
     flat.insert(flat.end(), parallel.law.k.begin(), parallel.law.k.end());
     flat.insert(flat.end(), parallel.law.tau_s.begin(), parallel.law.tau_s.end());
     flat.resize(2 * n + 1);
-    prepared.law.memory = branch_memory(true, spec_.branches, flat);
+    prepared.law.relaxation = branch_relaxation(true, spec_.branches, flat);
     prepared.chain_slopes = std::move(parallel.slopes);
   } else if (spec_.fractional != Fractional::none) {
-    prepared.law.memory = fractional_memory(spec_.fractional, values, *rates);
+    prepared.law.relaxation = fractional_relaxation(spec_.fractional, values, *rates);
   } else {
-    prepared.law.memory = branch_memory(spec_.solid, spec_.branches, values);
+    prepared.law.relaxation = branch_relaxation(spec_.solid, spec_.branches, values);
   }
   return prepared;
 }
 
-LawAtParameters LawModel::at(std::span<const double> values, const FractionalMemory* rates) const {
+LawAtParameters LawModel::at(std::span<const double> values, const ExponentialSum* rates) const {
   return prepare(values, rates).law;
 }
 
@@ -400,12 +400,12 @@ Response LawModel::respond(const Protocol& protocol, std::span<const double> tim
   if (auto stepped = respond_to_step(spec_, parameters_, parameters, protocol, times_s, want)) {
     return *std::move(stepped);
   }
-  std::optional<FractionalMemory> rates;
+  std::optional<ExponentialSum> rates;
   if (spec_.fractional != Fractional::none) rates = rates_for(spec_, protocol, times_s);
   const Prepared prepared = prepare(parameters, rates ? &*rates : nullptr);
   const LawAtParameters& law = prepared.law;
   const bool displacement = protocol.drive() == Drive::displacement;
-  if (displacement && law.memory.infinite_under_jump) require_no_jump(protocol, law.contact);
+  if (displacement && law.relaxation.infinite_under_jump) require_no_jump(protocol, law.contact);
   const bool want_slopes = want == Want::values_and_sensitivity;
   Response response;
   const Stops stops = stops_for(spec_, law, protocol, times_s, want);

@@ -73,10 +73,10 @@ class CreepSteps {
 CreepSteps::CreepSteps(const LawAtParameters& law, double load, Want want)
     : law_(law),
       want_slopes_(want == Want::values_and_sensitivity),
-      slow_start_(law.memory.dashpot > 0.0),
+      slow_start_(law.relaxation.dashpot > 0.0),
       load_(load - law.offset),
-      weights_(law.memory) {
-  const Eigen::Index branches = law.memory.stiffness.size();
+      weights_(law.relaxation) {
+  const Eigen::Index branches = law.relaxation.stiffness.size();
   y_.setZero(branches);
   if (want_slopes_) {
     y_by_.setZero(branches, law.parameter_count);
@@ -97,7 +97,7 @@ CreepSteps::CreepSteps(const LawAtParameters& law, double load, Want want)
 }
 
 double CreepSteps::first_step(double end) const {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   return slow_start_ ? std::min(end, 1.0 / m.rate_per_s.maxCoeff()) : end;
 }
 
@@ -115,7 +115,7 @@ Slopes CreepSteps::kernel_slopes(const KernelShape::Values& k) const {
 
 void CreepSteps::set_weights(double h) {
   h_ = h;
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   weights_.set_step(h);
   const CreepRule& rule = creep_rule();
   sum_.lag = m.constant * rule.interpolation + m.dashpot / h * rule.derivative;
@@ -183,8 +183,8 @@ bool CreepSteps::find_depths() {
 double CreepSteps::off_balance() const {
   const CreepRule& rule = creep_rule();
   double most = 0.0;
-  const double soon = law_.memory.constant + sum_.decay[kCreepNodes] +
-                      law_.memory.dashpot / (h_ * rule.fraction[kCreepNodes]);
+  const double soon = law_.relaxation.constant + sum_.decay[kCreepNodes] +
+                      law_.relaxation.dashpot / (h_ * rule.fraction[kCreepNodes]);
   for (Eigen::Index b = kCreepNodes; b < kCreepPlaces; ++b) {
     const double v = rule.interpolation.col(b).dot(course_);
     if (!(v > 0.0)) return std::numeric_limits<double>::infinity();
@@ -206,7 +206,7 @@ double CreepSteps::attempt(double h) {
 
 /// The balance at all nodes, differentiated: one matrix for all parameters.
 void CreepSteps::differentiate() {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   y_at_nodes_.resize(y_.size(), kCreepNodes);
   for (Eigen::Index j = 0; j < y_.size(); ++j) {
     const BranchWeights& w = weights_[j];
@@ -251,7 +251,7 @@ void CreepSteps::differentiate() {
 }
 
 void CreepSteps::go_on() {
-  const Memory& m = law_.memory;
+  const RelaxationSum& m = law_.relaxation;
   constexpr Eigen::Index kLast = kCreepNodes - 1;
   if (want_slopes_) {
     for (Eigen::Index j = 0; j < y_.size(); ++j) {

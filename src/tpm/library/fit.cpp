@@ -2,7 +2,7 @@
 
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/fitted_law.hpp"
-#include "tpm/fit/tables.hpp"
+#include "tpm/fit/petab.hpp"
 #include "tpm/study/selection.hpp"
 
 namespace tpm::fit {

@@ -19,7 +19,7 @@ TpmParameters from_vector(const TpmVector& v) {
 
 BondElement TpmParameters::bonds(LateralBond lateral) const {
   BondElement element;
-  element.equilibrium_Pa = relaxed_modulus_Pa();
+  element.equilibrium_Pa = equilibrium_modulus_Pa();
   element.branches = {{relaxing_modulus_Pa(), relaxation_time_s()}};
   element.lateral_Pa = Eprime_Pa;
   element.lateral = lateral;
@@ -71,7 +71,7 @@ double step_relaxation_force_N(const TpmParameters& p, double lambda1, double de
 
 double creep_depth_m(const TpmParameters& p, double lambda1, double load_N, double time_s) {
   const double sum = p.E1_Pa + p.E2_Pa;
-  const double relaxed = p.relaxed_modulus_Pa() + lambda1;
+  const double relaxed = p.equilibrium_modulus_Pa() + lambda1;
   const double instantaneous = p.E2_Pa + lambda1;
   // T = (P3 + lambda1 P1) / (P2 + lambda1), the retardation time
   const double retardation = p.eta1_Pa_s * instantaneous / sum / relaxed;

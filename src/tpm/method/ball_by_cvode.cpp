@@ -31,7 +31,7 @@ class ViscousNetwork {
         viscous_(bonds),
         balance_(network_.bonds, network_.constraints, work_),
         load_(Eigen::Matrix3Xd::Zero(3, network_.position.cols())) {
-    memory_.offset = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(network_.bonds.size()));
+    viscous_state_.offset = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(network_.bonds.size()));
   }
 
   [[nodiscard]] Eigen::Index size() const { return viscous_.size(); }
@@ -49,7 +49,7 @@ class ViscousNetwork {
   [[nodiscard]] std::optional<Eigen::Vector3d> force(double time_s,
                                                      const Eigen::Ref<const Eigen::VectorXd>& y) {
     if (!balanced(time_s, y)) return std::nullopt;
-    balance_forces(network_.bonds, network_.position, memory_, load_, force_);
+    balance_forces(network_.bonds, network_.position, viscous_state_, load_, force_);
     return force_.rightCols<1>();
   }
 
@@ -69,7 +69,7 @@ class ViscousNetwork {
 
   [[nodiscard]] bool balanced(double time_s, const Eigen::Ref<const Eigen::VectorXd>& y) {
     viscous_.set_mean(y, of_bond_);
-    memory_.offset.head(of_bond_.size()) = of_bond_;
+    viscous_state_.offset.head(of_bond_.size()) = of_bond_;
     const Eigen::Vector3d to = ball_at(time_s), from = network_.position.rightCols<1>();
     constexpr int kMostParts = 64;
     for (int parts = 1; parts <= kMostParts; parts *= 4) {
@@ -77,7 +77,7 @@ class ViscousNetwork {
       bool found = true;
       for (int i = 1; i <= parts && found; ++i) {
         next.rightCols<1>() = from + static_cast<double>(i) / parts * (to - from);
-        found = balance_.find(next, memory_, load_, kDisplaced_m) == MethodEnd::completed;
+        found = balance_.find(next, viscous_state_, load_, kDisplaced_m) == MethodEnd::completed;
       }
       if (!found) continue;
       network_.position = std::move(next);
@@ -92,7 +92,7 @@ class ViscousNetwork {
   MethodWork work_;
   ImplicitBalance balance_;
   Eigen::Matrix3Xd load_, force_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
   Eigen::VectorXd of_bond_, followed_;
 };
 

@@ -21,13 +21,13 @@ class BondProjection {
   /// Multipliers start at 0.
   void forget() { tension_.setZero(); }
   /// Multipliers start at what the bonds pull with.
-  void remember(const Positions& position, const BondMemory& memory) {
-    bonds_.tensions(position, memory, tension_);
+  void store_tensions(const Positions& position, const ViscousState& viscous_state) {
+    bonds_.tensions(position, viscous_state, tension_);
   }
 
   /// One sweep over the bonds in their order (Gauss-Seidel).
   /// @param compliance_m_per_N how far each sphere goes under a force
-  void sweep(Positions& position, const BondMemory& memory,
+  void sweep(Positions& position, const ViscousState& viscous_state,
              const Eigen::VectorXd& compliance_m_per_N);
 
  private:

@@ -32,10 +32,11 @@ ImplicitBalance::ImplicitBalance(const BondSystem& bonds, const Constraints& con
   stiffest_ = sum.maxCoeff();
 }
 
-double ImplicitBalance::potential(const Positions& position, const BondMemory& memory,
+double ImplicitBalance::potential(const Positions& position, const ViscousState& viscous_state,
                                   const Eigen::Matrix3Xd& load,
                                   const SphereAnchors* anchors) const {
-  const double bonds = bonds_.potential_J(position, memory) - position.cwiseProduct(load).sum();
+  const double bonds =
+      bonds_.potential_J(position, viscous_state) - position.cwiseProduct(load).sum();
   if (anchors == nullptr) return bonds;
   return bonds +
          0.5 * (position - anchors->to).colwise().squaredNorm().dot(anchors->stiffness.transpose());
@@ -48,11 +49,11 @@ double ImplicitBalance::tolerance_N(const Positions& position, double depth_m,
   return stiffness * (kShareOfDepth * depth_m + kForceResolution * position.cwiseAbs().maxCoeff());
 }
 
-bool ImplicitBalance::factorise_matrix(const Positions& position, const BondMemory& memory,
+bool ImplicitBalance::factorise_matrix(const Positions& position, const ViscousState& viscous_state,
                                        const SphereAnchors* anchors, BlockLdlt& factor) {
   ++work_.factorisations;
   matrix_.set_zero();
-  bonds_.add_stiffness(position, memory, matrix_);
+  bonds_.add_stiffness(position, viscous_state, matrix_);
   if (anchors != nullptr) {
     for (std::size_t i = 0; i < matrix_.diagonal.size(); ++i) {
       matrix_.diagonal[i].diagonal().array() += anchors->stiffness[static_cast<Eigen::Index>(i)];
@@ -62,8 +63,8 @@ bool ImplicitBalance::factorise_matrix(const Positions& position, const BondMemo
   return factor.factorise(matrix_);
 }
 
-MethodEnd ImplicitBalance::factorise(const Positions& position, const BondMemory& memory) {
-  if (!factorise_matrix(position, memory, nullptr, factor_)) return MethodEnd::newton_failed;
+MethodEnd ImplicitBalance::factorise(const Positions& position, const ViscousState& viscous_state) {
+  if (!factorise_matrix(position, viscous_state, nullptr, factor_)) return MethodEnd::newton_failed;
   return factor_.negative_count() == 0 ? MethodEnd::completed : MethodEnd::buckled;
 }
 
@@ -78,33 +79,33 @@ void ImplicitBalance::displace(Eigen::Matrix3Xd& vectors, const BlockLdlt& facto
   constraints_.project(vectors);
 }
 
-ImplicitBalance::KeptFactor& ImplicitBalance::kept_for(const BondMemory& memory,
+ImplicitBalance::KeptFactor& ImplicitBalance::kept_for(const ViscousState& viscous_state,
                                                        const SphereAnchors* anchors) {
   const double anchored = anchors == nullptr ? 0.0 : anchors->stiffness.maxCoeff();
   for (KeptFactor& kept : kept_) {
     const bool alike =
-        kept.relaxation_factor == memory.relaxation_factor && kept.anchored == anchored;
+        kept.relaxation_factor == viscous_state.relaxation_factor && kept.anchored == anchored;
     if (kept.used > 0 && alike) return kept;
   }
   KeptFactor& oldest = kept_[0].used <= kept_[1].used ? kept_[0] : kept_[1];
   oldest.used = 0;
-  oldest.relaxation_factor = memory.relaxation_factor;
+  oldest.relaxation_factor = viscous_state.relaxation_factor;
   oldest.anchored = anchored;
   return oldest;
 }
 
-MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
+MethodEnd ImplicitBalance::find(Positions& position, const ViscousState& viscous_state,
                                 const Eigen::Matrix3Xd& load, double depth_m,
                                 const SphereAnchors* anchors) {
   const double tolerance = tolerance_N(position, depth_m, anchors);
-  double energy = potential(position, memory, load, anchors);
-  KeptFactor& kept = kept_for(memory, anchors);
+  double energy = potential(position, viscous_state, load, anchors);
+  KeptFactor& kept = kept_for(viscous_state, anchors);
   bool known = kept.used > 0;  // and found elsewhere
   kept.used = 0;               // until it has served
   double left_before = std::numeric_limits<double>::infinity();
   for (int iteration = 0;; ++iteration) {
     ++work_.rates;
-    balance_forces(bonds_, position, memory, load, force_);
+    balance_forces(bonds_, position, viscous_state, load, force_);
     if (anchors != nullptr) {
       force_ -= (position - anchors->to) * anchors->stiffness.asDiagonal();
     }
@@ -121,7 +122,7 @@ MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
     for (bool moved = false; !moved;) {
       const bool here = !known;
       if (here) {
-        if (!factorise_matrix(position, memory, anchors, kept.factor)) {
+        if (!factorise_matrix(position, viscous_state, anchors, kept.factor)) {
           return MethodEnd::newton_failed;
         }
         if (kept.factor.negative_count() > 0) {
@@ -132,13 +133,13 @@ MethodEnd ImplicitBalance::find(Positions& position, const BondMemory& memory,
       step_ = force_;
       displace(step_, kept.factor);
       const double slope = -force_.cwiseProduct(step_).sum();
-      // There the potential has no digits left to judge by.
+      // There the potential has no digits left to compare.
       const bool near = step_.colwise().norm().maxCoeff() <= kNear * depth_m;
       double length = 1.0;
       for (int halvings = 0; !moved; ++halvings, length *= 0.5) {
         if (halvings == kMostHalvings) return MethodEnd::newton_failed;
         const Positions next = position + length * step_;
-        const double there = potential(next, memory, load, anchors);
+        const double there = potential(next, viscous_state, load, anchors);
         moved = near || there <= energy + 1e-4 * length * slope;
         if (!moved && !here) {
           known = false;  // a shorter step is worth less than a factor found here

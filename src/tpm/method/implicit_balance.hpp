@@ -25,12 +25,12 @@ class ImplicitBalance {
   /// @param position start, with what is imposed in place; the balance if `completed`
   /// @param load on each sphere, N
   /// @param depth_m size of the displacements that accuracy is relative to, m
-  [[nodiscard]] MethodEnd find(Positions& position, const BondMemory& memory,
+  [[nodiscard]] MethodEnd find(Positions& position, const ViscousState& viscous_state,
                                const Eigen::Matrix3Xd& load, double depth_m,
                                const SphereAnchors* anchors = nullptr);
 
   /// Factorises the stiffness at a position, anchors left out.
-  [[nodiscard]] MethodEnd factorise(const Positions& position, const BondMemory& memory);
+  [[nodiscard]] MethodEnd factorise(const Positions& position, const ViscousState& viscous_state);
   /// Replaces forces on the spheres by displacements of the free coordinates.
   void displace(Eigen::Matrix3Xd& vectors);
 
@@ -44,12 +44,13 @@ class ImplicitBalance {
     long used = 0;  ///< number of the balance that used it last; 0: holds nothing
   };
 
-  [[nodiscard]] bool factorise_matrix(const Positions& position, const BondMemory& memory,
+  [[nodiscard]] bool factorise_matrix(const Positions& position, const ViscousState& viscous_state,
                                       const SphereAnchors* anchors, BlockLdlt& factor);
   /// The factor kept for balances like this one, or the one longest not used.
-  [[nodiscard]] KeptFactor& kept_for(const BondMemory& memory, const SphereAnchors* anchors);
+  [[nodiscard]] KeptFactor& kept_for(const ViscousState& viscous_state,
+                                     const SphereAnchors* anchors);
   void displace(Eigen::Matrix3Xd& vectors, const BlockLdlt& factor);
-  [[nodiscard]] double potential(const Positions& position, const BondMemory& memory,
+  [[nodiscard]] double potential(const Positions& position, const ViscousState& viscous_state,
                                  const Eigen::Matrix3Xd& load, const SphereAnchors* anchors) const;
   /// What rounding and a share of the depth leave of a force, N.
   [[nodiscard]] double tolerance_N(const Positions& position, double depth_m,

@@ -26,7 +26,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
         balance_(bonds_, tissue_.constraints(), work()),
         projection_(bonds_, tissue_.constraints()),
         position_(rest_),
-        memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0},
+        viscous_state_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0},
         viscous_(bonds_),
         peak_(protocol.peak()) {
     depth_scale_ = depth_scale(protocol);
@@ -39,14 +39,14 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
   [[nodiscard]] Eigen::Index columns() const { return rest_.cols(); }
 
   /// What the bonds pull with where they have the y.
-  void set_memory(const ConstVector& y) {
-    viscous_.set_mean(y, memory_.offset);
-    memory_.relaxation_factor = 0.0;
+  void set_viscous_state(const ConstVector& y) {
+    viscous_.set_mean(y, viscous_state_.offset);
+    viscous_state_.relaxation_factor = 0.0;
   }
   /// The same where y = offset + relaxation_factor V(l).
-  void set_memory(const ConstVector& offset, const ConstVector& relaxation_factor) {
-    viscous_.set_mean(offset, memory_.offset);
-    memory_.relaxation_factor = viscous_.mean_relaxation_factor(relaxation_factor);
+  void set_viscous_state(const ConstVector& offset, const ConstVector& relaxation_factor) {
+    viscous_.set_mean(offset, viscous_state_.offset);
+    viscous_state_.relaxation_factor = viscous_.mean_relaxation_factor(relaxation_factor);
   }
 
   /// What is imposed at one time, found in two ways.
@@ -66,7 +66,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     Positions next = position_;
     tissue_.impose(next, imposed);
     tissue_.load(imposed, load_);
-    const MethodEnd end = balance_.find(next, memory_, load_, depth_scale_);
+    const MethodEnd end = balance_.find(next, viscous_state_, load_, depth_scale_);
     if (end == MethodEnd::completed) position_ = next;
     return end;
   }
@@ -91,7 +91,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
 
   /// Positions with everything relaxed under an imposed value.
   MethodEnd relax_under(double imposed, Vector& y) {
-    set_memory(Vector::Zero(viscous()), Vector::Ones(viscous()));
+    set_viscous_state(Vector::Zero(viscous()), Vector::Ones(viscous()));
     const MethodEnd end = follow(0.0, imposed);
     find_elongations(position_, y);
     return end;
@@ -100,7 +100,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
   /// Bonds pulled sphere by sphere towards what they want, `memory_` in place.
   void sweep(Positions& position, const Eigen::VectorXd& compliance_m_per_N) {
     ++work().rates;
-    projection_.sweep(position, memory_, compliance_m_per_N);
+    projection_.sweep(position, viscous_state_, compliance_m_per_N);
   }
 
   const BondSystem& bonds_;
@@ -109,7 +109,7 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
   ImplicitBalance balance_;
   BondProjection projection_;
   Positions position_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
   ViscousElongations viscous_;  ///< what the y are
   double peak_;                 ///< of what is imposed
   double depth_scale_ = 0.0;
@@ -124,8 +124,9 @@ class NetworkSystem : public StageSystem, public ProjectionSystem, public Newton
     const double relaxed = std::abs(tissue_.linear_response(tissue_.at_rest(0.0), peak));
     // A fluid has no equilibrium: use its instantaneous response and the duration.
     const TissueState rest = tissue_.at_rest(0.0);
-    if (!tissue_.equilibrium().factorise(rest.position, rest.memory())) return relaxed;
-    const double instantaneous = std::abs(tissue_.unit_field(rest, rest.memory()).stiffness) * peak;
+    if (!tissue_.equilibrium().factorise(rest.position, rest.viscous_state())) return relaxed;
+    const double instantaneous =
+        std::abs(tissue_.unit_field(rest, rest.viscous_state()).stiffness) * peak;
     const double lasts = protocol.knots().back().time_s - protocol.start_s();
     const double most = instantaneous * (1.0 + lasts / bonds_.shortest_relaxation_time_s());
     return relaxed > 0.0 ? std::min(relaxed, most) : most;
@@ -168,19 +169,19 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
   }
 
   MethodEnd stage(double t, const ImplicitStage& stage, Vector& state) override {
-    set_memory(stage.known, stage.relaxation_factor);
+    set_viscous_state(stage.known, stage.relaxation_factor);
     if (const auto end = follow(known_.imposed, imposed(t)); end != MethodEnd::completed)
       return end;
-    follow_memory(stage.known, stage.relaxation_factor, imposed(t), state);
+    follow_viscous_state(stage.known, stage.relaxation_factor, imposed(t), state);
     return MethodEnd::completed;
   }
 
   MethodEnd response(double t, const ConstVector& state, double& response) override {
     const MethodEnd end = balance_at(imposed(t), state);
     ++work().rates;
-    set_memory(state);
+    set_viscous_state(state);
     tissue_.load(imposed(t), force_);
-    bonds_.add_forces(position_, memory_, force_);
+    bonds_.add_forces(position_, viscous_state_, force_);
     response = tissue_.response(position_, force_);
     return end;
   }
@@ -192,19 +193,19 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
     const Eigen::ArrayXd ratio = h / relaxation_times_s().array();
     const Vector relaxation_factor = ratio / (1.0 + ratio);
     const Vector offset = state.array() / (1.0 + ratio);
-    if (give_.size() == 0) set_give();
-    set_memory(offset, relaxation_factor);
+    if (compliance_.size() == 0) set_compliance();
+    set_viscous_state(offset, relaxation_factor);
     tissue_.impose(position_, imposed(t));
     tissue_.load(imposed(t), load_);
     for (int i = 0; i < sweeps; ++i) {
       ++work().rates;
-      balance_forces(bonds_, position_, memory_, load_, force_);
+      balance_forces(bonds_, position_, viscous_state_, load_, force_);
       tissue_.constraints().project(force_);
-      projection_.remember(position_, memory_);
-      position_ += force_ * give_.asDiagonal();
-      sweep(position_, give_);
+      projection_.store_tensions(position_, viscous_state_);
+      position_ += force_ * compliance_.asDiagonal();
+      sweep(position_, compliance_);
     }
-    follow_memory(offset, relaxation_factor, imposed(t), state);
+    follow_viscous_state(offset, relaxation_factor, imposed(t), state);
     return MethodEnd::completed;
   }
 
@@ -230,9 +231,9 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
                  Eigen::Ref<Vector> imbalance, Vector& elongation) override {
     ++work().rates;
     put(place, t);
-    set_memory(y);
+    set_viscous_state(y);
     tissue_.load(imposed(t), load_);
-    balance_forces(bonds_, put_, memory_, load_, force_);
+    balance_forces(bonds_, put_, viscous_state_, load_, force_);
     tissue_.constraints().project(force_);
     // What is not free has to stay 0.
     Eigen::Matrix3Xd bound = ConstSpheres(place.data(), 3, columns());
@@ -284,27 +285,27 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
   }
 
  private:
-  void set_give() {
+  void set_compliance() {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(columns());
     for (std::size_t i = 0; i < bonds_.size(); ++i) {
       const double k = bonds_.stiffness()[static_cast<Eigen::Index>(i)];
       sum[bonds_.end_a()[i]] += k;
       sum[bonds_.end_b()[i]] += k;
     }
-    give_ = (sum.array() > 0.0).select(sum.cwiseInverse(), 0.0);
+    compliance_ = (sum.array() > 0.0).select(sum.cwiseInverse(), 0.0);
   }
 
   MethodEnd balance_at(double imposed, const ConstVector& y) {
     if (is_same(known_.imposed, imposed) && known_.y == y) return MethodEnd::completed;
-    set_memory(y);
+    set_viscous_state(y);
     const MethodEnd end = follow(known_.imposed, imposed);
     if (end == MethodEnd::completed) known_ = {imposed, y};
     return end;
   }
 
   /// y at the end of a step, where the positions are.
-  void follow_memory(const ConstVector& offset, const ConstVector& relaxation_factor,
-                     double imposed, Vector& state) {
+  void follow_viscous_state(const ConstVector& offset, const ConstVector& relaxation_factor,
+                            double imposed, Vector& state) {
     find_elongations(position_, elongation_);
     state = offset + relaxation_factor.cwiseProduct(elongation_);
     known_ = {imposed, state};
@@ -324,9 +325,9 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
     factorised_at_ = position;
     const Vector relaxation_factor = 1.0 / (1.0 + per_y * relaxation_times_s().array());
     find_elongations(position, elongation_);
-    set_memory(y - relaxation_factor.cwiseProduct(elongation_), relaxation_factor);
+    set_viscous_state(y - relaxation_factor.cwiseProduct(elongation_), relaxation_factor);
     if (!bonds_.is_linear()) bonds_.kernel_slopes(position, kernel_slope_);
-    return balance_.factorise(position, memory_);
+    return balance_.factorise(position, viscous_state_);
   }
 
   struct Known {
@@ -335,7 +336,7 @@ class MasslessNetwork final : public NetworkSystem, public BalanceSystem {
   };
   Known known_;  ///< what position_ belongs to
   Vector elongation_;
-  Eigen::VectorXd give_;  ///< of XPBD, m/N
+  Eigen::VectorXd compliance_;  ///< of XPBD, m/N
   double per_y_ = 0.0;
   Positions put_, factorised_at_;
   Eigen::VectorXd kernel_slope_;  ///< V'(l) there
@@ -400,9 +401,9 @@ class NetworkWithMass final : public NetworkSystem {
     put(t, to);
     anchors_.to = position_;
     put(t, state);
-    set_memory(stage.known.tail(viscous()), stage.relaxation_factor);
+    set_viscous_state(stage.known.tail(viscous()), stage.relaxation_factor);
     tissue_.load(imposed(t), load_);
-    if (const auto end = balance_.find(position_, memory_, load_, depth_scale_, &anchors_);
+    if (const auto end = balance_.find(position_, viscous_state_, load_, depth_scale_, &anchors_);
         end != MethodEnd::completed) {
       return end;
     }
@@ -432,7 +433,7 @@ class NetworkWithMass final : public NetworkSystem {
     tissue_.load(imposed(t), load_);
     tissue_.constraints().project(load_);
     position_ += load_ * compliance.asDiagonal();
-    set_memory(offset, relaxation_factor);
+    set_viscous_state(offset, relaxation_factor);
     projection_.forget();
     for (int i = 0; i < sweeps; ++i) sweep(position_, compliance);
     take(Vector(state), h, state);

@@ -22,14 +22,14 @@ Response make_response(std::size_t n, Want want) {
 
 /// Derivatives of the two moduli and of ln(tau) with respect to E1, E2 and eta1.
 struct BranchDerivatives {
-  double relaxed_E1, relaxed_E2, relaxing_E1, relaxing_E2, log_tau_E, log_tau_eta1;
+  double equilibrium_E1, equilibrium_E2, relaxing_E1, relaxing_E2, log_tau_E, log_tau_eta1;
 
   explicit BranchDerivatives(const TpmParameters& p) {
     const double sum = p.E1_Pa + p.E2_Pa;
     const double share1 = p.E1_Pa / sum;
     const double share2 = p.E2_Pa / sum;
-    relaxed_E1 = share2 * share2;
-    relaxed_E2 = share1 * share1;
+    equilibrium_E1 = share2 * share2;
+    equilibrium_E2 = share1 * share1;
     relaxing_E1 = -share2 * share2;
     relaxing_E2 = share2 * (share2 + 2.0 * share1);
     log_tau_E = -1.0 / sum;
@@ -71,7 +71,7 @@ Response displacement_driven(const Protocol& protocol, std::span<const double> t
                              const TpmParameters& p, const TensionRule& rule, Want want) {
   Response response = make_response(times_s.size(), want);
   const double scale = p.modulus_to_stiffness_m();
-  const double relaxed = p.relaxed_modulus_Pa();
+  const double relaxed = p.equilibrium_modulus_Pa();
   const double relaxing = p.relaxing_modulus_Pa();
   const Tension tension(rule, p, protocol.peak());
   const BranchDerivatives d(p);
@@ -86,10 +86,10 @@ Response displacement_driven(const Protocol& protocol, std::span<const double> t
         if (want == Want::values) return;
         const double d_log_tau = -relaxing * branch.d_w;
         auto s = response.sensitivity.row(row);
-        s[kE1] =
-            scale * (d.relaxed_E1 * e + d.relaxing_E1 * (e - branch.w) + d_log_tau * d.log_tau_E);
-        s[kE2] =
-            scale * (d.relaxed_E2 * e + d.relaxing_E2 * (e - branch.w) + d_log_tau * d.log_tau_E);
+        s[kE1] = scale *
+                 (d.equilibrium_E1 * e + d.relaxing_E1 * (e - branch.w) + d_log_tau * d.log_tau_E);
+        s[kE2] = scale *
+                 (d.equilibrium_E2 * e + d.relaxing_E2 * (e - branch.w) + d_log_tau * d.log_tau_E);
         s[kEprime] = scale * pull.d_Eprime;
         s[kEta1] = scale * d_log_tau * d.log_tau_eta1;
         s[kSpacing] = scale * pull.d_spacing;
@@ -106,7 +106,7 @@ Response force_driven_frozen(const Protocol& protocol, std::span<const double> t
   Response response = make_response(times_s.size(), want);
   const double scale = p.modulus_to_stiffness_m();
   const double instantaneous = p.E2_Pa + lambda1;
-  const double finally = p.relaxed_modulus_Pa() + lambda1;
+  const double finally = p.equilibrium_modulus_Pa() + lambda1;
   if (!(instantaneous > 0.0 && finally > 0.0)) {
     throw bad_input("creep", "no spring carries the load in the end", "E1, E2 or lambda1 above 0");
   }
@@ -120,14 +120,15 @@ Response force_driven_frozen(const Protocol& protocol, std::span<const double> t
             load / instantaneous + (1.0 / finally - 1.0 / instantaneous) * branch.w;
         response.value[row] = value / scale;
         if (want == Want::values) return;
-        const double d_at_once = -(load - branch.w) / (instantaneous * instantaneous);
+        const double d_instantaneous = -(load - branch.w) / (instantaneous * instantaneous);
         const double d_finally = -branch.w / (finally * finally);
         const double d_log_T = (1.0 / finally - 1.0 / instantaneous) * branch.d_w;
         auto s = response.sensitivity.row(row);
         s[kE1] =
-            (d_finally * d.relaxed_E1 + d_log_T * (d.log_tau_E - d.relaxed_E1 / finally)) / scale;
-        s[kE2] = (d_at_once + d_finally * d.relaxed_E2 +
-                  d_log_T * (d.log_tau_E + 1.0 / instantaneous - d.relaxed_E2 / finally)) /
+            (d_finally * d.equilibrium_E1 + d_log_T * (d.log_tau_E - d.equilibrium_E1 / finally)) /
+            scale;
+        s[kE2] = (d_instantaneous + d_finally * d.equilibrium_E2 +
+                  d_log_T * (d.log_tau_E + 1.0 / instantaneous - d.equilibrium_E2 / finally)) /
                  scale;
         s[kEta1] = d_log_T * d.log_tau_eta1 / scale;
         s[kA0] = -response.value[row] / p.A0_m2;

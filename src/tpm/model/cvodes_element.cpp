@@ -273,7 +273,7 @@ class Integration {
 double depth_scale_m(const Protocol& protocol, const TpmParameters& p) {
   const double peak = protocol.peak();
   if (protocol.drive() == Drive::displacement) return peak;
-  const double modulus = p.relaxed_modulus_Pa() > 0.0 ? p.relaxed_modulus_Pa() : p.E2_Pa;
+  const double modulus = p.equilibrium_modulus_Pa() > 0.0 ? p.equilibrium_modulus_Pa() : p.E2_Pa;
   return equilibrium_depth_m(p, modulus, peak);
 }
 

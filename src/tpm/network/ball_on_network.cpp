@@ -29,7 +29,7 @@ BondSystem with_ball(const BondSystem& bonds, const BallTool& ball) {
 
 Constraints with_ball_held(const Constraints& constraints) {
   Constraints all = constraints.extended(1);
-  all.hold(constraints.size());
+  all.fix(constraints.size());
   return all;
 }
 
@@ -88,7 +88,7 @@ BallOnNetwork::BallOnNetwork(const BondSystem& bonds, const Positions& rest,
   viscous_ = Eigen::VectorXd::Zero(elongation_.size());
 }
 
-bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const BondMemory& memory) {
+bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const ViscousState& viscous_state) {
   constexpr int kMostParts = 64;
   const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, network_.position.cols());
   const Eigen::Vector3d from = network_.position.rightCols<1>();
@@ -98,7 +98,7 @@ bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const BondMemory& mem
     bool found = true;
     for (int i = 1; i <= parts && found; ++i) {
       next.rightCols<1>() = from + static_cast<double>(i) / parts * (ball_m - from);
-      const EquilibriumSearch search = equilibrium_.find(next, memory, load, tolerance_N_);
+      const EquilibriumSearch search = equilibrium_.find(next, viscous_state, load, tolerance_N_);
       found = search.converged && search.stable;
     }
     if (!found) continue;
@@ -110,19 +110,19 @@ bool BallOnNetwork::balance(const Eigen::Vector3d& ball_m, const BondMemory& mem
 
 Eigen::Vector3d BallOnNetwork::step(const Eigen::Vector3d& ball_m, double step_s) {
   const RelaxationWeights w = relaxation_weights(step_s / network_.bonds.relaxation_time_s());
-  BondMemory memory;
-  memory.offset = w.r * viscous_ + w.w0 * elongation_;
-  memory.relaxation_factor = w.w1;
-  if (!balance(ball_m, memory)) {
+  ViscousState viscous_state;
+  viscous_state.offset = w.r * viscous_ + w.w0 * elongation_;
+  viscous_state.relaxation_factor = w.w1;
+  if (!balance(ball_m, viscous_state)) {
     throw Error(ExitCode::numerical, "ball",
                 fmt::format("no stable equilibrium with the ball at ({}, {}, {}) mm",
                             significant(1e3 * ball_m.x(), 5), significant(1e3 * ball_m.y(), 5),
                             significant(1e3 * ball_m.z(), 5)));
   }
   network_.bonds.elongations(network_.position, elongation_);
-  viscous_ = memory.offset + w.w1 * elongation_;
+  viscous_ = viscous_state.offset + w.w1 * elongation_;
   Eigen::Matrix3Xd force;
-  equilibrium_.forces(network_.position, memory,
+  equilibrium_.forces(network_.position, viscous_state,
                       Eigen::Matrix3Xd::Zero(3, network_.position.cols()), force);
   return force.rightCols<1>();
 }

@@ -49,8 +49,8 @@ struct NetworkUnderBall {
 };
 
 /// The quasi-static network under a ball that moves in space: double precision, every step balanced
-/// by Newton's method with exact tangents, elongations linear in a step, under which what is
-/// remembered is advanced exactly. The error falls with the square of the step.
+/// by Newton's method with exact tangents, elongations linear in a step, under which the
+/// viscous elongations are advanced exactly. The error falls with the square of the step.
 class BallOnNetwork {
  public:
   /// @param bonds, constraints of the organ, without tools
@@ -74,7 +74,7 @@ class BallOnNetwork {
   [[nodiscard]] double dissipation_W() const;
 
  private:
-  [[nodiscard]] bool balance(const Eigen::Vector3d& ball_m, const BondMemory& memory);
+  [[nodiscard]] bool balance(const Eigen::Vector3d& ball_m, const ViscousState& viscous_state);
 
   NetworkUnderBall network_;
   Equilibrium equilibrium_;

@@ -231,19 +231,19 @@ bool BondSystem::carries(std::size_t bond, double elongation, std::span<const ch
 }
 
 BondSystem::Pull BondSystem::pull(std::size_t bond, double elongation,
-                                  const BondMemory& memory) const {
-  if (!carries(bond, elongation, memory.closed)) return {0.0, 0.0};
+                                  const ViscousState& viscous_state) const {
+  if (!carries(bond, elongation, viscous_state.closed)) return {0.0, 0.0};
   const auto i = static_cast<Eigen::Index>(bond);
   const double k = stiffness_[i];
   const double g = relaxing_[i];
   if (linear_ || bond >= first_contact()) {
-    const double slope = k - g * memory.relaxation_factor(law_[bond]);
-    return {slope * elongation - g * memory.offset[i], slope};
+    const double slope = k - g * viscous_state.relaxation_factor(law_[bond]);
+    return {slope * elongation - g * viscous_state.offset[i], slope};
   }
   const ViscousLaw& law = laws_[law_[bond]];
-  const double now = 1.0 - memory.relaxation_factor(law_[bond]);
+  const double now = 1.0 - viscous_state.relaxation_factor(law_[bond]);
   return {(k - g) * law.equilibrium(elongation) +
-              g * (now * law.kernel.value(elongation) - memory.offset[i]),
+              g * (now * law.kernel.value(elongation) - viscous_state.offset[i]),
           (k - g) * law.equilibrium_slope(elongation) + g * now * law.kernel.slope(elongation)};
 }
 
@@ -284,51 +284,51 @@ Eigen::VectorXd BondSystem::mean_viscous(const Eigen::MatrixXd& viscous) const {
   return mean;
 }
 
-BondMemory BondSystem::memory_at(const Eigen::VectorXd& y, const Eigen::VectorXd& followed,
-                                 RelaxationFactor relaxation_factor,
-                                 std::span<const char> closed) const {
-  BondMemory memory{y, std::move(relaxation_factor), closed};
+ViscousState BondSystem::viscous_state_at(const Eigen::VectorXd& y, const Eigen::VectorXd& followed,
+                                          RelaxationFactor relaxation_factor,
+                                          std::span<const char> closed) const {
+  ViscousState viscous_state{y, std::move(relaxation_factor), closed};
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    memory.offset[row] -= memory.relaxation_factor(law_[i]) * followed[row];
+    viscous_state.offset[row] -= viscous_state.relaxation_factor(law_[i]) * followed[row];
   }
-  return memory;
+  return viscous_state;
 }
 
-void BondSystem::tensions(const Positions& position, const BondMemory& memory,
+void BondSystem::tensions(const Positions& position, const ViscousState& viscous_state,
                           Eigen::VectorXd& tension) const {
   elongations(position, tension);
   for (std::size_t i = 0; i < size(); ++i) {
     double& n = tension[static_cast<Eigen::Index>(i)];
-    n = pull(i, n, memory).force;
+    n = pull(i, n, viscous_state).force;
   }
 }
 
-void BondSystem::add_forces(const Positions& position, const BondMemory& memory,
+void BondSystem::add_forces(const Positions& position, const ViscousState& viscous_state,
                             Eigen::Matrix3Xd& force) const {
   for (std::size_t i = 0; i < size(); ++i) {
-    const Line lies = line(i, position);
-    const Eigen::Vector3d f = pull(i, lies.elongation, memory).force * lies.direction;
+    const Line placed = line(i, position);
+    const Eigen::Vector3d f = pull(i, placed.elongation, viscous_state).force * placed.direction;
     force.col(end_a_[i]) += f;
     force.col(end_b_[i]) -= f;
   }
 }
 
 Eigen::Matrix3d BondSystem::stiffness_block(std::size_t bond, const Positions& position,
-                                            const BondMemory& memory) const {
-  const Line lies = line(bond, position);
-  const auto [force, slope] = pull(bond, lies.elongation, memory);
-  const double across = force * lies.per_length;
-  Eigen::Matrix3d block = (slope - across) * lies.direction * lies.direction.transpose();
+                                            const ViscousState& viscous_state) const {
+  const Line placed = line(bond, position);
+  const auto [force, slope] = pull(bond, placed.elongation, viscous_state);
+  const double across = force * placed.per_length;
+  Eigen::Matrix3d block = (slope - across) * placed.direction * placed.direction.transpose();
   block.diagonal().array() += across;
   return block;
 }
 
-void BondSystem::add_stiffness(const Positions& position, const BondMemory& memory,
+void BondSystem::add_stiffness(const Positions& position, const ViscousState& viscous_state,
                                BlockMatrix& matrix) const {
   const Graph& on = graph();
   for (std::size_t i = 0; i < size(); ++i) {
-    const Eigen::Matrix3d block = stiffness_block(i, position, memory);
+    const Eigen::Matrix3d block = stiffness_block(i, position, viscous_state);
     matrix.diagonal[end_a_[i]] += block;
     matrix.diagonal[end_b_[i]] += block;
     matrix.below[on.place[i].index] -= block;  // symmetric: the same either way round
@@ -352,37 +352,38 @@ void BondSystem::kernel_slopes(const Positions& position, Eigen::VectorXd& slope
   }
 }
 
-void BondSystem::add_stiffness_times(const Positions& position, const BondMemory& memory,
+void BondSystem::add_stiffness_times(const Positions& position, const ViscousState& viscous_state,
                                      const Eigen::Matrix3Xd& displacement,
                                      Eigen::Matrix3Xd& force) const {
   for (std::size_t i = 0; i < size(); ++i) {
-    const Line lies = line(i, position);
-    const auto [n, slope] = pull(i, lies.elongation, memory);
-    const double across = n * lies.per_length;
+    const Line placed = line(i, position);
+    const auto [n, slope] = pull(i, placed.elongation, viscous_state);
+    const double across = n * placed.per_length;
     const Eigen::Vector3d apart = displacement.col(end_b_[i]) - displacement.col(end_a_[i]);
     const Eigen::Vector3d f =
-        across * apart + (slope - across) * lies.direction.dot(apart) * lies.direction;
+        across * apart + (slope - across) * placed.direction.dot(apart) * placed.direction;
     force.col(end_b_[i]) += f;
     force.col(end_a_[i]) -= f;
   }
 }
 
-double BondSystem::potential_J(const Positions& position, const BondMemory& memory) const {
+double BondSystem::potential_J(const Positions& position, const ViscousState& viscous_state) const {
   double energy = 0.0;
   for (std::size_t i = 0; i < size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const double l = line(i, position).elongation;
-    if (!carries(i, l, memory.closed)) continue;
+    if (!carries(i, l, viscous_state.closed)) continue;
     const double k = stiffness_[row];
     const double g = relaxing_[row];
-    const double relaxation_factor = memory.relaxation_factor(law_[i]);
+    const double relaxation_factor = viscous_state.relaxation_factor(law_[i]);
     if (linear_ || i >= first_contact()) {
-      energy += l * (0.5 * (k - g * relaxation_factor) * l - g * memory.offset[row]);
+      energy += l * (0.5 * (k - g * relaxation_factor) * l - g * viscous_state.offset[row]);
       continue;
     }
     const ViscousLaw& law = laws_[law_[i]];
-    energy += (k - g) * law.equilibrium_integral(l) +
-              g * ((1.0 - relaxation_factor) * law.kernel.integral(l) - memory.offset[row] * l);
+    energy +=
+        (k - g) * law.equilibrium_integral(l) +
+        g * ((1.0 - relaxation_factor) * law.kernel.integral(l) - viscous_state.offset[row] * l);
   }
   return energy;
 }

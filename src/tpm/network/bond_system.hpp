@@ -34,7 +34,7 @@ class RelaxationFactor {
 
 /// The mean viscous elongation of the bonds as a function of what they follow, V(l) (for linear
 /// branches l itself): y = offset + relaxation_factor V(l).
-struct BondMemory {
+struct ViscousState {
   Eigen::VectorXd offset;              ///< m, one per bond
   RelaxationFactor relaxation_factor;  ///< 0 to 1
   /// Which tool contacts are closed, one entry each; none: those that overlap or just touch.
@@ -53,7 +53,7 @@ struct BondMemory {
 /// (docs/notation.md), for its lateral bonds k = w E' A0/l0 and g = 0; w is the bond's factor. The
 /// force acts along the bond as it lies now.
 ///
-/// Force and tangent stiffness depend on the m_j of a bond through the mean y alone (BondMemory).
+/// Force and tangent stiffness depend on the m_j of a bond through the mean y alone (ViscousState).
 /// Where every m_j counts, viscous elongations are a matrix with one row per bond and one column
 /// per branch of its law, most_branches() in all; the columns that a law does not have stay 0.
 ///
@@ -115,7 +115,7 @@ class BondSystem {
   /// The stiffness of each bond at rest of which a share has relaxed, k - relaxation_factor g, N/m.
   [[nodiscard]] Eigen::VectorXd stiffness_when(const RelaxationFactor& relaxation_factor) const;
 
-  /// The contacts that overlap or just touch, as BondMemory::closed.
+  /// The contacts that overlap or just touch, as ViscousState::closed.
   [[nodiscard]] std::vector<char> closed_contacts(const Positions& position) const;
 
   /// l of each bond, m; of a contact its gap, negative where it overlaps.
@@ -126,22 +126,23 @@ class BondSystem {
   /// @param viscous m_j by (bond, branch)
   [[nodiscard]] Eigen::VectorXd mean_viscous(const Eigen::MatrixXd& viscous) const;
   /// The viscous state with mean viscous elongations y at this instant, of which a share follows.
-  [[nodiscard]] BondMemory memory_at(const Eigen::VectorXd& y, const Eigen::VectorXd& followed,
-                                     RelaxationFactor relaxation_factor,
-                                     std::span<const char> closed = {}) const;
+  [[nodiscard]] ViscousState viscous_state_at(const Eigen::VectorXd& y,
+                                              const Eigen::VectorXd& followed,
+                                              RelaxationFactor relaxation_factor,
+                                              std::span<const char> closed = {}) const;
 
   /// What each bond pulls with, N: positive in tension.
-  void tensions(const Positions& position, const BondMemory& memory,
+  void tensions(const Positions& position, const ViscousState& viscous_state,
                 Eigen::VectorXd& tension) const;
 
   /// Adds to `force` what the bonds pull their spheres with, N: with relaxation_factor = 0 the
   /// offset is the mean viscous elongation now; with 1 and no offset everything is at equilibrium;
   /// between them it is an implicit step of time.
-  void add_forces(const Positions& position, const BondMemory& memory,
+  void add_forces(const Positions& position, const ViscousState& viscous_state,
                   Eigen::Matrix3Xd& force) const;
 
   /// Adds the stiffness matrix -d force / d position.
-  void add_stiffness(const Positions& position, const BondMemory& memory,
+  void add_stiffness(const Positions& position, const ViscousState& viscous_state,
                      BlockMatrix& matrix) const;
 
   /// The change of each bond's elongation, m, under small displacements of the spheres, m.
@@ -151,11 +152,12 @@ class BondSystem {
   void kernel_slopes(const Positions& position, Eigen::VectorXd& slope) const;
 
   /// Adds the stiffness matrix times displacements of the spheres, N.
-  void add_stiffness_times(const Positions& position, const BondMemory& memory,
+  void add_stiffness_times(const Positions& position, const ViscousState& viscous_state,
                            const Eigen::Matrix3Xd& displacement, Eigen::Matrix3Xd& force) const;
 
   /// What add_forces derives from: minus its gradient are the forces. J.
-  [[nodiscard]] double potential_J(const Positions& position, const BondMemory& memory) const;
+  [[nodiscard]] double potential_J(const Positions& position,
+                                   const ViscousState& viscous_state) const;
 
   /// Energy stored in the bonds, J: U(l) + sum_j g_j [P(l) + P*(m_j) - l m_j] (bond_law.hpp).
   /// @param viscous m_j by (bond, branch), most_branches() columns
@@ -170,7 +172,7 @@ class BondSystem {
   /// Minus the derivative of the force on sphere a by the place of sphere a (or b by b), N/m;
   /// minus this block stands at (a, b) and (b, a) of the stiffness matrix.
   [[nodiscard]] Eigen::Matrix3d stiffness_block(std::size_t bond, const Positions& position,
-                                                const BondMemory& memory) const;
+                                                const ViscousState& viscous_state) const;
 
   /// The graph of the spheres, and where each bond stands on it. Found when first asked for:
   /// factors of large networks do not fit into memory, and what iterates needs none.
@@ -200,7 +202,8 @@ class BondSystem {
   struct Pull {
     double force, slope;
   };
-  [[nodiscard]] Pull pull(std::size_t bond, double elongation, const BondMemory& memory) const;
+  [[nodiscard]] Pull pull(std::size_t bond, double elongation,
+                          const ViscousState& viscous_state) const;
   /// False for a slack rope and an open contact.
   [[nodiscard]] bool carries(std::size_t bond, double elongation,
                              std::span<const char> closed) const;

@@ -22,12 +22,12 @@ Constraints Constraints::first(std::size_t spheres) const {
   return some;
 }
 
-void Constraints::hold(std::size_t sphere) {
-  state_.at(sphere) = State::held;
+void Constraints::fix(std::size_t sphere) {
+  state_.at(sphere) = State::fixed;
   projector_[sphere].setZero();
 }
 
-void Constraints::guide(std::size_t sphere, const Eigen::Vector3d& direction) {
+void Constraints::slide(std::size_t sphere, const Eigen::Vector3d& direction) {
   state_.at(sphere) = State::partly;
   projector_[sphere] = direction * direction.transpose();
 }
@@ -40,7 +40,7 @@ void Constraints::impose(std::size_t sphere, const Eigen::Vector3d& direction) {
   // What rounding leaves of a direction that is gone would become a soft one.
   const bool held = p.trace() < 0.5;
   if (held) p.setZero();
-  state_[sphere] = held ? State::held : State::partly;
+  state_[sphere] = held ? State::fixed : State::partly;
 }
 
 std::size_t Constraints::count() const {
@@ -61,7 +61,7 @@ void Constraints::project(LaneMatrix& vectors) const {
   for (std::size_t i = 0; i < size(); ++i) {
     if (state_[i] == State::free) continue;
     auto of_sphere = vectors.middleCols<3>(3 * static_cast<Eigen::Index>(i));
-    if (state_[i] == State::held) {
+    if (state_[i] == State::fixed) {
       of_sphere.setZero();
     } else {
       of_sphere = (of_sphere * projector_[i]).eval();

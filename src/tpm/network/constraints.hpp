@@ -21,11 +21,11 @@ class Constraints {
   [[nodiscard]] Constraints first(std::size_t spheres) const;
 
   /// Fixes the sphere.
-  void hold(std::size_t sphere);
+  void fix(std::size_t sphere);
   /// Leaves only the motion along a unit direction free.
-  void guide(std::size_t sphere, const Eigen::Vector3d& direction);
-  /// The motion along a unit direction is imposed from outside. On a guided sphere it is the
-  /// direction of the guide.
+  void slide(std::size_t sphere, const Eigen::Vector3d& direction);
+  /// The motion along a unit direction is imposed from outside. On a sliding sphere it is the
+  /// direction of sliding.
   void impose(std::size_t sphere, const Eigen::Vector3d& direction);
 
   [[nodiscard]] std::size_t size() const { return state_.size(); }
@@ -48,7 +48,7 @@ class Constraints {
   void constrain(const BondSystem& bonds, BlockMatrix& matrix) const;
 
  private:
-  enum class State { free, partly, held };
+  enum class State { free, partly, fixed };
   std::vector<State> state_;
   std::vector<Eigen::Matrix3d> projector_;
 };

@@ -23,10 +23,10 @@ DrivenNetwork driven_network(const BondSystem& bonds, const Organ& organ,
     const std::size_t column = spheres + i;
     rest.col(static_cast<Eigen::Index>(column)) = tool.position;
     if (share > 0.0) {
-      with_tools.guide(column, tool.direction);
+      with_tools.slide(column, tool.direction);
       driven.push_back({column, tool.direction, share});
     } else {
-      with_tools.hold(column);
+      with_tools.fix(column);
     }
     const auto possible =
         possible_contacts(tool, static_cast<std::uint32_t>(column), organ, stiffness);

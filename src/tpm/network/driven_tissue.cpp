@@ -19,7 +19,7 @@ DrivenTissue::DrivenTissue(const BondSystem& bonds, Positions rest, Constraints 
     if (depth_driven()) constraints_.impose(probe.sphere, probe.direction);
   }
   const TissueState start = at_rest(0.0);
-  if (held_stiffness(start.position, start.memory()) > 0.0) return;
+  if (held_stiffness(start.position, start.viscous_state()) > 0.0) return;
   throw bad_input("probe", "touches nothing at rest", "a sphere with bonds, or a tool at one");
 }
 
@@ -114,7 +114,7 @@ double DrivenTissue::response(const Positions& position, const Eigen::Matrix3Xd&
 double DrivenTissue::response(const TissueState& state) const {
   Eigen::Matrix3Xd force;
   load(state.imposed, force);
-  bonds_.add_forces(state.position, state.memory(), force);
+  bonds_.add_forces(state.position, state.viscous_state(), force);
   return response(state.position, force);
 }
 
@@ -136,40 +136,41 @@ Eigen::Matrix3Xd DrivenTissue::unit_on_touched() const {
 }
 
 DrivenTissue::UnitField DrivenTissue::unit_field(const TissueState& state,
-                                                 const BondMemory& memory) const {
+                                                 const ViscousState& viscous_state) const {
   UnitField field;
   const Eigen::Matrix3Xd unit = this->unit();
   if (!depth_driven()) {
     field.displacement = unit;
     equilibrium_.displace(field.displacement);
     field.stiffness = along(field.displacement);
-    field.judge = field.displacement;
+    field.adjoint = field.displacement;
     return field;
   }
   Eigen::Matrix3Xd pushed = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  bonds_.add_stiffness_times(state.position, memory, unit, pushed);
+  bonds_.add_stiffness_times(state.position, viscous_state, unit, pushed);
   field.displacement = -pushed;
   equilibrium_.displace(field.displacement);
   field.stiffness = -pushed.cwiseProduct(field.displacement).sum();
   field.displacement += unit;
-  field.judge = field.displacement;
+  field.adjoint = field.displacement;
   if (!pushed.isZero(0.0)) return field;
   const Eigen::Matrix3Xd push = unit_on_touched();
-  field.judge = push;
-  equilibrium_.displace(field.judge);
-  field.stiffness = 1.0 / push.cwiseProduct(field.judge).sum();
-  field.judge *= field.stiffness;
+  field.adjoint = push;
+  equilibrium_.displace(field.adjoint);
+  field.stiffness = 1.0 / push.cwiseProduct(field.adjoint).sum();
+  field.adjoint *= field.stiffness;
   return field;
 }
 
-double DrivenTissue::held_stiffness(const Positions& position, const BondMemory& memory) const {
+double DrivenTissue::held_stiffness(const Positions& position,
+                                    const ViscousState& viscous_state) const {
   Eigen::Matrix3Xd pushed = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  bonds_.add_stiffness_times(position, memory, unit(), pushed);
+  bonds_.add_stiffness_times(position, viscous_state, unit(), pushed);
   return along(pushed);
 }
 
 double DrivenTissue::linear_response(const TissueState& rest, double peak) {
-  const BondMemory relaxed{Eigen::VectorXd::Zero(rest.followed.size()), 1.0};
+  const ViscousState relaxed{Eigen::VectorXd::Zero(rest.followed.size()), 1.0};
   if (!equilibrium_.factorise(rest.position, relaxed)) return 0.0;
   const UnitField field = unit_field(rest, relaxed);
   if (!depth_driven()) return field.stiffness * peak;

@@ -13,10 +13,10 @@ struct TissueState {
   Eigen::VectorXd followed;  ///< V(l) of each bond, m: where nothing stiffens its elongation l
   Eigen::MatrixXd viscous;   ///< m_j by (bond, branch), m
   Eigen::VectorXd mean;      ///< y of each bond, the mean of its m_j, m
-  std::vector<char> closed;  ///< contacts, as BondMemory::closed
+  std::vector<char> closed;  ///< contacts, as ViscousState::closed
 
   /// The viscous elongations at this instant.
-  [[nodiscard]] BondMemory memory() const { return {mean, 0.0, closed}; }
+  [[nodiscard]] ViscousState viscous_state() const { return {mean, 0.0, closed}; }
   /// Every viscous elongation is what it follows: nothing is left to relax.
   void set_equilibrium() {
     mean = followed;
@@ -67,17 +67,19 @@ class DrivenTissue {
     /// the adjoint of the response: a force R left on the free spheres changes it by that sign
     /// times their product.
     Eigen::Matrix3Xd displacement;
-    /// By which errors are judged: `displacement`; where the probe touches nothing and its response
+    /// Weights of errors: `displacement`; where the probe touches nothing and its response
     /// is nothing, that of a unit depth imposed on the spheres that it touched first.
-    Eigen::Matrix3Xd judge;
-    double stiffness = 0.0;  ///< work of `judge`: N/m under an imposed depth, m/N under a load
+    Eigen::Matrix3Xd adjoint;
+    double stiffness = 0.0;  ///< work of `adjoint`: N/m under an imposed depth, m/N under a load
   };
   /// From the last factorisation, which was at this state and viscous state.
-  [[nodiscard]] UnitField unit_field(const TissueState& state, const BondMemory& memory) const;
+  [[nodiscard]] UnitField unit_field(const TissueState& state,
+                                     const ViscousState& viscous_state) const;
   [[nodiscard]] double adjoint_sign() const { return depth_driven() ? -1.0 : 1.0; }
 
   /// Force on what is driven per displacement along the probe while all else stands still, N/m.
-  [[nodiscard]] double held_stiffness(const Positions& position, const BondMemory& memory) const;
+  [[nodiscard]] double held_stiffness(const Positions& position,
+                                      const ViscousState& viscous_state) const;
 
   /// Size of the response to a peak of what is imposed, with the equilibrium stiffness at rest.
   [[nodiscard]] double linear_response(const TissueState& rest, double peak);

@@ -43,20 +43,20 @@ LargeEquilibrium& Equilibrium::iterative(const Positions& position) {
   return *iterative_;
 }
 
-void Equilibrium::forces(const Positions& position, const BondMemory& memory,
+void Equilibrium::forces(const Positions& position, const ViscousState& viscous_state,
                          const Eigen::Matrix3Xd& load, Eigen::Matrix3Xd& force) const {
-  balance_forces(bonds_, position, memory, load, force);
+  balance_forces(bonds_, position, viscous_state, load, force);
 }
 
-bool Equilibrium::factorise(const Positions& position, const BondMemory& memory) {
+bool Equilibrium::factorise(const Positions& position, const ViscousState& viscous_state) {
   if (!direct_) {
     LargeEquilibrium& large = iterative(position);
-    large.assemble(position, memory);
+    large.assemble(position, viscous_state);
     const TangentAnswer answer = large.probe();
     stable_ = answer == TangentAnswer::solved;
     return answer != TangentAnswer::failed;
   }
-  const bool done = direct_->factor.factorise(direct_->blocks.assemble(position, memory));
+  const bool done = direct_->factor.factorise(direct_->blocks.assemble(position, viscous_state));
   stable_ = direct_->factor.negative_count() == 0;
   return done;
 }
@@ -78,20 +78,20 @@ void Equilibrium::displace(Eigen::Ref<Eigen::Matrix3Xd> vectors, double toleranc
   constraints_.project(vectors);
 }
 
-EquilibriumSearch Equilibrium::find(Positions& position, const BondMemory& memory,
+EquilibriumSearch Equilibrium::find(Positions& position, const ViscousState& viscous_state,
                                     const Eigen::Matrix3Xd& load, double tolerance_N) {
-  if (direct_) return find_directly(position, memory, load, tolerance_N);
-  return iterative(position).find(position, memory, load, tolerance_N);
+  if (direct_) return find_directly(position, viscous_state, load, tolerance_N);
+  return iterative(position).find(position, viscous_state, load, tolerance_N);
 }
 
-EquilibriumSearch Equilibrium::find_directly(Positions& position, const BondMemory& memory,
+EquilibriumSearch Equilibrium::find_directly(Positions& position, const ViscousState& viscous_state,
                                              const Eigen::Matrix3Xd& load, double tolerance_N) {
   // Contacts close and open between iterations: a factor of other contacts serves nothing.
   const bool keeps = bonds_.contact_count() == 0;
   Positions factorised_at;
   double last_residual_N = 0.0;
   int kept = 0;
-  const auto solve = [&](const Positions& at, const BondMemory& with, Eigen::Matrix3Xd& forces) {
+  const auto solve = [&](const Positions& at, const ViscousState& with, Eigen::Matrix3Xd& forces) {
     const double residual_N = forces.colwise().norm().maxCoeff();
     const bool serves =
         keeps && factorised_at.size() > 0 && residual_N <= kServes * last_residual_N;
@@ -107,7 +107,7 @@ EquilibriumSearch Equilibrium::find_directly(Positions& position, const BondMemo
     return TangentAnswer::solved;
   };
   EquilibriumSearch search =
-      newton_balance(bonds_, constraints_, position, memory, load, tolerance_N, solve);
+      newton_balance(bonds_, constraints_, position, viscous_state, load, tolerance_N, solve);
   search.factorisations -= kept;
   if (!keeps || !search.converged || !search.stable) return search;
   // The equilibrium itself is looked at, unless the factor was made as good as there.
@@ -116,7 +116,7 @@ EquilibriumSearch Equilibrium::find_directly(Positions& position, const BondMemo
   const double shortest_m = bonds_.rest_length_m().head(joined).minCoeff();
   if (moved_m <= kSamePlace * shortest_m) return search;
   ++search.factorisations;
-  search.converged = factorise(position, memory);
+  search.converged = factorise(position, viscous_state);
   search.stable = search.converged && is_stable();
   return search;
 }

@@ -62,17 +62,17 @@ class Equilibrium {
   /// @param position start, with what is imposed in place; the equilibrium if converged
   /// @param load on each sphere, N
   /// @param tolerance_N of the force left on each sphere
-  [[nodiscard]] EquilibriumSearch find(Positions& position, const BondMemory& memory,
+  [[nodiscard]] EquilibriumSearch find(Positions& position, const ViscousState& viscous_state,
                                        const Eigen::Matrix3Xd& load, double tolerance_N);
 
   /// Force of bonds and loads on every sphere, N: what is left of it on free coordinates is 0 in
   /// equilibrium; on the others it is minus the reaction.
-  void forces(const Positions& position, const BondMemory& memory, const Eigen::Matrix3Xd& load,
-              Eigen::Matrix3Xd& force) const;
+  void forces(const Positions& position, const ViscousState& viscous_state,
+              const Eigen::Matrix3Xd& load, Eigen::Matrix3Xd& force) const;
 
   /// Prepares solutions with the stiffness at a position. False if it cannot be; see also
   /// is_stable().
-  [[nodiscard]] bool factorise(const Positions& position, const BondMemory& memory);
+  [[nodiscard]] bool factorise(const Positions& position, const ViscousState& viscous_state);
   /// The stiffness prepared last is positive definite; where solutions iterate, a search for
   /// negative stiffness has found none.
   [[nodiscard]] bool is_stable() const { return stable_; }
@@ -91,7 +91,8 @@ class Equilibrium {
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
 
  private:
-  [[nodiscard]] EquilibriumSearch find_directly(Positions& position, const BondMemory& memory,
+  [[nodiscard]] EquilibriumSearch find_directly(Positions& position,
+                                                const ViscousState& viscous_state,
                                                 const Eigen::Matrix3Xd& load, double tolerance_N);
   /// Made when first needed: its multigrid takes the rigid motions from a position.
   [[nodiscard]] LargeEquilibrium& iterative(const Positions& position);

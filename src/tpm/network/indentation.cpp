@@ -24,7 +24,7 @@ void require_valid(const PatchIndentation& indentation, const Constraints& const
   if (indentation.patch.empty()) refuse("a patch without spheres", "a wider patch");
   for (const std::size_t sphere : indentation.patch) {
     if (sphere >= constraints.size() || !constraints.projector(sphere).isZero(0.0)) {
-      refuse(fmt::format("sphere {} of the patch", sphere + 1), "a sphere that is held by it");
+      refuse(fmt::format("sphere {} of the patch", sphere + 1), "a sphere that is fixed by it");
     }
   }
   if (!std::isfinite(indentation.depth_m)) {
@@ -36,7 +36,7 @@ void require_valid(const PatchIndentation& indentation, const Constraints& const
   }
 }
 
-BondMemory at_rest(const BondSystem& bonds, double relaxation_factor) {
+ViscousState at_rest(const BondSystem& bonds, double relaxation_factor) {
   return {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxation_factor};
 }
 
@@ -46,14 +46,14 @@ BondMemory at_rest(const BondSystem& bonds, double relaxation_factor) {
 }
 
 /// The free spheres follow a motion of the patch to first order.
-void follow(const BondSystem& bonds, const Constraints& constraints, const BondMemory& memory,
-            const Eigen::Matrix3Xd& moved, const EquilibriumFinder& finder, double depth_m,
-            Positions& position) {
+void follow(const BondSystem& bonds, const Constraints& constraints,
+            const ViscousState& viscous_state, const Eigen::Matrix3Xd& moved,
+            const EquilibriumFinder& finder, double depth_m, Positions& position) {
   Eigen::Matrix3Xd left = Eigen::Matrix3Xd::Zero(3, moved.cols());
-  bonds.add_stiffness_times(position, memory, moved, left);
+  bonds.add_stiffness_times(position, viscous_state, moved, left);
   left = -left;
   constraints.project(left);
-  const TangentAnswer answer = finder.solve(position, memory, left);
+  const TangentAnswer answer = finder.solve(position, viscous_state, left);
   if (answer == TangentAnswer::not_definite) give_up(depth_m, kNotDefinite);
   if (answer == TangentAnswer::failed) give_up(depth_m, "no solution with the stiffness");
   position += moved + left;
@@ -62,27 +62,27 @@ void follow(const BondSystem& bonds, const Constraints& constraints, const BondM
 }  // namespace
 
 EquilibriumFinder finder_of(Equilibrium& solver) {
-  const auto solve = [&solver](const Positions& position, const BondMemory& memory,
+  const auto solve = [&solver](const Positions& position, const ViscousState& viscous_state,
                                Eigen::Matrix3Xd& forces) {
-    if (!solver.factorise(position, memory)) return TangentAnswer::failed;
+    if (!solver.factorise(position, viscous_state)) return TangentAnswer::failed;
     if (!solver.is_stable()) return TangentAnswer::not_definite;
     solver.displace(forces);
     return TangentAnswer::solved;
   };
-  return {solve, [&solver](Positions& position, const BondMemory& memory,
+  return {solve, [&solver](Positions& position, const ViscousState& viscous_state,
                            const Eigen::Matrix3Xd& load, double tolerance_N) {
-            return solver.find(position, memory, load, tolerance_N);
+            return solver.find(position, viscous_state, load, tolerance_N);
           }};
 }
 
 EquilibriumFinder finder_of(LargeEquilibrium& solver) {
-  const auto solve = [&solver](const Positions& position, const BondMemory& memory,
+  const auto solve = [&solver](const Positions& position, const ViscousState& viscous_state,
                                Eigen::Matrix3Xd& forces) {
-    return solver.solve(position, memory, forces, kFollowTolerance);
+    return solver.solve(position, viscous_state, forces, kFollowTolerance);
   };
-  return {solve, [&solver](Positions& position, const BondMemory& memory,
+  return {solve, [&solver](Positions& position, const ViscousState& viscous_state,
                            const Eigen::Matrix3Xd& load, double tolerance_N) {
-            return solver.find(position, memory, load, tolerance_N);
+            return solver.find(position, viscous_state, load, tolerance_N);
           }};
 }
 
@@ -111,19 +111,19 @@ std::vector<std::size_t> far_side(const Organ& organ, const Eigen::Vector3d& dir
 double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,
                        std::span<const std::size_t> patch, const Eigen::Vector3d& direction,
                        double relaxation_factor, double tolerance) {
-  const BondMemory memory = at_rest(solver.bonds(), relaxation_factor);
+  const ViscousState viscous_state = at_rest(solver.bonds(), relaxation_factor);
   Eigen::Matrix3Xd moved = Eigen::Matrix3Xd::Zero(3, rest.cols());
   for (const std::size_t sphere : patch) moved.col(static_cast<Eigen::Index>(sphere)) = direction;
   const EquilibriumFinder finder{
-      [&](const Positions& position, const BondMemory& with, Eigen::Matrix3Xd& forces) {
+      [&](const Positions& position, const ViscousState& with, Eigen::Matrix3Xd& forces) {
         return solver.solve(position, with, forces, tolerance);
       },
       {}};
   Positions after = rest;
-  follow(solver.bonds(), solver.constraints(), memory, moved, finder, 0.0, after);
+  follow(solver.bonds(), solver.constraints(), viscous_state, moved, finder, 0.0, after);
   const Eigen::Matrix3Xd displacement = after - rest;
   Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.cols());
-  solver.bonds().add_stiffness_times(rest, memory, displacement, force);
+  solver.bonds().add_stiffness_times(rest, viscous_state, displacement, force);
   return displacement.cwiseProduct(force).sum();
 }
 
@@ -131,7 +131,7 @@ IndentationResult indent(const BondSystem& bonds, const Constraints& constraints
                          const Positions& rest, const PatchIndentation& indentation,
                          const EquilibriumFinder& finder) {
   require_valid(indentation, constraints);
-  const BondMemory memory = at_rest(bonds, indentation.relaxation_factor);
+  const ViscousState viscous_state = at_rest(bonds, indentation.relaxation_factor);
   const double stride = indentation.depth_m / indentation.strides;
   const Eigen::Matrix3Xd no_load = Eigen::Matrix3Xd::Zero(3, rest.cols());
   Eigen::Matrix3Xd moved = no_load;
@@ -142,16 +142,16 @@ IndentationResult indent(const BondSystem& bonds, const Constraints& constraints
   result.position = rest;
   for (int i = 1; i <= indentation.strides; ++i) {
     const double depth = stride * i;
-    follow(bonds, constraints, memory, moved, finder, depth, result.position);
+    follow(bonds, constraints, viscous_state, moved, finder, depth, result.position);
     const EquilibriumSearch search =
-        finder.find(result.position, memory, no_load, indentation.tolerance_N);
+        finder.find(result.position, viscous_state, no_load, indentation.tolerance_N);
     if (!search.stable) give_up(depth, kNotDefinite);
     if (!search.converged) give_up(depth, "the forces do not come to balance");
     result.newton_steps += search.iterations;
     result.residual_N = search.residual_N;
   }
   Eigen::Matrix3Xd force;
-  balance_forces(bonds, result.position, memory, no_load, force);
+  balance_forces(bonds, result.position, viscous_state, no_load, force);
   for (const std::size_t sphere : indentation.patch) {
     result.force_N -= indentation.direction.dot(force.col(static_cast<Eigen::Index>(sphere)));
   }

@@ -12,7 +12,7 @@ struct PatchIndentation {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< unit vector into the tissue
   double depth_m = 0.002;
   int strides = 1;                 ///< equal parts of the depth, >= 1
-  double relaxation_factor = 0.0;  ///< 0: instantaneous, 1: equilibrium; see BondMemory
+  double relaxation_factor = 0.0;  ///< 0: instantaneous, 1: equilibrium; see ViscousState
   double tolerance_N = 1e-9;       ///< of the force left on each free sphere
 };
 
@@ -28,7 +28,7 @@ struct IndentationResult {
 struct EquilibriumFinder {
   /// Replaces forces by displacements with the stiffness at a position.
   TangentSolve solve;
-  std::function<EquilibriumSearch(Positions&, const BondMemory&, const Eigen::Matrix3Xd& load,
+  std::function<EquilibriumSearch(Positions&, const ViscousState&, const Eigen::Matrix3Xd& load,
                                   double tolerance_N)>
       find;
 };
@@ -52,7 +52,7 @@ class LargeEquilibrium;
 /// Force of a glued punch per depth at rest, to first order, N/m: u^T K u of the displacements
 /// under a motion of 1 of the patch, so that an error of u counts by its square.
 /// @param patch spheres that are fixed in the constraints of the solver
-/// @param relaxation_factor see BondMemory
+/// @param relaxation_factor see ViscousState
 /// @param tolerance of LargeEquilibrium::solve
 /// Throws Error(numerical) if the stiffness is not positive definite or the solution fails.
 [[nodiscard]] double punch_stiffness(LargeEquilibrium& solver, const Positions& rest,

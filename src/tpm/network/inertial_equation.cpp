@@ -163,10 +163,10 @@ void InertialEquation::find_pressing() {
   const auto& contacts = tissue_.bonds().contacts();
   pressing_.assign(contacts.size(), 0);
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const Gap lies = gap(i);
-    const double pull = contacts[i].stiffness_N_per_m * lies.now_m +
-                        contact_dashpot_N_s_m_[static_cast<Eigen::Index>(i)] * lies.rate_m_s;
-    pressing_[i] = lies.now_m <= kTouching_m && pull <= 0.0 ? 1 : 0;
+    const Gap measured = gap(i);
+    const double pull = contacts[i].stiffness_N_per_m * measured.now_m +
+                        contact_dashpot_N_s_m_[static_cast<Eigen::Index>(i)] * measured.rate_m_s;
+    pressing_[i] = measured.now_m <= kTouching_m && pull <= 0.0 ? 1 : 0;
   }
 }
 
@@ -262,8 +262,8 @@ void InertialEquation::gaps(double time_s, const ConstVector& state, Eigen::Ref<
 bool InertialEquation::meets(double time_s, const ConstVector& state) {
   (void)unpack(time_s, state);
   for (std::size_t i = 0; i < tissue_.bonds().contact_count(); ++i) {
-    const Gap lies = gap(i);
-    if (std::abs(lies.now_m) <= kTouching_m && lies.rate_m_s < 0.0) return true;
+    const Gap measured = gap(i);
+    if (std::abs(measured.now_m) <= kTouching_m && measured.rate_m_s < 0.0) return true;
   }
   return false;
 }
@@ -277,9 +277,9 @@ InertialEquation::Vector InertialEquation::contact_pushes_N(double time_s,
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     if (pressing_[i] == 0) continue;
     const auto row = static_cast<Eigen::Index>(i);
-    const Gap lies = gap(i);
-    push[row] =
-        -contacts[i].stiffness_N_per_m * lies.now_m - contact_dashpot_N_s_m_[row] * lies.rate_m_s;
+    const Gap measured = gap(i);
+    push[row] = -contacts[i].stiffness_N_per_m * measured.now_m -
+                contact_dashpot_N_s_m_[row] * measured.rate_m_s;
   }
   return push;
 }
@@ -289,9 +289,9 @@ ToolImpact InertialEquation::strike(double time_s, Eigen::Ref<Vector> state) {
   const auto& contacts = tissue_.bonds().contacts();
   std::vector<TouchingPair> pairs;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const Gap lies = gap(i);
-    if (lies.now_m <= kTouching_m)
-      pairs.push_back({contacts[i].sphere, contacts[i].tool, lies.normal});
+    const Gap measured = gap(i);
+    if (measured.now_m <= kTouching_m)
+      pairs.push_back({contacts[i].sphere, contacts[i].tool, measured.normal});
   }
   Eigen::Matrix3Xd velocity = motion_.velocity;
   const Vector impulse = inelastic_impact(pairs, tissue_.constraints(), inertia_.mass_kg, velocity);
@@ -322,12 +322,12 @@ Eigen::Vector4d InertialEquation::powers_W(double time_s, const ConstVector& sta
   // A contact takes N dl/dt and keeps k l dl/dt of it, l < 0 its gap; N is 0 where it would pull.
   double contacts = 0.0;
   for (std::size_t i = 0; i < pressing_.size(); ++i) {
-    const Gap lies = gap(i);
-    if (lies.now_m > kTouching_m) continue;
-    contacts +=
-        pressing_[i] != 0
-            ? contact_dashpot_N_s_m_[static_cast<Eigen::Index>(i)] * lies.rate_m_s * lies.rate_m_s
-            : -tissue_.bonds().contacts()[i].stiffness_N_per_m * lies.now_m * lies.rate_m_s;
+    const Gap measured = gap(i);
+    if (measured.now_m > kTouching_m) continue;
+    contacts += pressing_[i] != 0 ? contact_dashpot_N_s_m_[static_cast<Eigen::Index>(i)] *
+                                        measured.rate_m_s * measured.rate_m_s
+                                  : -tissue_.bonds().contacts()[i].stiffness_N_per_m *
+                                        measured.now_m * measured.rate_m_s;
   }
   return {push * speed, tissue_.bonds().dissipation_W(now.position, now.viscous), dashpots + drag,
           contacts};
@@ -353,10 +353,11 @@ bool InertialEquation::factorise(double time_s, const ConstVector& state, double
   find_pressing();
   factorised_pressing_ = pressing_;
   matrix_.set_zero();
-  bonds.add_stiffness(now.position,
-                      bonds.memory_at(now.mean, followed_, relaxation_factor_over(bonds, gamma),
-                                      factorised_pressing_),
-                      matrix_);
+  bonds.add_stiffness(
+      now.position,
+      bonds.viscous_state_at(now.mean, followed_, relaxation_factor_over(bonds, gamma),
+                             factorised_pressing_),
+      matrix_);
   for (Eigen::Matrix3d& block : matrix_.diagonal) block *= gamma * gamma;
   for (Eigen::Matrix3d& block : matrix_.below) block *= gamma * gamma;
   const bool bonds_damped = inertia_.dashpot_N_s_m.size() > 0;

@@ -139,7 +139,7 @@ class InertialEquation {
   TissueMotion motion_;
   Eigen::Matrix3Xd force_;
   Vector followed_;
-  std::vector<char> pressing_;  ///< contacts, as BondMemory::closed
+  std::vector<char> pressing_;  ///< contacts, as ViscousState::closed
 
   // Newton's matrix.
   BlockMatrix matrix_;

@@ -168,10 +168,10 @@ void LaneBonds::followed(const LaneMatrix& position, LaneMatrix& followed) const
   }
 }
 
-void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
+void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                            LaneMatrix& force) const {
-  linear_ ? add_bond_forces<true>(position, memory, force)
-          : add_bond_forces<false>(position, memory, force);
+  linear_ ? add_bond_forces<true>(position, mean_viscous, force)
+          : add_bond_forces<false>(position, mean_viscous, force);
   for (const ToolContact& contact : closed_) {
     const ContactGeometry now = contact_geometry(contact, position);
     const Eigen::Matrix<double, kLanes, 3> pull =
@@ -182,10 +182,10 @@ void LaneBonds::add_forces(const LaneMatrix& position, const LaneMatrix& memory,
 }
 
 template <bool kLinear>
-void LaneBonds::add_bond_forces(const LaneMatrix& position, const LaneMatrix& memory,
+void LaneBonds::add_bond_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                                 LaneMatrix& force) const {
   const double* const x = position.data();
-  const double* const y = memory.data();
+  const double* const y = mean_viscous.data();
   double* const f = force.data();
   const std::size_t relaxing = relaxing_.size();
   const auto sweep = [&]() __attribute__((always_inline)) {
@@ -263,11 +263,11 @@ void LaneBonds::followed_changes(const LaneMatrix& position, const LaneMatrix& d
 }
 
 template <bool kLinear>
-void LaneBonds::add_bond_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+void LaneBonds::add_bond_force_changes(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                                        const Changes& changes, LaneMatrix& force) const {
   const double* const x = position.data();
   const double* const u = changes.displacement.data();
-  const double* const y = memory.data();
+  const double* const y = mean_viscous.data();
   const double* const dy = changes.mean.data();
   double* const f = force.data();
   const std::size_t relaxing = relaxing_.size();
@@ -334,10 +334,10 @@ void LaneBonds::add_bond_force_changes(const LaneMatrix& position, const LaneMat
   }
 }
 
-void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+void LaneBonds::add_force_changes(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                                   const Changes& changes, LaneMatrix& force) const {
-  linear_ ? add_bond_force_changes<true>(position, memory, changes, force)
-          : add_bond_force_changes<false>(position, memory, changes, force);
+  linear_ ? add_bond_force_changes<true>(position, mean_viscous, changes, force)
+          : add_bond_force_changes<false>(position, mean_viscous, changes, force);
   for (const ToolContact& contact : closed_) {
     const ContactGeometry now = contact_geometry(contact, position);
     const Eigen::Matrix<double, kLanes, 3> apart = columns_of(changes.displacement, contact.tool) -

@@ -15,7 +15,7 @@ class LaneBonds {
  public:
   explicit LaneBonds(const BondSystem& bonds);
 
-  /// Says which contacts are closed, as BondMemory::closed; at first none is.
+  /// Says which contacts are closed, as ViscousState::closed; at first none is.
   void close_contacts(std::span<const char> closed);
 
   /// The bonds with g > 0, by their number in the system, those of one law together.
@@ -40,8 +40,9 @@ class LaneBonds {
   void followed(const LaneMatrix& position, LaneMatrix& followed) const;
 
   /// Adds what all bonds pull their spheres with, N.
-  /// @param memory y of the relaxing bonds, m
-  void add_forces(const LaneMatrix& position, const LaneMatrix& memory, LaneMatrix& force) const;
+  /// @param mean_viscous y of the relaxing bonds, m
+  void add_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
+                  LaneMatrix& force) const;
 
   /// Changes of V(l) of the relaxing bonds with small displacements of the spheres and changes of
   /// the laws.
@@ -57,7 +58,7 @@ class LaneBonds {
     std::span<const LawChange> laws;   ///< of each law
   };
   /// Adds the change of what all bonds pull their spheres with, N.
-  void add_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+  void add_force_changes(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                          const Changes& changes, LaneMatrix& force) const;
 
  private:
@@ -76,10 +77,10 @@ class LaneBonds {
                                                  const LaneMatrix& position) const;
 
   template <bool kLinear>
-  void add_bond_forces(const LaneMatrix& position, const LaneMatrix& memory,
+  void add_bond_forces(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                        LaneMatrix& force) const;
   template <bool kLinear>
-  void add_bond_force_changes(const LaneMatrix& position, const LaneMatrix& memory,
+  void add_bond_force_changes(const LaneMatrix& position, const LaneMatrix& mean_viscous,
                               const Changes& changes, LaneMatrix& force) const;
 
   std::vector<ToolContact> contacts_, closed_;

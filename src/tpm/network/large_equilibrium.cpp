@@ -21,8 +21,8 @@ constexpr double kTired = 1.5;  // growth of the iterations that makes a precond
 /// How exactly the next step is worth solving.
 class Forcing {
  public:
-  explicit Forcing(double goal) : adjoint_(goal) {}
-  /// @param residual now, in the unit of the goal
+  explicit Forcing(double target) : adjoint_(target) {}
+  /// @param residual now, in the unit of the target
   double next(double residual) {
     double eta = kFirstForcing;
     if (last_residual_ > 0.0) {
@@ -31,7 +31,7 @@ class Forcing {
       const double safe = kForcingFactor * last_eta_ * last_eta_;
       if (safe > kSafeguard) eta = std::max(eta, safe);
     }
-    // Not more exactly than the goal asks for; by a good part, as norms differ.
+    // Not more exactly than the target asks for; by a good part, as norms differ.
     eta = std::max(eta, kSafeguard * kSafeguard * adjoint_ / residual);
     last_eta_ = std::clamp(eta, kLeastForcing, kFirstForcing);
     last_residual_ = residual;
@@ -100,8 +100,8 @@ void LargeEquilibrium::prepare() {
   ++work_.preconditioners;
 }
 
-void LargeEquilibrium::assemble(const Positions& position, const BondMemory& memory) {
-  stiffness_.assemble(position, memory);
+void LargeEquilibrium::assemble(const Positions& position, const ViscousState& viscous_state) {
+  stiffness_.assemble(position, viscous_state);
   prepare();
 }
 
@@ -129,26 +129,26 @@ TangentAnswer LargeEquilibrium::probe() {
   return answer_of(outcome.end);
 }
 
-TangentAnswer LargeEquilibrium::solve(const Positions& position, const BondMemory& memory,
+TangentAnswer LargeEquilibrium::solve(const Positions& position, const ViscousState& viscous_state,
                                       Eigen::Matrix3Xd& vectors, double tolerance) {
-  assemble(position, memory);
+  assemble(position, viscous_state);
   return displace(vectors, tolerance);
 }
 
-EquilibriumSearch LargeEquilibrium::find(Positions& position, const BondMemory& memory,
+EquilibriumSearch LargeEquilibrium::find(Positions& position, const ViscousState& viscous_state,
                                          const Eigen::Matrix3Xd& load, double tolerance_N) {
   Forcing forcing(tolerance_N);
-  const auto step = [&](const Positions& at, const BondMemory& with, Eigen::Matrix3Xd& forces) {
+  const auto step = [&](const Positions& at, const ViscousState& with, Eigen::Matrix3Xd& forces) {
     const double residual = forces.colwise().norm().maxCoeff();
     return solve(at, with, forces, forcing.next(residual));
   };
   EquilibriumSearch search =
-      newton_balance(bonds_, constraints_, position, memory, load, tolerance_N, step);
+      newton_balance(bonds_, constraints_, position, viscous_state, load, tolerance_N, step);
   if (!search.converged || !search.stable) return search;
-  assemble(position, memory);
+  assemble(position, viscous_state);
   const TangentAnswer answer = probe();
   search.stable = answer != TangentAnswer::not_definite;
-  search.converged = answer != TangentAnswer::failed;  // an equilibrium nobody judged
+  search.converged = answer != TangentAnswer::failed;  // an equilibrium without an error tolerance
   return search;
 }
 

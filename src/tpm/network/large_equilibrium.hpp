@@ -48,16 +48,16 @@ class LargeEquilibrium {
                    LargeEquilibriumOptions options = {});
 
   /// As Equilibrium::find; `factorisations` counts linear solutions.
-  [[nodiscard]] EquilibriumSearch find(Positions& position, const BondMemory& memory,
+  [[nodiscard]] EquilibriumSearch find(Positions& position, const ViscousState& viscous_state,
                                        const Eigen::Matrix3Xd& load, double tolerance_N);
 
   /// Replaces forces on the free spheres by displacements, with the stiffness at a position.
   /// @param tolerance of sqrt(r^T M^-1 r) against its start
-  [[nodiscard]] TangentAnswer solve(const Positions& position, const BondMemory& memory,
+  [[nodiscard]] TangentAnswer solve(const Positions& position, const ViscousState& viscous_state,
                                     Eigen::Matrix3Xd& vectors, double tolerance);
 
   /// Assembles the stiffness at a position, for displace() and probe().
-  void assemble(const Positions& position, const BondMemory& memory);
+  void assemble(const Positions& position, const ViscousState& viscous_state);
   /// As solve(), with the stiffness assembled last.
   [[nodiscard]] TangentAnswer displace(Eigen::Matrix3Xd& vectors, double tolerance);
   /// Looks for negative stiffness in the matrix assembled last.

@@ -31,10 +31,10 @@ class InverseIteration {
 
   /// The lowest omega^2 where a share of the relaxing stiffness has relaxed.
   double lowest(const RelaxationFactor& relaxation_factor) {
-    const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())),
-                            relaxation_factor};
+    const ViscousState viscous_state{
+        Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), relaxation_factor};
     BlockMatrix matrix(bonds_.pattern());
-    bonds_.add_stiffness(rest_, memory, matrix);
+    bonds_.add_stiffness(rest_, viscous_state, matrix);
     constraints_.constrain(bonds_, matrix);
     if (!factor_.factorise(matrix) || factor_.negative_count() > 0) {
       throw Error(ExitCode::numerical, "lowest mode", "the stiffness at rest is not positive");

@@ -15,10 +15,10 @@ double contact_stiffness_N_per_m(const BondSystem& bonds, const Positions& rest,
                                  double relaxation_factor) {
   require_valid(probe, constraints);
   require_rigid(bonds, rest, constraints, "contact stiffness");
-  const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
-                          relaxation_factor};
+  const ViscousState viscous_state{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
+                                   relaxation_factor};
   Equilibrium equilibrium(bonds, constraints);
-  if (!equilibrium.factorise(rest, memory)) {
+  if (!equilibrium.factorise(rest, viscous_state)) {
     throw Error(ExitCode::numerical, "contact stiffness", "the stiffness cannot be factorised");
   }
   const auto column = static_cast<Eigen::Index>(probe.sphere);

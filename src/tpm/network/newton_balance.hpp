@@ -22,11 +22,12 @@ enum class TangentAnswer { solved, not_definite, failed };
 /// Replaces forces on the free spheres by displacements, with the stiffness at a position.
 /// @param forces left on the free spheres, N
 using TangentSolve = std::function<TangentAnswer(
-    const Positions& position, const BondMemory& memory, Eigen::Matrix3Xd& forces)>;
+    const Positions& position, const ViscousState& viscous_state, Eigen::Matrix3Xd& forces)>;
 
 /// Force of bonds and loads on every sphere, N.
-void balance_forces(const BondSystem& bonds, const Positions& position, const BondMemory& memory,
-                    const Eigen::Matrix3Xd& load, Eigen::Matrix3Xd& force);
+void balance_forces(const BondSystem& bonds, const Positions& position,
+                    const ViscousState& viscous_state, const Eigen::Matrix3Xd& load,
+                    Eigen::Matrix3Xd& force);
 
 /// Newton's method for the balance of the free spheres, its steps shortened until the potential of
 /// bonds and loads falls. It ends at the first stiffness that is not positive definite, and looks
@@ -35,7 +36,7 @@ void balance_forces(const BondSystem& bonds, const Positions& position, const Bo
 /// @param tolerance_N of the force left on each sphere
 [[nodiscard]] EquilibriumSearch newton_balance(const BondSystem& bonds,
                                                const Constraints& constraints, Positions& position,
-                                               const BondMemory& memory,
+                                               const ViscousState& viscous_state,
                                                const Eigen::Matrix3Xd& load, double tolerance_N,
                                                const TangentSolve& solve);
 

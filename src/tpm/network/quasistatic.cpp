@@ -423,7 +423,7 @@ void require_valid(const Probe& probe, const Constraints& constraints) {
   }
   const Eigen::Vector3d free = constraints.projector(probe.sphere) * probe.direction;
   if (std::abs(free.norm() - 1.0) > 1e-9) {
-    throw bad_input("probe", fmt::format("sphere {} is held", probe.sphere + 1),
+    throw bad_input("probe", fmt::format("sphere {} is fixed", probe.sphere + 1),
                     "a sphere that is free to move along the direction of the probe");
   }
 }

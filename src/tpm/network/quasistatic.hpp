@@ -68,7 +68,7 @@ struct QuasiStaticOptions {
   double tolerance = 1e-6;
   int stages = kLanes;  ///< of a step, 2 to kLanes
   /// If given, s: all steps are that long (but for the last of a piece of the protocol), whatever
-  /// their error, and what is left unbalanced is still judged by the tolerance.
+  /// their error, and what is left unbalanced is still compared with the tolerance.
   std::optional<double> step_s = std::nullopt;
   /// If given, a run that takes more iterations throws Error(numerical).
   std::optional<int> most_iterations = std::nullopt;

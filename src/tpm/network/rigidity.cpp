@@ -28,10 +28,11 @@ BlockMatrix shifted(const BlockMatrix& stiffness, const Constraints& constraints
   return matrix;
 }
 
-double mean_diagonal(const BondSystem& bonds, const Positions& rest, const BondMemory& memory) {
+double mean_diagonal(const BondSystem& bonds, const Positions& rest,
+                     const ViscousState& viscous_state) {
   double sum = 0.0;
   for (std::size_t i = 0; i < bonds.size(); ++i) {
-    sum += 2.0 * bonds.stiffness_block(i, rest, memory).trace();
+    sum += 2.0 * bonds.stiffness_block(i, rest, viscous_state).trace();
   }
   return sum / (3.0 * static_cast<double>(bonds.spheres()));
 }
@@ -75,7 +76,7 @@ std::vector<std::size_t> spheres_that_move(const Eigen::MatrixXd& modes, std::si
 
 ZeroEnergyModes zero_energy_modes(const BondSystem& bonds, const Positions& rest,
                                   const Constraints& constraints) {
-  const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
+  const ViscousState none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 0.0};
   StiffnessBlocks blocks(bonds, constraints);
   const BlockMatrix& stiffness = blocks.assemble(rest, none);
   const double mean = mean_diagonal(bonds, rest, none);

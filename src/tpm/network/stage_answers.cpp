@@ -51,7 +51,7 @@ StageBalance::Within StageBalance::within(const TissueState& state,
   states.position.rowwise() += start_;
   LaneMatrix known;
   find_known(at.weights, begin_, known);
-  apply(at.weights, followed_, begin_, known, states.memory);
+  apply(at.weights, followed_, begin_, known, states.mean_viscous);
   states.weights = std::move(at.weights);
   return states;
 }
@@ -59,7 +59,7 @@ StageBalance::Within StageBalance::within(const TissueState& state,
 LaneVector StageBalance::responses(const Within& states) {
   force_.setZero();
   tissue_.add_load(states.imposed, force_);
-  bonds_.add_forces(states.position, states.memory, force_);
+  bonds_.add_forces(states.position, states.mean_viscous, force_);
   const LaneVector plain = tissue_.response(states.position, force_);
   tissue_.constraints().project(force_);
   return plain + tissue_.adjoint_sign() * (force_ * lane_field_.transpose());
@@ -108,7 +108,7 @@ LaneVector StageBalance::heat_W(const Within& states) const {
     }
     // V(l) = l, and the only branch is the viscous elongation: all lanes at once.
     const auto apart = elongation.middleCols(group.first, group.count) -
-                       states.memory.middleCols(group.first, group.count);
+                       states.mean_viscous.middleCols(group.first, group.count);
     heat += apart.cwiseAbs2() * relaxing.segment(group.first, group.count) /
             law.branches.front().relaxation_time_s;
   }

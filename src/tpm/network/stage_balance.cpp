@@ -15,12 +15,12 @@ constexpr double kFollowingChange = 0.45;  // likewise
 constexpr double kHopeless = 10.0;         // times the tolerance: an error that no balance mends
 constexpr int kLastHopeless = 2;           // iterations after which only the balance decides
 constexpr double kFurthestExtrapolation = 1.0;  // of the step before
-constexpr Eigen::Index kMemoryDepth = 6;
+constexpr Eigen::Index kAndersonDepth = 6;
 // How far what is driven may go at one step of a load: beyond, it may have snapped to another
 // place.
 constexpr double kLongestMove = 0.25;    // of a bond
 constexpr double kSnap = 2.0;            // times what the stiffness says
-constexpr double kGrains = 8.0;          // roundings of a coordinate that no balance gets below
+constexpr double kRoundings = 8.0;       // roundings of a coordinate that no balance gets below
 constexpr double kLeastBalance = 1e-12;  // of an equilibrium, in parts of the force
 
 std::vector<double> with_start(std::vector<double> nodes) {
@@ -43,7 +43,7 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
       full_(with_start(radau_nodes(stages))),
       inner_(radau_nodes(stages)),
       factor_(tissue.equilibrium()),
-      anderson_(coordinates_ * kLanes, kMemoryDepth),
+      anderson_(coordinates_ * kLanes, kAndersonDepth),
       x_(kLanes, coordinates_),
       d_(kLanes, coordinates_),
       force_(kLanes, coordinates_) {
@@ -51,13 +51,13 @@ StageBalance::StageBalance(DrivenTissue& tissue, int stages, bool choosing)
     lane_nodes_[static_cast<std::size_t>(lane)] = node(lane);
     stage_places_.push_back(full_.place(node(lane)));
   }
-  // The error is judged where outputs are taken from: at the stages, of which the last is more
+  // The error is measured where outputs are taken from: at the stages, of which the last is more
   // accurate than the others, and before the first of them, where a step that is long against the
   // relaxation time hides how the tissue settles after a change of rate.
-  std::vector<double> judged = inner_.nodes();
-  judged.push_back(0.25 * inner_.nodes().front());
-  judged.push_back(0.5 * inner_.nodes().front());
-  for (const double place : judged) {
+  std::vector<double> compared = inner_.nodes();
+  compared.push_back(0.25 * inner_.nodes().front());
+  compared.push_back(0.5 * inner_.nodes().front());
+  for (const double place : compared) {
     full_error_places_.push_back(full_.place(place));
     inner_error_places_.push_back(inner_.place(place));
   }
@@ -68,12 +68,12 @@ double StageBalance::node(int lane) const {
 }
 
 TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, double tolerance) {
-  const BondMemory memory{
+  const ViscousState viscous_state{
       relaxed ? Eigen::VectorXd(Eigen::VectorXd::Zero(state.mean.size())) : state.mean,
       relaxed ? 1.0 : 0.0};
   Positions position = state.position;
   tissue_.impose(position, imposed);
-  const std::optional<double> furthest_m = furthest_depth_change_m(state, memory, imposed);
+  const std::optional<double> furthest_m = furthest_depth_change_m(state, viscous_state, imposed);
   if (!furthest_m) return TissueMove::unbalanced;
   Eigen::Matrix3Xd load;
   tissue_.load(imposed, load);
@@ -81,7 +81,7 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
   // the rounding of positions decides.
   const double force_scale = tissue_.depth_driven() ? scale_ : std::abs(imposed);
   const EquilibriumSearch search = tissue_.equilibrium().find(
-      position, memory, load, std::max(tolerance, kLeastBalance) * force_scale);
+      position, viscous_state, load, std::max(tolerance, kLeastBalance) * force_scale);
   work_.factorisations += search.factorisations;
   work_.back_solves += search.iterations;
   factorised_ = false;
@@ -99,14 +99,14 @@ TissueMove StageBalance::move(TissueState& state, double imposed, bool relaxed, 
 }
 
 std::optional<double> StageBalance::furthest_depth_change_m(const TissueState& state,
-                                                            const BondMemory& memory,
+                                                            const ViscousState& viscous_state,
                                                             double imposed) {
   constexpr double kAny = std::numeric_limits<double>::infinity();
   if (tissue_.depth_driven() || imposed == state.imposed) return kAny;
   ++work_.factorisations;
-  if (!tissue_.equilibrium().factorise(state.position, memory)) return std::nullopt;
+  if (!tissue_.equilibrium().factorise(state.position, viscous_state)) return std::nullopt;
   const double expected =
-      std::abs((imposed - state.imposed) * tissue_.unit_field(state, memory).stiffness);
+      std::abs((imposed - state.imposed) * tissue_.unit_field(state, viscous_state).stiffness);
   const BondSystem& bonds = tissue_.bonds();
   const auto joined = static_cast<Eigen::Index>(bonds.first_contact());
   const double longest = kLongestMove * bonds.rest_length_m().head(joined).mean();
@@ -118,7 +118,7 @@ StageBalance::StepWeights StageBalance::weights_at(const Places& places,
                                                    std::span<const double> fractions,
                                                    double h) const {
   const std::span<const double> times = tissue_.bonds().relaxation_times_s();
-  std::vector<MemoryWeights> of_time(times.size());
+  std::vector<ViscousWeights> of_time(times.size());
   for (std::size_t t = 0; t < times.size(); ++t) {
     const double z = h / times[t];
     of_time[t].of_stages.setZero();
@@ -127,7 +127,7 @@ StageBalance::StepWeights StageBalance::weights_at(const Places& places,
       const Eigen::VectorXd weight = places[place].weights(z);
       of_time[t].of_start[lane] = weight[0];
       of_time[t].of_stages.row(lane).head(stages_) = weight.tail(stages_).transpose();
-      of_time[t].of_memory[lane] = std::exp(-z * fractions[place]);
+      of_time[t].of_viscous[lane] = std::exp(-z * fractions[place]);
     }
   }
   StepWeights weights;
@@ -135,12 +135,12 @@ StageBalance::StepWeights StageBalance::weights_at(const Places& places,
     LawWeights law;
     law.mean.of_stages.setZero();
     law.mean.of_start.setZero();
-    law.mean.of_memory.setZero();
+    law.mean.of_viscous.setZero();
     for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
-      const MemoryWeights& weight = of_time[branch.time];
+      const ViscousWeights& weight = of_time[branch.time];
       law.mean.of_stages += branch.share * weight.of_stages;
       law.mean.of_start += branch.share * weight.of_start;
-      law.mean.of_memory += branch.share * weight.of_memory;
+      law.mean.of_viscous += branch.share * weight.of_viscous;
       law.branch.push_back(weight);
     }
     weights.push_back(std::move(law));
@@ -174,7 +174,7 @@ void StageBalance::find_known(const StepWeights& weights, const Start& start,
     here.noalias() = law.mean.of_start * start.followed.segment(group.first, group.count);
     Eigen::Index j = 0;
     for (const ViscousLaw::Branch& branch : tissue_.bonds().laws()[group.law].branches) {
-      const LaneVector kept = branch.share * law.branch[static_cast<std::size_t>(j)].of_memory;
+      const LaneVector kept = branch.share * law.branch[static_cast<std::size_t>(j)].of_viscous;
       here.noalias() += kept * start.viscous.row(j).segment(group.first, group.count);
       ++j;
     }
@@ -203,12 +203,12 @@ void StageBalance::viscous_in_lane(const StepWeights& weights, const LaneMatrix&
   for (std::size_t i = 0; i < weights.size(); ++i) {
     const auto [law, first, count] = bonds_.groups()[i];
     for (std::size_t b = 0; b < weights[i].branch.size(); ++b) {
-      const MemoryWeights& weight = weights[i].branch[b];
+      const ViscousWeights& weight = weights[i].branch[b];
       const auto j = static_cast<Eigen::Index>(b);
       viscous.row(j).segment(first, count) =
           weight.of_stages.row(lane) * followed.middleCols(first, count) +
           weight.of_start[lane] * start.followed.segment(first, count) +
-          weight.of_memory[lane] * start.viscous.row(j).segment(first, count);
+          weight.of_viscous[lane] * start.viscous.row(j).segment(first, count);
     }
   }
 }
@@ -271,24 +271,24 @@ bool StageBalance::refactorise(const TissueState& state,
                                const RelaxationFactor& relaxation_factor) {
   relaxation_factor_ = relaxation_factor;
   // The same viscous elongations at this instant, of which a share follows.
-  const BondMemory memory =
-      tissue_.bonds().memory_at(state.mean, state.followed, relaxation_factor, state.closed);
+  const ViscousState viscous_state =
+      tissue_.bonds().viscous_state_at(state.mean, state.followed, relaxation_factor, state.closed);
   ++work_.factorisations;
   Equilibrium& equilibrium = tissue_.equilibrium();
-  factorised_ = equilibrium.factorise(state.position, memory) && equilibrium.is_stable();
+  factorised_ = equilibrium.factorise(state.position, viscous_state) && equilibrium.is_stable();
   if (!factorised_) return false;
   factor_.take();
-  const DrivenTissue::UnitField field = tissue_.unit_field(state, memory);
+  const DrivenTissue::UnitField field = tissue_.unit_field(state, viscous_state);
   path_stiffness_ = field.stiffness;
   lane_field_ = by_coordinate(field.displacement);
   ++work_.back_solves;
   Eigen::VectorXd change;
-  tissue_.bonds().elongation_changes(state.position, field.judge, change);
+  tissue_.bonds().elongation_changes(state.position, field.adjoint, change);
   adjoint_ =
       tissue_.adjoint_sign() * bonds_.of_relaxing(change.cwiseProduct(tissue_.bonds().relaxing()));
   rounding_ =
-      kGrains * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
-  if (tissue_.depth_driven()) rounding_ *= tissue_.held_stiffness(state.position, memory);
+      kRoundings * std::numeric_limits<double>::epsilon() * state.position.cwiseAbs().maxCoeff();
+  if (tissue_.depth_driven()) rounding_ *= tissue_.held_stiffness(state.position, viscous_state);
   last_iterations_ = 0;
   return true;
 }
@@ -325,16 +325,16 @@ void StageBalance::predict(const TissueState& state, double h, double rate) {
   tissue_.impose(x_, imposed_);
 }
 
-void StageBalance::update_memory() {
+void StageBalance::update_viscous() {
   bonds_.followed(x_, followed_);
-  apply(weights_, followed_, begin_, known_, memory_);
+  apply(weights_, followed_, begin_, known_, mean_viscous_);
 }
 
 void StageBalance::residuals() {
-  update_memory();
+  update_viscous();
   force_.setZero();
   tissue_.add_load(imposed_, force_);
-  bonds_.add_forces(x_, memory_, force_);
+  bonds_.add_forces(x_, mean_viscous_, force_);
   tissue_.constraints().project(force_);
   d_ = force_;
   factor_.solve(d_);
@@ -373,11 +373,11 @@ double StageBalance::error() const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(places);
   Eigen::VectorXd size = sum;
   for (const LaneBonds::Group& group : bonds_.groups()) {
-    const auto goal = adjoint_.segment(group.first, group.count);
+    const auto weight = adjoint_.segment(group.first, group.count);
     const auto followed = followed_.middleCols(group.first, group.count);
     const auto start = begin_.followed.segment(group.first, group.count);
-    const LaneVector aimed = followed * goal;
-    const double start_aimed = start * goal;
+    const LaneVector aimed = followed * weight;
+    const double start_aimed = start * weight;
     ErrorWeights mean;
     mean.of_stages.setZero(places, kLanes);
     mean.of_start.setZero(places);
@@ -390,7 +390,7 @@ double StageBalance::error() const {
     }
     Eigen::MatrixXd change = mean.of_stages * followed;
     change.noalias() += mean.of_start * start;
-    size += change.cwiseAbs() * goal.cwiseAbs();
+    size += change.cwiseAbs() * weight.cwiseAbs();
   }
   return (sum + 0.1 * size).maxCoeff();
 }
@@ -419,7 +419,7 @@ StepOutcome StageBalance::try_step(const TissueState& state, double h, double ra
     factorised_ = false;
     return outcome;
   }
-  if (balanced == Balance::found) update_memory();
+  if (balanced == Balance::found) update_viscous();
   outcome.error = std::max(error(), 1e-12 * outcome.allowed);
   outcome.accepted =
       balanced == Balance::found && outcome.error <= std::max(outcome.allowed, rounding_);

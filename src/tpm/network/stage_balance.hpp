@@ -108,8 +108,8 @@ class StageBalance {
 
   /// How the viscous elongations of one law follow over a step, lane by lane.
   struct LawWeights {
-    MemoryWeights mean;                 ///< of_memory only where there is one branch
-    std::vector<MemoryWeights> branch;  ///< one for each branch
+    ViscousWeights mean;                 ///< of_viscous only where there is one branch
+    std::vector<ViscousWeights> branch;  ///< one for each branch
   };
   using Places = std::vector<ExponentialCollocation::Place>;  ///< one per lane
   /// One for each group of relaxing bonds.
@@ -152,7 +152,7 @@ class StageBalance {
   /// States within a step, one per lane.
   struct Within {
     LaneVector imposed;
-    LaneMatrix position, memory;
+    LaneMatrix position, mean_viscous;
     StepWeights weights;
   };
   [[nodiscard]] Within within(const TissueState& state, std::span<const double> fractions, double h,
@@ -165,7 +165,7 @@ class StageBalance {
   /// snapped to another place; infinite where the depth is imposed or the load stays, none if the
   /// stiffness says already that it would go too far, or has no inverse and says nothing.
   [[nodiscard]] std::optional<double> furthest_depth_change_m(const TissueState& state,
-                                                              const BondMemory& memory,
+                                                              const ViscousState& viscous_state,
                                                               double imposed);
 
   enum class Balance { found, hopeless, failed };
@@ -182,7 +182,7 @@ class StageBalance {
   [[nodiscard]] Balance balance(double tolerance);
   /// The forces left on the free spheres of every stage, and from them the next correction.
   void residuals();
-  void update_memory();
+  void update_viscous();
   /// Gap of a contact at a fraction of the step just balanced, m.
   [[nodiscard]] double gap_m(const ToolContact& contact, double fraction) const;
   /// Estimate for the stages as they are, in the unit of the response.
@@ -197,7 +197,7 @@ class StageBalance {
   ExponentialCollocation inner_;  ///< through the stages alone
   Places stage_places_;           ///< of full_, where the lanes stand
   std::array<double, kLanes> lane_nodes_{};
-  Places full_error_places_, inner_error_places_;  ///< where the error is judged
+  Places full_error_places_, inner_error_places_;  ///< where the error is measured
   LaneStiffness factor_;
   Anderson anderson_;
   QuasiStaticWork work_;
@@ -218,13 +218,13 @@ class StageBalance {
   Eigen::RowVectorXd start_;  ///< positions where it begins, by coordinate
   Start begin_;
   LaneMatrix x_, d_, force_;
-  LaneMatrix followed_, memory_;  ///< of relaxing bonds
-  LaneMatrix known_;              ///< find_known()
+  LaneMatrix followed_, mean_viscous_;  ///< of relaxing bonds
+  LaneMatrix known_;                    ///< find_known()
   StepWeights weights_;
   LaneVector imposed_;
   /// What tells the two collocations apart, for one relaxation time.
   struct ErrorWeights {
-    Eigen::Matrix<double, Eigen::Dynamic, kLanes> of_stages;  ///< by (place judged, stage)
+    Eigen::Matrix<double, Eigen::Dynamic, kLanes> of_stages;  ///< by (place measured, stage)
     Eigen::VectorXd of_start;
   };
   std::vector<ErrorWeights> error_weights_;  ///< of each relaxation time of the system

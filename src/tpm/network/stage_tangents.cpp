@@ -8,7 +8,7 @@ namespace tpm::organ {
 namespace {
 
 constexpr int kMostTangentIterations = 60;
-constexpr Eigen::Index kTangentMemoryDepth = 8;
+constexpr Eigen::Index kTangentAndersonDepth = 8;
 
 }  // namespace
 
@@ -17,7 +17,7 @@ StageTangents::StageTangents(DrivenTissue& tissue, StageBalance& balance,
     : tissue_(tissue),
       balance_(balance),
       tolerance_(tolerance),
-      anderson_(kLanes * balance.coordinates_, kTangentMemoryDepth) {
+      anderson_(kLanes * balance.coordinates_, kTangentAndersonDepth) {
   const std::span<const ViscousLaw> laws = tissue.bonds().laws();
   for (const TangentDirection& direction : directions) {
     Tangent tangent;
@@ -58,10 +58,10 @@ StageTangents::Stages StageTangents::stages_at(const StageBalance::Places& place
       const auto j = static_cast<Eigen::Index>(b);
       const auto start = balance_.begin_.viscous.row(j).segment(first, count);
       aging.push_back(balance_.aging(places, fractions, h, i, b));
-      const MemoryWeights& weight = stages.weights[i].branch[b];
+      const ViscousWeights& weight = stages.weights[i].branch[b];
       LaneMatrix m = weight.of_stages * balance_.followed_.middleCols(first, count);
       m.noalias() += weight.of_start * balance_.begin_.followed.segment(first, count);
-      m.noalias() += weight.of_memory * start;
+      m.noalias() += weight.of_viscous * start;
       viscous.push_back(std::move(m));
     }
     stages.aging.push_back(std::move(aging));
@@ -73,7 +73,7 @@ StageTangents::Stages StageTangents::stages_at(const StageBalance::Places& place
 StageTangents::Stages StageTangents::stages_of_step(double h) const {
   Stages stages = stages_at(balance_.stage_places_, balance_.lane_nodes(), h);
   stages.position = balance_.x_;
-  stages.mean = balance_.memory_;
+  stages.mean = balance_.mean_viscous_;
   stages.imposed = balance_.imposed_;
   return stages;
 }
@@ -85,14 +85,14 @@ StageTangents::Stages StageTangents::instantaneous(const TissueState& state, boo
   const StageBalance::Start start = balance_.start_of(state);
   stages.mean = start.mean.replicate(kLanes, 1);
   stages.imposed.setConstant(state.imposed);
-  MemoryWeights weight;
+  ViscousWeights weight;
   weight.of_stages.setZero();
   if (relaxed) weight.of_stages.setIdentity();
   weight.of_start.setZero();
-  weight.of_memory.setConstant(relaxed ? 0.0 : 1.0);
+  weight.of_viscous.setConstant(relaxed ? 0.0 : 1.0);
   for (const LaneBonds::Group& group : balance_.bonds_.groups()) {
     const std::size_t branches = tissue_.bonds().laws()[group.law].branches.size();
-    stages.weights.push_back({weight, std::vector<MemoryWeights>(branches, weight)});
+    stages.weights.push_back({weight, std::vector<ViscousWeights>(branches, weight)});
     stages.aging.emplace_back(branches, LaneMatrix::Zero(kLanes, group.count));
     std::vector<LaneMatrix> viscous;
     for (std::size_t b = 0; b < branches; ++b) {
@@ -119,7 +119,7 @@ void StageTangents::prepare(Tangent& tangent, const Stages& stages) const {
   }
 }
 
-void StageTangents::update_memory(Tangent& tangent, const Stages& stages) const {
+void StageTangents::update_viscous(Tangent& tangent, const Stages& stages) const {
   balance_.bonds_.followed_changes(stages.position, tangent.position, tangent.laws,
                                    tangent.followed);
   balance_.apply(stages.weights, tangent.followed, tangent.begin, tangent.known, tangent.mean);
@@ -143,7 +143,7 @@ void StageTangents::solve(Tangent& tangent, const Stages& stages) {
   anderson_.restart();
   const double allowed = std::max(tolerance_ * balance_.scale_, balance_.rounding_);
   for (int i = 0; i < kMostTangentIterations; ++i) {
-    update_memory(tangent, stages);
+    update_viscous(tangent, stages);
     force_changes(tangent, stages, tangent.position, tangent.mean);
     constraints.project(force_);
     d_ = force_;
@@ -153,7 +153,7 @@ void StageTangents::solve(Tangent& tangent, const Stages& stages) {
     if (!std::isfinite(energy)) break;
     if (std::sqrt(std::max(energy, 0.0) * balance_.path_stiffness_) <= allowed) {
       tangent.position += d_;
-      update_memory(tangent, stages);
+      update_viscous(tangent, stages);
       return;
     }
     anderson_.step(flat(tangent.position), flat(d_));
@@ -219,7 +219,7 @@ Eigen::MatrixXd StageTangents::responses_within(const TissueState& state,
   const StageBalance::Within within = balance_.within(state, fractions, h, rate);
   Stages stages = stages_at(places, fractions, h);
   stages.position = within.position;
-  stages.mean = within.memory;
+  stages.mean = within.mean_viscous;
   stages.imposed = within.imposed;
   const LaneSquare interpolation = balance_.shapes(fractions, h).interpolation;
   Eigen::MatrixXd answer(static_cast<Eigen::Index>(fractions.size()), count());

@@ -62,7 +62,7 @@ class StageTangents {
   [[nodiscard]] Stages instantaneous(const TissueState& state, bool relaxed) const;
   void prepare(Tangent& tangent, const Stages& stages) const;
   void solve(Tangent& tangent, const Stages& stages);
-  void update_memory(Tangent& tangent, const Stages& stages) const;
+  void update_viscous(Tangent& tangent, const Stages& stages) const;
   /// Change of all forces, loads included.
   void force_changes(const Tangent& tangent, const Stages& stages, const LaneMatrix& position,
                      const LaneMatrix& mean);

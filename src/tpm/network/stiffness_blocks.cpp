@@ -17,10 +17,11 @@ StiffnessBlocks::StiffnessBlocks(const BondSystem& bonds, const Constraints& con
       graph_(moving_graph(bonds, constraints)),
       matrix_(graph_->pattern) {}
 
-const BlockMatrix& StiffnessBlocks::assemble(const Positions& position, const BondMemory& memory) {
+const BlockMatrix& StiffnessBlocks::assemble(const Positions& position,
+                                             const ViscousState& viscous_state) {
   matrix_.set_zero();
   for (std::size_t i = 0; i < bonds_.size(); ++i) {
-    const Eigen::Matrix3d block = bonds_.stiffness_block(i, position, memory);
+    const Eigen::Matrix3d block = bonds_.stiffness_block(i, position, viscous_state);
     const std::uint32_t a = bonds_.end_a()[i];
     const std::uint32_t b = bonds_.end_b()[i];
     matrix_.diagonal[a] += block;

@@ -11,7 +11,7 @@ class StiffnessBlocks {
   StiffnessBlocks(const BondSystem& bonds, const Constraints& constraints);
 
   /// The matrix at a position; the one before is overwritten.
-  const BlockMatrix& assemble(const Positions& position, const BondMemory& memory);
+  const BlockMatrix& assemble(const Positions& position, const ViscousState& viscous_state);
   [[nodiscard]] const BlockPattern& pattern() const { return graph_->pattern; }
 
  private:

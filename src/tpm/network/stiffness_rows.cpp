@@ -59,10 +59,10 @@ StiffnessRows::StiffnessRows(const BondSystem& bonds, const Constraints& constra
 }
 
 const BlockRows<3, 3>& StiffnessRows::assemble(const Positions& position,
-                                               const BondMemory& memory) {
+                                               const ViscousState& viscous_state) {
   std::fill(matrix_.block.begin(), matrix_.block.end(), Eigen::Matrix3d::Zero());
   for (std::size_t i = 0; i < bonds_.size(); ++i) {
-    const Eigen::Matrix3d block = bonds_.stiffness_block(i, position, memory);
+    const Eigen::Matrix3d block = bonds_.stiffness_block(i, position, viscous_state);
     matrix_.block[diagonal_[bonds_.end_a()[i]]] += block;
     matrix_.block[diagonal_[bonds_.end_b()[i]]] += block;
     if (off_diagonal_[i].ab == kNone) continue;

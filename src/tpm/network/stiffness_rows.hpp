@@ -12,7 +12,7 @@ class StiffnessRows {
   StiffnessRows(const BondSystem& bonds, const Constraints& constraints);
 
   /// The matrix at a position; the one before is overwritten.
-  const BlockRows<3, 3>& assemble(const Positions& position, const BondMemory& memory);
+  const BlockRows<3, 3>& assemble(const Positions& position, const ViscousState& viscous_state);
   [[nodiscard]] const BlockRows<3, 3>& matrix() const { return matrix_; }
 
  private:

@@ -50,42 +50,42 @@ class Bench {
         constraints_(network_.organ.size()),
         equilibrium_(bonds_, constraints_),
         factor_(equilibrium_.pattern()),
-        memory_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0, {}} {
+        viscous_state_{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 0.0, {}} {
     const Eigen::RowVectorXd height = network_.organ.position.row(2);
     const double middle = height.mean();
     for (std::size_t i = 0; i < constraints_.size(); ++i) {
-      if (height[static_cast<Eigen::Index>(i)] > middle) constraints_.hold(i);
+      if (height[static_cast<Eigen::Index>(i)] > middle) constraints_.fix(i);
     }
   }
 
   [[nodiscard]] double bond_force_s() {
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest().cols());
-    return time_of([&] { bonds_.add_forces(rest(), memory_, force); }) / bonds();
+    return time_of([&] { bonds_.add_forces(rest(), viscous_state_, force); }) / bonds();
   }
 
   [[nodiscard]] double bond_stiffness_s() {
     BlockMatrix matrix(bonds_.pattern());
     return time_of([&] {
              matrix.set_zero();
-             bonds_.add_stiffness(rest(), memory_, matrix);
+             bonds_.add_stiffness(rest(), viscous_state_, matrix);
            }) /
            bonds();
   }
 
   [[nodiscard]] double factor_product_s(double stiffness_s) {
-    const double whole = time_of([&] { (void)equilibrium_.factorise(rest(), memory_); });
+    const double whole = time_of([&] { (void)equilibrium_.factorise(rest(), viscous_state_); });
     const auto products = static_cast<double>(equilibrium_.pattern().factor_products());
     return std::max(whole - stiffness_s * bonds(), 0.1 * whole) / products;
   }
 
   [[nodiscard]] double solve_block_s() {
-    (void)equilibrium_.factorise(rest(), memory_);
+    (void)equilibrium_.factorise(rest(), viscous_state_);
     Eigen::Matrix3Xd x = Eigen::Matrix3Xd::Ones(3, rest().cols());
     return time_of([&] { equilibrium_.factor()->solve(x); }) / solved_blocks();
   }
 
   [[nodiscard]] double lane_block_s() {
-    (void)equilibrium_.factorise(rest(), memory_);
+    (void)equilibrium_.factorise(rest(), viscous_state_);
     factor_.copy(*equilibrium_.factor());
     LaneMatrix x = LaneMatrix::Ones(kLanes, 3 * rest().cols());
     return time_of([&] { factor_.solve(x); }) / solved_blocks();
@@ -189,7 +189,7 @@ class Bench {
   Constraints constraints_;
   Equilibrium equilibrium_;
   LaneFactor factor_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
 };
 
 double panel_product_s() {
@@ -215,10 +215,10 @@ double dense_flop_s() {
 /// A step of a scalar model with `branches` exponentials.
 double scalar_step_s(int branches) {
   std::vector<ScalarBranch> list(static_cast<std::size_t>(branches), {1.0, 10.0});
-  DepthCurve relaxed, relaxing;
-  relaxed.stiffness_N_per_m = 100.0;
+  DepthCurve equilibrium, relaxing;
+  equilibrium.stiffness_N_per_m = 100.0;
   relaxing.stiffness_N_per_m = 50.0;
-  ScalarModel model(std::move(relaxed), std::move(relaxing), std::move(list), 1e-3);
+  ScalarModel model(std::move(equilibrium), std::move(relaxing), std::move(list), 1e-3);
   double depth = 0.0;
   return time_of([&] {
     depth = depth > 1e-3 ? 0.0 : depth + 1e-6;

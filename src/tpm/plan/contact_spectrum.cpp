@@ -88,12 +88,12 @@ struct BranchFit {
 BranchFit fit_shares(const ContactSpectrum& spectrum, const std::vector<double>& times_s) {
   const auto rows = static_cast<Eigen::Index>(spectrum.per_rate_s.size());
   const auto columns = static_cast<Eigen::Index>(times_s.size());
-  const double whole = spectrum.instantaneous() - spectrum.relaxed();
+  const double whole = spectrum.instantaneous() - spectrum.equilibrium();
   Eigen::MatrixXd a(rows, columns);
   Eigen::VectorXd b(rows);
   for (Eigen::Index i = 0; i < rows; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    b[i] = (spectrum.stiffness_N_per_m[k] - spectrum.relaxed()) / whole;
+    b[i] = (spectrum.stiffness_N_per_m[k] - spectrum.equilibrium()) / whole;
     for (Eigen::Index j = 0; j < columns; ++j) {
       a(i, j) = remaining(spectrum.per_rate_s[k], times_s[static_cast<std::size_t>(j)]);
     }
@@ -159,18 +159,18 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
   std::vector<double> stiffness_of_theta;
   for (int i = 0; i < kThetas; ++i) {
     const double theta = 0.5 * (1.0 - std::cos(std::numbers::pi * i / (kThetas - 1)));
-    const BondMemory memory{rest.mean, theta, rest.closed};
-    if (!tissue.equilibrium().factorise(rest.position, memory) ||
+    const ViscousState viscous_state{rest.mean, theta, rest.closed};
+    if (!tissue.equilibrium().factorise(rest.position, viscous_state) ||
         !tissue.equilibrium().is_stable()) {
       throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");
     }
-    const DrivenTissue::UnitField unit = tissue.unit_field(rest, memory);
+    const DrivenTissue::UnitField unit = tissue.unit_field(rest, viscous_state);
     double per_depth = 1.0;
     double stiffness =
         1.0 / unit.stiffness;  // under a load the work of the unit field is the compliance
     if (tissue.depth_driven()) {
       Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, rest.position.cols());
-      driven.bonds.add_stiffness_times(rest.position, memory, unit.displacement, force);
+      driven.bonds.add_stiffness_times(rest.position, viscous_state, unit.displacement, force);
       stiffness = -tissue.response(rest.position, force);
     } else {
       per_depth = stiffness;
@@ -187,7 +187,7 @@ ContactSpectrum contact_spectrum(const PlanScene& scene) {
 }
 
 std::vector<ScalarBranch> fitted_branches(const ContactSpectrum& spectrum, int most) {
-  if (!(spectrum.instantaneous() - spectrum.relaxed() > 1e-12 * spectrum.instantaneous()))
+  if (!(spectrum.instantaneous() - spectrum.equilibrium() > 1e-12 * spectrum.instantaneous()))
     return {};
   BranchFit best;
   std::vector<double> times_s;

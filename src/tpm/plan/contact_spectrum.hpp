@@ -19,7 +19,7 @@ struct ContactSpectrum {
   Eigen::Matrix3Xd field_instantaneous, field_relaxed;
 
   [[nodiscard]] double instantaneous() const { return stiffness_N_per_m.front(); }
-  [[nodiscard]] double relaxed() const { return stiffness_N_per_m.back(); }
+  [[nodiscard]] double equilibrium() const { return stiffness_N_per_m.back(); }
 };
 
 /// One factorisation of the stiffness for each of a dozen theta; with several branches a polynomial

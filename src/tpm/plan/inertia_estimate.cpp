@@ -28,7 +28,7 @@ class Lanczos {
         rest_(rest),
         constraints_(constraints),
         root_(mass_kg.cwiseSqrt().transpose().replicate(3, 1).reshaped()),
-        memory_{rest.mean, relaxation_factor, rest.closed} {}
+        viscous_state_{rest.mean, relaxation_factor, rest.closed} {}
 
   /// @param field displacements, m
   [[nodiscard]] std::vector<SeenMode> modes(Eigen::Matrix3Xd field) const {
@@ -67,7 +67,7 @@ class Lanczos {
   [[nodiscard]] Eigen::VectorXd apply(const Eigen::VectorXd& q) const {
     const Eigen::Matrix3Xd x = q.cwiseQuotient(root_).reshaped(3, q.size() / 3);
     Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, x.cols());
-    bonds_.add_stiffness_times(rest_.position, memory_, x, force);
+    bonds_.add_stiffness_times(rest_.position, viscous_state_, x, force);
     constraints_.project(force);
     return force.reshaped().cwiseQuotient(root_);
   }
@@ -76,7 +76,7 @@ class Lanczos {
   const TissueState& rest_;
   const Constraints& constraints_;
   Eigen::VectorXd root_;
-  BondMemory memory_;
+  ViscousState viscous_state_;
 };
 
 /// Responses of a damped mode to a unit impulse: q, its integral, its rate.
@@ -192,14 +192,14 @@ InertiaModes inertia_modes(const PlanScene& scene) {
   DrivenTissue tissue(driven.bonds, driven.rest, driven.constraints, driven.probes,
                       scene.protocol().drive());
   const TissueState rest = tissue.at_rest(0.0);
-  const BondMemory memory{rest.mean, lowest.relaxation_factor, rest.closed};
-  if (!tissue.equilibrium().factorise(rest.position, memory)) {
+  const ViscousState viscous_state{rest.mean, lowest.relaxation_factor, rest.closed};
+  if (!tissue.equilibrium().factorise(rest.position, viscous_state)) {
     throw Error(ExitCode::numerical, "network", "its stiffness at rest is not positive", "");
   }
   InertiaModes found;
   found.modes = without_ringing_contacts(
       Lanczos(scene, rest, tissue.constraints(), mass, lowest.relaxation_factor)
-          .modes(tissue.unit_field(rest, memory).displacement),
+          .modes(tissue.unit_field(rest, viscous_state).displacement),
       driven.bonds, mass);
   found.lowest_Hz = lowest.frequency_Hz;
   found.alpha_per_s = alpha;

@@ -23,7 +23,7 @@ class LayeredCandidate : public PlanModel {
     const Organ& organ = surrogate.scene().network().organ;
     for (const SceneContact& contact : surrogate.scene().scene().contacts) {
       if (layers_ == 0 || organ.layer[contact.probe.sphere] < layers_) continue;
-      return "a contact lies in a layer that would be held";
+      return "a contact lies in a layer that would be fixed";
     }
     return std::nullopt;
   }

@@ -18,7 +18,7 @@ constexpr const char* kSeconds = "seconds_per_operation";
 }  // namespace
 
 const std::array<OperationEntry, kOperations>& operation_table() {
-  // Round figures by judgement, not measured: for a choice that repeats where nothing was
+  // Round figures, estimated, not measured: for a choice that repeats where nothing was
   // calibrated.
   static constexpr std::array<OperationEntry, kOperations> kTable{{
       {Operation::scalar_step, "scalar_step", 5e-9},

@@ -47,7 +47,7 @@ PlanRelevance relevance_of_viscosity(const PlanSurrogate& surrogate) {
   if (relaxed.error && elastic.error) {
     const double of_relaxed = *relaxed.error, of_elastic = *elastic.error;
     PlanRelevance& less = of_relaxed <= of_elastic ? relaxed : elastic;
-    less.note = fmt::format("everything relaxed at once: {} % of the peak; nothing relaxing: {} %",
+    less.note = fmt::format("everything at equilibrium: {} % of the peak; nothing relaxing: {} %",
                             significant(100.0 * of_relaxed, 3), significant(100.0 * of_elastic, 3));
     return less;
   }
@@ -66,7 +66,7 @@ PlanRelevance relevance_of_layers(const PlanSurrogate& surrogate) {
   if (moving < 2) {
     return {"layers", std::nullopt, false, false, "only the outer layer moves"};
   }
-  return switched_off(surrogate, "layers", fmt::format("layer {} held", moving),
+  return switched_off(surrogate, "layers", fmt::format("layer {} fixed", moving),
                       [&](const PlanScene& scene) { return scene.with_layers(moving - 1); });
 }
 
@@ -90,7 +90,7 @@ PlanRelevance relevance_of_inertia(const PlanSurrogate& surrogate) {
     }
     if (estimate.of_jumps > 0.0) {
       const double peak = surrogate.coarse().response.cwiseAbs().maxCoeff();
-      result.note += fmt::format("; a load put on at once would ring by {} % of the peak",
+      result.note += fmt::format("; a load step would ring by {} % of the peak",
                                  significant(100.0 * estimate.of_jumps / peak, 3));
       return result;
     }
@@ -109,7 +109,7 @@ PlanRelevance relevance_of_inertia(const PlanSurrogate& surrogate) {
     result.note.clear();
   } catch (const Error& error) {
     result.error.reset();
-    result.note = fmt::format("not judged: {}", error.what());
+    result.note = fmt::format("not compared: {}", error.what());
   }
   return result;
 }

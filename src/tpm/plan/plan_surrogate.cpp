@@ -128,10 +128,10 @@ const ContactCurves& PlanSurrogate::curves() const {
     for (const double depth : coarse().response) see(depth);
   }
   ContactCurves curves;
-  curves.relaxed = static_curve(scene_, least, most, Relaxed::all, most_iterations_);
+  curves.equilibrium = static_curve(scene_, least, most, Relaxed::all, most_iterations_);
   curves.relaxing = static_curve(scene_, least, most, Relaxed::nothing, most_iterations_);
-  for (std::size_t i = 0; i < curves.relaxed.force_N.size(); ++i) {
-    curves.relaxing.force_N[i] -= curves.relaxed.force_N[i];
+  for (std::size_t i = 0; i < curves.equilibrium.force_N.size(); ++i) {
+    curves.relaxing.force_N[i] -= curves.equilibrium.force_N[i];
   }
   curves_ = std::move(curves);
   return *curves_;

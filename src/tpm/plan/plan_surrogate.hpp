@@ -9,7 +9,7 @@ namespace tpm::organ {
 
 /// The static force of a contact over its depths: at equilibrium, and the relaxing part.
 struct ContactCurves {
-  DepthCurve relaxed, relaxing;
+  DepthCurve equilibrium, relaxing;
 };
 
 /// What the claims about a scene are made from: coarse runs of its network at few times, its linear
@@ -30,7 +30,8 @@ class PlanSurrogate {
 
   /// The network without masses, by collocation at a tolerance, at times().
   [[nodiscard]] const Trajectory& collocation(double tolerance) const;
-  /// That at the surrogate's own tolerance, by which models are judged before they are verified.
+  /// That at the surrogate's own tolerance, with which models are compared before they are
+  /// verified.
   [[nodiscard]] const Trajectory& coarse() const;
   /// Where a run at ten times its tolerance leaves the model's limits.
   [[nodiscard]] const Validity& validity() const { return rough().validity; }

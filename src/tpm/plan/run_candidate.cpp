@@ -7,7 +7,7 @@
 namespace tpm::organ {
 namespace {
 
-/// A formulation as it runs scenes, judged by the coarse run of the network.
+/// A formulation as it runs scenes, compared with the coarse run of the network.
 class RunCandidate final : public PlanModel {
  public:
   explicit RunCandidate(const Formulation& formulation)

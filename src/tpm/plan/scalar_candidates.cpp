@@ -32,7 +32,7 @@ class ScalarCandidate : public PlanModel {
       const PlanSurrogate& surrogate, std::span<const double> periods_s) const override {
     constexpr double kRange = 1.05;  // as of other contact models
     const ContactSpectrum& spectrum = surrogate.spectrum();
-    const ScalarContact::Range range{spectrum.instantaneous(), spectrum.relaxed(),
+    const ScalarContact::Range range{spectrum.instantaneous(), spectrum.equilibrium(),
                                      kRange * surrogate.scene().protocol().peak()};
     std::vector<std::unique_ptr<ContactModel>> models;
     for (const double period_s : periods_s) {
@@ -124,12 +124,12 @@ class ElementCandidate final : public LinearCandidate {
     const ContactSpectrum& spectrum = surrogate.spectrum();
     const Tissue& tissue = surrogate.scene().scene().tissue;
     const BondMaterial& material = tissue.materials.materials.front();
-    DepthCurve relaxed{
-        .stiffness_N_per_m = spectrum.relaxed(),
+    DepthCurve equilibrium{
+        .stiffness_N_per_m = spectrum.equilibrium(),
         .tension_N_per_m = 2.0 * material.lateral_Pa * material.modulus_to_stiffness_m(),
         .spacing_m = tissue.network.organ.spacing};
-    return {std::move(relaxed),
-            {.stiffness_N_per_m = spectrum.instantaneous() - spectrum.relaxed()},
+    return {std::move(equilibrium),
+            {.stiffness_N_per_m = spectrum.instantaneous() - spectrum.equilibrium()},
             fitted_branches(spectrum, 1),
             1.0};
   }

@@ -10,8 +10,8 @@ class ScalarContact final : public ContactModel {
  public:
   /// What is known of the contact it stands for.
   struct Range {
-    double instantaneous_N_per_m = 0.0, relaxed_N_per_m = 0.0;  ///< stiffness at rest
-    double deepest_m = 0.0;                                     ///< answers beyond are not trusted
+    double instantaneous_N_per_m = 0.0, equilibrium_N_per_m = 0.0;  ///< stiffness at rest
+    double deepest_m = 0.0;  ///< answers beyond are not trusted
   };
   /// @param into_tissue unit vector
   ScalarContact(ScalarModel model, const Eigen::Vector3d& into_tissue, const Range& range,
@@ -23,8 +23,8 @@ class ScalarContact final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return range_.instantaneous_N_per_m * (into_ * into_.transpose());
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
-    return range_.relaxed_N_per_m * (into_ * into_.transpose());
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return range_.equilibrium_N_per_m * (into_ * into_.transpose());
   }
 
  private:

@@ -26,9 +26,9 @@ double DepthCurve::operator()(double depth_m) const {
          f[2] * s * (s - 1) * (s - 3) / 2.0 + f[3] * s * (s - 1) * (s - 2) / 6.0;
 }
 
-ScalarModel::ScalarModel(DepthCurve relaxed, DepthCurve relaxing,
+ScalarModel::ScalarModel(DepthCurve equilibrium, DepthCurve relaxing,
                          std::vector<ScalarBranch> branches, double period_s)
-    : relaxed_(std::move(relaxed)),
+    : equilibrium_(std::move(equilibrium)),
       relaxing_(std::move(relaxing)),
       branches_(std::move(branches)),
       weights_(branches_.size()),
@@ -39,7 +39,7 @@ ScalarModel::ScalarModel(DepthCurve relaxed, DepthCurve relaxing,
 
 void ScalarModel::set_period(double period_s) {
   for (std::size_t i = 0; i < branches_.size(); ++i) {
-    // Memory of a quantity that is linear over the step, exact for every h/tau.
+    // Viscous state of a quantity that is linear over the step, exact for every h/tau.
     const double z = period_s / branches_[i].time_s;
     const double lost = -std::expm1(-z);  // 1 - exp(-z)
     const double mean = z < 1e-5 ? 1.0 - 0.5 * z : lost / z;
@@ -55,11 +55,11 @@ void ScalarModel::settle(double depth_m) {
 
 double ScalarModel::force_at(double depth_m, const std::vector<Weights>& weights) const {
   const double end_N = relaxing_(depth_m);
-  double force = relaxed_(depth_m);
+  double force = equilibrium_(depth_m);
   for (std::size_t i = 0; i < branches_.size(); ++i) {
     const Weights& w = weights[i];
-    const double memory = w.memory * viscous_[i] + w.start * start_N_ + w.end * end_N;
-    force += branches_[i].share * (end_N - memory);
+    const double viscous = w.viscous * viscous_[i] + w.start * start_N_ + w.end * end_N;
+    force += branches_[i].share * (end_N - viscous);
   }
   return force;
 }
@@ -68,7 +68,7 @@ void ScalarModel::accept(double depth_m, const std::vector<Weights>& weights) {
   const double end_N = relaxing_(depth_m);
   for (std::size_t i = 0; i < branches_.size(); ++i) {
     const Weights& w = weights[i];
-    viscous_[i] = w.memory * viscous_[i] + w.start * start_N_ + w.end * end_N;
+    viscous_[i] = w.viscous * viscous_[i] + w.start * start_N_ + w.end * end_N;
   }
   depth_m_ = depth_m;
   start_N_ = end_N;

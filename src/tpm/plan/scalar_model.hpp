@@ -33,7 +33,7 @@ struct ScalarBranch {
 class ScalarModel {
  public:
   /// @param period_s of a step, > 0
-  ScalarModel(DepthCurve relaxed, DepthCurve relaxing, std::vector<ScalarBranch> branches,
+  ScalarModel(DepthCurve equilibrium, DepthCurve relaxing, std::vector<ScalarBranch> branches,
               double period_s);
 
   /// Relaxed at a depth.
@@ -55,13 +55,13 @@ class ScalarModel {
 
  private:
   struct Weights {
-    double memory = 0.0, start = 0.0, end = 0.0;
+    double viscous = 0.0, start = 0.0, end = 0.0;
   };
   [[nodiscard]] double force_at(double depth_m, const std::vector<Weights>& weights) const;
   [[nodiscard]] double depth_under(double load_N, const std::vector<Weights>& weights) const;
   void accept(double depth_m, const std::vector<Weights>& weights);
 
-  DepthCurve relaxed_, relaxing_;
+  DepthCurve equilibrium_, relaxing_;
   std::vector<ScalarBranch> branches_;
   std::vector<Weights> weights_, instantaneous_;
   std::vector<double> viscous_;

@@ -6,15 +6,15 @@
 
 namespace tpm::organ {
 ScalarModel linear_contact(const ContactSpectrum& spectrum, int branches) {
-  return {{.stiffness_N_per_m = spectrum.relaxed()},
-          {.stiffness_N_per_m = spectrum.instantaneous() - spectrum.relaxed()},
+  return {{.stiffness_N_per_m = spectrum.equilibrium()},
+          {.stiffness_N_per_m = spectrum.instantaneous() - spectrum.equilibrium()},
           fitted_branches(spectrum, branches),
           1.0};
 }
 
 ScalarModel curves_contact(const ContactCurves& curves, const ContactSpectrum& spectrum,
                            int branches) {
-  return {curves.relaxed, curves.relaxing, fitted_branches(spectrum, branches), 1.0};
+  return {curves.equilibrium, curves.relaxing, fitted_branches(spectrum, branches), 1.0};
 }
 
 ScalarRun::ScalarRun(const Protocol& protocol, ScalarModel model, double longest_step_s,

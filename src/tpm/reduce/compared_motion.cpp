@@ -62,7 +62,7 @@ class Reference {
 
  private:
   static Constraints guided(Constraints constraints, const Probes& probes) {
-    for (const Probe& probe : probes) constraints.guide(probe.sphere, probe.direction);
+    for (const Probe& probe : probes) constraints.slide(probe.sphere, probe.direction);
     return constraints;
   }
 

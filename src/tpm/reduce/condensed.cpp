@@ -124,27 +124,27 @@ void CondensedContact::reset() noexcept {
   kept_ = 0;
 }
 
-CondensedMemory CondensedContact::memory() const noexcept {
-  return {Eigen::Vector3d::Map(&state_.memory[0]), Eigen::Vector3d::Map(&state_.memory[4]),
+CondensedViscousState CondensedContact::viscous_state() const noexcept {
+  return {Eigen::Vector3d::Map(&state_.viscous[0]), Eigen::Vector3d::Map(&state_.viscous[4]),
           several() ? of_branches_.spread_J() : 0.0};
 }
 
 double CondensedContact::stored_energy_J(const Eigen::Vector3d& displacement_m,
-                                         const CondensedMemory& memory) const noexcept {
-  return value_of(displacement_m, memory).energy_J + memory.spread_J;
+                                         const CondensedViscousState& viscous) const noexcept {
+  return value_of(displacement_m, viscous).energy_J + viscous.spread_J;
 }
 
 Eigen::Vector3d CondensedContact::force_N(const Eigen::Vector3d& displacement_m,
-                                          const CondensedMemory& memory) const noexcept {
-  return fit_->frame.axes * value_of(displacement_m, memory).force_N;
+                                          const CondensedViscousState& viscous) const noexcept {
+  return fit_->frame.axes * value_of(displacement_m, viscous).force_N;
 }
 
 CondensedValue CondensedContact::value_of(const Eigen::Vector3d& displacement_m,
-                                          const CondensedMemory& memory) const noexcept {
+                                          const CondensedViscousState& viscous) const noexcept {
   const Eigen::Vector3d u = fit_->frame.local(displacement_m);
   Packed packed = Packed::Zero();
-  packed.head<3>() = memory.w_m;
-  packed.segment<3>(4) = memory.q_m;
+  packed.head<3>() = viscous.w_m;
+  packed.segment<3>(4) = viscous.q_m;
   return value_of_condensed(fit_->tables, u.data(), packed.data());
 }
 
@@ -159,14 +159,14 @@ ContactAnswer CondensedContact::step(const ToolPose& tool) noexcept {
   ContactAnswer answer;
   answer.force_N = fit_->frame.axes * Eigen::Vector3d::Map(&state_.force[0]);
   const Eigen::Vector3d q = several() ? of_branches_.second_m(state_)
-                                      : Eigen::Vector3d(Eigen::Vector3d::Map(&state_.memory[4]));
+                                      : Eigen::Vector3d(Eigen::Vector3d::Map(&state_.viscous[4]));
   const double place_aside_m = across(u[1], u[2]);
-  const double aside_m = std::max(place_aside_m, across(state_.memory[1], state_.memory[2]));
+  const double aside_m = std::max(place_aside_m, across(state_.viscous[1], state_.viscous[2]));
   const double aside = aside_m / fit_->frame.tangential_m;
   answer.error_N = (kMisfitAlong + aside * aside) * fit_->fit_error_N +
                    kSecondModeError * (fit_->coupling_along * std::abs(q[0]) +
                                        fit_->coupling_across * across(q[1], q[2])) +
-                   fit_->lag_error_N * condensed_lag(u, Eigen::Vector3d::Map(&state_.memory[0]),
+                   fit_->lag_error_N * condensed_lag(u, Eigen::Vector3d::Map(&state_.viscous[0]),
                                                      2.0 * fit_->frame.half_depth_m);
   answer.trusted = u[0] >= fit_->least_depth_m && u[0] <= fit_->most_depth_m &&
                    place_aside_m <= fit_->most_tangential_m;
@@ -177,8 +177,8 @@ Eigen::Matrix3d CondensedContact::instantaneous_stiffness() const noexcept {
   return fit_->instantaneous;
 }
 
-Eigen::Matrix3d CondensedContact::relaxed_stiffness() const noexcept {
-  return fit_->relaxed;
+Eigen::Matrix3d CondensedContact::equilibrium_stiffness() const noexcept {
+  return fit_->equilibrium;
 }
 
 Eigen::Index CondensedContact::spheres() const noexcept {
@@ -189,8 +189,8 @@ Eigen::Index CondensedContact::spheres() const noexcept {
 // NOLINTNEXTLINE(performance-unnecessary-value-param)
 void CondensedContact::displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {
   const Eigen::Vector3d u = Eigen::Vector3d::Map(&state_.u[0]);
-  fit_->field.displacements(u, Eigen::Vector3d::Map(&state_.memory[0]),
-                            Eigen::Vector3d::Map(&state_.memory[4]), all);
+  fit_->field.displacements(u, Eigen::Vector3d::Map(&state_.viscous[0]),
+                            Eigen::Vector3d::Map(&state_.viscous[4]), all);
   all.col(fit_->contact) = fit_->frame.axes * u;
 }
 

@@ -18,7 +18,7 @@ struct CondensedOptions {
 
 /// Viscous state of a condensed model, in the axes of its contact: into the tissue and two
 /// tangents. Of several branches the mean, weighted by their shares.
-struct CondensedMemory {
+struct CondensedViscousState {
   Eigen::Vector3d w_m = Eigen::Vector3d::Zero();  ///< fictitious displacement
   Eigen::Vector3d q_m = Eigen::Vector3d::Zero();  ///< along the second mode
   double spread_J = 0.0;  ///< energy stored in the differences of the branches from their mean
@@ -45,19 +45,19 @@ class CondensedContact final : public ContactModel {
   ContactAnswer step(const ToolPose& tool) noexcept override;
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override;
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override;
   [[nodiscard]] Eigen::Index spheres() const noexcept override;
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
 
   [[nodiscard]] const std::vector<CondensedBranch>& branches() const noexcept { return branches_; }
-  [[nodiscard]] CondensedMemory memory() const noexcept;
+  [[nodiscard]] CondensedViscousState viscous_state() const noexcept;
   /// Energy stored with the contact at a displacement and a viscous state, J: the force of step()
   /// is minus its gradient by the displacement.
   [[nodiscard]] double stored_energy_J(const Eigen::Vector3d& displacement_m,
-                                       const CondensedMemory& memory) const noexcept;
+                                       const CondensedViscousState& viscous) const noexcept;
   /// Force on what is in contact, N, with a viscous state.
   [[nodiscard]] Eigen::Vector3d force_N(const Eigen::Vector3d& displacement_m,
-                                        const CondensedMemory& memory) const noexcept;
+                                        const CondensedViscousState& viscous) const noexcept;
   /// Within a step the contact moves straight, and the viscous state relaxes while it is at this
   /// share of the way (docs/reduction_method.md), 0.5 to 1.
   [[nodiscard]] double relaxation_point() const noexcept {
@@ -65,13 +65,13 @@ class CondensedContact final : public ContactModel {
   }
   /// Number of steps since reset() in which the viscous state was kept because the computed update
   /// would have increased the energy.
-  [[nodiscard]] long long kept_memories() const noexcept { return kept_; }
+  [[nodiscard]] long long kept_viscous_states() const noexcept { return kept_; }
 
  private:
   void set_rates(double relaxation_time_s);
   [[nodiscard]] bool several() const noexcept { return branches_.size() > 1; }
   [[nodiscard]] CondensedValue value_of(const Eigen::Vector3d& displacement_m,
-                                        const CondensedMemory& memory) const noexcept;
+                                        const CondensedViscousState& viscous) const noexcept;
 
   std::shared_ptr<const CondensedFit> fit_;
   std::vector<CondensedBranch> branches_;

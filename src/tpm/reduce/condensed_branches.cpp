@@ -153,7 +153,7 @@ void CondensedBranches::reset() noexcept {
 }
 
 Eigen::Vector3d CondensedBranches::second_m(const CondensedState& state) const noexcept {
-  const Eigen::Vector3d mean = Eigen::Vector3d::Map(&state.memory[4]);
+  const Eigen::Vector3d mean = Eigen::Vector3d::Map(&state.viscous[4]);
   Eigen::Vector3d sum = mean.cwiseAbs2();
   for (std::size_t j = 0; j < share_.size(); ++j) {
     sum += share_[j] * Eigen::Vector3d::Map(&spread_[kWide * j + 4]).cwiseAbs2();
@@ -163,13 +163,13 @@ Eigen::Vector3d CondensedBranches::second_m(const CondensedState& state) const n
 
 void CondensedBranches::step(CondensedState& state, const double* to) noexcept {
   std::array<double, 3> way{};
-  std::array<double, 3> resting{};
+  std::array<double, 3> midway{};
   for (std::size_t k = 0; k < 3; ++k) {
     way[k] = to[k] - state.u[k];
-    resting[k] = state.u[k] + relaxation_point_ * way[k];
+    midway[k] = state.u[k] + relaxation_point_ * way[k];
   }
   CondensedPull pull;
-  pull_condensed(*tables_, rates_, resting.data(), state.memory, state.matrices, pull);
+  pull_condensed(*tables_, rates_, midway.data(), state.viscous, state.matrices, pull);
   const double before_J = pull.energy_J + spread_J_;
   CondensedAdvance advance;
   advance_condensed(modes_,
@@ -177,11 +177,11 @@ void CondensedBranches::step(CondensedState& state, const double* to) noexcept {
                      pending_.data(), spread_.data(), lacks_.data(), moved_.data(), next_.data()},
                     pull.velocity, way.data(), frame_.data(), advance);
   alignas(32) std::array<double, kWide> next;
-  for (std::size_t k = 0; k < kWide; ++k) next[k] = state.memory[k] + advance.change[k];
+  for (std::size_t k = 0; k < kWide; ++k) next[k] = state.viscous[k] + advance.change[k];
 
   alignas(32) std::array<double, CondensedTables::kMatrixEntries> matrices;
   matrices_of_condensed(*tables_, next.data(), matrices.data());
-  pull_condensed(*tables_, rates_, resting.data(), next.data(), matrices.data(), pull);
+  pull_condensed(*tables_, rates_, midway.data(), next.data(), matrices.data(), pull);
   state.kept = !(pull.energy_J + advance.spread_J <= before_J);
   if (state.kept) {
     std::fill(pending_.begin(), pending_.end(), 0.0);
@@ -200,14 +200,14 @@ void CondensedBranches::step(CondensedState& state, const double* to) noexcept {
         pending_[kWide * j + k] = later_[kWide * j + k] * change[k];
       }
     }
-    std::copy(next.begin(), next.end(), state.memory);
+    std::copy(next.begin(), next.end(), state.viscous);
     std::copy(matrices.begin(), matrices.end(), state.matrices);
     spread_.swap(next_);
     spread_J_ = advance.spread_J;
     (void)factor_of(state.matrices, frame_);  // beyond the range the one before serves
   }
   std::copy(to, to + 3, state.u);
-  pull_condensed(*tables_, rates_, to, state.memory, state.matrices, pull);
+  pull_condensed(*tables_, rates_, to, state.viscous, state.matrices, pull);
   std::copy(pull.force, pull.force + 3, state.force);
 }
 

@@ -105,7 +105,7 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
                                  const CondensedOptions& options) {
   require_valid(bonds, rest, contact, into_tissue, options);
   Constraints held = constraints;
-  held.hold(contact);
+  held.fix(contact);
   const auto fit = std::make_shared<CondensedFit>();
   fit->frame = frame_of(into_tissue, options);
   fit->contact = static_cast<Eigen::Index>(contact);
@@ -115,17 +115,17 @@ CondensedContact build_condensed(const BondSystem& bonds, const Positions& rest,
 
   CondensedSampler sampler(bonds, rest, held, contact, kStride * options.depth_m);
   std::vector<CondensedBranch> branches = condensed_branches(bonds);
-  SpreadPlaces memories(fit->frame, options, {2, 3, 5});
+  SpreadPlaces viscous_places(fit->frame, options, {2, 3, 5});
   SpreadPlaces places(fit->frame, options, {7, 11, 13});
   std::vector<CondensedMetric> metrics;
   std::vector<CondensedSample> samples;
   for (int i = 0; i < kMemories; ++i) {
-    const Eigen::Vector3d w = i == 0 ? Eigen::Vector3d::Zero() : memories.next();
+    const Eigen::Vector3d w = i == 0 ? Eigen::Vector3d::Zero() : viscous_places.next();
     const CondensedMetric metric = sampler.relax_at(w);
     const CondensedSample relaxed = sampler.sample_at(w);
     if (i == 0) {
       fit->instantaneous = relaxed.by_uu;
-      fit->relaxed = relaxed.by_uu + relaxed.by_wu;
+      fit->equilibrium = relaxed.by_uu + relaxed.by_wu;
     }
     const auto local = [&](const Eigen::Matrix3d& m) {
       return Eigen::Matrix3d(fit->frame.axes.transpose() * (0.5 * (m + m.transpose())) *

@@ -54,7 +54,7 @@ struct CondensedFit {
   Eigen::Matrix3d mean_coupling = Eigen::Matrix3d::Zero();  ///< CondensedMatrices
   Eigen::Matrix3d mean_second = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d instantaneous = Eigen::Matrix3d::Zero();  ///< at rest, N/m, of the organ's axes
-  Eigen::Matrix3d relaxed = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d equilibrium = Eigen::Matrix3d::Zero();
 };
 
 }  // namespace tpm::organ

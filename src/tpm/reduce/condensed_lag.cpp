@@ -40,7 +40,7 @@ double condensed_lag_error_N(const CondensedContact& model, const CondensedFit& 
     for (Eigen::Index i = 0; i < motion.force_N.size(); ++i) {
       const double u_m = motion.depth_m[static_cast<std::size_t>(i)];
       const ContactAnswer answer = contact.step(u_m * into_tissue);
-      const double lag = condensed_lag({u_m, 0.0, 0.0}, contact.memory().w_m, depth_m);
+      const double lag = condensed_lag({u_m, 0.0, 0.0}, contact.viscous_state().w_m, depth_m);
       const double error_N = std::abs(answer.force_N.dot(into_tissue) + motion.force_N[i]);
       if (lag < kLeastLag) continue;
       per_lag_N = std::max(per_lag_N, (kLagSafety * error_N - answer.error_N) / lag);

@@ -30,15 +30,15 @@ CondensedSampler::CondensedSampler(const BondSystem& bonds, Positions rest,
       equilibrium_(bonds, constraints),
       no_load_(Eigen::Matrix3Xd::Zero(3, rest_.cols())) {
   relaxed_.position = rest_;
-  memory_ = {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 1.0};
-  find_moves(relaxed_, memory_);
+  viscous_state_ = {Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), 1.0};
+  find_moves(relaxed_, viscous_state_);
   tolerance_N_ = kSampleBalance * relaxed_.stiffness.norm() * stride_m_;
   latest_ = relaxed_;
 }
 
-void CondensedSampler::find_moves(State& state, const BondMemory& memory) {
+void CondensedSampler::find_moves(State& state, const ViscousState& viscous_state) {
   ++factorisations_;
-  if (!equilibrium_.factorise(state.position, memory) || !equilibrium_.is_stable()) {
+  if (!equilibrium_.factorise(state.position, viscous_state) || !equilibrium_.is_stable()) {
     throw Error(ExitCode::numerical, "condensed model",
                 fmt::format("with the contact at {} mm the tissue buckles: its stiffness is not "
                             "positive; expected a smaller depth",
@@ -51,30 +51,31 @@ void CondensedSampler::find_moves(State& state, const BondMemory& memory) {
     shift.setZero(3, rest_.cols());
     shift(k, contact_) = 1.0;
     force.setZero(3, rest_.cols());
-    bonds_.add_stiffness_times(state.position, memory, shift, force);
+    bonds_.add_stiffness_times(state.position, viscous_state, shift, force);
     force = -force;
     equilibrium_.displace(force);
     shift += force;
     state.moves.col(k) = shift.reshaped();
     force.setZero(3, rest_.cols());
-    bonds_.add_stiffness_times(state.position, memory, shift, force);
+    bonds_.add_stiffness_times(state.position, viscous_state, shift, force);
     state.stiffness.col(k) = force.col(contact_);
   }
 }
 
-bool CondensedSampler::balance(Positions& position, const BondMemory& memory) {
+bool CondensedSampler::balance(Positions& position, const ViscousState& viscous_state) {
   Eigen::Matrix3Xd force;
   double before_N = std::numeric_limits<double>::infinity();
   bool factorised = false;
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
-    equilibrium_.forces(position, memory, no_load_, force);
+    equilibrium_.forces(position, viscous_state, no_load_, force);
     equilibrium_.constraints().project(force);
     const double left_N = force.colwise().norm().maxCoeff();
     if (left_N <= tolerance_N_) return true;
     if (!std::isfinite(left_N)) return false;
     if (!factorised || left_N > kSlow * before_N) {
       ++factorisations_;
-      if (!equilibrium_.factorise(position, memory) || !equilibrium_.is_stable()) return false;
+      if (!equilibrium_.factorise(position, viscous_state) || !equilibrium_.is_stable())
+        return false;
       factorised = true;
     }
     before_N = left_N;
@@ -85,7 +86,7 @@ bool CondensedSampler::balance(Positions& position, const BondMemory& memory) {
 }
 
 void CondensedSampler::move(State& state, const Eigen::Vector3d& contact,
-                            const BondMemory& memory) {
+                            const ViscousState& viscous_state) {
   double stride = stride_m_;
   while (state.contact != contact) {
     const Eigen::Vector3d way = contact - state.contact;
@@ -96,18 +97,18 @@ void CondensedSampler::move(State& state, const Eigen::Vector3d& contact,
     next.position += (state.moves * step).reshaped(3, rest_.cols());
     next.position.col(contact_) = rest_.col(contact_) + next.contact;
     const Positions predicted = next.position;
-    if (balance(next.position, memory)) {
-      find_moves(next, memory);
+    if (balance(next.position, viscous_state)) {
+      find_moves(next, viscous_state);
       state = std::move(next);
       continue;
     }
     // With a line search, and the reason if that fails too.
     next.position = predicted;
     const EquilibriumSearch search =
-        equilibrium_.find(next.position, memory, no_load_, tolerance_N_);
+        equilibrium_.find(next.position, viscous_state, no_load_, tolerance_N_);
     factorisations_ += search.factorisations;
     if (search.converged && search.stable) {
-      find_moves(next, memory);
+      find_moves(next, viscous_state);
       state = std::move(next);
       continue;
     }
@@ -138,20 +139,21 @@ Eigen::VectorXd CondensedSampler::elongations(const State& state) const {
 }
 
 CondensedMetric CondensedSampler::relax_at(const Eigen::Vector3d& w_m) {
-  const BondMemory all_follow{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), 1.0};
+  const ViscousState all_follow{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())),
+                                1.0};
   move(relaxed_, w_m, all_follow);
-  memory_moves_ = elongation_moves(relaxed_);
-  memory_ = {elongations(relaxed_), 0.0};
+  viscous_moves_ = elongation_moves(relaxed_);
+  viscous_state_ = {elongations(relaxed_), 0.0};
   latest_ = relaxed_;
-  find_moves(latest_, memory_);
+  find_moves(latest_, viscous_state_);
 
   const auto g = bonds_.relaxing().asDiagonal();
   const Moves held = elongation_moves(latest_);
   CondensedMetric found;
   found.w_m = w_m;
-  found.metric = memory_moves_.transpose() * g * memory_moves_;
+  found.metric = viscous_moves_.transpose() * g * viscous_moves_;
   const Moves second =
-      held - memory_moves_ * found.metric.llt().solve(memory_moves_.transpose() * g * held);
+      held - viscous_moves_ * found.metric.llt().solve(viscous_moves_.transpose() * g * held);
   found.second_metric = second.transpose() * g * second;
   // The reduced energy of a change dy of the viscous state is dy' (g - g S g) dy / 2, S g dy = B
   // K^-1 B' g dy what the elongations answer to it: found as the displacement under the forces of
@@ -162,8 +164,8 @@ CondensedMetric CondensedSampler::relax_at(const Eigen::Vector3d& w_m) {
     // add_forces is affine in the viscous state: the forces of dy alone are a difference.
     Eigen::Matrix3Xd with = no_load_;
     Eigen::Matrix3Xd without = no_load_;
-    bonds_.add_forces(latest_.position, {memory_.offset + second.col(k), 0.0}, with);
-    bonds_.add_forces(latest_.position, memory_, without);
+    bonds_.add_forces(latest_.position, {viscous_state_.offset + second.col(k), 0.0}, with);
+    bonds_.add_forces(latest_.position, viscous_state_, without);
     with -= without;
     equilibrium_.displace(with);
     found.second_moves.col(k) = with.reshaped();
@@ -179,20 +181,20 @@ CondensedMetric CondensedSampler::relax_at(const Eigen::Vector3d& w_m) {
 CondensedSample CondensedSampler::sample_at(const Eigen::Vector3d& u_m) {
   if ((u_m - relaxed_.contact).norm() < (u_m - latest_.contact).norm()) {
     latest_ = relaxed_;
-    find_moves(latest_, memory_);
+    find_moves(latest_, viscous_state_);
   }
-  move(latest_, u_m, memory_);
+  move(latest_, u_m, viscous_state_);
   CondensedSample sample;
   sample.u_m = u_m;
   sample.w_m = relaxed_.contact;
   // All branches alike.
-  sample.energy_J =
-      bonds_.stored_energy_J(latest_.position, memory_.offset.replicate(1, bonds_.most_branches()));
+  sample.energy_J = bonds_.stored_energy_J(
+      latest_.position, viscous_state_.offset.replicate(1, bonds_.most_branches()));
   Eigen::Matrix3Xd force = no_load_;
-  bonds_.add_forces(latest_.position, memory_, force);
+  bonds_.add_forces(latest_.position, viscous_state_, force);
   sample.by_u_N = -force.col(contact_);
-  const auto weighted = memory_moves_.transpose() * bonds_.relaxing().asDiagonal();
-  sample.by_w_N = weighted * (memory_.offset - elongations(latest_));
+  const auto weighted = viscous_moves_.transpose() * bonds_.relaxing().asDiagonal();
+  sample.by_w_N = weighted * (viscous_state_.offset - elongations(latest_));
   sample.by_uu = 0.5 * (latest_.stiffness + latest_.stiffness.transpose());
   sample.by_wu = -(weighted * elongation_moves(latest_));
   sample.position_m = latest_.position;

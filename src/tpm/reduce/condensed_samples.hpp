@@ -65,11 +65,11 @@ class CondensedSampler {
     Moves moves;
     Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
   };
-  void find_moves(State& state, const BondMemory& memory);
+  void find_moves(State& state, const ViscousState& viscous_state);
   /// Newton's method with the factorisation at the start, found anew where it converges slowly.
   /// False if it does not converge or the tissue is not stable where it was factorised.
-  [[nodiscard]] bool balance(Positions& position, const BondMemory& memory);
-  void move(State& state, const Eigen::Vector3d& contact, const BondMemory& memory);
+  [[nodiscard]] bool balance(Positions& position, const ViscousState& viscous_state);
+  void move(State& state, const Eigen::Vector3d& contact, const ViscousState& viscous_state);
   [[nodiscard]] Moves elongation_moves(const State& state) const;
   [[nodiscard]] Eigen::VectorXd elongations(const State& state) const;
 
@@ -81,8 +81,8 @@ class CondensedSampler {
   Equilibrium equilibrium_;
   Eigen::Matrix3Xd no_load_;
   State relaxed_, latest_;
-  BondMemory memory_;
-  Moves memory_moves_;  ///< J
+  ViscousState viscous_state_;
+  Moves viscous_moves_;  ///< J
   int factorisations_ = 0;
 };
 

@@ -45,11 +45,11 @@ void step_condensed(const CondensedTables& tables, const CondensedRates& rates,
 }
 
 void pull_condensed(const CondensedTables& tables, const CondensedRates& rates, const double* u,
-                    const double* memory, const double* matrices, CondensedPull& pull) noexcept {
+                    const double* viscous, const double* matrices, CondensedPull& pull) noexcept {
 #ifdef TPM_CONDENSED_WIDE
-  if (is_wide()) return wide::pull_of(tables, rates, u, memory, matrices, pull);
+  if (is_wide()) return wide::pull_of(tables, rates, u, viscous, matrices, pull);
 #endif
-  plain::pull_of(tables, rates, u, memory, matrices, pull);
+  plain::pull_of(tables, rates, u, viscous, matrices, pull);
 }
 
 void matrices_of_condensed(const CondensedTables& tables, const double* w,
@@ -70,9 +70,9 @@ void advance_condensed(const CondensedModeTables& modes, const CondensedBranchAr
 }
 
 CondensedValue value_of_condensed(const CondensedTables& tables, const double* u,
-                                  const double* memory) noexcept {
+                                  const double* viscous) noexcept {
   double result[4];
-  plain::value(tables, u, memory, result);
+  plain::value(tables, u, viscous, result);
   return {result[0], {result[1], result[2], result[3]}};
 }
 // NOLINTEND(*-avoid-c-arrays, *-reinterpret-cast, bugprone-suspicious-include)

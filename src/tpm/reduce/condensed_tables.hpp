@@ -41,7 +41,7 @@ struct alignas(32) CondensedRates {
 /// The state of a condensed model between steps, and its answer; in the axes of the contact.
 struct alignas(32) CondensedState {
   // NOLINTBEGIN(*-avoid-c-arrays)
-  double memory[8] = {};                                  ///< w (3), 0, q (3), 0; m
+  double viscous[8] = {};                                 ///< w (3), 0, q (3), 0; m
   double matrices[CondensedTables::kMatrixEntries] = {};  ///< at w
   double pending[8] = {};                                 ///< to be added to the viscous state; m
   double u[4] = {};                                       ///< m
@@ -69,7 +69,7 @@ struct alignas(32) CondensedPull {
 /// @param rates those of q by q are used
 /// @param matrices matrices_of_condensed() at w
 void pull_condensed(const CondensedTables& tables, const CondensedRates& rates, const double* u,
-                    const double* memory, const double* matrices, CondensedPull& pull) noexcept;
+                    const double* viscous, const double* matrices, CondensedPull& pull) noexcept;
 /// The matrices at w, CondensedTables::kMatrixEntries of them.
 void matrices_of_condensed(const CondensedTables& tables, const double* w,
                            double* matrices) noexcept;
@@ -116,6 +116,6 @@ struct CondensedValue {
   Eigen::Vector3d force_N = Eigen::Vector3d::Zero();  ///< minus its gradient by u
 };
 [[nodiscard]] CondensedValue value_of_condensed(const CondensedTables& tables, const double* u,
-                                                const double* memory) noexcept;
+                                                const double* viscous) noexcept;
 
 }  // namespace tpm::organ

@@ -22,7 +22,7 @@ Constraints with_contact_held(Constraints constraints, const PushedSpheres& cont
       throw bad_input("contact", fmt::format("sphere {} is not free", sphere + 1),
                       "a sphere that nothing holds or guides");
     }
-    constraints.hold(sphere);
+    constraints.fix(sphere);
   }
   return constraints;
 }
@@ -56,13 +56,13 @@ PushedContact::PushedContact(const BondSystem& bonds, Positions rest, Constraint
   require_at_rest(bonds_, rest_);
 }
 
-BondMemory PushedContact::memory(const Positions& position, double relaxed,
-                                 double relaxation_factor) const {
-  BondMemory memory;
-  bonds_.elongations(position, memory.offset);
-  memory.offset *= relaxed - relaxation_factor;
-  memory.relaxation_factor = relaxation_factor;
-  return memory;
+ViscousState PushedContact::viscous_state(const Positions& position, double relaxed,
+                                          double relaxation_factor) const {
+  ViscousState viscous_state;
+  bonds_.elongations(position, viscous_state.offset);
+  viscous_state.offset *= relaxed - relaxation_factor;
+  viscous_state.relaxation_factor = relaxation_factor;
+  return viscous_state;
 }
 
 Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxed) {
@@ -76,7 +76,8 @@ Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxe
   const double way = (displacement_m - from).norm();
   const double tolerance_N = kBalance * kBalanceLength_m * bonds_.stiffness().maxCoeff();
   const Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-  const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())), relaxed};
+  const ViscousState viscous_state{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds_.size())),
+                                   relaxed};
   double done = 0.0;
   double stride = kStride_m;
   // What is free goes on as it went over the stride before.
@@ -90,7 +91,7 @@ Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxe
       const auto column = static_cast<Eigen::Index>(sphere);
       next.col(column) = rest_.col(column) + from + aim / way * (displacement_m - from);
     }
-    const EquilibriumSearch search = equilibrium_.find(next, memory, load, tolerance_N);
+    const EquilibriumSearch search = equilibrium_.find(next, viscous_state, load, tolerance_N);
     if (search.converged && search.stable) {
       before = std::move(here.position);
       here.position = std::move(next);
@@ -111,8 +112,8 @@ Positions PushedContact::at(const Eigen::Vector3d& displacement_m, double relaxe
   return here.position;
 }
 
-ContactFields PushedContact::fields(const Positions& position, const BondMemory& memory) {
-  if (!equilibrium_.factorise(position, memory) || !equilibrium_.is_stable()) {
+ContactFields PushedContact::fields(const Positions& position, const ViscousState& viscous_state) {
+  if (!equilibrium_.factorise(position, viscous_state) || !equilibrium_.is_stable()) {
     throw Error(ExitCode::numerical, "contact", "the tissue has no stiffness there");
   }
   ContactFields fields;
@@ -120,13 +121,13 @@ ContactFields PushedContact::fields(const Positions& position, const BondMemory&
     Eigen::Matrix3Xd unit = Eigen::Matrix3Xd::Zero(3, rest_.cols());
     for (const std::size_t sphere : contact_) unit(axis, static_cast<Eigen::Index>(sphere)) = 1.0;
     Eigen::Matrix3Xd pull = Eigen::Matrix3Xd::Zero(3, rest_.cols());
-    bonds_.add_stiffness_times(position, memory, unit, pull);
+    bonds_.add_stiffness_times(position, viscous_state, unit, pull);
     Eigen::Matrix3Xd& field = fields.displacement[static_cast<std::size_t>(axis)];
     field = -pull;
     equilibrium_.displace(field);
     field += unit;
     pull.setZero();
-    bonds_.add_stiffness_times(position, memory, field, pull);
+    bonds_.add_stiffness_times(position, viscous_state, field, pull);
     fields.stiffness.col(axis) = contact_.sum(pull);
   }
   fields.stiffness = (0.5 * (fields.stiffness + fields.stiffness.transpose())).eval();

@@ -62,10 +62,10 @@ class PushedContact {
   [[nodiscard]] Positions at(const Eigen::Vector3d& displacement_m, double relaxed);
   /// The viscous elongations at such an equilibrium, told so that changes are felt with a given
   /// stiffness: 0 the instantaneous one, 1 that of equilibrium.
-  [[nodiscard]] BondMemory memory(const Positions& position, double relaxed,
-                                  double relaxation_factor) const;
+  [[nodiscard]] ViscousState viscous_state(const Positions& position, double relaxed,
+                                           double relaxation_factor) const;
   /// About such an equilibrium. Throws Error(numerical) if the tissue is not stiff there.
-  [[nodiscard]] ContactFields fields(const Positions& position, const BondMemory& memory);
+  [[nodiscard]] ContactFields fields(const Positions& position, const ViscousState& viscous_state);
   /// Replaces forces by the displacements of what is free under them, with the stiffness of the
   /// last fields().
   void displace(Eigen::Matrix3Xd& forces) const { equilibrium_.displace(forces); }

@@ -53,8 +53,8 @@ ServoNetwork::ServoNetwork(const BondSystem& bonds, const Positions& rest,
   require_servo_material(bonds, "the network at servo rate");
   PushedContact tissue(bonds, rest, constraints, contact);
   weights_ = servo_weights(bonds, options.period_s);
-  instantaneous_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
-  relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
+  instantaneous_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 0.0)).stiffness;
+  equilibrium_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 1.0)).stiffness;
   branch_error_.assign(weights_.branches.size(), Eigen::Vector3d::Zero());
   const double forgotten = 1.0 - static_cast<double>(weights_.longest_kept());
   rounding_ = kRounding + kViscousRounding / std::max(forgotten, 1.0 / kLongestLag);
@@ -97,8 +97,8 @@ void ServoNetwork::choose_bonds(const PushedContact& tissue) {
 
 void ServoNetwork::factorise(PushedContact& tissue, const Positions& position) {
   const auto relaxed = static_cast<double>(weights_.of_end);
-  const BondMemory memory = tissue.memory(position, relaxed, relaxed);
-  if (spheres_->factorise(tissue.bonds(), tissue.constraints(), position, memory,
+  const ViscousState viscous_state = tissue.viscous_state(position, relaxed, relaxed);
+  if (spheres_->factorise(tissue.bonds(), tissue.constraints(), position, viscous_state,
                           options_.portable)) {
     return;
   }
@@ -122,20 +122,20 @@ ServoNetwork::Field ServoNetwork::field_of(const std::array<Eigen::Matrix3Xd, 3>
 
 void ServoNetwork::add_field(PushedContact& tissue, const Positions& position, double depth_m) {
   const auto relaxed = static_cast<double>(weights_.of_end);
-  const BondMemory memory = tissue.memory(position, relaxed, relaxed);
-  fields_.push_back(field_of(tissue.fields(position, memory).displacement, depth_m));
+  const ViscousState viscous_state = tissue.viscous_state(position, relaxed, relaxed);
+  fields_.push_back(field_of(tissue.fields(position, viscous_state).displacement, depth_m));
 }
 
 void ServoNetwork::add_viscous_response(PushedContact& tissue, const Positions& position) {
   const auto relaxed = static_cast<double>(weights_.of_end);
-  ContactFields fields = tissue.fields(position, tissue.memory(position, relaxed, relaxed));
+  ContactFields fields = tissue.fields(position, tissue.viscous_state(position, relaxed, relaxed));
   for (Eigen::Matrix3Xd& field : fields.displacement) {
     Eigen::Matrix3Xd instantaneous = Eigen::Matrix3Xd::Zero(3, position.cols());
     Eigen::Matrix3Xd in_the_end = instantaneous;
-    tissue.bonds().add_stiffness_times(position, tissue.memory(position, relaxed, 0.0), field,
-                                       instantaneous);
-    tissue.bonds().add_stiffness_times(position, tissue.memory(position, relaxed, 1.0), field,
-                                       in_the_end);
+    tissue.bonds().add_stiffness_times(position, tissue.viscous_state(position, relaxed, 0.0),
+                                       field, instantaneous);
+    tissue.bonds().add_stiffness_times(position, tissue.viscous_state(position, relaxed, 1.0),
+                                       field, in_the_end);
     field = instantaneous - in_the_end;
     tissue.displace(field);
   }
@@ -213,7 +213,7 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
       rounding_ * largest_N_;
   answer_.error_N =
       std::max(field_error_N, kHold * held_error_N_) + viscous_error_.norm() + step_error_N;
-  const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
+  const double scale_N = std::max(largest_N_, kScaleDepth_m * equilibrium_.norm());
   answer_.trusted = depth_m <= options_.deepest_m && depth_m >= -options_.deepest_m &&
                     aside_m <= options_.aside_m && answer_.error_N <= kTrusted * scale_N;
 }
@@ -224,7 +224,7 @@ ContactAnswer ServoNetwork::step(const ToolPose& tool) noexcept {
   for (Eigen::Index c = 0; c < 3; ++c) contact[c] = static_cast<float>(tool.displacement_m[c]);
   at_contact_.add_next(displacement_.data(), weights_, force_.data());
   const double step_error_N = step_error_->advance(tool.displacement_m).norm();
-  const double scale_N = std::max(largest_N_, kScaleDepth_m * relaxed_.norm());
+  const double scale_N = std::max(largest_N_, kScaleDepth_m * equilibrium_.norm());
   balance(kNext);
   answer(tool.displacement_m, step_error_N);
   const double elsewhere_N = viscous_error_.norm() + step_error_N;

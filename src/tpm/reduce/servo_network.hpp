@@ -46,7 +46,9 @@ class ServoNetwork final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return instantaneous_;
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return equilibrium_;
+  }
   [[nodiscard]] Eigen::Index spheres() const noexcept override {
     return static_cast<Eigen::Index>(spheres_->columns());
   }
@@ -88,7 +90,7 @@ class ServoNetwork final : public ContactModel {
   std::vector<Field> fields_;  ///< at even depths from rest on
   Field viscous_response_;     ///< what residual forces do through the viscous state
   std::unique_ptr<StepError> step_error_;
-  Eigen::Matrix3d instantaneous_, relaxed_;
+  Eigen::Matrix3d instantaneous_, equilibrium_;
 
   AlignedFloats displacement_, force_, change_;
   ContactAnswer answer_;

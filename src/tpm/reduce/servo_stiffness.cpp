@@ -33,13 +33,14 @@ ServoStiffness::ServoStiffness(const BondSystem& bonds, const Positions& rest,
 }
 
 bool ServoStiffness::factorise(const BondSystem& bonds, const Constraints& constraints,
-                               const Positions& position, const BondMemory& memory, bool portable) {
+                               const Positions& position, const ViscousState& viscous_state,
+                               bool portable) {
   std::vector<Eigen::Matrix3d> diagonal(column_.size(), Eigen::Matrix3d::Zero());
   std::vector<Eigen::Matrix3d> across;
   for (std::size_t b = 0; b < bonds.size(); ++b) {
     const std::uint32_t from = bonds.end_a()[b];
     const std::uint32_t to = bonds.end_b()[b];
-    const Eigen::Matrix3d block = bonds.stiffness_block(b, position, memory);
+    const Eigen::Matrix3d block = bonds.stiffness_block(b, position, viscous_state);
     diagonal[from] += block;
     diagonal[to] += block;
     if (!moves(from) || !moves(to)) continue;

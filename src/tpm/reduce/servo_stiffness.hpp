@@ -19,7 +19,8 @@ class ServoStiffness {
   /// To be called before solve(), with bonds and constraints as before. False if the tissue is not
   /// stiff there.
   [[nodiscard]] bool factorise(const BondSystem& bonds, const Constraints& constraints,
-                               const Positions& position, const BondMemory& memory, bool portable);
+                               const Positions& position, const ViscousState& viscous_state,
+                               bool portable);
 
   /// Spheres that move, in the order of the organ; they have the first columns.
   [[nodiscard]] const std::vector<std::size_t>& free() const { return free_; }

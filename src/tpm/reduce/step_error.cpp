@@ -34,8 +34,8 @@ std::vector<ViscousLaw::Branch> branches_of(const BondSystem& bonds) {
 
 StepError::StepError(PushedContact& tissue, const Positions& position, double relaxed,
                      double period_s) {
-  const BondMemory instantaneous = tissue.memory(position, relaxed, 0.0);
-  const BondMemory in_the_end = tissue.memory(position, relaxed, 1.0);
+  const ViscousState instantaneous = tissue.viscous_state(position, relaxed, 0.0);
+  const ViscousState in_the_end = tissue.viscous_state(position, relaxed, 1.0);
   const ContactFields first = tissue.fields(position, instantaneous);
   const ContactFields last = tissue.fields(position, in_the_end);
   std::array<Eigen::Matrix3Xd, 6> field;
@@ -62,17 +62,17 @@ StepError::StepError(PushedContact& tissue, const Positions& position, double re
   // z = (u, v), forces K z - H p, of which those on v vanish; dp/dt = (z - p)/tau.
   const double scale = stiffness.topLeftCorner<3, 3>().trace();
   const Eigen::Matrix3d soft = inverse_where_stiff(stiffness.bottomRightCorner<3, 3>(), scale);
-  SixSquare z_of_memory = SixSquare::Zero();
-  z_of_memory.bottomRows<3>() = soft * relaxing.bottomRows<3>();
+  SixSquare z_of_viscous = SixSquare::Zero();
+  z_of_viscous.bottomRows<3>() = soft * relaxing.bottomRows<3>();
   SixThree z_of_contact = SixThree::Zero();
   z_of_contact.topRows<3>().setIdentity();
   z_of_contact.bottomRows<3>() = -soft * stiffness.bottomLeftCorner<3, 3>();
   const Eigen::Matrix<double, 3, 6> force_of_mean =
-      stiffness.topRows<3>() * z_of_memory - relaxing.topRows<3>();
+      stiffness.topRows<3>() * z_of_viscous - relaxing.topRows<3>();
 
   const std::vector<ViscousLaw::Branch> branches = branches_of(tissue.bonds());
   const auto n = static_cast<Eigen::Index>(branches.size());
-  force_of_memory_.resize(3, 6 * n);
+  force_of_viscous_.resize(3, 6 * n);
   // The contact moves linearly: (p of all branches, u, change of u) is a linear system of its own,
   // dp_j/dt = (z - p_j)/tau_j, z = z_of_memory sum of gamma_j p_j + z_of_contact u.
   Eigen::MatrixXd rate = Eigen::MatrixXd::Zero(6 * n + 6, 6 * n + 6);
@@ -85,7 +85,7 @@ StepError::StepError(PushedContact& tissue, const Positions& position, double re
     const double x = period_s / branches[static_cast<std::size_t>(j)].relaxation_time_s;
     const RelaxationWeights w = relaxation_weights(x);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const SixSquare mean = branches[static_cast<std::size_t>(i)].share * z_of_memory;
+      const SixSquare mean = branches[static_cast<std::size_t>(i)].share * z_of_viscous;
       rate.block<6, 6>(6 * j, 6 * i) += x * mean;
       left.block<6, 6>(6 * j, 6 * i) -= w.w1 * mean;
       right.block<6, 6>(6 * j, 6 * i) += w.w0 * mean;
@@ -95,31 +95,31 @@ StepError::StepError(PushedContact& tissue, const Positions& position, double re
     rate.block<6, 3>(6 * j, 6 * n) = x * z_of_contact;
     of_start.middleRows<6>(6 * j) = w.w0 * z_of_contact;
     of_end.middleRows<6>(6 * j) = w.w1 * z_of_contact;
-    force_of_memory_.middleCols<6>(6 * j) =
+    force_of_viscous_.middleCols<6>(6 * j) =
         branches[static_cast<std::size_t>(j)].share * force_of_mean;
   }
   rate.block<3, 3>(6 * n, 6 * n + 3).setIdentity();
   const Eigen::MatrixXd over = rate.exp();
-  exact_.of_memory = over.topLeftCorner(6 * n, 6 * n);
+  exact_.of_viscous = over.topLeftCorner(6 * n, 6 * n);
   exact_.of_end = over.block(0, 6 * n + 3, 6 * n, 3);
   exact_.of_start = over.block(0, 6 * n, 6 * n, 3) - exact_.of_end;
-  stepped_.of_memory = solve_square(left, right);
+  stepped_.of_viscous = solve_square(left, right);
   stepped_.of_start = solve_square(left, of_start);
   stepped_.of_end = solve_square(left, of_end);
-  exact_.memory = exact_.next = stepped_.memory = stepped_.next = Eigen::VectorXd::Zero(6 * n);
+  exact_.viscous = exact_.next = stepped_.viscous = stepped_.next = Eigen::VectorXd::Zero(6 * n);
 }
 
 void StepError::reset() noexcept {
-  exact_.memory.setZero();
-  stepped_.memory.setZero();
+  exact_.viscous.setZero();
+  stepped_.viscous.setZero();
   at_.setZero();
 }
 
 void StepError::Advance::move(const Eigen::Vector3d& from, const Eigen::Vector3d& to) noexcept {
-  next.noalias() = of_memory * memory;
+  next.noalias() = of_viscous * viscous;
   next.noalias() += of_start * from;
   next.noalias() += of_end * to;
-  memory.swap(next);
+  viscous.swap(next);
 }
 
 Eigen::Vector3d StepError::advance(const Eigen::Vector3d& displacement_m) noexcept {
@@ -127,8 +127,8 @@ Eigen::Vector3d StepError::advance(const Eigen::Vector3d& displacement_m) noexce
   stepped_.move(at_, displacement_m);
   at_ = displacement_m;
   Eigen::Vector3d error_N;
-  error_N.noalias() = force_of_memory_ * exact_.memory;
-  error_N.noalias() -= force_of_memory_ * stepped_.memory;
+  error_N.noalias() = force_of_viscous_ * exact_.viscous;
+  error_N.noalias() -= force_of_viscous_ * stepped_.viscous;
   return error_N;
 }
 

@@ -24,13 +24,13 @@ class StepError {
   /// One way to advance: the viscous elongations, six of each branch, follow from themselves and
   /// the contact's displacements.
   struct Advance {
-    Eigen::MatrixXd of_memory, of_start, of_end;
-    Eigen::VectorXd memory, next;
+    Eigen::MatrixXd of_viscous, of_start, of_end;
+    Eigen::VectorXd viscous, next;
     void move(const Eigen::Vector3d& from, const Eigen::Vector3d& to) noexcept;
   };
 
   Advance exact_, stepped_;
-  Eigen::MatrixXd force_of_memory_;  ///< 3 by the viscous elongations
+  Eigen::MatrixXd force_of_viscous_;  ///< 3 by the viscous elongations
   Eigen::Vector3d at_ = Eigen::Vector3d::Zero();
 };
 

@@ -90,8 +90,9 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   stride_ = 8 * ((stiffness_.free().size() + 1) / 2);
   change_.assign(stride_, 0.0F);
   const auto relaxed = static_cast<double>(weights_.of_end);
-  const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())), relaxed};
-  if (!stiffness_.factorise(bonds, constraints, rest, memory, options.portable)) {
+  const ViscousState viscous_state{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
+                                   relaxed};
+  if (!stiffness_.factorise(bonds, constraints, rest, viscous_state, options.portable)) {
     throw Error(ExitCode::numerical, "tissue", "it is not stiff at rest");
   }
   add_surface();
@@ -99,7 +100,7 @@ SurfaceNetwork::SurfaceNetwork(const BondSystem& bonds, const Positions& rest,
   // An elongation that bends by b between periods lies b v (1 - v)/2 off the line, v from the end;
   // what it leaves in the viscous state is the integral of that over exp(-z v) z dv.
   const double lasting =
-      instantaneous_.norm() > 0.0 ? relaxed_.norm() / instantaneous_.norm() : 1.0;
+      instantaneous_.norm() > 0.0 ? equilibrium_.norm() / instantaneous_.norm() : 1.0;
   // Not all of a bond relaxes: all of its force is taken.
   const double z = options.period_s / bonds.longest_relaxation_time_s();
   bend_kept_ = std::exp(-lasting * z);
@@ -146,21 +147,21 @@ void SurfaceNetwork::find_stiffness(const BondSystem& bonds, const Constraints& 
     sphere = ball_.touchable[i];
   }
   instantaneous_.setZero();
-  relaxed_.setZero();
+  equilibrium_.setZero();
   if (nearest == nullptr) return;
   const Eigen::Vector3d normal = nearest->rest_m.normalized();
   Equilibrium equilibrium(bonds, constraints);
   for (const double relaxation_factor : {0.0, 1.0}) {
-    const BondMemory memory{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
-                            relaxation_factor};
+    const ViscousState viscous_state{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bonds.size())),
+                                     relaxation_factor};
     Eigen::Matrix3Xd push = Eigen::Matrix3Xd::Zero(3, rest_.cols());
     push.col(static_cast<Eigen::Index>(sphere)) = normal;
-    if (!equilibrium.factorise(rest_, memory)) {
+    if (!equilibrium.factorise(rest_, viscous_state)) {
       throw Error(ExitCode::numerical, "tissue", "it is not stiff at rest");
     }
     equilibrium.displace(push);
     const double compliance = normal.dot(push.col(static_cast<Eigen::Index>(sphere)));
-    (relaxation_factor > 0.0 ? relaxed_ : instantaneous_) =
+    (relaxation_factor > 0.0 ? equilibrium_ : instantaneous_) =
         normal * normal.transpose() / (compliance + 1.0 / ball_.stiffness_N_per_m);
   }
 }
@@ -169,11 +170,11 @@ void SurfaceNetwork::reset() noexcept {
   bonds_.forget();
   std::fill(displacement_.begin(), displacement_.end(), 0.0F);
   std::fill(force_.begin(), force_.end(), 0.0F);
-  for (SurfaceSphere& skin : surface_) {
-    skin.pushed_N.setZero();
-    skin.before_N.setZero();
-    skin.change_N.setZero();
-    skin.linearisation_N.setZero();
+  for (SurfaceSphere& candidate : surface_) {
+    candidate.pushed_N.setZero();
+    candidate.before_N.setZero();
+    candidate.change_N.setZero();
+    candidate.linearisation_N.setZero();
   }
   ball_at_.setZero();
   largest_N_ = held_error_N_ = linear_error_N_ = 0.0;
@@ -183,8 +184,8 @@ Eigen::Vector3d SurfaceNetwork::displacement_of(std::size_t column) const noexce
   return Eigen::Map<const Eigen::Vector3f>(displacement_.data() + 4 * column).cast<double>();
 }
 
-Eigen::Vector3d SurfaceNetwork::from_ball(const SurfaceSphere& skin) const noexcept {
-  return skin.rest_m - ball_at_ + displacement_of(skin.column);
+Eigen::Vector3d SurfaceNetwork::from_ball(const SurfaceSphere& candidate) const noexcept {
+  return candidate.rest_m - ball_at_ + displacement_of(candidate.column);
 }
 
 Eigen::Matrix3d SurfaceNetwork::compliance(const SurfaceSphere& of,
@@ -203,12 +204,12 @@ void SurfaceNetwork::find_near(double way_m) noexcept {
   near_count_ = 0;
   too_many_ = false;
   for (std::size_t s = 0; s < surface_.size(); ++s) {
-    const SurfaceSphere& skin = surface_[s];
-    const Eigen::Vector3d apart = from_ball(skin);
-    const bool pushed = !skin.pushed_N.isZero(0.0);
+    const SurfaceSphere& candidate = surface_[s];
+    const Eigen::Vector3d apart = from_ball(candidate);
+    const bool pushed = !candidate.pushed_N.isZero(0.0);
     if (!pushed && !(apart.squaredNorm() <= within_m * within_m)) continue;
     if (near_count_ < kMostTouched) {
-      near_[static_cast<std::size_t>(near_count_++)] = {s, apart, skin.pushed_N};
+      near_[static_cast<std::size_t>(near_count_++)] = {s, apart, candidate.pushed_N};
     } else {
       too_many_ = true;
     }
@@ -220,7 +221,7 @@ void SurfaceNetwork::press() noexcept {
   std::array<std::array<Eigen::Matrix3d, kMostTouched>, kMostTouched> yields;
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t j = 0; j < count; ++j) {
-      yields[i][j] = compliance(surface_[near_[i].skin], surface_[near_[j].skin]);
+      yields[i][j] = compliance(surface_[near_[i].candidate], surface_[near_[j].candidate]);
     }
   }
   std::array<Eigen::Vector3d, kMostTouched> left;
@@ -282,7 +283,7 @@ void SurfaceNetwork::press() noexcept {
       near_[closed[a]].pushed_N += right.segment<3>(3 * static_cast<Eigen::Index>(a));
     }
   }
-  for (std::size_t i = 0; i < count; ++i) surface_[near_[i].skin].pushed_N = near_[i].pushed_N;
+  for (std::size_t i = 0; i < count; ++i) surface_[near_[i].candidate].pushed_N = near_[i].pushed_N;
 }
 
 Eigen::Vector3d SurfaceNetwork::total_N() const noexcept {
@@ -300,15 +301,15 @@ void SurfaceNetwork::balance(std::size_t first, double way_m) noexcept {
   find_near(way_m);
   for (int i = 0; i < near_count_; ++i) {
     Near& near = near_[static_cast<std::size_t>(i)];
-    const SurfaceSphere& skin = surface_[near.skin];
-    if (skin.fields == nullptr) continue;
+    const SurfaceSphere& candidate = surface_[near.candidate];
+    if (candidate.fields == nullptr) continue;
     near.free_m +=
-        Eigen::Map<const Eigen::Vector3f>(change_.data() + 4 * skin.column).cast<double>();
+        Eigen::Map<const Eigen::Vector3f>(change_.data() + 4 * candidate.column).cast<double>();
   }
   press();
   for (int i = 0; i < near_count_; ++i) {
     const Near& near = near_[static_cast<std::size_t>(i)];
-    const float* const field = surface_[near.skin].fields;
+    const float* const field = surface_[near.candidate].fields;
     if (field == nullptr || near.pushed_N.isZero(0.0)) continue;
     const Eigen::Vector3f push = near.pushed_N.cast<float>();
     run_wide([&] {
@@ -357,15 +358,15 @@ void SurfaceNetwork::answer() noexcept {
   double deepest_m = 0.0;
   for (int i = 0; i < near_count_; ++i) {
     Near& near = near_[static_cast<std::size_t>(i)];
-    const SurfaceSphere& skin = surface_[near.skin];
-    if (skin.fields != nullptr) near.free_m += weighed(skin.fields);
+    const SurfaceSphere& candidate = surface_[near.candidate];
+    if (candidate.fields != nullptr) near.free_m += weighed(candidate.fields);
   }
   press();
   for (int i = 0; i < near_count_; ++i) {
     const Near& near = near_[static_cast<std::size_t>(i)];
     if (near.pushed_N.isZero(0.0)) continue;
-    held = held || surface_[near.skin].fields == nullptr;
-    deepest_m = std::max(deepest_m, displacement_of(surface_[near.skin].column).norm());
+    held = held || surface_[near.candidate].fields == nullptr;
+    deepest_m = std::max(deepest_m, displacement_of(surface_[near.candidate].column).norm());
   }
   // Written so that a force that is no number is passed on, and found.
   answer_.force_N = total_N() + 0.0 * Eigen::Vector3d::Constant(static_cast<double>(sum));
@@ -378,19 +379,20 @@ void SurfaceNetwork::answer() noexcept {
 
 void SurfaceNetwork::add_linear_error() noexcept {
   linear_error_N_ = 0.0;
-  for (SurfaceSphere& skin : surface_) {
-    const Eigen::Vector3d change_N = skin.pushed_N - skin.before_N;
-    skin.linearisation_N = bend_kept_ * skin.linearisation_N + bend_ * (change_N - skin.change_N);
-    skin.before_N = skin.pushed_N;
-    skin.change_N = change_N;
-    linear_error_N_ += skin.linearisation_N.norm();
+  for (SurfaceSphere& candidate : surface_) {
+    const Eigen::Vector3d change_N = candidate.pushed_N - candidate.before_N;
+    candidate.linearisation_N =
+        bend_kept_ * candidate.linearisation_N + bend_ * (change_N - candidate.change_N);
+    candidate.before_N = candidate.pushed_N;
+    candidate.change_N = change_N;
+    linear_error_N_ += candidate.linearisation_N.norm();
   }
   answer_.error_N += linear_error_N_;
   if (!(answer_.error_N <= kTrustedError * scale_N())) answer_.trusted = false;
 }
 
 double SurfaceNetwork::scale_N() const noexcept {
-  return std::max(largest_N_, kScaleAtDepth_m * relaxed_.norm());
+  return std::max(largest_N_, kScaleAtDepth_m * equilibrium_.norm());
 }
 
 bool SurfaceNetwork::has_fallen_in() const noexcept {

@@ -50,7 +50,9 @@ class SurfaceNetwork final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return instantaneous_;
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return equilibrium_;
+  }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return rest_.cols(); }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
 
@@ -65,7 +67,7 @@ class SurfaceNetwork final : public ContactModel {
   struct SurfaceSphere {
     std::size_t column;        ///< of displacements
     Eigen::Vector3d rest_m;    ///< its centre at rest, from the ball's start
-    const float* fields;       ///< its displacements per force on it, x, y and z; null: it is held
+    const float* fields;       ///< its displacements per force on it, x, y and z; null: it is fixed
     Eigen::Vector3d pushed_N;  ///< with what the ball pushes it
     /// At the end of the last period, and its change in that.
     Eigen::Vector3d before_N = Eigen::Vector3d::Zero(), change_N = Eigen::Vector3d::Zero();
@@ -74,7 +76,7 @@ class SurfaceNetwork final : public ContactModel {
   };
   /// A sphere in reach of the ball while forces are balanced.
   struct Near {
-    std::size_t skin;
+    std::size_t candidate;
     Eigen::Vector3d free_m;    ///< from the ball to its centre, if the ball pushed nothing
     Eigen::Vector3d pushed_N;  ///< with what the ball pushes it
   };
@@ -82,7 +84,7 @@ class SurfaceNetwork final : public ContactModel {
   void add_surface();
   void find_stiffness(const BondSystem& bonds, const Constraints& constraints);
   [[nodiscard]] Eigen::Vector3d displacement_of(std::size_t column) const noexcept;
-  [[nodiscard]] Eigen::Vector3d from_ball(const SurfaceSphere& skin) const noexcept;
+  [[nodiscard]] Eigen::Vector3d from_ball(const SurfaceSphere& candidate) const noexcept;
   /// Displacement of the first per force on the second.
   [[nodiscard]] Eigen::Matrix3d compliance(const SurfaceSphere& of,
                                            const SurfaceSphere& under) const noexcept;
@@ -111,7 +113,7 @@ class SurfaceNetwork final : public ContactModel {
   std::size_t stride_ = 0;
   std::vector<SurfaceSphere> surface_;
   std::vector<std::size_t> inside_;  ///< spheres that it is not to touch
-  Eigen::Matrix3d instantaneous_, relaxed_;
+  Eigen::Matrix3d instantaneous_, equilibrium_;
 
   AlignedFloats displacement_, force_, change_;
   std::array<Near, kMostTouched> near_{};

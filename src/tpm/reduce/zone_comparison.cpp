@@ -46,7 +46,7 @@ Eigen::Vector3d force_at(PushedContact& tissue, const Eigen::Vector3d& displacem
                          double relaxed) {
   const Positions position = tissue.at(displacement_m, relaxed);
   Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Zero(3, position.cols());
-  tissue.bonds().add_forces(position, tissue.memory(position, relaxed, relaxed), force);
+  tissue.bonds().add_forces(position, tissue.viscous_state(position, relaxed, relaxed), force);
   return tissue.contact().sum(force);
 }
 

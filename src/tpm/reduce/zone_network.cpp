@@ -45,8 +45,8 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest,
   require_servo_material(bonds, "the zone");
   PushedContact tissue(bonds, rest, constraints, contact);
   weights_ = servo_weights(bonds, options.period_s);
-  instantaneous_ = tissue.fields(rest, tissue.memory(rest, 0.0, 0.0)).stiffness;
-  relaxed_ = tissue.fields(rest, tissue.memory(rest, 0.0, 1.0)).stiffness;
+  instantaneous_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 0.0)).stiffness;
+  equilibrium_ = tissue.fields(rest, tissue.viscous_state(rest, 0.0, 1.0)).stiffness;
   choose_zone(tissue);
   const Parts parts = build(tissue);
   compare(tissue, constraints, parts);
@@ -54,37 +54,36 @@ ZoneNetwork::ZoneNetwork(const BondSystem& bonds, const Positions& rest,
 
 void ZoneNetwork::choose_zone(const PushedContact& tissue) {
   const BondSystem& bonds = tissue.bonds();
-  held_or_free_.assign(bonds.spheres(), 1);
+  zone_role_.assign(bonds.spheres(), 1);
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
     if (contact_.has(i) || tissue.constraints().is_free(i)) continue;
     if (!tissue.constraints().projector(i).isZero(0.0)) {
       throw bad_input("guides", "sphere " + std::to_string(i + 1) + " is guided",
-                      "spheres that are free or held");
+                      "spheres that are free or fixed");
     }
-    held_or_free_[i] = 0;
+    zone_role_[i] = 0;
   }
-  for (const std::size_t sphere : contact_) held_or_free_[sphere] = 2;
+  for (const std::size_t sphere : contact_) zone_role_[sphere] = 2;
   for (int ring = 0; ring < options_.rings; ++ring) {
-    std::vector<char> wider = held_or_free_;
+    std::vector<char> wider = zone_role_;
     for (std::size_t b = 0; b < bonds.size(); ++b) {
       const std::uint32_t from = bonds.end_a()[b];
       const std::uint32_t to = bonds.end_b()[b];
-      if (held_or_free_[from] == 2 && held_or_free_[to] == 1) wider[to] = 2;
-      if (held_or_free_[to] == 2 && held_or_free_[from] == 1) wider[from] = 2;
+      if (zone_role_[from] == 2 && zone_role_[to] == 1) wider[to] = 2;
+      if (zone_role_[to] == 2 && zone_role_[from] == 1) wider[from] = 2;
     }
-    held_or_free_ = std::move(wider);
+    zone_role_ = std::move(wider);
   }
   std::vector<char> at_edge(bonds.spheres(), 0);
   for (std::size_t b = 0; b < bonds.size(); ++b) {
     const std::uint32_t from = bonds.end_a()[b];
     const std::uint32_t to = bonds.end_b()[b];
-    if (held_or_free_[from] == 2 && held_or_free_[to] == 1) at_edge[from] = 1;
-    if (held_or_free_[to] == 2 && held_or_free_[from] == 1) at_edge[to] = 1;
+    if (zone_role_[from] == 2 && zone_role_[to] == 1) at_edge[from] = 1;
+    if (zone_role_[to] == 2 && zone_role_[from] == 1) at_edge[to] = 1;
   }
   for (const bool edge : {false, true}) {
     for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-      if (held_or_free_[i] == 2 && !contact_.has(i) && (at_edge[i] != 0) == edge)
-        zone_.push_back(i);
+      if (zone_role_[i] == 2 && !contact_.has(i) && (at_edge[i] != 0) == edge) zone_.push_back(i);
     }
   }
   edge_ = static_cast<std::size_t>(std::count(at_edge.begin(), at_edge.end(), 1));
@@ -95,7 +94,7 @@ void ZoneNetwork::choose_zone(const PushedContact& tissue) {
     column_[sphere] = static_cast<std::uint32_t>(zone_.size());
   }
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
-    if (held_or_free_[i] == 1) outside_.push_back(i);
+    if (zone_role_[i] == 1) outside_.push_back(i);
   }
 }
 
@@ -207,7 +206,7 @@ ContactAnswer ZoneNetwork::step(const ToolPose& tool) noexcept {
   claim_.advance(depth_m);
   answer.error_N = claim_.at(claim_.place(), aside_m) + kUnbalanced * correction.norm() +
                    step_error_->advance(tool.displacement_m).norm();
-  const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * relaxed_.norm());
+  const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * equilibrium_.norm());
   answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&
                    answer.error_N <= kTrustedZone * scale_N;
   return answer;

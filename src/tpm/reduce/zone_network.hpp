@@ -51,9 +51,11 @@ class ZoneNetwork final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return instantaneous_;
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override { return relaxed_; }
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return equilibrium_;
+  }
   [[nodiscard]] Eigen::Index spheres() const noexcept override {
-    return static_cast<Eigen::Index>(held_or_free_.size());
+    return static_cast<Eigen::Index>(zone_role_.size());
   }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override;
 
@@ -100,11 +102,11 @@ class ZoneNetwork final : public ContactModel {
   std::vector<std::size_t> zone_;      ///< movable spheres of the zone, those at its edge last
   std::size_t edge_ = 0;               ///< how many of them are at the edge
   std::vector<std::uint32_t> column_;  ///< of each sphere among displacements
-  std::vector<char> held_or_free_;     ///< of each sphere: 0 held, 1 outside, 2 in the zone
+  std::vector<char> zone_role_;        ///< of each sphere: 0 held, 1 outside, 2 in the zone
   std::vector<std::size_t> outside_;
   Eigen::Index own_ = 0;
   double softest_ = 0.0;
-  Eigen::Matrix3d instantaneous_, relaxed_;
+  Eigen::Matrix3d instantaneous_, equilibrium_;
 
   ServoBonds at_contact_, elsewhere_;
   Dense inverse_;   ///< of the frozen stiffness, by coordinates of zone and own displacements

@@ -42,13 +42,13 @@ ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
     const std::uint32_t from = bonds.end_a()[b];
     const std::uint32_t to = bonds.end_b()[b];
     const ServoBonds::Choice choice{b, column_[from], column_[to]};
-    if (held_or_free_[from] == 1 || held_or_free_[to] == 1) {
+    if (zone_role_[from] == 1 || zone_role_[to] == 1) {
       linear[b] = 1;
     } else if (column_[from] == column_[to]) {
-      continue;  // within the patch, or between what is held
+      continue;  // within the patch, or between fixed spheres
     } else if (contact_.has(from) || contact_.has(to)) {
       parts.near.push_back(choice);
-    } else if (held_or_free_[from] == 2 || held_or_free_[to] == 2) {
+    } else if (zone_role_[from] == 2 || zone_role_[to] == 2) {
       parts.far.push_back(choice);
     }
   }
@@ -62,7 +62,7 @@ ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
   const Positions pressed = tissue.at(options_.linear_depth_m * into_, relaxed);
   const LinearBonds around(tissue, pressed, relaxed, linear);
   Constraints outside = tissue.constraints();
-  for (const std::size_t i : zone_) outside.hold(i);
+  for (const std::size_t i : zone_) outside.fix(i);
   BlockLdlt factor(bonds.pattern());
   {
     BlockMatrix matrix = around.matrix(relaxed);
@@ -89,8 +89,10 @@ ZoneNetwork::Parts ZoneNetwork::build(PushedContact& tissue) {
       basis.push_back(follow(unit));
     }
   }
-  const ContactFields instantaneous = tissue.fields(pressed, tissue.memory(pressed, relaxed, 0.0));
-  const ContactFields in_the_end = tissue.fields(pressed, tissue.memory(pressed, relaxed, 1.0));
+  const ContactFields instantaneous =
+      tissue.fields(pressed, tissue.viscous_state(pressed, relaxed, 0.0));
+  const ContactFields in_the_end =
+      tissue.fields(pressed, tissue.viscous_state(pressed, relaxed, 1.0));
   Fields own;
   Fields resisted;
   for (const ContactFields* const fields : {&instantaneous, &in_the_end}) {
@@ -164,14 +166,14 @@ void ZoneNetwork::set_weights(const PushedContact& tissue, const Parts& parts,
   const BondSystem& bonds = tissue.bonds();
   const auto n = static_cast<Eigen::Index>(3 * zone_.size()) + own_;
   const Eigen::Index tail = stiff.rows();
-  const BondMemory memory = tissue.memory(parts.frozen, parts.relaxed, relaxed);
+  const ViscousState viscous_state = tissue.viscous_state(parts.frozen, parts.relaxed, relaxed);
   Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(n, n);
   whole.bottomRightCorner(tail, tail) = stiff;
   Eigen::MatrixXd coupling = Eigen::MatrixXd::Zero(n, 3);
   const auto in_zone = [&](std::uint32_t column) { return column < zone_.size(); };
   for (const auto* const some : {&parts.near, &parts.far}) {
     for (const auto& [bond, from, to] : *some) {
-      const Eigen::Matrix3d block = bonds.stiffness_block(bond, parts.frozen, memory);
+      const Eigen::Matrix3d block = bonds.stiffness_block(bond, parts.frozen, viscous_state);
       const Eigen::Index a = 3 * static_cast<Eigen::Index>(from);
       const Eigen::Index b = 3 * static_cast<Eigen::Index>(to);
       if (in_zone(from)) whole.block<3, 3>(a, a) += block;

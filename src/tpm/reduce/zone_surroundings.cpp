@@ -5,8 +5,8 @@ namespace tpm::organ {
 LinearBonds::LinearBonds(const PushedContact& tissue, const Positions& position, double relaxed,
                          const std::vector<char>& chosen)
     : bonds_(tissue.bonds()) {
-  const BondMemory instantaneous = tissue.memory(position, relaxed, 0.0);
-  const BondMemory in_the_end = tissue.memory(position, relaxed, 1.0);
+  const ViscousState instantaneous = tissue.viscous_state(position, relaxed, 0.0);
+  const ViscousState in_the_end = tissue.viscous_state(position, relaxed, 1.0);
   for (std::size_t b = 0; b < bonds_.size(); ++b) {
     if (chosen[b] == 0) continue;
     const Eigen::Matrix3d first = bonds_.stiffness_block(b, position, instantaneous);

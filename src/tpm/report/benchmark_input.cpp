@@ -86,8 +86,8 @@ BenchmarkResult read_result(const Json& json) {
   }
   const Json& reference = json.at("reference");
   result.unit = reference.at("peak_unit").get<std::string>();
-  result.reference.judge.words = reference.at("judge").get<std::string>();
-  result.reference.judge.method = reference.at("judge_method").get<std::string>();
+  result.reference.first.words = reference.at("first").get<std::string>();
+  result.reference.first.method = reference.at("first_method").get<std::string>();
   result.reference.second.words = reference.at("second").get<std::string>();
   result.reference.second.method = reference.at("second_method").get<std::string>();
   result.reference.exact = reference.at("exact").get<bool>();

@@ -145,7 +145,7 @@ Json result_json(const BenchmarkResult& result, bool timing) {
     json["targets"].push_back(std::move(one));
   }
   json["reference"] = {
-      {"judge", reference.judge.words},   {"judge_method", reference.judge.method},
+      {"first", reference.first.words},   {"first_method", reference.first.method},
       {"second", reference.second.words}, {"second_method", reference.second.method},
       {"exact", reference.exact},         {"peak", stored(reference.peak)},
       {"peak_unit", result.unit},         {"agreement", stored(reference.agreement)},

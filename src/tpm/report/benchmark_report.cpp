@@ -41,13 +41,13 @@ std::string reference_words(const BenchmarkResult& result) {
       result.unit.empty() ? "the peak"
                           : fmt::format("the peak of {} {}", significant(r.peak, 4), result.unit);
   if (r.exact) {
-    return fmt::format("Reference: {}, exact; {} differs from it by {} of {} and judges it.",
-                       r.judge.words, r.second.words, significant(r.agreement, 2), peak);
+    return fmt::format("Reference: {}, exact; {} differs from it by {} of {} and checks it.",
+                       r.first.words, r.second.words, significant(r.agreement, 2), peak);
   }
   return fmt::format(
-      "Reference: {}. {} judges that method itself; the two differ by {} of {}, so errors are told "
+      "Reference: {}. {} checks that method itself; the two differ by {} of {}, so errors are told "
       "down to {}, ten times that.",
-      r.judge.words, r.second.words, significant(r.agreement, 2), peak, significant(r.floor, 2));
+      r.first.words, r.second.words, significant(r.agreement, 2), peak, significant(r.floor, 2));
 }
 
 /// What a cell says of the cheapest point within an error.
@@ -284,7 +284,7 @@ std::string introduction(const BenchmarkOptions& options) {
       "Every method at many settings on named problems. The error is the largest absolute "
       "difference "
       "of the response to the reference over the protocol, divided by the largest response; 1 % is "
-      "1e-2 in the charts. No method is its own judge.";
+      "1e-2 in the charts. No method is its own reference.";
   if (!options.timing) return text + " Made with `--no-timing`: counts, and no clock.";
   return text + fmt::format(
                     " Wall times are medians of {} repeats of each setting that completes, on one "

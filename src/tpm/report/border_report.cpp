@@ -85,7 +85,7 @@ Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
 
 Figure border_figure(const BorderStudy& study) {
   const double damping = study.plant.damping_N_s_per_m;
-  const Axis stiffness{"largest stiffness at once", "N/m", true, std::nullopt, std::nullopt};
+  const Axis stiffness{"largest instantaneous stiffness", "N/m", true, std::nullopt, std::nullopt};
   Panel passive{
       fmt::format("passive, device with {} N s/m", significant(damping, 3)), kRate, stiffness, {}};
   Panel stable{"stable with the arm of one operator", kRate, stiffness, {}};
@@ -135,7 +135,8 @@ Figure rule_figure(const BorderStudy& study) {
   figure.id = "rules";
   figure.title = "Three ways to advance the contact (simulated device)";
   figure.caption = fmt::format(
-      "A contact of {0} N/m at once and {1} N/m relaxed. The exact update needs between {1} T/2 "
+      "A contact of {0} N/m instantaneously and {1} N/m at equilibrium. The exact update needs "
+      "between {1} T/2 "
       "and "
       "{0} T/2 at every relaxation time; forward Euler diverges below T/2, to the left of where "
       "its "
@@ -162,7 +163,8 @@ Json impacts_json(const BorderStudy& study) {
     for (const RiseLimit limit : kRiseLimits) {
       const auto which = static_cast<std::size_t>(limit);
       by_limit[std::string(word_of(limit))] = {
-          {"comes_to_rest", p.rests[which]}, {"given_to_hand_J", number_or_null(p.given_J[which])}};
+          {"comes_to_rest", p.rests[which]},
+          {"delivered_to_hand_J", number_or_null(p.delivered_J[which])}};
     }
     json["by_limit_of_rise"] = std::move(by_limit);
     list.push_back(std::move(json));
@@ -309,7 +311,8 @@ Json border_json(const BorderStudy& study) {
 
 std::string border_text(const BorderStudy& study) {
   std::string text = fmt::format(
-      "SIMULATED DEVICE\nlargest stiffness at once, N/m, relaxed half of it, relaxation time {} "
+      "SIMULATED DEVICE\nlargest instantaneous stiffness, N/m, half of it at equilibrium, "
+      "relaxation time {} "
       "ms\n"
       "{:>7} {:>6} {:>9} {:>22} {:>22}\n",
       significant(1e3 * study.relaxation_time_s, 3), "Hz", "delay", "b N s/m",

@@ -44,7 +44,7 @@ Json hazard_json(const HazardStudy& study) {
                     {"cause", ran(row) ? Json(word_of(row.cause)) : Json()},
                     {"largest_force_N", number(row.largest_force_N, ran(row))},
                     {"largest_rise_N", number(row.largest_rise_N, ran(row))},
-                    {"given_to_hand_J", number(row.given_J, ran(row))},
+                    {"delivered_to_hand_J", number(row.delivered_J, ran(row))},
                     {"to_zero_force_s", number(row.to_zero_s, stopped(row))},
                     {"travel_m", number(row.travel_m, stopped(row))},
                     {"passive", row.passive},
@@ -55,8 +55,8 @@ Json hazard_json(const HazardStudy& study) {
           {"bounds",
            {{"force_N", b.force_N},
             {"rise_in_a_period_N", b.rise_N},
-            {"given_to_hand_J", b.given_J},
-            {"given_to_hand_stopped_J", b.given_stopped_J},
+            {"delivered_to_hand_J", b.delivered_J},
+            {"delivered_to_hand_stopped_J", b.delivered_stopped_J},
             {"travel_m", b.travel_m},
             {"to_zero_force_s", b.to_zero_s},
             {"fault_to_zero_force_s", b.fault_to_zero_s}}},
@@ -75,7 +75,7 @@ std::string hazard_text(const HazardStudy& study) {
                         row.setting, row.accepted ? ", accepted as unstable" : "", outcome_of(row),
                         in(row.largest_force_N, 1.0, ran(row)),
                         in(row.largest_rise_N, 1.0, ran(row)) + (row.damped ? " (damped)" : ""),
-                        in(row.given_J, 1e3, ran(row)), in(row.to_zero_s, 1e3, stopped(row)),
+                        in(row.delivered_J, 1e3, ran(row)), in(row.to_zero_s, 1e3, stopped(row)),
                         in(row.travel_m, 1e3, stopped(row)), row.within ? "yes" : "NO");
   }
   const auto within = std::count_if(study.rows.begin(), study.rows.end(),
@@ -85,8 +85,8 @@ std::string hazard_text(const HazardStudy& study) {
       "controller damps; energy given to the hand {} mJ, of a session that is stopped {} mJ, which "
       "ends within {} ms and {} mm of the first touch, or within {} ms of the fault (after a "
       "stall); nothing passive is refused\n",
-      within, study.rows.size(), b.force_N, b.rise_N, 1e3 * b.given_J, 1e3 * b.given_stopped_J,
-      1e3 * b.to_zero_s, 1e3 * b.travel_m, 1e3 * b.fault_to_zero_s);
+      within, study.rows.size(), b.force_N, b.rise_N, 1e3 * b.delivered_J,
+      1e3 * b.delivered_stopped_J, 1e3 * b.to_zero_s, 1e3 * b.travel_m, 1e3 * b.fault_to_zero_s);
   return text;
 }
 
@@ -99,7 +99,7 @@ Json clock_hazard_json(const ClockHazardStudy& study) {
          {"setting", row.setting},
          {"cause", word_of(row.cause)},
          {"expected_cause", word_of(row.expected)},
-         {"missed_periods_at_once", row.missed_at_once},
+         {"consecutive_missed_periods", row.consecutive_missed},
          {"largest_force_N", rounded(row.largest_force_N, kHazardDigits)},
          {"to_zero_force_s", stopped_by_it ? Json(rounded(row.to_zero_s, kHazardDigits)) : Json()},
          {"to_zero_force_bound_s", stopped_by_it ? Json(row.bound_s) : Json()},
@@ -114,16 +114,17 @@ Json clock_hazard_json(const ClockHazardStudy& study) {
 std::string clock_hazard_text(const ClockHazardStudy& study) {
   std::string text = fmt::format(
       "Hazards on the clock, on the simulated Omega.7 and operator: no hardware; {}\n\n"
-      "| hazard | setting | outcome | periods missed at once | largest force, N | from the fault "
+      "| hazard | setting | outcome | consecutive periods missed | largest force, N | from the "
+      "fault "
       "to forces off, ms | bound, ms | tries | within bounds |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
       study.scheduling);
   for (const ClockHazardRow& row : study.rows) {
     const bool stopped_by_it = row.expected != StopCause::finished;
     text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", row.hazard, row.setting,
-                        word_of(row.cause), row.missed_at_once, significant(row.largest_force_N, 3),
-                        in(row.to_zero_s, 1e3, stopped_by_it), in(row.bound_s, 1e3, stopped_by_it),
-                        row.tries, row.within ? "yes" : "NO");
+                        word_of(row.cause), row.consecutive_missed,
+                        significant(row.largest_force_N, 3), in(row.to_zero_s, 1e3, stopped_by_it),
+                        in(row.bound_s, 1e3, stopped_by_it), row.tries, row.within ? "yes" : "NO");
   }
   const auto within = std::count_if(study.rows.begin(), study.rows.end(),
                                     [](const ClockHazardRow& row) { return row.within; });

@@ -144,7 +144,7 @@ std::string experiment_line(const Verification& v) {
   }
   return fmt::format(
       "beside the pig-liver readings of the same indentations: {} to {}, which "
-      "judges the material, not the rendering",
+      "compares the material, not the rendering",
       percent_text(least, 0), percent_text(most, 0));
 }
 

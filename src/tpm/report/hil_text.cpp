@@ -88,7 +88,7 @@ Json check_json(const JitterCheck& check) {
           {"busy", times_json(o.busy)},
           {"woke_late_histogram", bins},
           {"cause", word_of(o.cause)},
-          {"most_missed_at_once", o.counts.most_missed_at_once},
+          {"most_consecutive_missed", o.counts.most_consecutive_missed},
           {"most_late_of_1000", o.counts.most_late},
           {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
           {"hang_limit_s", rounded(check.hang_limit_s, kHilDigits)},
@@ -110,9 +110,9 @@ std::string check_text(const JitterCheck& check) {
   for (const auto& [edge, count] : octaves(o.woke_late)) {
     text += fmt::format("  {:>8} us {:>10}\n", us(edge), count);
   }
-  text += fmt::format("at most {} periods missed at once, {} of 1000 cycles late; watchdog {} ms\n",
-                      o.counts.most_missed_at_once, o.counts.most_late,
-                      significant(1e3 * check.watchdog_s, 3));
+  text += fmt::format(
+      "at most {} consecutive periods missed, {} of 1000 cycles late; watchdog {} ms\n",
+      o.counts.most_consecutive_missed, o.counts.most_late, significant(1e3 * check.watchdog_s, 3));
   return text + "verdict: " + check.verdict + "\n" + check.advice + "\n";
 }
 

@@ -61,8 +61,9 @@ Json network_json(const Tissue& tissue, const NetworkInspection& inspection) {
   if (organ.contact) {
     json["contact"] = {
         {"sphere", *organ.contact + 1},
-        {"stiffness_over_star_at_once", rounded(inspection.contact_over_star->instantaneous, 9)},
-        {"stiffness_over_star_relaxed", rounded(inspection.contact_over_star->relaxed, 9)}};
+        {"stiffness_over_star_instantaneous",
+         rounded(inspection.contact_over_star->instantaneous, 9)},
+        {"stiffness_over_star_equilibrium", rounded(inspection.contact_over_star->equilibrium, 9)}};
   }
   json["assumptions"] = organ.assumptions;
   json["unused_blocks"] = tissue.unused_blocks;
@@ -88,15 +89,16 @@ std::string network_text(const Tissue& tissue, const NetworkInspection& inspecti
   text +=
       fmt::format("\nbond sums besides the contact: radial {}, lateral {} (the star: 1 and 2)\n",
                   spread_words(inspection.radial_sum), spread_words(inspection.lateral_sum));
-  text += fmt::format("held: {} spheres{}{}; {} free coordinates\n", tissue.anchors.size(),
+  text += fmt::format("fixed: {} spheres{}{}; {} free coordinates\n", tissue.anchors.size(),
                       tissue.anchor_words.empty() ? "" : ", ",
                       fmt::join(tissue.anchor_words, " and "), inspection.free_coordinates);
   if (organ.contact) {
     text += fmt::format(
-        "contact: sphere {}, with its neighbours held {} times as stiff as the star at once, {} "
-        "times relaxed\n",
+        "contact: sphere {}, with its neighbours fixed {} times as stiff as the star "
+        "instantaneously, {} "
+        "times at equilibrium\n",
         *organ.contact + 1, significant(inspection.contact_over_star->instantaneous, 7),
-        significant(inspection.contact_over_star->relaxed, 7));
+        significant(inspection.contact_over_star->equilibrium, 7));
   }
   for (const std::string& assumption : organ.assumptions) {
     text += fmt::format("assumed: {}\n", assumption);

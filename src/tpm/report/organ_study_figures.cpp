@@ -107,7 +107,7 @@ Figure static_figure(const OrganStudy& study, std::size_t condition) {
   Figure figure{
       "static",
       "Static force against depth",
-      "Everything has relaxed. Compare Fig. 6 of the paper. The bands are ranges over "
+      "At equilibrium. Compare Fig. 6 of the paper. The bands are ranges over "
       "three pigs; between them nothing is known. Of a fit that meets every band the curve is "
       "one of many.",
       {}};

@@ -136,10 +136,10 @@ double deepest_m(const OrganStudy& study, const StudyCurves& set) {
 
 void add_readings(Document& document, const OrganStudy& study, const StudyCurves& set) {
   for (const auto& [kind, caption] :
-       {std::pair{Kind::static_, "Static force, everything relaxed."},
+       {std::pair{Kind::static_, "Static force, at equilibrium."},
         std::pair{Kind::ramp_hold,
                   "Force of ramp and hold, at the end of the ramp and of the hold."},
-        std::pair{Kind::creep, "Depth of creep, at once and at the end."}}) {
+        std::pair{Kind::creep, "Depth of creep, instantaneous and at the end."}}) {
     Table table = readings_table(study, set, kind, caption);
     if (!table.rows.empty()) document.table(std::move(table));
   }
@@ -296,7 +296,7 @@ void add_costs(Document& document, const OrganStudy& study) {
   document.heading(2, "What \"we ignore the displacement of the spheres A and C\" costs");
   document.paragraph(fmt::format(
       "All tissues at one material. The difference is that from '{}', whose neighbours A and C and "
-      "partner D are held.",
+      "partner D are fixed.",
       study.config.tissues.front().name));
   for (std::size_t m = 0; m < study.config.materials.size(); ++m) {
     const StudyMaterial& material = study.config.materials[m];
@@ -305,9 +305,10 @@ void add_costs(Document& document, const OrganStudy& study) {
     std::string words =
         fmt::format("{}: the fit '{}' of '{}'", element_words(set.parameters.value()),
                     study.config.fits[material.fit].name, study.config.tissues.front().name);
-    for (const auto& [name, value] : material.held.values) words += fmt::format(", {} held", name);
+    for (const auto& [name, value] : material.fixed.values)
+      words += fmt::format(", {} fixed", name);
     for (const HypothesisResult& h : study.fit(material.fit, 0).result->hypotheses) {
-      if (material.held.values.empty() || h.hypothesis.name != material.held.name) continue;
+      if (material.fixed.values.empty() || h.hypothesis.name != material.fixed.name) continue;
       words += fmt::format(" (the deviance rises by {}, p = {})", significant(h.rise, 4),
                            probability(h.p_value));
     }

@@ -294,7 +294,7 @@ std::string equations_text(const ExperimentScene& scene, const SimulationRun& ru
   if (!f.masses) {
     return fmt::format(
         "{}, {}, tolerance {}\n", network,
-        !f.entry().can().course ? "static: everything has relaxed at each time" : "quasi-static",
+        !f.entry().can().course ? "static: equilibrium at each time" : "quasi-static",
         shortest(f.tolerance));
   }
   return fmt::format(

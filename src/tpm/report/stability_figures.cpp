@@ -59,7 +59,8 @@ std::vector<Figure> stability_figures(const StabilityStudy& study) {
       figure.id = fmt::format("{}_{}", step_rule_name(entry.meaning), pair.name);
       figure.title = fmt::format("{}: where it fails", step_rule_name(entry.meaning));
       figure.caption = fmt::format(
-          "Left: {}. Right: {}. Runs of 300 steps (with a rising load: 300 after it), judged over "
+          "Left: {}. Right: {}. Runs of 300 steps (with a rising load: 300 after it), compared "
+          "over "
           "the last 32.{}",
           first->problem, second->problem,
           limited ? "" : " Linear theory gives this rule no limit here.");

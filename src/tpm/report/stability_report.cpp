@@ -156,10 +156,11 @@ Table maps_table(const StabilityStudy& study) {
 void add_maps(Document& document, const StabilityStudy& study, const std::vector<Figure>& figures) {
   document.heading(2, "Maps");
   document.paragraph(fmt::format(
-      "A run holds if it is within {} of the truth at its end, in parts of the peak; the truth is "
+      "A run holds if it is within {} of the reference at its end, in parts of the peak; the "
+      "reference is "
       "a "
       "closed form, or the modes of the linear motion. It diverged if a value is not finite or "
-      "beyond 1000 times its scale, or if its distance from the truth still grows; with masses "
+      "beyond 1000 times its scale, or if its distance from the reference still grows; with masses "
       "that "
       "is called growing energy.",
       percent(kHoldsWithin)));

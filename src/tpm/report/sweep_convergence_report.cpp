@@ -54,9 +54,9 @@ std::string verdict(const SweepConvergence& c) {
 }
 
 /// " at depth = 2 mm, rate = 4 mm/s"
-std::string held_text(const SweepConvergence& c) {
+std::string fixed_text(const SweepConvergence& c) {
   std::string text;
-  for (const HeldValue& h : c.held) {
+  for (const FixedValue& h : c.fixed) {
     const Unit unit = shown_unit_of(h.unit);
     text += fmt::format("{} {} = {}{}{}", text.empty() ? " at" : ",", h.axis,
                         significant(h.value / unit.to_si, 5), unit.symbol.empty() ? "" : " ",
@@ -70,7 +70,7 @@ Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
   const GridConvergence& finest = c.threes.back();
   Figure figure{fmt::format("convergence_{}", c.variable),
                 c.variable,
-                fmt::format("{}: {} over {}{}: {}.", title, c.variable, c.size_text, held_text(c),
+                fmt::format("{}: {} over {}{}: {}.", title, c.variable, c.size_text, fixed_text(c),
                             verdict(c)),
                 {}};
   const Axis size_axis{c.size_text, unit_size.symbol, true, {}, {}};
@@ -119,7 +119,7 @@ std::string convergence_text(const std::vector<SweepConvergence>& all) {
     const Unit unit = shown_unit_of(c.unit), unit_size = shown_unit_of(c.size_unit);
     text += fmt::format("{}{} over axis {}", text.empty() ? "" : "\n",
                         named_in_unit(c.variable, unit), c.axis);
-    text += held_text(c);
+    text += fixed_text(c);
     if (c.left_out > 0) text += fmt::format(", {} places without a number left out", c.left_out);
     text += fmt::format("\n{:>20} {:>14} {:>12} {:>8} {:>14} {:>10}\n",
                         named_in_unit(c.size_text, unit_size), "value", "behaviour", "order",
@@ -155,14 +155,14 @@ Json convergence_json(const std::vector<SweepConvergence>& all) {
       entry["index"] = limit ? Json(rounded(g.index, 6)) : Json();
       threes.push_back(std::move(entry));
     }
-    Json held = Json::array();
-    for (const HeldValue& h : c.held) {
-      held.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
+    Json fixed = Json::array();
+    for (const FixedValue& h : c.fixed) {
+      fixed.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
     }
     list.push_back({{"variable", c.variable},
                     {"unit", c.unit},
                     {"axis", c.axis},
-                    {"held", std::move(held)},
+                    {"fixed", std::move(fixed)},
                     {"size_is", c.size_text},
                     {"size", c.size},
                     {"value", c.value},

@@ -51,22 +51,22 @@ std::string place_words(const ReadAxis& axis, std::uint64_t place) {
                      unit.symbol.empty() ? "" : " ", unit.symbol);
 }
 
-std::string held_words(const SweepReader& sweep, const std::vector<std::string>& free,
-                       const HeldPlaces& held) {
+std::string fixed_words(const SweepReader& sweep, const std::vector<std::string>& free,
+                        const FixedPlaces& fixed) {
   std::string words;
   for (const ReadAxis& axis : sweep.axes()) {
     if (std::find(free.begin(), free.end(), axis.name) != free.end()) continue;
     std::uint64_t place = 0;
-    for (const auto& [name, at] : held) place = name == axis.name ? at : place;
+    for (const auto& [name, at] : fixed) place = name == axis.name ? at : place;
     words += (words.empty() ? " At " : ", ") + place_words(axis, place);
   }
   return words.empty() ? words : words + ".";
 }
 
 /// A place on an axis that the figure draws as a whole says nothing.
-void refuse_free(const std::vector<std::string>& free, const HeldPlaces& held,
+void refuse_free(const std::vector<std::string>& free, const FixedPlaces& fixed,
                  const std::string& variable) {
-  for (const auto& [name, place] : held) {
+  for (const auto& [name, place] : fixed) {
     if (std::find(free.begin(), free.end(), name) == free.end()) continue;
     throw Error(ExitCode::usage, "--at " + name,
                 fmt::format("the figure of {} is drawn over that axis", variable),
@@ -95,10 +95,10 @@ void add_lines(const std::string& label, const std::vector<double>& x, const std
 }
 
 Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const std::string& x,
-                const std::string& y, const HeldPlaces& held) {
+                const std::string& y, const FixedPlaces& fixed) {
   const ReadAxis& across = sweep.axes()[sweep.axis(x)];
   const ReadAxis& up = sweep.axes()[sweep.axis(y)];
-  const std::vector<double> all = sweep.slice(v.name, y, x, held);
+  const std::vector<double> all = sweep.slice(v.name, y, x, fixed);
   const auto columns = some_of(across.places.size(), kMostPlaces);
   const auto rows = some_of(up.places.size(), kMostPlaces);
   const Unit unit = shown_unit_of(v.unit), unit_x = shown_unit_of(across.unit),
@@ -118,19 +118,19 @@ Panel sweep_map(const SweepReader& sweep, const ReadVariable& v, const std::stri
 }
 
 Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const std::string& x,
-                   const std::optional<std::string>& of, const HeldPlaces& held) {
+                   const std::optional<std::string>& of, const FixedPlaces& fixed) {
   const ReadAxis& across = sweep.axes()[sweep.axis(x)];
   const Unit unit = shown_unit_of(v.unit);
   Panel panel{
       named_in_unit(v.name, unit), axis_of(across), {v.name, unit.symbol, false, {}, {}}, {}};
   const std::vector<double> places = in_shown_unit(across.places, shown_unit_of(across.unit));
   if (!of) {
-    add_lines(v.name, places, in_shown_unit(sweep.slice(v.name, {}, x, held), unit), panel.series);
+    add_lines(v.name, places, in_shown_unit(sweep.slice(v.name, {}, x, fixed), unit), panel.series);
     return panel;
   }
   const ReadAxis& other = sweep.axes()[sweep.axis(*of)];
   for (const std::size_t place : some_of(other.places.size(), kLines)) {
-    HeldPlaces here = held;
+    FixedPlaces here = fixed;
     here.emplace_back(*of, place);
     add_lines(place_words(other, place), places,
               in_shown_unit(sweep.slice(v.name, {}, x, here), unit), panel.series);
@@ -139,7 +139,7 @@ Panel sweep_family(const SweepReader& sweep, const ReadVariable& v, const std::s
 }
 
 Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const std::string& of,
-                   const HeldPlaces& held) {
+                   const FixedPlaces& fixed) {
   const ReadAxis& axis = sweep.axes()[sweep.axis(of)];
   const Unit unit = shown_unit_of(v.unit);
   Panel panel{v.name,
@@ -147,7 +147,7 @@ Panel sweep_curves(const SweepReader& sweep, const ReadVariable& v, const std::s
               {v.name, unit.symbol, false, {}, {}},
               {}};
   for (const std::size_t place : some_of(axis.places.size(), kLines)) {
-    HeldPlaces here = held;
+    FixedPlaces here = fixed;
     here.emplace_back(of, place);
     add_lines(place_words(axis, place), v.times_s, in_shown_unit(sweep.curve(v.name, here), unit),
               panel.series);
@@ -166,9 +166,9 @@ bool sampled_in_logarithm(const SweepReader& sweep, const ReadAxis& axis, const 
 
 /// A number over each parameter of an axis of samples.
 std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
-                                const ReadAxis& axis, const HeldPlaces& held) {
+                                const ReadAxis& axis, const FixedPlaces& fixed) {
   const Unit unit = shown_unit_of(v.unit);
-  const auto found = in_shown_unit(sweep.slice(v.name, {}, axis.name, held), unit);
+  const auto found = in_shown_unit(sweep.slice(v.name, {}, axis.name, fixed), unit);
   const auto chosen = some_of(found.size(), kMostPoints);
   std::vector<Panel> panels;
   for (const std::string& name : axis.parameters) {
@@ -191,35 +191,35 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
 
 Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const SweepFigures& wished) {
   const auto& axes = sweep.axes();
-  const auto is_held = [&](const std::string& name) {
-    return std::any_of(wished.held.begin(), wished.held.end(),
+  const auto is_fixed = [&](const std::string& name) {
+    return std::any_of(wished.fixed.begin(), wished.fixed.end(),
                        [&](const auto& h) { return h.first == name; });
   };
   std::string x = wished.x.value_or(axes.back().name);
-  for (std::size_t a = axes.size(); a-- > 0 && !wished.x && is_held(x);) {
-    if (!is_held(axes[a].name)) x = axes[a].name;
+  for (std::size_t a = axes.size(); a-- > 0 && !wished.x && is_fixed(x);) {
+    if (!is_fixed(axes[a].name)) x = axes[a].name;
   }
   const ReadAxis& across = axes[sweep.axis(x)];
   std::optional<std::string> y = wished.y;
   for (std::size_t a = axes.size(); a-- > 0 && !y;) {
-    if (axes[a].name != x && !is_held(axes[a].name)) y = axes[a].name;
+    if (axes[a].name != x && !is_fixed(axes[a].name)) y = axes[a].name;
   }
   Figure figure{v.name, v.name, fmt::format("{}: {}.", sweep.title(), v.meaning), {}};
   std::vector<std::string> free{x};
   if (!v.times_s.empty()) {
-    figure.panels.push_back(sweep_curves(sweep, v, x, wished.held));
+    figure.panels.push_back(sweep_curves(sweep, v, x, wished.fixed));
   } else if (across.parameters != std::vector{across.name}) {
-    figure.panels = sweep_clouds(sweep, v, across, wished.held);
+    figure.panels = sweep_clouds(sweep, v, across, wished.fixed);
   } else {
     if (y) {
       free.push_back(*y);
-      figure.panels.push_back(sweep_map(sweep, v, x, *y, wished.held));
+      figure.panels.push_back(sweep_map(sweep, v, x, *y, wished.fixed));
     }
-    figure.panels.push_back(sweep_family(sweep, v, x, y, wished.held));
+    figure.panels.push_back(sweep_family(sweep, v, x, y, wished.fixed));
   }
   if (!v.times_s.empty() || across.parameters != std::vector{across.name}) free = {x};
-  refuse_free(free, wished.held, v.name);
-  const std::string slice = held_words(sweep, free, wished.held);
+  refuse_free(free, wished.fixed, v.name);
+  const std::string slice = fixed_words(sweep, free, wished.fixed);
   figure.caption += slice;
   figure.note = slice.empty() ? slice : slice.substr(1);
   return figure;

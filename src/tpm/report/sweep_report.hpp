@@ -31,7 +31,7 @@ namespace tpm::report {
 struct SweepFigures {
   std::vector<std::string> variables;  ///< empty: all that are no counts
   std::optional<std::string> x, y;     ///< axes; none: the last and the one before
-  HeldPlaces held;                     ///< places on the other axes
+  FixedPlaces fixed;                   ///< places on the other axes
   /// Two numbers that are both better when smaller, such as misfit and cost.
   std::optional<std::pair<std::string, std::string>> pareto;
 };

@@ -8,9 +8,9 @@ namespace tpm::report {
 namespace {
 
 /// ", at depth = 4 mm, rate = 2 mm/s"; empty if there is no other axis.
-std::string held_values_words(const std::vector<HeldValue>& held) {
+std::string fixed_values_words(const std::vector<FixedValue>& fixed) {
   std::string words;
-  for (const HeldValue& h : held) {
+  for (const FixedValue& h : fixed) {
     const Unit unit = shown_unit_of(h.unit);
     words += fmt::format("{}{} = {}{}{}", words.empty() ? ", at " : ", ", h.axis,
                          significant(h.value / unit.to_si, 4), unit.symbol.empty() ? "" : " ",
@@ -19,9 +19,9 @@ std::string held_values_words(const std::vector<HeldValue>& held) {
   return words;
 }
 
-Json held_json(const std::vector<HeldValue>& held) {
+Json fixed_json(const std::vector<FixedValue>& fixed) {
   Json list = Json::array();
-  for (const HeldValue& h : held) {
+  for (const FixedValue& h : fixed) {
     list.push_back({{"axis", h.axis}, {"value", h.value}, {"unit", h.unit}});
   }
   return list;
@@ -61,7 +61,7 @@ std::string sensitivity_text(const std::vector<SweepSensitivity>& all) {
                         significant(s.indices.standard_deviation, 4), s.design.replicates,
                         s.design.points);
     if (s.indices.left_out > 0) text += fmt::format(", {} points left out", s.indices.left_out);
-    text += held_values_words(s.held);
+    text += fixed_values_words(s.fixed);
     text += "\n";
     if (s.indices.inputs.empty()) {
       text += "it does not vary\n";
@@ -97,7 +97,7 @@ Json sensitivity_json(const std::vector<SweepSensitivity>& all) {
                     {"points", s.design.points},
                     {"replicates", s.design.replicates},
                     {"points_left_out", s.indices.left_out},
-                    {"held", held_json(s.held)},
+                    {"fixed", fixed_json(s.fixed)},
                     {"inputs", std::move(inputs)}});
   }
   return Json{{"sensitivity", std::move(list)}};
@@ -114,7 +114,7 @@ std::vector<Figure> sensitivity_figures(const std::vector<SweepSensitivity>& all
          fmt::format("{}: shares of the variance of {} with 95 % intervals.", title, s.variable),
          {index_panel("first-order index", s, &InputSensitivity::first_order),
           index_panel("total index", s, &InputSensitivity::total)},
-         s.held.empty() ? std::string() : held_values_words(s.held).substr(2)});
+         s.fixed.empty() ? std::string() : fixed_values_words(s.fixed).substr(2)});
   }
   return figures;
 }

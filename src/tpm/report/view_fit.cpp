@@ -102,7 +102,7 @@ void add_law(ViewPage& page, const Json& law, const std::filesystem::path& file)
     }
   }
   for (const auto& [name, value] : law.at("parameters").items()) {
-    std::string error = "held";
+    std::string error = "fixed";
     for (std::size_t i = 0; i < fitted.size(); ++i) {
       if (fitted[i] == name) error = errors[i];
     }

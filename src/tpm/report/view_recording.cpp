@@ -139,7 +139,7 @@ class RecordedOrgan {
     }
     said_ = fmt::format("{}; recomputed from the recorded motion, {} pictures of {} s",
                         shape_.field ? "all spheres as the model in the loop places them"
-                                     : "the contact sphere as recorded; the others are held",
+                                     : "the contact sphere as recorded; the others are fixed",
                         times_s_.size(),
                         significant(static_cast<double>(stride * every) * period_s, 3));
   }

@@ -84,8 +84,11 @@ void add_organ(const Hdf5Reader& file, const std::filesystem::path& path, std::s
   organ["rest_m"] = page.put(std::span<const float>(floats(rest)));
   organ["layer"] =
       page.put(std::span<const std::uint32_t>(whole_numbers(file, path, "/spheres/layer", kAny)));
-  organ["held"] =
-      page.put(std::span<const std::uint32_t>(whole_numbers(file, path, "/spheres/held", 3)));
+  // Files of version 0.1 name it by another word.
+  const char* const constraint =
+      file.has("/spheres/constraint") ? "/spheres/constraint" : "/spheres/held";
+  organ["constraint"] =
+      page.put(std::span<const std::uint32_t>(whole_numbers(file, path, constraint, 3)));
   organ["bonds"] =
       page.put(std::span<const std::uint32_t>(whole_numbers(file, path, "/bonds/ends", spheres)));
   organ["time_s"] = page.put(std::span<const double>(shown_times));
@@ -140,7 +143,8 @@ void add_origin(const Hdf5Reader& file, ViewPage& page) {
   page.fact("written by", attribute("written_by"));
   page.fact("scene's SHA-256", attribute("scene_sha256"));
   page.fact("assumptions", attribute("assumptions"));
-  if (!file.sealed()) page.fact("check sum", "none: the file was not written by tpm, or is older");
+  if (!file.has_checksum())
+    page.fact("check sum", "none: the file was not written by tpm, or is older");
   page.description["scene"] = attribute("scene");
 }
 

@@ -50,14 +50,15 @@ NetworkInspection inspect(const Tissue& tissue) {
   result.radial_sum = spread_of(radial);
   result.lateral_sum = spread_of(lateral);
   if (!organ.contact) return result;
-  const HeldStiffness held =
+  const ContactStiffness held =
       held_stiffness(tissue.bonds(), organ.position, *organ.contact,
                      organ.normal.col(static_cast<Eigen::Index>(*organ.contact)));
   const BondLaw star_bond = tissue.materials.materials.front().radial_law();
-  const HeldStiffness star{star_bond.instantaneous_N_per_m(), star_bond.equilibrium_N_per_m()};
-  result.contact_over_star = HeldStiffness{held.instantaneous / star.instantaneous, 0.0};
+  const ContactStiffness star{star_bond.instantaneous_N_per_m(), star_bond.equilibrium_N_per_m()};
+  result.contact_over_star = ContactStiffness{held.instantaneous / star.instantaneous, 0.0};
   // A material that relaxes to nothing has no equilibrium stiffness to compare.
-  if (star.relaxed > 0.0) result.contact_over_star->relaxed = held.relaxed / star.relaxed;
+  if (star.equilibrium > 0.0)
+    result.contact_over_star->equilibrium = held.equilibrium / star.equilibrium;
   return result;
 }
 

@@ -22,7 +22,7 @@ struct NetworkInspection {
   /// the rule `normalised` they would be 1 and 2, were an exact scaling possible.
   Spread radial_sum, lateral_sum;
   /// Of the contact along its normal, its neighbours fixed, over that of the star.
-  std::optional<HeldStiffness> contact_over_star;
+  std::optional<ContactStiffness> contact_over_star;
 };
 
 [[nodiscard]] NetworkInspection inspect(const Tissue& tissue);

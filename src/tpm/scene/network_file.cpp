@@ -34,10 +34,11 @@ void write_spheres(const Tissue& tissue, Hdf5Writer& file) {
   file.integers("/spheres/index", index, 1);
   file.integers("/spheres/number", number, 1);
   file.integers("/spheres/layer", layer, 1);
-  file.integers("/spheres/held", role, 1);
+  file.integers("/spheres/constraint", role, 1);
   file.integers("/spheres/contact", contact, 1);
   file.attribute("/spheres/layer", "meaning", "1: outermost");
-  file.attribute("/spheres/held", "meaning", "0: free, 1: guided along its normal, 2: anchored");
+  file.attribute("/spheres/constraint", "meaning",
+                 "0: free, 1: guided along its normal, 2: anchored");
 }
 
 void write_bonds(const Network& network, Hdf5Writer& file) {
@@ -72,7 +73,7 @@ std::string xdmf(const Network& network, const std::string& file) {
       "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
       "    <Grid Name=\"spheres\" GridType=\"Uniform\">\n";
   text += source.points(position, n);
-  for (const std::string name : {"number", "layer", "held", "contact"}) {
+  for (const std::string name : {"number", "layer", "constraint", "contact"}) {
     text += source.scalar(name, "/spheres/" + name, Centre::node, n, Number::whole);
   }
   text += source.vector("normal", "/spheres/normal", n);

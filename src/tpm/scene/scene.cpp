@@ -91,8 +91,8 @@ BondElement Tissue::element(std::string_view user) const {
 
 Constraints Tissue::constraints() const {
   Constraints constraints(network.organ.size());
-  for (const Guide& guide : guides) constraints.guide(guide.sphere, guide.direction);
-  for (const std::size_t sphere : anchors) constraints.hold(sphere);
+  for (const Guide& guide : guides) constraints.slide(guide.sphere, guide.direction);
+  for (const std::size_t sphere : anchors) constraints.fix(sphere);
   return constraints;
 }
 

@@ -13,7 +13,7 @@ class EmptySpace : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return Eigen::Matrix3d::Identity();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
     return Eigen::Matrix3d::Identity();
   }
 

@@ -34,8 +34,8 @@ void EnergyWatch::observe(const Eigen::Vector3d& sent_N, const Eigen::Vector3d& 
   }
   largest_J_[block_] = std::max(largest_J_[block_], q_J_);
   largest_of_all_J_ = std::max(largest_of_all_J_, q_J_);
-  given_J_ = largest_of_all_J_ - q_J_;
-  most_given_J_ = std::max(most_given_J_, given_J_);
+  delivered_J_ = largest_of_all_J_ - q_J_;
+  most_delivered_J_ = std::max(most_delivered_J_, delivered_J_);
 }
 
 }  // namespace tpm::haptics

@@ -44,12 +44,12 @@ class EnergyWatch {
                int periods) noexcept;
 
   /// Energy given to the hand within the window, J, >= 0.
-  [[nodiscard]] double given_J() const noexcept { return given_J_; }
-  /// The largest of given_J() so far.
-  [[nodiscard]] double most_given_J() const noexcept { return most_given_J_; }
+  [[nodiscard]] double delivered_J() const noexcept { return delivered_J_; }
+  /// The largest of delivered_J() so far.
+  [[nodiscard]] double most_delivered_J() const noexcept { return most_delivered_J_; }
   [[nodiscard]] double tissue_J() const noexcept { return tissue_J_; }
   [[nodiscard]] bool too_much() const noexcept {
-    return given_J_ > settings_.allowance_J || tissue_J_ < -settings_.allowance_J;
+    return delivered_J_ > settings_.allowance_J || tissue_J_ < -settings_.allowance_J;
   }
 
  private:
@@ -63,7 +63,7 @@ class EnergyWatch {
   std::array<double, kBlocks> largest_J_{};
   std::size_t block_ = 0;
   double largest_of_all_J_ = 0.0;
-  double q_J_ = 0.0, tissue_J_ = 0.0, given_J_ = 0.0, most_given_J_ = 0.0;
+  double q_J_ = 0.0, tissue_J_ = 0.0, delivered_J_ = 0.0, most_delivered_J_ = 0.0;
 };
 
 }  // namespace tpm::haptics

@@ -31,8 +31,8 @@ class OneSidedContact final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
     return model_.instantaneous_stiffness();
   }
-  [[nodiscard]] Eigen::Matrix3d relaxed_stiffness() const noexcept override {
-    return model_.relaxed_stiffness();
+  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
+    return model_.equilibrium_stiffness();
   }
   [[nodiscard]] Eigen::Index spheres() const noexcept override { return model_.spheres(); }
   void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept override {

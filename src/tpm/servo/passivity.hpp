@@ -17,9 +17,9 @@ class PassivityControl {
   void observe(const Eigen::Vector3d& held_N, const Eigen::Vector3d& moved_m) noexcept;
   /// What to add to the next force on the hand.
   /// @param moved_m in the last period
-  /// @param given_J to be taken back
+  /// @param delivered_J to be taken back
   [[nodiscard]] Eigen::Vector3d damping_N(const Eigen::Vector3d& moved_m,
-                                          double given_J) const noexcept;
+                                          double delivered_J) const noexcept;
   [[nodiscard]] double observed_J() const noexcept { return observed_J_; }
 
  private:

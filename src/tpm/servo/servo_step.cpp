@@ -273,9 +273,9 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
 Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
   constexpr double kTolerated = 0.1;  // of what ends the session
   sent_size_N_ = tissue_size_N_;
-  const double given_J = energy_.given_J() - kTolerated * settings_.energy_allowance_J;
-  if (!(given_J > 0.0)) return tissue_N_;
-  const Eigen::Vector3d damping = passivity_.damping_N(moved_m_, given_J);
+  const double delivered_J = energy_.delivered_J() - kTolerated * settings_.energy_allowance_J;
+  if (!(delivered_J > 0.0)) return tissue_N_;
+  const Eigen::Vector3d damping = passivity_.damping_N(moved_m_, delivered_J);
   if (damping.isZero(0.0)) return tissue_N_;
   row.flags |= kDamped;
   Eigen::Vector3d force_N = tissue_N_ + damping;
@@ -287,7 +287,7 @@ Eigen::Vector3d ServoStep::with_damping(ServoRecord& row) noexcept {
   return force_N;
 }
 
-StopCause ServoStep::judge_rendering(int periods) noexcept {
+StopCause ServoStep::check_rendering(int periods) noexcept {
   energy_.observe(sent_N_, moved_m_, tissue_work_J_, periods);
   if (settings_.watch_oscillation) oscillation_.observe(sent_size_N_, periods);
   if (energy_.too_much()) return StopCause::energy;
@@ -324,7 +324,7 @@ bool ServoStep::storm(int missed) noexcept {
   late_now_ += late - slot;
   slot = late;
   counts_.most_late = std::max(counts_.most_late, late_now_);
-  counts_.most_missed_at_once = std::max(counts_.most_missed_at_once, missed);
+  counts_.most_consecutive_missed = std::max(counts_.most_consecutive_missed, missed);
   return late_now_ > settings_.most_late || missed > settings_.most_missed;
 }
 
@@ -354,7 +354,7 @@ StopCause ServoStep::work(int missed, ServoRecord& row) noexcept {
   touch(missed, row);
   begun_ = true;
   if (!std::isfinite(model_N_) || !tissue_N_.allFinite()) return StopCause::force_not_finite;
-  cause = judge_rendering(missed + 1);
+  cause = check_rendering(missed + 1);
   if (cause != StopCause::none) return cause;
   cause = write(with_damping(row), row);
   count_limits(row.flags);

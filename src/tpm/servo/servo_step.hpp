@@ -75,7 +75,7 @@ class ServoStep {
   [[nodiscard]] double felt_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept;
   void count_limits(std::uint32_t flags) noexcept;
   [[nodiscard]] Eigen::Vector3d with_damping(ServoRecord& row) noexcept;
-  [[nodiscard]] StopCause judge_rendering(int periods) noexcept;
+  [[nodiscard]] StopCause check_rendering(int periods) noexcept;
   [[nodiscard]] StopCause write(const Eigen::Vector3d& force_N, ServoRecord& row) noexcept;
   [[nodiscard]] StopCause look_at_status() noexcept;
   [[nodiscard]] bool storm(int missed) noexcept;

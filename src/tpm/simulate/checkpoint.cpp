@@ -230,7 +230,7 @@ std::optional<Checkpoint> read_checkpoint(const fs::path& path, const std::strin
     }
     return std::nullopt;
   }
-  if (!file.sealed()) {
+  if (!file.has_checksum()) {
     throw bad_input(path.string(), "is damaged: it has no check sum", kExpected);
   }
   const ListReader lists(file, path);

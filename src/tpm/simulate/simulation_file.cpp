@@ -213,7 +213,7 @@ std::string step_xdmf(const ExperimentScene& scene, const XdmfSource& source,
       "    <Grid Name=\"spheres\" GridType=\"Uniform\">\n",
       shortest(time_s));
   text += source.points(position, n);
-  for (const std::string name : {"number", "layer", "held", "contact"}) {
+  for (const std::string name : {"number", "layer", "constraint", "contact"}) {
     text += source.scalar(name, "/spheres/" + name, Centre::node, n, Number::whole);
   }
   text += source.vector("displacement_m", group + "/displacement_m", n);

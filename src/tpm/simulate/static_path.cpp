@@ -40,7 +40,7 @@ void StaticPath::start_from(const QuasiStaticState& state) {
 }
 
 bool StaticPath::stride_to(double imposed) {
-  const BondMemory relaxed{Eigen::VectorXd::Zero(state_.mean.size()), 1.0};
+  const ViscousState relaxed{Eigen::VectorXd::Zero(state_.mean.size()), 1.0};
   Positions position = state_.position;
   tissue_.impose(position, imposed);
   const auto moved_far = [&] {

@@ -14,7 +14,7 @@ namespace tpm::organ {
 /// of such a liver. They say nothing about an organ of another shape or size.
 [[nodiscard]] bool depth_limits_apply(const Tissue& tissue);
 
-/// Judges the positions of a network against the limits. The indentation of a sphere is its
+/// Compares the positions of a network with the limits. The indentation of a sphere is its
 /// displacement along the probe's direction.
 class ValidityWatch {
  public:

@@ -43,16 +43,16 @@ void write_topology(const Network& network, Hdf5Writer& file) {
 /// What does not change in time: once, and every time begins at its beginning.
 void write_still_fields(const Tissue& tissue, std::size_t outputs, Hdf5Writer& file) {
   const Organ& organ = tissue.network.organ;
-  std::vector<std::int32_t> number, layer, held(organ.size(), 0);
+  std::vector<std::int32_t> number, layer, constraint(organ.size(), 0);
   for (std::size_t i = 0; i < organ.size(); ++i) {
     number.push_back(static_cast<std::int32_t>(i + 1));
     layer.push_back(organ.layer[i] + 1);
   }
-  for (const Guide& guide : tissue.guides) held[guide.sphere] = 1;
-  for (const std::size_t sphere : tissue.anchors) held[sphere] = 2;
+  for (const Guide& guide : tissue.guides) constraint[guide.sphere] = 1;
+  for (const std::size_t sphere : tissue.anchors) constraint[sphere] = 2;
   const std::vector<std::int64_t> still(outputs, 0);
   for (const auto& [name, values] :
-       {std::pair{"number", &number}, {"layer", &layer}, {"held", &held}}) {
+       {std::pair{"number", &number}, {"layer", &layer}, {"constraint", &constraint}}) {
     file.integers(std::string("/VTKHDF/PointData/") + name, *values, 1);
     file.long_integers(std::string("/VTKHDF/Steps/PointDataOffsets/") + name, still);
   }

@@ -11,7 +11,7 @@ namespace tpm {
 class Anderson {
  public:
   /// @param size of x
-  /// @param depth how many earlier steps are remembered, >= 1
+  /// @param depth how many earlier steps are stored, >= 1
   Anderson(Eigen::Index size, Eigen::Index depth)
       : dx_(size, depth), dd_(size, depth), gram_(depth, depth), last_x_(size), last_d_(size) {}
 
@@ -19,7 +19,7 @@ class Anderson {
 
   /// Replaces x, where the plain step would be d, by the accelerated next point.
   void step(Eigen::Ref<Eigen::VectorXd> x, const Eigen::Ref<const Eigen::VectorXd>& d) {
-    if (known_ >= 0) remember(x, d);
+    if (known_ >= 0) store(x, d);
     ++known_;
     last_x_ = x;
     last_d_ = d;
@@ -34,7 +34,7 @@ class Anderson {
   }
 
  private:
-  void remember(const Eigen::Ref<Eigen::VectorXd>& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
+  void store(const Eigen::Ref<Eigen::VectorXd>& x, const Eigen::Ref<const Eigen::VectorXd>& d) {
     const Eigen::Index slot = known_ % dx_.cols();
     const Eigen::Index used = std::min(known_ + 1, dx_.cols());
     dx_.col(slot) = x - last_x_;

@@ -17,7 +17,7 @@ struct Problem {
   T E1, E2, Eprime, eta1, spacing;
   T stress_length;  // load l0 / A0
 
-  [[nodiscard]] T relaxed() const { return E1 * E2 / (E1 + E2); }
+  [[nodiscard]] T equilibrium() const { return E1 * E2 / (E1 + E2); }
   [[nodiscard]] T tau() const { return eta1 / (E1 + E2); }
 
   /// T'(u) = 2 E' (1 - cos^3)
@@ -48,12 +48,12 @@ T reduced_time(const Problem<T>& p, const T& final_depth, const T& start_remaini
   using std::log;
   using Rule = boost::math::quadrature::gauss<double, 40>;
   const T final_slope = p.tension_slope(final_depth);
-  const T residue = (p.E2 + final_slope) / (p.relaxed() + final_slope);
+  const T residue = (p.E2 + final_slope) / (p.equilibrium() + final_slope);
   const auto smooth = [&](const T& v) {
     const T u = final_depth - v;
     const T secant = p.tension_secant(u, final_depth);
     const T numerator = (p.tension_slope(u) - final_slope) - residue * (secant - final_slope);
-    return numerator / ((p.relaxed() + secant) * v);
+    return numerator / ((p.equilibrium() + secant) * v);
   };
   const T half = 0.5 * (start_remaining - remaining);
   const T middle = 0.5 * (start_remaining + remaining);
@@ -82,12 +82,12 @@ CreepUnderConstantLoad::CreepUnderConstantLoad(const TpmParameters& p, double lo
   require_valid(p, "creep");
   if (!std::isfinite(load_N)) throw bad_input("creep", "the load is not finite");
   if (stress_length_ == 0.0) return;
-  if (p.Eprime_Pa == 0.0 && !(p.relaxed_modulus_Pa() > 0.0)) {
+  if (p.Eprime_Pa == 0.0 && !(p.equilibrium_modulus_Pa() > 0.0)) {
     throw bad_input("creep", "no spring carries the load in the end: E1 or E2 is 0 and so is E'",
                     "E' above 0, or E1 and E2 above 0");
   }
   start_ = equilibrium_depth_m(p, p.E2_Pa, std::abs(load_N));
-  final_ = equilibrium_depth_m(p, p.relaxed_modulus_Pa(), std::abs(load_N));
+  final_ = equilibrium_depth_m(p, p.equilibrium_modulus_Pa(), std::abs(load_N));
 }
 
 double CreepUnderConstantLoad::remaining_log(double time_s) const {
@@ -97,7 +97,7 @@ double CreepUnderConstantLoad::remaining_log(double time_s) const {
   const double gap = final_ - start_;
   const double target = time_s / tau_;
   const double final_slope = p.tension_slope(final_);
-  const double residue = (p.E2 + final_slope) / (p.relaxed() + final_slope);
+  const double residue = (p.E2 + final_slope) / (p.equilibrium() + final_slope);
   double low = 0.0;
   double high = std::numeric_limits<double>::infinity();
   double y = target / residue;
@@ -107,7 +107,8 @@ double CreepUnderConstantLoad::remaining_log(double time_s) const {
     const double error = reduced_time(p, final_, gap, v) - target;
     (error > 0.0 ? high : low) = y;
     const double u = final_ - v;
-    const double slope = (p.E2 + p.tension_slope(u)) / (p.relaxed() + p.tension_secant(u, final_));
+    const double slope =
+        (p.E2 + p.tension_slope(u)) / (p.equilibrium() + p.tension_secant(u, final_));
     double next = y - error / slope;
     if (!(next > low && next < high)) next = std::isfinite(high) ? 0.5 * (low + high) : 2.0 * y;
     if (std::abs(next - y) <= 1e-15 * (1.0 + y)) return next;
@@ -135,7 +136,7 @@ TpmVector CreepUnderConstantLoad::depth_sensitivity(double time_s) const {
     const double slope = modulus.a + p.tension_slope(e).a;
     return e - (modulus * e + p.tension(e) - p.stress_length) / slope;
   };
-  const Jet final_depth = with_derivatives(final_, p.relaxed());
+  const Jet final_depth = with_derivatives(final_, p.equilibrium());
   const Jet start = with_derivatives(start_, p.E2);
   const double gap = final_ - start_;
   Eigen::Matrix<double, 6, 1> d = final_depth.v;
@@ -151,8 +152,9 @@ TpmVector CreepUnderConstantLoad::depth_sensitivity(double time_s) const {
       remaining.a = gap * std::exp(-y);
       const Jet time = p.tau() * reduced_time(p, final_depth, start_remaining, remaining);
       const Jet u(final_ - remaining.a);
-      const double time_slope = tau_ * (p.E2.a + p.tension_slope(u).a) /
-                                ((p.relaxed() + p.tension_secant(u, final_depth)).a * remaining.a);
+      const double time_slope =
+          tau_ * (p.E2.a + p.tension_slope(u).a) /
+          ((p.equilibrium() + p.tension_secant(u, final_depth)).a * remaining.a);
       d = -time.v / time_slope;
     }
   }

@@ -37,7 +37,11 @@ std::vector<double> radau_nodes(int count) {
 }
 
 ExponentialCollocation::ExponentialCollocation(std::vector<double> nodes)
-    : nodes_(std::move(nodes)) {}
+    : nodes_(std::move(nodes)), scale_(static_cast<Eigen::Index>(nodes_.size())) {
+  for (Eigen::Index k = 0; k < scale_.size(); ++k) {
+    scale_[k] = others(nodes_[static_cast<std::size_t>(k)])[k];
+  }
+}
 
 ExponentialCollocation::Place ExponentialCollocation::place(double c) const {
   // Gauss with 30 abscissas: to rounding for exp(-z (c - s)) times a polynomial up to z c = 60.
@@ -59,16 +63,15 @@ ExponentialCollocation::Place ExponentialCollocation::place(double c) const {
   }
   place.coefficient_ = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    place.coefficient_(k, 0) = 1.0;
+    auto row = place.coefficient_.row(k);
+    row[0] = 1.0 / scale_[k];
+    Eigen::Index degree = 0;
     for (Eigen::Index j = 0; j < n; ++j) {
       if (j == k) continue;
-      const double node = nodes_[static_cast<std::size_t>(j)];
-      const double apart = nodes_[static_cast<std::size_t>(k)] - node;
-      // Times (c - node - a)/apart.
-      for (Eigen::Index m = n - 1; m >= 0; --m) {
-        const double lower = m > 0 ? place.coefficient_(k, m - 1) : 0.0;
-        place.coefficient_(k, m) = ((c - node) * place.coefficient_(k, m) - lower) / apart;
-      }
+      // Times c - node - a.
+      const double apart = c - nodes_[static_cast<std::size_t>(j)];
+      for (Eigen::Index m = ++degree; m > 0; --m) row[m] = apart * row[m] - row[m - 1];
+      row[0] *= apart;
     }
   }
   return place;
@@ -112,17 +115,26 @@ Eigen::VectorXd ExponentialCollocation::Place::weight_slopes(double z) const {
   return coefficient_ * power;
 }
 
-Eigen::VectorXd ExponentialCollocation::interpolation(double c) const {
-  // As products: powers of c would cancel.
-  const auto n = nodes_.size();
-  Eigen::VectorXd values = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
-  for (std::size_t k = 0; k < n; ++k) {
-    for (std::size_t j = 0; j < n; ++j) {
-      if (j == k) continue;
-      values[static_cast<Eigen::Index>(k)] *= (c - nodes_[j]) / (nodes_[k] - nodes_[j]);
-    }
+/// For each node, the product of c less all the others.
+Eigen::VectorXd ExponentialCollocation::others(double c) const {
+  const auto n = static_cast<Eigen::Index>(nodes_.size());
+  Eigen::VectorXd product(n);
+  double before = 1.0;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    product[k] = before;
+    before *= c - nodes_[static_cast<std::size_t>(k)];
   }
-  return values;
+  double behind = 1.0;
+  for (Eigen::Index k = n - 1; k >= 0; --k) {
+    product[k] *= behind;
+    behind *= c - nodes_[static_cast<std::size_t>(k)];
+  }
+  return product;
+}
+
+Eigen::VectorXd ExponentialCollocation::interpolation(double c) const {
+  // As products: powers of c would cancel. At a node the same product stands above and below.
+  return others(c).cwiseQuotient(scale_);
 }
 
 }  // namespace tpm

@@ -59,7 +59,10 @@ class ExponentialCollocation {
   [[nodiscard]] Eigen::VectorXd interpolation(double c) const;
 
  private:
+  [[nodiscard]] Eigen::VectorXd others(double c) const;
+
   std::vector<double> nodes_;
+  Eigen::VectorXd scale_;  ///< others() of each node at that node
 };
 
 }  // namespace tpm

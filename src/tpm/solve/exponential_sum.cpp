@@ -25,7 +25,7 @@ struct Sloped {
 };
 
 [[noreturn]] void refuse(std::string_view what, double value, std::string_view expected) {
-  throw bad_input("fractional memory", fmt::format("{} = {}", what, shortest(value)), expected);
+  throw bad_input("exponential sum", fmt::format("{} = {}", what, shortest(value)), expected);
 }
 
 void check_alpha(double alpha) {
@@ -130,11 +130,11 @@ SpectralValue sum_below(const CardinalWeight& weight, long first, long last,
 
 // The tolerance is spent by halves: one on the step (error exp(-pi^2/(2h)), reached at alpha = 1),
 // a quarter on each end of the grid.
-double FractionalMemory::log_step_for(double tolerance) {
+double ExponentialSum::log_step_for(double tolerance) {
   return pi * pi / (2.0 * std::log(2.0 / tolerance));
 }
 
-FractionalMemory::FractionalMemory(double t_min_s, double t_max_s, double tolerance)
+ExponentialSum::ExponentialSum(double t_min_s, double t_max_s, double tolerance)
     : t_min_s_(t_min_s), t_max_s_(t_max_s) {
   check_window(t_min_s, t_max_s, tolerance);
   step_ = log_step_for(tolerance);
@@ -154,7 +154,7 @@ FractionalMemory::FractionalMemory(double t_min_s, double t_max_s, double tolera
   stated_error_ = tolerance;
 }
 
-void FractionalMemory::prepare(FractionalWeights& out) const {
+void ExponentialSum::prepare(FractionalWeights& out) const {
   const auto n = static_cast<Eigen::Index>(rates_.size());
   out.weight.resize(n);
   out.d_weight_d_alpha.resize(n);
@@ -164,7 +164,7 @@ void FractionalMemory::prepare(FractionalWeights& out) const {
   out.d_dashpot_d_beta_s = out.d_dashpot_d_log_tau_s = 0.0;
 }
 
-void FractionalMemory::mittag_leffler(double alpha, double tau_s, FractionalWeights& out) const {
+void ExponentialSum::mittag_leffler(double alpha, double tau_s, FractionalWeights& out) const {
   check_alpha(alpha);
   check_tau(tau_s);
   prepare(out);
@@ -190,7 +190,7 @@ void FractionalMemory::mittag_leffler(double alpha, double tau_s, FractionalWeig
   out.d_dashpot_d_log_tau_s = fast.d_x;
 }
 
-void FractionalMemory::springpot(double alpha, FractionalWeights& out) const {
+void ExponentialSum::springpot(double alpha, FractionalWeights& out) const {
   check_order("alpha", alpha);
   prepare(out);
   const double rest = 1.0 - alpha;
@@ -219,8 +219,8 @@ void FractionalMemory::springpot(double alpha, FractionalWeights& out) const {
   out.d_dashpot_d_alpha_s = -fast.slope;
 }
 
-void FractionalMemory::springpots_in_series(double alpha, double beta, double tau_s,
-                                            FractionalWeights& out) const {
+void ExponentialSum::springpots_in_series(double alpha, double beta, double tau_s,
+                                          FractionalWeights& out) const {
   check_order("alpha", alpha);
   check_order("beta", beta);
   check_tau(tau_s);
@@ -254,7 +254,7 @@ void FractionalMemory::springpots_in_series(double alpha, double beta, double ta
   out.d_dashpot_d_log_tau_s = dashpot.d_x;
 }
 
-double FractionalMemory::at(const FractionalWeights& weights, double t_s) const {
+double ExponentialSum::at(const FractionalWeights& weights, double t_s) const {
   double sum = weights.constant;
   for (std::size_t i = 0; i < rates_.size(); ++i) {
     sum += weights.weight[static_cast<Eigen::Index>(i)] * std::exp(-rates_[i] * t_s);
@@ -262,7 +262,7 @@ double FractionalMemory::at(const FractionalWeights& weights, double t_s) const 
   return sum;
 }
 
-double FractionalMemory::integral_s(const FractionalWeights& weights, double t_s) const {
+double ExponentialSum::integral_s(const FractionalWeights& weights, double t_s) const {
   double sum = weights.dashpot_s + weights.constant * t_s;
   for (std::size_t i = 0; i < rates_.size(); ++i) {
     sum -= weights.weight[static_cast<Eigen::Index>(i)] * std::expm1(-rates_[i] * t_s) / rates_[i];

@@ -5,7 +5,7 @@
 
 namespace tpm {
 
-/// A fractional relaxation function as a sum over the rates r_j of a FractionalMemory,
+/// A fractional relaxation function as a sum over the rates r_j of a ExponentialSum,
 ///
 ///     G(t) ~ constant + sum_j weight_j exp(-r_j t) + dashpot_s delta(t)
 ///
@@ -27,9 +27,9 @@ struct FractionalWeights {
   double d_dashpot_d_log_tau_s = 0.0;
 };
 
-/// The memory of fractional elements over a window of times: rates r_j on a logarithmic grid that
-/// depends on the window and the tolerance only. While alpha and tau are being fitted the states
-/// y_j of a given history u,
+/// Exponential sums for fractional elements over a window of times: rates r_j on a logarithmic grid
+/// that depends on the window and the tolerance only. While alpha and tau are being fitted the
+/// states y_j of a given history u,
 ///
 ///     dy_j/dt = du/dt - r_j y_j,   F = constant u + sum_j weight_j y_j + dashpot_s du/dt,
 ///
@@ -53,13 +53,13 @@ struct FractionalWeights {
 /// switches at any alpha, and alpha = 1 is exp(-t/tau) like the rest. Rates below the grid go into
 /// `constant` and the first weight with total and mean rate kept, rates above it into `dashpot_s`.
 /// docs/fractional.md has the derivation and measured errors.
-class FractionalMemory {
+class ExponentialSum {
  public:
   /// @param t_min_s smallest time between knots, > 0
   /// @param t_max_s longest time from the first knot to an answer, >= t_min_s
   /// @param tolerance 1e-12 to 1e-3
   /// Throws Error(bad_input).
-  FractionalMemory(double t_min_s, double t_max_s, double tolerance = 1e-9);
+  ExponentialSum(double t_min_s, double t_max_s, double tolerance = 1e-9);
 
   /// log_step() of a tolerance: the rates of all windows lie on one lattice, exp(k log_step).
   [[nodiscard]] static double log_step_for(double tolerance);

@@ -8,15 +8,15 @@ namespace tpm {
 
 // A Ref is a view: what it shows is changed.
 // NOLINTBEGIN(performance-unnecessary-value-param)
-void MemoryWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
-                          const Eigen::Ref<const Eigen::RowVectorXd>& start,
-                          const Eigen::Ref<const Eigen::RowVectorXd>& memory,
-                          Eigen::Ref<LaneMatrix> out) const {
+void ViscousWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
+                           const Eigen::Ref<const Eigen::RowVectorXd>& start,
+                           const Eigen::Ref<const Eigen::RowVectorXd>& viscous_start,
+                           Eigen::Ref<LaneMatrix> out) const {
   const double* const weight = of_stages.data();
   const double* const from_start = of_start.data();
-  const double* const from_memory = of_memory.data();
+  const double* const from_viscous = of_viscous.data();
   const double* const at_start = start.data();
-  const double* const viscous = memory.data();
+  const double* const viscous = viscous_start.data();
   const double* const in = stages.data();
   double* const to = out.data();
   const auto bonds = static_cast<std::size_t>(start.size());
@@ -25,7 +25,7 @@ void MemoryWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
       std::array<double, kLanes> sum;
 #pragma omp simd
       for (std::size_t s = 0; s < kLanes; ++s) {
-        double lane = from_start[s] * at_start[i] + from_memory[s] * viscous[i];
+        double lane = from_start[s] * at_start[i] + from_viscous[s] * viscous[i];
         for (std::size_t j = 0; j < kLanes; ++j)
           lane += weight[kLanes * j + s] * in[kLanes * i + j];
         sum[s] = lane;
@@ -36,9 +36,9 @@ void MemoryWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
   });
 }
 
-void MemoryWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
-                          const Eigen::Ref<const LaneMatrix>& known,
-                          Eigen::Ref<LaneMatrix> out) const {
+void ViscousWeights::apply(const Eigen::Ref<const LaneMatrix>& stages,
+                           const Eigen::Ref<const LaneMatrix>& known,
+                           Eigen::Ref<LaneMatrix> out) const {
   const double* const weight = of_stages.data();
   const double* const at_start = known.data();
   const double* const in = stages.data();

@@ -13,16 +13,17 @@ using LaneMatrix = Eigen::Matrix<double, kLanes, Eigen::Dynamic>;
 using LaneVector = Eigen::Matrix<double, kLanes, 1>;
 using LaneSquare = Eigen::Matrix<double, kLanes, kLanes>;
 
-/// How memories follow, lane by lane, from those at the start of a step and from elongations at its
-/// start and its stages.
-struct MemoryWeights {
+/// How viscous elongations follow, lane by lane, from those at the start of a step and from
+/// elongations at its start and its stages.
+struct ViscousWeights {
   LaneSquare of_stages;  ///< by (lane, stage)
-  LaneVector of_start, of_memory;
+  LaneVector of_start, of_viscous;
 
   /// The viscous elongations in every lane, one column per bond; `stages` is no part of `out`.
   void apply(const Eigen::Ref<const LaneMatrix>& stages,
              const Eigen::Ref<const Eigen::RowVectorXd>& start,
-             const Eigen::Ref<const Eigen::RowVectorXd>& memory, Eigen::Ref<LaneMatrix> out) const;
+             const Eigen::Ref<const Eigen::RowVectorXd>& viscous_start,
+             Eigen::Ref<LaneMatrix> out) const;
   /// The same where the part from the start of the step is known in every lane.
   void apply(const Eigen::Ref<const LaneMatrix>& stages, const Eigen::Ref<const LaneMatrix>& known,
              Eigen::Ref<LaneMatrix> out) const;

@@ -16,7 +16,7 @@ constexpr double kSoft_Pa = 12e3;
 
 }  // namespace
 
-StabilityVerdict CheckedProblem::judge(const MethodSettings& settings) const {
+StabilityVerdict CheckedProblem::verdict(const MethodSettings& settings) const {
   return classify_run(problem->run(settings, times_s), reference, peak, moves);
 }
 
@@ -26,38 +26,38 @@ std::vector<double> last_steps(double end_s, double step_s, int count) {
   return times;
 }
 
-CheckedProblem judged_rest(const BondElement& p, const Protocol& protocol, double step_s) {
-  CheckedProblem judged;
-  judged.times_s = last_steps(protocol.end_s(), step_s, kComparedSteps);
+CheckedProblem massless_problem(const BondElement& p, const Protocol& protocol, double step_s) {
+  CheckedProblem checked;
+  checked.times_s = last_steps(protocol.end_s(), step_s, kComparedSteps);
   ModelOptions options;
   if (p.lateral_Pa == 0.0) options.tension = TensionRule::frozen(0.0);
   const ClosedForm exact(options);
-  judged.reference =
-      exact.respond(protocol, judged.times_s, element_constants(p), Want::values).value;
-  // The peak of the whole protocol, not of the part that is judged.
+  checked.reference =
+      exact.respond(protocol, checked.times_s, element_constants(p), Want::values).value;
+  // The peak of the whole protocol, not of the part that is compared.
   const double unit = p.modulus_to_stiffness_m();
-  judged.peak = judged.reference.cwiseAbs().maxCoeff();
+  checked.peak = checked.reference.cwiseAbs().maxCoeff();
   if (protocol.drive() == Drive::displacement) {
     const double instantaneous = p.instantaneous_Pa() > 0.0 ? p.instantaneous_Pa() : kSoft_Pa;
-    judged.peak = unit * (instantaneous * protocol.peak() + p.tension().value(protocol.peak()));
+    checked.peak = unit * (instantaneous * protocol.peak() + p.tension().value(protocol.peak()));
   }
-  judged.problem = element_problem(p, protocol);
-  return judged;
+  checked.problem = element_problem(p, protocol);
+  return checked;
 }
 
 CheckedProblem problem_with_mass(const BondElement& p, double mass_kg, double drag_per_s,
                                  double load_N, double end_s, double step_s) {
-  CheckedProblem judged;
-  judged.moves = true;
-  judged.times_s = last_steps(end_s, step_s, kComparedSteps);
+  CheckedProblem checked;
+  checked.moves = true;
+  checked.times_s = last_steps(end_s, step_s, kComparedSteps);
   LinearElement linear = linear_element(p, 0.0);
   linear.mass_kg = mass_kg;
   linear.drag_per_s = drag_per_s;
-  judged.reference = linear_motion_m(linear, load_N, judged.times_s);
-  judged.peak = load_N / (linear.stiffness_N_per_m - linear.relaxing_N_per_m);
-  judged.problem = element_problem(p, creep(load_N, end_s),
-                                   MethodMasses{Eigen::VectorXd::Constant(1, mass_kg), drag_per_s});
-  return judged;
+  checked.reference = linear_motion_m(linear, load_N, checked.times_s);
+  checked.peak = load_N / (linear.stiffness_N_per_m - linear.relaxing_N_per_m);
+  checked.problem = element_problem(
+      p, creep(load_N, end_s), MethodMasses{Eigen::VectorXd::Constant(1, mass_kg), drag_per_s});
+  return checked;
 }
 
 namespace {
@@ -79,7 +79,7 @@ DrivenNetwork pushed(const Network& network, const BondSystem& bonds) {
   Constraints constraints(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
     const double further = along[static_cast<Eigen::Index>(i)] - near;
-    if (organ.layer[i] == 0 && further > kFarShare * (along.maxCoeff() - near)) constraints.hold(i);
+    if (organ.layer[i] == 0 && further > kFarShare * (along.maxCoeff() - near)) constraints.fix(i);
   }
   return {
       bonds, organ.position, std::move(constraints), Probes(Probe{contact, direction, 1.0}), {}};

@@ -17,20 +17,20 @@ struct CheckedProblem {
   double peak = 0.0;
   bool moves = false;
 
-  [[nodiscard]] StabilityVerdict judge(const MethodSettings& settings) const;
+  [[nodiscard]] StabilityVerdict verdict(const MethodSettings& settings) const;
 };
 
 /// The last `count` ends of steps before a time, rising.
 [[nodiscard]] std::vector<double> last_steps(double end_s, double step_s, int count);
 
-/// Steps of a run of a map, and how many of them are judged.
+/// Steps of a run of a map, and how many of them are compared.
 inline constexpr double kStudySteps = 300.0;
 inline constexpr int kComparedSteps = 32;
 
 /// The element without mass; the closed form is the reference. With frozen tension (E' = 0) any
 /// history of loads, else constant ones.
-[[nodiscard]] CheckedProblem judged_rest(const BondElement& p, const Protocol& protocol,
-                                         double step_s);
+[[nodiscard]] CheckedProblem massless_problem(const BondElement& p, const Protocol& protocol,
+                                              double step_s);
 
 /// The element with mass and E' = 0 under a constant load from rest.
 [[nodiscard]] CheckedProblem problem_with_mass(const BondElement& p, double mass_kg,

@@ -24,14 +24,14 @@ bool same_kind(StabilityClass a, StabilityClass b) {
 }
 
 StabilityCorner tried(std::string name, std::string setup, std::string expected,
-                      const CheckedProblem& judged, double step_s, const Expect& expect) {
+                      const CheckedProblem& checked, double step_s, const Expect& expect) {
   StabilityCorner corner{std::move(name), std::move(setup), std::move(expected), {}};
   for (const StepRuleEntry& entry : kStepRules) {
     MethodSettings settings;
     settings.rule = entry.meaning;
     settings.step_s = step_s;
     settings.most_rates = 2'000'000;
-    CornerCell cell{entry.meaning, judged.judge(settings), expect(entry.meaning), false};
+    CornerCell cell{entry.meaning, checked.verdict(settings), expect(entry.meaning), false};
     cell.right = same_kind(cell.verdict.found, cell.expected);
     corner.cells.push_back(std::move(cell));
   }
@@ -69,7 +69,7 @@ StabilityCorner instantaneous_depth(std::string name, const BondElement& p, doub
   return tried(std::move(name),
                significant(1e3 * depth_m, 3) + " mm at once and held for 300 steps of " +
                    significant(step_s, 3) + " s",
-               std::move(expected), judged_rest(p, protocol, step_s), step_s,
+               std::move(expected), massless_problem(p, protocol, step_s), step_s,
                of_theory(under_depth(p), step_s, kStudySteps - kComparedSteps));
 }
 
@@ -144,7 +144,7 @@ void add_moduli(std::vector<StabilityCorner>& corners) {
       tried("E2 = 0, a load", "0.05 N at once and held",
             "tension carries it: all hold but XPBD, whose made-up mass is that of the "
             "stiffness at rest, 0",
-            judged_rest(loose, creep(0.05, end), kStep_s), kStep_s, [](StepRule rule) {
+            massless_problem(loose, creep(0.05, end), kStep_s), kStep_s, [](StepRule rule) {
               return rule == StepRule::xpbd ? StabilityClass::diverged : StabilityClass::holds;
             }));
   loose.lateral_Pa = 0.0;
@@ -187,8 +187,8 @@ struct CornerStar {
   }
   static Constraints freedom_of(bool guided) {
     Constraints constraints(4);
-    if (guided) constraints.guide(1, Eigen::Vector3d::UnitZ());
-    for (const std::size_t i : {0, 2, 3}) constraints.hold(i);
+    if (guided) constraints.slide(1, Eigen::Vector3d::UnitZ());
+    for (const std::size_t i : {0, 2, 3}) constraints.fix(i);
     return constraints;
   }
 
@@ -221,13 +221,13 @@ double star_force_N(const BondElement& p, double rate, double time_s) {
 }
 
 /// What the straight path of a star answers in its last steps.
-void set_star_reference(const BondElement& p, double rate, double end_s, CheckedProblem& judged) {
-  judged.times_s = last_steps(end_s, kStep_s, kComparedSteps);
-  judged.reference.resize(kComparedSteps);
+void set_star_reference(const BondElement& p, double rate, double end_s, CheckedProblem& checked) {
+  checked.times_s = last_steps(end_s, kStep_s, kComparedSteps);
+  checked.reference.resize(kComparedSteps);
   for (int i = 0; i < kComparedSteps; ++i) {
-    judged.reference[i] = star_force_N(p, rate, judged.times_s[static_cast<std::size_t>(i)]);
+    checked.reference[i] = star_force_N(p, rate, checked.times_s[static_cast<std::size_t>(i)]);
   }
-  judged.peak = judged.reference.cwiseAbs().maxCoeff();
+  checked.peak = checked.reference.cwiseAbs().maxCoeff();
 }
 
 StabilityCorner pushed_star(std::string name, std::string setup, std::string expected,
@@ -235,11 +235,11 @@ StabilityCorner pushed_star(std::string name, std::string setup, std::string exp
   const BondElement p = paper_element(0.02);
   const CornerStar star(p, true);
   const double end = kStudySteps * kStep_s;
-  CheckedProblem judged;
-  judged.problem =
+  CheckedProblem checked;
+  checked.problem =
       network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, depth_m}}));
-  set_star_reference(p, depth_m / end, end, judged);
-  return tried(std::move(name), std::move(setup), std::move(expected), judged, kStep_s, expect);
+  set_star_reference(p, depth_m / end, end, checked);
+  return tried(std::move(name), std::move(setup), std::move(expected), checked, kStep_s, expect);
 }
 
 void add_stars(std::vector<StabilityCorner>& corners) {
@@ -261,14 +261,14 @@ void add_stars(std::vector<StabilityCorner>& corners) {
   const BondElement p = paper_element(0.02);
   const CornerStar star(p, false);
   const double end = kStudySteps * kStep_s;
-  CheckedProblem judged;
-  judged.problem =
+  CheckedProblem checked;
+  checked.problem =
       network_problem(star.driven, Protocol(Drive::displacement, {{0.0, 0.0}, {end, 0.004}}));
-  set_star_reference(p, 0.004 / end, end, judged);
+  set_star_reference(p, 0.004 / end, end, checked);
   corners.push_back(tried("buckling", "star, B not guided, 0 to 4 mm in 300 steps",
                           "its stiffness across the plane is negative at once: buckled; XPBD "
                           "does not look and follows the straight path",
-                          judged, kStep_s, [](StepRule rule) {
+                          checked, kStep_s, [](StepRule rule) {
                             return rule == StepRule::xpbd ? StabilityClass::holds
                                                           : StabilityClass::buckled;
                           }));
@@ -282,14 +282,14 @@ void add_masses(std::vector<StabilityCorner>& corners) {
     LinearElement linear = linear_element(p, 0.0);
     linear.mass_kg = mass;
     linear.drag_per_s = kDrag_per_s;
-    const CheckedProblem judged =
+    const CheckedProblem checked =
         problem_with_mass(p, mass, kDrag_per_s, 0.05, kStudySteps * kStep_s, kStep_s);
     corners.push_back(
         tried("mass " + significant(mass, 2) + " kg", "0.05 N at once and held, drag 20 1/s",
               mass < 1.0 ? "far above 2/omega: explicit rules grow, midpoint, Newmark and the "
                            "exponential rule on them ring, damped rules hold"
                          : "hardly moves: all hold",
-              judged, kStep_s, [&](StepRule rule) {
+              checked, kStep_s, [&](StepRule rule) {
                 const auto limit = stable_step_s(rule, linear);
                 if (limit && kStep_s > *limit) return StabilityClass::diverged;
                 const bool rings = rule == StepRule::implicit_midpoint ||

@@ -116,8 +116,8 @@ void add_motion_limits(std::vector<StabilityLimit>& limits) {
 double highest_frequency(const DrivenNetwork& network, const Eigen::VectorXd& mass_kg) {
   constexpr int kMost = 20000;
   const Eigen::Index n = network.rest.cols();
-  const BondMemory none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(network.bonds.size())),
-                        0.0};
+  const ViscousState none{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(network.bonds.size())),
+                          0.0};
   Eigen::Matrix3Xd u(3, n);
   std::mt19937_64 random(1);  // any start that is not orthogonal to the mode
   for (double& value : u.reshaped()) value = static_cast<double>(random() >> 11) * 0x1p-53 - 0.5;

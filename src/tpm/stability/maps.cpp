@@ -40,7 +40,8 @@ MapPlan over_relaxation_time(int along) {
           decades(along, 1e-4, 1e2),
           decades(along, 1e-5, 1e3),
           [](double tau, double h) {
-            return judged_rest(paper_element(tau), step_and_hold(kDepth_m, kStudySteps * h), h);
+            return massless_problem(paper_element(tau), step_and_hold(kDepth_m, kStudySteps * h),
+                                    h);
           },
           [](double tau) {
             LinearElement e = linear_element(paper_element(tau), 0.0);
@@ -66,7 +67,7 @@ MapPlan over_load_rate(int along) {
           [](double rate, double h) {
             const double rises = kLoad_N / rate;
             const double ends = rises + kStudySteps * h;
-            return judged_rest(
+            return massless_problem(
                 without_tension(kTau_s),
                 Protocol(Drive::force, {{0.0, 0.0}, {rises, kLoad_N}, {ends, kLoad_N}}), h);
           },
@@ -85,7 +86,7 @@ MapPlan over_depth(int along) {
           decades(along, 1e-3, 4e-2),
           decades(along, 1e-3, 1e3),
           [load](double depth, double h) {
-            return judged_rest(paper_element(kTau_s), creep(load(depth), kStudySteps * h), h);
+            return massless_problem(paper_element(kTau_s), creep(load(depth), kStudySteps * h), h);
           },
           [](double depth) { return linear_element(paper_element(kTau_s), depth); }};
 }
@@ -168,12 +169,12 @@ void draw_plan(const MapPlan& plan, std::vector<StabilityMap>& maps, Progress& p
   }
   for (const double x : plan.x) {
     for (const double h : plan.step_s) {
-      const CheckedProblem judged = plan.build(x, h);
+      const CheckedProblem checked = plan.build(x, h);
       for (std::size_t i = first; i < maps.size(); ++i) {
         MethodSettings settings;
         settings.rule = maps[i].rule;
         settings.step_s = h;
-        maps[i].points.push_back({x, h, judged.judge(settings)});
+        maps[i].points.push_back({x, h, checked.verdict(settings)});
       }
       progress.advance();
     }

@@ -40,9 +40,9 @@ Matrix amplification(StepRule rule, const LinearElement& e, double h) {
   Matrix position = one;
   position(0, 1) = h;
   const double ratio = h / e.relaxation_time_s;
-  Matrix memory = one;
-  memory.row(2) << ratio / (1.0 + ratio), 0.0, 1.0 / (1.0 + ratio);
-  return memory * position * velocity;
+  Matrix viscous = one;
+  viscous.row(2) << ratio / (1.0 + ratio), 0.0, 1.0 / (1.0 + ratio);
+  return viscous * position * velocity;
 }
 
 bool is_stable(StepRule rule, const LinearElement& e, double h) {

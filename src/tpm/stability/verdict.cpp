@@ -47,7 +47,7 @@ StabilityVerdict classify_run(const MethodRun& run, const Eigen::VectorXd& refer
   const double swing = 0.5 * (off.maxCoeff() - off.minCoeff());
   if (after > kGrows * before) {
     verdict.found = moves ? StabilityClass::energy_grew : StabilityClass::diverged;
-    verdict.reason = "the difference from the truth still grows";
+    verdict.reason = "the difference from the reference still grows";
   } else if (swing > std::abs(middle)) {
     verdict.found = StabilityClass::oscillates;
   } else {

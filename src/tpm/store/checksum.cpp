@@ -18,13 +18,13 @@
 namespace tpm {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "seals hold little-endian numbers");
+static_assert(std::endian::native == std::endian::little, "check sums hold little-endian numbers");
 
 constexpr std::string_view kChecksumMagic = "TPMSEAL1";
 
 struct CheckSum {
   char magic[8];
-  std::uint64_t size;  ///< of what is sealed
+  std::uint64_t size;  ///< of what the check sum covers
   std::uint32_t crc;
   std::uint32_t nothing;
 };

@@ -39,7 +39,7 @@ class Contained;
 
 /// Writes an HDF5 file through a Replacement. HDF5 itself, which crashes if memory is short, runs
 /// in a child process (contained.hpp) and arranges the file; numbers are written past it, by this
-/// process, to where they stand. commit() seals the file (checksum.hpp), passes it to the disk
+/// process, to where they stand. commit() adds a check sum (checksum.hpp), passes it to the disk
 /// and gives it its name. A writer that is destroyed without commit() leaves nothing behind. Paths
 /// inside the file are absolute ("/curves/a/time"); groups on the way are created. No time stamps
 /// are stored, so that the same content gives the same bytes. Errors are Error(environment).
@@ -117,7 +117,7 @@ class Hdf5Reader {
   Hdf5Reader& operator=(const Hdf5Reader&) = delete;
 
   /// True if the file has a check sum, which then is right.
-  [[nodiscard]] bool sealed() const noexcept;
+  [[nodiscard]] bool has_checksum() const noexcept;
 
   [[nodiscard]] bool has(const std::string& name) const;
   /// Names of the members of a group, in alphabetical order.

@@ -138,7 +138,7 @@ Hdf5Reader::~Hdf5Reader() = default;
 Hdf5Reader::Hdf5Reader(Hdf5Reader&&) noexcept = default;
 Hdf5Reader& Hdf5Reader::operator=(Hdf5Reader&&) noexcept = default;
 
-bool Hdf5Reader::sealed() const noexcept {
+bool Hdf5Reader::has_checksum() const noexcept {
   return check_sum_ == ChecksumState::whole;
 }
 

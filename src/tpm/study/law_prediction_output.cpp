@@ -64,7 +64,7 @@ std::string placement_words(const LawPrediction& p) {
   const char* whose = p.placement == Placement::surface ? "none: depths count from the surface"
                       : p.placement == Placement::fitted
                           ? "of the fit"
-                          : "found for this recording, material held";
+                          : "found for this recording, material fixed";
   return fmt::format("contact {} {}, offset {} {} ({})\n", significant(p.contact / drive.to_si, 4),
                      drive.symbol, significant(p.offset / response.to_si, 4), response.symbol,
                      whose);

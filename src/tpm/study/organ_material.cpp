@@ -319,7 +319,7 @@ BondMaterial by_correspondence(OrganMaterial& m, const OrganLessLaw& organ, Bond
   const double factor = product / squares;
   if (!(factor > 0.0) || !std::isfinite(factor)) {
     throw Error(ExitCode::numerical, std::string(where), "the organ does not answer the motion",
-                "a contact sphere that is not held");
+                "a contact sphere that is not fixed");
   }
   for (MaterialCourse& course : m.courses) {
     for (double& f : course.correspondence_N) f *= factor;

@@ -73,7 +73,7 @@ void answer_creep(const Model& model, const StudyCondition& c, const TpmVector& 
   curve.x.push_back(0.0);
   add_hold(curve.x, 0.0, c.duration_s);
   curve.x.back() = c.duration_s;
-  answer_in_time(model, creep(c.load_N, c.duration_s), parameters, "at once", 0, curve);
+  answer_in_time(model, creep(c.load_N, c.duration_s), parameters, "instantaneous", 0, curve);
 }
 
 StudyCurve answer(const Model& model, const StudyCondition& condition, const TpmVector& values) {
@@ -127,8 +127,8 @@ TissueFit fitted(const FitConfig& config, std::size_t fit, std::size_t tissue) {
 std::vector<StudyFit> with_materials(const OrganStudyConfig& config) {
   std::vector<StudyFit> fits = config.fits;
   for (const StudyMaterial& material : config.materials) {
-    if (material.held.values.empty()) continue;
-    fits[material.fit].configs.front().hypotheses.push_back(material.held);
+    if (material.fixed.values.empty()) continue;
+    fits[material.fit].configs.front().hypotheses.push_back(material.fixed);
   }
   return fits;
 }
@@ -142,7 +142,7 @@ TpmVector parameters_of(const OrganStudy& study, const StudyMaterial& material) 
   const FitResult& fit = *made.result;
   std::span<const double> natural = fit.best.natural;
   for (const HypothesisResult& h : fit.hypotheses) {
-    if (!material.held.values.empty() && h.hypothesis.name == material.held.name) {
+    if (!material.fixed.values.empty() && h.hypothesis.name == material.fixed.name) {
       natural = h.minimum.natural;
     }
   }

@@ -28,7 +28,7 @@ struct StudyFit {
 struct StudyMaterial {
   std::string name;
   std::size_t fit = 0;  ///< place in OrganStudyConfig::fits
-  Hypothesis held;      ///< no values: the fit as it is
+  Hypothesis fixed;     ///< no values: the fit as it is
 };
 
 /// One experiment of which a curve is computed, SI.
@@ -59,7 +59,7 @@ struct OrganStudyConfig {
 
 /// The response at one place of a curve.
 struct StudyReading {
-  std::string label;      ///< "peak", "end", "at once", or the depth of a static force
+  std::string label;      ///< "peak", "end", "instantaneous", or the depth of a static force
   double x = 0.0;         ///< depth, m (static), or time, s
   double response = 0.0;  ///< N, or m (creep)
   /// Over the first tissue's response at the same material, less 1; none for that tissue itself,

@@ -87,9 +87,9 @@ std::vector<StudyFit> parse_fits(const Json& document, const std::vector<StudyTi
 }
 
 /// What a material holds, checked as a hypothesis of the fit is.
-Hypothesis parse_held(const Json& hold, const std::string& name, const FitConfig& config,
-                      const DocumentPlace& place) {
-  Hypothesis held{name, {}};
+Hypothesis parse_fixed(const Json& hold, const std::string& name, const FitConfig& config,
+                       const DocumentPlace& place) {
+  Hypothesis fixed{name, {}};
   for (const auto& [parameter, text] : hold.items()) {
     const auto found =
         std::find_if(config.parameters.begin(), config.parameters.end(),
@@ -103,12 +103,12 @@ Hypothesis parse_held(const Json& hold, const std::string& name, const FitConfig
     if (!(value >= p.lower && value <= p.upper)) {
       throw bad_input(here.where, "outside the parameter's bounds", "a value within them");
     }
-    held.values.emplace_back(parameter, value);
+    fixed.values.emplace_back(parameter, value);
   }
-  if (held.values.size() == config.parameters.size()) {
-    throw bad_input(place.where, "all parameters are held", "at least one that is fitted");
+  if (fixed.values.size() == config.parameters.size()) {
+    throw bad_input(place.where, "all parameters are fixed", "at least one that is fitted");
   }
-  return held;
+  return fixed;
 }
 
 std::vector<StudyMaterial> parse_materials(const Json& list, const std::vector<StudyFit>& fits,
@@ -131,8 +131,8 @@ std::vector<StudyMaterial> parse_materials(const Json& list, const std::vector<S
       throw bad_input(here.key("name").where, "another material has it", "a name for each");
     }
     if (j.contains("hold")) {
-      material.held =
-          parse_held(j.at("hold"), material.name, fit->configs.front(), here.key("hold"));
+      material.fixed =
+          parse_fixed(j.at("hold"), material.name, fit->configs.front(), here.key("hold"));
     }
     materials.push_back(std::move(material));
   }

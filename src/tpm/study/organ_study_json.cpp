@@ -31,8 +31,8 @@ Json materials_json(const OrganStudy& study) {
     Json j{{"name", m.name},
            {"fit", study.config.fits[m.fit].name},
            {"tissue", study.config.tissues.front().name}};
-    j["held"] = Json::array();
-    for (const auto& [name, value] : m.held.values) j["held"].push_back(name);
+    j["fixed"] = Json::array();
+    for (const auto& [name, value] : m.fixed.values) j["fixed"].push_back(name);
     j["parameters"] = parameters_json(study.curves[i].parameters.value());
     list.push_back(std::move(j));
   }

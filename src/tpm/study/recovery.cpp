@@ -47,7 +47,7 @@ double visible_value(const LawParameter& p, int branches, double order) {
 /// What the trials of one law share.
 struct Trials {
   LawSpec law;
-  std::vector<double> truth;
+  std::vector<double> true_values;
   Recording clean;
   double sigma = 0.0;
 };
@@ -61,9 +61,10 @@ Recording scattered(const Trials& trials, Random& random) {
 /// Whether the fitted curve stays within one sigma of the true curve over the whole record.
 bool predicts_true_curve(const FitResult& fit, const Trials& trials) {
   const std::vector<double>& predicted = fit.recordings.front().predicted;
-  return std::equal(
-      predicted.begin(), predicted.end(), trials.clean.response.begin(),
-      [&](double fitted, double truth) { return std::abs(fitted - truth) < trials.sigma; });
+  return std::equal(predicted.begin(), predicted.end(), trials.clean.response.begin(),
+                    [&](double fitted, double true_values) {
+                      return std::abs(fitted - true_values) < trials.sigma;
+                    });
 }
 
 /// Why a candidate was not recommended: what is not identified in it, or its BIC.
@@ -75,20 +76,20 @@ std::string reason_against(const Candidate& candidate, double margin) {
 
 void count_choice(const Selection& selection, const Trials& trials, ChoiceCount& count) {
   const Candidate& chosen = selection.candidates[least_within(selection.candidates, count.margin)];
-  const std::string truth = law_name(trials.law);
+  const std::string true_values = law_name(trials.law);
   const std::string name = law_name(chosen.law);
   ++count.chosen[name];
   const auto generating =
       std::find_if(selection.candidates.begin(), selection.candidates.end(),
-                   [&](const Candidate& c) { return law_name(c.law) == truth; });
-  if (name == truth) {
+                   [&](const Candidate& c) { return law_name(c.law) == true_values; });
+  if (name == true_values) {
     ++count.returned;
   } else if (predicts_true_curve(chosen.fit, trials)) {
     ++count.equivalent;
   }
   if (generating == selection.candidates.end()) return;
   if (chosen.parameters > generating->parameters) ++count.larger;
-  if (name != truth) ++count.reasons[reason_against(*generating, count.margin)];
+  if (name != true_values) ++count.reasons[reason_against(*generating, count.margin)];
 }
 
 /// The residuals of the generating law, with the reference depth of the true law so that its
@@ -108,7 +109,7 @@ std::vector<double> true_estimates(const FitResult& fit, const Trials& trials) {
   const LawModel model(trials.law);
   std::vector<double> natural;
   for (const ParameterResult& p : fit.parameters) {
-    natural.push_back(trials.truth[model.index(p.parameter.name)]);
+    natural.push_back(trials.true_values[model.index(p.parameter.name)]);
   }
   return natural;
 }
@@ -119,11 +120,11 @@ void count_intervals(const ExperimentResiduals& function, const Trials& trials,
   const FitResult fit = fit_experiments(function);
   std::vector<FitParameter> parameters;
   for (const ParameterResult& p : fit.parameters) parameters.push_back(p.parameter);
-  const std::vector<double> truth = true_estimates(fit, trials);
-  const std::vector<std::vector<double>> starts{fit.best.natural, truth};
+  const std::vector<double> true_values = true_estimates(fit, trials);
+  const std::vector<std::vector<double>> starts{fit.best.natural, true_values};
   std::vector<double> deviance;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    deviance.push_back(profile_deviance(function, parameters, starts, i, truth[i]));
+    deviance.push_back(profile_deviance(function, parameters, starts, i, true_values[i]));
   }
   const double least =
       std::min(fit.best.deviance, *std::min_element(deviance.begin(), deviance.end()));
@@ -170,10 +171,10 @@ std::string coverage_text(const std::vector<ParameterCoverage>& parameters, int 
 }
 
 /// The laws that were returned instead, most frequent first.
-std::string others_text(const ChoiceCount& c, const std::string& truth) {
+std::string others_text(const ChoiceCount& c, const std::string& true_values) {
   std::vector<std::pair<int, std::string>> others;
   for (const auto& [name, count] : c.chosen) {
-    if (name != truth) others.emplace_back(-count, name);
+    if (name != true_values) others.emplace_back(-count, name);
   }
   std::sort(others.begin(), others.end());
   std::string text;
@@ -222,11 +223,11 @@ bool ChoiceCount::fulfilled() const {
   return right() >= kRequired * trials && larger <= (1.0 - kRequired) * trials;
 }
 
-RecoveryResult recover(const LawSpec& law, std::span<const double> truth,
+RecoveryResult recover(const LawSpec& law, std::span<const double> true_values,
                        const RecoveryOptions& options) {
-  Trials trials{law, {truth.begin(), truth.end()}, {}, 0.0};
+  Trials trials{law, {true_values.begin(), true_values.end()}, {}, 0.0};
   trials.law.reference = options.test.depth_m;
-  trials.clean = simulated_recording(trials.law, truth, options.test);
+  trials.clean = simulated_recording(trials.law, true_values, options.test);
   trials.sigma = options.noise * largest(trials.clean.response);
   SelectionOptions selection = options.selection;
   selection.held_out = false;
@@ -234,7 +235,7 @@ RecoveryResult recover(const LawSpec& law, std::span<const double> truth,
 
   RecoveryResult result;
   result.law = trials.law;
-  result.truth = trials.truth;
+  result.true_values = trials.true_values;
   result.noise = options.noise;
   result.seed = options.seed;
   std::vector<double> margins = options.margins;
@@ -274,7 +275,7 @@ Json to_json(const RecoveryResult& r) {
   const LawModel model(r.law);
   for (const ParameterCoverage& p : r.parameters) {
     list.push_back({{"name", p.name},
-                    {"truth_SI", r.truth[model.index(p.name)]},
+                    {"true_SI", r.true_values[model.index(p.name)]},
                     {"covered", p.covered},
                     {"binomial_p_value", rounded(p.p_value, 6)}});
   }
@@ -285,7 +286,7 @@ Json to_json(const RecoveryResult& r) {
 std::string to_terminal_text(std::span<const RecoveryResult> results) {
   std::string text = fmt::format("{:<20} {:>6} {:>6} {:>8} {:>6} {:>6} {:>6}  {}\n", "law",
                                  "margin", "trials", "returned", "equiv.", "larger", "failed",
-                                 "95 % intervals that hold the truth, % | returned instead");
+                                 "95 % intervals that hold the true value, % | returned instead");
   for (const RecoveryResult& r : results) {
     for (const ChoiceCount& c : r.choices) {
       const bool first = &c == r.choices.data();

@@ -61,7 +61,7 @@ struct ChoiceCount {
 /// that law's own fit contained the true value.
 struct RecoveryResult {
   LawSpec law;
-  std::vector<double> truth;  ///< SI, in the order of law_parameters()
+  std::vector<double> true_values;  ///< SI, in the order of law_parameters()
   double noise = 0.0;
   std::uint64_t seed = 0;
   int trials = 0;
@@ -78,7 +78,7 @@ struct RecoveryResult {
 /// Simulates recordings with independent normal noise, selects, and counts. An interval contains
 /// the true value if the deviance, minimised with the parameter fixed there, rises by no more than
 /// the threshold: the profile-likelihood intervals of tpm fit, without the walk to their limits.
-[[nodiscard]] RecoveryResult recover(const LawSpec& law, std::span<const double> truth,
+[[nodiscard]] RecoveryResult recover(const LawSpec& law, std::span<const double> true_values,
                                      const RecoveryOptions& options);
 
 [[nodiscard]] Json to_json(const RecoveryResult& result);

@@ -58,7 +58,7 @@ Json band_json(const BandRow& row) {
   json["spacing_m"] = row.spacing_m;
   json["printed_where"] = row.printed_where;
   json["lambda1"] = cell_json(row.lambda1, "Pa");
-  json["relaxed_force"] = cell_json(row.force, "N");
+  json["equilibrium_force"] = cell_json(row.force, "N");
   json["band_printed"] = {row.band_low, row.band_high};
   json["band_unit"] = row.band_unit.symbol;
   json["band_low_N"] = row.band_low_N;

@@ -62,7 +62,7 @@ double factor_of(const LawSpec& law, const ContactGeometry& geometry) {
 std::optional<YoungModulus> sum_of(const FitResult& fit, const std::vector<std::size_t>& places,
                                    double factor) {
   const Covariance& c = fit.covariance;
-  YoungModulus sum{"E_at_once", "", "Pa", 0.0, {}, {}, {}, "linearised", ""};
+  YoungModulus sum{"E_instantaneous", "", "Pa", 0.0, {}, {}, {}, "linearised", ""};
   Eigen::VectorXd direction = Eigen::VectorXd::Zero(std::ssize(c.free));
   for (const std::size_t i : places) {
     const ParameterResult& p = fit.parameters[i];

@@ -11,7 +11,7 @@ namespace tpm::study {
 
 /// Young's modulus of one stiffness of a fitted law, with its interval. SI.
 struct YoungModulus {
-  std::string name;  ///< "E_inf", "E1", "E_at_once"
+  std::string name;  ///< "E_inf", "E1", "E_instantaneous"
   std::string of;    ///< the parameter, or the sum, that it stands for
   std::string unit;  ///< "Pa", of a spring-pot "Pa s^alpha", its stiffness at 1 s
   double estimate = 0.0;

@@ -44,21 +44,21 @@ std::vector<double> sizes_along(const SweepReader& sweep, const ReadAxis& axis,
 
 SweepConvergence convergence_of(const SweepReader& sweep, const std::string& variable,
                                 const std::optional<std::string>& wished_axis,
-                                const std::string& size, const HeldPlaces& held) {
+                                const std::string& size, const FixedPlaces& fixed) {
   SweepConvergence found;
   found.variable = variable;
   found.unit = sweep.variable(variable).unit;
   found.axis = wished_axis.value_or(sweep.axes().back().name);
   const ReadAxis& axis = sweep.axes()[sweep.axis(found.axis)];
   require_no_samples(sweep, axis);
-  found.held = other_places(sweep, axis, held);
+  found.fixed = other_places(sweep, axis, fixed);
   found.size_text = size.empty() ? axis.name : size;
   found.size_unit = size.empty() ? axis.unit : "";
   for (const std::string& name : axis.parameters) {
     if (name == size) found.size_unit = sweep.parameter_unit(name);
   }
   const std::vector<double> sizes = sizes_along(sweep, axis, size);
-  const std::vector<double> values = sweep.slice(variable, {}, axis.name, held);
+  const std::vector<double> values = sweep.slice(variable, {}, axis.name, fixed);
   std::vector<std::size_t> order(sizes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),

@@ -11,7 +11,7 @@ namespace tpm::study {
 struct SweepConvergence {
   std::string variable, unit;
   std::string axis;
-  std::vector<HeldValue> held;  ///< on the other axes
+  std::vector<FixedValue> fixed;  ///< on the other axes
   std::string size_text;       ///< what the size of a place is, such as "spacing" or "count^(-1/3)"
   std::string size_unit;       ///< SI; empty where the size is a formula
   std::vector<double> size;    ///< falling
@@ -33,6 +33,6 @@ struct SweepConvergence {
 /// not above 0 or coincide, and fewer than three places with a number.
 [[nodiscard]] SweepConvergence convergence_of(const SweepReader& sweep, const std::string& variable,
                                               const std::optional<std::string>& axis,
-                                              const std::string& size, const HeldPlaces& held);
+                                              const std::string& size, const FixedPlaces& fixed);
 
 }  // namespace tpm::study

@@ -115,19 +115,19 @@ std::string SweepReader::choice_of_models() const {
   return file_.has("/model_text") ? file_.attribute("/model", "choice") : std::string();
 }
 
-std::vector<std::uint64_t> SweepReader::start_at(const HeldPlaces& held) const {
+std::vector<std::uint64_t> SweepReader::start_at(const FixedPlaces& fixed) const {
   std::vector<std::uint64_t> first(axes_.size(), 0);
-  for (const auto& [name, place] : held) first[axis(name)] = place;
+  for (const auto& [name, place] : fixed) first[axis(name)] = place;
   return first;
 }
 
 std::vector<double> SweepReader::slice(const std::string& name,
                                        const std::optional<std::string>& rows,
-                                       const std::string& columns, const HeldPlaces& held) const {
+                                       const std::string& columns, const FixedPlaces& fixed) const {
   if (!variable(name).times_s.empty()) {
     throw bad_input("sweep", fmt::format("'{}' is a curve in each cell", name), "a number");
   }
-  std::vector<std::uint64_t> first = start_at(held), counts(axes_.size(), 1);
+  std::vector<std::uint64_t> first = start_at(fixed), counts(axes_.size(), 1);
   const std::size_t column = axis(columns);
   first[column] = 0;
   counts[column] = axes_[column].places.size();
@@ -147,8 +147,8 @@ std::vector<double> SweepReader::slice(const std::string& name,
   return turned;
 }
 
-std::vector<double> SweepReader::curve(const std::string& name, const HeldPlaces& held) const {
-  std::vector<std::uint64_t> first = start_at(held), counts(axes_.size(), 1);
+std::vector<double> SweepReader::curve(const std::string& name, const FixedPlaces& fixed) const {
+  std::vector<std::uint64_t> first = start_at(fixed), counts(axes_.size(), 1);
   first.push_back(0);
   counts.push_back(variable(name).times_s.size());
   return file_.part(path_of(name), first, counts);
@@ -170,16 +170,16 @@ void SweepReader::each(
   }
 }
 
-std::vector<HeldValue> other_places(const SweepReader& sweep, const ReadAxis& along,
-                                    const HeldPlaces& held) {
-  std::vector<HeldValue> others;
+std::vector<FixedValue> other_places(const SweepReader& sweep, const ReadAxis& along,
+                                     const FixedPlaces& fixed) {
+  std::vector<FixedValue> others;
   for (const ReadAxis& axis : sweep.axes()) {
-    const auto named = std::find_if(held.begin(), held.end(),
+    const auto named = std::find_if(fixed.begin(), fixed.end(),
                                     [&](const auto& place) { return place.first == axis.name; });
     if (axis.name != along.name) {
-      const std::uint64_t place = named == held.end() ? 0 : named->second;
+      const std::uint64_t place = named == fixed.end() ? 0 : named->second;
       others.push_back({axis.name, axis.places[place], axis.unit});
-    } else if (named != held.end()) {
+    } else if (named != fixed.end()) {
       throw bad_input("--at", fmt::format("'{}' is the axis that is looked along", axis.name),
                       "another axis");
     }

@@ -26,14 +26,14 @@ struct ReadVariable {
 };
 
 /// Where another axis is fixed.
-struct HeldValue {
+struct FixedValue {
   std::string axis;
   double value = 0.0;  ///< SI
   std::string unit;
 };
 
 /// A place on each axis that is fixed, by name.
-using HeldPlaces = std::vector<std::pair<std::string, std::uint64_t>>;
+using FixedPlaces = std::vector<std::pair<std::string, std::uint64_t>>;
 
 /// Reads what write_sweep has written, a piece at a time. Everything throws Error(bad_input).
 class SweepReader {
@@ -65,16 +65,17 @@ class SweepReader {
   /// @param rows, columns names of axes; no rows: one row
   [[nodiscard]] std::vector<double> slice(const std::string& variable,
                                           const std::optional<std::string>& rows,
-                                          const std::string& columns, const HeldPlaces& held) const;
+                                          const std::string& columns,
+                                          const FixedPlaces& fixed) const;
   /// A curve at a place on each axis.
   [[nodiscard]] std::vector<double> curve(const std::string& variable,
-                                          const HeldPlaces& held) const;
+                                          const FixedPlaces& fixed) const;
   /// All numbers of several scalars, a stretch of cells at a time.
   void each(const std::vector<std::string>& names,
             const std::function<void(const std::vector<std::vector<double>>&)>& see) const;
 
  private:
-  [[nodiscard]] std::vector<std::uint64_t> start_at(const HeldPlaces& held) const;
+  [[nodiscard]] std::vector<std::uint64_t> start_at(const FixedPlaces& fixed) const;
 
   Hdf5Reader file_;
   std::string title_;
@@ -85,7 +86,7 @@ class SweepReader {
 
 /// Where all axes but one are fixed (at the first place, if not said).
 /// Throws Error(bad_input) naming `--at` if that one is fixed too.
-[[nodiscard]] std::vector<HeldValue> other_places(const SweepReader& sweep, const ReadAxis& along,
-                                                  const HeldPlaces& held);
+[[nodiscard]] std::vector<FixedValue> other_places(const SweepReader& sweep, const ReadAxis& along,
+                                                   const FixedPlaces& fixed);
 
 }  // namespace tpm::study

@@ -12,12 +12,12 @@ struct SweepSensitivity {
   std::vector<std::string> parameters;  ///< in the order of `indices.inputs`
   SensitivityDesign design;
   SensitivityResult indices;
-  std::vector<HeldValue> held;  ///< on the other axes
+  std::vector<FixedValue> fixed;  ///< on the other axes
 };
 
 /// Throws Error(bad_input) if the file has no such axis, or as sobol_indices does.
 /// @param held places on the other axes
 [[nodiscard]] SweepSensitivity sensitivity_of(const SweepReader& sweep, const std::string& variable,
-                                              const HeldPlaces& held, double level = 0.95);
+                                              const FixedPlaces& fixed, double level = 0.95);
 
 }  // namespace tpm::study

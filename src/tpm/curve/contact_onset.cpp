@@ -1,4 +1,4 @@
-#include "tpm/curve/touch.hpp"
+#include "tpm/curve/contact_onset.hpp"
 
 #include <algorithm>
 #include <cmath>

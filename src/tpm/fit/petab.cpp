@@ -1,4 +1,4 @@
-#include "tpm/fit/tables.hpp"
+#include "tpm/fit/petab.hpp"
 
 #include <fmt/format.h>
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""An independent judge of `tpm fit configs/liver_relaxation.json`.
+"""An independent reference for `tpm fit configs/liver_relaxation.json`.
 
 Writes the ramp-and-hold force of the paper's element down again from its differential equation's
 solution, reads the shipped numbers and searches E, eta1 and x with scipy: differential evolution
 over the whole box first, then bounded least squares from its best points. Shares no code with tpm.
 
-usage: judge_relaxation.py data/evren_relaxation.csv [--rate 4] [--sigma 0.1]
+usage: reference_relaxation.py data/evren_relaxation.csv [--rate 4] [--sigma 0.1]
 Prints JSON: chi_square, E_Pa, eta1_Pa_s, spacing_m.
 """
 import argparse

@@ -1,4 +1,4 @@
-#include "tpm/law/memory.hpp"
+#include "tpm/law/relaxation_sum.hpp"
 
 #include <cmath>
 #include <initializer_list>
@@ -40,10 +40,10 @@ Eigen::VectorXd with_ends(double slow, const Eigen::VectorXd& grid,
 
 }  // namespace
 
-Memory branch_memory(bool solid, int branches, std::span<const double> parallel) {
+RelaxationSum branch_relaxation(bool solid, int branches, std::span<const double> parallel) {
   const Eigen::Index n = branches;
   const int first = solid ? 1 : 0;
-  Memory m;
+  RelaxationSum m;
   m.constant = solid ? parallel[0] : 0.0;
   m.rate_per_s.resize(n);
   m.stiffness.resize(n);
@@ -76,7 +76,7 @@ struct GridColumn {
 
 /// Adds one fractional element to a relaxation function: `unit` times its stiffness, and the
 /// derivatives.
-void add_element(Memory& m, const GridColumn& unit, std::initializer_list<GridColumn> slopes,
+void add_element(RelaxationSum& m, const GridColumn& unit, std::initializer_list<GridColumn> slopes,
                  const FastPair* fast) {
   /// `total` is what the coefficients add up to at time 0
   const auto column = [&](const GridColumn& c, double total) -> Eigen::VectorXd {
@@ -99,8 +99,8 @@ void add_element(Memory& m, const GridColumn& unit, std::initializer_list<GridCo
 
 }  // namespace
 
-Memory fractional_memory(Fractional law, std::span<const double> values,
-                         const FractionalMemory& rates) {
+RelaxationSum fractional_relaxation(Fractional law, std::span<const double> values,
+                                    const ExponentialSum& rates) {
   if (law == Fractional::none) throw bad_input("law", "not fractional", "a fractional law");
   const bool pair = has_two_springpots(law);
   const bool side_by_side = law == Fractional::kelvin_voigt_pair;
@@ -119,7 +119,7 @@ Memory fractional_memory(Fractional law, std::span<const double> values,
   const FastPair::Stiffness end_rates{ends.first_rate, ends.second_rate};
   const FastPair* fast = has_tau && !pair ? &ends : nullptr;
 
-  Memory m;
+  RelaxationSum m;
   m.infinite_under_jump = fast == nullptr;
   m.rate_per_s =
       with_ends(kNever_per_s, Eigen::Map<const Eigen::VectorXd>(grid.data(), std::ssize(grid)),

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
-#include "python_judge.hpp"
+#include "python_reference.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/network_file.hpp"
@@ -13,7 +13,7 @@ using namespace tpm::organ;
 using namespace tpm::fit;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
-using tpm_test::judged;
+using tpm_test::python_reference;
 
 TEST_CASE("an independent optimiser finds the same minimum of the relaxation problem") {
   const std::string source = TPM_TEST_SOURCE_DIR;
@@ -24,12 +24,12 @@ TEST_CASE("an independent optimiser finds the same minimum of the relaxation pro
     CAPTURE(rate);
     config.data[0].protocol.rate_m_per_s = rate * 1e-3;
     const FitResult fit = run_fit(config);
-    const Json judge =
-        judged("judge_relaxation.py",
-               fmt::format("'{}/data/evren_relaxation.csv' --rate {}", source, rate));
-    CHECK_THAT(fit.chi_square, WithinRel(judge.at("chi_square").get<double>(), 1e-5));
-    CHECK_THAT(fit.best.natural[0], WithinRel(judge.at("E_Pa").get<double>(), 1e-5));
-    CHECK_THAT(fit.best.natural[1], WithinRel(judge.at("eta1_Pa_s").get<double>(), 1e-5));
+    const Json reference =
+        python_reference("reference_relaxation.py",
+                         fmt::format("'{}/data/evren_relaxation.csv' --rate {}", source, rate));
+    CHECK_THAT(fit.chi_square, WithinRel(reference.at("chi_square").get<double>(), 1e-5));
+    CHECK_THAT(fit.best.natural[0], WithinRel(reference.at("E_Pa").get<double>(), 1e-5));
+    CHECK_THAT(fit.best.natural[1], WithinRel(reference.at("eta1_Pa_s").get<double>(), 1e-5));
   }
 }
 
@@ -37,7 +37,7 @@ TEST_CASE(
     "an independent solver finds the same contact force of the liver at every step, pushed and "
     "held") {
   const std::string source = TPM_TEST_SOURCE_DIR;
-  const std::string file = std::string(TPM_TEST_BINARY_DIR) + "/judged_liver.h5";
+  const std::string file = std::string(TPM_TEST_BINARY_DIR) + "/reference_liver.h5";
   const Tissue tissue = read_tissue(source + "/configs/liver_scene.json");
   (void)write_network(tissue, file);
   const Organ& organ = tissue.network.organ;
@@ -46,10 +46,11 @@ TEST_CASE(
   for (const double tau : {0.5, 10.0}) {
     CAPTURE(tau);
     const BondSystem bonds(tissue.network, TpmParameters{}.with_relaxation_time(tau));
-    const Json judge = judged("judge_quasistatic.py", fmt::format("'{}' --tau {}", file, tau));
-    const auto times_s = judge.at("time_s").get<std::vector<double>>();
-    const auto expected_N = judge.at("force_N").get<std::vector<double>>();
-    const double peak_N = judge.at("force_at_peak_N").get<double>();
+    const Json reference =
+        python_reference("reference_quasistatic.py", fmt::format("'{}' --tau {}", file, tau));
+    const auto times_s = reference.at("time_s").get<std::vector<double>>();
+    const auto expected_N = reference.at("force_N").get<std::vector<double>>();
+    const double peak_N = reference.at("force_at_peak_N").get<double>();
     REQUIRE(times_s.size() >= 19);
     const Eigen::VectorXd force =
         QuasiStatic(bonds, organ.position, tissue.constraints(), probe, {.tolerance = 1e-8})

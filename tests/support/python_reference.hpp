@@ -1,5 +1,5 @@
 #pragma once
-// Runs the judges of scripts/, which are written in Python with numpy and scipy.
+// Runs the reference programs of scripts/, which are written in Python with numpy and scipy.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -31,8 +31,8 @@ inline std::string output_of(const std::string& command) {
   return text;
 }
 
-/// What a judge prints.
-inline tpm::Json judged(const std::string& script, const std::string& arguments) {
+/// What such a reference prints.
+inline tpm::Json python_reference(const std::string& script, const std::string& arguments) {
   const std::string command = fmt::format("{} '{}/scripts/{}' {}", python_with_scipy(),
                                           TPM_TEST_SOURCE_DIR, script, arguments);
   return tpm::parse_json(output_of(command), script);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times scipy's sparse direct solver (SuperLU) on a matrix that measure_factorisation wrote; one line of JSON.
 
-    /usr/bin/python3 scripts/growth_judges.py MATRIX_FILE
+    /usr/bin/python3 scripts/growth_scipy.py MATRIX_FILE
 
 Orders by minimum degree on A + A^T with symmetric mode, the fastest of SuperLU's for these matrices. Processor
 times in s.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""An independent judge of quasi-static runs of a network: force and time.
+"""An independent reference for quasi-static runs of a network: force and time.
 
 Reads what `tpm network build SCENE -o NETWORK` wrote, pushes the contact sphere along its inward
 normal at a rate to a depth and holds it there. Forces balance on every free sphere at each step
@@ -8,7 +8,7 @@ linear in time, for which what it remembers is exact. That is of second order: t
 every step of the other halved, give the fourth by Richardson's extrapolation and the error of the
 finer. Shares no code with tpm.
 
-usage: judge_quasistatic.py NETWORK.h5 --tau 10 [--depth 8 --rate 4 --end 31 --steps 12]
+usage: reference_quasistatic.py NETWORK.h5 --tau 10 [--depth 8 --rate 4 --end 31 --steps 12]
 Prints JSON: time_s, the ends of the coarser mesh's steps; force_N there, extrapolated; error_N, the change by
 the extrapolation; force_at_peak_N, force_at_end_N and *_finer_N, *_error_N of the two corners; steps, cpu_s and
 finer_cpu_s.
@@ -32,19 +32,19 @@ class Tissue:
         with h5py.File(path, "r") as f:
             self.rest = f["spheres/position_m"][:]
             normal = f["spheres/normal"][:]
-            held = f["spheres/held"][:]
+            constraint = f["spheres/constraint"][:]
             contact = int(np.flatnonzero(f["spheres/contact"][:])[0])
             self.ends = f["bonds/ends"][:].astype(int)
             radial = f["bonds/kind"][:] == 0
             factor = f["bonds/factor"][:]
             self.length = f["bonds/rest_length_m"][:]
-        if (held == 1).any():
-            raise SystemExit("judge: guided spheres are not known here")
+        if (constraint == 1).any():
+            raise SystemExit("reference: guided spheres are not known here")
         self.k = factor * STIFFNESS_M * modulus_Pa
         self.g = np.where(radial, 0.5 * self.k, 0.0)  # E1 = E2
         self.push = np.zeros((len(self.rest), 3))
         self.push[contact] = -normal[contact]
-        columns = np.eye(3 * len(self.rest))[:, np.repeat(held == 0, 3)]
+        columns = np.eye(3 * len(self.rest))[:, np.repeat(constraint == 0, 3)]
         rows = slice(3 * contact, 3 * contact + 3)
         across = np.linalg.svd(normal[contact][None])[2][1:]  # two directions beside the push
         keep = ~columns[rows].any(axis=0)
@@ -95,7 +95,7 @@ class Tissue:
             x = x + (self.basis @ change).reshape(-1, 3)
             if np.linalg.norm(change) < 1e-15:
                 return x, -np.sum(force * self.push)
-        raise SystemExit("judge: Newton's method does not converge")
+        raise SystemExit("reference: Newton's method does not converge")
 
 
 def mesh(length, tau, steps):

@@ -8,7 +8,7 @@
 
 namespace tpm {
 
-/// The error that the rates of a fractional law are chosen for, FractionalMemory's tolerance.
+/// The error that the rates of a fractional law are chosen for, ExponentialSum's tolerance.
 inline constexpr double kFractionalTolerance = 1e-10;
 
 /// The relaxation function of a law at given parameters, as the time stepper uses it:
@@ -16,7 +16,7 @@ inline constexpr double kFractionalTolerance = 1e-10;
 ///     G(t) = constant + sum_j stiffness_j exp(-rate_j t) + dashpot delta(t)
 ///
 /// with the derivatives of the coefficients by the few parameters that they depend on.
-struct Memory {
+struct RelaxationSum {
   double constant = 0.0;
   double dashpot = 0.0;              ///< N s/m
   bool infinite_under_jump = false;  ///< a spring-pot answers a jump with an infinite force
@@ -34,7 +34,8 @@ struct Memory {
 
 /// Relaxation function of a law with branches. The parameters it refers to are those of the
 /// parallel form: k_inf (if solid), k_1.., tau_1...
-[[nodiscard]] Memory branch_memory(bool solid, int branches, std::span<const double> parallel);
+[[nodiscard]] RelaxationSum branch_relaxation(bool solid, int branches,
+                                              std::span<const double> parallel);
 
 /// Relaxation function of a fractional law on the fixed rates of a window. What the window does not
 /// see is kept too: slow rates as a branch that relaxes only under infinite time, so that
@@ -42,8 +43,8 @@ struct Memory {
 /// stiffness and viscosity, so that G(0) is exact; for spring-pots, with infinite instantaneous
 /// stiffness, as the dashpot.
 /// @param values those of law_parameters: [k_inf], k1, [k2], [tau1], alpha, [beta]
-/// Throws Error(bad_input) for a law that is not fractional, or as FractionalMemory.
-[[nodiscard]] Memory fractional_memory(Fractional law, std::span<const double> values,
-                                       const FractionalMemory& rates);
+/// Throws Error(bad_input) for a law that is not fractional, or as ExponentialSum.
+[[nodiscard]] RelaxationSum fractional_relaxation(Fractional law, std::span<const double> values,
+                                                  const ExponentialSum& rates);
 
 }  // namespace tpm

@@ -1,11 +1,11 @@
-// Prints the quasi-static run of the paper's liver beside scripts/judge_quasistatic.py, force and
-// time in one run: build/release/tests/measure_judged_quasistatic
+// Prints the quasi-static run of the paper's liver beside scripts/reference_quasistatic.py, force
+// and time in one run: build/release/tests/measure_python_quasistatic
 #include <algorithm>
 #include <ctime>
 #include <filesystem>
 #include <vector>
 
-#include "python_judge.hpp"
+#include "python_reference.hpp"
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/scene/network_file.hpp"
 #include "tpmkit/tpm_element.hpp"
@@ -17,14 +17,14 @@ namespace {
 
 void measure() {
   const std::string source = TPM_TEST_SOURCE_DIR;
-  const std::string file = (std::filesystem::temp_directory_path() / "judged_liver.h5").string();
+  const std::string file = (std::filesystem::temp_directory_path() / "reference_liver.h5").string();
   const Tissue tissue = read_tissue(source + "/configs/liver_scene.json");
   (void)write_network(tissue, file);
   const Organ& organ = tissue.network.organ;
   const std::size_t contact = organ.contact.value();
   const Probe probe{contact, -organ.normal.col(static_cast<Eigen::Index>(contact))};
-  fmt::print("{:>8} {:>12} {:>12} {:>10} {:>9} {:>9} {:>7}\n", "tau, s", "end, N", "judge, N",
-             "difference", "CPU ms", "judge ms", "ratio");
+  fmt::print("{:>8} {:>12} {:>12} {:>10} {:>9} {:>9} {:>7}\n", "tau, s", "end, N", "Python, N",
+             "difference", "CPU ms", "Python ms", "ratio");
   for (const double tau : {2e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0}) {
     const TpmParameters material = TpmParameters{}.with_relaxation_time(tau);
     const BondSystem bonds(tissue.network, material);
@@ -37,14 +37,14 @@ void measure() {
       taken.push_back(1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
     }
     std::sort(taken.begin(), taken.end());
-    const Json judge =
-        tpm_test::judged("judge_quasistatic.py", fmt::format("'{}' --tau {}", file, tau));
-    const double end_N = judge.at("force_at_end_N").get<double>();
-    const double judge_ms = 1e3 * judge.at("cpu_s").get<double>();
+    const Json reference = tpm_test::python_reference("reference_quasistatic.py",
+                                                      fmt::format("'{}' --tau {}", file, tau));
+    const double end_N = reference.at("force_at_end_N").get<double>();
+    const double python_ms = 1e3 * reference.at("cpu_s").get<double>();
     const double median_ms = taken[taken.size() / 2];
     fmt::print("{:>8g} {:>12.8f} {:>12.8f} {:>10.1e} {:>9.2f} {:>9.0f} {:>7.0f}\n", tau, force[1],
-               end_N, std::abs(force[1] - end_N) / force[0], median_ms, judge_ms,
-               judge_ms / median_ms);
+               end_N, std::abs(force[1] - end_N) / force[0], median_ms, python_ms,
+               python_ms / median_ms);
   }
 }
 
