@@ -11,6 +11,7 @@
 #include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/stage_tangents.hpp"
+#include "tpm/solve/sampled_function.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
@@ -288,29 +289,47 @@ class Run {
 
   /// Answers the times asked for within the step just found, its end left out.
   void report_within(double h, double rate, const std::optional<StepEnergy>& energy) {
-    std::array<double, kLanes> fractions{};
-    for (;;) {
-      std::size_t count = 0;
-      while (count < kLanes && next_ + count < order_.size()) {
-        const double time = times_s_[order_[next_ + count]];
-        if (!(time < state_.time_s + h)) break;
-        fractions[count++] = std::max((time - state_.time_s) / h, 0.0);
-      }
-      if (count == 0) return;
-      const std::span<const double> asked(fractions.data(), count);
-      if (tangents_) {
-        const Eigen::MatrixXd rows = tangents_->responses_within(state_, asked, h, rate);
-        for (std::size_t i = 0; i < count; ++i) {
-          derivative_row(next_ + i) = rows.row(static_cast<Eigen::Index>(i));
-        }
-      }
-      if (observer_) {
-        show_within(asked, h, rate, energy);
-        continue;
-      }
-      const LaneVector responses = stages_.responses_within(state_, asked, h, rate);
-      for (std::size_t i = 0; i < count; ++i) put(responses[static_cast<Eigen::Index>(i)]);
+    std::vector<double> fractions;
+    for (std::size_t i = next_; i < order_.size(); ++i) {
+      const double time = times_s_[order_[i]];
+      if (!(time < state_.time_s + h)) break;
+      fractions.push_back(std::max((time - state_.time_s) / h, 0.0));
     }
+    Eigen::RowVectorXd allowed = Eigen::RowVectorXd::Constant(
+        tangents_ ? 1 + tangents_->count() : 1,
+        kStepShare * options_.derivative_tolerance.value_or(options_.tolerance));
+    allowed[0] = kStepShare * options_.tolerance;
+    const Eigen::MatrixXd answers =
+        sampled([&](std::span<const double> asked) { return answers_within(asked, h, rate); },
+                fractions, kLanes, stages_.scale() * allowed);
+    for (Eigen::Index i = 0; i < answers.rows() && tangents_; ++i) {
+      derivative_row(next_ + static_cast<std::size_t>(i)) = answers.row(i).tail(tangents_->count());
+    }
+    if (!observer_) {
+      for (const double response : answers.col(0)) put(response);
+      return;
+    }
+    for (std::span<const double> rest = fractions; !rest.empty();) {
+      const std::size_t count = std::min<std::size_t>(kLanes, rest.size());
+      show_within(rest.first(count), h, rate, energy);
+      rest = rest.subspan(count);
+    }
+  }
+
+  /// Responses, then their derivatives, at fractions of the step just found. Responses are left out
+  /// where an observer is shown states, which bring them.
+  [[nodiscard]] Eigen::MatrixXd answers_within(std::span<const double> fractions, double h,
+                                               double rate) {
+    const auto count = static_cast<Eigen::Index>(fractions.size());
+    Eigen::MatrixXd answers = Eigen::MatrixXd::Zero(count, tangents_ ? 1 + tangents_->count() : 1);
+    if (!observer_) {
+      answers.col(0) = stages_.responses_within(state_, fractions, h, rate).head(count);
+    }
+    if (tangents_) {
+      answers.rightCols(tangents_->count()) =
+          tangents_->responses_within(state_, fractions, h, rate);
+    }
+    return answers;
   }
 
   /// Responses within the step just found, with the states there.

@@ -69,6 +69,7 @@ class StageBalance {
   /// Size of the response that tolerances are parts of: at least `least`, N or m.
   void set_scale(double least) { scale_ = std::abs(least); }
   void see(double response) { scale_ = std::max(scale_, std::abs(response)); }
+  [[nodiscard]] double scale() const { return scale_; }
   /// Response per unit of what is imposed: turns tolerances of forces into such of lengths.
   void set_unit_response(double response) { unit_response_ = std::abs(response); }
   [[nodiscard]] const QuasiStaticWork& work() const { return work_; }
