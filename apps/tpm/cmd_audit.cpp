@@ -1,5 +1,4 @@
 // tpm audit: recomputes what a paper prints.
-#include <fmt/format.h>
 
 #include <memory>
 
@@ -44,9 +43,7 @@ void add_audit_command(CLI::App& app, Session& session) {
   command->footer(
       "Findings are results, not errors: the exit code is 0 when the audit ran.\n"
       "Example:\n  tpm audit --all\n  tpm audit my_claims.json --format json --output audit.json");
-  command->callback([&session, options] {
-    session.run = [&session, options] { return run_command(session, *options); };
-  });
+  set_run(*command, session, [&session, options] { return run_command(session, *options); });
 }
 
 }  // namespace tpm::app

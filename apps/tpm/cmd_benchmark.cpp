@@ -1,5 +1,4 @@
 // tpm benchmark: error against cost of every method on named problems.
-#include <fmt/format.h>
 
 #include <chrono>
 #include <filesystem>
@@ -175,9 +174,7 @@ void add_benchmark_command(CLI::App& app, Session& session) {
       "  tpm benchmark -o reports/accuracy --keep\n"
       "  tpm benchmark bond_paper organ_poke --repeats 50\n"
       "  tpm benchmark --record speed.csv --commit $(git rev-parse --short HEAD)");
-  command->callback([choice, &session] {
-    session.run = [choice, &session] { return benchmark(*choice, session); };
-  });
+  set_run(*command, session, [choice, &session] { return benchmark(*choice, session); });
 }
 
 }  // namespace tpm::app

@@ -81,9 +81,7 @@ int run_budget(const BudgetCommand& command, const Session& session) {
   std::string text = session.json() ? to_text(to_json(budget)) : to_terminal_text(budget);
   if (!command.folder.empty()) {
     const auto files = write_budget_report(command.folder, budget);
-    if (!session.json()) {
-      text += fmt::format("\nwritten to {}: {}\n", command.folder, fmt::join(files, ", "));
-    }
+    if (!session.json()) text += written(command.folder, files);
   }
   deliver(text, command.output);
   deliver_csv(to_csv(budget), csv);
@@ -133,9 +131,7 @@ void add_budget_command(CLI::App& app, Session& session) {
       "Example:\n  tpm fit recording.csv --folder fitted\n"
       "  tpm budget fitted/law.json recording.csv --folder budget\n"
       "  tpm plan configs/plan/servo.json --tolerance data --budget budget/budget.json");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return run_budget(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return run_budget(*options, session); });
 }
 
 }  // namespace tpm::app

@@ -49,9 +49,7 @@ void add_check_gradient_command(CLI::App& app, Session& session) {
   command->footer(
       "Exit code 1 if a derivative is wrong, or more than half of them are undecided.\n"
       "Example:\n  tpm check-gradient configs/liver_relaxation.json");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return check(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return check(*options, session); });
 }
 
 }  // namespace tpm::app

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include <chrono>
 #include <memory>
@@ -61,9 +60,7 @@ void add_coverage_command(CLI::App& app, Session& session) {
   command->footer(
       "Exit code 1 if a coverage differs from its level at the 0.1 % level (exact binomial test).\n"
       "Example:\n  tpm coverage configs/coverage_absolute.json --sets 2000 --seed 0");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return coverage(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return coverage(*options, session); });
 }
 
 }  // namespace tpm::app

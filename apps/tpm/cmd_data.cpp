@@ -1,5 +1,4 @@
 // tpm data: list, show, check and pack. The importer is in cmd_data_import.cpp.
-#include <fmt/format.h>
 
 #include <filesystem>
 #include <memory>
@@ -116,7 +115,7 @@ void add_list(CLI::App& data, Session& session) {
   command->footer(
       "Example:\n  tpm data list\n"
       "JSON: a list of objects with id, kind (points, recording, spectrum, values), rows, title");
-  command->callback([&session] { session.run = [&session] { return list(session); }; });
+  set_run(*command, session, [&session] { return list(session); });
 }
 
 void add_show(CLI::App& data, Session& session) {
@@ -138,9 +137,8 @@ void add_show(CLI::App& data, Session& session) {
       "          loss_N/m; storage_sd_Pa, loss_sd_Pa) as lists\n"
       "  values: values with name, quantity, unit_SI, value, lower, upper, provenance\n"
       "An .h5 file gives a list of such objects.");
-  command->callback([&session, argument, all_rows] {
-    session.run = [&session, argument, all_rows] { return show(session, *argument, *all_rows); };
-  });
+  set_run(*command, session,
+          [&session, argument, all_rows] { return show(session, *argument, *all_rows); });
 }
 
 void add_check(CLI::App& data, Session& session) {
@@ -151,8 +149,7 @@ void add_check(CLI::App& data, Session& session) {
   command->footer(
       "Example:\n  tpm data check mine/*.csv\n"
       "JSON: a list of objects with file, ok, rows or error");
-  command->callback(
-      [&session, files] { session.run = [&session, files] { return check(session, *files); }; });
+  set_run(*command, session, [&session, files] { return check(session, *files); });
 }
 
 void add_pack(CLI::App& data, Session& session) {
@@ -170,10 +167,8 @@ void add_pack(CLI::App& data, Session& session) {
   command->footer(
       "Example:\n  tpm data pack evren_relaxation evren_static -o curves.h5\n"
       "JSON: file, curves (how many)");
-  command->callback([&session, options] {
-    session.run = [&session, options] {
-      return pack(session, options->curves, options->output, options->force);
-    };
+  set_run(*command, session, [&session, options] {
+    return pack(session, options->curves, options->output, options->force);
   });
 }
 

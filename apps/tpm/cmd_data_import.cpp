@@ -368,9 +368,7 @@ void add_data_import_command(CLI::App& data, Session& session) {
       "      --probe-diameter \"10 um\"\n"
       "JSON: a list of objects with source, csv (null if not written), id and understood\n"
       "(what was found in the file)");
-  command->callback([&session, arguments] {
-    session.run = [&session, arguments] { return import_files(session, *arguments); };
-  });
+  set_run(*command, session, [&session, arguments] { return import_files(session, *arguments); });
 }
 
 }  // namespace tpm::app

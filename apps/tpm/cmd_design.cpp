@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include <memory>
 #include <optional>
@@ -9,7 +8,6 @@
 #include "tpm/report/json_table_csv.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/design.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {
@@ -70,9 +68,7 @@ void add_design_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm design configs/design_liver.json --draw out/design\n"
       "  tpm design configs/design_meat.json --check 0 --format json");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return design(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return design(*options, session); });
 }
 
 }  // namespace tpm::app

@@ -1,5 +1,4 @@
 // tpm experiments: the paper's experiments on the star and on organs, fitted and compared.
-#include <fmt/format.h>
 
 #include <chrono>
 #include <memory>
@@ -55,9 +54,7 @@ void add_experiments_command(CLI::App& app, Session& session) {
       ->capture_default_str();
   add_format_option(*command, session);
   command->footer("Example:\n  tpm experiments --output out/experiments");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return experiments(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return experiments(*options, session); });
 }
 
 }  // namespace tpm::app

@@ -122,11 +122,9 @@ void add_export_command(CLI::App& app, Session& session) {
       "Example:\n  tpm export law.json --to abaqus --radius \"2 mm\"\n"
       "  tpm export fractional.json --to febio --from \"0.1 s\" --until \"30 s\"\n"
       "  tpm export on_liver/scene.json --to mjcf -o liver.xml");
-  command->callback([texts, &session] {
-    session.run = [texts] {
-      const auto engine = organ_target(texts->to);
-      return engine ? export_scene(*texts, *engine) : export_law_file(*texts);
-    };
+  set_run(*command, session, [texts] {
+    const auto engine = organ_target(texts->to);
+    return engine ? export_scene(*texts, *engine) : export_law_file(*texts);
   });
 }
 

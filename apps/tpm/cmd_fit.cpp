@@ -8,7 +8,6 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "tpm/core/text.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/fit/fit.hpp"
@@ -187,10 +186,6 @@ std::vector<std::string> recordings_in(const std::filesystem::path& folder) {
                     "files that end in .csv, .txt, .tsv or .jpk-force");
   }
   return files;
-}
-
-std::string written(const std::string& folder, const std::vector<std::string>& files) {
-  return fmt::format("\nwritten to {}: {}\n", folder, fmt::join(files, ", "));
 }
 
 /// --folder, or NAME_fit after the recording or the folder of recordings.
@@ -441,9 +436,7 @@ void add_fit_command(CLI::App& app, Session& session) {
       "  tpm fit meat.csv\n  tpm fit liver.csv --radius \"2 mm\" --poisson 0.5\n  tpm fit "
       "folder_of_recordings --law power-2\n"
       "  tpm fit configs/liver_relaxation.json --hold-out \"8 mm\" --format json -o fit.json");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return fit(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return fit(*options, session); });
 }
 
 }  // namespace tpm::app

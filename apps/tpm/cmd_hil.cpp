@@ -216,11 +216,9 @@ void warn_if_beyond_model(const ServoOutcome& outcome) {
       outcome.counts.beyond_model, outcome.cycles);
 }
 
-constexpr int kStoppedBySignal = 128;
-
 int exit_code_of(const ServoOutcome& outcome) {
   if (outcome.cause == StopCause::finished) return 0;
-  if (outcome.cause == StopCause::signal) return kStoppedBySignal + InterruptWatch::signal();
+  if (outcome.cause == StopCause::signal) return InterruptWatch::exit_code();
   tell_user("tpm: session stopped: {}{}{}\n", word_of(outcome.cause),
             outcome.detail.empty() ? "" : ": ", outcome.detail);
   return static_cast<int>(ExitCode::environment);
@@ -272,7 +270,7 @@ int run_hil(const RunChoice& choice, const Session& session) {
   } catch (const Error& error) {
     if (!InterruptWatch::seen()) throw;
     tell_user("tpm: {}\n", error.what());
-    return kStoppedBySignal + InterruptWatch::signal();
+    return InterruptWatch::exit_code();
   }
   guide.reset();
   if (session.json()) {
@@ -346,9 +344,7 @@ void add_hil_command(CLI::App& app, Session& session) {
                       "Those of a device plugin instead (docs/c_interface.md)");
   add_format_option(*devices, session);
   devices->footer("Examples:\n  tpm hil devices\n  tpm hil devices --plugin ./my_device.so");
-  devices->callback([listed, &session] {
-    session.run = [listed, &session] { return list_devices(*listed, session); };
-  });
+  set_run(*devices, session, [listed, &session] { return list_devices(*listed, session); });
 
   CLI::App* run = hil->add_subcommand("run", "Run a session and record it");
   auto choice = std::make_shared<RunChoice>();
@@ -386,9 +382,7 @@ void add_hil_command(CLI::App& app, Session& session) {
       "Examples:\n  tpm hil run configs/hil_omega7.json --device virtual -o session.tpmrec\n"
       "  tpm fit recording.csv -o fitted && tpm hil run configs/hil_omega7.json --law "
       "fitted/law.json");
-  run->callback([choice, &session] {
-    session.run = [choice, &session] { return run_hil(*choice, session); };
-  });
+  set_run(*run, session, [choice, &session] { return run_hil(*choice, session); });
 
   add_hil_check_command(*hil, session);
   add_hil_verify_commands(*hil, session);

@@ -62,9 +62,7 @@ void add_hil_check_command(CLI::App& hil, Session& session) {
   command->footer(
       "Examples:\n  tpm hil check configs/hil_liver.json --device omega7\n"
       "  tpm hil check --device virtual --rate \"4 kHz\" --duration \"10 s\"");
-  command->callback([choice, &session] {
-    session.run = [choice, &session] { return check_hil(*choice, session); };
-  });
+  set_run(*command, session, [choice, &session] { return check_hil(*choice, session); });
 }
 
 }  // namespace tpm::app

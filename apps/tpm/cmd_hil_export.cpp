@@ -1,5 +1,4 @@
 // tpm hil export: a recording for other programs.
-#include <fmt/format.h>
 
 #include <memory>
 
@@ -42,9 +41,7 @@ void add_hil_export_command(CLI::App& hil, Session& session) {
   command->add_option("-o,--output", choice->output, "HDF5 file")->required();
   add_format_option(*command, session);
   command->footer("Example:\n  tpm hil export session.tpmrec -o session.h5");
-  command->callback([choice, &session] {
-    session.run = [choice, &session] { return export_hil(*choice, session); };
-  });
+  set_run(*command, session, [choice, &session] { return export_hil(*choice, session); });
 }
 
 }  // namespace tpm::app

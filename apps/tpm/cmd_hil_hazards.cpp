@@ -1,5 +1,4 @@
 // tpm hil hazards: what can go wrong in a session, and what becomes of it.
-#include <fmt/format.h>
 
 #include <memory>
 #include <optional>
@@ -53,9 +52,7 @@ void add_hil_hazards_command(CLI::App& hil, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Examples:\n  tpm hil hazards -o hazards.md\n  tpm hil hazards --wall-clock -o clock.md");
-  command->callback([choice, &session] {
-    session.run = [choice, &session] { return try_hazards(*choice, session); };
-  });
+  set_run(*command, session, [choice, &session] { return try_hazards(*choice, session); });
 }
 
 }  // namespace tpm::app

@@ -1,5 +1,4 @@
 // tpm hil stability: what can be rendered passively, and what stays stable.
-#include <fmt/format.h>
 
 #include <memory>
 
@@ -16,16 +15,14 @@ void add_hil_stability_command(CLI::App& hil, Session& session) {
   command->add_option("--figures", *figures, "Folder for figures (SVG, PNG)");
   add_format_option(*command, session);
   command->footer("Example:\n  tpm hil stability --figures hil_borders");
-  command->callback([figures, &session] {
-    session.run = [figures, &session] {
-      const BorderStudy study = study_borders({});
-      std::vector<std::string> files;
-      if (!figures->empty()) files = write_figures(*figures, border_figures(study));
-      Json json = border_json(study);
-      json["files"] = files;
-      say("{}", session.json() ? to_text(json) : border_text(study));
-      return 0;
-    };
+  set_run(*command, session, [figures, &session] {
+    const BorderStudy study = study_borders({});
+    std::vector<std::string> files;
+    if (!figures->empty()) files = write_figures(*figures, border_figures(study));
+    Json json = border_json(study);
+    json["files"] = files;
+    say("{}", session.json() ? to_text(json) : border_text(study));
+    return 0;
   });
 }
 

@@ -1,10 +1,8 @@
 // tpm hil verify, tpm hil report: was what the operator felt the model?
-#include <fmt/format.h>
 
 #include <memory>
 
 #include "command.hpp"
-#include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/hil_report.hpp"
 #include "tpmkit/error.hpp"
@@ -86,17 +84,14 @@ void add_hil_verify_commands(CLI::App& hil, Session& session) {
       "verify", "Compare the forces of a recording with the full network under the same motion");
   const auto to_verify = add_choice(*verify_command, session);
   verify_command->footer("Example:\n  tpm hil verify session.tpmrec");
-  verify_command->callback([to_verify, &session] {
-    session.run = [to_verify, &session] { return verify_hil(*to_verify, session); };
-  });
+  set_run(*verify_command, session,
+          [to_verify, &session] { return verify_hil(*to_verify, session); });
 
   CLI::App* report = hil.add_subcommand("report", "One page on a session, with figures");
   const auto to_report = add_choice(*report, session);
   report->add_option("-o,--output", to_report->output, "Folder")->capture_default_str();
   report->footer("Example:\n  tpm hil report session.tpmrec -o hil_report");
-  report->callback([to_report, &session] {
-    session.run = [to_report, &session] { return report_hil(*to_report, session); };
-  });
+  set_run(*report, session, [to_report, &session] { return report_hil(*to_report, session); });
 }
 
 }  // namespace tpm::app

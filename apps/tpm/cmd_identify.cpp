@@ -9,7 +9,6 @@
 #include "tpm/report/json_table_csv.hpp"
 #include "tpm/study/identification.hpp"
 #include "tpm/study/identified_loop.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
 namespace tpm::app {
@@ -62,9 +61,7 @@ int run_identify(const IdentifyCommand& command, const Session& session) {
   if (!command.folder.empty()) {
     const auto files =
         write_identification_report(command.folder, id, identified_law(id, recording), json);
-    if (!session.json()) {
-      text += fmt::format("\nwritten to {}: {}\n", command.folder, fmt::join(files, ", "));
-    }
+    if (!session.json()) text += written(command.folder, files);
   }
   deliver(text, command.output);
   deliver_csv(json_table_csv(json.at("history"), "/parameters"), csv);
@@ -106,9 +103,7 @@ void add_identify_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm identify recording.csv --target 5% --folder identified\n"
       "  tpm hil run configs/hil_law.json --law identified/law.json");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return run_identify(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return run_identify(*options, session); });
 }
 
 }  // namespace tpm::app

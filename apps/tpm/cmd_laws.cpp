@@ -34,8 +34,7 @@ constexpr std::array<const char*, 16> kExamples{"linear",
 std::string grammar() {
   return fmt::format(
       "KERNEL[-BRANCHES][-TENSION][-fluid][-series]: kernel linear, hertz or power; branches 1 to "
-      "{} "
-      "or fspringpot, fmaxwell, fkelvin_voigt, fzener, with two spring-pots fmaxwell2, "
+      "{} or fspringpot, fmaxwell, fkelvin_voigt, fzener, with two spring-pots fmaxwell2, "
       "fkelvin_voigt2, fzener2; tension elastic or relaxing",
       kMostBranches);
 }
@@ -108,11 +107,9 @@ void add_laws_command(CLI::App& app, Session& session) {
   command->add_option("name", *name, "A law, e.g. linear-2-elastic");
   add_format_option(*command, session);
   command->footer("Example:\n  tpm laws hertz-fzener");
-  command->callback([name, &session] {
-    session.run = [name, &session] {
-      deliver(answer(*name, session), "");
-      return 0;
-    };
+  set_run(*command, session, [name, &session] {
+    deliver(answer(*name, session), "");
+    return 0;
   });
 }
 

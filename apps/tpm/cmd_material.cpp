@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 
 #include "command.hpp"
 #include "protocol_options.hpp"
@@ -76,9 +75,7 @@ int run_material(const MaterialCommand& command, const Session& session) {
   std::string text = session.json() ? to_text(to_json(result)) : to_terminal_text(result);
   if (!command.folder.empty()) {
     const auto files = write_organ_material_report(command.folder, result);
-    if (!session.json()) {
-      text += fmt::format("\nwritten to {}: {}\n", command.folder, fmt::join(files, ", "));
-    }
+    if (!session.json()) text += written(command.folder, files);
   }
   write_output(text);
   return 0;
@@ -128,9 +125,7 @@ void add_material_command(CLI::App& app, Session& session) {
       "Example:\n  tpm fit recording.csv --folder fitted\n"
       "  tpm material fitted/law.json configs/liver_scene.json recording.csv --folder on_liver\n"
       "  tpm hil run on_liver/session.json -o on_liver.tpmrec && tpm hil verify on_liver.tpmrec");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return run_material(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return run_material(*options, session); });
 }
 
 }  // namespace tpm::app

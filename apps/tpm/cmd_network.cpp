@@ -1,5 +1,4 @@
 // tpm network: build, check and show the network of spheres that a scene describes.
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -145,18 +144,14 @@ void add_network_command(CLI::App& app, Session& session) {
   build_command->footer(
       "Example:\n  tpm network build --count 424 --layers 2 -o organ.h5\n"
       "  tpm network build configs/liver_scene.json -o organ.h5");
-  build_command->callback([to_build, &session] {
-    session.run = [to_build, &session] { return build(*to_build, session); };
-  });
+  set_run(*build_command, session, [to_build, &session] { return build(*to_build, session); });
 
   CLI::App* check_command =
       network->add_subcommand("check", "Does it stand? Loose spheres, bond sums, neighbours");
   const auto to_check = add_choice(*check_command);
   add_format_option(*check_command, session);
   check_command->footer("Example:\n  tpm network check configs/liver_scene.json");
-  check_command->callback([to_check, &session] {
-    session.run = [to_check, &session] { return check(*to_check, session); };
-  });
+  set_run(*check_command, session, [to_check, &session] { return check(*to_check, session); });
 
   CLI::App* show_command = network->add_subcommand("show", "Draw it from the front and the side");
   const auto to_show = add_choice(*show_command);
@@ -165,8 +160,7 @@ void add_network_command(CLI::App& app, Session& session) {
       ->add_option("-o,--output", to_show->output, "Name of the pictures, without an ending")
       ->capture_default_str();
   show_command->footer("Example:\n  tpm network show configs/liver_scene.json -o liver");
-  show_command->callback(
-      [to_show, &session] { session.run = [to_show] { return show(*to_show); }; });
+  set_run(*show_command, session, [to_show] { return show(*to_show); });
 }
 
 }  // namespace tpm::app

@@ -153,9 +153,7 @@ void add_plan_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm plan configs/plan/shallow.json --tolerance 1% --rate 1000\n"
       "Exit code 1: no model meets tolerance and budget.");
-  command->callback([choice, &session] {
-    session.run = [choice, &session] { return run_plan(*choice, session); };
-  });
+  set_run(*command, session, [choice, &session] { return run_plan(*choice, session); });
 }
 
 }  // namespace tpm::app

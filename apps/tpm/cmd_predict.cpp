@@ -83,9 +83,7 @@ int predict(const PredictOptions& options, const Session& session) {
   if (session.json()) text = to_text(json);
   if (!options.folder.empty()) {
     const auto files = write_prediction_report(options.folder, prediction, json);
-    if (!session.json()) {
-      text += fmt::format("\nwritten to {}: {}\n", options.folder, fmt::join(files, ", "));
-    }
+    if (!session.json()) text += written(options.folder, files);
   }
   deliver(text, options.output);
   deliver_csv(to_csv(prediction), csv);
@@ -134,9 +132,7 @@ void add_predict_command(CLI::App& app, Session& session) {
       "  tpm predict fitted/law.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"\n"
       "  tpm predict fitted/law.json other.csv --verdict --folder predicted\n"
       "  tpm predict on_liver/scene.json --depth \"4 mm\" --rate \"2 mm/s\" --hold \"30 s\"");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return predict(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return predict(*options, session); });
 }
 
 }  // namespace tpm::app

@@ -98,9 +98,7 @@ void add_recovery_command(CLI::App& app, Session& session) {
       "trials,\n"
       "or a law with more parameters in over 5 %.\n"
       "Example:\n  tpm recovery --laws linear-1,power-2 --trials 20");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return recovery(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return recovery(*options, session); });
 }
 
 }  // namespace tpm::app

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include <memory>
 
@@ -26,7 +25,7 @@ void add_report_command(CLI::App& app, Session& session) {
   auto folder = std::make_shared<std::string>("out/paper");
   command->add_option("-o,--output", *folder, "Folder to write into")->capture_default_str();
   command->footer("Example:\n  tpm report --output out/paper");
-  command->callback([folder, &session] { session.run = [folder] { return report(*folder); }; });
+  set_run(*command, session, [folder] { return report(*folder); });
 }
 
 }  // namespace tpm::app

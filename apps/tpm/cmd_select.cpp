@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include <memory>
 
@@ -6,7 +5,6 @@
 #include "recording_options.hpp"
 #include "tpm/report/fit_csv.hpp"
 #include "tpm/study/selection.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::app {
 namespace {
@@ -69,9 +67,7 @@ void add_select_command(CLI::App& app, Session& session) {
       "Example:\n  tpm select meat.csv\n"
       "  tpm select slow.csv fast.csv --laws linear-1,linear-2,power-2 --format json -o laws.json\n"
       "The last one writes its table beside the JSON, too: laws.csv.");
-  command->callback([options, &session] {
-    session.run = [options, &session] { return select(*options, session); };
-  });
+  set_run(*command, session, [options, &session] { return select(*options, session); });
 }
 
 }  // namespace tpm::app

@@ -275,9 +275,8 @@ int run_command(const SimulateChoice& choice, const Session& session) {
     if (choice.planned) return simulate_planned(choice, session);
     return simulate_and_report(choice, session);
   } catch (const Interrupted& stop) {
-    constexpr int kStoppedBySignal = 128;
     tell_user("tpm: {}\n", stop.what());
-    return kStoppedBySignal + InterruptWatch::signal();
+    return InterruptWatch::exit_code();
   }
 }
 
@@ -310,9 +309,7 @@ void add_simulate_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5 --figures pictures\n"
       "An interrupted run goes on from its last checkpoint when the same command is given again.");
-  command->callback([choice, &session] {
-    session.run = [choice, &session] { return run_command(*choice, session); };
-  });
+  set_run(*command, session, [choice, &session] { return run_command(*choice, session); });
 }
 
 }  // namespace tpm::app

@@ -141,8 +141,7 @@ void add_spectrum_command(CLI::App& app, Session& session) {
   add_format_option(*command, session);
   command->footer(
       "Example:\n  tpm spectrum law.json --from \"0.01 Hz\" --to \"1000 Hz\" --points 31");
-  command->callback(
-      [texts, &session] { session.run = [texts, &session] { return spectrum(*texts, session); }; });
+  set_run(*command, session, [texts, &session] { return spectrum(*texts, session); });
 }
 
 }  // namespace tpm::app

@@ -70,15 +70,13 @@ void add_stability_command(CLI::App& app, Session& session) {
   command->footer(
       "Examples:\n  tpm stability --output out/stability\n  tpm stability --points 5  (a quick "
       "look)\n  tpm stability --only corners,servo");
-  command->callback([folder, along, only, &session] {
-    session.run = [folder, along, only, &session] {
-      constexpr std::uint64_t kMost = 200;
-      const std::uint64_t points = parse_whole_number(*along, "--points", 2);
-      if (points > kMost) {
-        throw Error(ExitCode::usage, "--points", *along, fmt::format("2 to {}", kMost));
-      }
-      return stability(*folder, static_cast<int>(points), parts_of(*only), session);
-    };
+  set_run(*command, session, [folder, along, only, &session] {
+    constexpr std::uint64_t kMost = 200;
+    const std::uint64_t points = parse_whole_number(*along, "--points", 2);
+    if (points > kMost) {
+      throw Error(ExitCode::usage, "--points", *along, fmt::format("2 to {}", kMost));
+    }
+    return stability(*folder, static_cast<int>(points), parts_of(*only), session);
   });
 }
 

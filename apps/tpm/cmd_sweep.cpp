@@ -91,10 +91,9 @@ Json sidecar(const Sweep& sweep, const SweepRun& run, const WrittenSweep& writte
 
 int stopped(BlockLog& log) {
   log.sync();
-  constexpr int kStoppedBySignal = 128;
   tell_user("tpm: stopped; what was computed is in {}: the same command goes on\n",
             log.path().string());
-  return kStoppedBySignal + InterruptWatch::signal();
+  return InterruptWatch::exit_code();
 }
 
 WrittenSweep write_results(const Sweep& sweep, const SweepRun& run,
@@ -330,8 +329,7 @@ void add_sweep_command(CLI::App& app, Session& session) {
   merging->add_option("-o,--output", choice->output, "HDF5 file, as it was given to the shards")
       ->capture_default_str();
   add_format_option(*merging, session);
-  merging->callback(
-      [choice, &session] { session.run = [choice, &session] { return merge(*choice, session); }; });
+  set_run(*merging, session, [choice, &session] { return merge(*choice, session); });
   add_sweep_views(*command, session);
   command->callback([command, choice, &session] {
     if (!command->get_subcommands().empty()) return;

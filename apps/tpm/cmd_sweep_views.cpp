@@ -14,7 +14,6 @@
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpm/sweep/best_cells.hpp"
-#include "tpm/sweep/sweep_result.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
 
@@ -198,17 +197,14 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   CLI::App* showing = sweep.add_subcommand("show", "What a file of results holds");
   showing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   add_format_option(*showing, session);
-  showing->callback(
-      [choice, &session] { session.run = [choice, &session] { return show(*choice, session); }; });
+  set_run(*showing, session, [choice, &session] { return show(*choice, session); });
   CLI::App* command = sweep.add_subcommand("sensitivity", "Sobol indices with their intervals");
   command->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   command->add_option("--variable", choice->variables, "Of what (default: all numbers but counts)");
   command->add_option("--at", choice->at, "AXIS=VALUE: place on an axis beside the samples");
   command->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
   add_format_option(*command, session);
-  command->callback([choice, &session] {
-    session.run = [choice, &session] { return sensitivity(*choice, session); };
-  });
+  set_run(*command, session, [choice, &session] { return sensitivity(*choice, session); });
   CLI::App* refining = sweep.add_subcommand(
       "convergence", "Order, extrapolated value and grid convergence index along an axis");
   refining->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
@@ -221,9 +217,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   refining->add_option("--at", choice->at, "AXIS=VALUE: place on another axis");
   refining->add_option("-o,--output", choice->figure_folder, "Folder for pictures (PNG, SVG)");
   add_format_option(*refining, session);
-  refining->callback([choice, &session] {
-    session.run = [choice, &session] { return convergence(*choice, session); };
-  });
+  set_run(*refining, session, [choice, &session] { return convergence(*choice, session); });
   CLI::App* choosing = sweep.add_subcommand("best", "The cells with the least value of an output");
   choosing->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   choosing->add_option("--output", choice->best_output, "What is to be least, such as a misfit")
@@ -233,8 +227,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   choosing->add_option("--fit", choice->fit, "Configuration of tpm fit to be started there");
   choosing->add_option("--start", choice->start, "File for the configuration with these starts");
   add_format_option(*choosing, session);
-  choosing->callback(
-      [choice, &session] { session.run = [choice, &session] { return best(*choice, session); }; });
+  set_run(*choosing, session, [choice, &session] { return best(*choice, session); });
   CLI::App* plotting = sweep.add_subcommand("plot", "Maps, families of lines, Pareto fronts");
   plotting->add_option("FILE", choice->file, "HDF5 file of tpm sweep")->required();
   plotting->add_option("-o,--output", choice->folder, "Folder for pictures (PNG, SVG)")
@@ -245,7 +238,7 @@ void add_sweep_views(CLI::App& sweep, Session& session) {
   plotting->add_option("--at", choice->at, "AXIS=VALUE: place on an axis that is not drawn");
   plotting->add_option("--pareto", choice->pareto,
                        "MISFIT,COST: cells that no other betters in both");
-  plotting->callback([choice, &session] { session.run = [choice] { return plot(*choice); }; });
+  set_run(*plotting, session, [choice] { return plot(*choice); });
 }
 
 }  // namespace tpm::app

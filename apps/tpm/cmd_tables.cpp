@@ -1,5 +1,4 @@
 // tpm tables: Tables 1-5 of the paper, recomputed, and the same tables for other inputs.
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <memory>
@@ -146,8 +145,7 @@ void add_tables_command(CLI::App& app, Session& session) {
       "Plain numbers are mm, kPa, Pa s, mm^2, mm/s and s; other units go with the number.\n"
       "Example:\n  tpm tables --depths 2,4,6,8 --spacings 20,25,30,35 --E \"12 kPa\"\n"
       "  tpm tables --consistent --eta \"2e5 Pa s\" --rate \"2 mm/s\" --format md");
-  command->callback(
-      [&session, options] { session.run = [options] { return run_command(*options); }; });
+  set_run(*command, session, [options] { return run_command(*options); });
 }
 
 }  // namespace tpm::app

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include "command.hpp"
 #include "tpm/store/json.hpp"
@@ -9,15 +8,13 @@ namespace tpm::app {
 void add_version_command(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("version", "Print the version of tpm");
   add_format_option(*command, session);
-  command->callback([&session] {
-    session.run = [&session] {
-      if (session.json()) {
-        say("{}", to_text(Json{{"version", version()}}));
-      } else {
-        say("tpm {}\n", version());
-      }
-      return 0;
-    };
+  set_run(*command, session, [&session] {
+    if (session.json()) {
+      say("{}", to_text(Json{{"version", version()}}));
+    } else {
+      say("tpm {}\n", version());
+    }
+    return 0;
   });
 }
 

@@ -92,8 +92,7 @@ void add_view_command(CLI::App& app, Session& session) {
   command->footer(
       "Example:\n  tpm simulate configs/liver_indentation.json -o results.h5\n"
       "  tpm view results.h5 -o results.html");
-  command->callback(
-      [choice, &session] { session.run = [choice, &session] { return view(*choice, session); }; });
+  set_run(*command, session, [choice, &session] { return view(*choice, session); });
 }
 
 }  // namespace tpm::app

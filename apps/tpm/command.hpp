@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace tpm::app {
 
@@ -23,6 +24,9 @@ struct Session {
   [[nodiscard]] bool json() const { return format == "json"; }
 };
 
+/// Has a command do this work, after the whole command line was read (Session::run).
+void set_run(CLI::App& command, Session& session, std::function<int()> work);
+
 /// Adds --format text|json to a command.
 void add_format_option(CLI::App& command, Session& session);
 
@@ -35,6 +39,9 @@ void deliver(const std::string& text, const std::string& file);
 [[nodiscard]] std::filesystem::path csv_beside(const std::string& output, const Session& session);
 /// Writes it, unless the name is empty.
 void deliver_csv(const std::string& csv, const std::filesystem::path& file);
+
+/// The line that says which files were written into a folder.
+[[nodiscard]] std::string written(const std::string& folder, const std::vector<std::string>& files);
 
 /// Announces the files of these names in a folder, before they are computed (will_write()); none if
 /// the folder is empty.

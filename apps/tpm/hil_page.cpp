@@ -1,8 +1,6 @@
 // The page of tpm hil run: when it begins, and when it ends.
 #include "hil_page.hpp"
 
-#include <fmt/format.h>
-
 #include <chrono>
 #include <cstdio>
 #include <thread>

@@ -16,6 +16,8 @@ class InterruptWatch {
   [[nodiscard]] static bool seen();
   /// Its number; 0 if none was seen.
   [[nodiscard]] static int signal();
+  /// That of a program that was stopped by it, as shells expect it.
+  [[nodiscard]] static int exit_code() { return 128 + signal(); }
 
  private:
   struct sigaction before_interrupt_ {};

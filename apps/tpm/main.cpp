@@ -31,6 +31,10 @@ void add_format_option(CLI::App& command, Session& session) {
       ->capture_default_str();
 }
 
+void set_run(CLI::App& command, Session& session, std::function<int()> work) {
+  command.callback([&session, work = std::move(work)] { session.run = work; });
+}
+
 void write_output(std::string_view text) {
   const std::string safe = for_terminal(text, LineEnds::kept);
   if (std::fwrite(safe.data(), 1, safe.size(), stdout) == safe.size()) return;
@@ -63,6 +67,10 @@ std::filesystem::path csv_beside(const std::string& output, const Session& sessi
 
 void deliver_csv(const std::string& csv, const std::filesystem::path& file) {
   if (!file.empty()) write_file(file, csv);
+}
+
+std::string written(const std::string& folder, const std::vector<std::string>& files) {
+  return fmt::format("\nwritten to {}: {}\n", folder, fmt::join(files, ", "));
 }
 
 void will_write_into(const std::filesystem::path& folder,

@@ -48,31 +48,30 @@ void hand_over(const Struct& filled, Struct& given) noexcept {
               reinterpret_cast<const char*>(&filled) + head, bytes - head);  // NOLINT
 }
 
+struct Cause {
+  StopCause servo;
+  int ours;
+  const char* text;
+};
+
+constexpr Cause kCauses[] = {
+    {StopCause::none, TPM_HAPTICS_RUNNING, "running"},
+    {StopCause::finished, TPM_HAPTICS_FINISHED, "finished"},
+    {StopCause::position_not_finite, TPM_HAPTICS_POSITION_NOT_FINITE, "position not finite"},
+    {StopCause::position_jump, TPM_HAPTICS_POSITION_JUMPED, "position jumped"},
+    {StopCause::force_not_finite, TPM_HAPTICS_FORCE_NOT_FINITE, "force not finite"},
+    {StopCause::overrun_storm, TPM_HAPTICS_LATE, "too many periods missed"},
+    {StopCause::not_in_place, TPM_HAPTICS_NOT_IN_PLACE, "tool not in place"},
+    {StopCause::untrusted, TPM_HAPTICS_UNTRUSTED, "model not trusted"},
+    {StopCause::energy, TPM_HAPTICS_ENERGY, "energy given to the hand"},
+    {StopCause::oscillation, TPM_HAPTICS_OSCILLATION, "oscillation"},
+};
+
 int cause_of(StopCause cause) noexcept {
-  switch (cause) {
-    case StopCause::none:
-      return TPM_HAPTICS_RUNNING;
-    case StopCause::finished:
-      return TPM_HAPTICS_FINISHED;
-    case StopCause::position_not_finite:
-      return TPM_HAPTICS_POSITION_NOT_FINITE;
-    case StopCause::position_jump:
-      return TPM_HAPTICS_POSITION_JUMPED;
-    case StopCause::force_not_finite:
-      return TPM_HAPTICS_FORCE_NOT_FINITE;
-    case StopCause::overrun_storm:
-      return TPM_HAPTICS_LATE;
-    case StopCause::not_in_place:
-      return TPM_HAPTICS_NOT_IN_PLACE;
-    case StopCause::untrusted:
-      return TPM_HAPTICS_UNTRUSTED;
-    case StopCause::energy:
-      return TPM_HAPTICS_ENERGY;
-    case StopCause::oscillation:
-      return TPM_HAPTICS_OSCILLATION;
-    default:
-      return TPM_HAPTICS_OTHER;
+  for (const Cause& known : kCauses) {
+    if (known.servo == cause) return known.ours;
   }
+  return TPM_HAPTICS_OTHER;
 }
 
 std::uint32_t flags_of(std::uint32_t row) noexcept {
@@ -234,30 +233,10 @@ void tpm_haptics_close(tpm_haptics_contact* contact) {
 }
 
 const char* tpm_haptics_cause_text(int cause) {
-  switch (cause) {
-    case TPM_HAPTICS_RUNNING:
-      return "running";
-    case TPM_HAPTICS_FINISHED:
-      return "finished";
-    case TPM_HAPTICS_POSITION_NOT_FINITE:
-      return "position not finite";
-    case TPM_HAPTICS_POSITION_JUMPED:
-      return "position jumped";
-    case TPM_HAPTICS_FORCE_NOT_FINITE:
-      return "force not finite";
-    case TPM_HAPTICS_LATE:
-      return "too many periods missed";
-    case TPM_HAPTICS_NOT_IN_PLACE:
-      return "tool not in place";
-    case TPM_HAPTICS_UNTRUSTED:
-      return "model not trusted";
-    case TPM_HAPTICS_ENERGY:
-      return "energy given to the hand";
-    case TPM_HAPTICS_OSCILLATION:
-      return "oscillation";
-    default:
-      return "stopped for another cause";
+  for (const Cause& known : kCauses) {
+    if (known.ours == cause) return known.text;
   }
+  return "stopped for another cause";
 }
 
 }  // extern "C"

@@ -43,11 +43,11 @@ class ContactModel {
   [[nodiscard]] virtual Eigen::Matrix3d instantaneous_stiffness() const noexcept = 0;
   /// Equilibrium tangent stiffness at rest, N/m.
   [[nodiscard]] virtual Eigen::Matrix3d equilibrium_stiffness() const noexcept = 0;
-  /// Number of spheres whose displacements displacements() writes; 0: none.
-  [[nodiscard]] virtual Eigen::Index spheres() const noexcept = 0;
+  /// Number of spheres whose displacements displacements() writes; none unless a model says so.
+  [[nodiscard]] virtual Eigen::Index spheres() const noexcept { return 0; }
   /// Displacements of all spheres after the last step, m.
   /// @param all 3 x spheres()
-  virtual void displacements(Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept = 0;
+  virtual void displacements([[maybe_unused]] Eigen::Ref<Eigen::Matrix3Xd> all) const noexcept {}
 };
 
 }  // namespace tpm

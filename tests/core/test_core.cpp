@@ -10,7 +10,6 @@
 #include "sanitizer.hpp"
 #include "tpm/core/memory_reserve.hpp"
 #include "tpm/core/quantity_text.hpp"
-#include "tpm/core/text.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpmkit/error.hpp"

@@ -1,14 +1,12 @@
 // Recordings from one path, and their phases.
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <functional>
 #include <random>
 
 #include "temp_folder.hpp"
 #include "tpm/curve/phases.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/store/file.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

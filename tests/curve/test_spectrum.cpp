@@ -10,7 +10,6 @@
 #include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpmkit/curve_file.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinRel;

@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 
 #include "tpm/fit/coverage.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::fit;

@@ -8,8 +8,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
+#include "fitted_parameter.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/store/file.hpp"
@@ -29,14 +29,6 @@ std::string config_path(const std::string& name) {
 
 FitConfig relaxation() {
   return read_fit_config(config_path("liver_relaxation.json"));
-}
-
-const ParameterResult& find(const FitResult& fit, const std::string& name) {
-  for (const ParameterResult& p : fit.parameters) {
-    if (p.parameter.name == name) return p;
-  }
-  FAIL("no parameter " << name);
-  return fit.parameters.front();
 }
 
 /// A residual function as a Ceres cost in natural parameters divided by a reference point.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "fitted_parameter.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/experiment_refit.hpp"
@@ -110,14 +111,6 @@ FitConfig relaxation_with(const std::string& noise) {
   j.erase("hypotheses");
   j["starts"]["count"] = 8;
   return without_profiles(parse_fit_config(j, "f.json"));
-}
-
-const ParameterResult& find(const FitResult& fit, const std::string& name) {
-  for (const ParameterResult& p : fit.parameters) {
-    if (p.parameter.name == name) return p;
-  }
-  FAIL("no parameter " << name);
-  return fit.parameters.front();
 }
 
 bool says(const std::vector<std::string>& flags, const std::string& part) {

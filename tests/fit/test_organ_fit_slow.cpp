@@ -1,6 +1,5 @@
 // Fits with an organ, small enough for a test.
 #include <catch2/catch.hpp>
-#include <filesystem>
 
 #include "tpm/fit/fit.hpp"
 #include "tpm/scene/organ_model.hpp"

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "tpm/fit/config.hpp"
-#include "tpm/fit/surrogate_minimum.hpp"
 #include "tpm/scene/organ_model.hpp"
 #include "tpmkit/tpm_element.hpp"
 

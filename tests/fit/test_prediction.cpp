@@ -5,7 +5,6 @@
 
 #include "coverage_studies.hpp"
 #include "refusal.hpp"
-#include "temp_folder.hpp"
 #include "tpm/fit/fitted_law.hpp"
 #include "tpm/fit/prediction.hpp"
 #include "tpm/law/law_json.hpp"

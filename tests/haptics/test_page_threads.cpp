@@ -10,7 +10,6 @@
 #include "tpm/haptics/page_server.hpp"
 #include "tpm/haptics/recording.hpp"
 #include "tpm/haptics/session_run.hpp"
-#include "tpmkit/error.hpp"
 
 // After Eigen: it brings <resolv.h> along, whose macros have the names of Eigen's parameters.
 #include <httplib.h>

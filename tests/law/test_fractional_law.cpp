@@ -5,7 +5,6 @@
 
 #include "tpm/core/random.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
 using namespace tpm;

@@ -1,5 +1,4 @@
 // Laws under an imposed load: the closed form against the stepped path and the Kelvin chain.
-#include <fmt/format.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -7,8 +7,6 @@
 #include "temp_folder.hpp"
 #include "tpm/law/law_export.hpp"
 #include "tpm/law/law_json.hpp"
-#include "tpm/store/file.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"

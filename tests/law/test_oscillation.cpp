@@ -5,12 +5,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "fitted_parameter.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/coverage.hpp"
 #include "tpm/fit/fit.hpp"
 #include "tpm/fit/gradient_check.hpp"
 #include "tpm/report/fit_report.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -107,14 +107,6 @@ std::string relaxation_time(const std::string& name, const std::string& start = 
 
 const std::string kOneBranch =
     stiffness("k_inf") + ", " + stiffness("k1") + ", " + relaxation_time("tau1");
-
-const ParameterResult& find(const FitResult& fit, const std::string& name) {
-  for (const ParameterResult& p : fit.parameters) {
-    if (p.parameter.name == name) return p;
-  }
-  FAIL("no parameter " << name);
-  return fit.parameters.front();
-}
 
 /// True values of the joint fit: k_inf, k1 (N/m), tau1 (s), contact, offset.
 const std::vector<double> kFast{40.0, 60.0, 0.05, 0.0, 0.0};

@@ -15,7 +15,6 @@
 #include "tpm/law/relaxation.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
 #include "tpm/store/file.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/frequency_response.hpp"
 #include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"

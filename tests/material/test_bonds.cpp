@@ -12,7 +12,6 @@
 #include "tpm/network/quasistatic.hpp"
 #include "tpm/network/rigidity.hpp"
 #include "tpm/network/simple_organs.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

@@ -2,7 +2,6 @@
 // branches against the same branches written out and integrated by CVODES.
 #include <catch2/catch.hpp>
 #include <complex>
-#include <numeric>
 
 #include "organ_scene.hpp"
 #include "shape_suite.hpp"

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "program.hpp"
 #include "tpm/benchmark/contact_reference.hpp"
 #include "tpm/haptics/network_beside.hpp"
 #include "tpm/scene/scene.hpp"
@@ -85,16 +86,7 @@ void measure(const std::string& file, Eigen::Index steps, std::uint64_t seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  try {
-    if (words.size() == 3) {
-      measure(words[0], std::stol(words[1]), std::stoull(words[2]));
-      return 0;
-    }
-  } catch (const Error& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return static_cast<int>(error.code());
-  }
-  fmt::print(stderr, "measure_beside SCENE STEPS SEED\n");
-  return 2;
+  return test::measured(argc, argv, 3, 3, "measure_beside SCENE STEPS SEED", [](const auto& words) {
+    measure(words[0], std::stol(words[1]), std::stoull(words[2]));
+  });
 }

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "endless_motion.hpp"
+#include "program.hpp"
 #include "tpm/haptics/session.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/scene/scene.hpp"
@@ -23,7 +24,7 @@ using namespace tpm::haptics;
 
 namespace {
 
-int run(const std::string& file, double hours, const std::filesystem::path& folder) {
+void run(const std::string& file, double hours, const std::filesystem::path& folder) {
   constexpr double kRound_s = 4.0, kDepth_m = 4e-3;
   constexpr double kHour_s = 3600.0,
                    kForgotten = 80.0;  // relaxation times, the contact's longest is two
@@ -73,20 +74,11 @@ int run(const std::string& file, double hours, const std::filesystem::path& fold
   if (const auto* condensed = dynamic_cast<const CondensedContact*>(loop.model.get())) {
     fmt::print("viscous states that the guard kept: {}\n", condensed->kept_viscous_states());
   }
-  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) {
-    fmt::print(stderr, "measure_hil_long SESSION HOURS FOLDER\n");
-    return 2;
-  }
-  try {
-    return run(argv[1], std::stod(argv[2]), argv[3]);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "measure_hil_long: {}\n", error.what());
-    return 3;
-  }
+  return test::measured(argc, argv, 3, 3, "measure_hil_long SESSION HOURS FOLDER",
+                        [](const auto& words) { run(words[0], std::stod(words[1]), words[2]); });
 }

@@ -16,7 +16,6 @@
 #include "tpm/servo/real_time.hpp"
 #include "tpm/servo/servo_step.hpp"
 #include "tpm/store/row_log.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::haptics;

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <string_view>
 
 #include "tpm/network/filling.hpp"
 #include "tpm/network/liver.hpp"

@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "program.hpp"
 #include "raw_client.hpp"
 #include "tpm/haptics/page_server.hpp"
 #include "tpm/haptics/session_run.hpp"
@@ -173,16 +174,8 @@ void measure(HilSession session, double seconds, int rounds) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  try {
-    if (words.size() == 3) {
-      measure(read_session(words[0]), std::stod(words[1]), std::stoi(words[2]));
-      return 0;
-    }
-  } catch (const Error& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return static_cast<int>(error.code());
-  }
-  fmt::print(stderr, "measure_page SESSION SECONDS ROUNDS\n");
-  return 2;
+  return test::measured(argc, argv, 3, 3, "measure_page SESSION SECONDS ROUNDS",
+                        [](const auto& words) {
+                          measure(read_session(words[0]), std::stod(words[1]), std::stoi(words[2]));
+                        });
 }

@@ -2,8 +2,6 @@
 // build/release/tests/measure_refinement
 #include <fmt/format.h>
 
-#include <numbers>
-
 #include "patch_test.hpp"
 #include "punch_on_block.hpp"
 #include "tpm/network/filling.hpp"

@@ -8,11 +8,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
+#include "program.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/surface_scene.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::haptics;
@@ -67,20 +66,12 @@ void run(const HilSession& session, const char* how) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    fmt::print(stderr, "measure_slide SESSION\n");
-    return 2;
-  }
-  try {
-    HilSession session = read_session(argv[1]);
+  return test::measured(argc, argv, 1, 1, "measure_slide SESSION", [](const auto& words) {
+    HilSession session = read_session(words[0]);
     fmt::print(
         "way,phase,least_depth_mm,most_depth_mm,spread_of_depth_mm,least_push_N,most_push_N\n");
     run(session, "follows");
     for (SessionPhase& phase : session.phases) phase.surface_m.clear();
     run(session, "straight");
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "measure_slide: {}\n", error.what());
-    return 3;
-  }
-  return 0;
+  });
 }

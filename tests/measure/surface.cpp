@@ -12,11 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "program.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/surface_scene.hpp"
 #include "tpm/reduce/surface_network.hpp"
 #include "tpm/servo/real_time.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;
@@ -206,7 +206,7 @@ void random_motions(const Setup& setup, long steps, std::uint64_t seed) {
       at(0.99), at(1.0));
 }
 
-int run(const std::string& file, long steps, std::uint64_t seed) {
+void run(const std::string& file, long steps, std::uint64_t seed) {
   const std::clock_t begin = std::clock();
   const Setup setup(file);
   (void)setup.network();
@@ -225,20 +225,12 @@ int run(const std::string& file, long steps, std::uint64_t seed) {
   for (const double speed : {0.02, 0.2}) claim(setup, speed, 10.0);
   for (const double tau_s : {0.1, 0.01, 0.003, 0.001}) claim(setup, 0.2, tau_s);
   random_motions(setup, steps, seed);
-  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) {
-    fmt::print(stderr, "measure_surface SESSION STEPS SEED\n");
-    return 2;
-  }
-  try {
-    return run(argv[1], std::stol(argv[2]), std::stoul(argv[3]));
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "measure_surface: {}\n", error.what());
-    return 3;
-  }
+  return test::measured(
+      argc, argv, 3, 3, "measure_surface SESSION STEPS SEED",
+      [](const auto& words) { run(words[0], std::stol(words[1]), std::stoul(words[2])); });
 }

@@ -4,9 +4,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "columns.hpp"
 #include "star_network.hpp"
 #include "tpm/network/driven_network.hpp"
-#include "tpm/network/material_directions.hpp"
 #include "tpm/network/simple_organs.hpp"
 #include "tpm/simulate/static_path.hpp"
 #include "tpmkit/error.hpp"
@@ -35,7 +35,7 @@ Tool tool_at(const Organ& organ, std::size_t sphere, const Eigen::Vector3d& dire
 struct Columns {
   Columns(int count, double step, const TpmParameters& p, double stiffness,
           ToolShape shape = {ToolKind::punch, 1.0})
-      : network(join(organ(count, step), pairs(count), {.rule = StiffnessRule::per_bond}, "test")),
+      : network(test::columns(count, step)),
         bonds(network, p),
         constraints(network.organ.size()),
         stiffness_N_per_m(stiffness) {
@@ -47,28 +47,6 @@ struct Columns {
     driven.emplace(driven_network(bonds, network.organ, constraints, {}, {{tool, 1.0, stiffness}}));
   }
   static std::size_t top(int column) { return 2 * static_cast<std::size_t>(column); }
-  static Organ organ(int count, double step) {
-    Organ organ;
-    organ.name = "columns";
-    organ.position.resize(3, 2 * count);
-    for (int i = 0; i < count; ++i) {
-      organ.position.col(2 * i) = Eigen::Vector3d(0.05 * i, 0, step * i);
-      organ.position.col(2 * i + 1) = Eigen::Vector3d(0.05 * i, 0, step * i + 0.02);
-      organ.layer.push_back(0);
-      organ.layer.push_back(1);
-    }
-    organ.normal = Eigen::Vector3d(0, 0, -1).replicate(1, 2 * count);
-    organ.radius = 0.01;
-    organ.spacing = 0.02;
-    return organ;
-  }
-  static std::vector<NeighbourPair> pairs(int count) {
-    std::vector<NeighbourPair> list;
-    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(count); ++i) {
-      list.push_back({2 * i, 2 * i + 1});
-    }
-    return list;
-  }
   [[nodiscard]] QuasiStaticRun run(const Protocol& protocol, std::span<const double> times,
                                    QuasiStaticOptions options,
                                    const QuasiStaticObserver& observer = {}) const {
@@ -106,7 +84,7 @@ struct Press {
 }  // namespace
 
 TEST_CASE("a tool is put where it first touches") {
-  const Organ organ = Columns::organ(3, -0.001);  // the last is the highest
+  const Organ organ = test::columns(3, -0.001).organ;  // the last is the highest
   const Eigen::Vector3d down = Eigen::Vector3d::UnitZ();
   const Tool ball = tool_at(organ, 0, down);
   CHECK_THAT(ball.position.z(), WithinAbs(-0.012, 1e-15));

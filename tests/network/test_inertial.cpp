@@ -15,7 +15,6 @@
 #include "tpm/network/inertial.hpp"
 #include "tpm/network/inertial_equation.hpp"
 #include "tpm/network/simple_organs.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

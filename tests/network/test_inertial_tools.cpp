@@ -1,11 +1,11 @@
 // Tools among spheres with mass: impacts, closed forms of a sphere on a spring, the energy, and
 // what forces tend to as contacts are made stiffer.
-#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <optional>
 #include <vector>
 
+#include "columns.hpp"
 #include "star_network.hpp"
 #include "tpm/network/driven_network.hpp"
 #include "tpm/network/inertial.hpp"
@@ -26,8 +26,7 @@ constexpr double kSphere_kg = 0.004;
 /// than that before it, under a wide punch that pushes along +z.
 struct Springs {
   Springs(int count, double step_m, double times_stiffer, double tool_kg, double relaxation_time_s)
-      : network(
-            join(organ(count, step_m), pairs(count), {.rule = StiffnessRule::per_bond}, "test")),
+      : network(test::columns(count, step_m)),
         bonds(network, TpmParameters{}.with_relaxation_time(relaxation_time_s)),
         constraints(network.organ.size()) {
     for (std::size_t i = 0; i < network.organ.size(); i += 2) {
@@ -40,28 +39,6 @@ struct Springs {
                                   {{tool, 1.0, times_stiffer * bond_N_per_m()}}));
     mass_kg = Eigen::VectorXd::Constant(driven->rest.cols(), kSphere_kg);
     mass_kg.tail(1).setConstant(tool_kg);
-  }
-  static Organ organ(int count, double step_m) {
-    Organ organ;
-    organ.name = "springs";
-    organ.position.resize(3, 2 * count);
-    for (int i = 0; i < count; ++i) {
-      organ.position.col(2 * i) = Eigen::Vector3d(0.05 * i, 0, step_m * i);
-      organ.position.col(2 * i + 1) = Eigen::Vector3d(0.05 * i, 0, step_m * i + 0.02);
-      organ.layer.push_back(0);
-      organ.layer.push_back(1);
-    }
-    organ.normal = Eigen::Vector3d(0, 0, -1).replicate(1, 2 * count);
-    organ.radius = 0.01;
-    organ.spacing = 0.02;
-    return organ;
-  }
-  static std::vector<NeighbourPair> pairs(int count) {
-    std::vector<NeighbourPair> list;
-    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(count); ++i) {
-      list.push_back({2 * i, 2 * i + 1});
-    }
-    return list;
   }
   [[nodiscard]] double bond_N_per_m() const { return bonds.stiffness()[0]; }
   [[nodiscard]] Inertial inertial(InertialOptions options = {}) const {

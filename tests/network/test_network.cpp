@@ -3,9 +3,7 @@
 #include <cmath>
 
 #include "star_network.hpp"
-#include "tpm/core/random.hpp"
 #include "tpm/network/rigidity.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/model.hpp"
 
 using namespace tpm;

@@ -1,6 +1,5 @@
 // Against independent implementations in numpy and scipy that share no code.
 #include <catch2/catch.hpp>
-#include <filesystem>
 #include <vector>
 
 #include "python_reference.hpp"

@@ -5,7 +5,6 @@
 #include "organ_scene.hpp"
 #include "star_network.hpp"
 #include "tpm/network/liver.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

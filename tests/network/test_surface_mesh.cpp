@@ -12,7 +12,6 @@
 #include "tpm/network/filling.hpp"
 #include "tpm/network/mesh_file.hpp"
 #include "tpm/network/mesh_surface.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

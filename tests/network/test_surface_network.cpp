@@ -7,7 +7,6 @@
 #include "counted_allocations.hpp"
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/haptics/surface_scene.hpp"
 #include "tpm/method/ball_by_cvode.hpp"
 #include "tpm/network/network.hpp"
 #include "tpm/network/simple_organs.hpp"

@@ -4,7 +4,6 @@
 #include <fstream>
 
 #include "hil_scenes.hpp"
-#include "refusal.hpp"
 #include "simulated_scene.hpp"
 #include "temp_folder.hpp"
 #include "tpm/haptics/recording.hpp"
@@ -12,7 +11,6 @@
 #include "tpm/report/view_file.hpp"
 #include "tpm/simulate/simulation_file.hpp"
 #include "tpm/store/file.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using namespace tpm::organ;

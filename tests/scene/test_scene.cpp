@@ -11,7 +11,6 @@
 #include "tpm/scene/network_file.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/hdf5.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/tpm_element.hpp"
 
 using namespace tpm;

@@ -11,6 +11,7 @@
 #include "tpm/core/random.hpp"
 #include "tpm/haptics/live_view.hpp"
 #include "tpm/haptics/session_run.hpp"
+#include "tpm/servo/empty_space.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/servo_loop.hpp"
 
@@ -421,8 +422,6 @@ class Doubtful final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
     return instantaneous_stiffness();
   }
-  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-  void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
 
  private:
   Way way_;
@@ -520,22 +519,12 @@ TEST_CASE("No part of the watch allocates, also when it acts") {
 // --- catching up ----------------------------------------------------------------------------
 
 /// Counts its steps.
-class Counting final : public ContactModel {
+class Counting final : public EmptySpace {
  public:
-  void reset() noexcept override {}
   ContactAnswer step(const ToolPose&) noexcept override {
     ++steps;
     return {};
   }
-  [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
-  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return Eigen::Matrix3d::Identity();
-  }
-  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
-    return Eigen::Matrix3d::Identity();
-  }
-  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-  void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
   int steps = 0;
 };
 

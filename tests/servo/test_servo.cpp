@@ -5,12 +5,14 @@
 
 #include "counted_allocations.hpp"
 #include "hil_scenes.hpp"
+#include "shaken_contact.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/element_contact.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
+#include "tpm/servo/empty_space.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/servo_loop.hpp"
@@ -21,36 +23,13 @@ namespace {
 
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
+using test::Puppet;
 
 TpmParameters slow_liver() {
   TpmParameters p;
   p.eta1_Pa_s = 2.4e4;  // tau 1 s
   return p;
 }
-
-/// A device that is wherever a test puts it.
-class Puppet final : public HapticDevice {
- public:
-  const DeviceIdentity& open() override { return identity_; }
-  void prepare(const DevicePreparation&) override {}
-  DeviceAnswer read(Eigen::Vector3d& position_m) noexcept override {
-    position_m = at;
-    return DeviceAnswer::ok;
-  }
-  DeviceAnswer write(const Eigen::Vector3d& force_N) noexcept override {
-    force = force_N;
-    return DeviceAnswer::ok;
-  }
-  DeviceStatus status() noexcept override { return {}; }
-  void stop() noexcept override { ++stops; }
-  void cut_forces() noexcept override {}
-
-  Eigen::Vector3d at = Eigen::Vector3d::Zero(), force = Eigen::Vector3d::Zero();
-  int stops = 0;
-
- private:
-  DeviceIdentity identity_;
-};
 
 ServoSettings plain(std::uint64_t cycles = 1'000'000) {
   ServoSettings s;
@@ -235,23 +214,13 @@ TEST_CASE("Limits: force, rise, ramp-in: the model's tool slips, falls pass, eac
 }
 
 TEST_CASE("A force that is no number stops the session before it is sent") {
-  class Broken final : public ContactModel {
+  class Broken final : public EmptySpace {
    public:
-    void reset() noexcept override {}
     ContactAnswer step(const ToolPose&) noexcept override {
       ContactAnswer answer;
       if (++steps_ > 10) answer.force_N.z() = std::numeric_limits<double>::quiet_NaN();
       return answer;
     }
-    [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
-    [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-      return Eigen::Matrix3d::Identity();
-    }
-    [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
-      return Eigen::Matrix3d::Identity();
-    }
-    [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-    void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
 
    private:
     int steps_ = 0;

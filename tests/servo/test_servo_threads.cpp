@@ -17,6 +17,7 @@
 #include "tpm/haptics/network_beside.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpm/haptics/verify.hpp"
+#include "tpm/servo/empty_space.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -199,19 +200,9 @@ TEST_CASE("Slow calls of the device end in a safe stop with the overrun storm as
 }
 
 TEST_CASE("Whatever throws while a session runs, its threads end and the forces are off") {
-  class Free final : public ContactModel {
+  class Free final : public EmptySpace {
    public:
-    void reset() noexcept override {}
     ContactAnswer step(const ToolPose&) noexcept override { return {}; }
-    [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
-    [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-      return Eigen::Matrix3d::Identity();
-    }
-    [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
-      return Eigen::Matrix3d::Identity();
-    }
-    [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-    void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
   };
   HilSession session = patient_session();
   session.servo.gate.reset();

@@ -29,6 +29,20 @@ const std::string kThree = R"("contacts": [{"kind": "ball", "radius": "30 mm"},
   {"kind": "punch", "radius": "35 mm", "number": 12, "share": 0.5},
   {"kind": "punch", "radius": "1 mm", "number": 20, "share": 0}], )";
 
+/// A run that was stopped and went on.
+SimulationRun stopped_and_resumed(const ExperimentScene& scene) {
+  const TempFolder folder;
+  SimulationControls controls;
+  controls.checkpoint = folder / "c";
+  int seen = 0;
+  controls.interrupted = [&] { return ++seen == 120; };
+  CHECK_THROWS_AS(simulate(scene, network_to_run(scene), controls), Interrupted);
+  controls.interrupted = {};
+  SimulationRun rest = simulate(scene, network_to_run(scene), controls);
+  CHECK(rest.resumed_at_s.has_value());
+  return rest;
+}
+
 }  // namespace
 
 TEST_CASE("a scene says what meets the tissue") {
@@ -92,15 +106,7 @@ TEST_CASE("formulations agree on a tool where time does not matter", "[heavy]") 
 TEST_CASE("runs with tools are resumed to the bit", "[heavy]") {
   const ExperimentScene scene = small_scene(kThree + kPoke);
   const SimulationRecord whole = run_of(scene).record;
-  const TempFolder folder;
-  SimulationControls controls;
-  controls.checkpoint = folder / "c";
-  int seen = 0;
-  controls.interrupted = [&] { return ++seen == 120; };
-  CHECK_THROWS_AS(simulate(scene, network_to_run(scene), controls), Interrupted);
-  controls.interrupted = {};
-  const SimulationRun rest = simulate(scene, network_to_run(scene), controls);
-  CHECK(rest.resumed_at_s.has_value());
+  const SimulationRun rest = stopped_and_resumed(scene);
   REQUIRE(rest.record.curve.size() == whole.curve.size());
   for (std::size_t i = 0; i < whole.curve.size(); ++i) {
     CHECK(rest.record.curve[i].response == whole.curve[i].response);
@@ -188,15 +194,7 @@ TEST_CASE("a heavy tool under a load pushes with more than the load as it comes 
   for (const CurvePoint& p : run.record.curve) largest = std::max(largest, p.force_on_tissue_N);
   CHECK(largest > 0.12);
   // A run that was stopped goes on to the bit, blows and forces on tissue among it.
-  const TempFolder folder;
-  SimulationControls controls;
-  controls.checkpoint = folder / "c";
-  int seen = 0;
-  controls.interrupted = [&] { return ++seen == 120; };
-  CHECK_THROWS_AS(simulate(scene, network_to_run(scene), controls), Interrupted);
-  controls.interrupted = {};
-  const SimulationRun rest = simulate(scene, network_to_run(scene), controls);
-  CHECK(rest.resumed_at_s.has_value());
+  const SimulationRun rest = stopped_and_resumed(scene);
   REQUIRE(rest.record.curve.size() == run.record.curve.size());
   for (std::size_t i = 0; i < run.record.curve.size(); ++i) {
     CHECK(rest.record.curve[i].force_on_tissue_N == run.record.curve[i].force_on_tissue_N);

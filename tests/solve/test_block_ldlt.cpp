@@ -1,7 +1,6 @@
 // The sparse direct solver: orders, fronts, factors and solutions against dense ones by Eigen.
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
-#include <cstdlib>
 #include <numeric>
 #include <set>
 

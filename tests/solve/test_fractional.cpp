@@ -5,7 +5,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 #include <sstream>
 
 #include "fractional_reference.hpp"
@@ -14,7 +13,6 @@
 #include "tpm/solve/exponential_sum.hpp"
 #include "tpm/solve/mittag_leffler.hpp"
 #include "tpm/store/file.hpp"
-#include "tpmkit/error.hpp"
 
 using namespace tpm;
 using Catch::Matchers::WithinAbs;

@@ -5,15 +5,12 @@
 #include <sys/wait.h>
 
 #include <algorithm>
-#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
-#include <memory>
-#include <regex>
 
 #include "error_case.hpp"
 #include "jpk_error_cases.hpp"

@@ -7,7 +7,6 @@
 #include <catch2/catch.hpp>
 #include <csignal>
 #include <cstdlib>
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>

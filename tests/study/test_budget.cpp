@@ -5,7 +5,6 @@
 
 #include "refusal.hpp"
 #include "tpm/core/random.hpp"
-#include "tpm/plan/perception.hpp"
 #include "tpm/scene/protocol_file.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/error_budget.hpp"

@@ -8,7 +8,6 @@
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/fit/config.hpp"
-#include "tpm/report/function_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/material_function.hpp"
 

@@ -5,7 +5,6 @@
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"
-#include "tpm/report/organ_study_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/organ_study.hpp"
 #include "tpmkit/tpm_element.hpp"

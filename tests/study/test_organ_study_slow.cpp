@@ -2,7 +2,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "tpm/store/file.hpp"
 #include "tpm/study/organ_study.hpp"
 
 using namespace tpm;

@@ -11,7 +11,6 @@
 #include "tpm/core/random.hpp"
 #include "tpm/curve/recording_file.hpp"
 #include "tpm/fit/exchange_order.hpp"
-#include "tpm/report/fit_csv.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/study/material_function.hpp"
 #include "tpm/study/young_moduli.hpp"

@@ -5,7 +5,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>
-#include <numbers>
 
 #include "refusal.hpp"
 #include "temp_folder.hpp"

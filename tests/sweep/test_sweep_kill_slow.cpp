@@ -1,6 +1,5 @@
 // Sweeps that are killed: what was computed stands, and the result is that of an undisturbed run.
 // TPM_KILLS is the number of moments; by default few enough for every build.
-#include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -5,7 +5,6 @@
 
 #include "temp_folder.hpp"
 #include "tpm/plan/shared_plan.hpp"
-#include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/simulate/static_path.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/sweep/run_sweep.hpp"

@@ -182,8 +182,7 @@ BenchmarkProblem organ_poke_mass_problem() {
   problem.title = "Organ with masses, poked at 100 mm/s";
   problem.text =
       "The liver with the paper's eta1 and a mass of 4.4 g in each sphere (1060 kg/m3), damped by "
-      "a "
-      "tenth of the lowest mode: 8 mm in at 100 mm/s, held to 0.2 s. The collocation leaves the "
+      "a tenth of the lowest mode: 8 mm in at 100 mm/s, held to 0.2 s. The collocation leaves the "
       "masses out: its error is what inertia matters.";
   return problem;
 }

@@ -1,5 +1,7 @@
 #include "tpm/benchmark/runner.hpp"
 
+#include "tpm/core/enum_names.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -135,20 +137,16 @@ double quantile_of_sorted(std::span<const double> values, double share) {
 }
 
 std::string_view benchmark_end_word(MethodEnd end) {
-  switch (end) {
-    case MethodEnd::completed:
-      return "completed";
-    case MethodEnd::diverged:
-      return "diverged";
-    case MethodEnd::newton_failed:
-      return "newton_failed";
-    case MethodEnd::buckled:
-      return "buckled";
-    case MethodEnd::too_much_work:
-      return "too_much_work";
-    case MethodEnd::not_applicable:
-      return "not_applicable";
-  }
+  static constexpr auto kNames = std::to_array<Word<MethodEnd>>({
+      {MethodEnd::completed, "completed"},
+      {MethodEnd::diverged, "diverged"},
+      {MethodEnd::newton_failed, "newton_failed"},
+      {MethodEnd::buckled, "buckled"},
+      {MethodEnd::too_much_work, "too_much_work"},
+      {MethodEnd::not_applicable, "not_applicable"},
+  });
+  const std::string_view word = word_for(kNames, end);
+  if (!word.empty()) return word;
   throw Error(ExitCode::numerical, "benchmark", "an end that has no word");
 }
 

@@ -13,7 +13,6 @@
 #include "tpm/reduce/zone_network.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/file.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::study {
 namespace {

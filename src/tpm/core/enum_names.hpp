@@ -25,6 +25,14 @@ constexpr const auto& entry_of(const Words& words, Enum meaning) noexcept {
                        [meaning](const auto& word) { return word.meaning == meaning; });
 }
 
+/// The text of a value; nothing if the table does not hold it.
+template <typename Words, typename Enum>
+constexpr std::string_view word_for(const Words& words, Enum meaning) noexcept {
+  const auto found = std::find_if(words.begin(), words.end(),
+                                  [meaning](const auto& word) { return word.meaning == meaning; });
+  return found == words.end() ? std::string_view() : std::string_view(found->text);
+}
+
 /// The entry with this text, or null.
 template <typename Words>
 constexpr auto find_entry(const Words& words, std::string_view text) noexcept {

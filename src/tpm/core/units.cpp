@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/quantity_text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -283,66 +284,34 @@ std::string known_units(std::optional<Dimension> dimension) {
   return fmt::format("{}", fmt::join(symbols, ", "));
 }
 
+struct DimensionWord {
+  Dimension meaning;
+  std::string_view text, si;
+};
+
+constexpr auto kDimensionWords = std::to_array<DimensionWord>({
+    {Dimension::dimensionless, "dimensionless", ""},
+    {Dimension::time, "time", "s"},
+    {Dimension::length, "length", "m"},
+    {Dimension::area, "area", "m^2"},
+    {Dimension::force, "force", "N"},
+    {Dimension::stress, "stress or modulus", "Pa"},
+    {Dimension::viscosity, "viscosity", "Pa s"},
+    {Dimension::speed, "speed", "m/s"},
+    {Dimension::frequency, "frequency", "Hz"},
+    {Dimension::stiffness, "stiffness", "N/m"},
+    {Dimension::angle, "angle", "rad"},
+    {Dimension::compliance, "compliance", "1/Pa"},
+});
+
 }  // namespace
 
 std::string_view dimension_name(Dimension dimension) noexcept {
-  switch (dimension) {
-    case Dimension::dimensionless:
-      return "dimensionless";
-    case Dimension::time:
-      return "time";
-    case Dimension::length:
-      return "length";
-    case Dimension::area:
-      return "area";
-    case Dimension::force:
-      return "force";
-    case Dimension::stress:
-      return "stress or modulus";
-    case Dimension::viscosity:
-      return "viscosity";
-    case Dimension::speed:
-      return "speed";
-    case Dimension::frequency:
-      return "frequency";
-    case Dimension::stiffness:
-      return "stiffness";
-    case Dimension::angle:
-      return "angle";
-    case Dimension::compliance:
-      return "compliance";
-  }
-  return "";
+  return entry_of(kDimensionWords, dimension).text;
 }
 
 std::string_view si_symbol(Dimension dimension) noexcept {
-  switch (dimension) {
-    case Dimension::dimensionless:
-      return "";
-    case Dimension::time:
-      return "s";
-    case Dimension::length:
-      return "m";
-    case Dimension::area:
-      return "m^2";
-    case Dimension::force:
-      return "N";
-    case Dimension::stress:
-      return "Pa";
-    case Dimension::viscosity:
-      return "Pa s";
-    case Dimension::speed:
-      return "m/s";
-    case Dimension::frequency:
-      return "Hz";
-    case Dimension::stiffness:
-      return "N/m";
-    case Dimension::angle:
-      return "rad";
-    case Dimension::compliance:
-      return "1/Pa";
-  }
-  return "";
+  return entry_of(kDimensionWords, dimension).si;
 }
 
 Unit shown_unit(Dimension dimension) {

@@ -7,7 +7,6 @@
 #include <array>
 #include <numeric>
 
-#include "tpm/core/text.hpp"
 #include "tpm/curve/assemble.hpp"
 #include "tpm/curve/import_digitizer.hpp"
 #include "tpm/curve/import_jpk.hpp"
@@ -86,53 +85,26 @@ std::vector<ImportedSeries> datasets_series(std::vector<DigitizedDataset> datase
   throw bad_input(file, fmt::format("no dataset '{}'", printable(options.dataset)), names);
 }
 
-bool is_jpk(ImportInput& input) {
-  return looks_like_zip(input.bytes());
-}
-
-std::vector<ImportedSeries> read_jpk_file(ImportInput& input) {
-  return {read_jpk(input.bytes(), input.file(), input.options())};
-}
-
-bool is_wpd_json(ImportInput& input) {
-  return looks_like_json(input.bytes());
-}
-
-std::vector<ImportedSeries> read_wpd_json_file(ImportInput& input) {
-  return datasets_series(read_wpd_json(input.bytes(), input.file()), input.file(), input.options());
-}
-
-bool is_wpd_table(ImportInput& input) {
-  return is_wpd_csv(input.table());
-}
-
-std::vector<ImportedSeries> read_wpd_table(ImportInput& input) {
-  return datasets_series(read_wpd_csv(input.table(), input.file()), input.file(), input.options());
-}
-
-bool is_engauge_table(ImportInput& input) {
-  return is_engauge(input.table());
-}
-
-std::vector<ImportedSeries> read_engauge_table(ImportInput& input) {
-  return datasets_series(read_engauge(input.table(), input.file()), input.file(), input.options());
-}
-
-bool is_anything(ImportInput& /*input*/) {
-  return true;
-}
-
-std::vector<ImportedSeries> read_machine_table(ImportInput& input) {
-  return {read_machine(input.table(), input.file(), input.options())};
-}
+using AllSeries = std::vector<ImportedSeries>;
 
 // Asked in this order whether they recognise a file; the last takes what is left.
 constexpr auto kImporters = std::to_array<Importer>({
-    {"jpk", Provenance::measured, is_jpk, read_jpk_file},
-    {"wpd-json", Provenance::digitized, is_wpd_json, read_wpd_json_file},
-    {"wpd-csv", Provenance::digitized, is_wpd_table, read_wpd_table},
-    {"engauge", Provenance::digitized, is_engauge_table, read_engauge_table},
-    {"machine", Provenance::measured, is_anything, read_machine_table},
+    {"jpk", Provenance::measured, [](ImportInput& in) { return looks_like_zip(in.bytes()); },
+     [](ImportInput& in) { return AllSeries{read_jpk(in.bytes(), in.file(), in.options())}; }},
+    {"wpd-json", Provenance::digitized, [](ImportInput& in) { return looks_like_json(in.bytes()); },
+     [](ImportInput& in) {
+       return datasets_series(read_wpd_json(in.bytes(), in.file()), in.file(), in.options());
+     }},
+    {"wpd-csv", Provenance::digitized, [](ImportInput& in) { return is_wpd_csv(in.table()); },
+     [](ImportInput& in) {
+       return datasets_series(read_wpd_csv(in.table(), in.file()), in.file(), in.options());
+     }},
+    {"engauge", Provenance::digitized, [](ImportInput& in) { return is_engauge(in.table()); },
+     [](ImportInput& in) {
+       return datasets_series(read_engauge(in.table(), in.file()), in.file(), in.options());
+     }},
+    {"machine", Provenance::measured, [](ImportInput& /*in*/) { return true; },
+     [](ImportInput& in) { return AllSeries{read_machine(in.table(), in.file(), in.options())}; }},
 });
 
 const Importer& importer_of(ImportInput& input) {
@@ -152,12 +124,6 @@ std::vector<ImportFinding> format_findings(const Importer& importer, ImportInput
   findings.push_back({"separator", std::string(separator_name(table.separator))});
   findings.push_back({"decimal sign", table.decimal_comma ? "comma" : "point"});
   return findings;
-}
-
-void require_no_jpk_options(const ImportOptions& options, const std::string& file) {
-  if (!options.spring_constant_N_per_m && options.segments.empty()) return;
-  throw bad_input(file, "is no JPK force file",
-                  "--spring-constant and --segments only for such a file (.jpk-force)");
 }
 
 }  // namespace
@@ -188,9 +154,11 @@ DigitizedAxis parse_axis(std::string_view text, std::string_view where) {
 
 ImportedFile import_series(const std::filesystem::path& path, const ImportOptions& options) {
   ImportInput input(read_file(path), path.string(), options);
-  const bool jpk = options.format == "jpk" || (options.format == "auto" && is_jpk(input));
-  if (!jpk) require_no_jpk_options(options, input.file());
   const Importer& importer = importer_of(input);
+  if (importer.name != "jpk" && (options.spring_constant_N_per_m || !options.segments.empty())) {
+    throw bad_input(input.file(), "is no JPK force file",
+                    "--spring-constant and --segments only for such a file (.jpk-force)");
+  }
   ImportedFile imported;
   imported.usual = importer.usual;
   imported.series = importer.read(input);

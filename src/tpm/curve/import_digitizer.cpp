@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "tpmkit/error.hpp"
 
 namespace tpm {

@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <numeric>
-#include <tuple>
 
 #include "tpm/core/text.hpp"
 #include "tpm/curve/contact.hpp"

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <tuple>
 
-#include "tpm/core/text.hpp"
 #include "tpm/curve/contact.hpp"
 #include "tpm/curve/machine_header.hpp"
 #include "tpm/curve/specimen_size.hpp"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

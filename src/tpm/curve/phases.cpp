@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/contact_onset.hpp"
 #include "tpm/curve/drive_pieces.hpp"
@@ -332,23 +333,16 @@ class Finder {
 }  // namespace
 
 std::string_view phase_name(PhaseKind kind) noexcept {
-  switch (kind) {
-    case PhaseKind::before_contact:
-      return "before contact";
-    case PhaseKind::loading:
-      return "loading";
-    case PhaseKind::hold:
-      return "hold";
-    case PhaseKind::creep:
-      return "creep";
-    case PhaseKind::unloading:
-      return "unloading";
-    case PhaseKind::detached:
-      return "detached";
-    case PhaseKind::recovery:
-      return "recovery";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<PhaseKind>>({
+      {PhaseKind::before_contact, "before contact"},
+      {PhaseKind::loading, "loading"},
+      {PhaseKind::hold, "hold"},
+      {PhaseKind::creep, "creep"},
+      {PhaseKind::unloading, "unloading"},
+      {PhaseKind::detached, "detached"},
+      {PhaseKind::recovery, "recovery"},
+  });
+  return word_for(kNames, kind);
 }
 
 RecordingPhases find_phases(const Recording& recording, const PhaseOptions& options) {

@@ -6,7 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "tpm/core/text.hpp"
 #include "tpm/curve/assemble.hpp"
 #include "tpm/store/delimited.hpp"
 #include "tpm/store/json.hpp"

@@ -1,45 +1,33 @@
 #include "tpmkit/device.hpp"
 
+#include "tpm/core/enum_names.hpp"
+
 namespace tpm::haptics {
 
 std::string_view word_of(ForcesOff cause) {
-  switch (cause) {
-    case ForcesOff::none:
-      return "none";
-    case ForcesOff::button:
-      return "button";
-    case ForcesOff::velocity:
-      return "velocity";
-    case ForcesOff::watchdog:
-      return "watchdog";
-    case ForcesOff::software:
-      return "software";
-    case ForcesOff::unplugged:
-      return "unplugged";
-    case ForcesOff::dead_man:
-      return "dead man's switch";
-    case ForcesOff::unknown:
-      break;
-  }
-  return "unknown";
+  static constexpr auto kNames = std::to_array<Word<ForcesOff>>({
+      {ForcesOff::none, "none"},
+      {ForcesOff::button, "button"},
+      {ForcesOff::velocity, "velocity"},
+      {ForcesOff::watchdog, "watchdog"},
+      {ForcesOff::software, "software"},
+      {ForcesOff::unplugged, "unplugged"},
+      {ForcesOff::dead_man, "dead man's switch"},
+  });
+  const std::string_view word = word_for(kNames, cause);
+  return word.empty() ? "unknown" : word;
 }
 
 std::string_view word_of(DeviceLink link) {
-  switch (link) {
-    case DeviceLink::none:
-      return "none";
-    case DeviceLink::synchronous:
-      return "synchronous";
-    case DeviceLink::asynchronous:
-      return "asynchronous";
-    case DeviceLink::simulated:
-      return "simulated";
-    case DeviceLink::network:
-      return "network";
-    case DeviceLink::unknown:
-      break;
-  }
-  return "unknown";
+  static constexpr auto kNames = std::to_array<Word<DeviceLink>>({
+      {DeviceLink::none, "none"},
+      {DeviceLink::synchronous, "synchronous"},
+      {DeviceLink::asynchronous, "asynchronous"},
+      {DeviceLink::simulated, "simulated"},
+      {DeviceLink::network, "network"},
+  });
+  const std::string_view word = word_for(kNames, link);
+  return word.empty() ? "unknown" : word;
 }
 
 }  // namespace tpm::haptics

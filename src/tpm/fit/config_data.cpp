@@ -1,10 +1,8 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 
 #include "tpm/core/enum_names.hpp"
-#include "tpm/core/text.hpp"
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpmkit/error.hpp"

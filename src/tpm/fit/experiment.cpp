@@ -8,7 +8,6 @@
 #include <map>
 
 #include "tpm/curve/recording_file.hpp"
-#include "tpm/fit/estimated_sigma.hpp"
 #include "tpm/protocol/straight_pieces.hpp"
 #include "tpmkit/curve_file.hpp"
 #include "tpmkit/error.hpp"

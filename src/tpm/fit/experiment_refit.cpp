@@ -6,7 +6,6 @@
 #include <array>
 
 #include "tpm/core/enum_names.hpp"
-#include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {

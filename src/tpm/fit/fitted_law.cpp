@@ -85,11 +85,6 @@ std::vector<double> law_values(const FitResult& fit, const LawSpec& spec,
   return values;
 }
 
-Coordinate coordinate_of(Scale scale) {
-  if (scale == Scale::log) return Coordinate::log;
-  return scale == Scale::linear ? Coordinate::linear : Coordinate::inverse_square;
-}
-
 /// The coordinate in which each parameter of the law is stated.
 std::vector<Coordinate> law_coordinates(const FitResult& fit, const LawSpec& spec) {
   const std::vector<LawParameter> parameters = law_parameters(spec);
@@ -220,6 +215,11 @@ std::optional<LawUncertainty> uncertainty_of(const FitResult& fit, const LawSpec
 }
 
 }  // namespace
+
+Coordinate coordinate_of(Scale scale) {
+  if (scale == Scale::log) return Coordinate::log;
+  return scale == Scale::linear ? Coordinate::linear : Coordinate::inverse_square;
+}
 
 std::optional<std::string> no_law_because(const FitConfig& config) {
   if (config.law) return std::nullopt;

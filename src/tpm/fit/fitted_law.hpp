@@ -23,4 +23,7 @@ namespace tpm::fit {
 /// all parameters. Throws Error(bad_input) with no_law_because().
 [[nodiscard]] LawFile fitted_law(const FitResult& fit);
 
+/// The coordinate of a law file in which a parameter was estimated.
+[[nodiscard]] Coordinate coordinate_of(Scale scale);
+
 }  // namespace tpm::fit

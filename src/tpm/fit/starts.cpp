@@ -1,11 +1,8 @@
 #include "tpm/fit/starts.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 namespace tpm::fit {

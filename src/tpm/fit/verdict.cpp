@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 
 namespace tpm::fit {
@@ -29,21 +30,15 @@ std::string bound_note(const ParameterResult& p) {
 }  // namespace
 
 std::string_view verdict_name(Verdict verdict) noexcept {
-  switch (verdict) {
-    case Verdict::identified:
-      return "identified";
-    case Verdict::lower_only:
-      return "one-sided: lower limit only";
-    case Verdict::upper_only:
-      return "one-sided: upper limit only";
-    case Verdict::flat:
-      return "flat";
-    case Verdict::failed:
-      return "profile failed";
-    case Verdict::not_profiled:
-      return "not profiled";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<Verdict>>({
+      {Verdict::identified, "identified"},
+      {Verdict::lower_only, "one-sided: lower limit only"},
+      {Verdict::upper_only, "one-sided: upper limit only"},
+      {Verdict::flat, "flat"},
+      {Verdict::failed, "profile failed"},
+      {Verdict::not_profiled, "not profiled"},
+  });
+  return word_for(kNames, verdict);
 }
 
 std::string in_unit(const FitParameter& parameter, double natural) {

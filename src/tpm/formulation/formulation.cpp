@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

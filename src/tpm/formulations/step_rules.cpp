@@ -1,7 +1,5 @@
 // The step rules of method/ on the network of a scene, one formulation each.
-#include <fmt/format.h>
 
-#include <array>
 #include <memory>
 
 #include "tpm/method/method.hpp"

@@ -2,9 +2,8 @@
 
 #include <cmath>
 
-#include "tpm/core/text.hpp"
+#include "tpm/core/require.hpp"
 #include "tpm/model/validity_limits.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
 
@@ -20,9 +19,7 @@ ElementContact::ElementContact(const BondElement& material, double period_s, Ele
       dashpot_N_s_per_m_(dashpot_N_s_per_m),
       rule_(rule) {
   require_one_branch(material, "element");
-  if (!(period_s > 0.0) || !std::isfinite(period_s)) {
-    throw bad_input("element: period", shortest(period_s), "above 0 s");
-  }
+  require_number(is_positive(period_s), "element: period", period_s, "above 0 s");
 }
 
 ContactAnswer ElementContact::step(const ToolPose& tool) noexcept {

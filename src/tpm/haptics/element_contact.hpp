@@ -26,8 +26,6 @@ class ElementContact final : public ContactModel {
   [[nodiscard]] double period_s() const noexcept override { return period_s_; }
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
   [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override;
-  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-  void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
 
  private:
   double equilibrium_N_per_m_, relaxing_N_per_m_, per_Pa_m_, relaxation_time_s_;

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "tpm/core/text.hpp"
 #include "tpm/device/virtual_omega7.hpp"
 #include "tpm/haptics/session_run.hpp"
 #include "tpmkit/error.hpp"

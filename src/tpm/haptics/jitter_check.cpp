@@ -6,29 +6,10 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/servo/empty_space.hpp"
 
 namespace tpm::haptics {
 namespace {
-
-/// Nothing there: no force at any depth.
-class EmptySpace final : public ContactModel {
- public:
-  explicit EmptySpace(double period_s) : period_s_(period_s) {}
-  void reset() noexcept override {}
-  ContactAnswer step(const ToolPose&) noexcept override { return {}; }
-  [[nodiscard]] double period_s() const noexcept override { return period_s_; }
-  [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override {
-    return Eigen::Matrix3d::Identity();
-  }
-  [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
-    return Eigen::Matrix3d::Identity();
-  }
-  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-  void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
-
- private:
-  double period_s_;
-};
 
 HilSession idle_session(const HilSession& like, double duration_s) {
   HilSession session;

@@ -43,8 +43,6 @@ class LawContact final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d instantaneous_stiffness() const noexcept override;
   /// At the same depth.
   [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override;
-  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-  void displacements(Eigen::Ref<Eigen::Matrix3Xd>) const noexcept override {}
 
   /// Depth of the surface after the last step, m; 0 or more in contact.
   [[nodiscard]] double depth_m() const noexcept { return depth_m_; }

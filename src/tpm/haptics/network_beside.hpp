@@ -51,9 +51,6 @@ class NetworkBeside final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
     return network_->equilibrium_stiffness();
   }
-  /// None: the network is at work in another thread.
-  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-  void displacements(Eigen::Ref<Eigen::Matrix3Xd> /*all*/) const noexcept override {}
 
   /// Periods of the loop that the answer in use is old.
   [[nodiscard]] std::uint64_t age() const noexcept { return step_ - used_.step; }

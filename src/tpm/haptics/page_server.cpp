@@ -211,7 +211,7 @@ std::uint64_t wanted_point(const httplib::Request& request) {
 class PageServer::Service {
  public:
   Service(const LiveView& view, int port)
-      : page_(read_file(share_dir() / "pages" / "session.html")), http_(make_http_server()) {
+      : page_(read_page("session.html")), http_(make_http_server()) {
     http_->new_task_queue = [] { return new BoundedQueue; };
     // The library would share the port with any other server that asks for it.
     http_->set_socket_options([](socket_t socket) {

@@ -72,9 +72,8 @@ void warn_of_rests(RenderingCheck& check, const HilSession& session) {
   if (shortest_s == 0.0 || shortest_s >= needed_s) return;
   check.warnings.push_back(fmt::format(
       "a rest of {} s is too short: the surface recovers with a time constant of {} s, so that {} "
-      "% "
-      "of what is left of an indentation is still there at the next one, whose force is smaller by "
-      "that; {} s leave 1 %",
+      "% of what is left of an indentation is still there at the next one, whose force is smaller "
+      "by that; {} s leave 1 %",
       significant(shortest_s, 3), significant(check.recovery_s, 3),
       significant(100.0 * std::exp(-shortest_s / check.recovery_s), 2), significant(needed_s, 3)));
 }
@@ -106,8 +105,7 @@ std::string RenderingCheck::verdict() const {
   if (!passive()) {
     return fmt::format(
         "stable with the operator's arm (up to {} N/m), not passive: {}; passive with every "
-        "operator "
-        "up to {} N/m",
+        "operator up to {} N/m",
         significant(stable_N_per_m, 3), what, significant(passive_N_per_m, 3));
   }
   return fmt::format("passive: {}; the border is {} N/m, that of stability {} N/m", what,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/device/device_limits.hpp"
 #include "tpm/haptics/loop_maker.hpp"
@@ -276,27 +277,18 @@ std::vector<std::uint64_t> ends_of(const std::vector<SessionPhase>& phases, doub
 }  // namespace
 
 std::string_view word_of(SessionPhaseKind kind) {
-  switch (kind) {
-    case SessionPhaseKind::approach:
-      return "approach";
-    case SessionPhaseKind::indent:
-      return "indent";
-    case SessionPhaseKind::hold:
-      return "hold";
-    case SessionPhaseKind::slide:
-      return "slide";
-    case SessionPhaseKind::release:
-      return "release";
-    case SessionPhaseKind::rest:
-      return "rest";
-    case SessionPhaseKind::load:
-      return "load";
-    case SessionPhaseKind::creep:
-      return "creep";
-    case SessionPhaseKind::motion:
-      break;
-  }
-  return "motion";
+  static constexpr auto kNames = std::to_array<Word<SessionPhaseKind>>({
+      {SessionPhaseKind::approach, "approach"},
+      {SessionPhaseKind::indent, "indent"},
+      {SessionPhaseKind::hold, "hold"},
+      {SessionPhaseKind::slide, "slide"},
+      {SessionPhaseKind::release, "release"},
+      {SessionPhaseKind::rest, "rest"},
+      {SessionPhaseKind::load, "load"},
+      {SessionPhaseKind::creep, "creep"},
+  });
+  const std::string_view word = word_for(kNames, kind);
+  return word.empty() ? "motion" : word;
 }
 
 double deepest_asked_m(const HilSession& session, double under_loads_m) {

@@ -68,9 +68,8 @@ void require_acceptable(const RenderingCheck& rendering, const DeviceChoice& cho
   }
   if (rendering.acceptable() || options.accept_unstable || choice.kind == "replay") return;
   throw Error(ExitCode::answer_is_no, "stability", rendering.verdict(),
-              "a softer tissue, a higher rate, a shorter delay or a faster rise; --accept-unstable "
-              "with --device "
-              "virtual");
+              "a softer tissue, a higher rate, a shorter delay or a faster rise; "
+              "--accept-unstable with --device virtual");
 }
 
 std::shared_ptr<PluginDevice> plugin_of(const DeviceChoice& choice) {

@@ -3,10 +3,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "tpm/law/contact_history.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm {
 

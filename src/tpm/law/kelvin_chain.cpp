@@ -9,7 +9,6 @@
 #include <numeric>
 #include <type_traits>
 
-#include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {

@@ -102,34 +102,21 @@ std::string law_words(const LawSpec& spec) {
   std::string words = spec.kernel == Kernel::linear  ? "linear kernel"
                       : spec.kernel == Kernel::hertz ? "Hertz kernel"
                                                      : "power-law kernel";
-  switch (spec.fractional) {
-    case Fractional::none:
-      words += fmt::format(
-          ", {} relaxing branch{}",
-          count < kNumbers.size() ? std::string(kNumbers[count]) : std::to_string(spec.branches),
-          spec.branches == 1 ? "" : "es");
-      break;
-    case Fractional::springpot:
-      words += ", spring-pot";
-      break;
-    case Fractional::maxwell:
-      words += ", fractional Maxwell";
-      break;
-    case Fractional::kelvin_voigt:
-      words += ", fractional Kelvin-Voigt";
-      break;
-    case Fractional::zener:
-      words += ", fractional Zener";
-      break;
-    case Fractional::maxwell_pair:
-      words += ", fractional Maxwell of two spring-pots";
-      break;
-    case Fractional::kelvin_voigt_pair:
-      words += ", fractional Kelvin-Voigt of two spring-pots";
-      break;
-    case Fractional::zener_pair:
-      words += ", fractional Zener of two spring-pots";
-      break;
+  static constexpr auto kFractionalWords = std::to_array<Word<Fractional>>({
+      {Fractional::springpot, ", spring-pot"},
+      {Fractional::maxwell, ", fractional Maxwell"},
+      {Fractional::kelvin_voigt, ", fractional Kelvin-Voigt"},
+      {Fractional::zener, ", fractional Zener"},
+      {Fractional::maxwell_pair, ", fractional Maxwell of two spring-pots"},
+      {Fractional::kelvin_voigt_pair, ", fractional Kelvin-Voigt of two spring-pots"},
+      {Fractional::zener_pair, ", fractional Zener of two spring-pots"},
+  });
+  words += word_for(kFractionalWords, spec.fractional);
+  if (spec.fractional == Fractional::none) {
+    words += fmt::format(
+        ", {} relaxing branch{}",
+        count < kNumbers.size() ? std::string(kNumbers[count]) : std::to_string(spec.branches),
+        spec.branches == 1 ? "" : "es");
   }
   if (spec.form == BranchForm::series) words += " as a Kelvin chain";
   if (!spec.solid) words += ", no lasting stiffness";

@@ -224,13 +224,6 @@ ExportTarget parse_export_target(std::string_view text, std::string_view where) 
   return parse_word(kTargets, "program", text, where);
 }
 
-std::vector<std::string> export_target_names() {
-  std::vector<std::string> names;
-  names.reserve(kTargets.size());
-  for (const TargetWord& word : kTargets) names.emplace_back(word.text);
-  return names;
-}
-
 std::vector<std::string> export_warnings(const LawFile& law, const ExportOptions& options) {
   std::vector<std::string> warnings;
   const bool drops = law.spec.kernel == Kernel::power || law.spec.tension != Tension::none;

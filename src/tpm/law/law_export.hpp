@@ -15,7 +15,6 @@ enum class ExportTarget { abaqus, ansys, febio, json };
 
 /// Throws Error(bad_input) naming the known words.
 [[nodiscard]] ExportTarget parse_export_target(std::string_view text, std::string_view where);
-[[nodiscard]] std::vector<std::string> export_target_names();
 
 struct ExportOptions {
   ExportTarget target = ExportTarget::abaqus;

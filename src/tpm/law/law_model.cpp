@@ -13,8 +13,6 @@
 #include "tpm/law/imposed_load.hpp"
 #include "tpm/law/kelvin_chain.hpp"
 #include "tpm/law/kept_step.hpp"
-#include "tpm/law/relaxation.hpp"
-#include "tpm/law/tension_creep.hpp"
 #include "tpm/solve/exponential_sum.hpp"
 #include "tpmkit/error.hpp"
 

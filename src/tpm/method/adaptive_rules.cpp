@@ -12,12 +12,9 @@ namespace tpm::organ {
 namespace {
 
 using sundials::check;
+using sundials::view;
 using Vector = Eigen::VectorXd;
 constexpr long kMostSteps = std::numeric_limits<long>::max();
-
-Eigen::Map<Vector> view(N_Vector v) {
-  return {NV_DATA_S(v), static_cast<Eigen::Index>(NV_LENGTH_S(v))};
-}
 
 struct FreeNonlinearSolver {
   void operator()(SUNNonlinearSolver s) const { SUNNonlinSolFree(s); }
@@ -76,54 +73,12 @@ int dae_residual(sunrealtype t, N_Vector z, N_Vector z_dot, N_Vector r, void* us
 int dae_setup(sunrealtype t, sunrealtype c, N_Vector z, N_Vector, N_Vector, SUNMatrix,
               void* user_data, N_Vector, N_Vector, N_Vector);
 
-SUNLinearSolver_Type method_solver_type(SUNLinearSolver) {
-  // Its matrix is its own: SUNDIALS only hands it on.
-  return SUNLINEARSOLVER_DIRECT;
-}
-
 int method_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
   auto solution = view(x);
   solution = view(b);
   static_cast<NewtonSystem*>(solver->content)->solve(solution);
   return 0;
 }
-
-int method_solver_free(SUNLinearSolver solver) {
-  SUNLinSolFreeEmpty(solver);
-  return 0;
-}
-
-SUNMatrix_ID method_matrix_id(SUNMatrix) {
-  return SUNMATRIX_CUSTOM;
-}
-
-void method_matrix_destroy(SUNMatrix matrix) {
-  SUNMatFreeEmpty(matrix);
-}
-
-int method_matrix_zero(SUNMatrix) {
-  return 0;
-}
-}
-
-/// A matrix that stands for the factorisation inside the problem.
-sundials::Matrix custom_matrix(SUNContext context) {
-  sundials::Matrix matrix(SUNMatNewEmpty(context));
-  matrix->ops->getid = method_matrix_id;
-  matrix->ops->destroy = method_matrix_destroy;
-  matrix->ops->zero = method_matrix_zero;
-  return matrix;
-}
-
-sundials::LinearSolver custom_solver(SUNContext context, void* content,
-                                     int (*solve)(SUNLinearSolver, SUNMatrix, N_Vector, N_Vector,
-                                                  sunrealtype)) {
-  sundials::LinearSolver solver(SUNLinSolNewEmpty(context));
-  solver->content = content;
-  solver->ops->gettype = method_solver_type;
-  solver->ops->solve = solve;
-  solver->ops->free = method_solver_free;
-  return solver;
 }
 
 class CvodeRule final : public AdaptiveRule {
@@ -148,8 +103,8 @@ class CvodeRule final : public AdaptiveRule {
       check(CVodeSetNonlinearSolver(m, nonlinear_.get()), "CVodeSetNonlinearSolver");
       return;
     }
-    matrix_ = custom_matrix(context_.get());
-    solver_ = custom_solver(context_.get(), &system, method_solve);
+    matrix_ = sundials::custom_matrix(context_.get());
+    solver_ = sundials::custom_solver(context_.get(), &system, method_solve);
     check(CVodeSetLinearSolver(m, solver_.get(), matrix_.get()), "CVodeSetLinearSolver");
     check(CVodeSetLinSysFn(m, method_setup), "CVodeSetLinSysFn");
   }
@@ -256,8 +211,8 @@ class IdaRule final : public AdaptiveRule {
     check(IDASVtolerances(m, 0.0, error_.get()), "IDASVtolerances");
     check(IDASetMaxNumSteps(m, kMostSteps), "IDASetMaxNumSteps");
     mute();
-    matrix_ = custom_matrix(context_.get());
-    solver_ = custom_solver(context_.get(), &side_, dae_solve);
+    matrix_ = sundials::custom_matrix(context_.get());
+    solver_ = sundials::custom_solver(context_.get(), &side_, dae_solve);
     check(IDASetLinearSolver(m, solver_.get(), matrix_.get()), "IDASetLinearSolver");
     check(IDASetJacFn(m, dae_setup), "IDASetJacFn");
   }

@@ -16,12 +16,6 @@
 namespace tpm::organ {
 namespace {
 
-using StateView = Eigen::Map<Eigen::VectorXd>;
-
-StateView state_of(N_Vector v) {
-  return {NV_DATA_S(v), static_cast<Eigen::Index>(NV_LENGTH_S(v))};
-}
-
 struct FreeFixedPoint {
   void operator()(SUNNonlinearSolver s) const { SUNNonlinSolFree(s); }
 };
@@ -103,9 +97,9 @@ class ViscousNetwork {
 };
 
 extern "C" int ball_rate(sunrealtype t, N_Vector y, N_Vector y_dot, void* network) {
-  auto rate = state_of(y_dot);
+  auto rate = sundials::view(y_dot);
   // 1: another, shorter step.
-  return static_cast<ViscousNetwork*>(network)->rate(t, state_of(y), rate) ? 0 : 1;
+  return static_cast<ViscousNetwork*>(network)->rate(t, sundials::view(y), rate) ? 0 : 1;
 }
 
 }  // namespace
@@ -121,7 +115,7 @@ std::vector<Eigen::Vector3d> ball_forces_by_cvode(const BondSystem& bonds, const
   if (places.empty()) return forces;
   const sundials::Context context = sundials::make_context();
   const sundials::Vector state(N_VNew_Serial(network.size(), context.get()));
-  state_of(state.get()).setZero();
+  sundials::view(state.get()).setZero();
   const FixedPoint iteration(SUNNonlinSol_FixedPoint(state.get(), 0, context.get()));
   const sundials::Cvodes memory(CVodeCreate(CV_ADAMS, context.get()));
   void* const m = memory.get();
@@ -137,7 +131,8 @@ std::vector<Eigen::Vector3d> ball_forces_by_cvode(const BondSystem& bonds, const
     if (place.time_s > places.front().time_s) {
       check(CVode(m, place.time_s, state.get(), &reached, CV_NORMAL), "CVode");
     }
-    const std::optional<Eigen::Vector3d> force = network.force(place.time_s, state_of(state.get()));
+    const std::optional<Eigen::Vector3d> force =
+        network.force(place.time_s, sundials::view(state.get()));
     if (!force) {
       throw Error(ExitCode::numerical, "ball",
                   fmt::format("no balance at t = {} s", significant(place.time_s, 5)));

@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "tpm/method/step_system.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::organ {
 namespace {

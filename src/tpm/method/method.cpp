@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/enum_names.hpp"
+#include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/method/adaptive_rules.hpp"
 #include "tpm/method/step_rules.hpp"
@@ -20,34 +22,25 @@ constexpr double kSameTime = 1e-9;      // of a step
 constexpr double kBeyondReach = 3.0;    // of what is to be expected: no balance leads there
 
 void require_valid(const MethodSettings& settings) {
-  const auto require = [](bool good, std::string_view what, double got, std::string_view expected) {
-    if (!good) throw bad_input(what, shortest(got), expected);
-  };
-  require(settings.step_s > 0.0 && std::isfinite(settings.step_s), "step", settings.step_s,
-          "a time above 0");
-  require(settings.tolerance >= 1e-13 && settings.tolerance <= 0.1, "tolerance", settings.tolerance,
-          "1e-13 to 0.1");
-  require(settings.sweeps >= 1, "sweeps", settings.sweeps, "at least 1");
-  require(settings.most_rates >= 1, "most rates", static_cast<double>(settings.most_rates),
-          "at least 1");
+  require_number(settings.step_s > 0.0 && std::isfinite(settings.step_s), "step", settings.step_s,
+                 "a time above 0");
+  require_number(settings.tolerance >= 1e-13 && settings.tolerance <= 0.1, "tolerance",
+                 settings.tolerance, "1e-13 to 0.1");
+  require_number(settings.sweeps >= 1, "sweeps", settings.sweeps, "at least 1");
+  require_number(settings.most_rates >= 1, "most rates", static_cast<double>(settings.most_rates),
+                 "at least 1");
 }
 
 std::string_view words(MethodEnd end) {
-  switch (end) {
-    case MethodEnd::completed:
-      return "";
-    case MethodEnd::diverged:
-      return "a value is not finite or grew beyond 1000 times its scale";
-    case MethodEnd::newton_failed:
-      return "Newton's method found no solution";
-    case MethodEnd::buckled:
-      return "the tangent stiffness is no longer positive definite";
-    case MethodEnd::too_much_work:
-      return "more evaluations of the forces than allowed";
-    case MethodEnd::not_applicable:
-      return "the rule has no meaning here";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<MethodEnd>>({
+      {MethodEnd::completed, ""},
+      {MethodEnd::diverged, "a value is not finite or grew beyond 1000 times its scale"},
+      {MethodEnd::newton_failed, "Newton's method found no solution"},
+      {MethodEnd::buckled, "the tangent stiffness is no longer positive definite"},
+      {MethodEnd::too_much_work, "more evaluations of the forces than allowed"},
+      {MethodEnd::not_applicable, "the rule has no meaning here"},
+  });
+  return word_for(kNames, end);
 }
 
 /// One run through the protocol.

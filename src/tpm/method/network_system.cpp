@@ -1,5 +1,4 @@
 // A network under its probe, for the step rules.
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +9,6 @@
 #include "tpm/method/viscous_elongations.hpp"
 #include "tpm/network/inertial_equation.hpp"
 #include "tpm/network/lowest_mode.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::organ {
 namespace {

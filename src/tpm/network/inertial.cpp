@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/inertial_integration.hpp"
 #include "tpmkit/error.hpp"
@@ -15,19 +16,16 @@ namespace tpm::organ {
 namespace {
 
 void require_valid(const InertialOptions& options) {
-  const auto require = [](bool good, std::string_view what, double got, std::string_view expected) {
-    if (!good) throw bad_input(what, shortest(got), expected);
-  };
-  require(options.tolerance >= 1e-12 && options.tolerance <= 0.1, "tolerance", options.tolerance,
-          "1e-12 to 0.1");
-  require(options.highest_order >= 1 && options.highest_order <= 5, "highest order",
-          options.highest_order, "1 to 5");
-  require(options.damping_ratio >= 0.0 && options.damping_ratio <= 10.0, "damping ratio",
-          options.damping_ratio, "0 to 10");
-  require(options.stiffness_share >= 0.0 && options.stiffness_share <= 1.0, "stiffness share",
-          options.stiffness_share, "0 to 1");
-  require(options.contact_damping_ratio >= 0.0 && options.contact_damping_ratio <= 10.0,
-          "contact damping ratio", options.contact_damping_ratio, "0 to 10");
+  require_number(options.tolerance >= 1e-12 && options.tolerance <= 0.1, "tolerance",
+                 options.tolerance, "1e-12 to 0.1");
+  require_number(options.highest_order >= 1 && options.highest_order <= 5, "highest order",
+                 options.highest_order, "1 to 5");
+  require_number(options.damping_ratio >= 0.0 && options.damping_ratio <= 10.0, "damping ratio",
+                 options.damping_ratio, "0 to 10");
+  require_number(options.stiffness_share >= 0.0 && options.stiffness_share <= 1.0,
+                 "stiffness share", options.stiffness_share, "0 to 1");
+  require_number(options.contact_damping_ratio >= 0.0 && options.contact_damping_ratio <= 10.0,
+                 "contact damping ratio", options.contact_damping_ratio, "0 to 10");
 }
 
 Inertia inertia_of(const BondSystem& bonds, const Eigen::VectorXd& mass, const LowestMode& lowest,

@@ -13,10 +13,7 @@ namespace tpm::organ {
 namespace {
 
 using sundials::check;
-
-Eigen::Map<Eigen::VectorXd> view(N_Vector v) {
-  return {NV_DATA_S(v), static_cast<Eigen::Index>(NV_LENGTH_S(v))};
-}
+using sundials::view;
 
 InertialEquation& equation(void* user_data) {
   return *static_cast<InertialEquation*>(user_data);
@@ -57,28 +54,11 @@ int eliminated_setup(sunrealtype t, N_Vector y, N_Vector /*fy*/, SUNMatrix, sunb
   return equation(user_data).factorise(t, view(y), gamma) ? 0 : 1;
 }
 
-SUNLinearSolver_Type eliminated_type(SUNLinearSolver) {
-  return SUNLINEARSOLVER_DIRECT;
-}
-
 int eliminated_solve(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, sunrealtype) {
   auto solution = view(x);
   solution = view(b);
   equation(solver->content).solve(solution);
   return 0;
-}
-
-int eliminated_free(SUNLinearSolver solver) {
-  SUNLinSolFreeEmpty(solver);
-  return 0;
-}
-
-SUNMatrix_ID eliminated_id(SUNMatrix) {
-  return SUNMATRIX_CUSTOM;
-}
-
-void eliminated_destroy(SUNMatrix matrix) {
-  SUNMatFreeEmpty(matrix);
 }
 }
 
@@ -122,14 +102,8 @@ void InertialIntegration::use_klu() {
 }
 
 void InertialIntegration::use_elimination() {
-  matrix_.reset(SUNMatNewEmpty(context_.get()));
-  matrix_->ops->getid = eliminated_id;
-  matrix_->ops->destroy = eliminated_destroy;
-  solver_.reset(SUNLinSolNewEmpty(context_.get()));
-  solver_->content = &equation_;
-  solver_->ops->gettype = eliminated_type;
-  solver_->ops->solve = eliminated_solve;
-  solver_->ops->free = eliminated_free;
+  matrix_ = sundials::custom_matrix(context_.get());
+  solver_ = sundials::custom_solver(context_.get(), &equation_, eliminated_solve);
   check(CVodeSetLinearSolver(memory_.get(), solver_.get(), matrix_.get()), "CVodeSetLinearSolver");
   check(CVodeSetLinSysFn(memory_.get(), eliminated_setup), "CVodeSetLinSysFn");
 }

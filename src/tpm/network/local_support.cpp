@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/text.hpp"

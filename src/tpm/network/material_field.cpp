@@ -1,7 +1,5 @@
 #include "tpm/network/material_field.hpp"
 
-#include <algorithm>
-
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/network/stage_tangents.hpp"
 #include "tpm/solve/sampled_function.hpp"
@@ -462,9 +463,8 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Constraints co
       constraints_(std::move(constraints)),
       probes_(std::move(probes)),
       options_(options) {
-  if (!(options.tolerance >= 1e-12 && options.tolerance <= 0.1)) {
-    throw bad_input("tolerance", shortest(options.tolerance), "1e-12 to 0.1");
-  }
+  require_number(options.tolerance >= 1e-12 && options.tolerance <= 0.1, "tolerance",
+                 options.tolerance, "1e-12 to 0.1");
   if (options.stages < 2 || options.stages > kLanes) {
     throw bad_input("stages", std::to_string(options.stages), fmt::format("2 to {}", kLanes));
   }
@@ -474,9 +474,8 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Constraints co
     throw bad_input("directions", "changes of another number of bonds",
                     fmt::format("one number for each of the {} bonds", size));
   }
-  if (options.step_s && !(*options.step_s > 0.0 && std::isfinite(*options.step_s))) {
-    throw bad_input("step", shortest(*options.step_s) + " s", "a time above 0");
-  }
+  const double step_s = options.step_s.value_or(1.0);
+  require_number(is_positive(step_s), "step", step_s, "a time above 0", " s");
   require_valid(probes_, constraints_);
 }
 

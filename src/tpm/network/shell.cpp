@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <tuple>
 
 #include "tpm/network/filling.hpp"
 #include "tpm/network/landing_site.hpp"

@@ -7,7 +7,6 @@
 #include <functional>
 #include <vector>
 
-#include "tpm/core/text.hpp"
 #include "tpm/plan/plan_model.hpp"
 #include "tpm/reduce/condensed.hpp"
 #include "tpm/reduce/servo_network.hpp"

@@ -6,7 +6,6 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/plan/plan_model.hpp"
-#include "tpmkit/error.hpp"
 
 namespace tpm::organ {
 namespace {

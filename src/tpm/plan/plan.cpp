@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/perception.hpp"
 #include "tpm/plan/plan_reference.hpp"
@@ -20,19 +20,17 @@ constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
 constexpr double kSlowest_Hz = 1.0, kFastest_Hz = 1e6;
 
 void require_valid(const PlanRequest& request) {
-  if (!(request.tolerance >= kLeastTolerance && request.tolerance <= kMostTolerance)) {
-    throw bad_input("tolerance", shortest(request.tolerance), "1e-6 to 0.5 of the peak");
-  }
+  require_number(request.tolerance >= kLeastTolerance && request.tolerance <= kMostTolerance,
+                 "tolerance", request.tolerance, "1e-6 to 0.5 of the peak");
   const PlanBudget& budget = request.budget;
-  if (budget.rate_Hz && !(*budget.rate_Hz >= kSlowest_Hz && *budget.rate_Hz <= kFastest_Hz)) {
-    throw bad_input("rate", shortest(*budget.rate_Hz) + " Hz", "1 to 1e6 Hz");
-  }
+  const double rate_Hz = budget.rate_Hz.value_or(kSlowest_Hz);
+  require_number(rate_Hz >= kSlowest_Hz && rate_Hz <= kFastest_Hz, "rate", rate_Hz, "1 to 1e6 Hz",
+                 " Hz");
   if (request.for_loop && !budget.rate_Hz) {
     throw bad_input("rate", "is missing", "that of the loop");
   }
-  if (budget.wall_s_per_s && !(*budget.wall_s_per_s > 0.0 && std::isfinite(*budget.wall_s_per_s))) {
-    throw bad_input("wall", shortest(*budget.wall_s_per_s) + " s per s", "a time above 0");
-  }
+  const double wall = budget.wall_s_per_s.value_or(1.0);
+  require_number(is_positive(wall), "wall", wall, "a time above 0", " s per s");
 }
 
 bool masses_known(const ExperimentScene& scene) {

@@ -91,12 +91,6 @@ Trajectory ScalarCandidate::run(const PlanSurrogate& surrogate, const PlanBudget
   return answer;
 }
 
-DepthCurve straight(double stiffness_N_per_m) {
-  DepthCurve curve;
-  curve.stiffness_N_per_m = stiffness_N_per_m;
-  return curve;
-}
-
 class LinearCandidate : public ScalarCandidate {
  public:
   explicit LinearCandidate(int branches) : branches_(branches) {}
@@ -130,11 +124,14 @@ class ElementCandidate final : public LinearCandidate {
     const ContactSpectrum& spectrum = surrogate.spectrum();
     const Tissue& tissue = surrogate.scene().scene().tissue;
     const BondMaterial& material = tissue.materials.materials.front();
-    DepthCurve equilibrium = straight(spectrum.equilibrium());
-    equilibrium.tension_N_per_m = 2.0 * material.lateral_Pa * material.modulus_to_stiffness_m();
-    equilibrium.spacing_m = tissue.network.organ.spacing;
-    return {std::move(equilibrium), straight(spectrum.instantaneous() - spectrum.equilibrium()),
-            fitted_branches(spectrum, 1), 1.0};
+    DepthCurve equilibrium{
+        .stiffness_N_per_m = spectrum.equilibrium(),
+        .tension_N_per_m = 2.0 * material.lateral_Pa * material.modulus_to_stiffness_m(),
+        .spacing_m = tissue.network.organ.spacing};
+    return {std::move(equilibrium),
+            {.stiffness_N_per_m = spectrum.instantaneous() - spectrum.equilibrium()},
+            fitted_branches(spectrum, 1),
+            1.0};
   }
 };
 

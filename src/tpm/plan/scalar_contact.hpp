@@ -26,8 +26,6 @@ class ScalarContact final : public ContactModel {
   [[nodiscard]] Eigen::Matrix3d equilibrium_stiffness() const noexcept override {
     return range_.equilibrium_N_per_m * (into_ * into_.transpose());
   }
-  [[nodiscard]] Eigen::Index spheres() const noexcept override { return 0; }
-  void displacements(Eigen::Ref<Eigen::Matrix3Xd> /*all*/) const noexcept override {}
 
  private:
   ScalarModel model_;

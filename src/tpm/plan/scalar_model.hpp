@@ -8,7 +8,7 @@ namespace tpm::organ {
 /// A function of the depth: a stiffness, or a curve through even points, cubic between them.
 struct DepthCurve {
   double stiffness_N_per_m = 0.0;  ///< used where there are no points
-  std::vector<double> force_N;     ///< at even depths from first_m to last_m; at least 4, or none
+  std::vector<double> force_N{};   ///< at even depths from first_m to last_m; at least 4, or none
   double first_m = 0.0, last_m = 0.0;
   /// Added, if given: 2 E' A0/l0, N/m, and x, of the pull of two lateral bonds.
   double tension_N_per_m = 0.0, spacing_m = 1.0;

@@ -5,20 +5,11 @@
 #include <cstdint>
 
 namespace tpm::organ {
-namespace {
-
-DepthCurve straight_curve(double stiffness_N_per_m) {
-  DepthCurve curve;
-  curve.stiffness_N_per_m = stiffness_N_per_m;
-  return curve;
-}
-
-}  // namespace
-
 ScalarModel linear_contact(const ContactSpectrum& spectrum, int branches) {
-  return {straight_curve(spectrum.equilibrium()),
-          straight_curve(spectrum.instantaneous() - spectrum.equilibrium()),
-          fitted_branches(spectrum, branches), 1.0};
+  return {{.stiffness_N_per_m = spectrum.equilibrium()},
+          {.stiffness_N_per_m = spectrum.instantaneous() - spectrum.equilibrium()},
+          fitted_branches(spectrum, branches),
+          1.0};
 }
 
 ScalarModel curves_contact(const ContactCurves& curves, const ContactSpectrum& spectrum,

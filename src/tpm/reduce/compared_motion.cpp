@@ -1,6 +1,5 @@
 #include "tpm/reduce/compared_motion.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "tpmkit/error.hpp"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/core/wide_vectors.hpp"
 #include "tpm/reduce/flush_denormals.hpp"
@@ -30,26 +31,16 @@ constexpr std::size_t kNow = 0, kNext = 4;
 using Eight [[gnu::vector_size(8 * sizeof(float))]] = float;
 
 void require(const ServoNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
-  const auto refuse = [](std::string_view key, double value, std::string_view expected) {
-    throw bad_input(key, significant(value, 6), expected);
-  };
-  if (!(options.period_s > 0.0 && std::isfinite(options.period_s))) {
-    refuse("period_s", options.period_s, "a time above 0");
-  }
-  if (!(options.deepest_m > 0.0 && std::isfinite(options.deepest_m))) {
-    refuse("deepest_m", options.deepest_m, "a depth above 0");
-  }
-  if (!(options.frozen_depth_m >= 0.0 && options.frozen_depth_m <= options.deepest_m)) {
-    refuse("frozen_depth_m", options.frozen_depth_m, "from 0 to deepest_m");
-  }
-  if (!(options.aside_m > 0.0)) refuse("aside_m", options.aside_m, "above 0");
-  if (!(options.balance_again_above > 0.0)) {
-    refuse("balance_again_above", options.balance_again_above, "above 0");
-  }
-  if (options.most_balances < 1) refuse("most_balances", options.most_balances, "1 or more");
-  if (std::abs(into_tissue.norm() - 1.0) > 1e-9) {
-    refuse("into_tissue", into_tissue.norm(), "a unit vector");
-  }
+  require_number(is_positive(options.period_s), "period_s", options.period_s, "a time above 0");
+  require_number(is_positive(options.deepest_m), "deepest_m", options.deepest_m, "a depth above 0");
+  require_number(options.frozen_depth_m >= 0.0 && options.frozen_depth_m <= options.deepest_m,
+                 "frozen_depth_m", options.frozen_depth_m, "from 0 to deepest_m");
+  require_number(options.aside_m > 0.0, "aside_m", options.aside_m, "above 0");
+  require_number(options.balance_again_above > 0.0, "balance_again_above",
+                 options.balance_again_above, "above 0");
+  require_number(options.most_balances >= 1, "most_balances", options.most_balances, "1 or more");
+  require_number(std::abs(into_tissue.norm() - 1.0) <= 1e-9, "into_tissue", into_tissue.norm(),
+                 "a unit vector");
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "tpm/core/text.hpp"
+#include "tpm/core/require.hpp"
 #include "tpm/core/wide_vectors.hpp"
 #include "tpm/reduce/flush_denormals.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
@@ -36,18 +36,15 @@ using PressMatrix =
 using PressVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostUnknowns, 1>;
 
 void require_valid(const SurfaceNetworkOptions& options, const BallTool& ball) {
-  const auto refuse = [](std::string_view key, double value) {
-    throw bad_input(key, significant(value, 6), "above 0");
+  const auto positive = [](std::string_view key, double value) {
+    require_number(is_positive(value), key, value, "above 0");
   };
-  const auto above_0 = [](double value) { return value > 0.0 && std::isfinite(value); };
-  if (!above_0(options.period_s)) refuse("period_s", options.period_s);
-  if (!above_0(options.deepest_m)) refuse("deepest_m", options.deepest_m);
-  if (!above_0(options.balance_again_above)) {
-    refuse("balance_again_above", options.balance_again_above);
-  }
-  if (options.most_balances < 1) refuse("most_balances", options.most_balances);
-  if (!above_0(ball.radius_m)) refuse("radius_m", ball.radius_m);
-  if (!above_0(ball.stiffness_N_per_m)) refuse("stiffness_N_per_m", ball.stiffness_N_per_m);
+  positive("period_s", options.period_s);
+  positive("deepest_m", options.deepest_m);
+  positive("balance_again_above", options.balance_again_above);
+  positive("most_balances", options.most_balances);
+  positive("radius_m", ball.radius_m);
+  positive("stiffness_N_per_m", ball.stiffness_N_per_m);
 }
 
 void require_touching_nothing(const BallTool& ball, const Positions& rest) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tpm/core/text.hpp"
+#include "tpm/core/require.hpp"
 #include "tpm/reduce/flush_denormals.hpp"
 #include "tpmkit/error.hpp"
 
@@ -16,25 +16,16 @@ constexpr double kUnbalanced = 0.1;         // what is left of the correction fo
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
 
 void require(const ZoneNetworkOptions& options, const Eigen::Vector3d& into_tissue) {
-  const auto refuse = [](std::string_view key, double value, std::string_view expected) {
-    throw bad_input(key, significant(value, 6), expected);
-  };
-  if (!(options.period_s > 0.0 && std::isfinite(options.period_s))) {
-    refuse("period_s", options.period_s, "a time above 0");
-  }
-  if (options.rings < 1) refuse("rings", options.rings, "1 or more");
-  if (!(options.deepest_m > 0.0 && std::isfinite(options.deepest_m))) {
-    refuse("deepest_m", options.deepest_m, "a depth above 0");
-  }
+  require_number(is_positive(options.period_s), "period_s", options.period_s, "a time above 0");
+  require_number(options.rings >= 1, "rings", options.rings, "1 or more");
+  require_number(is_positive(options.deepest_m), "deepest_m", options.deepest_m, "a depth above 0");
   for (const double depth_m : {options.linear_depth_m, options.frozen_depth_m}) {
-    if (!(depth_m >= 0.0 && depth_m <= options.deepest_m)) {
-      refuse("depth", depth_m, "linear_depth_m and frozen_depth_m from 0 to deepest_m");
-    }
+    require_number(depth_m >= 0.0 && depth_m <= options.deepest_m, "depth", depth_m,
+                   "linear_depth_m and frozen_depth_m from 0 to deepest_m");
   }
-  if (!(options.aside_m > 0.0)) refuse("aside_m", options.aside_m, "above 0");
-  if (std::abs(into_tissue.norm() - 1.0) > 1e-9) {
-    refuse("into_tissue", into_tissue.norm(), "a unit vector");
-  }
+  require_number(options.aside_m > 0.0, "aside_m", options.aside_m, "above 0");
+  require_number(std::abs(into_tissue.norm() - 1.0) <= 1e-9, "into_tissue", into_tissue.norm(),
+                 "a unit vector");
 }
 
 std::size_t padded(std::size_t size) {

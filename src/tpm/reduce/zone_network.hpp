@@ -61,8 +61,6 @@ class ZoneNetwork final : public ContactModel {
 
   /// Of a step.
   [[nodiscard]] BalanceWork work() const noexcept;
-  /// Spheres of the zone that move, those of the contact left out.
-  [[nodiscard]] std::size_t zone_spheres() const noexcept { return zone_.size(); }
   /// Displacements of the surroundings beside those that follow the edge.
   [[nodiscard]] Eigen::Index own_displacements() const noexcept { return own_; }
   /// The least eigenvalue of the equilibrium stiffness of the surroundings before negative ones

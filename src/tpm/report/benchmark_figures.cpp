@@ -58,10 +58,7 @@ CostOf count_per_second(const BenchmarkResult& result, long MethodWork::*count) 
 
 Series trail_of(const BenchmarkResult& result, const std::string& curve, const CostOf& cost_of,
                 bool spread) {
-  Series s;
-  s.kind = Series::Kind::trail;
-  s.label = curve;
-  s.provenance = "model";
+  Series s{.kind = Series::Kind::trail, .label = curve, .provenance = "model"};
   for (const BenchmarkPoint& point : result.points) {
     if (point.curve() != curve || point.failed()) continue;
     const std::optional<Cost> cost = cost_of(point);
@@ -78,12 +75,8 @@ Series trail_of(const BenchmarkResult& result, const std::string& curve, const C
 /// The failures of a curve that have a word in common.
 Series failed_of(const BenchmarkResult& result, const std::string& curve, const std::string& end,
                  const CostOf& cost_of) {
-  Series s;
-  s.kind = Series::Kind::failed;
-  s.label = curve;
-  s.provenance = "model";
-  s.text = end;
-  std::replace(s.text.begin(), s.text.end(), '_', ' ');
+  Series s{
+      .kind = Series::Kind::failed, .label = curve, .provenance = "model", .text = spaced(end)};
   for (const BenchmarkPoint& point : result.points) {
     if (point.curve() != curve || point.end != end || end == "not_applicable") continue;
     if (const std::optional<Cost> cost = cost_of(point)) s.x.push_back(cost->value);
@@ -100,10 +93,7 @@ constexpr std::array<const char*, 6> kFailures{
     "not_applicable", "too_much_work", "buckled", "newton_failed", "diverged", "error_above_peak"};
 
 Series limit(Series::Kind kind, double place, std::string text) {
-  Series s;
-  s.kind = kind;
-  s.provenance = "model";
-  s.text = std::move(text);
+  Series s{.kind = kind, .provenance = "model", .text = std::move(text)};
   (kind == Series::Kind::level ? s.y : s.x).push_back(place);
   return s;
 }

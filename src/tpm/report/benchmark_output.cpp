@@ -1,7 +1,5 @@
 #include "tpm/report/benchmark_report.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
 #include "tpm/core/text.hpp"

@@ -103,9 +103,8 @@ void add_servo_cells(std::vector<Cell>& row, const BenchmarkPoint* point, double
     row.insert(row.end(), {{"-"}, {"-"}});
     return;
   }
-  std::string failure = point->end;
-  std::replace(failure.begin(), failure.end(), '_', ' ');
-  row.push_back(point->failed() ? Cell{failure, Tone::bad} : Cell{percent_words(point->error)});
+  row.push_back(point->failed() ? Cell{spaced(point->end), Tone::bad}
+                                : Cell{percent_words(point->error)});
   if (!point->times || point->failed() || point->work.steps == 0) {
     row.push_back({"-"});
     return;
@@ -155,10 +154,10 @@ Table failure_table(const BenchmarkResult& result) {
         if (settings.empty()) reason = p.reason;
         settings.push_back(p.parameter.empty() ? "all" : setting_words(p));
       }
-      std::string how = end;
-      std::replace(how.begin(), how.end(), '_', ' ');
-      table.rows.push_back(
-          {{curve}, {how, Tone::bad}, {fmt::format("{}", fmt::join(settings, "; "))}, {reason}});
+      table.rows.push_back({{curve},
+                            {spaced(end), Tone::bad},
+                            {fmt::format("{}", fmt::join(settings, "; "))},
+                            {reason}});
     }
   }
   return table;

@@ -74,9 +74,7 @@ void add_rate_curve(Panel& panel, const std::vector<BorderPoint>& points, int de
 }
 
 Series colgate_line(const std::vector<BorderPoint>& points, double damping) {
-  Series s;
-  s.label = "Colgate-Schenkel 2b/T, all taut";
-  s.provenance = "model";
+  Series s{.label = "Colgate-Schenkel 2b/T, all taut", .provenance = "model"};
   for (const BorderPoint& p : points) {
     if (p.delay_periods != 0 || p.damping_N_s_per_m != damping) continue;
     s.x.push_back(p.rate_Hz);
@@ -101,11 +99,10 @@ Figure border_figure(const BorderStudy& study) {
   figure.title = "Passivity and stability of the contact (simulated device)";
   figure.caption =
       "Lines: passivity by the condition of Colgate and Schenkel with the discrete transfer "
-      "function "
-      "of the exactly updated Zener contact, stability by the spectral radius of the loop. Points: "
-      "measured on the simulated device by bisection. Passivity is safe with every passive "
-      "operator "
-      "and found at the worst frequency; stability belongs to one operator, and asks for less.";
+      "function of the exactly updated Zener contact, stability by the spectral radius of the "
+      "loop. Points: measured on the simulated device by bisection. Passivity is safe with every "
+      "passive operator and found at the worst frequency; stability belongs to one operator, and "
+      "asks for less.";
   figure.panels = {std::move(passive), std::move(stable)};
   return figure;
 }
@@ -262,9 +259,8 @@ Figure impact_figure(const BorderStudy& study) {
   figure.title = "Impacts with the slip of a session (simulated device)";
   figure.caption =
       "A hand runs into the one-sided contact and stays 4 mm deep; stiffness over that at which "
-      "the "
-      "linear, two-sided loop becomes unstable. The rise of the force is limited to 400 N/s by a "
-      "slip of the model's tool, its size to 8 N.";
+      "the linear, two-sided loop becomes unstable. The rise of the force is limited to 400 N/s "
+      "by a slip of the model's tool, its size to 8 N.";
   for (const ImpactPoint& p : study.impacts) {
     const std::string title = fmt::format("delay {} periods", p.delay_periods);
     if (figure.panels.empty() || figure.panels.back().title != title) {
@@ -273,10 +269,7 @@ Figure impact_figure(const BorderStudy& study) {
                   {"stiffness over the linear border", "", true, std::nullopt, std::nullopt},
                   {}};
       for (const char* label : {"comes to rest", "oscillates"}) {
-        Series series;
-        series.kind = Series::Kind::points;
-        series.provenance = "simulated";
-        series.label = label;
+        Series series{.kind = Series::Kind::points, .label = label, .provenance = "simulated"};
         panel.series.push_back(std::move(series));
       }
       figure.panels.push_back(std::move(panel));

@@ -28,14 +28,10 @@ std::size_t instant_of_largest_sum(const ErrorBudget& b) {
 
 Panel waterfall_panel(const ErrorBudget& b) {
   const std::size_t at = instant_of_largest_sum(b);
-  Panel panel;
-  panel.title = fmt::format("adding up at {} s", significant(b.time_s[at], 4));
-  panel.x = {"", "", false, 0.5, 1.5 + static_cast<double>(b.lines.size())};
-  panel.y = {"sum so far, of the peak", "%", false, {}, {}};
-  Series steps;
-  steps.kind = Series::Kind::bracket;
-  steps.label = "line";
-  steps.provenance = "derived";
+  Panel panel{.title = fmt::format("adding up at {} s", significant(b.time_s[at], 4)),
+              .x = {"", "", false, 0.5, 1.5 + static_cast<double>(b.lines.size())},
+              .y = {"sum so far, of the peak", "%", false, {}, {}}};
+  Series steps{.kind = Series::Kind::bracket, .label = "line", .provenance = "derived"};
   Series sums = line("sum so far", {}, {});
   sums.kind = Series::Kind::points;
   sums.provenance = "derived";
@@ -68,14 +64,10 @@ Series threshold(const char* words, double share, double until) {
 
 Panel largest_panel(const ErrorBudget& b) {
   constexpr double kLeastDrawn = 1e-5;  // of the peak, on a logarithmic axis
-  Panel panel;
-  panel.title = "each line's own largest";
-  panel.x = {"", "", false, 0.5, {}};
-  panel.y = {"of the peak", "%", true, {}, {}};
-  Series own;
-  own.kind = Series::Kind::points;
-  own.label = "largest of the line";
-  own.provenance = "derived";
+  Panel panel{.title = "each line's own largest",
+              .x = {"", "", false, 0.5, {}},
+              .y = {"of the peak", "%", true, {}, {}}};
+  Series own{.kind = Series::Kind::points, .label = "largest of the line", .provenance = "derived"};
   const auto add = [&](const std::string& name, double part) {
     panel.x.names.push_back(name);
     own.x.push_back(static_cast<double>(panel.x.names.size()));
@@ -111,9 +103,7 @@ std::vector<std::string> write_budget_report(const std::filesystem::path& folder
   std::vector<std::string> files{"budget.json", "budget.csv"};
   write_file(folder / files[0], to_text(to_json(budget)));
   write_file(folder / files[1], to_csv(budget));
-  const auto drawn = write_figures(folder, {budget_figure(budget)});
-  files.insert(files.end(), drawn.begin(), drawn.end());
-  return files;
+  return write_figures(folder, {budget_figure(budget)}, std::move(files));
 }
 
 }  // namespace tpm::report

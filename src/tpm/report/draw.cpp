@@ -183,10 +183,11 @@ std::vector<std::string> draw_deformation(const std::string& python,
 }
 
 std::vector<std::string> write_figures(const std::filesystem::path& folder,
-                                       const std::vector<Figure>& figures) {
-  std::vector<std::string> files{"figures.json"};
-  write_file(folder / files.front(), to_text(to_json(figures)));
-  draw_figures(find_drawing_python(), folder / files.front(), folder, Drawings::svg_and_png);
+                                       const std::vector<Figure>& figures,
+                                       std::vector<std::string> files) {
+  const std::string& json = files.emplace_back("figures.json");
+  write_file(folder / json, to_text(to_json(figures)));
+  draw_figures(find_drawing_python(), folder / json, folder, Drawings::svg_and_png);
   for (const Figure& figure : figures) {
     files.push_back(fmt::format("{}.svg", figure.id));
     files.push_back(fmt::format("{}.png", figure.id));

@@ -22,9 +22,11 @@ void draw_figures(const std::string& python, const std::filesystem::path& figure
                   const std::filesystem::path& folder, Drawings drawings = Drawings::svg);
 
 /// Writes figures.json into `folder` and draws its figures there as SVG and PNG. Returns the names
-/// of the files. Throws Error(environment) if drawing is not possible; figures.json is then there.
+/// of the files, after those of `files`. Throws Error(environment) if drawing is not possible;
+/// figures.json is then there.
 [[nodiscard]] std::vector<std::string> write_figures(const std::filesystem::path& folder,
-                                                     const std::vector<Figure>& figures);
+                                                     const std::vector<Figure>& figures,
+                                                     std::vector<std::string> files = {});
 
 /// Writes figures.json into `folder` and draws its figures as figures/ID.svg below. Returns the
 /// text of each drawing by id, as to_html wants it. Throws as draw_figures does.

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string_view>
 #include <utility>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 
@@ -13,29 +15,19 @@ namespace tpm::report {
 namespace {
 
 std::string_view kind_name(Series::Kind kind) {
-  switch (kind) {
-    case Series::Kind::line:
-      return "line";
-    case Series::Kind::points:
-      return "points";
-    case Series::Kind::band:
-      return "band";
-    case Series::Kind::bracket:
-      return "bracket";
-    case Series::Kind::mark:
-      return "mark";
-    case Series::Kind::trail:
-      return "trail";
-    case Series::Kind::failed:
-      return "failed";
-    case Series::Kind::upright:
-      return "upright";
-    case Series::Kind::level:
-      return "level";
-    case Series::Kind::heat:
-      return "heat";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<Series::Kind>>({
+      {Series::Kind::line, "line"},
+      {Series::Kind::points, "points"},
+      {Series::Kind::band, "band"},
+      {Series::Kind::bracket, "bracket"},
+      {Series::Kind::mark, "mark"},
+      {Series::Kind::trail, "trail"},
+      {Series::Kind::failed, "failed"},
+      {Series::Kind::upright, "upright"},
+      {Series::Kind::level, "level"},
+      {Series::Kind::heat, "heat"},
+  });
+  return word_for(kNames, kind);
 }
 
 /// More than a drawing shows, and the same on every machine.
@@ -142,13 +134,21 @@ Json to_json(const std::vector<Figure>& figures) {
 }
 
 Series line(std::string label, std::vector<double> x, std::vector<double> y) {
-  Series s;
-  s.kind = Series::Kind::line;
-  s.label = std::move(label);
-  s.provenance = "model";
-  s.x = std::move(x);
-  s.y = std::move(y);
-  return s;
+  return {.kind = Series::Kind::line,
+          .label = std::move(label),
+          .provenance = "model",
+          .x = std::move(x),
+          .y = std::move(y)};
+}
+
+void add_if_any(Panel& panel, Series series) {
+  if (!series.x.empty()) panel.series.push_back(std::move(series));
+}
+
+std::string spaced(std::string_view name) {
+  std::string words(name);
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
 }
 
 }  // namespace tpm::report

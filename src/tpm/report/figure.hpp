@@ -1,6 +1,7 @@
 #pragma once
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tpm/store/json.hpp"
@@ -22,16 +23,16 @@ struct Series {
     heat,     ///< x, y, and `z` at each place of them, row by row of x: colours
   };
   Kind kind = Kind::line;
-  std::string label;       ///< for the legend; same label, same colour in all panels of a figure
-  std::string provenance;  ///< "model", "simulated", or a word of provenance_name()
-  std::string assumed;     ///< what of its place is assumed ("time"); empty if nothing
-  std::vector<double> x;
-  std::vector<double> y;
-  std::vector<double> sd;
-  std::vector<double> lower;
-  std::vector<double> upper;
-  std::vector<double> z;  ///< NaN: nothing there
-  std::string text;
+  std::string label{};       ///< for the legend; same label, same colour in all panels of a figure
+  std::string provenance{};  ///< "model", "simulated", or a word of provenance_name()
+  std::string assumed{};     ///< what of its place is assumed ("time"); empty if nothing
+  std::vector<double> x{};
+  std::vector<double> y{};
+  std::vector<double> sd{};
+  std::vector<double> lower{};
+  std::vector<double> upper{};
+  std::vector<double> z{};  ///< NaN: nothing there
+  std::string text{};
 };
 
 struct Axis {
@@ -44,10 +45,10 @@ struct Axis {
 };
 
 struct Panel {
-  std::string title;
-  Axis x;
-  Axis y;
-  std::vector<Series> series;
+  std::string title{};
+  Axis x{};
+  Axis y{};
+  std::vector<Series> series{};
 };
 
 /// A figure as data: scripts/draw_figures.py draws it, and it can be redrawn without recomputing.
@@ -64,5 +65,11 @@ struct Figure {
 [[nodiscard]] Json to_json(const std::vector<Figure>& figures);
 
 [[nodiscard]] Series line(std::string label, std::vector<double> x, std::vector<double> y);
+
+/// Adds a series to a panel, unless it is empty.
+void add_if_any(Panel& panel, Series series);
+
+/// A name as words: "contact force" of "contact_force".
+[[nodiscard]] std::string spaced(std::string_view name);
 
 }  // namespace tpm::report

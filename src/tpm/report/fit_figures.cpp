@@ -30,32 +30,6 @@ double interval_rise(const FitResult& fit) {
   return threshold.rise(fit.best.deviance);
 }
 
-Panel profile_panel(const FitResult& fit, const DrawnProfile& drawn, double rise) {
-  const ParameterResult& result = fit.parameters[drawn.parameter];
-  Series profile = line("profile", {}, {});
-  // Far above the limit a profile only squeezes the part that matters.
-  const double ceiling = 2.0 * rise;
-  for (const ProfilePoint& point : drawn.points) {
-    const double risen = point.deviance - fit.best.deviance;
-    if (risen > ceiling) continue;
-    profile.x.push_back(point.natural / result.parameter.unit.to_si);
-    profile.y.push_back(risen);
-  }
-  Panel panel{
-      "", parameter_axis(result.parameter), {"rise of the deviance", "", false, 0.0, {}}, {}};
-  panel.y.upper = 1.6 * rise;
-  Series limit = line(fmt::format("limit of the {:.4g} % interval", 100.0 * fit.config.level),
-                      {profile.x.front(), profile.x.back()}, {rise, rise});
-  Series best;
-  best.kind = Series::Kind::points;
-  best.label = "best fit";
-  best.provenance = "derived";
-  best.x = {result.estimate / result.parameter.unit.to_si};
-  best.y = {0.0};
-  panel.series = {std::move(profile), std::move(limit), std::move(best)};
-  return panel;
-}
-
 Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::string& name,
                         double stated) {
   Series interval;
@@ -93,6 +67,30 @@ Panel sensitivity_panel(const FitStudy& study, NoiseKind noise, const std::strin
 
 }  // namespace
 
+std::vector<Series> profile_series(const ParameterResult& result,
+                                   std::span<const ProfilePoint> points, double least,
+                                   const ProfileLimit& at) {
+  const double si = result.parameter.unit.to_si;
+  Series profile = line("profile", {}, {});
+  for (const ProfilePoint& point : points) {
+    const double risen = point.deviance - least;
+    if (risen > 2.0 * at.rise)
+      continue;  // far above the limit it only squeezes the part that matters
+    profile.x.push_back(point.natural / si);
+    profile.y.push_back(risen / at.unit);
+  }
+  Series limit =
+      line(fmt::format("limit of the {:.4g} % interval", 100.0 * at.level),
+           {profile.x.front(), profile.x.back()}, {at.rise / at.unit, at.rise / at.unit});
+  return {std::move(profile),
+          std::move(limit),
+          {.kind = Series::Kind::points,
+           .label = "best fit",
+           .provenance = "derived",
+           .x = {result.estimate / si},
+           .y = {0.0}}};
+}
+
 const ParameterResult& parameter_of(const FitResult& fit, const std::string& name) {
   for (const ParameterResult& p : fit.parameters) {
     if (p.parameter.name == name) return p;
@@ -109,9 +107,7 @@ std::string estimate_words(const FitResult& fit) {
 }
 
 std::string noise_words(NoiseKind noise) {
-  std::string words(noise_kind_name(noise));
-  std::replace(words.begin(), words.end(), '_', ' ');
-  return words;
+  return spaced(noise_kind_name(noise));
 }
 
 Figure profile_figure(const FitStudy& study) {
@@ -122,7 +118,13 @@ Figure profile_figure(const FitStudy& study) {
                 {}};
   const double rise = interval_rise(study.reference);
   for (const DrawnProfile& drawn : study.profiles) {
-    figure.panels.push_back(profile_panel(study.reference, drawn, rise));
+    const ParameterResult& result = study.reference.parameters[drawn.parameter];
+    Panel panel{
+        "", parameter_axis(result.parameter), {"rise of the deviance", "", false, 0.0, {}}, {}};
+    panel.y.upper = 1.6 * rise;
+    panel.series = profile_series(result, drawn.points, study.reference.best.deviance,
+                                  {study.reference.config.level, rise});
+    figure.panels.push_back(std::move(panel));
   }
   return figure;
 }

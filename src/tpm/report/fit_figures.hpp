@@ -1,4 +1,6 @@
 #pragma once
+#include <span>
+
 #include "tpm/report/figure.hpp"
 #include "tpm/study/fit_variations.hpp"
 
@@ -7,6 +9,19 @@ namespace tpm::report {
 /// Rise of the deviance along each parameter, the others re-optimised, with the level that bounds
 /// the confidence interval. No panels if the fit was not profiled.
 [[nodiscard]] Figure profile_figure(const FitStudy& study);
+
+/// Where a profile leaves the confidence interval.
+struct ProfileLimit {
+  double level = 0.95;
+  double rise = 0.0;  ///< of the deviance
+  double unit = 1.0;  ///< of the deviance's axis
+};
+
+/// What a panel of a profile draws: the profile, the limit, the best fit.
+/// @param least deviance, of the best fit
+[[nodiscard]] std::vector<Series> profile_series(const ParameterResult& result,
+                                                 std::span<const ProfilePoint> points, double least,
+                                                 const ProfileLimit& at);
 
 /// Estimate and interval of one parameter against the assumed ramp rate, one panel per noise
 /// convention.

@@ -33,13 +33,13 @@ std::vector<const FittedDatum*> readings_of(const FitResult& fit, std::size_t ch
 /// The readings of one part that a logarithmic axis can show, fitted or held out.
 Series measured_part(const std::vector<const FittedDatum*>& readings, bool storage, bool held_out,
                      double unit) {
-  Series s;
-  s.kind = Series::Kind::points;
-  s.label = fmt::format("{}{}", storage ? "storage" : "loss", held_out ? ", not fitted" : "");
+  Series s{
+      .kind = Series::Kind::points,
+      .label = fmt::format("{}{}", storage ? "storage" : "loss", held_out ? ", not fitted" : "")};
   for (const FittedDatum* d : readings) {
     const FitDatum& datum = d->datum;
     if (is_storage(datum.quantity) != storage || datum.held_out != held_out) continue;
-    s.provenance = provenance_name(datum.provenance);
+    s.provenance = std::string(provenance_name(datum.provenance));
     if (!(*datum.value > 0.0)) continue;
     s.x.push_back(*datum.frequency_Hz);
     s.y.push_back(*datum.value / unit);
@@ -177,8 +177,7 @@ Figure spectrum_figure(const FitResult& fit, std::size_t choice) {
   figure.title = fmt::format("{}: {}", name, law_name(fit.config.law.value()));
   figure.caption = fmt::format(
       "Storage and loss of small oscillations over their frequency, and the fitted law {}; bars "
-      "are "
-      "standard deviations.{}",
+      "are standard deviations.{}",
       law_name(*fit.config.law),
       hidden > 0 ? fmt::format(" {} readings are not above 0 and not drawn.", hidden) : "");
   Panel panel{
@@ -250,9 +249,7 @@ std::vector<std::string> write_specimen_report(const std::filesystem::path& fold
   for (const SpecimenRow& row : study.rows) {
     if (row.fit) figures.push_back(recording_figure(*row.fit, 0));
   }
-  const std::vector<std::string> drawn = write_figures(folder, figures);
-  files.insert(files.end(), drawn.begin(), drawn.end());
-  return files;
+  return write_figures(folder, figures, std::move(files));
 }
 
 }  // namespace tpm::report

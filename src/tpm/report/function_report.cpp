@@ -3,39 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
-#include "tpm/core/text.hpp"
-#include "tpm/fit/fitted_law.hpp"
-#include "tpm/report/draw.hpp"
-#include "tpm/report/fit_csv.hpp"
 #include "tpm/report/fit_report.hpp"
 #include "tpm/report/recording_report.hpp"
-#include "tpm/store/file.hpp"
-#include "tpmkit/law_file.hpp"
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::report {
-namespace {
-
-std::string spaced_name(Quantity quantity) {
-  std::string words(quantity_name(quantity));
-  std::replace(words.begin(), words.end(), '_', ' ');
-  return words;
-}
-
-}  // namespace
-
 Figure step_response_figure(const FitResult& fit, std::size_t choice) {
   std::vector<const FittedDatum*> readings;
   for (const FittedDatum& d : fit.data) {
     if (d.datum.choice == choice && d.datum.time_s > 0.0) readings.push_back(&d);
   }
   const Quantity quantity = fit.data.front().datum.quantity;
+  const std::string measured_name = spaced(quantity_name(quantity));
   const Unit unit = shown_unit(quantity_dimension(quantity));
-  Series measured;
-  measured.kind = Series::Kind::points;
-  measured.label = spaced_name(quantity);
+  Series measured{.kind = Series::Kind::points, .label = measured_name};
   Series law = line("law", {}, {});
   std::vector<std::pair<double, double>> along;
   for (const FittedDatum* d : readings) {
@@ -52,8 +34,7 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
     law.x.push_back(time);
     law.y.push_back(value);
   }
-  Panel panel{
-      "", {"time", "s", true, {}, {}}, {spaced_name(quantity), unit.symbol, true, {}, {}}, {}};
+  Panel panel{"", {"time", "s", true, {}, {}}, {measured_name, unit.symbol, true, {}, {}}, {}};
   if (!measured.x.empty()) panel.series.push_back(std::move(measured));
   panel.series.push_back(std::move(law));
   Figure figure;
@@ -63,7 +44,7 @@ Figure step_response_figure(const FitResult& fit, std::size_t choice) {
   figure.title = fmt::format("{}: {}", name, law_name(fit.config.law.value()));
   figure.caption = fmt::format(
       "{} after a unit step at time 0, and the fitted law {}; bars are standard deviations.",
-      spaced_name(quantity), law_name(*fit.config.law));
+      measured_name, law_name(*fit.config.law));
   figure.panels = {std::move(panel)};
   return figure;
 }
@@ -78,17 +59,7 @@ std::vector<std::string> write_function_report(const std::filesystem::path& fold
   } else {
     figures.push_back(step_response_figure(fit, 0));
   }
-  figures.push_back(selection_figure(selection));
-  figures.push_back(waterfall_figure(fit));
-  std::vector<std::string> files{"config.json", "selection.json", "law.json", "laws.csv"};
-  write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
-  write_file(folder / files[1], to_text(to_json(selection)));
-  write_law(folder / files[2], fitted_law(fit));
-  write_file(folder / files[3], laws_csv(selection));
-  for (std::string& name : write_fit_csv(folder, fit)) files.push_back(std::move(name));
-  const std::vector<std::string> drawn = write_figures(folder, figures);
-  files.insert(files.end(), drawn.begin(), drawn.end());
-  return files;
+  return write_selection(folder, selection, std::move(figures));
 }
 
 }  // namespace tpm::report

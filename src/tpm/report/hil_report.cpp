@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
@@ -59,10 +58,8 @@ std::vector<Series> asked_depths(const HilRecording& recording, const std::vecto
 Series some_points(std::string label, const std::vector<double>& x, const std::vector<double>& y,
                    std::string provenance) {
   constexpr std::size_t kPoints = 120;
-  Series series;
-  series.kind = Series::Kind::points;
-  series.label = std::move(label);
-  series.provenance = std::move(provenance);
+  Series series{
+      .kind = Series::Kind::points, .label = std::move(label), .provenance = std::move(provenance)};
   const std::size_t stride = std::max<std::size_t>(1, x.size() / kPoints);
   for (std::size_t i = 0; i < x.size(); i += stride) {
     series.x.push_back(x[i]);

@@ -33,9 +33,8 @@ struct BrokenLine {
 
 /// Over the samples at which a law was the least.
 Panel width_panel(const Identification& id) {
-  Panel panel;
-  panel.x = {"time", "s", false, {}, {}};
-  panel.y = {"half width of the interval", "% of the estimate", true, {}, {}};
+  Panel panel{.x = {"time", "s", false, {}, {}},
+              .y = {"half width of the interval", "% of the estimate", true, {}, {}}};
   const std::size_t law = id.result().law;
   std::map<std::string, BrokenLine> lines;
   std::vector<std::string> order;
@@ -73,14 +72,12 @@ Panel width_panel(const Identification& id) {
 }
 
 Panel law_panel(const Identification& id) {
-  Panel panel;
-  panel.x = {"time", "s", false, {}, {}};
-  panel.y = {"least law, by its place", "", false, 0.5, 0.5 + static_cast<double>(id.laws.size())};
+  Panel panel{
+      .x = {"time", "s", false, {}, {}},
+      .y = {"least law, by its place", "", false, 0.5, 0.5 + static_cast<double>(id.laws.size())}};
   for (std::size_t law = 0; law < id.laws.size(); ++law) {
-    Series s;
-    s.kind = Series::Kind::points;
-    s.label = law_name(id.laws[law]);
-    s.provenance = "derived";
+    Series s{
+        .kind = Series::Kind::points, .label = law_name(id.laws[law]), .provenance = "derived"};
     for (const IdentifiedSample& sample : id.history) {
       if (sample.law != law) continue;
       s.x.push_back(sample.time_s);
@@ -112,9 +109,7 @@ std::vector<std::string> write_identification_report(const std::filesystem::path
   std::vector<std::string> files{"identification.json", "law.json"};
   write_file(folder / files[0], to_text(answer));
   write_law(folder / files[1], law);
-  const auto drawn = write_figures(folder, {identification_figure(identification)});
-  files.insert(files.end(), drawn.begin(), drawn.end());
-  return files;
+  return write_figures(folder, {identification_figure(identification)}, std::move(files));
 }
 
 }  // namespace tpm::report

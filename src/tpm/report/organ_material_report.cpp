@@ -4,16 +4,14 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
+#include "tpm/report/fit_figures.hpp"
 #include "tpm/store/file.hpp"
 
 namespace tpm::report {
 namespace {
 
 Series less(const OrganMaterial& m, const char* label, std::vector<double> MaterialCourse::*force) {
-  Series s;
-  s.kind = Series::Kind::points;
-  s.label = label;
-  s.provenance = "derived";
+  Series s{.kind = Series::Kind::points, .label = label, .provenance = "derived"};
   for (const MaterialCourse& c : m.courses) {
     for (std::size_t i = 0; i < c.time_s.size(); ++i) {
       s.x.push_back(1e3 * c.depth_m[i]);
@@ -47,27 +45,12 @@ Panel force_panel(const MaterialCourse& c, bool titled) {
 
 Panel material_profile_panel(const ReadingsFit& readings, const ParameterResult& result) {
   const FitParameter& p = result.parameter;
-  Series profile = line("profile", {}, {});
-  const double ceiling = 2.0 * readings.rise;  // above it a profile only squeezes what matters
-  for (const ProfilePoint& point : result.profile.points) {
-    const double risen = point.deviance - readings.fit.best.deviance;
-    if (risen > ceiling) continue;
-    profile.x.push_back(point.natural / p.unit.to_si);
-    profile.y.push_back(risen / readings.rise);
-  }
-  Series limit = line(fmt::format("limit of the {:.4g} % interval", 100.0 * readings.level),
-                      {profile.x.front(), profile.x.back()}, {1.0, 1.0});
-  Series best;
-  best.kind = Series::Kind::points;
-  best.label = "best fit";
-  best.provenance = "derived";
-  best.x = {result.estimate / p.unit.to_si};
-  best.y = {0.0};
   Panel panel{"",
               {p.name, p.unit.symbol, p.scale == Scale::log, {}, {}},
               {"rise of the deviance over its limit", "", false, 0.0, 1.6},
               {}};
-  panel.series = {std::move(profile), std::move(limit), std::move(best)};
+  panel.series = profile_series(result, result.profile.points, readings.fit.best.deviance,
+                                {readings.level, readings.rise, readings.rise});
   return panel;
 }
 
@@ -103,11 +86,10 @@ Figure organ_material_figure(const OrganMaterial& m) {
   for (const MaterialCourse& c : m.courses) {
     figure.panels.push_back(force_panel(c, m.courses.size() > 1));
   }
-  Panel misses;
-  misses.x = {"depth", "mm", false, {}, {}};
-  misses.y = {"organ less law, of the peak", "%", false, {}, {}};
-  misses.series = {less(m, "by correspondence less law", &MaterialCourse::correspondence_N),
-                   less(m, "fitted less law", &MaterialCourse::organ_N)};
+  Panel misses{.x = {"depth", "mm", false, {}, {}},
+               .y = {"organ less law, of the peak", "%", false, {}, {}},
+               .series = {less(m, "by correspondence less law", &MaterialCourse::correspondence_N),
+                          less(m, "fitted less law", &MaterialCourse::organ_N)}};
   figure.panels.push_back(std::move(misses));
   return figure;
 }
@@ -119,9 +101,7 @@ std::vector<std::string> write_organ_material_report(const std::filesystem::path
   write_file(folder / files[1], to_text(result.session));
   write_file(folder / files[2], to_text(to_json(result)));
   write_file(folder / files[3], to_csv(result));
-  const auto drawn = write_figures(folder, material_figures(result));
-  files.insert(files.end(), drawn.begin(), drawn.end());
-  return files;
+  return write_figures(folder, material_figures(result), std::move(files));
 }
 
 }  // namespace tpm::report

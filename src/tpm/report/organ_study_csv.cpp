@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include "tpm/core/text.hpp"
 #include "tpm/fit/verdict.hpp"

@@ -71,13 +71,11 @@ std::string missing_words(const OrganStudy& study, const StudyCurves& set,
 /// @param place of a datum on the x axis
 template <class Applies, class Place>
 Series readings(const StudyData& data, double y_factor, Applies applies, Place place) {
-  Series s;
-  s.label = data.points.header.id;
-  s.kind = Series::Kind::points;
+  Series s{.kind = Series::Kind::points, .label = data.points.header.id};
   if (data.points.time_provenance == Provenance::assumed) s.assumed = "time";
   for (const Datum& d : data.points.data) {
     if (!applies(d)) continue;
-    s.provenance = provenance_name(d.provenance);
+    s.provenance = std::string(provenance_name(d.provenance));
     s.x.push_back(place(d));
     if (d.is_band()) {
       s.kind = Series::Kind::bracket;

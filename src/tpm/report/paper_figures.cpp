@@ -54,12 +54,10 @@ Axis force_axis() {
 /// Ranges as brackets, each at the place `place` of its datum, values times `factor`.
 template <class Place>
 Series brackets(std::string label, const std::vector<Datum>& data, double factor, Place place) {
-  Series s;
-  s.kind = Series::Kind::bracket;
-  s.label = std::move(label);
+  Series s{.kind = Series::Kind::bracket, .label = std::move(label)};
   for (const Datum& d : data) {
     if (!d.is_band()) continue;
-    s.provenance = provenance_name(d.provenance);
+    s.provenance = std::string(provenance_name(d.provenance));
     s.x.push_back(place(d));
     s.lower.push_back(*d.lower * factor);
     s.upper.push_back(*d.upper * factor);
@@ -89,7 +87,7 @@ Series printed_relaxation(const PointSet& relaxation, double ramp_s) {
   s.assumed = "time";
   for (const Datum& d : relaxation.data) {
     if (!d.value || !d.time_s || !d.depth_m || std::abs(*d.depth_m - kDepth_m) > 1e-9) continue;
-    s.provenance = provenance_name(d.provenance);
+    s.provenance = std::string(provenance_name(d.provenance));
     s.x.push_back(ramp_s + *d.time_s);
     s.y.push_back(*d.value);
   }
@@ -160,13 +158,12 @@ Figure creep_figure(const PaperFigureData& data, const PrintedCreep& printed) {
     Series band = brackets("range over livers", bands, 1e3,
                            [](const Datum& d) { return d.time_s.value_or(kCreep_s); });
     band.assumed = "time";
-    Series end_value;
-    end_value.kind = Series::Kind::mark;
-    end_value.label = "Eq. 18 as printed, t → ∞";
-    end_value.provenance = "text";
-    end_value.text = mm(printed.end_depth_m);
-    end_value.x = {end};
-    end_value.y = {printed.end_depth_m * 1e3};
+    Series end_value{.kind = Series::Kind::mark,
+                     .label = "Eq. 18 as printed, t → ∞",
+                     .provenance = "text",
+                     .x = {end},
+                     .y = {printed.end_depth_m * 1e3},
+                     .text = mm(printed.end_depth_m)};
     made.series = {
         line(fmt::format("Eq. 14, λ₁ = {:.4g} kPa as printed", printed.lambda1_Pa * 1e-3), times,
              depth_mm(TensionRule::frozen(printed.lambda1_Pa), times)),
@@ -211,11 +208,10 @@ namespace {
 Series elastography(const ValueSet& values, std::string_view name, std::string label,
                     double frequency_Hz) {
   const NamedValue& v = values.at(name);
-  Series s;
-  s.label = std::move(label);
-  s.provenance = provenance_name(v.provenance);
-  s.assumed = "frequency";
-  s.x = {frequency_Hz};
+  Series s{.label = std::move(label),
+           .provenance = std::string(provenance_name(v.provenance)),
+           .assumed = "frequency",
+           .x = {frequency_Hz}};
   if (v.value && !v.plus_minus) {
     s.kind = Series::Kind::points;
     s.y = {*v.value};

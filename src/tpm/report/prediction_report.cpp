@@ -20,10 +20,7 @@ std::size_t stride_of(const LawPrediction& p) {
 
 Series band(const LawPrediction& p, const char* label, const std::vector<double>& lower,
             const std::vector<double>& upper, double unit) {
-  Series s;
-  s.kind = Series::Kind::band;
-  s.label = label;
-  s.provenance = "model";
+  Series s{.kind = Series::Kind::band, .label = label, .provenance = "model"};
   for (std::size_t i = 0; i < lower.size(); i += stride_of(p)) {
     if (!std::isfinite(lower[i]) || !std::isfinite(upper[i])) continue;
     s.x.push_back(p.time_s[i]);
@@ -34,10 +31,9 @@ Series band(const LawPrediction& p, const char* label, const std::vector<double>
 }
 
 Series prediction_readings(const LawPrediction& p, bool fitted, double unit, bool residual) {
-  Series s;
-  s.kind = Series::Kind::points;
-  s.label = fitted ? "measured, fitted" : "measured, not fitted";
-  s.provenance = residual ? "derived" : "measured";
+  Series s{.kind = Series::Kind::points,
+           .label = fitted ? "measured, fitted" : "measured, not fitted",
+           .provenance = residual ? "derived" : "measured"};
   const PredictedRecording& r = p.recording.value();
   for (std::size_t i = 0; i < r.observed.size(); i += stride_of(p)) {
     if (r.was_fitted[i] != fitted || !std::isfinite(p.response[i])) continue;
@@ -47,16 +43,6 @@ Series prediction_readings(const LawPrediction& p, bool fitted, double unit, boo
   return s;
 }
 
-void add(Panel& panel, Series series) {
-  if (!series.x.empty()) panel.series.push_back(std::move(series));
-}
-
-std::string spaced(Quantity quantity) {
-  std::string words(quantity_name(quantity));
-  std::replace(words.begin(), words.end(), '_', ' ');
-  return words;
-}
-
 }  // namespace
 
 Figure prediction_figure(const LawPrediction& p) {
@@ -64,19 +50,19 @@ Figure prediction_figure(const LawPrediction& p) {
   const Unit unit = shown_unit(p.response_dimension());
   Figure figure;
   figure.id = "prediction";
-  figure.title = fmt::format("{}: predicted {}", p.subject(), spaced(answer));
+  figure.title = fmt::format("{}: predicted {}", p.subject(), spaced(quantity_name(answer)));
   figure.caption = fmt::format(
       "The {} answer with the {} % band of its mean and the {} % band for one new reading.",
       p.organ_spheres > 0 ? "organ's" : "law's", significant(100.0 * p.level, 3),
       significant(100.0 * p.level, 3));
-  Panel panel;
-  panel.x = {"time", "s", false, {}, {}};
-  panel.y = {spaced(answer), unit.symbol, false, {}, {}};
-  add(panel, band(p, "band for a new reading", p.reading_lower, p.reading_upper, unit.to_si));
-  add(panel, band(p, "band of the mean", p.mean_lower, p.mean_upper, unit.to_si));
+  Panel panel{.x = {"time", "s", false, {}, {}},
+              .y = {spaced(quantity_name(answer)), unit.symbol, false, {}, {}}};
+  add_if_any(panel,
+             band(p, "band for a new reading", p.reading_lower, p.reading_upper, unit.to_si));
+  add_if_any(panel, band(p, "band of the mean", p.mean_lower, p.mean_upper, unit.to_si));
   if (p.recording) {
     for (const bool fitted : {true, false})
-      add(panel, prediction_readings(p, fitted, unit.to_si, false));
+      add_if_any(panel, prediction_readings(p, fitted, unit.to_si, false));
   }
   Series mean = line("mean", {}, {});
   for (std::size_t i = 0; i < p.time_s.size(); i += stride_of(p)) {
@@ -84,24 +70,23 @@ Figure prediction_figure(const LawPrediction& p) {
     mean.x.push_back(p.time_s[i]);
     mean.y.push_back(p.response[i] / unit.to_si);
   }
-  add(panel, std::move(mean));
+  add_if_any(panel, std::move(mean));
   figure.panels.push_back(std::move(panel));
   if (!p.recording) return figure;
-  Panel residual;
-  residual.x = {"time", "s", false, {}, {}};
-  residual.y = {"prediction less measured, of the peak", "%", false, {}, {}};
+  Panel residual{.x = {"time", "s", false, {}, {}},
+                 .y = {"prediction less measured, of the peak", "%", false, {}, {}}};
   const auto about_zero = [&](const std::vector<double>& limit) {
     std::vector<double> shifted;
     for (std::size_t i = 0; i < limit.size(); ++i) shifted.push_back(limit[i] - p.response[i]);
     return shifted;
   };
   const double percent = 0.01 * p.recording->peak;
-  add(residual, band(p, "band for a new reading", about_zero(p.reading_lower),
-                     about_zero(p.reading_upper), percent));
-  add(residual,
-      band(p, "band of the mean", about_zero(p.mean_lower), about_zero(p.mean_upper), percent));
+  add_if_any(residual, band(p, "band for a new reading", about_zero(p.reading_lower),
+                            about_zero(p.reading_upper), percent));
+  add_if_any(residual, band(p, "band of the mean", about_zero(p.mean_lower),
+                            about_zero(p.mean_upper), percent));
   for (const bool fitted : {true, false})
-    add(residual, prediction_readings(p, fitted, percent, true));
+    add_if_any(residual, prediction_readings(p, fitted, percent, true));
   figure.panels.push_back(std::move(residual));
   return figure;
 }
@@ -112,9 +97,7 @@ std::vector<std::string> write_prediction_report(const std::filesystem::path& fo
   std::vector<std::string> files{"prediction.csv", "prediction.json"};
   write_file(folder / files[0], to_csv(prediction));
   write_file(folder / files[1], to_text(answer));
-  const std::vector<std::string> drawn = write_figures(folder, {prediction_figure(prediction)});
-  files.insert(files.end(), drawn.begin(), drawn.end());
-  return files;
+  return write_figures(folder, {prediction_figure(prediction)}, std::move(files));
 }
 
 }  // namespace tpm::report

@@ -28,12 +28,6 @@ Units units_of(const RecordingFit& r) {
           shown_unit(stretch ? Dimension::stress : Dimension::force)};
 }
 
-std::string words_of(Quantity quantity) {
-  std::string words(quantity_name(quantity));
-  std::replace(words.begin(), words.end(), '_', ' ');
-  return words;
-}
-
 std::string file_stem(const std::string& path) {
   return std::filesystem::path(path).stem().string();
 }
@@ -52,24 +46,15 @@ Series sampled(Series series, const RecordingFit& r, const std::vector<double>& 
 }
 
 Series measured(const char* label, const RecordingFit& r) {
-  Series s;
-  s.kind = Series::Kind::points;
-  s.label = label;
-  s.provenance = provenance_name(r.provenance);
-  return s;
-}
-
-void add_if_any(Panel& panel, Series series) {
-  if (!series.x.empty()) panel.series.push_back(std::move(series));
+  return {.kind = Series::Kind::points,
+          .label = label,
+          .provenance = std::string(provenance_name(r.provenance))};
 }
 
 /// Where 95 % (or the fit's level) of new readings would fall.
 void add_band(Panel& panel, const RecordingFit& r, double y_unit) {
   if (r.lower.size() != r.time_s.size()) return;
-  Series band;
-  band.kind = Series::Kind::band;
-  band.label = "prediction band";
-  band.provenance = "model";
+  Series band{.kind = Series::Kind::band, .label = "prediction band", .provenance = "model"};
   const std::size_t stride = 1 + r.time_s.size() / kMostDrawn;
   for (std::size_t i = 0; i < r.time_s.size(); i += stride) {
     if (!r.fitted[i] || !std::isfinite(r.lower[i]) || !std::isfinite(r.upper[i])) continue;
@@ -77,7 +62,7 @@ void add_band(Panel& panel, const RecordingFit& r, double y_unit) {
     band.lower.push_back(r.lower[i] / y_unit);
     band.upper.push_back(r.upper[i] / y_unit);
   }
-  if (!band.x.empty()) panel.series.push_back(std::move(band));
+  add_if_any(panel, std::move(band));
 }
 
 Panel response_panel(const RecordingFit& r, bool over_time) {
@@ -85,12 +70,12 @@ Panel response_panel(const RecordingFit& r, bool over_time) {
   Panel panel;
   const std::vector<double>& x = over_time ? r.time_s : r.drive;
   const double x_unit = over_time ? 1.0 : units.drive.to_si;
-  panel.x = {over_time ? "time" : words_of(r.drive_quantity),
+  panel.x = {over_time ? "time" : spaced(quantity_name(r.drive_quantity)),
              over_time ? "s" : units.drive.symbol,
              false,
              {},
              {}};
-  panel.y = {words_of(r.response_quantity), units.response.symbol, false, {}, {}};
+  panel.y = {spaced(quantity_name(r.response_quantity)), units.response.symbol, false, {}, {}};
   const double y_unit = units.response.to_si;
   const auto inside = [&](std::size_t i) { return r.fitted[i]; };
   const auto outside = [&](std::size_t i) { return !r.fitted[i]; };
@@ -108,25 +93,19 @@ Panel response_panel(const RecordingFit& r, bool over_time) {
 }
 
 Panel residual_panel(const RecordingFit& r) {
-  Panel panel;
-  panel.x = {"time", "s", false, {}, {}};
-  panel.y = {"residual over peak", "%", false, {}, {}};
+  Panel panel{.x = {"time", "s", false, {}, {}}, .y = {"residual over peak", "%", false, {}, {}}};
   std::vector<double> residual(r.observed.size());
   for (std::size_t i = 0; i < residual.size(); ++i) residual[i] = r.predicted[i] - r.observed[i];
-  Series s;
-  s.kind = Series::Kind::points;
-  s.label = "law less measured";
-  s.provenance = "derived";
+  Series s{.kind = Series::Kind::points, .label = "law less measured", .provenance = "derived"};
   add_if_any(panel, sampled(std::move(s), r, r.time_s, 1.0, residual, 0.01 * r.peak,
                             [&](std::size_t i) { return r.fitted[i]; }));
   return panel;
 }
 
 Series laws_at(const Selection& s, bool bic, bool recommended) {
-  Series series;
-  series.kind = Series::Kind::points;
-  series.label = recommended ? "recommended" : "law";
-  series.provenance = "derived";
+  Series series{.kind = Series::Kind::points,
+                .label = recommended ? "recommended" : "law",
+                .provenance = "derived"};
   for (std::size_t i = 0; i < s.candidates.size(); ++i) {
     const Candidate& c = s.candidates[i];
     if (c.failed || (i == s.recommended) != recommended) continue;
@@ -134,6 +113,19 @@ Series laws_at(const Selection& s, bool bic, bool recommended) {
     series.y.push_back(bic ? c.delta_bic : 100.0 * c.rms_over_peak);
   }
   return series;
+}
+
+/// The configuration with its data sets as a file in the folder finds them.
+FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
+  for (DataChoice& data : config.data) {
+    const std::filesystem::path path(data.dataset);
+    if (path.has_extension() && path.is_relative()) {
+      data.dataset = std::filesystem::absolute(path)
+                         .lexically_relative(std::filesystem::absolute(folder))
+                         .generic_string();
+    }
+  }
+  return config;
 }
 
 }  // namespace
@@ -147,7 +139,7 @@ Figure recording_figure(const FitResult& fit, std::size_t recording) {
   figure.title = fmt::format("{}: {}", name, law);
   figure.caption = fmt::format(
       "{} and the law {}, driven by the measured {}; rms residual {} % of the peak where fitted.",
-      words_of(r.response_quantity), law, words_of(r.drive_quantity),
+      spaced(quantity_name(r.response_quantity)), law, spaced(quantity_name(r.drive_quantity)),
       significant(100.0 * r.rms_residual / r.peak, 3));
   if (r.not_predicted > 0) {
     figure.caption += fmt::format(
@@ -169,16 +161,13 @@ Figure selection_figure(const Selection& selection) {
   figure.title = "Which law";
   figure.caption = fmt::format(
       "Every law that was fitted: residual, and BIC above the best with {} effective readings, "
-      "over "
-      "the number of estimated parameters. The recommended law is {}.",
+      "over the number of estimated parameters. The recommended law is {}.",
       significant(selection.effective_count, 3),
       law_name(selection.candidates[selection.recommended].law));
   Panel residual;
   residual.x = {"estimated parameters", "", false, {}, {}};
   residual.y = {"rms residual over peak", "%", true, {}, {}};
-  Panel bic;
-  bic.x = residual.x;
-  bic.y = {"BIC above the best", "", false, {}, {}};
+  Panel bic{.x = residual.x, .y = {"BIC above the best", "", false, {}, {}}};
   for (const bool recommended : {false, true}) {
     add_if_any(residual, laws_at(selection, false, recommended));
     add_if_any(bic, laws_at(selection, true, recommended));
@@ -193,13 +182,9 @@ Figure waterfall_figure(const FitResult& fit) {
   figure.title = "Where the starts ended";
   figure.caption = fmt::format("Deviance of the end of each start that was followed, sorted: {}.",
                                fit.waterfall.words);
-  Panel panel;
-  panel.x = {"start, sorted", "", false, {}, {}};
-  panel.y = {"deviance above the best", "", false, {}, {}};
-  Series ends;
-  ends.kind = Series::Kind::points;
-  ends.label = "end of a start";
-  ends.provenance = "model";
+  Panel panel{.x = {"start, sorted", "", false, {}, {}},
+              .y = {"deviance above the best", "", false, {}, {}}};
+  Series ends{.kind = Series::Kind::points, .label = "end of a start", .provenance = "model"};
   for (std::size_t i = 0; i < fit.waterfall.deviances.size(); ++i) {
     ends.x.push_back(static_cast<double>(i + 1));
     ends.y.push_back(fit.waterfall.deviances[i] - fit.waterfall.deviances.front());
@@ -209,16 +194,18 @@ Figure waterfall_figure(const FitResult& fit) {
   return figure;
 }
 
-FitConfig seen_from(const std::filesystem::path& folder, FitConfig config) {
-  for (DataChoice& data : config.data) {
-    const std::filesystem::path path(data.dataset);
-    if (path.has_extension() && path.is_relative()) {
-      data.dataset = std::filesystem::absolute(path)
-                         .lexically_relative(std::filesystem::absolute(folder))
-                         .generic_string();
-    }
-  }
-  return config;
+std::vector<std::string> write_selection(const std::filesystem::path& folder,
+                                         const Selection& selection, std::vector<Figure> figures) {
+  const FitResult& fit = selection.candidates[selection.recommended].fit;
+  figures.push_back(selection_figure(selection));
+  figures.push_back(waterfall_figure(fit));
+  std::vector<std::string> files{"config.json", "selection.json", "law.json", "laws.csv"};
+  write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
+  write_file(folder / files[1], to_text(to_json(selection)));
+  write_law(folder / files[2], fitted_law(fit));
+  write_file(folder / files[3], laws_csv(selection));
+  for (std::string& name : write_fit_csv(folder, fit)) files.push_back(std::move(name));
+  return write_figures(folder, figures, std::move(files));
 }
 
 std::vector<std::string> write_recording_report(const std::filesystem::path& folder,
@@ -230,18 +217,7 @@ std::vector<std::string> write_recording_report(const std::filesystem::path& fol
     figures.back().id =
         fmt::format("{}{}", i == 0 ? "fit" : "fit_", i == 0 ? "" : fmt::format("{}", i + 1));
   }
-  figures.push_back(selection_figure(selection));
-  figures.push_back(waterfall_figure(fit));
-  std::vector<std::string> files{"config.json", "selection.json", "law.json"};
-  write_file(folder / files[0], to_text(config_json(seen_from(folder, fit.config))));
-  write_file(folder / files[1], to_text(to_json(selection)));
-  write_law(folder / files[2], fitted_law(fit));
-  files.emplace_back("laws.csv");
-  write_file(folder / files.back(), laws_csv(selection));
-  for (std::string& name : write_fit_csv(folder, fit)) files.push_back(std::move(name));
-  const std::vector<std::string> drawn = write_figures(folder, figures);
-  files.insert(files.end(), drawn.begin(), drawn.end());
-  return files;
+  return write_selection(folder, selection, std::move(figures));
 }
 
 }  // namespace tpm::report

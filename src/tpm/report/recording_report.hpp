@@ -19,8 +19,10 @@ namespace tpm::report {
 /// Deviances in which the starts ended, sorted.
 [[nodiscard]] Figure waterfall_figure(const FitResult& fit);
 
-/// The configuration with its data sets as a file in the folder finds them.
-[[nodiscard]] FitConfig seen_from(const std::filesystem::path& folder, FitConfig config);
+/// Writes what write_recording_report does, with these figures before those of the selection.
+[[nodiscard]] std::vector<std::string> write_selection(const std::filesystem::path& folder,
+                                                       const Selection& selection,
+                                                       std::vector<Figure> figures);
 
 /// Writes config.json (rerun it with tpm fit), law.json, selection.json with its tables as CSV
 /// (fit_csv.hpp), figures.json and the figures as SVG and PNG into `folder`. Returns the names of

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 
 #include "tpm/core/text.hpp"
 #include "tpm/report/fit_figures.hpp"

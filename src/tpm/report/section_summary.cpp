@@ -3,8 +3,6 @@
 
 #include <cmath>
 
-#include "tpm/core/text.hpp"
-#include "tpm/report/fit_figures.hpp"
 #include "tpm/report/sections.hpp"
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/error.hpp"

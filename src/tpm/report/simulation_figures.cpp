@@ -2,15 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "tpm/core/text.hpp"
 #include "tpm/report/draw.hpp"
 #include "tpm/report/network_report.hpp"
 #include "tpm/simulate/smoothness.hpp"
 #include "tpm/simulate/step_fields.hpp"
 #include "tpm/store/file.hpp"
-#include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
 
 namespace tpm::report {
@@ -97,11 +94,10 @@ Json state_json(const FiguredRun& figured) {
 Panel panel_of(const std::vector<FiguredRun>& runs, bool imposed) {
   const bool by_depth = runs.front().scene->protocol.drive() == Drive::displacement;
   const bool length = imposed == by_depth;
-  Panel panel;
-  panel.title = imposed ? "Imposed" : "Response";
-  panel.x = {"time", "s", false, {}, {}};
-  panel.y = length ? Axis{"indentation depth", "mm", false, {}, {}}
-                   : Axis{imposed ? "load" : "contact force", "N", false, {}, {}};
+  Panel panel{.title = imposed ? "Imposed" : "Response",
+              .x = {"time", "s", false, {}, {}},
+              .y = length ? Axis{"indentation depth", "mm", false, {}, {}}
+                          : Axis{imposed ? "load" : "contact force", "N", false, {}, {}}};
   for (const FiguredRun& figured : runs) {
     std::vector<double> x;
     std::vector<double> y;

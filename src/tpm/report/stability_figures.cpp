@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "tpm/report/stability_report.hpp"
 
 namespace tpm::report {
@@ -27,15 +25,12 @@ const StabilityMap* map_of(const StabilityStudy& study, const std::string& id, S
 }
 
 Panel map_panel(const StabilityMap& map) {
-  Panel panel;
-  panel.title = fmt::format("{}: step against {}", step_rule_name(map.rule), map.quantity);
-  panel.x = {map.quantity, map.unit, true, std::nullopt, std::nullopt};
-  panel.y = {"step", "s", true, std::nullopt, std::nullopt};
+  Panel panel{.title = fmt::format("{}: step against {}", step_rule_name(map.rule), map.quantity),
+              .x = {map.quantity, map.unit, true, std::nullopt, std::nullopt},
+              .y = {"step", "s", true, std::nullopt, std::nullopt}};
   for (const StabilityClassEntry& entry : kStabilityClasses) {
-    Series found;
-    found.kind = Series::Kind::points;
-    found.label = entry.text;
-    found.provenance = "model";
+    Series found{
+        .kind = Series::Kind::points, .label = std::string(entry.text), .provenance = "model"};
     for (const StabilityPoint& p : map.points) {
       if (p.verdict.found != entry.meaning) continue;
       found.x.push_back(p.x);

@@ -5,21 +5,12 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/report/sweep_report.hpp"
 
 namespace tpm::report {
 namespace {
 
 using Behaviour = GridConvergence::Behaviour;
-
-/// The unit in which people read a size or a value.
-Unit convergence_unit(const std::string& si_unit) {
-  if (si_unit.empty()) return {"", Dimension::dimensionless, 1.0};
-  return shown_unit(parse_unit(si_unit, "unit").dimension);
-}
-
-std::string with_symbol(const std::string& name, const Unit& unit) {
-  return unit.symbol.empty() ? name : fmt::format("{} [{}]", name, unit.symbol);
-}
 
 /// The index of the finest size in parts of the extrapolated value.
 double relative_index(const GridConvergence& g) {
@@ -32,7 +23,7 @@ std::string percent_of(double share) {
 
 std::string verdict(const SweepConvergence& c) {
   const GridConvergence& finest = c.threes.back();
-  const Unit unit = convergence_unit(c.unit);
+  const Unit unit = shown_unit_of(c.unit);
   switch (finest.behaviour) {
     case Behaviour::exact:
       return "the finest three agree to rounding: nothing is left to converge";
@@ -66,7 +57,7 @@ std::string verdict(const SweepConvergence& c) {
 std::string fixed_text(const SweepConvergence& c) {
   std::string text;
   for (const FixedValue& h : c.fixed) {
-    const Unit unit = convergence_unit(h.unit);
+    const Unit unit = shown_unit_of(h.unit);
     text += fmt::format("{} {} = {}{}{}", text.empty() ? " at" : ",", h.axis,
                         significant(h.value / unit.to_si, 5), unit.symbol.empty() ? "" : " ",
                         unit.symbol);
@@ -75,7 +66,7 @@ std::string fixed_text(const SweepConvergence& c) {
 }
 
 Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
-  const Unit unit = convergence_unit(c.unit), unit_size = convergence_unit(c.size_unit);
+  const Unit unit = shown_unit_of(c.unit), unit_size = shown_unit_of(c.size_unit);
   const GridConvergence& finest = c.threes.back();
   Figure figure{fmt::format("convergence_{}", c.variable),
                 c.variable,
@@ -125,13 +116,13 @@ Figure convergence_figure(const SweepConvergence& c, const std::string& title) {
 std::string convergence_text(const std::vector<SweepConvergence>& all) {
   std::string text;
   for (const SweepConvergence& c : all) {
-    const Unit unit = convergence_unit(c.unit), unit_size = convergence_unit(c.size_unit);
+    const Unit unit = shown_unit_of(c.unit), unit_size = shown_unit_of(c.size_unit);
     text += fmt::format("{}{} over axis {}", text.empty() ? "" : "\n",
-                        with_symbol(c.variable, unit), c.axis);
+                        named_in_unit(c.variable, unit), c.axis);
     text += fixed_text(c);
     if (c.left_out > 0) text += fmt::format(", {} places without a number left out", c.left_out);
     text += fmt::format("\n{:>20} {:>14} {:>12} {:>8} {:>14} {:>10}\n",
-                        with_symbol(c.size_text, unit_size), "value", "behaviour", "order",
+                        named_in_unit(c.size_text, unit_size), "value", "behaviour", "order",
                         "extrapolated", "index");
     for (std::size_t i = 0; i < c.size.size(); ++i) {
       text += fmt::format("{:>20} {:>14}", significant(c.size[i] / unit_size.to_si, 5),

@@ -22,10 +22,6 @@ std::vector<double> in_shown_unit(std::vector<double> values, const Unit& unit) 
   return values;
 }
 
-std::string named_in_unit(const std::string& name, const Unit& unit) {
-  return unit.symbol.empty() ? name : fmt::format("{} [{}]", name, unit.symbol);
-}
-
 /// At most so many numbers from 0 to count - 1, evenly, both ends among them.
 std::vector<std::size_t> some_of(std::size_t count, std::size_t most) {
   std::vector<std::size_t> chosen;
@@ -178,10 +174,7 @@ std::vector<Panel> sweep_clouds(const SweepReader& sweep, const ReadVariable& v,
   for (const std::string& name : axis.parameters) {
     const std::vector<double> values = sweep.parameter(name);
     const Unit unit_x = shown_unit_of(sweep.parameter_unit(name));
-    Series cloud;
-    cloud.kind = Series::Kind::points;
-    cloud.label = v.name;
-    cloud.provenance = "model";
+    Series cloud{.kind = Series::Kind::points, .label = v.name, .provenance = "model"};
     for (const std::size_t i : chosen) {
       if (!std::isfinite(found[i])) continue;
       cloud.x.push_back(values[i] / unit_x.to_si);
@@ -235,10 +228,7 @@ Figure sweep_figure(const SweepReader& sweep, const ReadVariable& v, const Sweep
 Figure pareto_figure(const SweepReader& sweep, const std::string& first,
                      const std::string& second) {
   std::vector<std::pair<double, double>> front;
-  Series cloud;
-  cloud.kind = Series::Kind::points;
-  cloud.label = "cells";
-  cloud.provenance = "model";
+  Series cloud{.kind = Series::Kind::points, .label = "cells", .provenance = "model"};
   const std::uint64_t stride = sweep.cells() / kMostPoints + 1;
   std::uint64_t cell = 0;
   const Unit unit_x = shown_unit_of(sweep.variable(second).unit),
@@ -291,6 +281,10 @@ FoundRange range_of(const SweepReader& sweep, const std::string& name) {
 }
 
 }  // namespace
+
+std::string named_in_unit(const std::string& name, const Unit& unit) {
+  return unit.symbol.empty() ? name : fmt::format("{} [{}]", name, unit.symbol);
+}
 
 Unit shown_unit_of(const std::string& si_unit) {
   if (si_unit.empty()) return {"", Dimension::dimensionless, 1.0};

@@ -12,6 +12,8 @@ namespace tpm::report {
 
 /// The unit in which people read numbers of an SI unit; empty for plain numbers.
 [[nodiscard]] Unit shown_unit_of(const std::string& si_unit);
+/// "depth [mm]"
+[[nodiscard]] std::string named_in_unit(const std::string& name, const Unit& unit);
 
 /// What a file of results holds: axes, variables with their ranges, cells and reasons.
 [[nodiscard]] std::string sweep_text(const SweepReader& sweep);

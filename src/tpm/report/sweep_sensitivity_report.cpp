@@ -34,10 +34,7 @@ Panel index_panel(const std::string& what, const SweepSensitivity& s,
   interval.kind = Series::Kind::bracket;
   interval.label = "95 % interval";
   interval.provenance = "model";
-  Series value;
-  value.kind = Series::Kind::points;
-  value.label = "index";
-  value.provenance = "model";
+  Series value{.kind = Series::Kind::points, .label = "index", .provenance = "model"};
   for (std::size_t i = 0; i < s.parameters.size(); ++i) {
     const IndexEstimate& index = s.indices.inputs[i].*of;
     interval.x.push_back(static_cast<double>(i + 1));

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 
-#include "tpm/core/text.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 
@@ -73,11 +72,10 @@ void ViewPage::fact(std::string_view name, std::string_view value) {
 }
 
 std::string ViewPage::html() const {
-  const auto file = share_dir() / "pages" / "view.html";
-  std::string page = read_file(file);
+  std::string page = read_page("view.html");
   const std::size_t at = page.find(kPlaceOfData);
   if (at == std::string::npos) {
-    throw Error(ExitCode::environment, file.string(), "has no place for the data",
+    throw Error(ExitCode::environment, "pages/view.html", "has no place for the data",
                 "the page that belongs to this version of tpm");
   }
   const std::string data =

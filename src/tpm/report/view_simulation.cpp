@@ -1,8 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-
-#include "tpm/core/text.hpp"
 #include "tpm/report/view_parts.hpp"
 #include "tpm/store/hdf5.hpp"
 #include "tpmkit/error.hpp"

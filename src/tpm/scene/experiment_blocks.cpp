@@ -9,7 +9,6 @@
 
 #include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
-#include "tpm/scene/blocks.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {

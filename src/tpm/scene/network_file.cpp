@@ -4,7 +4,6 @@
 
 #include <numeric>
 
-#include "tpm/core/text.hpp"
 #include "tpm/scene/xdmf.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/version.hpp"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "tpm/core/text.hpp"
 #include "tpm/network/lowest_mode.hpp"

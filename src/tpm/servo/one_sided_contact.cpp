@@ -1,7 +1,5 @@
 #include "tpm/servo/one_sided_contact.hpp"
 
-#include <algorithm>
-
 namespace tpm::haptics {
 
 OneSidedContact::OneSidedContact(ContactModel& model, const Eigen::Vector3d& push)

@@ -1,6 +1,5 @@
 #include "tpm/servo/oscillation_watch.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace tpm::haptics {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/enum_names.hpp"
+
 namespace tpm::haptics {
 namespace {
 
@@ -47,51 +49,31 @@ bool is_gone(int error) {
 }  // namespace
 
 std::string_view word_of(StopCause cause) {
-  switch (cause) {
-    case StopCause::none:
-      return "none";
-    case StopCause::finished:
-      return "finished";
-    case StopCause::signal:
-      return "signal";
-    case StopCause::exception:
-      return "exception";
-    case StopCause::communication:
-      return "communication error";
-    case StopCause::unplugged:
-      return "unplugged";
-    case StopCause::watchdog:
-      return "watchdog of the device";
-    case StopCause::velocity:
-      return "too fast for the device";
-    case StopCause::button:
-      return "button of the device";
-    case StopCause::software:
-      return "forces switched off by software";
-    case StopCause::dead_man:
-      return "dead man's switch";
-    case StopCause::forces_off:
-      return "forces cut for an unknown reason";
-    case StopCause::position_not_finite:
-      return "position not finite";
-    case StopCause::force_not_finite:
-      return "force not finite";
-    case StopCause::overrun_storm:
-      return "overrun storm";
-    case StopCause::hang:
-      return "hang";
-    case StopCause::not_in_place:
-      return "operator not in place";
-    case StopCause::untrusted:
-      return "model not trusted";
-    case StopCause::energy:
-      return "energy given to the hand";
-    case StopCause::oscillation:
-      return "oscillation";
-    case StopCause::position_jump:
-      return "position jumped";
-  }
-  return "unknown";
+  static constexpr auto kNames = std::to_array<Word<StopCause>>({
+      {StopCause::none, "none"},
+      {StopCause::finished, "finished"},
+      {StopCause::signal, "signal"},
+      {StopCause::exception, "exception"},
+      {StopCause::communication, "communication error"},
+      {StopCause::unplugged, "unplugged"},
+      {StopCause::watchdog, "watchdog of the device"},
+      {StopCause::velocity, "too fast for the device"},
+      {StopCause::button, "button of the device"},
+      {StopCause::software, "forces switched off by software"},
+      {StopCause::dead_man, "dead man's switch"},
+      {StopCause::forces_off, "forces cut for an unknown reason"},
+      {StopCause::position_not_finite, "position not finite"},
+      {StopCause::force_not_finite, "force not finite"},
+      {StopCause::overrun_storm, "overrun storm"},
+      {StopCause::hang, "hang"},
+      {StopCause::not_in_place, "operator not in place"},
+      {StopCause::untrusted, "model not trusted"},
+      {StopCause::energy, "energy given to the hand"},
+      {StopCause::oscillation, "oscillation"},
+      {StopCause::position_jump, "position jumped"},
+  });
+  const std::string_view word = word_for(kNames, cause);
+  return word.empty() ? "unknown" : word;
 }
 
 ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings settings)

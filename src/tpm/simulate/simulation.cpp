@@ -1,6 +1,5 @@
 #include "tpm/simulate/simulation.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "tpm/network/lowest_mode.hpp"

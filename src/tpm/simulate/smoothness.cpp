@@ -1,7 +1,5 @@
 #include "tpm/simulate/smoothness.hpp"
 
-#include <algorithm>
-
 namespace tpm::organ {
 
 SmoothnessProbe::SmoothnessProbe(const ExperimentScene& scene)

@@ -6,6 +6,26 @@
 
 namespace tpm::sundials {
 
+extern "C" {
+// A custom matrix and its solver hold nothing of their own.
+static SUNMatrix_ID custom_matrix_id(SUNMatrix) {
+  return SUNMATRIX_CUSTOM;
+}
+
+static int custom_matrix_zero(SUNMatrix) {
+  return 0;
+}
+
+static SUNLinearSolver_Type custom_solver_type(SUNLinearSolver) {
+  return SUNLINEARSOLVER_DIRECT;
+}
+
+static int custom_solver_free(SUNLinearSolver solver) {
+  SUNLinSolFreeEmpty(solver);
+  return 0;
+}
+}
+
 std::string flag_name(int flag) {
   char* name = CVodeGetReturnFlagName(flag);
   std::string text = name;
@@ -30,6 +50,25 @@ Context make_context() {
   SUNContext_ClearErrHandlers(context);
 #endif
   return Context(context);
+}
+
+Matrix custom_matrix(SUNContext context) {
+  Matrix matrix(SUNMatNewEmpty(context));
+  matrix->ops->getid = custom_matrix_id;
+  matrix->ops->destroy = SUNMatFreeEmpty;
+  matrix->ops->zero = custom_matrix_zero;
+  return matrix;
+}
+
+LinearSolver custom_solver(SUNContext context, void* content,
+                           int (*solve)(SUNLinearSolver, SUNMatrix, N_Vector, N_Vector,
+                                        sunrealtype)) {
+  LinearSolver solver(SUNLinSolNewEmpty(context));
+  solver->content = content;
+  solver->ops->gettype = custom_solver_type;
+  solver->ops->solve = solve;
+  solver->ops->free = custom_solver_free;
+  return solver;
 }
 
 void mute(void* cvodes) {

@@ -7,6 +7,7 @@
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
+#include <Eigen/Core>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -45,6 +46,19 @@ using Cvodes = std::unique_ptr<void, FreeCvodes>;
 void check(int flag, std::string_view call);
 
 [[nodiscard]] Context make_context();
+
+/// The numbers of a serial vector.
+[[nodiscard]] inline Eigen::Map<Eigen::VectorXd> view(N_Vector v) {
+  return {NV_DATA_S(v), static_cast<Eigen::Index>(NV_LENGTH_S(v))};
+}
+
+/// A matrix that stands for a factorisation inside the problem.
+[[nodiscard]] Matrix custom_matrix(SUNContext context);
+
+/// The solver of such a matrix. @param content what `solve` finds in its first argument
+[[nodiscard]] LinearSolver custom_solver(SUNContext context, void* content,
+                                         int (*solve)(SUNLinearSolver, SUNMatrix, N_Vector,
+                                                      N_Vector, sunrealtype));
 
 /// Lets an integrator print nothing: what goes wrong is thrown where its return value is checked.
 void mute(void* cvodes);

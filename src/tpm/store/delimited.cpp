@@ -6,9 +6,9 @@
 
 #include <algorithm>
 #include <deque>
-#include <iterator>
 #include <utility>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -311,19 +311,14 @@ bool uses_decimal_comma(const std::vector<DelimitedRow>& rows, char separator) {
 }  // namespace
 
 std::string_view encoding_name(Encoding encoding) noexcept {
-  switch (encoding) {
-    case Encoding::utf8:
-      return "UTF-8";
-    case Encoding::utf8_with_mark:
-      return "UTF-8 with byte order mark";
-    case Encoding::utf16_little_endian:
-      return "UTF-16 LE";
-    case Encoding::utf16_big_endian:
-      return "UTF-16 BE";
-    case Encoding::latin1:
-      return "latin-1";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<Encoding>>({
+      {Encoding::utf8, "UTF-8"},
+      {Encoding::utf8_with_mark, "UTF-8 with byte order mark"},
+      {Encoding::utf16_little_endian, "UTF-16 LE"},
+      {Encoding::utf16_big_endian, "UTF-16 BE"},
+      {Encoding::latin1, "latin-1"},
+  });
+  return word_for(kNames, encoding);
 }
 
 std::string_view separator_name(char separator) noexcept {

@@ -229,6 +229,19 @@ fs::path share_dir() {
               "an installation with share/tpmkit, or TPMKIT_SHARE pointing to one");
 }
 
+std::string read_page(std::string_view name) {
+  constexpr std::string_view kPlace = "<script src=\"drawing.js\"></script>";
+  const fs::path folder = share_dir() / "pages";
+  std::string page = read_file(folder / name);
+  const std::size_t at = page.find(kPlace);
+  if (at == std::string::npos) {
+    throw Error(ExitCode::environment, (folder / name).string(), "does not name drawing.js",
+                "the page that belongs to this version of tpm");
+  }
+  return page.replace(at, kPlace.size(),
+                      "<script>\n" + read_file(folder / "drawing.js") + "</script>");
+}
+
 std::string sha256_hex(std::string_view bytes) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
   SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), digest.data());

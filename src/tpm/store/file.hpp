@@ -44,6 +44,10 @@ void write_file(const std::filesystem::path& path, std::string_view bytes);
 /// Error(environment) if none of them has a data folder.
 [[nodiscard]] std::filesystem::path share_dir();
 
+/// A page of share_dir()/pages as one file, with pages/drawing.js in it. Throws Error(environment)
+/// if either is missing or damaged.
+[[nodiscard]] std::string read_page(std::string_view name);
+
 /// SHA-256 of the bytes in lower-case hexadecimal; ties a result to the data that made it.
 [[nodiscard]] std::string sha256_hex(std::string_view bytes);
 

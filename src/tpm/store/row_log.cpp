@@ -127,13 +127,8 @@ void RowLogWriter::append(const void* row) {
 }
 
 void RowLogWriter::flush() {
-  std::size_t done = 0;
-  while (done < kept_.size()) {
-    const ssize_t written = ::write(file_, kept_.data() + done, kept_.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw cannot_write_rows(path_, "cannot be written on");
-    done += static_cast<std::size_t>(written);
-  }
+  const std::string_view bytes(reinterpret_cast<const char*>(kept_.data()), kept_.size());
+  if (!write_all(file_, bytes)) throw cannot_write_rows(path_, "cannot be written on");
   kept_.clear();
 }
 

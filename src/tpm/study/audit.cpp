@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/audit_kinds.hpp"
 #include "tpmkit/error.hpp"
@@ -115,21 +116,15 @@ Finding examine(const ClaimSet& set, const Json& item) {
 }  // namespace
 
 std::string_view verdict_name(AuditVerdict verdict) noexcept {
-  switch (verdict) {
-    case AuditVerdict::holds:
-      return "holds";
-    case AuditVerdict::holds_by_truncation:
-      return "holds by truncation";
-    case AuditVerdict::last_digit_off:
-      return "last digit off";
-    case AuditVerdict::differs:
-      return "differs";
-    case AuditVerdict::contradicted:
-      return "contradicted";
-    case AuditVerdict::cannot_be_told:
-      return "cannot be told";
-  }
-  return "";
+  static constexpr auto kNames = std::to_array<Word<AuditVerdict>>({
+      {AuditVerdict::holds, "holds"},
+      {AuditVerdict::holds_by_truncation, "holds by truncation"},
+      {AuditVerdict::last_digit_off, "last digit off"},
+      {AuditVerdict::differs, "differs"},
+      {AuditVerdict::contradicted, "contradicted"},
+      {AuditVerdict::cannot_be_told, "cannot be told"},
+  });
+  return word_for(kNames, verdict);
 }
 
 std::string Finding::verdict_words() const {

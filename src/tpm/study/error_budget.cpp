@@ -59,8 +59,7 @@ std::string hand_sentence(const ErrorBudget& budget) {
   if (all < kForceJnd) {
     return fmt::format(
         "the whole chain ({}) stays below what a hand tells of a force ({}): measuring or "
-        "computing "
-        "finer would not be felt",
+        "computing finer would not be felt",
         part_text(all), part_text(kForceJnd));
   }
   if (all < kStiffnessThroughTool) {

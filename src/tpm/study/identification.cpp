@@ -6,19 +6,12 @@
 #include <cmath>
 
 #include "tpm/core/text.hpp"
+#include "tpm/fit/fitted_law.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
 namespace tpm::study {
 namespace {
-
-LawSpec live_law(Kernel kernel, int branches, Tension tension) {
-  LawSpec spec;
-  spec.kernel = kernel;
-  spec.branches = branches;
-  spec.tension = tension;
-  return spec;
-}
 
 void require_possible(const IdentifyOptions& options) {
   const auto within = [](double value, double low, double high, const char* what) {
@@ -88,11 +81,6 @@ class StoppingRule {
   std::size_t law_ = 0;
 };
 
-Coordinate coordinate_of(Scale scale) {
-  if (scale == Scale::log) return Coordinate::log;
-  return scale == Scale::linear ? Coordinate::linear : Coordinate::inverse_square;
-}
-
 LawUncertainty uncertainty_of(const SequentialEstimate& e, double level) {
   LawUncertainty u;
   std::vector<Eigen::Index> rows;
@@ -125,10 +113,10 @@ std::vector<LawSpec> live_laws() {
   std::vector<LawSpec> laws;
   for (const Kernel kernel : {Kernel::linear, Kernel::power}) {
     for (int branches = 0; branches <= 2; ++branches) {
-      laws.push_back(live_law(kernel, branches, Tension::none));
+      laws.push_back({.kernel = kernel, .branches = branches});
     }
   }
-  laws.push_back(live_law(Kernel::linear, 1, Tension::elastic));
+  laws.push_back({.tension = Tension::elastic});
   return laws;
 }
 

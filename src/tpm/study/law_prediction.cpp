@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
-#include <limits>
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/enum_names.hpp"

@@ -7,7 +7,6 @@
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/enum_names.hpp"
-#include "tpm/core/text.hpp"
 #include "tpm/fit/least_squares.hpp"
 #include "tpm/study/budget_parts.hpp"
 #include "tpm/study/organ_bonds.hpp"

@@ -1,5 +1,4 @@
 // A study of the paper's experiments as JSON.
-#include <fmt/format.h>
 
 #include "tpm/core/text.hpp"
 #include "tpm/study/organ_study.hpp"

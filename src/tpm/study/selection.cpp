@@ -12,14 +12,6 @@
 namespace tpm::study {
 namespace {
 
-LawSpec law_of(Kernel kernel, int branches, Tension tension) {
-  LawSpec spec;
-  spec.kernel = kernel;
-  spec.branches = branches;
-  spec.tension = tension;
-  return spec;
-}
-
 /// Residuals of a fit, one run for each recording, in the order of time.
 std::vector<std::vector<double>> standardised_runs(const FitResult& fit) {
   std::vector<std::vector<double>> runs;
@@ -350,12 +342,12 @@ std::vector<LawSpec> classical_family() {
   std::vector<LawSpec> laws;
   for (const Kernel kernel : {Kernel::linear, Kernel::hertz, Kernel::power}) {
     for (int branches = 0; branches <= 3; ++branches) {
-      laws.push_back(law_of(kernel, branches, Tension::none));
+      laws.push_back({.kernel = kernel, .branches = branches});
     }
   }
   for (int branches = 0; branches <= 3; ++branches) {
-    laws.push_back(law_of(Kernel::linear, branches, Tension::elastic));
-    if (branches > 0) laws.push_back(law_of(Kernel::linear, branches, Tension::relaxing));
+    laws.push_back({.branches = branches, .tension = Tension::elastic});
+    if (branches > 0) laws.push_back({.branches = branches, .tension = Tension::relaxing});
   }
   return laws;
 }
@@ -365,9 +357,7 @@ std::vector<LawSpec> fractional_family() {
   for (const Kernel kernel : {Kernel::linear, Kernel::hertz, Kernel::power}) {
     for (const Fractional fractional : {Fractional::springpot, Fractional::maxwell,
                                         Fractional::kelvin_voigt, Fractional::zener}) {
-      LawSpec spec = law_of(kernel, 0, Tension::none);
-      spec.fractional = fractional;
-      laws.push_back(spec);
+      laws.push_back({.kernel = kernel, .branches = 0, .fractional = fractional});
     }
   }
   return laws;

@@ -74,8 +74,7 @@ std::vector<std::string> outside_words(const FitResult& fit) {
       const bool describes = rms <= kDescribes * r.rms_residual;
       words.push_back(fmt::format(
           "{}: after the fitted part (from {} s, {} samples, to a drive of {}) the prediction is "
-          "off "
-          "by {} % of the peak (rms){}",
+          "off by {} % of the peak (rms){}",
           name, significant(o.last_fitted_s, 4), o.predicted, significant(o.last_drive, 3),
           significant(100.0 * rms / r.peak, 3),
           describes ? "" : ": the law does not describe the unloading and what follows"));
