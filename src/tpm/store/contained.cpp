@@ -138,9 +138,9 @@ void confine(int descriptor, int parent, bool writes, std::uint64_t memory_bytes
   ::dup2(back, kParent);
   (void)::close_range(kParent + 1, ~0U, 0);
 
-  // Nothing else can be opened from here on; where HDF5 writes, UBSan looks at memory by a pipe.
-  const std::uint64_t of_sanitizer = kSanitized && writes ? 2 : 0;
-  set_limit(RLIMIT_NOFILE, kParent + 1 + of_sanitizer);
+  // Nothing else can be opened from here on; UBSan looks at memory by a pipe.
+  constexpr std::uint64_t kOfSanitizer = kSanitized ? 2 : 0;
+  set_limit(RLIMIT_NOFILE, kParent + 1 + kOfSanitizer);
   set_limit(RLIMIT_CORE, 0);
   if (writes) return;
   set_limit(RLIMIT_FSIZE, 0);
