@@ -10,7 +10,7 @@ namespace tpm {
 namespace {
 
 constexpr std::size_t kNodes = 16;
-constexpr std::size_t kWorth = 3;  // times the nodes: fewer places are not worth a polynomial
+constexpr std::size_t kWorth = 2;  // times the nodes: fewer places are not worth a polynomial
 
 /// Chebyshev nodes of a stretch, rising.
 std::array<double, kNodes> nodes_between(double from, double to) {
