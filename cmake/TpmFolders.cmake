@@ -138,7 +138,7 @@ namespace tpm {
 endfunction()
 
 set(TPM_SANITIZED_FOLDERS core store protocol material solve model law network curve scene simulate method
-    reduce device servo haptics sample CACHE STRING "Folders under address and undefined in sanitized copies")
+    reduce device servo haptics sample fit study CACHE STRING "Folders under address and undefined in sanitized copies")
 
 # A copy of the library in which the folders named run under sanitizers; the others are those of
 # tpmkit. The fast tests, compiled once, run with tpmkit and with the copy. A folder's own inline
