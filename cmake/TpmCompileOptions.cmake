@@ -22,6 +22,9 @@ if(TPM_SANITIZE)
   if(TPM_SANITIZE MATCHES "address" AND TPM_SANITIZE MATCHES "undefined" AND NOT TPM_SANITIZE_EVERYTHING)
     add_compile_options(-fno-sanitize=null,alignment,object-size,vptr)
   endif()
+  if(TPM_SANITIZE_EVERYTHING)
+    add_compile_definitions(TPM_SANITIZE_EVERYTHING)
+  endif()
   # Under AddressSanitizer Eigen would align by hand, while the packaged Ceres, built without it,
   # leaves that to malloc: matrices handed from one to the other would be freed wrongly.
   add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
