@@ -10,6 +10,7 @@ namespace {
 
 std::vector<double> evenly(double from, double to, int count) {
   std::vector<double> places;
+  places.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) places.push_back(from + (to - from) * i / (count - 1));
   return places;
 }

@@ -462,19 +462,19 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Constraints co
       rest_(std::move(rest)),
       constraints_(std::move(constraints)),
       probes_(std::move(probes)),
-      options_(options) {
-  require_number(options.tolerance >= 1e-12 && options.tolerance <= 0.1, "tolerance",
-                 options.tolerance, "1e-12 to 0.1");
-  if (options.stages < 2 || options.stages > kLanes) {
-    throw bad_input("stages", std::to_string(options.stages), fmt::format("2 to {}", kLanes));
+      options_(std::move(options)) {
+  require_number(options_.tolerance >= 1e-12 && options_.tolerance <= 0.1, "tolerance",
+                 options_.tolerance, "1e-12 to 0.1");
+  if (options_.stages < 2 || options_.stages > kLanes) {
+    throw bad_input("stages", std::to_string(options_.stages), fmt::format("2 to {}", kLanes));
   }
-  for (const TangentDirection& direction : options.directions) {
+  for (const TangentDirection& direction : options_.directions) {
     const auto size = static_cast<Eigen::Index>(bonds.size());
     if (direction.stiffness.size() == size && direction.relaxing.size() == size) continue;
     throw bad_input("directions", "changes of another number of bonds",
                     fmt::format("one number for each of the {} bonds", size));
   }
-  const double step_s = options.step_s.value_or(1.0);
+  const double step_s = options_.step_s.value_or(1.0);
   require_number(is_positive(step_s), "step", step_s, "a time above 0", " s");
   require_valid(probes_, constraints_);
 }
