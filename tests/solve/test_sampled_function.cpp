@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <vector>
@@ -87,4 +88,14 @@ TEST_CASE("Nothing is interpolated where no difference is allowed, or a value is
               Eigen::RowVector2d(1.0, 1.0));
   CHECK(std::isnan(values(150, 0)));
   CHECK(values(10, 0) == Approx(places[10]));
+  // Places that no number lies between cannot be halved, whichever of them their middle rounds to.
+  Counted never{[](double) { return std::nan(""); }};
+  for (const double from : {0.3, std::nextafter(0.3, 1.0)}) {
+    std::vector<double> next_to(64, from);
+    std::fill(next_to.begin() + 32, next_to.end(), std::nextafter(from, 1.0));
+    const Eigen::MatrixXd close =
+        sampled([&](std::span<const double> asked) { return never(asked); }, next_to, 8,
+                Eigen::RowVector2d(1.0, 1.0));
+    CHECK(close.col(0).array().isNaN().all());
+  }
 }

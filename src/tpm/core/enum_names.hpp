@@ -25,12 +25,14 @@ constexpr const auto& entry_of(const Words& words, Enum meaning) noexcept {
                        [meaning](const auto& word) { return word.meaning == meaning; });
 }
 
-/// The text of a value; nothing if the table does not hold it.
+/// The text of a value, or another where the table does not hold it.
 template <typename Words, typename Enum>
-constexpr std::string_view word_for(const Words& words, Enum meaning) noexcept {
-  const auto found = std::find_if(words.begin(), words.end(),
-                                  [meaning](const auto& word) { return word.meaning == meaning; });
-  return found == words.end() ? std::string_view() : std::string_view(found->text);
+constexpr std::string_view word_for(const Words& words, Enum meaning,
+                                    std::string_view otherwise = "") noexcept {
+  for (const auto& word : words) {
+    if (word.meaning == meaning) return word.text;
+  }
+  return otherwise;
 }
 
 /// The entry with this text, or null.

@@ -14,8 +14,7 @@ std::string_view word_of(ForcesOff cause) {
       {ForcesOff::unplugged, "unplugged"},
       {ForcesOff::dead_man, "dead man's switch"},
   });
-  const std::string_view word = word_for(kNames, cause);
-  return word.empty() ? "unknown" : word;
+  return word_for(kNames, cause, "unknown");
 }
 
 std::string_view word_of(DeviceLink link) {
@@ -26,8 +25,7 @@ std::string_view word_of(DeviceLink link) {
       {DeviceLink::simulated, "simulated"},
       {DeviceLink::network, "network"},
   });
-  const std::string_view word = word_for(kNames, link);
-  return word.empty() ? "unknown" : word;
+  return word_for(kNames, link, "unknown");
 }
 
 }  // namespace tpm::haptics

@@ -287,8 +287,7 @@ std::string_view word_of(SessionPhaseKind kind) {
       {SessionPhaseKind::load, "load"},
       {SessionPhaseKind::creep, "creep"},
   });
-  const std::string_view word = word_for(kNames, kind);
-  return word.empty() ? "motion" : word;
+  return word_for(kNames, kind, "motion");
 }
 
 double deepest_asked_m(const HilSession& session, double under_loads_m) {

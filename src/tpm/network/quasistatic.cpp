@@ -294,41 +294,37 @@ class Run {
       if (!(time < state_.time_s + h)) break;
       fractions.push_back(std::max((time - state_.time_s) / h, 0.0));
     }
-    Eigen::RowVectorXd allowed = Eigen::RowVectorXd::Constant(
-        tangents_ ? 1 + tangents_->count() : 1,
-        kStepShare * options_.derivative_tolerance.value_or(options_.tolerance));
-    allowed[0] = kStepShare * options_.tolerance;
-    const Eigen::MatrixXd answers =
-        sampled([&](std::span<const double> asked) { return answers_within(asked, h, rate); },
-                fractions, kLanes, stages_.scale() * allowed);
-    for (Eigen::Index i = 0; i < answers.rows() && tangents_; ++i) {
-      derivative_row(next_ + static_cast<std::size_t>(i)) = answers.row(i).tail(tangents_->count());
-    }
-    if (!observer_) {
-      for (const double response : answers.col(0)) put(response);
-      return;
-    }
-    for (std::span<const double> rest = fractions; !rest.empty();) {
+    if (tangents_ || !observer_) answer(fractions, h, rate);
+    for (std::span<const double> rest = fractions; observer_ && !rest.empty();) {
       const std::size_t count = std::min<std::size_t>(kLanes, rest.size());
       show_within(rest.first(count), h, rate, energy);
       rest = rest.subspan(count);
     }
   }
 
-  /// Responses, then their derivatives, at fractions of the step just found. Responses are left out
-  /// where an observer is shown states, which bring them.
-  [[nodiscard]] Eigen::MatrixXd answers_within(std::span<const double> fractions, double h,
-                                               double rate) {
-    const auto count = static_cast<Eigen::Index>(fractions.size());
-    Eigen::MatrixXd answers = Eigen::MatrixXd::Zero(count, tangents_ ? 1 + tangents_->count() : 1);
-    if (!observer_) {
-      answers.col(0) = stages_.responses_within(state_, fractions, h, rate).head(count);
+  /// Puts derivatives at fractions of the step just found, and responses unless an observer is
+  /// shown states, which bring them.
+  void answer(std::span<const double> fractions, double h, double rate) {
+    const Eigen::Index derivatives = tangents_ ? tangents_->count() : 0;
+    Eigen::RowVectorXd allowed = Eigen::RowVectorXd::Constant(
+        1 + derivatives, options_.derivative_tolerance.value_or(options_.tolerance));
+    allowed[0] = options_.tolerance;
+    const auto answers_at = [&](std::span<const double> asked) {
+      const auto count = static_cast<Eigen::Index>(asked.size());
+      Eigen::MatrixXd rows(count, 1 + derivatives);
+      rows.col(0) = stages_.responses_within(state_, asked, h, rate).head(count);
+      if (tangents_) {
+        rows.rightCols(derivatives) = tangents_->responses_within(state_, asked, h, rate);
+      }
+      return rows;
+    };
+    const Eigen::MatrixXd answers =
+        sampled(answers_at, fractions, kLanes, kStepShare * stages_.scale() * allowed);
+    for (Eigen::Index i = 0; i < answers.rows() && tangents_; ++i) {
+      derivative_row(next_ + static_cast<std::size_t>(i)) = answers.row(i).tail(derivatives);
     }
-    if (tangents_) {
-      answers.rightCols(tangents_->count()) =
-          tangents_->responses_within(state_, fractions, h, rate);
-    }
-    return answers;
+    if (observer_) return;
+    for (const double response : answers.col(0)) put(response);
   }
 
   /// Responses within the step just found, with the states there.
@@ -474,8 +470,9 @@ QuasiStatic::QuasiStatic(const BondSystem& bonds, Positions rest, Constraints co
     throw bad_input("directions", "changes of another number of bonds",
                     fmt::format("one number for each of the {} bonds", size));
   }
-  const double step_s = options_.step_s.value_or(1.0);
-  require_number(is_positive(step_s), "step", step_s, "a time above 0", " s");
+  if (options_.step_s) {
+    require_number(is_positive(*options_.step_s), "step", *options_.step_s, "a time above 0", " s");
+  }
   require_valid(probes_, constraints_);
 }
 

@@ -72,8 +72,7 @@ std::string_view word_of(StopCause cause) {
       {StopCause::oscillation, "oscillation"},
       {StopCause::position_jump, "position jumped"},
   });
-  const std::string_view word = word_for(kNames, cause);
-  return word.empty() ? "unknown" : word;
+  return word_for(kNames, cause, "unknown");
 }
 
 ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings settings)

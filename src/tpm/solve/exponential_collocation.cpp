@@ -37,16 +37,12 @@ std::vector<double> radau_nodes(int count) {
 }
 
 ExponentialCollocation::ExponentialCollocation(std::vector<double> nodes)
-    : nodes_(std::move(nodes)), scale_(static_cast<Eigen::Index>(nodes_.size())) {
-  for (Eigen::Index k = 0; k < scale_.size(); ++k) {
-    scale_[k] = others(nodes_[static_cast<std::size_t>(k)])[k];
-  }
-}
+    : basis_(std::move(nodes)) {}
 
 ExponentialCollocation::Place ExponentialCollocation::place(double c) const {
   // Gauss with 30 abscissas: to rounding for exp(-z (c - s)) times a polynomial up to z c = 60.
   using Rule = boost::math::quadrature::gauss<double, 30>;
-  const auto n = static_cast<Eigen::Index>(nodes_.size());
+  const auto n = static_cast<Eigen::Index>(nodes().size());
   const auto half_count = static_cast<Eigen::Index>(Rule::abscissa().size());
   Place place;
   place.c_ = c;
@@ -64,12 +60,12 @@ ExponentialCollocation::Place ExponentialCollocation::place(double c) const {
   place.coefficient_ = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index k = 0; k < n; ++k) {
     auto row = place.coefficient_.row(k);
-    row[0] = 1.0 / scale_[k];
+    row[0] = 1.0 / basis_.scale()[k];
     Eigen::Index degree = 0;
     for (Eigen::Index j = 0; j < n; ++j) {
       if (j == k) continue;
       // Times c - node - a.
-      const double apart = c - nodes_[static_cast<std::size_t>(j)];
+      const double apart = c - nodes()[static_cast<std::size_t>(j)];
       for (Eigen::Index m = ++degree; m > 0; --m) row[m] = apart * row[m] - row[m - 1];
       row[0] *= apart;
     }
@@ -113,28 +109,6 @@ Eigen::VectorXd ExponentialCollocation::Place::weight_slopes(double z) const {
     power[m] = -static_cast<double>(m) * term / z;
   }
   return coefficient_ * power;
-}
-
-/// For each node, the product of c less all the others.
-Eigen::VectorXd ExponentialCollocation::others(double c) const {
-  const auto n = static_cast<Eigen::Index>(nodes_.size());
-  Eigen::VectorXd product(n);
-  double before = 1.0;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    product[k] = before;
-    before *= c - nodes_[static_cast<std::size_t>(k)];
-  }
-  double behind = 1.0;
-  for (Eigen::Index k = n - 1; k >= 0; --k) {
-    product[k] *= behind;
-    behind *= c - nodes_[static_cast<std::size_t>(k)];
-  }
-  return product;
-}
-
-Eigen::VectorXd ExponentialCollocation::interpolation(double c) const {
-  // As products: powers of c would cancel. At a node the same product stands above and below.
-  return others(c).cwiseQuotient(scale_);
 }
 
 }  // namespace tpm

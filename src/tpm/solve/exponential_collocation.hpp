@@ -2,6 +2,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "tpm/solve/lagrange_basis.hpp"
+
 namespace tpm {
 
 /// Right-hand Radau nodes of the unit interval: `count` rising numbers, the last of them 1.
@@ -45,7 +47,7 @@ class ExponentialCollocation {
   /// @param nodes different numbers in [0, 1], at most 10
   explicit ExponentialCollocation(std::vector<double> nodes);
 
-  [[nodiscard]] const std::vector<double>& nodes() const { return nodes_; }
+  [[nodiscard]] const std::vector<double>& nodes() const { return basis_.nodes(); }
 
   /// @param c in [0, 1]
   [[nodiscard]] Place place(double c) const;
@@ -56,13 +58,10 @@ class ExponentialCollocation {
   [[nodiscard]] Eigen::VectorXd weights(double c, double z) const { return place(c).weights(z); }
 
   /// L_k(c) of all nodes: what interpolates at c.
-  [[nodiscard]] Eigen::VectorXd interpolation(double c) const;
+  [[nodiscard]] Eigen::VectorXd interpolation(double c) const { return basis_.at(c); }
 
  private:
-  [[nodiscard]] Eigen::VectorXd others(double c) const;
-
-  std::vector<double> nodes_;
-  Eigen::VectorXd scale_;  ///< others() of each node at that node
+  LagrangeBasis basis_;
 };
 
 }  // namespace tpm

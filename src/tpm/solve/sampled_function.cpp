@@ -1,10 +1,11 @@
 #include "tpm/solve/sampled_function.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
+
+#include "tpm/solve/lagrange_basis.hpp"
 
 namespace tpm {
 namespace {
@@ -12,50 +13,16 @@ namespace {
 constexpr std::size_t kNodes = 16;
 constexpr std::size_t kWorth = 2;  // times the nodes: fewer places are not worth a polynomial
 
-/// Chebyshev nodes of a stretch, rising.
-std::array<double, kNodes> nodes_between(double from, double to) {
-  std::array<double, kNodes> nodes{};
-  for (std::size_t i = 0; i < kNodes; ++i) {
-    const double angle = std::numbers::pi * (static_cast<double>(i) + 0.5) / kNodes;
-    nodes[i] = 0.5 * (from + to) - 0.5 * (to - from) * std::cos(angle);
+/// Chebyshev nodes of the unit stretch, rising, each `stride`-th of them.
+std::vector<double> unit_nodes(std::size_t stride) {
+  std::vector<double> nodes;
+  nodes.reserve(kNodes / stride);
+  for (std::size_t i = 0; i < kNodes; i += stride) {
+    nodes.push_back(0.5 -
+                    0.5 * std::cos(std::numbers::pi * (static_cast<double>(i) + 0.5) / kNodes));
   }
   return nodes;
 }
-
-/// A polynomial through values at nodes, in barycentric form.
-class Interpolant {
- public:
-  /// @param nodes, values must live as long as this
-  Interpolant(std::span<const double> nodes, const Eigen::MatrixXd& values)
-      : nodes_(nodes), values_(values), weight_(nodes.size()) {
-    const double reach = nodes.back() - nodes.front();
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      double product = 1.0;
-      for (std::size_t j = 0; j < nodes.size(); ++j) {
-        if (j != i) product *= 4.0 * (nodes[i] - nodes[j]) / reach;
-      }
-      weight_[i] = 1.0 / product;
-    }
-  }
-
-  [[nodiscard]] Eigen::RowVectorXd operator()(double place) const {
-    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(values_.cols());
-    double total = 0.0;
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      const auto row = values_.row(static_cast<Eigen::Index>(i));
-      const double apart = place - nodes_[i];
-      if (apart == 0.0) return row;
-      sum += weight_[i] / apart * row;
-      total += weight_[i] / apart;
-    }
-    return sum / total;
-  }
-
- private:
-  std::span<const double> nodes_;
-  const Eigen::MatrixXd& values_;
-  std::vector<double> weight_;
-};
 
 class Sampling {
  public:
@@ -92,12 +59,12 @@ class Sampling {
   void fill(std::size_t first, std::size_t last) {
     const std::span<const double> here = places_.subspan(first, last - first);
     const std::size_t worth = kWorth * std::max(kNodes, together_);
-    if (here.size() < worth || !(here.front() < here.back())) {
+    const double middle = here.empty() ? 0.0 : 0.5 * (here.front() + here.back());
+    if (here.size() < worth || !(here.front() < middle && middle < here.back())) {
       rows(first, last) = values_at(here);
       return;
     }
     if (interpolate(first, last)) return;
-    const double middle = 0.5 * (here.front() + here.back());
     const auto cut = std::lower_bound(here.begin(), here.end(), middle);
     const std::size_t half = first + static_cast<std::size_t>(cut - here.begin());
     fill(first, half);
@@ -105,22 +72,20 @@ class Sampling {
   }
 
   [[nodiscard]] bool interpolate(std::size_t first, std::size_t last) {
-    const std::array<double, kNodes> nodes = nodes_between(places_[first], places_[last - 1]);
+    static const LagrangeBasis fine(unit_nodes(1)), coarse(unit_nodes(2));
+    const double from = places_[first], length = places_[last - 1] - from;
+    std::vector<double> nodes = fine.nodes();
+    for (double& node : nodes) node = from + length * node;
     const Eigen::MatrixXd values = values_at(nodes);
-    std::array<double, kNodes / 2> others{};
-    Eigen::MatrixXd other_values(kNodes / 2, values.cols());
-    for (std::size_t i = 0; i < others.size(); ++i) {
-      others[i] = nodes[2 * i];
-      other_values.row(static_cast<Eigen::Index>(i)) = values.row(static_cast<Eigen::Index>(2 * i));
-    }
-    const Interpolant coarse(others, other_values);
+    const Eigen::MatrixXd other_values = values(Eigen::seqN(0, kNodes / 2, 2), Eigen::all);
     for (std::size_t i = 1; i < kNodes; i += 2) {
-      const Eigen::RowVectorXd apart = coarse(nodes[i]) - values.row(static_cast<Eigen::Index>(i));
+      const Eigen::RowVectorXd apart = coarse.at(fine.nodes()[i]).transpose() * other_values -
+                                       values.row(static_cast<Eigen::Index>(i));
       if (!(apart.array().abs() <= allowed_.array()).all()) return false;
     }
-    const Interpolant fine(nodes, values);
     for (std::size_t i = first; i < last; ++i) {
-      answer_.row(static_cast<Eigen::Index>(i)) = fine(places_[i]);
+      answer_.row(static_cast<Eigen::Index>(i)) =
+          fine.at((places_[i] - from) / length).transpose() * values;
     }
     return true;
   }
