@@ -20,7 +20,7 @@ set(TPM_core_OF_protocol protocol)
 set(TPM_core_OF_curve curve)
 set(TPM_core_OF_model closed_form model)
 set(TPM_core_OF_solve cardinal_weight creep_exact exponential_collocation exponential_quadrature exponential_sum
-    laplace_contour mittag_leffler nonnegative relaxation_filter relaxation_spectrum springpot_pair)
+    lagrange_basis laplace_contour mittag_leffler nonnegative relaxation_filter relaxation_spectrum springpot_pair)
 set(TPM_core_OF_law contact_edge_force contact_geometry contact_history contact_history_load contact_retreat
     creep_weights depth_pieces drive_path frequency_response imposed_depth imposed_load kelvin_chain kept_step kernel
     kernel_tables law law_model operational_stiffness prony_table relaxation relaxation_sum stored_energy tension_creep)
