@@ -95,6 +95,14 @@ TEST_CASE("the spectrum of the star is its two stiffnesses and one time") {
   const auto branches = fitted_branches(spectrum, 1);
   REQUIRE(branches.size() == 1);
   CHECK_THAT(branches[0].time_s, WithinRel(0.7, 1e-9));
+  for (const int most : {2, 3}) {  // more than relax
+    const auto fitted = fitted_branches(spectrum, most);
+    REQUIRE_FALSE(fitted.empty());
+    double share = 0.0;
+    for (const ScalarBranch& branch : fitted) share += branch.share;
+    CHECK_THAT(share, WithinRel(1.0, 1e-9));
+    CHECK_THAT(fitted.front().time_s, WithinRel(0.7, 1e-9));
+  }
 }
 
 TEST_CASE("the star needs no more than its element, which is exact") {

@@ -191,7 +191,8 @@ std::vector<ScalarBranch> fitted_branches(const ContactSpectrum& spectrum, int m
     return {};
   BranchFit best;
   std::vector<double> times_s;
-  search(spectrum, times_s, 0, most, best);
+  // One more exponential than relax gets a share of 0, or of rounding with either sign.
+  for (int count = 1; count <= most; ++count) search(spectrum, times_s, 0, count, best);
   return best.branches;
 }
 
