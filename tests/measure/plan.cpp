@@ -98,6 +98,7 @@ double share_of(std::vector<double> values, double share) {
 
 struct Tally {
   int count = 0, violated = 0;
+  int undecided = 0;  ///< the true error is above the claim by less than the reference's own error
   std::vector<double> ratio;
 };
 
@@ -108,9 +109,9 @@ int count(const std::vector<std::string>& files) {
   Tally picks, all;
   std::vector<double> cpu;
   int rejected = 0;
-  const auto add = [](Tally& tally, double claimed, double reference) {
+  const auto add = [](Tally& tally, double claimed, double reference, double uncertain) {
     ++tally.count;
-    if (reference > claimed) ++tally.violated;
+    if (reference > claimed) ++(reference - uncertain > claimed ? tally.violated : tally.undecided);
     tally.ratio.push_back(claimed / std::max(reference, kNothing));
   };
   for (const std::string& file : files) {
@@ -130,22 +131,26 @@ int count(const std::vector<std::string>& files) {
         if (!counted.insert(claim.at(3)).second) continue;
         const double claimed = std::stod(claim.at(5));
         const double reference = std::stod(claim.at(6));
-        add(by_formulation[claim.at(4)], claimed, reference);
-        add(all, claimed, reference);
-        if (claim.at(8) == "1") add(picks, claimed, reference);
+        const double uncertain = std::stod(claim.at(7));
+        add(by_formulation[claim.at(4)], claimed, reference, uncertain);
+        add(all, claimed, reference, uncertain);
+        if (claim.at(8) == "1") add(picks, claimed, reference, uncertain);
         if (claim.at(9) == "1") ++rejected;
         if (reference > claimed) {
-          fmt::print("{} of {}: {}{} claims {:.3g}, true {:.3g}\n", line[2], line[1], claim[3],
-                     claim[8] == "1" ? ", picked," : "", claimed, reference);
+          fmt::print("{} of {}: {}{} claims {:.3g}, true {:.3g}, reference uncertain by {:.2g}\n",
+                     line[2], line[1], claim[3], claim[8] == "1" ? ", picked," : "", claimed,
+                     reference, uncertain);
         }
       }
     }
   }
-  fmt::print("\n{:<14} {:>6} {:>9}   {:<20}\n", "", "count", "violated", "claimed/true");
-  fmt::print("{:<14} {:>6} {:>9} {:>9} {:>9} {:>9}\n", "", "", "", "least", "median", "9 in 10");
+  fmt::print("\n{:<14} {:>6} {:>9} {:>9}   {:<20}\n", "", "count", "violated", "undecided",
+             "claimed/true");
+  fmt::print("{:<14} {:>6} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "", "", "", "", "least", "median",
+             "9 in 10");
   const auto row = [](const std::string& name, const Tally& t) {
-    fmt::print("{:<14} {:>6} {:>9} {:>9.2f} {:>9.2f} {:>9.3g}\n", name, t.count, t.violated,
-               share_of(t.ratio, 0.0), share_of(t.ratio, 0.5), share_of(t.ratio, 0.9));
+    fmt::print("{:<14} {:>6} {:>9} {:>9} {:>9.2f} {:>9.2f} {:>9.3g}\n", name, t.count, t.violated,
+               t.undecided, share_of(t.ratio, 0.0), share_of(t.ratio, 0.5), share_of(t.ratio, 0.9));
   };
   for (const auto& [name, tally] : by_formulation) row(name, tally);
   row("all", all);
