@@ -77,6 +77,7 @@ def measure(options):
                 peers = {}
                 if options.cholmod:
                     peers["cholmod"] = [options.cholmod, matrix]
+                    peers["supernodal"] = [options.cholmod, matrix, "supernodal"]
                 peers["splu"] = [sys.executable, str(HERE / "growth_scipy.py"), matrix]
                 wanted = [s for s in peers if (kind, s) not in stopped and not any(
                     k["kind"] == kind and k["count"] == count and k["solver"] == s for k in known)]
@@ -90,7 +91,8 @@ def measure(options):
                 add(kind, count, "multigrid", [options.growth, kind, str(count), "multigrid"], multigrid_case)
 
 
-NAMES = {"tpm": "tpm", "before": "tpm before", "cholmod": "CHOLMOD, simplicial", "splu": "scipy splu",
+NAMES = {"tpm": "tpm", "before": "tpm before", "cholmod": "CHOLMOD, simplicial",
+         "supernodal": "CHOLMOD, supernodal", "splu": "scipy splu",
          "multigrid": "tpm, multigrid, a Newton step"}
 
 
@@ -169,8 +171,8 @@ def main():
     m.add_argument("--after", required=True)
     for name in ("before", "cholmod", "growth"):
         m.add_argument(f"--{name}")
-    m.add_argument("--shell", type=int, nargs="*", default=[424, 1700, 6800, 27200, 100000])
-    m.add_argument("--solid", type=int, nargs="*", default=[424, 1700, 4000, 12000])
+    m.add_argument("--shell", type=int, nargs="*", default=[424, 1700, 6800, 27200, 100000, 400000])
+    m.add_argument("--solid", type=int, nargs="*", default=[424, 1700, 4000, 12000, 40000, 400000])
     m.add_argument("--shell-multigrid", type=int, nargs="*", default=[4000, 40000, 400000])
     m.add_argument("--solid-multigrid", type=int, nargs="*", default=[4000, 40000, 400000])
     m.add_argument("--most-s", type=float, default=1200.0)

@@ -1,8 +1,8 @@
-// Times CHOLMOD's simplicial factorisation, ordered by METIS, of a matrix that
+// Times CHOLMOD's simplicial or supernodal factorisation, ordered by METIS, of a matrix that
 // measure_factorisation wrote:
 //
 //     g++ -O3 cholmod_factor.cpp -I/usr/include/suitesparse -lcholmod -o cholmod_factor
-//     cholmod_factor MATRIX_FILE
+//     cholmod_factor MATRIX_FILE [supernodal]
 //
 // Only a measurement: nothing of tpm links it.
 #include <cholmod.h>
@@ -20,14 +20,14 @@ static double lap() {
 }
 
 int main(int argc, char** argv) {
-  std::FILE* file = argc == 2 ? std::fopen(argv[1], "rb") : nullptr;
+  std::FILE* file = argc >= 2 ? std::fopen(argv[1], "rb") : nullptr;
   std::int64_t sizes[2];
   if (file == nullptr || std::fread(sizes, sizeof sizes, 1, file) != 1) return 2;
   cholmod_common common;
   cholmod_start(&common);
   common.nmethods = 1;
   common.method[0].ordering = CHOLMOD_METIS;
-  common.supernodal = CHOLMOD_SIMPLICIAL;
+  common.supernodal = argc == 3 ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
   const auto n = static_cast<std::size_t>(sizes[0]);
   const auto entries = static_cast<std::size_t>(sizes[1]);
   cholmod_triplet* list = cholmod_allocate_triplet(n, n, entries, -1, CHOLMOD_REAL, &common);
