@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "expected_values.hpp"
 #include "fitted_parameter.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/fit/fit.hpp"
@@ -202,9 +203,11 @@ TEST_CASE("the noise convention moves x, as docs/data say") {
   config.profiles = false;
   config.hypotheses.clear();
   config.data[0].noise = {NoiseKind::log, 0.0, 0.1, true};
-  CHECK_THAT(find(run_fit(config), "spacing").estimate, WithinAbs(0.125, 0.002));
+  CHECK_THAT(find(run_fit(config), "spacing").estimate,
+             test::expected("liver_relaxation.spacing_with_log_noise"));
   config.data[0].noise.kind = NoiseKind::relative_to_model;
-  CHECK_THAT(find(run_fit(config), "spacing").estimate, WithinAbs(0.071, 0.002));
+  CHECK_THAT(find(run_fit(config), "spacing").estimate,
+             test::expected("liver_relaxation.spacing_with_noise_relative_to_model"));
 }
 
 TEST_CASE("results do not depend on the order of runs and repeat for a seed; seed 0 is a seed") {

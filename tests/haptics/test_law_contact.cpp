@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "counted_allocations.hpp"
+#include "expected_values.hpp"
 #include "hil_scenes.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
@@ -81,7 +82,7 @@ constexpr const char* kLaws[] = {"linear",           "linear-1",           "line
 TEST_CASE("The loop answers as the law does, whatever its kernel and branches") {
   for (const char* name : kLaws) {
     INFO(name);
-    CHECK(off_the_law(law_of(name), 1e-3, 3.0) < 5e-5);
+    CHECK(off_the_law(law_of(name), 1e-3, 3.0) < test::allowed_error("law_contact.against_law"));
   }
 }
 
@@ -139,7 +140,8 @@ TEST_CASE("Two quadratures of a law agree, where the surface lets go too") {
       peak = std::max(peak, gauss[i]);
       apart = std::max(apart, std::abs(gauss[i] - model.value[static_cast<Eigen::Index>(i)]));
     }
-    CHECK(apart < 1e-4 * peak);  // where it lets go within a stretch, to the length of a stretch
+    // Where it lets go within a stretch, to the length of a stretch.
+    CHECK(apart < test::allowed_error("law_contact.quadratures_apart") * peak);
   }
   CHECK_THROWS_WITH(law_forces_by_gauss(law_of("linear-fzener"), time, depth),
                     Contains("a law with branches"));
@@ -171,8 +173,8 @@ TEST_CASE("A law is felt in a session, and what is felt is the law") {
     const test::TempFolder folder;
     const Verification v = verified(test::parsed(law_session(name)), folder);
     CHECK(v.all.peak_N > 0.05);
-    CHECK(v.all.max_N < 1e-3 * v.all.peak_N);
-    CHECK(v.reference_error_N < 1e-3 * v.all.peak_N);
+    CHECK(v.all.max_N < test::allowed_error("session.law") * v.all.peak_N);
+    CHECK(v.reference_error_N < test::allowed_error("session.law_reference") * v.all.peak_N);
   }
 }
 
@@ -231,15 +233,17 @@ TEST_CASE("The motion of a recording is repeated, and the recording stands besid
     const HilSession session = read_session(
         folder / "session.json", {.law = folder / "law.json", .motion = folder / "r.csv"});
     const Verification v = verified(session, folder, "replay");
-    CHECK(v.all.max_N < 1e-5 * v.all.peak_N);
+    CHECK(v.all.max_N < test::allowed_error("session.replay") * v.all.peak_N);
     const CrossCheck& beside = v.others.back();
     CHECK_THAT(beside.name, Contains("MEASURED: the recording r.csv"));
     CHECK(beside.commanded.instants == 4000);
     // The offset is not rendered; what is left is a straight line between samples, most at the
     // bend.
-    CHECK(beside.commanded.max_N < 5e-4 * v.all.peak_N);
-    CHECK(beside.commanded.rms_N < 5e-5 * v.all.peak_N);
-    CHECK(beside.apart_N < 5e-4 * v.all.peak_N);
+    CHECK(beside.commanded.max_N <
+          test::allowed_error("session.replay_beside_recording") * v.all.peak_N);
+    CHECK(beside.commanded.rms_N <
+          test::allowed_error("session.replay_beside_recording_rms") * v.all.peak_N);
+    CHECK(beside.apart_N < test::allowed_error("session.replay_references_apart") * v.all.peak_N);
   }
   CHECK_THROWS_WITH(read_session(folder / "session.json", {.law = {}, .motion = folder / "r.csv"}),
                     Contains("the session feels no law"));

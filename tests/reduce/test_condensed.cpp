@@ -3,6 +3,7 @@
 
 #include "condensed_passivity.hpp"
 #include "contact_path.hpp"
+#include "expected_values.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpmkit/error.hpp"
 
@@ -75,8 +76,8 @@ TEST_CASE("a condensed contact follows the full network, force and field", "[con
     field_error = std::max(field_error, (field - true_field).colwise().norm().maxCoeff());
     field_peak = std::max(field_peak, true_field.colwise().norm().maxCoeff());
   }
-  CHECK(force_error < 5e-3 * force_peak);
-  CHECK(field_error < 1e-2 * field_peak);
+  CHECK(force_error < test::allowed_error("condensed.force") * force_peak);
+  CHECK(field_error < test::allowed_error("condensed.field") * field_peak);
   CHECK(bounded);
 }
 
@@ -113,7 +114,7 @@ TEST_CASE("another relaxation time needs no new solutions", "[condensed][heavy]"
     off = std::max(off, (half.step(path(i)).force_N - force).norm());
     peak = std::max(peak, force.norm());
   }
-  CHECK(off < 2e-4 * peak);
+  CHECK(off < test::allowed_error("condensed.half_period") * peak);
 }
 
 TEST_CASE("a condensed contact creates no energy", "[condensed][heavy]") {

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "expected_values.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/solve/creep_exact.hpp"
 #include "tpm/solve/relaxation_filter.hpp"
@@ -78,8 +79,9 @@ TEST_CASE("step relaxation is Eq. 11 with its limits") {
 
 TEST_CASE("the paper's worked example: 0.613 N at 4 mm and x = 30 mm") {
   const TpmParameters paper;
-  CHECK_THAT(lambda1_Pa(12e3, 0.004, 0.030), WithinAbs(211.0, 0.5));
-  CHECK_THAT(step_relaxation_force_N(paper, 211.0, 0.004, 0.0), WithinAbs(0.6135, 5e-5));
+  CHECK_THAT(lambda1_Pa(12e3, 0.004, 0.030), test::expected("paper.printed_lambda1_at_4_mm"));
+  CHECK_THAT(step_relaxation_force_N(paper, 211.0, 0.004, 0.0),
+             test::expected("paper.peak_force_at_4_mm"));
 }
 
 TEST_CASE("ramp and hold follows its closed form") {
@@ -162,8 +164,10 @@ TEST_CASE("creep with frozen lambda1 is Eq. 14 with its limits") {
 TEST_CASE("creep with the true lambda1 ends where the springs balance the load") {
   TpmParameters paper;
   // Ends of creep (docs/notation.md): 10.59 mm at 0.98 N, 2.56 mm at 0.196 N
-  CHECK_THAT(CreepUnderConstantLoad(paper, 0.98).final_depth_m(), WithinAbs(10.59e-3, 5e-6));
-  CHECK_THAT(CreepUnderConstantLoad(paper, 0.196).final_depth_m(), WithinAbs(2.56e-3, 5e-6));
+  CHECK_THAT(CreepUnderConstantLoad(paper, 0.98).final_depth_m(),
+             test::expected("paper.creep_end_at_0.98_N"));
+  CHECK_THAT(CreepUnderConstantLoad(paper, 0.196).final_depth_m(),
+             test::expected("paper.creep_end_at_0.196_N"));
   const CreepUnderConstantLoad creep_(paper, 0.98);
   CHECK_THAT(creep_.depth_m(0.0), WithinRel(creep_.instantaneous_depth_m(), 1e-15));
   CHECK_THAT(creep_.depth_m(1e9), WithinRel(creep_.final_depth_m(), 1e-15));

@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "expected_values.hpp"
 #include "tpm/report/study_report.hpp"
 #include "tpm/study/audit.hpp"
 #include "tpm/study/expression.hpp"
@@ -106,7 +107,7 @@ TEST_CASE("formulas: names, definitions, the dynamic scope and the model library
   CHECK(e.evaluate("line", scope, "here") == 21.0);
   CHECK(e.inputs("line", scope, "here") == std::vector<std::string>{"k"});
   CHECK_THAT(e.evaluate("tension_modulus(12000, 0.004, 0.03)", {}, "here"),
-             WithinRel(210.54, 1e-3));
+             test::expected("paper.tension_modulus_at_4_mm"));
   CHECK_THROWS_WITH(e.define_symbol("k", 1.0, "here"), Contains("'k' is taken"));
   CHECK_THROWS_WITH(e.define_symbol("pi", 1.0, "here"), Contains("'pi' is taken"));
   CHECK_THROWS_WITH(e.define_symbol("exp", 1.0, "here"), Contains("'exp' is taken"));
@@ -134,13 +135,16 @@ TEST_CASE("item 1: the stated viscosity relaxes in 0.2 ms") {
   CHECK_THAT(finding(paper(), "relaxation-after-1s").consequence, Contains("0.2083 ms"));
   CHECK(finding(paper(), "relaxed-at-30s").verdict == AuditVerdict::holds);
   CHECK(finding(paper(), "rate-dependence").verdict == AuditVerdict::contradicted);
-  CHECK_THAT(finding(paper(), "peak-with-ramp").recomputed->value, WithinAbs(0.3121, 5e-5));
+  CHECK_THAT(finding(paper(), "peak-with-ramp").recomputed->value,
+             test::expected("paper_audit.peak_with_ramp"));
 }
 
 TEST_CASE("item 2: Eq. 18 is not the limit of Eq. 14") {
   CHECK(finding(paper(), "eq18-limit").verdict == AuditVerdict::contradicted);
-  CHECK_THAT(finding(paper(), "creep-small-end").recomputed->value, WithinAbs(2.53, 0.005));
-  CHECK_THAT(finding(paper(), "creep-large-end").recomputed->value, WithinAbs(6.61, 0.005));
+  CHECK_THAT(finding(paper(), "creep-small-end").recomputed->value,
+             test::expected("paper_audit.creep_small_end"));
+  CHECK_THAT(finding(paper(), "creep-large-end").recomputed->value,
+             test::expected("paper_audit.creep_large_end"));
   CHECK(finding(paper(), "creep-small-end-eq18").verdict == AuditVerdict::holds);
 }
 
@@ -149,10 +153,11 @@ TEST_CASE("items 3 and 4: the search finds the two loads, 0.20 N and 3.68 mm by 
   REQUIRE_FALSE(mixed.causes.empty());
   CHECK(mixed.causes.front().only_printed);
   CHECK_THAT(mixed.causes.front().text, Contains("0.98 N (Fig. 9) in term 1, 0.96 N"));
-  CHECK_THAT(mixed.causes.front().recomputed, WithinAbs(10.86, 0.005));
+  CHECK_THAT(mixed.causes.front().recomputed,
+             test::expected("paper_audit.creep_large_end_of_two_loads"));
   const Finding& start = finding(paper(), "creep-small-start");
   CHECK(start.verdict == AuditVerdict::differs);
-  CHECK_THAT(start.recomputed->value, WithinAbs(1.281, 5e-4));
+  CHECK_THAT(start.recomputed->value, test::expected("paper_audit.creep_small_start"));
   CHECK_THAT(start.causes.at(0).text, Contains("load_small = 0.2 N instead of 0.196 N"));
   CHECK_THAT(finding(paper(), "creep-small-lambda1").causes.at(0).text, Contains("3.68 mm"));
   CHECK_THAT(finding(paper(), "creep-large-start").causes.at(0).text, Contains("0.98 N (Fig. 9)"));
@@ -163,17 +168,17 @@ TEST_CASE("item 5: with lambda1(e) one creep claim survives, the other does not"
              Contains("40.68 degrees") && Contains("25.79 mm"));
   const Finding& large = finding(paper(), "creep-large-self-consistent");
   CHECK(large.verdict == AuditVerdict::holds);
-  CHECK_THAT(large.recomputed->value, WithinAbs(10.59, 0.005));
+  CHECK_THAT(1e-3 * large.recomputed->value, test::expected("paper.creep_end_at_0.98_N"));
   const Finding& small = finding(paper(), "creep-small-self-consistent");
   CHECK(small.verdict == AuditVerdict::contradicted);
-  CHECK_THAT(small.recomputed->value, WithinAbs(2.56, 0.005));
+  CHECK_THAT(1e-3 * small.recomputed->value, test::expected("paper.creep_end_at_0.196_N"));
 }
 
 TEST_CASE("items 6 to 13") {
   CHECK_THAT(finding(paper(), "lambda1-range-pi6").details.at(1).recomputed.value,
-             WithinAbs(3.215, 5e-4));
+             test::expected("paper_audit.lambda1_at_pi_6"));
   CHECK_THAT(finding(paper(), "lambda1-range-pi4").details.at(1).recomputed.value,
-             WithinAbs(7.029, 5e-4));
+             test::expected("paper_audit.lambda1_at_pi_4"));
   CHECK(finding(paper(), "angle-ranges").verdict == AuditVerdict::contradicted);
   CHECK(finding(paper(), "eq10-as-converted").verdict == AuditVerdict::contradicted);
   CHECK(finding(paper(), "eq10-without-s").verdict == AuditVerdict::holds);
@@ -182,7 +187,8 @@ TEST_CASE("items 6 to 13") {
   CHECK(finding(paper(), "tables-forces").cells->by_truncation == 14);
   CHECK(finding(paper(), "tables-forces-area").recomputed_words() == "28 of 32");
   CHECK(finding(paper(), "peak-to-end-ratio").verdict == AuditVerdict::contradicted);
-  CHECK_THAT(finding(paper(), "angle-guards-damage").recomputed->value, WithinAbs(17.32, 0.005));
+  CHECK_THAT(finding(paper(), "angle-guards-damage").recomputed->value,
+             test::expected("paper_audit.depth_of_angle_30"));
   CHECK(finding(paper(), "creep-validity").verdict == AuditVerdict::contradicted);
   CHECK(finding(paper(), "table1-lambda1-range").verdict == AuditVerdict::contradicted);
   CHECK(finding(paper(), "strain-rate-unit").verdict == AuditVerdict::contradicted);
@@ -190,7 +196,8 @@ TEST_CASE("items 6 to 13") {
   CHECK(finding(paper(), "gap").verdict == AuditVerdict::holds);
   CHECK(finding(paper(), "distance-as-x").verdict == AuditVerdict::contradicted);
   CHECK(finding(paper(), "close-to-experiment").verdict == AuditVerdict::cannot_be_told);
-  CHECK_THAT(finding(paper(), "creep-probe").recomputed->value, WithinAbs(6.01, 0.005));
+  CHECK_THAT(finding(paper(), "creep-probe").recomputed->value,
+             test::expected("paper_audit.creep_probe"));
 }
 
 TEST_CASE("changing a printed number changes the verdict") {
