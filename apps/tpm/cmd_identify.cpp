@@ -22,21 +22,14 @@ struct IdentifyCommand {
   bool no_loop = false;
 };
 
-double share(std::string text, const char* option) {
-  constexpr double kPercent = 100.0;
-  const bool percent = text.ends_with('%');
-  if (percent) text.pop_back();
-  return parse_number(text, option) / (percent ? kPercent : 1.0);
-}
-
 IdentifyOptions identify_options(const IdentifyCommand& command, Quantity drive) {
   IdentifyOptions options;
   for (const std::string& name : command.laws) {
     options.laws.push_back(parse_law_name(name, "--laws"));
   }
-  options.target = share(command.target, "--target");
+  options.target = parse_share(command.target, "--target");
   options.patience = parse_number(command.patience, "--patience");
-  options.level = share(command.level, "--level");
+  options.level = parse_share(command.level, "--level");
   options.seed = parse_whole_number(command.seed, "--seed", 0);
   if (!command.reference.empty()) {
     options.reference = parse_quantity(command.reference, quantity_dimension(drive), "--reference");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "command.hpp"
 #include "plan_options.hpp"
@@ -11,6 +12,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/report/json_table_csv.hpp"
 #include "tpm/report/plan_report.hpp"
+#include "tpm/store/file.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/error_budget.hpp"
 #include "tpmkit/error.hpp"
@@ -92,6 +94,8 @@ namespace {
 
 struct PlanCommand {
   std::string scene, output;
+  std::string spheres, scene_output;
+  std::size_t most_spheres = SpheresRequest{}.most;
   bool calibrate = false;
   bool brief = false;
   PlanChoice choice;
@@ -121,6 +125,43 @@ int calibrate(const PlanCommand& command, const Session& session) {
   return 0;
 }
 
+/// How many spheres, and the scene with them; the file's own scene if that is not asked for.
+struct PlannedScene {
+  std::optional<SpheresPlan> spheres;
+  std::optional<ExperimentScene> scene;  ///< none: no number of spheres is enough
+};
+
+PlannedScene planned_scene(const PlanCommand& command) {
+  if (command.spheres.empty()) {
+    if (!command.scene_output.empty()) {
+      throw Error(ExitCode::usage, "--write-scene", "without --spheres", "both or none");
+    }
+    return {std::nullopt, read_experiment(command.scene)};
+  }
+  SpheresRequest request;
+  request.tolerance = parse_share(command.spheres, "--spheres");
+  request.most = command.most_spheres;
+  const fs::path file = command.scene;
+  const RefilledScene refilled(read_json(file), command.scene, file.parent_path());
+  Progress progress("numbers of spheres", 0);
+  request.tried = [&] { progress.advance(); };
+  PlannedScene planned{plan_spheres(refilled, request), std::nullopt};
+  if (!planned.spheres->choice) return planned;
+  const RefilledScene::Filling& filling = planned.spheres->chosen().filling;
+  planned.scene = refilled.scene(filling);
+  if (!command.scene_output.empty()) {
+    Json document = refilled.document(filling);
+    Json& organ = document["organ"];
+    if (organ.contains("mesh")) {  // its path is relative to the scene
+      organ["mesh"] = fs::relative(file.parent_path() / organ.at("mesh").get<std::string>(),
+                                   fs::absolute(command.scene_output).parent_path())
+                          .generic_string();
+    }
+    write_file(command.scene_output, to_text(document));
+  }
+  return planned;
+}
+
 int run_plan(const PlanCommand& command, const Session& session) {
   if (command.calibrate) return calibrate(command, session);
   if (command.scene.empty()) {
@@ -129,9 +170,20 @@ int run_plan(const PlanCommand& command, const Session& session) {
   const auto csv = csv_beside(command.output, session);
   PlanRequest request = plan_request(command.choice);
   request.relevance = request.changes = !command.brief;
-  const Plan plan = planned(read_experiment(command.scene), std::move(request));
-  const Json json = plan_json(plan);
-  deliver(session.json() ? to_text(json) : plan_text(plan), command.output);
+  const PlannedScene chosen = planned_scene(command);
+  if (!chosen.scene) {
+    const Json json{{"spheres_choice", spheres_json(*chosen.spheres)}};
+    deliver(session.json() ? to_text(json) : spheres_text(*chosen.spheres), command.output);
+    return static_cast<int>(ExitCode::answer_is_no);
+  }
+  const Plan plan = planned(*chosen.scene, std::move(request));
+  Json json = plan_json(plan);
+  std::string text = plan_text(plan);
+  if (chosen.spheres) {
+    json["spheres_choice"] = spheres_json(*chosen.spheres);
+    text = spheres_text(*chosen.spheres) + text;
+  }
+  deliver(session.json() ? to_text(json) : text, command.output);
   deliver_csv(json_table_csv(json.at("frontier")), csv);
   return plan.choice ? 0 : static_cast<int>(ExitCode::answer_is_no);
 }
@@ -143,6 +195,16 @@ void add_plan_command(CLI::App& app, Session& session) {
   auto choice = std::make_shared<PlanCommand>();
   command->add_option("SCENE", choice->scene, "JSON scene (schemas/scene.schema.json)");
   add_plan_options(*command, choice->choice);
+  command->add_option(
+      "--spheres", choice->spheres,
+      "How far the number of spheres may be from the limit of many small ones, such "
+      "as 10%: choose it first (spacing_law continuum)");
+  command
+      ->add_option("--most-spheres", choice->most_spheres, "Of --spheres: the most that are tried")
+      ->check(CLI::Range(200, 1'000'000))
+      ->capture_default_str();
+  command->add_option("--write-scene", choice->scene_output,
+                      "Of --spheres: write the scene with the number chosen");
   command->add_flag("--brief", choice->brief,
                     "Leave out what does not matter and what would break");
   command->add_flag("--calibrate", choice->calibrate,

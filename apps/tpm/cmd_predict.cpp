@@ -30,13 +30,7 @@ struct PredictOptions {
 
 PredictionOptions prediction_options(const PredictOptions& options) {
   PredictionOptions chosen;
-  if (!options.level.empty()) {
-    constexpr double kPercent = 100.0;
-    std::string text = options.level;
-    const bool percent = text.ends_with('%');
-    if (percent) text.pop_back();
-    chosen.level = parse_number(text, "--level") / (percent ? kPercent : 1.0);
-  }
+  if (!options.level.empty()) chosen.level = parse_share(options.level, "--level");
   if (!options.placement.empty()) {
     chosen.placement = parse_placement(options.placement, "--placement");
   }

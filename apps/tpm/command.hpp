@@ -51,6 +51,9 @@ void will_write_into(const std::filesystem::path& folder, std::initializer_list<
 [[nodiscard]] std::uint64_t parse_whole_number(const std::string& text, const char* option,
                                                std::uint64_t smallest);
 
+/// A share such as "10%" or "0.1". Throws Error(bad_input) naming the option.
+[[nodiscard]] double parse_share(std::string_view text, const char* option);
+
 /// Writes to standard output, control characters from names and titles escaped (for_terminal()).
 /// Throws Error(environment) if it takes nothing more.
 void write_output(std::string_view text);

@@ -22,6 +22,7 @@
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
 #include "tpmkit/error.hpp"
+#include "tpmkit/units.hpp"
 
 namespace tpm::app {
 
@@ -79,6 +80,13 @@ void will_write_into(const std::filesystem::path& folder,
   std::vector<std::filesystem::path> files;
   for (const char* name : names) files.push_back(folder / name);
   will_write(files);
+}
+
+double parse_share(std::string_view text, const char* option) {
+  constexpr double kPercent = 100.0;
+  const bool percent = text.ends_with('%');
+  if (percent) text.remove_suffix(1);
+  return parse_number(text, option) / (percent ? kPercent : 1.0);
 }
 
 std::uint64_t parse_whole_number(const std::string& text, const char* option,

@@ -178,6 +178,52 @@ std::string frontier_text(const Plan& plan) {
 
 }  // namespace
 
+Json spheres_json(const SpheresPlan& plan) {
+  Json tried = Json::array();
+  for (const TriedSpheres& t : plan.tried) {
+    tried.push_back({{"spheres", t.filling.spheres},
+                     {"spacing_m", rounded(t.spacing_m, kPlanDigits)},
+                     {"area_ratio", number(t.area_ratio)},
+                     {"peak", number(t.peak)},
+                     {"claimed_error", number(t.claimed_error)},
+                     {"run_s", rounded(t.operations_s, kPlanDigits)},
+                     {"reason", t.reason.empty() ? Json(nullptr) : Json(t.reason)}});
+  }
+  return {{"tolerance", plan.request.tolerance},
+          {"most", plan.request.most},
+          {"spheres", plan.choice ? Json(plan.chosen().filling.spheres) : Json(nullptr)},
+          {"claimed_error", plan.choice ? number(plan.chosen().claimed_error) : Json(nullptr)},
+          {"limit_peak", rounded(plan.limit_peak, kPlanDigits)},
+          {"limit_uncertainty", rounded(plan.limit_uncertainty, kPlanDigits)},
+          {"tried", std::move(tried)}};
+}
+
+std::string spheres_text(const SpheresPlan& plan) {
+  std::string text =
+      plan.choice
+          ? fmt::format(
+                "spheres: {}, at most {} of the peak from the limit of many small ones "
+                "({} allowed)\n",
+                plan.chosen().filling.spheres, share_text(*plan.chosen().claimed_error),
+                share_text(plan.request.tolerance))
+          : fmt::format(
+                "spheres: no number up to {} is within {} of the limit of many small ones\n",
+                plan.request.most, share_text(plan.request.tolerance));
+  text += fmt::format("\n{:>9} {:>11} {:>10} {:>12} {:>10} {:>10}\n", "spheres", "spacing, mm",
+                      "area", "peak", "claimed", "a run");
+  for (const TriedSpheres& t : plan.tried) {
+    text += fmt::format("{:>9} {:>11} {:>10} {:>12} {:>10} {:>10}  {}\n", t.filling.spheres,
+                        significant(1e3 * t.spacing_m, 3),
+                        t.area_ratio ? significant(*t.area_ratio, 3) : std::string("-"),
+                        t.peak ? significant(*t.peak, 5) : std::string("-"),
+                        t.claimed_error ? share_text(*t.claimed_error) : std::string("-"),
+                        t.peak ? time_text(t.operations_s) : std::string("-"), t.reason);
+  }
+  return text + fmt::format("{:>9} {:>11} {:>10} {:>12} {:>10}  a line in the spacing, 95 %\n\n",
+                            "limit", 0, plan.tried.front().area_ratio ? "1" : "-",
+                            significant(plan.limit_peak, 5), share_text(plan.limit_uncertainty));
+}
+
 Json claim_json(const Plan& plan) {
   const PlanClaim claim = claim_of(plan);
   return {{"quantity", claim.quantity}, {"norm", claim.norm}, {"protocol", claim.protocol}};

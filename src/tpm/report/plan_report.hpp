@@ -4,6 +4,7 @@
 
 #include "tpm/core/namespaces.hpp"
 #include "tpm/plan/plan.hpp"
+#include "tpm/plan/spheres_plan.hpp"
 #include "tpm/store/json.hpp"
 
 namespace tpm::report {
@@ -11,6 +12,10 @@ namespace tpm::report {
 /// A plan, as docs/plan_results.md describes the keys.
 [[nodiscard]] Json plan_json(const Plan& plan);
 [[nodiscard]] std::string plan_text(const Plan& plan);
+
+/// The choice of the number of spheres: the key `spheres_choice` of a plan.
+[[nodiscard]] Json spheres_json(const SpheresPlan& plan);
+[[nodiscard]] std::string spheres_text(const SpheresPlan& plan);
 
 /// What the errors of a plan are about.
 [[nodiscard]] Json claim_json(const Plan& plan);

@@ -1,6 +1,10 @@
 #pragma once
 // Parts of parse_tissue, one per block of a scene. All throw Error(bad_input) with the key; all are
 // given blocks that the schema has accepted.
+#include <optional>
+#include <utility>
+#include <vector>
+
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/document_place.hpp"
 
@@ -16,6 +20,16 @@ struct OrganBlock {
 /// Block `organ`.
 [[nodiscard]] OrganBlock parse_organ(const Json& block, const DocumentPlace& place,
                                      const std::filesystem::path& folder);
+
+/// The block of the same body filled with spheres whose spacing is the own one over `finer`, and
+/// the number of spheres that it states; none where cells or layers cannot be so many. A shell
+/// keeps its thickness by its number of layers.
+/// @param organ what the block leads to
+/// Throws Error(bad_input) for kinds whose spheres are given one by one.
+[[nodiscard]] std::optional<std::pair<Json, std::size_t>> refilled_organ(
+    const Json& block, const Organ& organ, double finer, const DocumentPlace& place);
+/// The values of `finer` that make sense for a block, rising, 1 among them.
+[[nodiscard]] std::vector<double> refilling_steps(const Json& block, const Organ& organ);
 
 /// Block `bonds`.
 [[nodiscard]] NetworkOptions parse_bonds(const Json& block, const DocumentPlace& place);

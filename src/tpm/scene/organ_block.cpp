@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numeric>
 
 #include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
@@ -266,6 +268,73 @@ Organ organ_of(OrganKind kind, const Json& block, const DocumentPlace& place,
 }
 
 }  // namespace
+
+std::vector<double> refilling_steps(const Json& block, const Organ& organ) {
+  constexpr int kMostParts = 12, kSteps = 18;  // of cells or layers; of the spacing of a solid
+  std::vector<double> steps;
+  if (block.at("kind") == "block") {
+    const auto cells = block.at("cells").get<std::array<int, 3>>();
+    const int common = std::gcd(cells[0], std::gcd(cells[1], cells[2]));
+    for (int i = 1; i <= kMostParts * common; ++i) steps.push_back(static_cast<double>(i) / common);
+  } else if (block.value("filling", "shell") == "solid") {
+    for (int i = -kSteps; i <= kSteps; ++i) steps.push_back(std::exp2(i / 3.0));
+  } else {
+    const int own = organ.layer_count();
+    for (int i = 1; i <= kMostParts * own; ++i) steps.push_back(static_cast<double>(i) / own);
+  }
+  return steps;
+}
+
+std::optional<std::pair<Json, std::size_t>> refilled_organ(const Json& block, const Organ& organ,
+                                                           double finer,
+                                                           const DocumentPlace& place) {
+  const auto kind = find_entry(kKinds, block.at("kind").get<std::string>())->meaning;
+  if (kind == OrganKind::star || kind == OrganKind::listed) {
+    throw bad_input(place.key("kind").where, "spheres that are given one by one",
+                    "a body that can be filled with more of them: liver, mesh or block");
+  }
+  Json refilled = block;
+  const std::string spacing = shortest(organ.spacing / finer) + " m";
+  if (kind == OrganKind::block) {
+    for (Json& cells : refilled.at("cells")) {
+      const double count = cells.get<double>() * finer;
+      if (std::abs(count - std::round(count)) > 1e-9 || count < 1.5) return std::nullopt;
+      cells = static_cast<int>(std::round(count));
+    }
+    refilled["spacing"] = spacing;
+    const auto cells = refilled.at("cells").get<std::array<int, 3>>();
+    const double share = cells[0] * 1.0 * cells[1] * cells[2];
+    const auto own = block.at("cells").get<std::array<int, 3>>();
+    return std::pair{std::move(refilled),
+                     static_cast<std::size_t>(std::round(static_cast<double>(organ.size()) * share /
+                                                         (own[0] * 1.0 * own[1] * own[2])))};
+  }
+  const auto count = static_cast<std::size_t>(
+      std::round(static_cast<double>(organ.size()) * finer * finer * finer));
+  refilled.erase("spacing");
+  refilled["count"] = count;
+  if (block.value("filling", "shell") != "solid") {
+    const double layers = organ.layer_count() * finer;
+    if (std::abs(layers - std::round(layers)) > 1e-9 || layers < 0.5) return std::nullopt;
+    refilled["layers"] = static_cast<int>(std::round(layers));
+  }
+  if (kind == OrganKind::liver && !block.value("shape", Json::object()).contains("width")) {
+    const Json stated = block.value("shape", Json::object());
+    const LiverShape own = parse_shape(stated, place.key("shape"));
+    LiverShape shape = own;
+    if (block.value("filling", "shell") != "solid") {
+      const auto outer = std::count(organ.layer.begin(), organ.layer.end(), 0);
+      shape = scaled(
+          own, organ.spacing / even_spacing(liver_surface(own), static_cast<std::size_t>(outer)));
+    }
+    refilled["shape"] = stated;
+    for (const auto& [key, length] :
+         {std::pair{"width", shape.width}, {"height", shape.height}, {"depth", shape.depth}}) {
+      refilled["shape"][key] = shortest(length) + " m";
+    }
+  }
+  return std::pair{std::move(refilled), count};
+}
 
 std::size_t parse_sphere(const Json& number, const Organ& organ, const DocumentPlace& place) {
   const auto value = number.get<std::int64_t>();
