@@ -216,7 +216,7 @@ PlanScene PlanScene::with_layers(int layers) const {
   }
   std::sort(anchors.begin(), anchors.end());
   anchors.erase(std::unique(anchors.begin(), anchors.end()), anchors.end());
-  std::erase_if(scene.tissue.guides, [&](const Guide& g) { return layer[g.sphere] >= layers; });
+  std::erase_if(scene.tissue.sliders, [&](const Slider& g) { return layer[g.sphere] >= layers; });
   return PlanScene(std::move(scene));
 }
 
