@@ -288,7 +288,7 @@ LawPrediction predict_organ(const OrganOfLaw& organ, const PreparedRecording& re
     depth_m.push_back(r.drive[i]);
   }
   Protocol whole = measured_history(Drive::displacement, time_s, depth_m);
-  whole.set_relaxed_at_start(true);
+  whole.set_equilibrium_at_start(true);
   const Protocol motion = followed_by_organ(whole, placed(organ.law().values).contact);
   return named(predict_recording_by(
                    organ, organ.law(), recording, motion,
