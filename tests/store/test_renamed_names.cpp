@@ -185,8 +185,9 @@ TEST_CASE("the program warns of a former name in one line on standard error") {
   const test::TempFolder folder;
   const std::string scene = folder / "s.json", said = folder / "said";
   write_file(scene, R"({"organ": {"kind": "star"}, "guides": [2]})");
-  CHECK(std::system(("'" TPM_TEST_PROGRAM "' network '" + scene + "' > /dev/null 2> '" + said + "'")
-                        .c_str()) == 0);
+  CHECK(std::system(
+            ("'" TPM_TEST_PROGRAM "' network check '" + scene + "' > /dev/null 2> '" + said + "'")
+                .c_str()) == 0);
   CHECK(read_file(said) == "tpm: warning: " + scene +
                                ": key /guides is now called 'sliders'; the former name is read "
                                "until version 0.3\n");
