@@ -113,7 +113,7 @@ def organ(options, folder):
     arguments = ["budget", options.law, "--scene", options.scene] + (["--finer", options.finer] if options.finer else [])
     budget = tpm_json(options.tpm, *arguments)
     scene = json.loads(Path(options.scene).read_text(encoding="utf-8"))
-    scene["guides"] = sorted({*scene.get("guides", []), *(c["number"] for c in scene["contacts"] if "number" in c)})
+    scene["sliders"] = sorted({*scene.get("sliders", []), *(c["number"] for c in scene["contacts"] if "number" in c)})
     scene["outputs"] = {"times": [f"{t!r} s" for t in budget["time_s"]], "fields": ["force"]}
     plain = simulated(options, scene, folder, "plain")
     masses = simulated(options, {**scene, "formulation": {"kind": "inertial"}}, folder, "masses")

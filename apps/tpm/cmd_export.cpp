@@ -76,7 +76,6 @@ int export_scene(const ExportTexts& texts, OrganTarget target) {
     options.density_kg_m3 = parse_number(*texts.density, "--density");
   }
   const Json scene = read_json(texts.law);
-  check_schema(scene, "scene", texts.law);
   const Tissue tissue =
       parse_tissue(scene, texts.law, std::filesystem::path(texts.law).parent_path());
   const std::string text = export_organ(tissue, options);

@@ -9,6 +9,7 @@
 #include "tpm/report/organ_material_report.hpp"
 #include "tpm/scene/protocol_file.hpp"
 #include "tpm/store/json.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpm/study/organ_material.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_file.hpp"
@@ -66,8 +67,7 @@ int run_material(const MaterialCommand& command, const Session& session) {
     will_write_into(command.folder, {"material_profiles.svg", "material_profiles.png"});
   }
   const LawFile law = read_law(command.law);
-  const Json scene = read_json(command.scene);
-  check_schema(scene, "scene", command.scene);
+  const Json scene = checked(read_json(command.scene), "scene", command.scene);
   const OrganMaterial result =
       put_on_organ(law, chosen_motions(command, law, scene), scene, command.scene,
                    std::filesystem::path(command.scene).parent_path(), material_options(command));

@@ -13,6 +13,7 @@
 #include "tpm/report/sweep_report.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpm/sweep/best_cells.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -135,8 +136,7 @@ int best(const SweepViewChoice& choice, const Session& session) {
     throw Error(ExitCode::usage, "--fit", "alone", "--fit FIT.json with --start START.json");
   }
   if (!choice.fit.empty()) {
-    Json fit = read_json(choice.fit);
-    check_schema(fit, "fit", choice.fit);
+    Json fit = checked(read_json(choice.fit), "fit", choice.fit);
     fit = fit_from_cell(std::move(fit), cells.front(), choice.fit);
     move_scene(fit, choice.fit, choice.start);
     write_file(choice.start, to_text(fit));

@@ -1,6 +1,8 @@
 // tpmkit._core: the library for Python. The package around it (tpmkit/*.py) makes DataFrames,
 // Datasets and figures of what it answers.
 #include "binding.hpp"
+#include "tpm/core/text.hpp"
+#include "tpm/core/warning.hpp"
 #include "tpm/store/file.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/units.hpp"
@@ -34,6 +36,15 @@ void bind_errors(py::module_& module) {
   });
 }
 
+/// Warnings of the library are FutureWarnings, which Python shows by default.
+void bind_warnings() {
+  set_warning_sink([](const std::string& text) {
+    const std::string safe = for_terminal(text, LineEnds::escaped);
+    const py::gil_scoped_acquire lock;
+    if (PyErr_WarnEx(PyExc_FutureWarning, safe.c_str(), 1) != 0) throw py::error_already_set();
+  });
+}
+
 }  // namespace
 }  // namespace tpm::python
 
@@ -42,6 +53,7 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled part of tpmkit; use the package tpmkit.";
   module.attr("__version__") = std::string(tpm::version());
   bind_errors(module);
+  bind_warnings();
   module.def(
       "parse_quantity",
       [](const std::string& text, const std::string& dimension) {

@@ -44,15 +44,21 @@ class Protocol {
 
   /// True if the tissue is in equilibrium with the first value at the first knot (a preload),
   /// instead of jumping to it from 0.
-  [[nodiscard]] bool relaxed_at_start() const noexcept { return relaxed_at_start_; }
-  void set_relaxed_at_start(bool relaxed) noexcept { relaxed_at_start_ = relaxed; }
+  [[nodiscard]] bool equilibrium_at_start() const noexcept { return equilibrium_at_start_; }
+  void set_equilibrium_at_start(bool equilibrium) noexcept { equilibrium_at_start_ = equilibrium; }
+  [[deprecated("use equilibrium_at_start()")]] bool relaxed_at_start() const noexcept {
+    return equilibrium_at_start();
+  }
+  [[deprecated("use set_equilibrium_at_start()")]] void set_relaxed_at_start(bool relaxed) noexcept {
+    set_equilibrium_at_start(relaxed);
+  }
 
  private:
   Drive drive_;
   std::vector<Knot> knots_;
   std::string name_;
   bool holds_forever_;
-  bool relaxed_at_start_ = false;
+  bool equilibrium_at_start_ = false;
 };
 
 /// The imposed value at a time not before the first knot. At a jump it is the value after the jump,

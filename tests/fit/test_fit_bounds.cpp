@@ -31,7 +31,7 @@ PreparedRecording pressed_from_the_start(double before, double exponent) {
   }
   // The contact has rested at its first depth.
   Protocol history = measured_history(Drive::displacement, r.time_s, r.drive);
-  history.set_relaxed_at_start(true);
+  history.set_equilibrium_at_start(true);
   const Eigen::VectorXd f = LawModel(spec).respond(history, r.time_s, values, Want::values).value;
   Random random(11);
   for (const double force : f) r.response.push_back(force + 2e-4 * f.maxCoeff() * random.normal());

@@ -87,7 +87,7 @@ TEST_CASE("an organ follows a measured motion in straight pieces, nearly as it d
   }
   const OrganModel model(std::make_shared<Tissue>(read_tissue(folder / "s.json")));
   Protocol whole = measured_history(Drive::displacement, time, depth);
-  whole.set_relaxed_at_start(true);
+  whole.set_equilibrium_at_start(true);
   const Eigen::VectorXd force = model.respond(whole, time, model.own_values(), Want::values).value;
   std::string csv = "time [s],depth [m],force [N]\n";
   for (std::size_t i = 0; i < time.size(); ++i) {
@@ -107,7 +107,7 @@ TEST_CASE("an organ follows a measured motion in straight pieces, nearly as it d
   const ExperimentResiduals function(config);
   const Protocol followed = followed_by_organ(whole);
   CHECK(followed.knots().size() < 50);
-  CHECK(followed.relaxed_at_start());
+  CHECK(followed.equilibrium_at_start());
   double off = 0.0;
   for (std::size_t i = 0; i < time.size(); ++i) {
     off = std::max(off, std::abs(value_at(followed, time[i]) - depth[i]));

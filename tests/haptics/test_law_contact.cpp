@@ -221,7 +221,7 @@ TEST_CASE("The motion of a recording is repeated, and the recording stands besid
       depth.push_back(std::min(2e-3 * time.back(), 3e-3));
     }
     Protocol history = measured_history(Drive::displacement, time, depth);
-    history.set_relaxed_at_start(true);
+    history.set_equilibrium_at_start(true);
     const auto force = model.respond(history, time, law.values, Want::values).value;
     std::string csv = "time [s],depth [m],force [N]\n";
     for (std::size_t i = 0; i < time.size(); ++i) {

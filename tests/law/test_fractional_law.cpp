@@ -98,7 +98,7 @@ TEST_CASE("a random history is the sum of its ramps", "[fractional]") {
                      5e-3 + 1e-3 * random.normal()});
   }
   Protocol history(Drive::displacement, knots);
-  history.set_relaxed_at_start(true);
+  history.set_equilibrium_at_start(true);
   std::vector<double> times;
   for (const Knot& k : knots) times.push_back(k.time_s);
   for (const Element& element : kElements) {

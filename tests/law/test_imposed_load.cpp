@@ -64,7 +64,7 @@ std::vector<Protocol> loads() {
   const Protocol ramps(Drive::force,
                        {{0.0, 0.0}, {0.5, 0.1}, {2.0, 0.1}, {2.0, 0.25}, {6.0, 0.2}, {20.0, 0.4}});
   Protocol preloaded(Drive::force, {{0.0, 0.05}, {1.0, 0.05}, {3.0, 0.3}, {20.0, 0.3}});
-  preloaded.set_relaxed_at_start(true);
+  preloaded.set_equilibrium_at_start(true);
   return {step, ramps, preloaded};
 }
 
@@ -80,7 +80,7 @@ TEST_CASE("A law under a load in closed form agrees with the stepped path", "[la
     const std::vector<double> values = spread_values(law, random, 0.02);
     const Stepped stepped(law, values);
     for (const Protocol& load : loads()) {
-      if (load.relaxed_at_start() && !law.spec().solid) continue;
+      if (load.equilibrium_at_start() && !law.spec().solid) continue;
       INFO(name << ", " << load.knots().size() << " knots");
       const Response r = law.respond(load, kTimes, values, Want::values_and_sensitivity);
       const Response s =

@@ -400,14 +400,14 @@ TEST_CASE("a preloaded recording starts relaxed", "[law]") {
   const LawModel law(parse_law_name("linear-1", "test"));
   const std::vector<double> values{20.0, 30.0, 1.0, -1e-3, 0.0};
   Protocol hold(Drive::displacement, {{0.0, 0.0}, {5.0, 0.0}});
-  hold.set_relaxed_at_start(true);
+  hold.set_equilibrium_at_start(true);
   const auto relaxed = law.respond(hold, evenly(0.0, 5.0, 6), values, Want::values).value;
   for (const double f : relaxed) CHECK_THAT(f, WithinRel(0.02, 1e-12));
-  hold.set_relaxed_at_start(false);
+  hold.set_equilibrium_at_start(false);
   const auto jumped = law.respond(hold, evenly(0.0, 5.0, 6), values, Want::values).value;
   CHECK_THAT(jumped[0], WithinRel(0.05, 1e-12));
   Protocol load(Drive::force, {{0.0, 0.1}, {5.0, 0.1}});
-  load.set_relaxed_at_start(true);
+  load.set_equilibrium_at_start(true);
   const auto depth = law.respond(load, evenly(0.0, 5.0, 6), values, Want::values).value;
   for (const double d : depth) CHECK_THAT(d, WithinRel(0.1 / 20.0 - 1e-3, 1e-9));
 }
@@ -444,7 +444,7 @@ Protocol trembling_hold(double jitter, std::vector<double>& times) {
     times.push_back(time);
   }
   Protocol protocol(Drive::displacement, std::move(knots));
-  protocol.set_relaxed_at_start(true);
+  protocol.set_equilibrium_at_start(true);
   return protocol;
 }
 

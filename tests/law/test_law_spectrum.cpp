@@ -51,7 +51,7 @@ std::pair<double, double> simulated(const LawSpec& spec, const std::vector<doubl
     drive.push_back(depth + amplitude * std::sin(omega * time.back()));
   }
   Protocol protocol = measured_history(Drive::displacement, time, drive);
-  protocol.set_relaxed_at_start(true);
+  protocol.set_equilibrium_at_start(true);
   const std::vector<double> last(time.end() - kSamples, time.end());
   const auto force = LawModel(spec).respond(protocol, last, values, Want::values).value;
   double sine = 0.0;

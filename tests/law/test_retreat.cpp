@@ -248,7 +248,7 @@ TEST_CASE("sensitivities of a shrinking contact agree with differences", "[retre
     for (const bool preloaded : {false, true}) {
       if (preloaded) values[law.index("contact")] = -5e-4;
       Protocol protocol = path.protocol();
-      protocol.set_relaxed_at_start(preloaded);
+      protocol.set_equilibrium_at_start(preloaded);
       const std::vector<double> times{1.0, 2.05, 2.2, 2.4, 2.75};
       const Response r = law.respond(protocol, times, values, Want::values_and_sensitivity);
       REQUIRE(r.value.allFinite());
@@ -330,7 +330,7 @@ TEST_CASE("the jitter of a measured depth does not end the prediction", "[retrea
     knots.push_back({t, path.at(t) + 2e-3 * path.depth * (random.uniform() - 0.5)});
   }
   Protocol measured(Drive::displacement, knots);
-  measured.set_relaxed_at_start(true);
+  measured.set_equilibrium_at_start(true);
   const Eigen::VectorXd noisy = law.respond(measured, times, branches.values(), Want::values).value;
   const Eigen::VectorXd clean =
       law.respond(path.protocol(), times, branches.values(), Want::values).value;
@@ -358,7 +358,7 @@ TEST_CASE("a fit predicts the unloading of a Hertz contact, and says where it pr
                               (b.value - a.value) * (t - a.time_s) / (b.time_s - a.time_s));
   }
   Protocol once = measured_history(Drive::displacement, recording.time_s, recording.drive);
-  once.set_relaxed_at_start(true);
+  once.set_equilibrium_at_start(true);
   const Response r = law.respond(once, recording.time_s, branches.values(), Want::values);
   Random random(9);
   const double sigma = 0.005 * r.value[50];

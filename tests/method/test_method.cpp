@@ -283,7 +283,7 @@ TEST_CASE("method: a preload held for ever is where a run begins") {
   for (const Drive drive : {Drive::displacement, Drive::force}) {
     const double value = drive == Drive::displacement ? 0.003 : 0.2;
     Protocol protocol(drive, {{0.0, value}, {1.0, value}});
-    protocol.set_relaxed_at_start(true);
+    protocol.set_equilibrium_at_start(true);
     const std::vector<double> times{0.0, 0.5, 1.0};
     for (const StepRuleEntry& entry : kStepRules) {
       INFO(entry.text);

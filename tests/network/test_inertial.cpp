@@ -344,7 +344,7 @@ TEST_CASE("driven slowly, the inertial network is the quasi-static one", "[heavy
 TEST_CASE("a preload starts in equilibrium and a release rings down to rest") {
   const Block block(slow_tissue());
   Protocol release(Drive::force, {{0.0, 0.2}, {0.1, 0.2}, {0.1, 0.0}, {20.0, 0.0}});
-  release.set_relaxed_at_start(true);
+  release.set_equilibrium_at_start(true);
   InertialOptions options;
   options.tolerance = 1e-7;
   options.energy = true;

@@ -266,12 +266,12 @@ TEST_CASE("what an engine cannot say of an organ is said in the text and beside 
   CHECK(organ_export_warnings(tissue, {.instantaneous = true}).size() == 2);
 }
 
-TEST_CASE("ropes and guides reach the engines that know them") {
+TEST_CASE("ropes and sliders reach the engines that know them") {
   Json scene = exported_scene();
   scene["bonds"]["lateral"] = "rope";
   scene["material"].erase("branches");
   const std::size_t contact = *exported_tissue().network.organ.contact;
-  scene["guides"] = Json::array({contact + 1});
+  scene["sliders"] = Json::array({contact + 1});
   const Tissue tissue = exported_tissue(scene);
   const Built mjcf = built_from(tissue, {.target = OrganTarget::mjcf});
   const BondSystem bonds = tissue.bonds();

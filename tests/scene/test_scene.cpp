@@ -61,7 +61,7 @@ TEST_CASE("every key of a scene reaches the tissue") {
                  "A0": "5 mm^2", "l0": "6 mm"},
     "anchors": [{"kind": "inner_layer"}, {"kind": "spheres", "spheres": [1, 48]},
                 {"kind": "half_space", "point": ["0 mm", "25 mm", "0 mm"], "normal": [0, 2, 0]}],
-    "guides": [6], "contacts": [{"kind": "sphere"}],
+    "sliders": [6], "contacts": [{"kind": "sphere"}],
     "protocol": {"kind": "creep", "load": "1 N", "duration": "1 s"}})");
   const Organ& organ = tissue.network.organ;
   REQUIRE(organ.size() == 48);
@@ -79,8 +79,8 @@ TEST_CASE("every key of a scene reaches the tissue") {
   // The bottom plane of 16, sphere 1, and the rows y = 30 mm of the two planes above.
   CHECK(tissue.anchors.size() == 16 + 1 + 8);
   CHECK(tissue.anchor_words.size() == 3);
-  REQUIRE(tissue.guides.size() == 1);
-  CHECK(tissue.guides[0].sphere == 5);
+  REQUIRE(tissue.sliders.size() == 1);
+  CHECK(tissue.sliders[0].sphere == 5);
   CHECK(tissue.unused_blocks == std::vector<std::string>{"contacts", "protocol"});
 }
 

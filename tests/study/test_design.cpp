@@ -131,7 +131,7 @@ TEST_CASE("a decay of unknown size and rate: D-optimal are readings at 0 and tau
   // Two readings, at 0 and at the hold h: det = (h/tau)^2 exp(-2 h/tau) (k u)^4, largest at h =
   // tau.
   Json document = decay();
-  document["goal"] = "all";
+  document["criterion"] = "all";
   document["candidates"] = Json::array();
   for (const char* hold : {"1 s", "3 s", "8 s", "10 s", "12 s", "30 s", "90 s"}) {
     document["candidates"].push_back({{"kind", "ramp_hold"},
@@ -159,7 +159,7 @@ TEST_CASE("a hold long compared with tau goes before one that is too short") {
   Json document = decay();
   document["candidates"][0]["hold"] = {"1 s", "40 s"};
   for (const char* criterion : {"all", "worst", "tau1"}) {
-    document["goal"] = criterion;
+    document["criterion"] = criterion;
     const DesignResult result = plan(parsed(document));
     CHECK(result.ranked.front().experiment.hold_s == 40.0);
     CHECK_THAT(result.words[1],
@@ -305,8 +305,9 @@ TEST_CASE("bad designs are named") {
     document[Json::json_pointer(pointer)] = value;
     return message(document);
   };
-  CHECK_THAT(changed("/goal", "stiffness"),
-             Contains("/goal: no parameter is called 'stiffness'; expected all, worst, k_inf"));
+  CHECK_THAT(
+      changed("/criterion", "stiffness"),
+      Contains("/criterion: no parameter is called 'stiffness'; expected all, worst, k_inf"));
   CHECK_THAT(changed("/candidates/0/rate", Json::array({"0 mm/s"})),
              Contains("/candidates/0/rate/0: 0 m/s; expected a value above 0"));
   CHECK_THAT(changed("/candidates/0/load", Json::array({"1 N"})),

@@ -118,12 +118,13 @@ TEST_CASE("a study says which part of its configuration is wrong") {
   CHECK(refused(study) ==
         "s.json: key /materials/0/fit: no fit 'some'; expected a name under /fits");
   study = star_only();
-  study["materials"][0]["hold"] = {{"A0", "12 mm^2"}};
-  CHECK_THAT(refused(study), Contains("/materials/0/hold/A0: is not estimated"));
-  study["materials"][0]["hold"] = {{"spacing", "1 mm"}};
-  CHECK_THAT(refused(study), Contains("/materials/0/hold/spacing: outside the parameter's bounds"));
-  study["materials"][0]["hold"] = {{"spacing", "20 mm"}, {"E", "9 kPa"}, {"eta1", "5 Pa s"}};
-  CHECK_THAT(refused(study), Contains("/materials/0/hold: all parameters are fixed"));
+  study["materials"][0]["fixed"] = {{"A0", "12 mm^2"}};
+  CHECK_THAT(refused(study), Contains("/materials/0/fixed/A0: is not estimated"));
+  study["materials"][0]["fixed"] = {{"spacing", "1 mm"}};
+  CHECK_THAT(refused(study),
+             Contains("/materials/0/fixed/spacing: outside the parameter's bounds"));
+  study["materials"][0]["fixed"] = {{"spacing", "20 mm"}, {"E", "9 kPa"}, {"eta1", "5 Pa s"}};
+  CHECK_THAT(refused(study), Contains("/materials/0/fixed: all parameters are fixed"));
   study = star_only();
   study["materials"][1]["name"] = study["materials"][0]["name"];
   CHECK_THAT(refused(study), Contains("/materials/1/name: another material has it"));

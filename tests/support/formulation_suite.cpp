@@ -52,7 +52,7 @@ ExperimentScene star(const std::string& blocks, const Formulation& f) {
 /// that reduced contacts do not trust themselves.
 ExperimentScene liver(const std::string& blocks, const Formulation& f) {
   ExperimentScene scene = parsed(R"({"kind": "liver", "count": 40})", blocks, f);
-  scene.tissue.guides.push_back({scene.probe().sphere, scene.probe().direction});
+  scene.tissue.sliders.push_back({scene.probe().sphere, scene.probe().direction});
   return scene;
 }
 
@@ -309,7 +309,7 @@ ExperimentScene with_material(const Asking& asking, const Formulation& f) {
   const std::string text =
       R"({"organ": {"kind": "liver", "count": 40}, )" + asking.blocks + ", " + kRamp + "}";
   ExperimentScene scene = parse_experiment(parse_json(text, "scene"), "scene", {});
-  scene.tissue.guides.push_back({scene.probe().sphere, scene.probe().direction});
+  scene.tissue.sliders.push_back({scene.probe().sphere, scene.probe().direction});
   scene.formulation.kind = f.name();
   scene.formulation.masses = f.can().masses && !f.takes("masses");
   scene.formulation.where = "scene: key /formulation";

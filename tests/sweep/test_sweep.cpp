@@ -107,7 +107,7 @@ TEST_CASE("a ramp and a hold in a sweep are those of tpm tables --consistent") {
 TEST_CASE("creep in a sweep obeys the balance at once and in the end, and the model in between") {
   const Sweep sweep = parsed(R"({"model": "single_contact", "material": {"eta1": "240 kPa s"},
     "creep": {}, "axes": [{"parameter": "load", "values": ["0.196 N", "0.98 N"]}],
-    "outputs": ["creep_depth_at_once", "creep_depth", {"creep_depth_at": "7 s", "name": "at7"},
+    "outputs": ["instantaneous_creep_depth", "creep_depth", {"creep_depth_at": "7 s", "name": "at7"},
                 {"creep_depth_over": {"values": ["0 s", "7 s"]}, "name": "depth_over"}]})");
   const CellBlock block = only_block(sweep);
   TpmParameters p;

@@ -30,10 +30,15 @@ class Protocol:
         """A constant load from time 0 on."""
     @staticmethod
     def history(
-        times_s: npt.ArrayLike, values: npt.ArrayLike, drive: str = "displacement", relaxed_at_start: bool = False
+        times_s: npt.ArrayLike,
+        values: npt.ArrayLike,
+        drive: str = "displacement",
+        equilibrium_at_start: bool = False,
+        relaxed_at_start: bool | None = None,
     ) -> Protocol:
         """A measured history of depths (drive "displacement") or loads ("force"); times increase.
-        relaxed_at_start: the first value had been kept for ever before."""
+        equilibrium_at_start: the first value had been kept for ever before; relaxed_at_start is its
+        former name, read until version 0.3."""
     @property
     def name(self) -> str: ...
     @property

@@ -6,6 +6,7 @@
 
 #include "tpm/core/enum_names.hpp"
 #include "tpm/core/text.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm {
@@ -145,8 +146,7 @@ std::string segments_words(const std::vector<RecordedSegment>& segments) {
 
 CurveDescription read_description(const std::filesystem::path& path) {
   const std::string file = path.string();
-  const Json json = read_json(path);
-  check_schema(json, "curve", file);
+  const Json json = checked(read_json(path), "curve", file);
   CurveDescription description;
   CurveHeader& header = description.header;
   header.id = text_of(json, "id");

@@ -7,6 +7,7 @@
 #include "tpm/fit/config_parts.hpp"
 #include "tpm/fit/experiment_refit.hpp"
 #include "tpm/scene/organ_model.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/formulation.hpp"
 #include "tpmkit/law_model.hpp"
@@ -118,9 +119,9 @@ TpmVector fitted_element(const FitConfig& config, std::span<const double> natura
   return vector;
 }
 
-FitConfig parse_fit_config(const Json& document, std::string_view where,
+FitConfig parse_fit_config(const Json& written, std::string_view where,
                            const std::filesystem::path& folder) {
-  check_schema(document, "fit", where);
+  const Json document = checked(written, "fit", where);
   const DocumentPlace place{std::string(where)};
   FitConfig config;
   config.folder = folder;

@@ -207,7 +207,7 @@ void add_recording(ExperimentSet& set, const FitConfig& config, std::size_t choi
   require_drive(config, recording, data.dataset);
   const std::vector<double>& sd = recording.response_sd;
   Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
-  history.set_relaxed_at_start(true);
+  history.set_equilibrium_at_start(true);
   TimeCourse course{std::move(history), recording.time_s};
   if (config.organ) course.followed = followed_by_organ(course.protocol);
   Experiment experiment{std::move(course), {}, choice, true};

@@ -334,7 +334,7 @@ void thin(Experiment& experiment, std::size_t stride) {
     data.push_back(experiment.data[i]);
   }
   Protocol protocol(course.protocol.drive(), std::move(knots), course.protocol.name());
-  protocol.set_relaxed_at_start(course.protocol.relaxed_at_start());
+  protocol.set_equilibrium_at_start(course.protocol.equilibrium_at_start());
   course.protocol = std::move(protocol);
   course.times_s = std::move(times_s);
   experiment.data = std::move(data);

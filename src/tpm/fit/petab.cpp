@@ -9,6 +9,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/store/delimited.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::fit {
@@ -264,8 +265,8 @@ void add_measurements(const Table& measurements, const Table& conditions, const 
   }
 }
 
-FitProblem parse_fit_tables(const Json& problem, const fs::path& path) {
-  check_schema(problem, "fit_tables", path.string());
+FitProblem parse_fit_tables(const Json& written, const fs::path& path) {
+  const Json problem = checked(written, "fit_tables", path.string());
   const auto file = [&](const char* key) {
     return path.parent_path() / problem.at(key).get<std::string>();
   };

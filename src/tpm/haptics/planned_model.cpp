@@ -49,11 +49,11 @@ ExperimentScene scene_of(const PushedScene& pushed, const ContactRange& range) {
                         {},
                         {},
                         {}};
-  std::vector<Guide>& guides = scene.tissue.guides;
+  std::vector<Slider>& sliders = scene.tissue.sliders;
   for (const std::size_t sphere : spheres_of(pushed.contact, pushed.tissue.network.organ)) {
-    const auto of_contact = [&](const Guide& guide) { return guide.sphere == sphere; };
-    if (std::any_of(guides.begin(), guides.end(), of_contact)) continue;
-    guides.push_back({sphere, pushed.probe().direction});
+    const auto of_contact = [&](const Slider& slider) { return slider.sphere == sphere; };
+    if (std::any_of(sliders.begin(), sliders.end(), of_contact)) continue;
+    sliders.push_back({sphere, pushed.probe().direction});
   }
   return contact_scene(scene, range);
 }

@@ -6,6 +6,7 @@
 
 #include "tpm/law/law_json.hpp"
 #include "tpm/servo/real_time.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpm/store/row_log.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/version.hpp"
@@ -131,7 +132,9 @@ HilRecording read_recording(const std::filesystem::path& file) {
   if ((format != kFormat && format != kFirstFormat) || log.row_bytes != row_bytes) {
     throw bad_input(file.string(), "is a recording of another version of tpm", kFormat);
   }
-  recording.session = parse_session(recording.header.at("session"), file.string(), {});
+  const Json session =
+      with_current_names(recording.header.at("session"), "hil", file.string(), FormerNames::silent);
+  recording.session = parse_session(session, file.string(), {});
   if (recording.header.contains("surface_by_phase_m")) {  // before, slides went straight
     set_surface(recording.session, recording.header.at("surface_by_phase_m"), file.string());
   }

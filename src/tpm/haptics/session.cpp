@@ -16,6 +16,7 @@
 #include "tpm/plan/plan.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::haptics {
@@ -324,9 +325,9 @@ OperatorScript HilSession::operator_script() const {
   return OperatorScript(std::move(pieces));
 }
 
-HilSession parse_session(const Json& json, std::string_view where,
+HilSession parse_session(const Json& written, std::string_view where,
                          const std::filesystem::path& folder) {
-  check_schema(json, "hil", where);
+  const Json json = checked(written, "hil", where);
   const DocumentPlace place{std::string(where)};
   const DeviceLimits& device = limits_of("omega7");  // the simulated one has the same
   HilSession session;
@@ -411,8 +412,7 @@ void require_within(const HilSession& session, const DeviceLimits& limits) {
 }
 
 HilSession read_session(const std::filesystem::path& file, const SessionChanges& changes) {
-  Json json = read_json(file);
-  check_schema(json, "hil", file.string());
+  Json json = checked(read_json(file), "hil", file.string());
   if (!changes.law.empty()) {
     json["model"] = {{"kind", "law"}, {"law", to_json(read_law(changes.law))}};
   }

@@ -264,7 +264,7 @@ std::vector<ContactEdge> contact_edges(const LawAtParameters& law, const Protoco
                                        Want want) {
   const auto knots = protocol.knots();
   EdgeFinder finder(law, want == Want::values_and_sensitivity);
-  finder.begin(knots.front(), protocol.relaxed_at_start());
+  finder.begin(knots.front(), protocol.equilibrium_at_start());
   for (std::size_t i = 1; i <= turn.knot; ++i) finder.move_to(knots[i]);
   finder.end_growth();
   std::vector<ContactEdge> edges;

@@ -9,7 +9,7 @@ std::optional<DrivePath> drive_path(const Protocol& protocol, std::span<const do
   const auto knots = protocol.knots();
   DrivePath path;
   path.start = knots.front().value;
-  path.relaxed = protocol.relaxed_at_start();
+  path.relaxed = protocol.equilibrium_at_start();
   path.time_scale = std::max(std::abs(knots.front().time_s), std::abs(knots.back().time_s));
   path.steps.reserve(knots.size() + times_s.size());
   path.steps_before.reserve(times_s.size());

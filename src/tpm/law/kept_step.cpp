@@ -16,7 +16,7 @@ std::optional<double> kept_step(const Protocol& protocol) {
   const auto knots = protocol.knots();
   const double value = knots.front().value;
   const bool kept =
-      !protocol.relaxed_at_start() &&
+      !protocol.equilibrium_at_start() &&
       std::all_of(knots.begin(), knots.end(), [value](const Knot& k) { return k.value == value; });
   return kept ? std::optional(value) : std::nullopt;
 }

@@ -7,6 +7,7 @@
 
 #include "tpm/law/law_json.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
 
@@ -73,8 +74,8 @@ std::string law_key(const LawParameter& parameter) {
   return parameter.name + "_" + unit;
 }
 
-LawFile law_from_json(const Json& json, std::string_view where) {
-  check_schema(json, "law", where);
+LawFile law_from_json(const Json& written, std::string_view where) {
+  const Json json = checked(written, "law", where);
   LawFile law;
   law.spec = spec_of(json, where);
   law.values = values_of(json.at("parameters"), law.spec, where);

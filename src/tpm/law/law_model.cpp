@@ -95,7 +95,7 @@ void walk(const Protocol& protocol, std::span<const double> times_s, Contact& co
   const auto move = [&](double from, double to, double h) {
     if (h > 0.0) contact.move(from, to, h);
   };
-  if (protocol.relaxed_at_start()) {
+  if (protocol.equilibrium_at_start()) {
     contact.rest_at(knots.front().value);
   } else {
     jump(knots.front().value);
@@ -336,7 +336,7 @@ void LawModel::require_in_range(std::span<const double> values) const {
 
 void LawModel::require_no_jump(const Protocol& protocol, double contact) const {
   const auto knots = protocol.knots();
-  double before = protocol.relaxed_at_start() ? knots.front().value : 0.0;
+  double before = protocol.equilibrium_at_start() ? knots.front().value : 0.0;
   double time = knots.front().time_s;
   for (const Knot& k : knots) {
     const bool instantaneous = k.time_s == time && &k != knots.data();

@@ -128,7 +128,7 @@ class MethodDriver {
   [[nodiscard]] MethodEnd cross_all() {
     const Knot& first = knots_.front();
     system_.set_piece({first.time_s, 0.0}, {first.time_s + 1.0, 0.0});
-    const bool relaxed = protocol_.relaxed_at_start();
+    const bool relaxed = protocol_.equilibrium_at_start();
     if (const auto end = system_.start(first, relaxed, state_); end != MethodEnd::completed)
       return end;
     if (first.value != 0.0) {

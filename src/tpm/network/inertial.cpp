@@ -61,7 +61,7 @@ std::vector<Knot> finite_knots(const Protocol& protocol, std::span<const double>
 void require_no_jump_of_depth(const Protocol& protocol) {
   if (protocol.drive() == Drive::force) return;
   const auto knots = protocol.knots();
-  bool jumps = knots.front().value != 0.0 && !protocol.relaxed_at_start();
+  bool jumps = knots.front().value != 0.0 && !protocol.equilibrium_at_start();
   for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
     jumps =
         jumps || (knots[k].time_s == knots[k + 1].time_s && knots[k].value != knots[k + 1].value);
@@ -99,7 +99,7 @@ class MotionRun {
     TissueState start = tissue_.at_rest(knots_.front().time_s);
     const double response_scale = std::abs(tissue_.linear_response(start, protocol.peak()));
     const double depth = tissue_.depth_driven() ? protocol.peak() : response_scale;
-    if (!from && protocol.relaxed_at_start() && knots_.front().value != 0.0) {
+    if (!from && protocol.equilibrium_at_start() && knots_.front().value != 0.0) {
       preload(bonds, rest, constraints, probes, start);
     }
     if (from && from->motion.size() != equation_.size()) {

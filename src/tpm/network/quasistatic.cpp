@@ -117,7 +117,7 @@ class Run {
   void start() {
     const Knot& first = protocol_.knots().front();
     set_scales(first.time_s);
-    if (protocol_.relaxed_at_start()) {
+    if (protocol_.equilibrium_at_start()) {
       move_to(first.value, true);
     } else if (first.value != 0.0) {
       jump(first.value);

@@ -28,12 +28,12 @@ struct BuiltContact {
   std::function<int()> balances = {};  ///< of the last step; none: 0
 };
 
-/// The scene guides the sphere along its own push.
+/// The scene lets the sphere slide along its own push.
 bool is_guided(const PlanScene& scene) {
   const Probe& probe = scene.scene().probe();
-  const auto& guides = scene.scene().tissue.guides;
-  return std::any_of(guides.begin(), guides.end(),
-                     [&](const Guide& guide) { return guide.sphere == probe.sphere; });
+  const auto& sliders = scene.scene().tissue.sliders;
+  return std::any_of(sliders.begin(), sliders.end(),
+                     [&](const Slider& slider) { return slider.sphere == probe.sphere; });
 }
 
 PushedSpheres contact_of(const PlanScene& scene) {
@@ -44,7 +44,7 @@ PushedSpheres contact_of(const PlanScene& scene) {
 Constraints freedom_around(const PlanScene& scene) {
   Tissue tissue = scene.scene().tissue;
   const PushedSpheres contact = contact_of(scene);
-  std::erase_if(tissue.guides, [&](const Guide& guide) { return contact.has(guide.sphere); });
+  std::erase_if(tissue.sliders, [&](const Slider& slider) { return contact.has(slider.sphere); });
   return tissue.constraints();
 }
 

@@ -138,7 +138,7 @@ std::vector<Kink> rate_kinks(const Protocol& protocol) {
 
 double largest_jump(const Protocol& protocol) {
   const auto knots = protocol.knots();
-  double jump = protocol.relaxed_at_start() ? 0.0 : std::abs(knots.front().value);
+  double jump = protocol.equilibrium_at_start() ? 0.0 : std::abs(knots.front().value);
   for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
     if (knots[k].time_s != knots[k + 1].time_s) continue;
     jump = std::max(jump, std::abs(knots[k + 1].value - knots[k].value));

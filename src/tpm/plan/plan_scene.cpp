@@ -118,7 +118,7 @@ bool PlanScene::single_patch() const {
 
 bool PlanScene::jumps() const {
   const auto knots = protocol().knots();
-  bool jumps = knots.front().value != 0.0 && !protocol().relaxed_at_start();
+  bool jumps = knots.front().value != 0.0 && !protocol().equilibrium_at_start();
   for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
     jumps =
         jumps || (knots[k].time_s == knots[k + 1].time_s && knots[k].value != knots[k + 1].value);
@@ -161,7 +161,7 @@ PlanScene PlanScene::faster(double factor) const {
   const double begin = knots.front().time_s;
   for (Knot& knot : knots) knot.time_s = begin + (knot.time_s - begin) / factor;
   Protocol quick(protocol().drive(), std::move(knots), protocol().name());
-  quick.set_relaxed_at_start(protocol().relaxed_at_start());
+  quick.set_equilibrium_at_start(protocol().equilibrium_at_start());
   return with_protocol(std::move(quick));
 }
 
@@ -216,7 +216,7 @@ PlanScene PlanScene::with_layers(int layers) const {
   }
   std::sort(anchors.begin(), anchors.end());
   anchors.erase(std::unique(anchors.begin(), anchors.end()), anchors.end());
-  std::erase_if(scene.tissue.guides, [&](const Guide& g) { return layer[g.sphere] >= layers; });
+  std::erase_if(scene.tissue.sliders, [&](const Slider& g) { return layer[g.sphere] >= layers; });
   return PlanScene(std::move(scene));
 }
 

@@ -27,7 +27,7 @@ ScalarRun::ScalarRun(const Protocol& protocol, ScalarModel model, double longest
       knots_(protocol_.knots()) {
   time_s_ = knots_.front().time_s;
   const double first = knots_.front().value;
-  if (protocol_.relaxed_at_start()) {
+  if (protocol_.equilibrium_at_start()) {
     settle(first);
   } else {
     jump(first);

@@ -27,7 +27,7 @@ struct RampAndHold {
 
 std::optional<RampAndHold> as_ramp_and_hold(const Protocol& protocol) {
   const auto knots = protocol.knots();
-  const bool is_one = protocol.drive() == Drive::displacement && !protocol.relaxed_at_start() &&
+  const bool is_one = protocol.drive() == Drive::displacement && !protocol.equilibrium_at_start() &&
                       (knots.size() == 2 || knots.size() == 3) && knots[0].value == 0.0 &&
                       knots[0].time_s == 0.0 && knots[1].value > 0.0 && knots[1].time_s > 0.0 &&
                       knots.back().value == knots[1].value;

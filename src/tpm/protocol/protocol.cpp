@@ -79,7 +79,7 @@ Protocol history_until(const Protocol& protocol, double time_s) {
     knots.push_back({time_s, value_at(protocol, time_s)});
   }
   Protocol part(protocol.drive(), std::move(knots), protocol.name());
-  part.set_relaxed_at_start(protocol.relaxed_at_start());
+  part.set_equilibrium_at_start(protocol.equilibrium_at_start());
   return part;
 }
 

@@ -46,7 +46,7 @@ Protocol followed_by_organ(const Protocol& measured, double contact) {
   for (const Knot& knot : measured.knots()) deepest = std::max(deepest, knot.value - contact);
   Protocol motion(measured.drive(), in_straight_pieces(measured.knots(), kMotionWithin * deepest),
                   measured.name());
-  motion.set_relaxed_at_start(measured.relaxed_at_start());
+  motion.set_equilibrium_at_start(measured.equilibrium_at_start());
   return motion;
 }
 

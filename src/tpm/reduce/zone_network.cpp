@@ -58,7 +58,7 @@ void ZoneNetwork::choose_zone(const PushedContact& tissue) {
   for (std::size_t i = 0; i < bonds.spheres(); ++i) {
     if (contact_.has(i) || tissue.constraints().is_free(i)) continue;
     if (!tissue.constraints().projector(i).isZero(0.0)) {
-      throw bad_input("guides", "sphere " + std::to_string(i + 1) + " is guided",
+      throw bad_input("sliders", "sphere " + std::to_string(i + 1) + " slides along a line",
                       "spheres that are free or fixed");
     }
     zone_role_[i] = 0;

@@ -50,7 +50,7 @@ Json network_json(const Tissue& tissue, const NetworkInspection& inspection) {
             {"lateral_bonds", inspection.lateral_bonds},
             {"anchored_spheres", tissue.anchors.size()},
             {"anchors", tissue.anchor_words},
-            {"guided_spheres", tissue.guides.size()},
+            {"sliding_spheres", tissue.sliders.size()},
             {"free_coordinates", inspection.free_coordinates}};
   json["layers"] = Json::array();
   for (std::size_t k = 0; k < inspection.nearest.size(); ++k) {

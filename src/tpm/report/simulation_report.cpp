@@ -153,9 +153,9 @@ Json contacts_json(const ExperimentScene& scene, const RunNetwork& network,
 
 /// A driven sphere is no tool: nothing holds it across the push unless the scene does.
 std::string sideways_words(const ExperimentScene& scene, const Probe& probe) {
-  const std::vector<Guide>& guides = scene.tissue.guides;
-  const bool guided = std::any_of(guides.begin(), guides.end(),
-                                  [&](const Guide& g) { return g.sphere == probe.sphere; });
+  const std::vector<Slider>& sliders = scene.tissue.sliders;
+  const bool guided = std::any_of(sliders.begin(), sliders.end(),
+                                  [&](const Slider& g) { return g.sphere == probe.sphere; });
   return fmt::format("sphere {} is driven along its push and {} across it\n", probe.sphere + 1,
                      guided ? "guided" : "free");
 }

@@ -103,7 +103,7 @@ void require_patch_free(const SceneContact& patch, const Tissue& tissue,
     throw bad_input(
         place.key("radius").where,
         fmt::format("the patch has sphere {}, which cannot move along the push", sphere + 1),
-        "a smaller radius, or a place away from anchors and guides");
+        "a smaller radius, or a place away from anchors and sliders");
   }
 }
 

@@ -6,6 +6,7 @@
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -30,8 +31,7 @@ void require_masses(const std::vector<SceneContact>& contacts, std::string_view 
 
 ExperimentScene parse_experiment(const Json& scene, std::string_view where,
                                  const std::filesystem::path& folder) {
-  check_schema(scene, "scene", where);
-  return parse_checked_experiment(scene, where, folder);
+  return parse_checked_experiment(checked(scene, "scene", where), where, folder);
 }
 
 ExperimentScene parse_checked_experiment(const Json& scene, std::string_view where,

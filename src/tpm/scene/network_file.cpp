@@ -23,7 +23,7 @@ void write_spheres(const Tissue& tissue, Hdf5Writer& file) {
   std::vector<std::int32_t> index(organ.size());
   std::iota(index.begin(), index.end(), 0);
   std::vector<std::int32_t> role(organ.size(), 0);
-  for (const Guide& guide : tissue.guides) role[guide.sphere] = 1;
+  for (const Slider& slider : tissue.sliders) role[slider.sphere] = 1;
   for (const std::size_t sphere : tissue.anchors) role[sphere] = 2;
   std::vector<std::int32_t> contact(organ.size(), 0);
   if (organ.contact) contact[*organ.contact] = 1;
@@ -38,7 +38,7 @@ void write_spheres(const Tissue& tissue, Hdf5Writer& file) {
   file.integers("/spheres/contact", contact, 1);
   file.attribute("/spheres/layer", "meaning", "1: outermost");
   file.attribute("/spheres/constraint", "meaning",
-                 "0: free, 1: guided along its normal, 2: anchored");
+                 "0: free, 1: slides along its normal, 2: anchored");
 }
 
 void write_bonds(const Network& network, Hdf5Writer& file) {

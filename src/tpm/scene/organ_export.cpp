@@ -95,9 +95,9 @@ std::string sofa_document(const Tissue& tissue, const OrganExportOptions& option
     text += fmt::format("    <FixedProjectiveConstraint indices=\"{}\"/>\n",
                         fmt::join(tissue.anchors, " "));
   }
-  for (const Guide& guide : tissue.guides) {
+  for (const Slider& slider : tissue.sliders) {
     text += fmt::format("    <DirectionProjectiveConstraint indices=\"{}\" direction=\"{}\"/>\n",
-                        guide.sphere, coordinates(guide.direction));
+                        slider.sphere, coordinates(slider.direction));
   }
   text += fmt::format(
       "    <StiffSpringForceField template=\"Vec3d\" name=\"bonds\" spring=\"\n{}\"/>\n"
@@ -122,11 +122,11 @@ std::string mjcf_bodies(const Tissue& tissue, double mass_kg) {
         "    <body name=\"b{}\" pos=\"{}\"><inertial pos=\"0 0 0\" mass=\"{}\" diaginertia=\"{} "
         "{} {}\"/>",
         i, place, shortest(mass_kg), shortest(inertia), shortest(inertia), shortest(inertia));
-    const auto guide = std::find_if(tissue.guides.begin(), tissue.guides.end(),
-                                    [&](const Guide& g) { return g.sphere == sphere; });
+    const auto slider = std::find_if(tissue.sliders.begin(), tissue.sliders.end(),
+                                     [&](const Slider& g) { return g.sphere == sphere; });
     std::vector<Eigen::Vector3d> axes;
-    if (guide != tissue.guides.end()) {
-      axes = {guide->direction};
+    if (slider != tissue.sliders.end()) {
+      axes = {slider->direction};
     } else {
       axes = {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()};
     }

@@ -36,9 +36,9 @@ struct ExportedBond {
 };
 [[nodiscard]] std::vector<ExportedBond> exported_bonds(const Tissue& tissue, bool instantaneous);
 
-/// The spheres, masses, anchors, guides and bonds of an organ as a document of the engine, SI, with
-/// what it leaves out as comments. Spheres are numbered from 0 there. Without gravity, probe and
-/// protocol. Throws Error(bad_input) for a density that is not above 0.
+/// The spheres, masses, anchors, sliders and bonds of an organ as a document of the engine, SI,
+/// with what it leaves out as comments. Spheres are numbered from 0 there. Without gravity, probe
+/// and protocol. Throws Error(bad_input) for a density that is not above 0.
 [[nodiscard]] std::string export_organ(const Tissue& tissue, const OrganExportOptions& options);
 
 /// What the engine cannot say of this organ; each stands among the comments, too.

@@ -1,9 +1,11 @@
 #include "tpm/scene/protocol_file.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "tpm/protocol/protocol_block.hpp"
 #include "tpm/scene/experiment_blocks.hpp"
+#include "tpm/store/renamed_names.hpp"
 
 namespace tpm::organ {
 
@@ -16,7 +18,7 @@ ProtocolFile parse_protocol_file(const Json& document, std::string_view where) {
   for (const char* key : {"protocol", "outputs"}) {
     if (document.is_object() && document.contains(key)) blocks[key] = document.at(key);
   }
-  check_schema(blocks, "protocol", where);
+  blocks = checked(std::move(blocks), "protocol", where);
   const DocumentPlace place{std::string(where)};
   const DocumentPlace at = place.key("protocol");
   Protocol protocol =

@@ -11,6 +11,7 @@
 #include "tpm/network/rigidity.hpp"
 #include "tpm/scene/blocks.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -51,7 +52,7 @@ bool is_anchored(const Tissue& tissue, std::size_t sphere) {
   return std::binary_search(tissue.anchors.begin(), tissue.anchors.end(), sphere);
 }
 
-void read_guides(const Json& numbers, Tissue& tissue, const DocumentPlace& place) {
+void read_sliders(const Json& numbers, Tissue& tissue, const DocumentPlace& place) {
   const Organ& organ = tissue.network.organ;
   std::size_t index = 0;
   for (const Json& number : numbers) {
@@ -61,7 +62,7 @@ void read_guides(const Json& numbers, Tissue& tissue, const DocumentPlace& place
       throw bad_input(entry.where, fmt::format("sphere {} is anchored", sphere + 1),
                       "a sphere that may move");
     }
-    tissue.guides.push_back({sphere, organ.normal.col(static_cast<Eigen::Index>(sphere))});
+    tissue.sliders.push_back({sphere, organ.normal.col(static_cast<Eigen::Index>(sphere))});
   }
 }
 
@@ -91,15 +92,14 @@ BondElement Tissue::element(std::string_view user) const {
 
 Constraints Tissue::constraints() const {
   Constraints constraints(network.organ.size());
-  for (const Guide& guide : guides) constraints.slide(guide.sphere, guide.direction);
+  for (const Slider& slider : sliders) constraints.slide(slider.sphere, slider.direction);
   for (const std::size_t sphere : anchors) constraints.fix(sphere);
   return constraints;
 }
 
 Tissue parse_tissue(const Json& scene, std::string_view where,
                     const std::filesystem::path& folder) {
-  check_schema(scene, "scene", where);
-  return parse_checked_tissue(scene, where, folder);
+  return parse_checked_tissue(checked(scene, "scene", where), where, folder);
 }
 
 Tissue parse_checked_tissue(const Json& scene, std::string_view where,
@@ -108,7 +108,7 @@ Tissue parse_checked_tissue(const Json& scene, std::string_view where,
   const auto block = [&](const char* key) { return scene.value(key, Json::object()); };
   OrganBlock organ = parse_organ(scene.at("organ"), place.key("organ"), folder);
   const Json anchors = scene.value("anchors", usual_anchors(organ.star, organ.liver));
-  const Json guides = scene.value("guides", organ.star ? Json::array({2}) : Json::array());
+  const Json sliders = scene.value("sliders", organ.star ? Json::array({2}) : Json::array());
   Tissue tissue;
   tissue.liver = organ.liver;
   tissue.star = organ.star;
@@ -122,7 +122,7 @@ Tissue parse_checked_tissue(const Json& scene, std::string_view where,
   tissue.materials = std::move(read.materials);
   tissue.by_constants = read.by_constants;
   read_anchors(anchors, tissue, place.key("anchors"));
-  read_guides(guides, tissue, place.key("guides"));
+  read_sliders(sliders, tissue, place.key("sliders"));
   for (const char* key : kOtherBlocks) {
     if (scene.contains(key)) tissue.unused_blocks.emplace_back(key);
   }
@@ -130,7 +130,7 @@ Tissue parse_checked_tissue(const Json& scene, std::string_view where,
 }
 
 Json with_mesh_listed(Json scene, std::string_view where, const std::filesystem::path& folder) {
-  check_schema(scene, "scene", where);
+  scene = checked(std::move(scene), "scene", where);
   if (scene.at("organ").at("kind") != "mesh") return scene;
   const Organ organ = parse_tissue(scene, where, folder).network.organ;
   Json spheres = Json::array();

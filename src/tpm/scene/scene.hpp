@@ -14,7 +14,7 @@
 namespace tpm::organ {
 
 /// A sphere that may only move along a line.
-struct Guide {
+struct Slider {
   std::size_t sphere = 0;
   Eigen::Vector3d direction;  ///< unit vector
 };
@@ -31,7 +31,7 @@ struct Tissue {
   bool by_constants = false;
   std::vector<std::size_t> anchors;       ///< fixed spheres, rising, from 0
   std::vector<std::string> anchor_words;  ///< one entry per anchor block, for people
-  std::vector<Guide> guides;
+  std::vector<Slider> sliders;
   std::vector<std::string>
       unused_blocks;  ///< blocks of the scene that say nothing about the tissue
 
@@ -45,7 +45,7 @@ struct Tissue {
   [[nodiscard]] BondElement element(std::string_view user = "this formulation") const;
 };
 
-/// Reads the blocks organ, bonds, material, anchors and guides of a scene
+/// Reads the blocks organ, bonds, material, anchors and sliders of a scene
 /// (schemas/scene.schema.json, docs/network.md).
 /// @param where for messages, usually the file
 /// @param folder that a mesh path is relative to

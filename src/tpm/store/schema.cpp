@@ -117,9 +117,12 @@ std::string joined(const Json& words) {
   return text;
 }
 
+/// The keys that a file may have, without former names.
 std::string key_list(const Json& properties) {
   std::string text;
-  for (const auto& [key, value] : properties.items()) text += (text.empty() ? "" : ", ") + key;
+  for (const auto& [key, value] : properties.items()) {
+    if (!value.value("deprecated", false)) text += (text.empty() ? "" : ", ") + key;
+  }
   return text;
 }
 

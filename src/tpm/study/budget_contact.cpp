@@ -35,7 +35,7 @@ SteppedForces law_forces(const LawFile& law, const Protocol& motion, double peri
                            .longest_s = motion.end_s() - motion.start_s(),
                            .deepest_m = motion.peak(),
                            .trusted_m = trusted_depth_m(law, motion.peak())});
-  if (motion.relaxed_at_start()) {
+  if (motion.equilibrium_at_start()) {
     const double depth = motion.knots().front().value;
     const LawModel model(law.spec);
     contact.take_over(depth, model.at(law.values, nullptr).kernel.value(std::max(depth, 0.0)));
@@ -200,7 +200,7 @@ ErrorBudget contact_budget(const LawFile& law, const PreparedRecording& recordin
   std::vector<double> depth = r.drive;
   for (double& d : depth) d -= placed.contact;
   Protocol motion = measured_history(Drive::displacement, r.time_s, depth);
-  motion.set_relaxed_at_start(true);
+  motion.set_equilibrium_at_start(true);
   BudgetStage readings{"recording", "the readings less their offset", "", BudgetKind::data, {}};
   std::vector<double> times_s;
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {

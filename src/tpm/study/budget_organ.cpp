@@ -32,10 +32,11 @@ ExperimentScene guided(ExperimentScene scene) {
     throw bad_input("budget of an organ", "more than one sphere driven to a depth",
                     "a scene with one contact of the kind sphere and a protocol of depths");
   }
-  std::vector<Guide>& guides = scene.tissue.guides;
-  const bool there = std::any_of(guides.begin(), guides.end(),
-                                 [&](const Guide& guide) { return guide.sphere == probe.sphere; });
-  if (!there) guides.push_back({probe.sphere, probe.direction});
+  std::vector<Slider>& sliders = scene.tissue.sliders;
+  const bool there = std::any_of(sliders.begin(), sliders.end(), [&](const Slider& slider) {
+    return slider.sphere == probe.sphere;
+  });
+  if (!there) sliders.push_back({probe.sphere, probe.direction});
   return scene;
 }
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "tpm/store/file.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/error.hpp"
 
@@ -130,8 +131,8 @@ std::vector<PrintedTable> read_printed_tables(const Json& document, std::string_
   return tables;
 }
 
-ClaimSet read_claims(const Json& document, std::string_view file) {
-  check_schema(document, "claims", file);
+ClaimSet read_claims(const Json& written, std::string_view file) {
+  const Json document = checked(written, "claims", file);
   ClaimSet set;
   set.file = std::string(file);
   set.title = document.at("title").get<std::string>();

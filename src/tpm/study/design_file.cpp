@@ -4,6 +4,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/protocol/protocol_block.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpm/study/design.hpp"
 #include "tpmkit/error.hpp"
 
@@ -176,14 +177,14 @@ void parse_known(const Json& document, DesignProblem& problem, std::string_view 
 }
 
 void parse_criterion(const Json& document, DesignProblem& problem, std::string_view where) {
-  const std::string criterion = document.value("goal", "worst");
+  const std::string criterion = document.value("criterion", "worst");
   if (criterion == "all" || criterion == "worst") {
     problem.criterion = criterion == "all" ? Criterion::all : Criterion::worst;
     return;
   }
   problem.criterion = Criterion::parameter;
   problem.criterion_parameter =
-      parameter_place(problem.config, criterion, key_of(where, "goal"), "all, worst, ");
+      parameter_place(problem.config, criterion, key_of(where, "criterion"), "all, worst, ");
 }
 
 void require_creep_noise(const DesignProblem& problem, std::string_view where) {
@@ -199,8 +200,8 @@ void require_creep_noise(const DesignProblem& problem, std::string_view where) {
 
 }  // namespace
 
-DesignProblem parse_design(const Json& document, std::string_view where) {
-  check_schema(document, "design", where);
+DesignProblem parse_design(const Json& written, std::string_view where) {
+  const Json document = checked(written, "design", where);
   DesignProblem problem;
   problem.config = parse_model(document, where);
   separate_nuisance(document, problem, where);

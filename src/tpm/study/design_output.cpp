@@ -138,7 +138,7 @@ std::string check_words(const DesignCheck& check, double level) {
 Json to_json(const DesignResult& result, const DesignCheck* check, std::size_t top) {
   const DesignProblem& problem = result.problem;
   Json j{{"title", problem.config.title},
-         {"goal", criterion_words(problem)},
+         {"criterion", criterion_words(problem)},
          {"confidence_level", problem.config.level},
          {"identified_factor", problem.factor},
          {"candidates_evaluated", result.ranked.size()},

@@ -42,7 +42,7 @@ MaterialMotion motion_of_recording(const LawFile& law, const PreparedRecording& 
                     "a depth beyond the law's contact");
   }
   Protocol whole = measured_history(Drive::displacement, time_s, drive_m);
-  whole.set_relaxed_at_start(true);
+  whole.set_equilibrium_at_start(true);
   const Protocol drive = followed_by_organ(whole, placement.contact_m);
   MaterialMotion motion{recording.name, beyond_contact(drive, placement.contact_m), {}};
   const std::size_t stride = 1 + time_s.size() / kMostTimes;

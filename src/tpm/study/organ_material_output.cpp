@@ -271,7 +271,7 @@ Json material_block(const BondMaterial& m, const Json& before) {
 
 Json network_session(std::string title, const Json& scene, const Json& ramp, double slowest_s) {
   Json tissue = Json::object();
-  for (const char* key : {"organ", "bonds", "material", "anchors", "guides"}) {
+  for (const char* key : {"organ", "bonds", "material", "anchors", "sliders"}) {
     if (scene.contains(key)) tissue[key] = scene.at(key);
   }
   constexpr double kRests = 8.0, kLeastRest_s = 5.0;

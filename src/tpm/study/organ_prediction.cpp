@@ -9,6 +9,7 @@
 
 #include "tpm/law/law_json.hpp"
 #include "tpm/protocol/straight_pieces.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpm/study/prediction_parts.hpp"
 #include "tpmkit/error.hpp"
 
@@ -194,8 +195,10 @@ OrganOfLaw organ_of_law(const Json& material, std::string_view where) {
   }
   Eigen::MatrixXd follows = matrix_of(part(material, "/uncertainty/follows_law", where),
                                       std::ssize(names), std::ssize(u.place), where);
-  return assembled(part(material, "/scene", where), names, std::move(natural), std::move(follows),
-                   std::move(law), where);
+  Json scene =
+      with_current_names(part(material, "/scene", where), "scene", where, FormerNames::silent);
+  return assembled(std::move(scene), names, std::move(natural), std::move(follows), std::move(law),
+                   where);
 }
 
 bool is_organ_document(const Json& document) {
@@ -203,7 +206,7 @@ bool is_organ_document(const Json& document) {
 }
 
 OrganOfLaw read_organ_of_law(const std::filesystem::path& path) {
-  const Json document = read_json(path);
+  const Json document = with_current_names(read_json(path), "scene", path.string());
   if (document.contains("scene")) return organ_of_law(document, path.string());
   const std::filesystem::path beside = path.parent_path() / "material.json";
   if (!std::filesystem::exists(beside)) {
@@ -211,8 +214,9 @@ OrganOfLaw read_organ_of_law(const std::filesystem::path& path) {
                     "a scene.json in the folder that tpm material has written");
   }
   const Json material = read_json(beside);
-  const Json& fitted = part(material, "/scene", beside.string());
-  for (const char* key : {"organ", "bonds", "material", "anchors", "guides", "contacts"}) {
+  const Json fitted = with_current_names(part(material, "/scene", beside.string()), "scene",
+                                         beside.string(), FormerNames::silent);
+  for (const char* key : {"organ", "bonds", "material", "anchors", "sliders", "contacts"}) {
     const bool same = document.contains(key) == fitted.contains(key) &&
                       (!document.contains(key) || document.at(key) == fitted.at(key));
     if (same) continue;
@@ -284,7 +288,7 @@ LawPrediction predict_organ(const OrganOfLaw& organ, const PreparedRecording& re
     depth_m.push_back(r.drive[i]);
   }
   Protocol whole = measured_history(Drive::displacement, time_s, depth_m);
-  whole.set_relaxed_at_start(true);
+  whole.set_equilibrium_at_start(true);
   const Protocol motion = followed_by_organ(whole, placed(organ.law().values).contact);
   return named(predict_recording_by(
                    organ, organ.law(), recording, motion,

@@ -246,7 +246,7 @@ Protocol beyond_contact(const Protocol& drive, double contact_m) {
     knots.push_back({own[i].time_s, std::max(depth, 0.0)});
   }
   Protocol result(drive.drive(), std::move(knots), drive.name(), std::isinf(drive.end_s()));
-  result.set_relaxed_at_start(drive.relaxed_at_start());
+  result.set_equilibrium_at_start(drive.equilibrium_at_start());
   return result;
 }
 

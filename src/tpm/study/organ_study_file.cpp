@@ -6,6 +6,7 @@
 
 #include "tpm/core/text.hpp"
 #include "tpm/store/document_place.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpm/study/organ_study.hpp"
 #include "tpmkit/error.hpp"
 
@@ -130,9 +131,9 @@ std::vector<StudyMaterial> parse_materials(const Json& list, const std::vector<S
     if (!names.insert(material.name).second) {
       throw bad_input(here.key("name").where, "another material has it", "a name for each");
     }
-    if (j.contains("hold")) {
+    if (j.contains("fixed")) {
       material.fixed =
-          parse_fixed(j.at("hold"), material.name, fit->configs.front(), here.key("hold"));
+          parse_fixed(j.at("fixed"), material.name, fit->configs.front(), here.key("fixed"));
     }
     materials.push_back(std::move(material));
   }
@@ -184,9 +185,9 @@ std::vector<StudyCondition> parse_conditions(const Json& j, const DocumentPlace&
 
 }  // namespace
 
-OrganStudyConfig parse_organ_study(const Json& document, std::string_view where,
+OrganStudyConfig parse_organ_study(const Json& written, std::string_view where,
                                    const std::filesystem::path& folder) {
-  check_schema(document, "organ_experiments", where);
+  const Json document = checked(written, "organ_experiments", where);
   const DocumentPlace place{std::string(where)};
   OrganStudyConfig config;
   config.title = document.at("title").get<std::string>();

@@ -132,7 +132,7 @@ LawPrediction predict_recording(const LawFile& law, const PreparedRecording& rec
                                 const PredictionOptions& options) {
   const Recording& r = recording.recording;
   Protocol protocol = measured_history(Drive::displacement, r.time_s, r.drive);
-  protocol.set_relaxed_at_start(true);
+  protocol.set_equilibrium_at_start(true);
   return predict_recording_by(
       LawModel(law.spec), law, recording, protocol, [&] { return place_recording(law, recording); },
       options);

@@ -199,7 +199,7 @@ Recording simulated_recording(const LawSpec& law, std::span<const double> parame
     recording.drive.push_back(std::min(t * test.rate_m_per_s, test.depth_m));
   }
   Protocol history = measured_history(Drive::displacement, recording.time_s, recording.drive);
-  history.set_relaxed_at_start(true);
+  history.set_equilibrium_at_start(true);
   const Response response =
       LawModel(law).respond(history, recording.time_s, parameters, Want::values);
   recording.response.assign(response.value.begin(), response.value.end());

@@ -38,7 +38,7 @@ WhitenedPrefix::WhitenedPrefix(const LawModel& model, const FitConfig& config,
                                  recording.recording.drive)),
       noise_(noise),
       sigma_(sigma) {
-  protocol_.set_relaxed_at_start(true);
+  protocol_.set_equilibrium_at_start(true);
   const Recording& r = recording.recording;
   for (std::size_t i = 0; i < r.time_s.size(); ++i) {
     if (r.time_s[i] < recording.from_s || r.time_s[i] > recording.to_s) continue;

@@ -9,6 +9,7 @@
 #include "tpm/core/text.hpp"
 #include "tpm/sample/sensitivity.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpm/study/expression.hpp"
 #include "tpm/sweep/sweep.hpp"
 #include "tpm/sweep/sweep_outputs.hpp"
@@ -281,7 +282,7 @@ void require_blocks_of_model(const Json& document, const DocumentPlace& place) {
 std::filesystem::path put_scene_in(Json& document, const std::filesystem::path& folder) {
   if (!document.contains("scene") || !document.at("scene").is_string()) return folder;
   const std::filesystem::path file = folder / document.at("scene").get<std::string>();
-  document.at("scene") = read_json(file);
+  document.at("scene") = with_current_names(read_json(file), "scene", file.string());
   return file.parent_path();
 }
 
@@ -342,10 +343,9 @@ std::size_t Sweep::width() const {
 
 Sweep parse_sweep(const Json& written, std::string_view where,
                   const std::filesystem::path& folder) {
-  check_schema(written, "sweep", where);
+  Json document = checked(written, "sweep", where);
   const DocumentPlace place{std::string(where)};
-  require_blocks_of_model(written, place);
-  Json document = written;
+  require_blocks_of_model(document, place);
   const std::filesystem::path scene_folder = put_scene_in(document, folder);
   Sweep sweep;
   sweep.title = document.value("title", "");

@@ -30,7 +30,7 @@ constexpr std::array<OutputWord, 9> kOutputWords{{
     {Kind::end_force, "end_force", "N", "force at the end of the indentation", When::fixed},
     {Kind::force_at, "force_at", "N", "force at a time", When::at},
     {Kind::force_over, "force_over", "N", "force over time", When::over},
-    {Kind::instantaneous_creep_depth, "creep_depth_at_once", "m", "depth just after the load",
+    {Kind::instantaneous_creep_depth, "instantaneous_creep_depth", "m", "depth just after the load",
      When::fixed},
     {Kind::creep_depth, "creep_depth", "m", "depth at the end of the load", When::fixed},
     {Kind::creep_depth_at, "creep_depth_at", "m", "depth under the load at a time", When::at},

@@ -1,0 +1,197 @@
+// Former names of keys and words in input files: read with a warning, never beside the new name.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <charconv>
+#include <cstdlib>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "refusal.hpp"
+#include "temp_folder.hpp"
+#include "tpm/core/warning.hpp"
+#include "tpm/scene/scene.hpp"
+#include "tpm/store/file.hpp"
+#include "tpm/store/renamed_names.hpp"
+#include "tpm/study/design.hpp"
+#include "tpm/sweep/sweep.hpp"
+#include "tpmkit/version.hpp"
+
+namespace tpm {
+namespace {
+
+using Catch::Matchers::Contains;
+using test::refusal_of;
+
+/// The warnings of the library while it lives.
+class Heard {
+ public:
+  Heard() : before_(set_warning_sink([this](const std::string& text) { lines.push_back(text); })) {}
+  ~Heard() { set_warning_sink(std::move(before_)); }
+  Heard(const Heard&) = delete;
+  Heard& operator=(const Heard&) = delete;
+
+  std::vector<std::string> lines;
+
+ private:
+  WarningSink before_;
+};
+
+std::string block_with(const std::string& keys) {
+  return R"({"organ": {"kind": "block", "cells": [2, 2, 2], "spacing": "10 mm"},
+             "anchors": [{"kind": "spheres", "spheres": [1]}], )" +
+         keys + "}";
+}
+
+organ::Tissue tissue_of(const std::string& keys, const char* where) {
+  return organ::parse_tissue(parse_json(block_with(keys), where), where, {});
+}
+
+/// "0.3" or "0.3.1" as a pair that can be compared.
+std::pair<int, int> minor_version(std::string_view text) {
+  std::pair<int, int> numbers{0, 0};
+  const std::size_t dot = text.find('.');
+  std::from_chars(text.data(), text.data() + dot, numbers.first);
+  std::from_chars(text.data() + dot + 1, text.data() + text.size(), numbers.second);
+  return numbers;
+}
+
+/// The keys of the objects that a place of a document of this kind names.
+Json properties_at(const Json& schema, const std::string& place) {
+  if (place.empty()) return schema.at("properties");
+  const std::size_t end = std::min(place.find('/', 1), place.size());
+  const std::string name = place.substr(1, end - 1);
+  const Json& part = name == "*" ? schema.at("items") : schema.at("properties").at(name);
+  return properties_at(part, place.substr(end));
+}
+
+TEST_CASE("a former key is read as the new one, with one warning") {
+  Heard heard;
+  const organ::Tissue by_new = tissue_of(R"("sliders": [6])", "new.json");
+  CHECK(heard.lines.empty());
+  for (int time = 0; time < 2; ++time) {
+    const organ::Tissue by_former = tissue_of(R"("guides": [6])", "former.json");
+    REQUIRE(by_former.sliders.size() == 1);
+    CHECK(by_former.sliders[0].sphere == by_new.sliders[0].sphere);
+    CHECK(by_former.constraints().count() == by_new.constraints().count());
+  }
+  CHECK(heard.lines ==
+        std::vector<std::string>{"former.json: key /guides is now called 'sliders'; the former "
+                                 "name is read until version 0.3"});
+}
+
+TEST_CASE("a former key beside the new one is an error that names both") {
+  CHECK(refusal_of([] {
+          static_cast<void>(tissue_of(R"("guides": [6], "sliders": [7])", "both.json"));
+        }) ==
+        "both.json: key /guides: stands beside its new name 'sliders'; expected 'sliders' alone");
+}
+
+TEST_CASE("mistakes below a former key are told under the new one, which is what is offered") {
+  Heard heard;
+  CHECK_THAT(refusal_of([] { static_cast<void>(tissue_of(R"("guides": ["six"])", "m.json")); }),
+             Contains("m.json: key /sliders/0: is of the wrong type"));
+  const std::string unknown =
+      refusal_of([] { static_cast<void>(tissue_of(R"("guide": [6])", "u.json")); });
+  CHECK_THAT(unknown, Contains("key /guide: unknown key") && Contains("sliders"));
+  CHECK_THAT(unknown, !Contains("guides"));
+}
+
+TEST_CASE("a former word of a list is read as the new one, in formulas as well") {
+  Heard heard;
+  const std::string former = R"({"model": "single_contact", "creep": {},
+    "axes": [{"parameter": "load", "values": ["0.2 N"]}],
+    "outputs": ["creep_depth_at_once", "creep_depth",
+                {"formula": "creep_depth/creep_depth_at_once", "name": "growth"}]})";
+  const Json current = checked(parse_json(former, "w.json"), "sweep", "w.json");
+  CHECK(current.at("outputs")[0] == "instantaneous_creep_depth");
+  CHECK(current.at("outputs")[2].at("formula") == "creep_depth/instantaneous_creep_depth");
+  CHECK(heard.lines == std::vector<std::string>{
+                           "w.json: key /outputs/0: 'creep_depth_at_once' is now called "
+                           "'instantaneous_creep_depth'; the former name is read until version "
+                           "0.3"});
+  CHECK(checked(current, "sweep", "w2.json") == current);
+  CHECK(study::parse_sweep(parse_json(former, "w.json"), "w.json", ".").document ==
+        study::parse_sweep(current, "w2.json", ".").document);
+  CHECK(heard.lines.size() == 1);
+
+  Json both = current;
+  both["outputs"].push_back("creep_depth_at_once");
+  CHECK(refusal_of([&] { static_cast<void>(checked(both, "sweep", "b.json")); }) ==
+        "b.json: key /outputs/3: 'creep_depth_at_once': stands beside its new name "
+        "'instantaneous_creep_depth'; expected 'instantaneous_creep_depth' alone");
+}
+
+TEST_CASE("a user's own name is left alone") {
+  const Json sweep = parse_json(R"({"model": "single_contact", "creep": {},
+    "axes": [{"parameter": "load", "values": ["0.2 N"]}],
+    "outputs": [{"creep_depth_at": "1 s", "name": "creep_depth_at_once"},
+                {"formula": "2 * creep_depth_at_once", "name": "twice"}]})",
+                                "own.json");
+  Heard heard;
+  CHECK(checked(sweep, "sweep", "own.json") == sweep);
+  CHECK(heard.lines.empty());
+}
+
+TEST_CASE("the design's former criterion chooses the same") {
+  Heard heard;
+  Json design = read_json(share_dir() / "configs" / "design_liver.json");
+  design["criterion"] = "eta1";
+  const study::DesignProblem by_new = study::parse_design(design, "d.json");
+  design.erase("criterion");
+  design["goal"] = "eta1";
+  const study::DesignProblem by_former = study::parse_design(design, "d.json");
+  CHECK(by_former.criterion == by_new.criterion);
+  CHECK(by_former.criterion_parameter == by_new.criterion_parameter);
+  CHECK(heard.lines.size() == 1);
+}
+
+TEST_CASE("scenes within other files are read by the same rule; what tpm wrote is no news") {
+  Heard heard;
+  const Json session = parse_json(R"({"model": {"scene": {"guides": [6]}}})", "t");
+  const Json expected = parse_json(R"({"model": {"scene": {"sliders": [6]}}})", "t");
+  CHECK(with_current_names(session, "hil", "r.tpmrec", FormerNames::silent) == expected);
+  CHECK(heard.lines.empty());
+  CHECK(with_current_names(session, "hil", "s.json") == expected);
+  REQUIRE(heard.lines.size() == 1);
+  CHECK_THAT(heard.lines.front(), Contains("s.json: key /model/scene/guides is now"));
+  // A document of any form is left to the schema.
+  for (const char* text : {"3", "[]", "null", R"({"outputs": 3})", R"({"outputs": {"fields": 1}})",
+                           R"({"materials": {"a": 1}})", R"({"scene": "a.json"})"}) {
+    for (const RenamedName& name : renamed_names()) {
+      CHECK(with_current_names(parse_json(text, "t"), name.schema, "t") == parse_json(text, "t"));
+    }
+  }
+}
+
+TEST_CASE("schemas mark former keys, and no name outlives its version") {
+  for (const RenamedName& name : renamed_names()) {
+    CAPTURE(name.schema, name.former);
+    CHECK(minor_version(version()) < minor_version(name.until));  // else drop its row
+    if (name.kind == RenamedName::Kind::value) continue;
+    const Json schema =
+        read_json(share_dir() / "schemas" / (std::string(name.schema) + ".schema.json"));
+    const Json keys = properties_at(schema, std::string(name.place));
+    const Json& former = keys.at(std::string(name.former));
+    CHECK(former.value("deprecated", false));
+    CHECK_THAT(former.at("description").get<std::string>(),
+               Contains("former name of " + std::string(name.current)) &&
+                   Contains("until version " + std::string(name.until)));
+    CHECK_FALSE(keys.at(std::string(name.current)).contains("deprecated"));
+  }
+}
+
+TEST_CASE("the program warns of a former name in one line on standard error") {
+  const test::TempFolder folder;
+  const std::string scene = folder / "s.json", said = folder / "said";
+  write_file(scene, R"({"organ": {"kind": "star"}, "guides": [2]})");
+  CHECK(std::system(
+            ("'" TPM_TEST_PROGRAM "' network check '" + scene + "' > /dev/null 2> '" + said + "'")
+                .c_str()) == 0);
+  CHECK(read_file(said) == "tpm: warning: " + scene +
+                               ": key /guides is now called 'sliders'; the former name is read "
+                               "until version 0.3\n");
+}
+
+}  // namespace
+}  // namespace tpm
