@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "tpm/scene/blocks.hpp"
+#include "tpm/store/renamed_names.hpp"
 #include "tpmkit/error.hpp"
 
 namespace tpm::organ {
@@ -50,7 +51,7 @@ void require_limit(const Json& scene, const ExperimentScene& own, const Document
   refuse_numbered(scene.value("material", Json::object()).value("regions", Json::array()),
                   place.key("material").key("regions"), {"spheres", "layer"},
                   "ball, box or function");
-  if (!own.tissue.guides.empty()) {
+  if (!own.tissue.sliders.empty()) {
     throw bad_input(place.where, "spheres that slide along lines are named by their numbers",
                     "a scene without them");
   }
@@ -59,10 +60,10 @@ void require_limit(const Json& scene, const ExperimentScene& own, const Document
 }  // namespace
 
 RefilledScene::RefilledScene(Json document, std::string where, std::filesystem::path folder)
-    : document_(std::move(document)),
-      where_(std::move(where)),
+    : where_(std::move(where)),
+      document_(checked(std::move(document), "scene", where_)),
       folder_(std::move(folder)),
-      own_(parse_experiment(document_, where_, folder_)) {
+      own_(parse_checked_experiment(document_, where_, folder_)) {
   require_limit(document_, own_, DocumentPlace{where_});
   (void)refilled_organ(document_.at("organ"), own_.tissue.network.organ, 1.0,
                        DocumentPlace{where_}.key("organ"));

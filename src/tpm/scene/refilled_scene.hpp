@@ -36,8 +36,8 @@ class RefilledScene {
   [[nodiscard]] const ExperimentScene& own() const { return own_; }
 
  private:
-  Json document_;
   std::string where_;
+  Json document_;
   std::filesystem::path folder_;
   ExperimentScene own_;
 };
