@@ -16,6 +16,8 @@ constexpr double kStride = 1.5;    // between factors tried
 constexpr double kFoundTo = 1.02;  // by bisection
 constexpr double kLeastSearch_s = 1.0;
 constexpr int kLeastTries = 4;
+constexpr double kLongestTry = 4.0;  // of the runs of the scene as it is
+constexpr int kLeastIterations = 500;
 constexpr int kTriesByStrides = 12;  // enough for strides to the end, and to bisect one
 
 /// The changes of a scene, and whether a model survives them.
@@ -29,12 +31,13 @@ class Survival {
         request_(request),
         valid_(passed_limits(surrogate).empty()),
         once_s_(std::max(nominal_costs().seconds_of(surrogate.spent()), 1e-9)),
-        most_tries_(std::max(static_cast<int>(std::ceil(search_s / once_s_)), kLeastTries)) {}
+        most_tries_(std::max(static_cast<int>(std::ceil(search_s / once_s_)), kLeastTries)),
+        most_iterations_(iterations_in(kLongestTry * once_s_)) {}
 
   /// What breaks in a changed scene; none if nothing does.
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
     try {
-      const PlanSurrogate changed(scene, request_.measure, surrogate_.inertial());
+      const PlanSurrogate changed(scene, request_.measure, surrogate_.inertial(), most_iterations_);
       if (auto reason = model_.why_not(changed, request_.budget)) return reason;
       if (valid_) {
         const auto passed = passed_limits(changed);
@@ -91,6 +94,13 @@ class Survival {
   }
 
  private:
+  /// A scene that is followed with more is past what breaks, such as a tissue that buckles.
+  [[nodiscard]] int iterations_in(double seconds) const {
+    const double one =
+        nominal_costs().seconds_of(newton_iteration_work(surrogate_.scene().driven()));
+    return std::max(static_cast<int>(std::min(seconds / one, 1e9)), kLeastIterations);
+  }
+
   [[nodiscard]] bool masses_known() const {
     return std::all_of(surrogate_.scene().scene().contacts.begin(),
                        surrogate_.scene().scene().contacts.end(),
@@ -101,8 +111,9 @@ class Survival {
   const PlanModel& model_;
   const PlanRequest& request_;
   bool valid_;
-  double once_s_;   ///< runs of the scene as it is, which each try repeats
-  int most_tries_;  ///< of one change
+  double once_s_;        ///< runs of the scene as it is, which each try repeats
+  int most_tries_;       ///< of one change
+  int most_iterations_;  ///< of one run
 };
 
 }  // namespace

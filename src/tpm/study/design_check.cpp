@@ -42,8 +42,8 @@ void collect(const FitResult& fit, Errors& errors) {
   }
 }
 
-CheckedParameter checked(const ExpectedParameter& expected, const FitParameter& parameter,
-                         const std::vector<double>& errors) {
+CheckedParameter check_of(const ExpectedParameter& expected, const FitParameter& parameter,
+                          const std::vector<double>& errors) {
   const auto n = static_cast<double>(errors.size());
   CheckedParameter result;
   result.name = expected.name;
@@ -154,7 +154,7 @@ DesignCheck check_design(const DesignProblem& problem, const PlannedExperiment& 
         fmt::format("{} of {} simulated data sets could not be fitted", check.failed, sets));
   }
   for (std::size_t i = 0; i < material; ++i) {
-    check.parameters.push_back(checked(expected.parameters[i], problem.parameter(i), errors[i]));
+    check.parameters.push_back(check_of(expected.parameters[i], problem.parameter(i), errors[i]));
     if (!check.parameters.back().agrees) {
       check.warnings.push_back(disagreement(check.parameters.back()));
     }
