@@ -120,7 +120,11 @@ SpheresPlan plan_spheres(const RefilledScene& scene, const SpheresRequest& reque
       const auto column = responses.col(static_cast<Eigen::Index>(i));
       claims.claimed_error = (column - limit.response).cwiseAbs().maxCoeff() / plan.limit_peak +
                              plan.limit_uncertainty;
-      if (*claims.claimed_error <= request.tolerance && !plan.choice) plan.choice = run[i];
+      if (*claims.claimed_error > request.tolerance) {
+        plan.choice.reset();  // fewer that come nearer do so by luck
+      } else if (!plan.choice) {
+        plan.choice = run[i];
+      }
     }
     if (plan.choice && found_before) break;
     found_before = plan.choice.has_value();

@@ -30,10 +30,11 @@ struct TriedSpheres {
 /// How many spheres a scene needs.
 struct SpheresPlan {
   SpheresRequest request;
-  std::vector<TriedSpheres> tried;    ///< by rising number
-  double limit_peak = 0.0;            ///< N or m
-  double limit_uncertainty = 0.0;     ///< 95 %, in parts of it
-  std::optional<std::size_t> choice;  ///< the fewest within the tolerance, in `tried`
+  std::vector<TriedSpheres> tried;  ///< by rising number
+  double limit_peak = 0.0;          ///< N or m
+  double limit_uncertainty = 0.0;   ///< 95 %, in parts of it
+  /// In `tried`: the fewest from which on all are within the tolerance.
+  std::optional<std::size_t> choice;
 
   [[nodiscard]] const TriedSpheres& chosen() const { return tried.at(choice.value()); }
 };
