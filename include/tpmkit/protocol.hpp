@@ -49,7 +49,8 @@ class Protocol {
   [[deprecated("use equilibrium_at_start()")]] bool relaxed_at_start() const noexcept {
     return equilibrium_at_start();
   }
-  [[deprecated("use set_equilibrium_at_start()")]] void set_relaxed_at_start(bool relaxed) noexcept {
+  [[deprecated("use set_equilibrium_at_start()")]] void set_relaxed_at_start(
+      bool relaxed) noexcept {
     set_equilibrium_at_start(relaxed);
   }
 
