@@ -13,6 +13,7 @@
 #include "tpm/report/json_table_csv.hpp"
 #include "tpm/report/plan_report.hpp"
 #include "tpm/store/file.hpp"
+#include "tpm/store/file_roles.hpp"
 #include "tpm/store/json.hpp"
 #include "tpm/study/error_budget.hpp"
 #include "tpmkit/error.hpp"
@@ -138,6 +139,7 @@ PlannedScene planned_scene(const PlanCommand& command) {
     }
     return {std::nullopt, read_experiment(command.scene)};
   }
+  if (!command.scene_output.empty()) will_write({command.scene_output});
   SpheresRequest request;
   request.tolerance = parse_share(command.spheres, "--spheres");
   request.most = command.most_spheres;

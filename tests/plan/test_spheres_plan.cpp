@@ -45,6 +45,11 @@ TEST_CASE("a line in the spacing has its limit, and its scatter the uncertainty"
   CHECK_THAT(limit.response(1), WithinRel(0.5, 1e-12));
   CHECK(limit.uncertainty < 1e-12);
 
+  terms.col(1).setConstant(0.1);  // the same on every filling: no line through these is the one
+  CHECK_THAT(test::refusal_of([&] { (void)spacing_limit(terms, exact); }),
+             Contains("cannot be told apart"));
+  terms.col(1) = area;
+
   // Scatter in proportion to the spacing: 95 of 100 intervals have the true limit.
   constexpr int kTrials = 2000;
   Random random(4);

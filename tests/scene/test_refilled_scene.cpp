@@ -84,4 +84,7 @@ TEST_CASE("what has no limit for small spheres is refused with its key") {
                      R"("anchors": [{"kind": "spheres", "spheres": [50, 51, 52, 53]}], )" +
                      R"("contacts": [{"kind": "patch", "radius": "10 mm"}]})"),
              Contains("/anchors/0/kind"));
+  CHECK_THAT(why_not("{" + kRest + liver + R"("material": {"regions": [{"kind": "layer", "layer": 1,
+                     "factor": 2}]}, "contacts": [{"kind": "patch", "radius": "10 mm"}]})"),
+             Contains("/material/regions/0/kind"));
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -48,6 +49,102 @@ std::optional<double> patches_area_ratio(const ExperimentScene& scene) {
   return stands_for / own;
 }
 
+/// Runs fillings and keeps what they claim.
+class SpheresSearch {
+ public:
+  SpheresSearch(const RefilledScene& scene, const SpheresRequest& request)
+      : scene_(scene),
+        times_(sampled_times(scene.own().protocol, kTimesOfFillingPiece, kMostFillingTimes)),
+        terms_(0, patches_area_ratio(scene.own()) ? 2 : 1),
+        responses_(std::ssize(times_), 0) {
+    plan_.request = request;
+  }
+
+  /// Whether to try the next one.
+  [[nodiscard]] bool run(const RefilledScene::Filling& filling) {
+    TriedSpheres tried;
+    tried.filling = filling;
+    tried.spacing_m = scene_.own().tissue.network.organ.spacing / filling.finer;
+    bool balanced = true;
+    try {
+      answer(tried);
+      ran_.push_back(plan_.tried.size());
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
+      tried.reason = error.what();
+      balanced = error.code() == ExitCode::bad_input;  // else more fail as well, after longer
+    }
+    plan_.tried.push_back(std::move(tried));
+    if (plan_.request.tried) plan_.request.tried();
+    if (!plan_.tried.back().reason.empty()) return balanced;
+    const bool found_before = plan_.choice.has_value();
+    if (enough()) claim();
+    return !(plan_.choice && found_before);
+  }
+
+  /// Throws Error(bad_input) if too few were run.
+  SpheresPlan take(double widest_m) {
+    if (enough()) return std::move(plan_);
+    std::string failed;
+    for (const TriedSpheres& t : plan_.tried) {
+      if (!t.reason.empty()) failed = fmt::format("; {}: {}", t.filling.spheres, t.reason);
+    }
+    throw bad_input(
+        "spheres",
+        fmt::format("{} numbers of spheres up to {} can be run with a spacing of at "
+                    "most {} mm, the radius of the smallest contact{}",
+                    ran_.size(), plan_.request.most, significant(1e3 * widest_m, 3), failed),
+        fmt::format("at least {}: more spheres, or a wider contact", fewest()));
+  }
+
+ private:
+  [[nodiscard]] std::size_t fewest() const {
+    return static_cast<std::size_t>(terms_.cols()) + 1 + kFreedom;
+  }
+  [[nodiscard]] bool enough() const { return ran_.size() >= fewest(); }
+
+  void answer(TriedSpheres& tried) {
+    const PlanScene filled(scene_.scene(tried.filling));
+    tried.filling.spheres = filled.network().organ.size();
+    tried.spacing_m = filled.network().organ.spacing;
+    tried.area_ratio = patches_area_ratio(filled.scene());
+    QuasiStaticOptions options;
+    options.tolerance = kFillingTolerance;
+    const Trajectory found = filled.quasi_static(options, times_, false);
+    tried.operations_s = nominal_costs().seconds_of(found.work);
+    tried.peak = found.response.cwiseAbs().maxCoeff();
+    responses_.conservativeResize(Eigen::NoChange, responses_.cols() + 1);
+    responses_.rightCols(1) = found.response;
+    terms_.conservativeResize(terms_.rows() + 1, Eigen::NoChange);
+    terms_(terms_.rows() - 1, 0) = tried.spacing_m;
+    if (tried.area_ratio) terms_(terms_.rows() - 1, 1) = *tried.area_ratio - 1.0;
+  }
+
+  void claim() {
+    const SpacingLimit limit = spacing_limit(terms_, responses_);
+    plan_.limit_peak = limit.response.cwiseAbs().maxCoeff();
+    plan_.limit_uncertainty = limit.uncertainty / plan_.limit_peak;
+    plan_.choice.reset();
+    for (std::size_t i = 0; i < ran_.size(); ++i) {
+      const auto response = responses_.col(static_cast<Eigen::Index>(i));
+      const double error = (response - limit.response).cwiseAbs().maxCoeff() / plan_.limit_peak +
+                           plan_.limit_uncertainty;
+      plan_.tried[ran_[i]].claimed_error = error;
+      if (error > plan_.request.tolerance) {
+        plan_.choice.reset();  // fewer that come nearer do so by luck
+      } else if (!plan_.choice) {
+        plan_.choice = ran_[i];
+      }
+    }
+  }
+
+  const RefilledScene& scene_;
+  std::vector<double> times_;
+  SpheresPlan plan_;
+  std::vector<std::size_t> ran_;       ///< of plan_.tried
+  Eigen::MatrixXd terms_, responses_;  ///< a row, a column for each of them
+};
+
 }  // namespace
 
 SpacingLimit spacing_limit(const Eigen::MatrixXd& terms, const Eigen::MatrixXd& responses) {
@@ -55,6 +152,11 @@ SpacingLimit spacing_limit(const Eigen::MatrixXd& terms, const Eigen::MatrixXd& 
   line << Eigen::VectorXd::Ones(terms.rows()), terms;
   const Eigen::VectorXd weight = terms.col(0).cwiseInverse();
   line = weight.asDiagonal() * line;
+  if (Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(line.colwise().normalized()).rank() <
+      line.cols()) {
+    throw Error(ExitCode::numerical, "spheres", "the terms of the line cannot be told apart",
+                "spacings and areas that differ");
+  }
   const Eigen::MatrixXd weighted = weight.asDiagonal() * responses.transpose();
   const Eigen::MatrixXd inverse = (line.transpose() * line).inverse();
   const Eigen::MatrixXd found = inverse * (line.transpose() * weighted);
@@ -67,80 +169,15 @@ SpacingLimit spacing_limit(const Eigen::MatrixXd& terms, const Eigen::MatrixXd& 
 
 SpheresPlan plan_spheres(const RefilledScene& scene, const SpheresRequest& request) {
   require_number(request.tolerance >= 1e-3 && request.tolerance <= 0.5, "spheres",
-                 request.tolerance, "0.1 % to 50 % of the peak");
-  SpheresPlan plan;
-  plan.request = request;
-  const ExperimentScene& own = scene.own();
-  const double widest = smallest_radius(own);
-  const std::vector<double> times =
-      sampled_times(own.protocol, kTimesOfFillingPiece, kMostFillingTimes);
-  QuasiStaticOptions options;
-  options.tolerance = kFillingTolerance;
-
-  std::vector<std::size_t> run;  // in plan.tried
-  const Eigen::Index terms_of_line = patches_area_ratio(own) ? 2 : 1;
-  const std::size_t fewest_runs = static_cast<std::size_t>(terms_of_line) + 1 + kFreedom;
-  Eigen::MatrixXd terms(0, terms_of_line), responses(std::ssize(times), 0);
-  bool found_before = false;
+                 request.tolerance, "0.001 to 0.5 of the peak, such as 0.1 or 10%");
+  const double widest = smallest_radius(scene.own());
+  SpheresSearch search(scene, request);
   for (const RefilledScene::Filling& filling : scene.fillings(kFewestSpheres, request.most)) {
-    const double spacing = own.tissue.network.organ.spacing / filling.finer;
+    const double spacing = scene.own().tissue.network.organ.spacing / filling.finer;
     if (spacing > widest || one_layer_of_many(scene, filling.finer)) continue;
-    TriedSpheres& tried = plan.tried.emplace_back();
-    tried.filling = filling;
-    tried.spacing_m = spacing;
-    try {
-      const PlanScene filled(scene.scene(filling));
-      tried.filling.spheres = filled.network().organ.size();
-      tried.spacing_m = filled.network().organ.spacing;
-      tried.area_ratio = patches_area_ratio(filled.scene());
-      const Trajectory answer = filled.quasi_static(options, times, false);
-      tried.operations_s = nominal_costs().seconds_of(answer.work);
-      tried.peak = answer.response.cwiseAbs().maxCoeff();
-      responses.conservativeResize(Eigen::NoChange, responses.cols() + 1);
-      responses.rightCols(1) = answer.response;
-    } catch (const Error& error) {
-      if (error.code() != ExitCode::numerical && error.code() != ExitCode::bad_input) throw;
-      tried.reason = error.what();
-      if (request.tried) request.tried();
-      if (error.code() == ExitCode::numerical) break;  // more spheres fail as well, after longer
-      continue;
-    }
-    if (request.tried) request.tried();
-    run.push_back(plan.tried.size() - 1);
-    terms.conservativeResize(terms.rows() + 1, Eigen::NoChange);
-    terms(terms.rows() - 1, 0) = tried.spacing_m;
-    if (tried.area_ratio) terms(terms.rows() - 1, 1) = *tried.area_ratio - 1.0;
-    if (run.size() < fewest_runs) continue;
-    const SpacingLimit limit = spacing_limit(terms, responses);
-    plan.limit_peak = limit.response.cwiseAbs().maxCoeff();
-    plan.limit_uncertainty = limit.uncertainty / plan.limit_peak;
-    plan.choice.reset();
-    for (std::size_t i = 0; i < run.size(); ++i) {
-      TriedSpheres& claims = plan.tried[run[i]];
-      const auto column = responses.col(static_cast<Eigen::Index>(i));
-      claims.claimed_error = (column - limit.response).cwiseAbs().maxCoeff() / plan.limit_peak +
-                             plan.limit_uncertainty;
-      if (*claims.claimed_error > request.tolerance) {
-        plan.choice.reset();  // fewer that come nearer do so by luck
-      } else if (!plan.choice) {
-        plan.choice = run[i];
-      }
-    }
-    if (plan.choice && found_before) break;
-    found_before = plan.choice.has_value();
+    if (!search.run(filling)) break;
   }
-  if (run.size() >= fewest_runs) return plan;
-  std::string failed;
-  for (const TriedSpheres& tried : plan.tried) {
-    if (!tried.reason.empty())
-      failed = fmt::format("; {}: {}", tried.filling.spheres, tried.reason);
-  }
-  throw bad_input(
-      "spheres",
-      fmt::format("{} numbers of spheres up to {} can be run with a spacing of at most {} mm, the "
-                  "radius of the smallest contact{}",
-                  run.size(), request.most, significant(1e3 * widest, 3), failed),
-      fmt::format("at least {}: more spheres, or a wider contact", fewest_runs));
+  return search.take(widest);
 }
 
 }  // namespace tpm::organ

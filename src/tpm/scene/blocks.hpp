@@ -21,6 +21,9 @@ struct OrganBlock {
 [[nodiscard]] OrganBlock parse_organ(const Json& block, const DocumentPlace& place,
                                      const std::filesystem::path& folder);
 
+/// The sphere of the outer layer that is nearest to a place.
+[[nodiscard]] std::size_t nearest_outer_sphere(const Organ& organ, const Eigen::Vector3d& place);
+
 /// The block of the same body filled with spheres whose spacing is the own one over `finer`, and
 /// the number of spheres that it states; none where cells or layers cannot be so many. A shell
 /// keeps its thickness by its number of layers.

@@ -131,10 +131,7 @@ Organ solid_filling(const Surface& surface, const Json& block,
   request.seed = block.value("seed", request.seed);
   Organ organ = made(place, [&] { return fill_solid(surface, request); });
   if (!landing) return organ;
-  const auto outer = std::count(organ.layer.begin(), organ.layer.end(), 0);  // numbered first
-  Eigen::Index nearest = 0;
-  (organ.position.leftCols(outer).colwise() - *landing).colwise().squaredNorm().minCoeff(&nearest);
-  organ.contact = static_cast<std::size_t>(nearest);
+  organ.contact = nearest_outer_sphere(organ, *landing);
   return organ;
 }
 
@@ -269,6 +266,13 @@ Organ organ_of(OrganKind kind, const Json& block, const DocumentPlace& place,
 
 }  // namespace
 
+std::size_t nearest_outer_sphere(const Organ& organ, const Eigen::Vector3d& place) {
+  const auto outer = std::count(organ.layer.begin(), organ.layer.end(), 0);  // numbered first
+  Eigen::Index nearest = 0;
+  (organ.position.leftCols(outer).colwise() - place).colwise().squaredNorm().minCoeff(&nearest);
+  return static_cast<std::size_t>(nearest);
+}
+
 std::vector<double> refilling_steps(const Json& block, const Organ& organ) {
   constexpr int kMostParts = 12, kSteps = 18;  // of cells or layers; of the spacing of a solid
   std::vector<double> steps;
@@ -285,53 +289,67 @@ std::vector<double> refilling_steps(const Json& block, const Organ& organ) {
   return steps;
 }
 
-std::optional<std::pair<Json, std::size_t>> refilled_organ(const Json& block, const Organ& organ,
-                                                           double finer,
-                                                           const DocumentPlace& place) {
-  const auto kind = find_entry(kKinds, block.at("kind").get<std::string>())->meaning;
+namespace {
+
+using Refilled = std::optional<std::pair<Json, std::size_t>>;
+
+/// A number of cells or layers, which is whole; none if it is not, or below the least.
+std::optional<int> whole(double number, int least) {
+  const double rounded_number = std::round(number);
+  if (std::abs(number - rounded_number) > 1e-9 || rounded_number < least) return std::nullopt;
+  return static_cast<int>(rounded_number);
+}
+
+Refilled refilled_block(Json block, const Organ& organ, double finer) {
+  constexpr int kFewestCells = 2;
+  for (Json& cells : block.at("cells")) {
+    const auto count = whole(cells.get<double>() * finer, kFewestCells);
+    if (!count) return std::nullopt;
+    cells = *count;
+  }
+  block["spacing"] = shortest(organ.spacing / finer) + " m";
+  const double spheres = static_cast<double>(organ.size()) * finer * finer * finer;  // about
+  return std::pair{std::move(block), static_cast<std::size_t>(std::round(spheres))};
+}
+
+/// The measures that a liver has by its count and spacing, stated.
+Json stated_shape(const Json& block, const Organ& organ, bool solid, const DocumentPlace& place) {
+  Json stated = block.value("shape", Json::object());
+  LiverShape shape = parse_shape(stated, place.key("shape"));
+  if (!solid) {
+    const auto outer =
+        static_cast<std::size_t>(std::count(organ.layer.begin(), organ.layer.end(), 0));
+    shape = scaled(shape, organ.spacing / even_spacing(liver_surface(shape), outer));
+  }
+  stated["width"] = shortest(shape.width) + " m";
+  stated["height"] = shortest(shape.height) + " m";
+  stated["depth"] = shortest(shape.depth) + " m";
+  return stated;
+}
+
+}  // namespace
+
+Refilled refilled_organ(const Json& block, const Organ& organ, double finer,
+                        const DocumentPlace& place) {
+  const OrganKind kind = find_entry(kKinds, block.at("kind").get<std::string>())->meaning;
   if (kind == OrganKind::star || kind == OrganKind::listed) {
     throw bad_input(place.key("kind").where, "spheres that are given one by one",
                     "a body that can be filled with more of them: liver, mesh or block");
   }
+  if (kind == OrganKind::block) return refilled_block(block, organ, finer);
+  const bool solid = is_solid(block, place);
   Json refilled = block;
-  const std::string spacing = shortest(organ.spacing / finer) + " m";
-  if (kind == OrganKind::block) {
-    for (Json& cells : refilled.at("cells")) {
-      const double count = cells.get<double>() * finer;
-      if (std::abs(count - std::round(count)) > 1e-9 || count < 1.5) return std::nullopt;
-      cells = static_cast<int>(std::round(count));
-    }
-    refilled["spacing"] = spacing;
-    const auto cells = refilled.at("cells").get<std::array<int, 3>>();
-    const double share = cells[0] * 1.0 * cells[1] * cells[2];
-    const auto own = block.at("cells").get<std::array<int, 3>>();
-    return std::pair{std::move(refilled),
-                     static_cast<std::size_t>(std::round(static_cast<double>(organ.size()) * share /
-                                                         (own[0] * 1.0 * own[1] * own[2])))};
+  if (!solid) {
+    const auto layers = whole(organ.layer_count() * finer, 1);
+    if (!layers) return std::nullopt;
+    refilled["layers"] = *layers;
   }
   const auto count = static_cast<std::size_t>(
       std::round(static_cast<double>(organ.size()) * finer * finer * finer));
-  refilled.erase("spacing");
   refilled["count"] = count;
-  if (block.value("filling", "shell") != "solid") {
-    const double layers = organ.layer_count() * finer;
-    if (std::abs(layers - std::round(layers)) > 1e-9 || layers < 0.5) return std::nullopt;
-    refilled["layers"] = static_cast<int>(std::round(layers));
-  }
+  refilled.erase("spacing");
   if (kind == OrganKind::liver && !block.value("shape", Json::object()).contains("width")) {
-    const Json stated = block.value("shape", Json::object());
-    const LiverShape own = parse_shape(stated, place.key("shape"));
-    LiverShape shape = own;
-    if (block.value("filling", "shell") != "solid") {
-      const auto outer = std::count(organ.layer.begin(), organ.layer.end(), 0);
-      shape = scaled(
-          own, organ.spacing / even_spacing(liver_surface(own), static_cast<std::size_t>(outer)));
-    }
-    refilled["shape"] = stated;
-    for (const auto& [key, length] :
-         {std::pair{"width", shape.width}, {"height", shape.height}, {"depth", shape.depth}}) {
-      refilled["shape"][key] = shortest(length) + " m";
-    }
+    refilled["shape"] = stated_shape(block, organ, solid, place);
   }
   return std::pair{std::move(refilled), count};
 }

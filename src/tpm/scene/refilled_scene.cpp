@@ -10,14 +10,6 @@
 namespace tpm::organ {
 namespace {
 
-/// The outer sphere nearest to a place.
-std::size_t outer_sphere(const Organ& organ, const Eigen::Vector3d& place) {
-  const auto outer = std::count(organ.layer.begin(), organ.layer.end(), 0);  // numbered first
-  Eigen::Index nearest = 0;
-  (organ.position.leftCols(outer).colwise() - place).colwise().squaredNorm().minCoeff(&nearest);
-  return static_cast<std::size_t>(nearest);
-}
-
 void refuse_numbered(const Json& list, const DocumentPlace& place,
                      std::initializer_list<const char*> kinds, const char* expected) {
   for (std::size_t i = 0; i < list.size(); ++i) {
@@ -102,7 +94,7 @@ Json RefilledScene::document(const Filling& filling) const {
     if (!organ) organ = parse_organ(scene.at("organ"), place, folder_).organ;
     contact.erase("at");
     contact["number"] =
-        outer_sphere(*organ, own.position.col(static_cast<Eigen::Index>(probe.sphere))) + 1;
+        nearest_outer_sphere(*organ, own.position.col(static_cast<Eigen::Index>(probe.sphere))) + 1;
     contact["direction"] = {probe.direction.x(), probe.direction.y(), probe.direction.z()};
   }
   return scene;
