@@ -201,7 +201,7 @@ void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& p
 }
 
 std::string parse_model(const Json& model, const DocumentPlace& place) {
-  const std::string kind = model.value("kind", std::string(kPlannedModel));
+  std::string kind = model.value("kind", std::string(kPlannedModel));
   if (kind == kPlannedModel) return kind;
   const Formulation* formulation = find_formulation(kind);
   if (formulation != nullptr && for_sessions(*formulation)) return std::string(formulation->name());
