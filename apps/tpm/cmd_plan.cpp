@@ -88,6 +88,11 @@ PlanRequest plan_request(const PlanChoice& choice) {
 Plan planned(const ExperimentScene& scene, PlanRequest request) {
   Progress progress("planning", 6);
   request.progress = [&](const std::string&) { progress.advance(); };
+  if (progress.is_shown()) {
+    request.expected = [](const ExpectedPlanWork& work) {
+      fmt::print(stderr, "\r{}", expected_plan_text(work));
+    };
+  }
   return make_plan(scene, request);
 }
 
@@ -99,6 +104,8 @@ struct PlanCommand {
   std::size_t most_spheres = SpheresRequest{}.most;
   bool calibrate = false;
   bool brief = false;
+  bool thorough = false;
+  bool estimate = false;
   PlanChoice choice;
 };
 
@@ -172,11 +179,18 @@ int run_plan(const PlanCommand& command, const Session& session) {
   const auto csv = csv_beside(command.output, session);
   PlanRequest request = plan_request(command.choice);
   request.relevance = request.changes = !command.brief;
+  request.thorough = command.thorough;
   const PlannedScene chosen = planned_scene(command);
   if (!chosen.scene) {
     const Json json{{"spheres_choice", spheres_json(*chosen.spheres)}};
     deliver(session.json() ? to_text(json) : spheres_text(*chosen.spheres), command.output);
     return static_cast<int>(ExitCode::answer_is_no);
+  }
+  if (command.estimate) {
+    const ExpectedPlanWork work = expected_work(*chosen.scene, request);
+    deliver(session.json() ? to_text(expected_plan_json(work)) : expected_plan_text(work),
+            command.output);
+    return 0;
   }
   const Plan plan = planned(*chosen.scene, std::move(request));
   Json json = plan_json(plan);
@@ -209,6 +223,12 @@ void add_plan_command(CLI::App& app, Session& session) {
                       "Of --spheres: write the scene with the number chosen");
   command->add_flag("--brief", choice->brief,
                     "Leave out what does not matter and what would break");
+  command
+      ->add_flag("--thorough", choice->thorough,
+                 "Try everything, also where that takes more than twice as long as the reference")
+      ->excludes("--brief");
+  command->add_flag("--estimate", choice->estimate,
+                    "Say what planning would take, from one coarse run, and do no more");
   command->add_flag("--calibrate", choice->calibrate,
                     "Measure what operations cost on this machine, and keep it");
   command->add_option("-o,--output", choice->output,

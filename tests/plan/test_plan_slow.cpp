@@ -50,6 +50,17 @@ TEST_CASE("a tool needs the full nonlinear network") {
   CHECK_THAT(linear->reason, Catch::Matchers::Contains("a tool"));
 }
 
+TEST_CASE("a plan whose runs take long ends at twice its reference") {
+  PlanRequest request;
+  request.tolerance = 0.01;
+  const Plan plan = make_plan(config("tool"), request);
+  REQUIRE(plan.choice);
+  CHECK(plan.work.reference_s > 1.0);
+  CHECK(plan.work.all_s <= 2.0 * plan.work.reference_s);
+  CHECK(*plan.chosen().verified_error <= request.tolerance);
+  for (const PlanChange& change : plan.changes) CHECK(change.survived == 1.0);
+}
+
 TEST_CASE("ten random scenes keep their claims") {
   int claims = 0, violated = 0;
   for (int i = 0; i < 10; ++i) {

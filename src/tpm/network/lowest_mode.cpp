@@ -14,14 +14,17 @@ namespace {
 
 constexpr std::size_t kVectors = 6;  // iterated at once: the lowest converges by its gap to the 7th
 constexpr int kMostModeIterations = 500;
-constexpr double kConverged = 1e-13;  // relative change of omega^2
 
 /// Subspace iteration for the lowest eigenvalues of K against M.
 class InverseIteration {
  public:
   InverseIteration(const BondSystem& bonds, const Positions& rest, const Constraints& constraints,
-                   const Eigen::VectorXd& mass)
-      : bonds_(bonds), rest_(rest), constraints_(constraints), factor_(bonds.pattern()) {
+                   const Eigen::VectorXd& mass, double converged)
+      : bonds_(bonds),
+        rest_(rest),
+        constraints_(constraints),
+        converged_(converged),
+        factor_(bonds.pattern()) {
     mass_ = mass.transpose().replicate(3, 1).reshaped();
     basis_.resize(mass_.size(), static_cast<Eigen::Index>(std::min(kVectors, constraints.count())));
     Random random(1);
@@ -42,7 +45,7 @@ class InverseIteration {
     double last = 0.0;
     for (int i = 0; i < kMostModeIterations; ++i) {
       const double value = iterate();
-      if (std::abs(value - last) <= kConverged * value) return value;
+      if (std::abs(value - last) <= converged_ * value) return value;
       last = value;
     }
     throw Error(ExitCode::numerical, "lowest mode", "inverse iteration does not converge");
@@ -76,6 +79,7 @@ class InverseIteration {
   const BondSystem& bonds_;
   const Positions& rest_;
   const Constraints& constraints_;
+  double converged_;
   BlockLdlt factor_;
   Eigen::VectorXd mass_;   ///< of each coordinate
   Eigen::MatrixXd basis_;  ///< one column a vector, M-orthonormal
@@ -107,12 +111,14 @@ Eigen::VectorXd sphere_masses_kg(const Organ& organ, double density_kg_per_m3) {
 }
 
 LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest,
-                       const Constraints& constraints, const Eigen::VectorXd& mass_kg) {
+                       const Constraints& constraints, const Eigen::VectorXd& mass_kg,
+                       double converged) {
   if (bonds.contact_count() > 0) {
     const BondSystem tissue = bonds.without_tools();
     const auto spheres = static_cast<Eigen::Index>(tissue.spheres());
-    LowestMode mode = lowest_mode(tissue, rest.leftCols(spheres),
-                                  constraints.first(tissue.spheres()), mass_kg.head(spheres));
+    LowestMode mode =
+        lowest_mode(tissue, rest.leftCols(spheres), constraints.first(tissue.spheres()),
+                    mass_kg.head(spheres), converged);
     mode.shape.conservativeResize(Eigen::NoChange, rest.cols());
     mode.shape.rightCols(rest.cols() - spheres).setZero();
     return mode;
@@ -120,7 +126,7 @@ LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest,
   require_rigid(bonds, rest, constraints, "lowest mode");
   if (constraints.count() == 0)
     throw bad_input("lowest mode", "nothing is free", "a free coordinate");
-  InverseIteration iteration(bonds, rest, constraints, mass_kg);
+  InverseIteration iteration(bonds, rest, constraints, mass_kg, converged);
   LowestMode mode;
   // From the unrelaxed network downwards: omega falls steadily to its own fixed point.
   double square = iteration.lowest(0.0);
@@ -128,7 +134,7 @@ LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest,
     mode.relaxation_factor = relaxed_at(bonds, square);
     const double last = square;
     square = iteration.lowest(mode.relaxation_factor);
-    if (std::abs(square - last) > 10.0 * kConverged * square) continue;
+    if (std::abs(square - last) > 10.0 * converged * square) continue;
     mode.frequency_Hz = std::sqrt(square) / (2.0 * std::numbers::pi);
     mode.shape = iteration.shape();
     return mode;

@@ -32,10 +32,11 @@ struct LowestMode {
 /// Procedures, section 11.6), inside a fixed-point iteration for omega.
 /// @param rest positions at which every bond has its rest length
 /// @param mass_kg one per sphere, > 0
+/// @param converged relative change of omega^2 at which the iteration ends, 1e-13 to 1e-3
 /// Throws Error(bad_input) for a network with zero-energy modes, Error(numerical) if an iteration
 /// does not converge.
 [[nodiscard]] LowestMode lowest_mode(const BondSystem& bonds, const Positions& rest,
-                                     const Constraints& constraints,
-                                     const Eigen::VectorXd& mass_kg);
+                                     const Constraints& constraints, const Eigen::VectorXd& mass_kg,
+                                     double converged = 1e-13);
 
 }  // namespace tpm::organ

@@ -22,7 +22,6 @@ constexpr double kLeastStep = 1e-9;  // of a piece of the protocol
 constexpr double kLeastMove = 1e-9;  // of a jump
 constexpr double kFirstStep = 3.0;   // after a change of rate, in the shortest relaxation times
 constexpr double kSafety = 0.8;
-constexpr int kUnlimited = std::numeric_limits<int>::max();
 constexpr double kMostGrowth = 30.0;    // from one step to the next
 constexpr double kLanded = 1.0 - 1e-6;  // of a step that was to end where a contact changes
 constexpr std::size_t kMostChangesTogether = 4;  // of a contact at one time
@@ -86,14 +85,18 @@ class Run {
       }
     }
     if (next_ < order_.size()) hold_on(knots.back());
-    const int rejected = result_.work.rejected;
-    result_.work = stages_.work();
-    result_.work.rejected = rejected;
+    result_.work = work();
     result_.solver = tissue_.equilibrium().choice();
     if (options_.energies) result_.energy = energy_of(state_, energy_);
     result_.position = state_.position;
     result_.viscous = state_.viscous;
     return std::move(result_);
+  }
+
+  [[nodiscard]] QuasiStaticWork work() const {
+    QuasiStaticWork work = stages_.work();
+    work.rejected = result_.work.rejected;
+    return work;
   }
 
  private:
@@ -207,8 +210,8 @@ class Run {
       if (last) h = left;
       const StepOutcome outcome =
           stages_.try_step(state_, h, rate, kStepShare * options_.tolerance);
-      if (stages_.work().iterations > options_.most_iterations.value_or(kUnlimited)) {
-        throw failed(state_.imposed, "the run has taken all the iterations that it may");
+      if (options_.may_go_on && !options_.may_go_on(work())) {
+        throw failed(state_.imposed, "the run has taken as long as it may");
       }
       const double factor = growth.after(h, outcome);
       const bool kept = outcome.accepted || (options_.step_s && outcome.balanced);
@@ -489,7 +492,13 @@ QuasiStaticRun QuasiStatic::run(const Protocol& protocol, std::span<const double
     require_same_network(*from, bonds_);
     require_later(times_s, from->time_s);
   }
-  return Run(bonds_, rest_, constraints_, probes_, options_, protocol, times_s, observer).go(from);
+  Run run(bonds_, rest_, constraints_, probes_, options_, protocol, times_s, observer);
+  try {
+    return run.go(from);
+  } catch (const Error&) {
+    if (options_.on_failure) options_.on_failure(run.work());
+    throw;
+  }
 }
 
 }  // namespace tpm::organ

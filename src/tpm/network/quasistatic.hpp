@@ -63,22 +63,6 @@ struct TangentDirection {
       {};  ///< one for each law of the system; empty: nothing else changes
 };
 
-struct QuasiStaticOptions {
-  /// Error of the response that steps are chosen for, in parts of its largest value; 1e-12 to 0.1.
-  double tolerance = 1e-6;
-  int stages = kLanes;  ///< of a step, 2 to kLanes
-  /// If given, s: all steps are that long (but for the last of a piece of the protocol), whatever
-  /// their error, and what is left unbalanced is still compared with the tolerance.
-  std::optional<double> step_s = std::nullopt;
-  /// If given, a run that takes more iterations throws Error(numerical).
-  std::optional<int> most_iterations = std::nullopt;
-  bool energies = false;  ///< work and dissipation are integrated along
-  EquilibriumOptions equilibrium = {.solver = StiffnessSolver::automatic};
-  std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
-  /// What is left unbalanced of a derivative, as `tolerance`; none: that.
-  std::optional<double> derivative_tolerance = std::nullopt;
-};
-
 /// What a run took.
 struct QuasiStaticWork {
   int steps = 0, rejected = 0;
@@ -86,6 +70,25 @@ struct QuasiStaticWork {
   int factorisations = 0;
   int back_solves = 0;
   int contact_changes = 0;  ///< contacts with tools that closed or opened between steps
+};
+
+struct QuasiStaticOptions {
+  /// Error of the response that steps are chosen for, in parts of its largest value; 1e-12 to 0.1.
+  double tolerance = 1e-6;
+  int stages = kLanes;  ///< of a step, 2 to kLanes
+  /// If given, s: all steps are that long (but for the last of a piece of the protocol), whatever
+  /// their error, and what is left unbalanced is still compared with the tolerance.
+  std::optional<double> step_s = std::nullopt;
+  /// If given, asked after each step that was tried: where it says no, the run throws
+  /// Error(numerical).
+  std::function<bool(const QuasiStaticWork&)> may_go_on = nullptr;
+  /// If given, told what a run took that throws Error.
+  std::function<void(const QuasiStaticWork&)> on_failure = nullptr;
+  bool energies = false;  ///< work and dissipation are integrated along
+  EquilibriumOptions equilibrium = {.solver = StiffnessSolver::automatic};
+  std::vector<TangentDirection> directions = {};  ///< of the derivatives to be found
+  /// What is left unbalanced of a derivative, as `tolerance`; none: that.
+  std::optional<double> derivative_tolerance = std::nullopt;
 };
 
 /// Where the energy went. In exact arithmetic work = stored + dissipated.

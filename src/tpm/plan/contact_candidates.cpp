@@ -206,7 +206,9 @@ class CondensedCandidate final : public ContactCandidate {
   [[nodiscard]] std::string name() const override { return "condensed"; }
   [[nodiscard]] std::string formulation() const override { return "condensed"; }
   [[nodiscard]] std::string settings() const override { return "potential of a slow manifold"; }
-  [[nodiscard]] double equilibria_to_build() const override { return 600.0; }
+  [[nodiscard]] OperationCount work_to_build(const PlanScene& scene) const override {
+    return newton_iteration_work(scene.driven()).times(600.0);
+  }
   [[nodiscard]] std::vector<std::unique_ptr<ContactModel>> contacts(
       const PlanSurrogate& surrogate, std::span<const double> periods_s) const override {
     std::vector<std::unique_ptr<ContactModel>> models;
@@ -252,7 +254,9 @@ class ZoneCandidate final : public ContactCandidate {
   [[nodiscard]] std::string settings() const override {
     return fmt::format("{} ring{} of bonds", rings_, rings_ == 1 ? "" : "s");
   }
-  [[nodiscard]] double equilibria_to_build() const override { return 500.0; }
+  [[nodiscard]] OperationCount work_to_build(const PlanScene& scene) const override {
+    return newton_iteration_work(scene.driven()).times(500.0);
+  }
 
  protected:
   [[nodiscard]] bool takes_patch() const override { return true; }
@@ -286,7 +290,9 @@ class ServoCandidate final : public ContactCandidate {
   [[nodiscard]] std::string name() const override { return "servo_network"; }
   [[nodiscard]] std::string formulation() const override { return "servo_network"; }
   [[nodiscard]] std::string settings() const override { return "factorised at half the depth"; }
-  [[nodiscard]] double equilibria_to_build() const override { return 30.0; }
+  [[nodiscard]] OperationCount work_to_build(const PlanScene& scene) const override {
+    return newton_iteration_work(scene.driven()).times(30.0);
+  }
   [[nodiscard]] ModelReach reach() const override { return ModelReach::full; }
 
  protected:

@@ -186,7 +186,9 @@ double of_jump(double jump, const std::vector<SeenMode>& modes, double alpha, do
 InertiaModes inertia_modes(const PlanScene& scene) {
   const DrivenNetwork& driven = scene.driven();
   const Eigen::VectorXd mass = masses_kg(scene.scene(), scene.run_network());
-  const LowestMode lowest = lowest_mode(driven.bonds, driven.rest, driven.constraints, mass);
+  constexpr double kConverged = 1e-8;  // sets damping and the time looked at
+  const LowestMode lowest =
+      lowest_mode(driven.bonds, driven.rest, driven.constraints, mass, kConverged);
   const double omega = lowest.angular_frequency();
   const double alpha = 2.0 * scene.scene().formulation.damping_ratio * omega;
   DrivenTissue tissue(driven.bonds, driven.rest, driven.constraints, driven.probes,

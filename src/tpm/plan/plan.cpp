@@ -8,6 +8,7 @@
 #include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/perception.hpp"
+#include "tpm/plan/plan_allowance.hpp"
 #include "tpm/plan/plan_reference.hpp"
 #include "tpm/plan/plan_relevance.hpp"
 #include "tpmkit/error.hpp"
@@ -18,6 +19,9 @@ namespace {
 
 constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
 constexpr double kSlowest_Hz = 1.0, kFastest_Hz = 1e6;
+// What a plan may take: in parts of its reference and cross-check, and that anyway. Models for a
+// loop are built, which takes longer and is done once before an hour of use.
+constexpr double kMostOfReference = 2.0, kAnyway_s = 1.5, kAnywayForRate_s = 10.0;
 
 void require_valid(const PlanRequest& request) {
   require_number(request.tolerance >= kLeastTolerance && request.tolerance <= kMostTolerance,
@@ -49,11 +53,30 @@ bool reference_has_masses(const ExperimentScene& scene, const PlanSurrogate& mas
          massless.inertia_share() >= std::max(request.tolerance, kMassesFelt);
 }
 
+double most_work_s(const PlanRequest& request, double reference_s) {
+  const double anyway_s = request.budget.rate_Hz ? kAnywayForRate_s : kAnyway_s;
+  return std::max(kMostOfReference * reference_s, anyway_s);
+}
+
+/// @param first_s of the run at a thousandth of the peak
+ExpectedPlanWork expected_after(double first_s, bool inertial, const PlanRequest& request) {
+  // Two runs; how much longer than the first they take at tighter tolerances was fitted to the
+  // shipped scenes and shells, within a factor of two.
+  constexpr double kRuns = 2.0, kOrder = 0.15;
+  ExpectedPlanWork expected;
+  expected.first_run_s = first_s;
+  expected.reference_s = kRuns * first_s * std::pow(request.tolerance, -kOrder);
+  if (!inertial && !request.thorough) {
+    expected.all_s = most_work_s(request, expected.reference_s);
+  }
+  return expected;
+}
+
 /// A plan being made.
 class Planning {
  public:
   Planning(const ExperimentScene& scene, const PlanRequest& request)
-      : scene_(scene), models_(plan_models(scene_)) {
+      : scene_(scene), models_(plan_models(scene_)), allowance_(scene_) {
     plan_.title = scene.tissue.title;
     plan_.request = request;
     plan_.by_depth = scene_.by_depth();
@@ -62,7 +85,11 @@ class Planning {
     plan_.bonds = scene_.network().bonds.size();
     tell("coarse runs of the network");
     PlanSurrogate massless(scene_, request.measure, false);
+    plan_.work.first_run_s = nominal_costs().seconds_of(massless.work_of_first());
     plan_.inertial = reference_has_masses(scene, massless, request);
+    if (request.expected) {
+      request.expected(expected_after(plan_.work.first_run_s, plan_.inertial, request));
+    }
     if (!plan_.inertial && masses_known(scene)) {
       const double share = massless.inertia_share();
       if (share > request.tolerance) plan_.masses_left_out = share;
@@ -75,13 +102,14 @@ class Planning {
   }
 
   Plan make() {
+    tell("reference");
+    reference_ = verified_reference(*surrogate_, plan_.request.tolerance);
+    plan_.reference = reference_.reference;
+    plan_.work.reference_s = nominal_costs().seconds_of(reference_.work);
+    limit_work();
     tell("candidates");
     for (const auto& model : models_) consider(*model);
     sort();
-    tell("reference");
-    reference_ =
-        verified_reference(scene_, plan_.request.measure, plan_.inertial, plan_.request.tolerance);
-    plan_.reference = reference_.reference;
     tell("verification");
     verify_cheap();
     choose();
@@ -91,20 +119,26 @@ class Planning {
     plan_.validity = passed_limits(*surrogate_);
     if (plan_.request.relevance) {
       tell("what does not matter");
-      plan_.relevance = plan_relevance(*surrogate_, plan_.request.tolerance);
+      plan_.relevance = plan_relevance(*surrogate_, plan_.request.tolerance, allowance_);
       settle_masses_left_out();
     }
     if (plan_.request.changes && plan_.choice) {
       tell("what would break first");
       plan_.changes = plan_changes(*surrogate_, model_of(plan_.chosen()), plan_.request,
-                                   nominal_costs().seconds_of(reference_.work));
+                                   plan_.work.reference_s, allowance_);
     }
+    plan_.work.all_s = allowance_.spent_s();
     return std::move(plan_);
   }
 
  private:
   void tell(const std::string& what) const {
     if (plan_.request.progress) plan_.request.progress(what);
+  }
+
+  void limit_work() {
+    if (plan_.request.thorough || plan_.inertial) return;
+    allowance_.set_most(most_work_s(plan_.request, plan_.work.reference_s));
   }
 
   [[nodiscard]] const PlanModel& model_of(const PlannedCandidate& candidate) const {
@@ -125,7 +159,7 @@ class Planning {
       candidate.reason = *reason;
     } else if (model.last_resort() && network_found_) {
       candidate.reason = "not tried: a coarser one meets the tolerance";
-    } else if (const auto too_long = too_long_to_build(model)) {
+    } else if (const auto too_long = too_long_to_try(model)) {
       candidate.reason = *too_long;
     } else if (model.has_masses() && with_masses_found_) {
       candidate.reason = "not tried: a cheaper one with masses meets the tolerance";
@@ -140,23 +174,24 @@ class Planning {
     plan_.candidates.push_back(std::move(candidate));
   }
 
-  /// For a loop, where some model does already: a large organ takes minutes to be condensed.
-  [[nodiscard]] std::optional<std::string> too_long_to_build(const PlanModel& model) const {
-    constexpr double kLong_s = 10.0;
-    const double equilibria = model.equilibria_to_build();
-    if (!plan_.request.for_loop || !(equilibria > 0.0)) return std::nullopt;
+  /// Where some model meets tolerance and budget already: a large organ takes minutes to be
+  /// condensed, and each run of its network seconds.
+  [[nodiscard]] std::optional<std::string> too_long_to_try(const PlanModel& model) const {
     const auto enough = std::find_if(plan_.candidates.begin(), plan_.candidates.end(),
                                      [](const PlannedCandidate& c) { return c.feasible; });
     if (enough == plan_.candidates.end()) return std::nullopt;
-    const OperationCount work = newton_iteration_work(scene_.driven()).times(equilibria);
+    OperationCount work = model.work_to_build(scene_);
+    work += model.work_to_claim(*surrogate_);
     const double seconds = nominal_costs().seconds_of(work);
-    if (seconds < kLong_s) return std::nullopt;
-    return fmt::format("not tried: takes some {} s to build, and {} meets the tolerance in time",
-                       significant(seconds, 1), enough->name);
+    if (seconds == 0.0 || allowance_.permits(work)) return std::nullopt;
+    return fmt::format("not tried: takes some {} s more, and {} meets the tolerance{}",
+                       significant(seconds, 1), enough->name,
+                       plan_.request.budget.rate_Hz ? " in time" : "");
   }
 
   void assess(const PlanModel& model, PlannedCandidate& candidate) {
     const PlanRequest& request = plan_.request;
+    scene_.spent().add(model.work_to_build(scene_));
     const ModelClaim claim = model.claim(*surrogate_, request.budget);
     candidate.claimed_error = claim.error;
     candidate.cost_s_per_s = request.costs.seconds_of(claim.work) / plan_.duration_s;
@@ -240,6 +275,7 @@ class Planning {
   Plan plan_;
   std::optional<PlanSurrogate> surrogate_;
   VerifiedReference reference_;
+  PlanAllowance allowance_;
   bool with_masses_found_ = false;
   bool network_found_ = false;  ///< a nonlinear network whose claim meets the tolerance
 };
@@ -300,6 +336,13 @@ PlanClaim claim_of(const Plan& plan) {
 Plan make_plan(const ExperimentScene& scene, const PlanRequest& request) {
   require_valid(request);
   return Planning(scene, request).make();
+}
+
+ExpectedPlanWork expected_work(const ExperimentScene& scene, const PlanRequest& request) {
+  require_valid(request);
+  const PlanSurrogate massless(PlanScene(scene), request.measure, false);
+  const double first_s = nominal_costs().seconds_of(massless.work_of_first());
+  return expected_after(first_s, reference_has_masses(scene, massless, request), request);
 }
 
 namespace {

@@ -10,6 +10,20 @@
 
 namespace tpm::organ {
 
+/// Counted operations of a plan, at nominal costs.
+struct PlanWork {
+  double first_run_s = 0.0;  ///< of the coarsest run of the network
+  double reference_s = 0.0;  ///< of the reference and its cross-check
+  double all_s = 0.0;        ///< of all runs and of what is built
+};
+
+/// What a plan will take, from its first run: `all_s` is a bound if the reference takes what is
+/// expected, which is within a factor of two; none where masses count or the plan is thorough.
+struct ExpectedPlanWork {
+  double first_run_s = 0.0, reference_s = 0.0;
+  std::optional<double> all_s;
+};
+
 /// What a plan is asked for.
 struct PlanRequest {
   double tolerance = 0.01;  ///< of the error, in parts of the peak; 1e-6 to 0.5
@@ -20,9 +34,13 @@ struct PlanRequest {
   /// For the loop of a haptic device: only what it can step, and without masses, which nothing in
   /// the loop has; what they would change is in masses_left_out. Needs a rate.
   bool for_loop = false;
-  bool relevance = true;                                  ///< find out what does not matter
-  bool changes = true;                                    ///< find out what would break first
+  bool relevance = true;  ///< find out what does not matter
+  bool changes = true;    ///< find out what would break first
+  /// Try everything, however long it takes. Else, by nominal costs and without masses, a plan takes
+  /// about twice as long as its reference and cross-check at most, or 1.5 s (with a rate 10 s).
+  bool thorough = false;
   std::function<void(const std::string& what)> progress;  ///< told what is being done
+  std::function<void(const ExpectedPlanWork&)> expected;  ///< told after the first run
 };
 
 /// 1e-6 to 0.5, or a threshold of perception: what `--tolerance` means. "1%", "0.01", "jnd".
@@ -58,7 +76,7 @@ struct PlanReference {
 /// What switching a part of the physics off would change.
 struct PlanRelevance {
   std::string part;             ///< inertia, layers, tension, viscosity
-  std::optional<double> error;  ///< in parts of the peak; none: it cannot be switched off
+  std::optional<double> error;  ///< in parts of the peak; none: not found, `note` says why
   bool estimated = false;       ///< by the linear network, not by a run
   bool matters = true;          ///< its error is above the tolerance
   std::string note;
@@ -67,9 +85,11 @@ struct PlanRelevance {
 /// By how much a scene can change before the pick no longer does.
 struct PlanChange {
   std::string change;            ///< "deeper, and as much faster", "faster", "stiffer"
-  std::optional<double> factor;  ///< none: not within kMostChange
-  double survived = 1.0;  ///< largest factor tried at which the pick holds, at most kMostChange
-  std::string breaks;     ///< what breaks there
+  std::optional<double> factor;  ///< none: not found
+  /// Largest factor tried at which the pick holds. At kMostChange nothing breaks; without a factor
+  /// and below, the search ended because the plan may not take longer.
+  double survived = 1.0;
+  std::string breaks;  ///< what breaks there
 };
 inline constexpr double kMostChange = 16.0;
 
@@ -94,6 +114,7 @@ struct Plan {
       without_budget;       ///< the cheapest that meets the tolerance, if no choice
   bool needs_full = false;  ///< no reduced model meets the tolerance
   PlanReference reference;
+  PlanWork work;
   std::vector<PlanRelevance> relevance;
   std::vector<PlanChange> changes;
   std::vector<std::string> validity;  ///< limits that the scene passes
@@ -113,6 +134,10 @@ struct PlanClaim {
 /// made for, Error(numerical) where the reference itself cannot be computed or its cross-check
 /// disagrees.
 [[nodiscard]] Plan make_plan(const ExperimentScene& scene, const PlanRequest& request);
+
+/// Runs the network once, coarsely. Throws as make_plan() does.
+[[nodiscard]] ExpectedPlanWork expected_work(const ExperimentScene& scene,
+                                             const PlanRequest& request);
 
 /// The planned model's answer over the scene's protocol, at the times given.
 /// @param plan with a choice, of the same scene

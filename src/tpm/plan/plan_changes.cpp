@@ -16,33 +16,34 @@ constexpr double kStride = 1.5;    // between factors tried
 constexpr double kFoundTo = 1.02;  // by bisection
 constexpr double kLeastSearch_s = 1.0;
 constexpr int kLeastTries = 4;
-constexpr double kLongestTry = 4.0;  // of the runs of the scene as it is
-constexpr int kLeastIterations = 500;
-constexpr int kTriesByStrides = 12;  // enough for strides to the end, and to bisect one
+constexpr double kLongestAnyway_s = 0.1;
+constexpr double kLongestTry = 12.0;  // of the runs of the scene as it is
+constexpr int kTriesByStrides = 12;   // enough for strides to the end, and to bisect one
 
 /// The changes of a scene, and whether a model survives them.
 class Survival {
  public:
   /// @param search_s how long the search for one change may take, at nominal costs
   Survival(const PlanSurrogate& surrogate, const PlanModel& model, const PlanRequest& request,
-           double search_s)
+           double search_s, const PlanAllowance& allowance)
       : surrogate_(surrogate),
         model_(model),
         request_(request),
+        allowance_(allowance),
         valid_(passed_limits(surrogate).empty()),
-        once_s_(std::max(nominal_costs().seconds_of(surrogate.spent()), 1e-9)),
-        most_tries_(std::max(static_cast<int>(std::ceil(search_s / once_s_)), kLeastTries)),
-        most_iterations_(iterations_in(kLongestTry * once_s_)) {}
+        once_s_(std::max(least_work_of_try_s(), 1e-9)),
+        most_tries_(std::max(static_cast<int>(std::ceil(search_s / once_s_)), kLeastTries)) {}
 
   /// What breaks in a changed scene; none if nothing does.
   [[nodiscard]] std::optional<std::string> breaks(const PlanScene& scene) const {
     try {
-      const PlanSurrogate changed(scene, request_.measure, surrogate_.inertial(), most_iterations_);
+      const PlanSurrogate changed(scene, request_.measure, surrogate_.inertial(), longest_run_s());
       if (auto reason = model_.why_not(changed, request_.budget)) return reason;
       if (valid_) {
         const auto passed = passed_limits(changed);
         if (!passed.empty()) return "validity: " + passed.front();
       }
+      surrogate_.scene().spent().add(model_.work_to_build(scene));
       const ModelClaim claim = model_.claim(changed, request_.budget);
       if (!(claim.error <= request_.tolerance)) return "tolerance: the claimed error leaves it";
       if (!surrogate_.inertial() && masses_known() &&
@@ -62,17 +63,28 @@ class Survival {
   }
 
   /// The least factor at which something breaks.
+  /// @param share of what the plan may still take
   template <class Change>
-  [[nodiscard]] PlanChange first(std::string name, Change&& change) const {
+  [[nodiscard]] PlanChange first(std::string name, double share, Change&& change) const {
     PlanChange result{std::move(name), std::nullopt, 1.0, ""};
+    const double until_s = (1.0 - share) * allowance_.left_s();
+    double try_s = once_s_;
+    // Without a limit both sides are infinite or not a number.
+    const auto may_try = [&] { return !(allowance_.left_s() - try_s < until_s); };
+    const auto breaks_at = [&](double factor) {
+      const double before_s = allowance_.spent_s();
+      auto broken = breaks(change(factor));
+      if (!broken) try_s = std::max(once_s_, allowance_.spent_s() - before_s);
+      return broken;
+    };
     int tries = 0;
     // With few tries from the end: what holds there holds, and else halves of the way tell most.
     const double stride = most_tries_ < kTriesByStrides ? kMostChange : kStride;
     for (double factor = stride; !result.factor; factor *= stride) {
-      if (result.survived == kMostChange) return result;
+      if (result.survived == kMostChange || !may_try()) return result;
       factor = std::min(factor, kMostChange);
       ++tries;
-      if (const auto broken = breaks(change(factor))) {
+      if (const auto broken = breaks_at(factor)) {
         result.factor = factor;
         result.breaks = *broken;
       } else {
@@ -80,9 +92,9 @@ class Survival {
       }
     }
     double broken_at = result.factor.value_or(kMostChange);
-    for (; broken_at / result.survived > kFoundTo && tries < most_tries_; ++tries) {
+    for (; broken_at / result.survived > kFoundTo && tries < most_tries_ && may_try(); ++tries) {
       const double middle = std::sqrt(result.survived * broken_at);
-      if (const auto there = breaks(change(middle))) {
+      if (const auto there = breaks_at(middle)) {
         broken_at = middle;
         result.breaks = *there;
       } else {
@@ -94,11 +106,16 @@ class Survival {
   }
 
  private:
-  /// A scene that is followed with more is past what breaks, such as a tissue that buckles.
-  [[nodiscard]] int iterations_in(double seconds) const {
-    const double one =
-        nominal_costs().seconds_of(newton_iteration_work(surrogate_.scene().driven()));
-    return std::max(static_cast<int>(std::min(seconds / one, 1e9)), kLeastIterations);
+  [[nodiscard]] double least_work_of_try_s() const {
+    OperationCount work = surrogate_.work_of_claims();
+    work += model_.work_to_build(surrogate_.scene());
+    return nominal_costs().seconds_of(work);
+  }
+
+  /// Of one run. A scene that is followed for longer is past what breaks, such as a tissue that
+  /// buckles.
+  [[nodiscard]] double longest_run_s() const {
+    return std::min(std::max(kLongestTry * once_s_, kLongestAnyway_s), allowance_.left_s());
   }
 
   [[nodiscard]] bool masses_known() const {
@@ -110,10 +127,10 @@ class Survival {
   const PlanSurrogate& surrogate_;
   const PlanModel& model_;
   const PlanRequest& request_;
+  const PlanAllowance& allowance_;
   bool valid_;
-  double once_s_;        ///< runs of the scene as it is, which each try repeats
-  int most_tries_;       ///< of one change
-  int most_iterations_;  ///< of one run
+  double once_s_;   ///< what a try takes at least, at nominal costs
+  int most_tries_;  ///< of one change
 };
 
 }  // namespace
@@ -129,15 +146,17 @@ std::vector<std::string> passed_limits(const PlanSurrogate& surrogate) {
 }
 
 std::vector<PlanChange> plan_changes(const PlanSurrogate& surrogate, const PlanModel& model,
-                                     const PlanRequest& request, double reference_s) {
-  const Survival survival(surrogate, model, request, std::max(reference_s, kLeastSearch_s));
+                                     const PlanRequest& request, double reference_s,
+                                     const PlanAllowance& allowance) {
+  const Survival survival(surrogate, model, request, std::max(reference_s, kLeastSearch_s),
+                          allowance);
   const PlanScene& scene = surrogate.scene();
   return {survival.first(
               scene.by_depth() ? "deeper, and as much faster" : "the load, put on as much faster",
-              [&](double f) { return scene.deeper(f); }),
-          survival.first(scene.by_depth() ? "faster" : "the speed of loading",
+              1.0 / 3.0, [&](double f) { return scene.deeper(f); }),
+          survival.first(scene.by_depth() ? "faster" : "the speed of loading", 1.0 / 2.0,
                          [&](double f) { return scene.faster(f); }),
-          survival.first("stiffer", [&](double f) { return scene.stiffer(f); })};
+          survival.first("stiffer", 1.0, [&](double f) { return scene.stiffer(f); })};
 }
 
 }  // namespace tpm::organ

@@ -51,8 +51,14 @@ class PlanModel {
   /// Tried only if no coarser network meets the tolerance: nearly as dear as the reference.
   [[nodiscard]] virtual bool last_resort() const { return false; }
 
-  /// About how many equilibria of the network are solved to build it, beside the coarse runs.
-  [[nodiscard]] virtual double equilibria_to_build() const { return 0.0; }
+  /// About what building it takes, beside runs of the network.
+  [[nodiscard]] virtual OperationCount work_to_build(const PlanScene& /*scene*/) const {
+    return {};
+  }
+  /// About what the runs for its claim take that were not made yet.
+  [[nodiscard]] virtual OperationCount work_to_claim(const PlanSurrogate& /*surrogate*/) const {
+    return {};
+  }
 
   /// Why the model has no answer to a scene at all; none if it has.
   [[nodiscard]] virtual std::optional<std::string> why_not(const PlanSurrogate& surrogate,

@@ -10,10 +10,8 @@
 namespace tpm::organ {
 namespace {
 
-constexpr int kTimesOfPiece = 64;
-constexpr int kMostTimes = 800;
-constexpr int kTimesOfPieceWithMasses = 640;
-constexpr int kMostTimesWithMasses = 3000;
+constexpr int kReferenceTimesOfPiece = 640;
+constexpr int kMostReferenceTimes = 3000;
 // Of the reference without masses, in parts of the plan's; tighter while the cross-check disagrees.
 constexpr double kReferenceShare = 1e-3, kTightestReference = 1e-10, kTighterReference = 1e-2;
 constexpr double kCheckTimesReference = 10.0;  // the tolerance of the cross-check
@@ -24,15 +22,15 @@ constexpr double kAgreement = 0.1;  // of the tolerance
 
 }  // namespace
 
-VerifiedReference verified_reference(const PlanScene& scene, const PlanMeasure& measure,
-                                     bool inertial, double tolerance) {
+VerifiedReference verified_reference(const PlanSurrogate& surrogate, double tolerance) {
   VerifiedReference reference;
-  const bool field = measure.output == PlanOutput::field;
-  const double tau_s = scene.driven().bonds.shortest_relaxation_time_s();
+  const PlanScene& scene = surrogate.scene();
+  const PlanMeasure& measure = surrogate.measure();
+  const bool field = surrogate.wants_field();
   Trajectory cross_check;
-  if (inertial) {
-    reference.times_s =
-        sampled_times(scene.protocol(), kTimesOfPieceWithMasses, kMostTimesWithMasses, tau_s);
+  if (surrogate.inertial()) {
+    reference.times_s = sampled_times(scene.protocol(), kReferenceTimesOfPiece, kMostReferenceTimes,
+                                      scene.driven().bonds.shortest_relaxation_time_s());
     // Errors gather over the periods of ringing, which few steps of a rise do not show: as tight as
     // it takes for the two to agree.
     for (double own = kInertialTolerance;; own *= kTighter) {
@@ -49,12 +47,11 @@ VerifiedReference verified_reference(const PlanScene& scene, const PlanMeasure& 
       if (apart <= kAgreement * tolerance || own < kTightest * (1.0 + kTighter)) break;
     }
   } else {
-    reference.times_s = sampled_times(scene.protocol(), kTimesOfPiece, kMostTimes, tau_s);
+    reference.times_s = surrogate.times();
     for (double own = std::max(kReferenceShare * tolerance, kTightestReference);;
          own = std::max(kTighterReference * own, kTightestReference)) {
+      reference.trajectory = surrogate.collocation(own);
       QuasiStaticOptions options;
-      options.tolerance = own;
-      reference.trajectory = scene.quasi_static(options, reference.times_s, field);
       options.tolerance = kCheckTimesReference * own;
       options.stages = kCheckStages;
       cross_check = scene.quasi_static(options, reference.times_s, field);

@@ -16,8 +16,8 @@ struct VerifiedReference {
 /// (of order 15 and 5 in smooth motion); with masses BDF of order 2 with the elimination by hand
 /// against order 3 with KLU. Throws Error(numerical) as the runs do, and where the two differ by
 /// more than a tenth of the tolerance.
-[[nodiscard]] VerifiedReference verified_reference(const PlanScene& scene,
-                                                   const PlanMeasure& measure, bool inertial,
+/// @param surrogate whose runs are shared: without masses the reference is one of them
+[[nodiscard]] VerifiedReference verified_reference(const PlanSurrogate& surrogate,
                                                    double tolerance);
 
 }  // namespace tpm::organ

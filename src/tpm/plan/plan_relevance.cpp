@@ -15,35 +15,53 @@ constexpr double kAffordable = 1.2e6;  // steps times spheres of a run with mass
 constexpr double kInertiaTolerance = 1e-4;
 
 /// The tissue of the reference with one part changed.
-Trajectory answer_of(const PlanScene& scene, const PlanSurrogate& like) {
-  const PlanSurrogate changed(scene, like.measure(), false);
+Trajectory answer_of(const PlanScene& scene, const PlanSurrogate& like,
+                     const PlanAllowance& allowance) {
   QuasiStaticOptions options;
   options.tolerance = PlanSurrogate::kTolerance;
-  return changed.scene().quasi_static(options, like.times(), like.wants_field());
+  return scene.quasi_static(options, like.times(), like.wants_field(), allowance.left_s());
+}
+
+/// About what a run with masses takes.
+OperationCount work_with_masses(const DrivenNetwork& driven, double steps) {
+  constexpr double kRatesOfStep = 2.0;
+  return OperationCount()
+      .add(Operation::bond_force,
+           2.0 * kRatesOfStep * steps * static_cast<double>(driven.bonds.size()))
+      .add(Operation::dense_flop,
+           60.0 * kRatesOfStep * steps * static_cast<double>(driven.rest.cols()));
 }
 
 /// Runs the scene with a part switched off.
 template <class Change>
-PlanRelevance switched_off(const PlanSurrogate& surrogate, std::string part, std::string note,
-                           Change&& change) {
+PlanRelevance switched_off(const PlanSurrogate& surrogate, const PlanAllowance& allowance,
+                           std::string part, std::string note, Change&& change) {
   PlanRelevance result;
   result.part = std::move(part);
   result.note = std::move(note);
+  const OperationCount& work = surrogate.coarse().work;
+  if (!allowance.permits(work)) {
+    result.note = fmt::format("not tried: a run takes some {} s more (--thorough)",
+                              significant(nominal_costs().seconds_of(work), 1));
+    return result;
+  }
   try {
     const PlanScene without = std::forward<Change>(change)(surrogate.scene());
-    result.error =
-        trajectory_error(answer_of(without, surrogate), surrogate.coarse(), surrogate.measure());
+    result.error = trajectory_error(answer_of(without, surrogate, allowance), surrogate.coarse(),
+                                    surrogate.measure());
   } catch (const Error& error) {
     result.note = fmt::format("cannot be switched off: {}", error.what());
   }
   return result;
 }
 
-PlanRelevance relevance_of_viscosity(const PlanSurrogate& surrogate) {
-  PlanRelevance relaxed = switched_off(surrogate, "viscosity", "",
+PlanRelevance relevance_of_viscosity(const PlanSurrogate& surrogate,
+                                     const PlanAllowance& allowance) {
+  PlanRelevance relaxed = switched_off(surrogate, allowance, "viscosity", "",
                                        [](const PlanScene& scene) { return scene.all_relaxed(); });
-  PlanRelevance elastic = switched_off(
-      surrogate, "viscosity", "", [](const PlanScene& scene) { return scene.nothing_relaxing(); });
+  PlanRelevance elastic =
+      switched_off(surrogate, allowance, "viscosity", "",
+                   [](const PlanScene& scene) { return scene.nothing_relaxing(); });
   if (relaxed.error && elastic.error) {
     const double of_relaxed = *relaxed.error, of_elastic = *elastic.error;
     PlanRelevance& less = of_relaxed <= of_elastic ? relaxed : elastic;
@@ -54,23 +72,24 @@ PlanRelevance relevance_of_viscosity(const PlanSurrogate& surrogate) {
   return relaxed.error ? relaxed : elastic;
 }
 
-PlanRelevance relevance_of_tension(const PlanSurrogate& surrogate) {
+PlanRelevance relevance_of_tension(const PlanSurrogate& surrogate, const PlanAllowance& allowance) {
   return switched_off(
-      surrogate, "tension", "lateral bonds without stiffness", [](const PlanScene& scene) {
+      surrogate, allowance, "tension", "lateral bonds without stiffness",
+      [](const PlanScene& scene) {
         return scene.with_materials([](BondMaterial& material) { material.lateral_Pa = 0.0; });
       });
 }
 
-PlanRelevance relevance_of_layers(const PlanSurrogate& surrogate) {
+PlanRelevance relevance_of_layers(const PlanSurrogate& surrogate, const PlanAllowance& allowance) {
   const int moving = surrogate.scene().moving_layers();
   if (moving < 2) {
     return {"layers", std::nullopt, false, false, "only the outer layer moves"};
   }
-  return switched_off(surrogate, "layers", fmt::format("layer {} fixed", moving),
+  return switched_off(surrogate, allowance, "layers", fmt::format("layer {} fixed", moving),
                       [&](const PlanScene& scene) { return scene.with_layers(moving - 1); });
 }
 
-PlanRelevance relevance_of_inertia(const PlanSurrogate& surrogate) {
+PlanRelevance relevance_of_inertia(const PlanSurrogate& surrogate, const PlanAllowance& allowance) {
   PlanRelevance result;
   result.part = "inertia";
   try {
@@ -100,8 +119,10 @@ PlanRelevance relevance_of_inertia(const PlanSurrogate& surrogate) {
       return result;
     }
     const double steps = 10.0 * estimate.highest_Hz * surrogate.scene().duration_s();
-    if (steps * static_cast<double>(surrogate.scene().network().organ.size()) > kAffordable)
+    if (steps * static_cast<double>(surrogate.scene().network().organ.size()) > kAffordable ||
+        !allowance.permits(work_with_masses(surrogate.scene().driven(), steps))) {
       return result;
+    }
     const PlanSurrogate moving(surrogate.scene(), surrogate.measure(), true);
     const Trajectory& reference = moving.with_masses(kInertiaTolerance);
     result.error = trajectory_error(moving.coarse(), reference, surrogate.measure());
@@ -139,10 +160,11 @@ std::optional<std::string> over_budget(const PlanModel& model, const ModelClaim&
   return std::nullopt;
 }
 
-std::vector<PlanRelevance> plan_relevance(const PlanSurrogate& surrogate, double tolerance) {
-  std::vector<PlanRelevance> all{relevance_of_inertia(surrogate), relevance_of_layers(surrogate),
-                                 relevance_of_tension(surrogate),
-                                 relevance_of_viscosity(surrogate)};
+std::vector<PlanRelevance> plan_relevance(const PlanSurrogate& surrogate, double tolerance,
+                                          const PlanAllowance& allowance) {
+  std::vector<PlanRelevance> all{
+      relevance_of_inertia(surrogate, allowance), relevance_of_layers(surrogate, allowance),
+      relevance_of_tension(surrogate, allowance), relevance_of_viscosity(surrogate, allowance)};
   for (PlanRelevance& part : all) {
     if (part.error) part.matters = *part.error > tolerance;
   }

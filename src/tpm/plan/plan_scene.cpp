@@ -92,17 +92,32 @@ std::vector<double> sampled_times(const Protocol& protocol, int per_piece, int m
   return times;
 }
 
+void WorkSpent::add(const OperationCount& work) {
+  const std::scoped_lock lock(mutex_);
+  work_ += work;
+}
+
+OperationCount WorkSpent::all() const {
+  const std::scoped_lock lock(mutex_);
+  return work_;
+}
+
 PlanScene::PlanScene(ExperimentScene scene)
+    : PlanScene(std::move(scene), std::make_shared<WorkSpent>()) {}
+
+PlanScene::PlanScene(ExperimentScene scene, std::shared_ptr<WorkSpent> spent)
     : scene_(plannable(std::move(scene))),
       network_(std::make_shared<const RunNetwork>(network_to_run(scene_))),
-      at_rest_(std::make_shared<RestAnswers>()) {}
+      at_rest_(std::make_shared<RestAnswers>()),
+      spent_(std::move(spent)) {}
 
 PlanScene::PlanScene(ExperimentScene scene, const PlanScene& same_network)
     : scene_(std::move(scene)),
       network_(same_network.network_),
       at_rest_(scene_.protocol.drive() == same_network.protocol().drive()
                    ? same_network.at_rest_
-                   : std::make_shared<RestAnswers>()) {}
+                   : std::make_shared<RestAnswers>()),
+      spent_(same_network.spent_) {}
 
 double PlanScene::duration_s() const {
   return protocol().knots().back().time_s - protocol().start_s();
@@ -137,13 +152,30 @@ int PlanScene::moving_layers() const {
 }
 
 Trajectory PlanScene::quasi_static(const QuasiStaticOptions& options,
-                                   const std::vector<double>& times_s, bool with_field) const {
-  return run_quasi_static(scene_, *network_, options, times_s, with_field);
+                                   const std::vector<double>& times_s, bool with_field,
+                                   double most_s) const {
+  QuasiStaticOptions counting = options;
+  counting.on_failure = [&](const QuasiStaticWork& work) {
+    spent_->add(counted_work(driven(), work));
+  };
+  if (std::isfinite(most_s)) {
+    const OperationCosts costs = nominal_costs();
+    const double iteration_s = costs.seconds_of(counted_work(driven(), {.iterations = 1}));
+    const double factorisation_s = costs.seconds_of(counted_work(driven(), {.factorisations = 1}));
+    counting.may_go_on = [=](const QuasiStaticWork& work) {
+      return work.iterations * iteration_s + work.factorisations * factorisation_s <= most_s;
+    };
+  }
+  Trajectory run = run_quasi_static(scene_, *network_, counting, times_s, with_field);
+  spent_->add(run.work);
+  return run;
 }
 
 Trajectory PlanScene::inertial(const InertialOptions& options, const std::vector<double>& times_s,
                                bool with_field) const {
-  return run_inertial(scene_, *network_, options, times_s, with_field);
+  Trajectory run = run_inertial(scene_, *network_, options, times_s, with_field);
+  spent_->add(run.work);
+  return run;
 }
 
 PlanScene PlanScene::with_protocol(Protocol protocol) const {
@@ -204,7 +236,7 @@ PlanScene PlanScene::all_relaxed() const {
 PlanScene PlanScene::with_materials(const std::function<void(BondMaterial&)>& change) const {
   ExperimentScene scene = scene_;
   for (BondMaterial& material : scene.tissue.materials.materials) change(material);
-  return PlanScene(std::move(scene));
+  return {std::move(scene), spent_};
 }
 
 PlanScene PlanScene::with_layers(int layers) const {
@@ -217,7 +249,7 @@ PlanScene PlanScene::with_layers(int layers) const {
   std::sort(anchors.begin(), anchors.end());
   anchors.erase(std::unique(anchors.begin(), anchors.end()), anchors.end());
   std::erase_if(scene.tissue.sliders, [&](const Slider& g) { return layer[g.sphere] >= layers; });
-  return PlanScene(std::move(scene));
+  return {std::move(scene), spent_};
 }
 
 }  // namespace tpm::organ

@@ -1,6 +1,8 @@
 #pragma once
 #include <functional>
+#include <limits>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "tpm/plan/operations.hpp"
@@ -38,6 +40,18 @@ struct PlanMeasure {
 
 struct RestAnswers;
 
+/// The counted work of the runs of a scene and of all that were made from it; several threads may
+/// add to it.
+class WorkSpent {
+ public:
+  void add(const OperationCount& work);
+  [[nodiscard]] OperationCount all() const;
+
+ private:
+  mutable std::mutex mutex_;
+  OperationCount work_;
+};
+
 /// A scene with its network, and the runs of the full nonlinear network on it.
 class PlanScene {
  public:
@@ -63,11 +77,16 @@ class PlanScene {
   [[nodiscard]] const RunNetwork& run_network() const { return *network_; }
   /// What the network at rest answers; scenes that differ in their protocols alone share it.
   [[nodiscard]] RestAnswers& at_rest() const { return *at_rest_; }
+  /// What the runs of this scene, and of all scenes that were changed from it or it from, took so
+  /// far.
+  [[nodiscard]] WorkSpent& spent() const { return *spent_; }
 
-  /// The network without masses. Throws Error(numerical) as QuasiStatic does.
+  /// The network without masses. Throws Error(numerical) as QuasiStatic does, and after `most_s`.
   /// @param times_s rising
-  [[nodiscard]] Trajectory quasi_static(const QuasiStaticOptions& options,
-                                        const std::vector<double>& times_s, bool with_field) const;
+  /// @param most_s that the run may take, at nominal costs
+  [[nodiscard]] Trajectory quasi_static(
+      const QuasiStaticOptions& options, const std::vector<double>& times_s, bool with_field,
+      double most_s = std::numeric_limits<double>::infinity()) const;
   /// The network with masses.
   [[nodiscard]] Trajectory inertial(const InertialOptions& options,
                                     const std::vector<double>& times_s, bool with_field) const;
@@ -87,10 +106,12 @@ class PlanScene {
 
  private:
   PlanScene(ExperimentScene scene, const PlanScene& same_network);
+  PlanScene(ExperimentScene scene, std::shared_ptr<WorkSpent> spent);
 
   ExperimentScene scene_;
   std::shared_ptr<const RunNetwork> network_;
   std::shared_ptr<RestAnswers> at_rest_;
+  std::shared_ptr<WorkSpent> spent_;
 };
 
 }  // namespace tpm::organ

@@ -2,40 +2,42 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace tpm::organ {
 namespace {
 
-constexpr int kSurrogateTimesOfPiece = 20;
-constexpr int kMostSurrogateTimes = 160;
+// Those of the reference, whose run is one of these, and which other runs are compared with.
+constexpr int kTimesOfPiece = 64, kMostTimes = 800;
+constexpr int kTimesOfPieceWithMasses = 160, kMostTimesWithMasses = 1280;
 constexpr int kCurvePoints = 33;
 constexpr double kCurveTolerance = 1e-5;
-constexpr double kRamp_s = 1.0;      // in which static curves are followed
-constexpr double kMargin = 1.02;     // of the depths of curves
-constexpr double kRounding = 1e-12;  // what no run shows
+constexpr double kRamp_s = 1.0;       // in which static curves are followed
+constexpr double kMargin = 1.02;      // of the depths of curves
+constexpr double kSame = 1.0 + 1e-9;  // tolerances that differ by rounding alone
+constexpr double kRounding = 1e-12;   // what no run shows
 
 /// How much of what can relax has done so.
 enum class Relaxed { nothing, all };
 
 /// Forces at `points` even depths from 0 to `last_m`.
 Eigen::VectorXd static_forces(const PlanScene& scene, double last_m, int points, Relaxed relaxed,
-                              std::optional<int> most_iterations) {
+                              double most_s) {
   const Protocol ramp(Drive::displacement, {{0.0, 0.0}, {kRamp_s, last_m}}, "ramp");
   std::vector<double> times;
   times.reserve(static_cast<std::size_t>(points));
   for (int i = 0; i < points; ++i) times.push_back(kRamp_s * i / (points - 1));
   QuasiStaticOptions options;
   options.tolerance = kCurveTolerance;
-  options.most_iterations = most_iterations;
   const PlanScene driven = scene.with_protocol(ramp);
   return (relaxed == Relaxed::all ? driven.all_relaxed() : driven.nothing_relaxing())
-      .quasi_static(options, times, false)
+      .quasi_static(options, times, false, most_s)
       .response;
 }
 
 /// A static curve from a depth of 0 or less to one above.
 DepthCurve static_curve(const PlanScene& scene, double least_m, double most_m, Relaxed relaxed,
-                        std::optional<int> most_iterations) {
+                        double most_s) {
   DepthCurve curve;
   const double spacing = (most_m - least_m) / (kCurvePoints - 1);
   // Even points of which one is at rest.
@@ -45,14 +47,12 @@ DepthCurve static_curve(const PlanScene& scene, double least_m, double most_m, R
   curve.first_m = -below * spacing;
   curve.last_m = above * spacing;
   if (below > 0) {
-    const Eigen::VectorXd force =
-        static_forces(scene, curve.first_m, below + 1, relaxed, most_iterations);
+    const Eigen::VectorXd force = static_forces(scene, curve.first_m, below + 1, relaxed, most_s);
     for (Eigen::Index i = below; i > 0; --i) curve.force_N.push_back(force[i]);
   }
   curve.force_N.push_back(0.0);
   if (above > 0) {
-    const Eigen::VectorXd force =
-        static_forces(scene, curve.last_m, above + 1, relaxed, most_iterations);
+    const Eigen::VectorXd force = static_forces(scene, curve.last_m, above + 1, relaxed, most_s);
     for (Eigen::Index i = 1; i <= above; ++i) curve.force_N.push_back(force[i]);
   }
   return curve;
@@ -68,14 +68,13 @@ InertialOptions inertial_options(const PlanScene& scene, double tolerance) {
 }
 
 PlanSurrogate::PlanSurrogate(PlanScene scene, const PlanMeasure& measure, bool inertial,
-                             std::optional<int> most_iterations)
+                             double most_s)
     : scene_(std::move(scene)),
       measure_(measure),
       inertial_(inertial),
-      most_iterations_(most_iterations),
-      times_(sampled_times(scene_.protocol(),
-                           inertial ? 8 * kSurrogateTimesOfPiece : kSurrogateTimesOfPiece,
-                           inertial ? 8 * kMostSurrogateTimes : kMostSurrogateTimes,
+      most_s_(most_s),
+      times_(sampled_times(scene_.protocol(), inertial ? kTimesOfPieceWithMasses : kTimesOfPiece,
+                           inertial ? kMostTimesWithMasses : kMostTimes,
                            scene_.driven().bonds.shortest_relaxation_time_s())) {}
 
 const Trajectory& PlanSurrogate::collocation(double tolerance) const {
@@ -83,10 +82,18 @@ const Trajectory& PlanSurrogate::collocation(double tolerance) const {
   if (found != collocation_.end()) return found->second;
   QuasiStaticOptions options;
   options.tolerance = tolerance;
-  options.most_iterations = most_iterations_;
   const bool with_field = wants_field() || tolerance == kRoughTolerance;  // its validity is read
-  return collocation_.emplace(tolerance, scene_.quasi_static(options, times_, with_field))
+  return collocation_.emplace(tolerance, scene_.quasi_static(options, times_, with_field, most_s_))
       .first->second;
+}
+
+bool PlanSurrogate::has_collocation_as_fine_as(double tolerance) const {
+  return !collocation_.empty() && collocation_.begin()->first <= kSame * tolerance;
+}
+
+const Trajectory& PlanSurrogate::collocation_as_fine_as(double tolerance) const {
+  if (!has_collocation_as_fine_as(tolerance)) return collocation(tolerance);
+  return std::prev(collocation_.upper_bound(kSame * tolerance))->second;
 }
 
 const Trajectory& PlanSurrogate::coarse() const {
@@ -128,8 +135,8 @@ const ContactCurves& PlanSurrogate::curves() const {
     for (const double depth : coarse().response) see(depth);
   }
   ContactCurves curves;
-  curves.equilibrium = static_curve(scene_, least, most, Relaxed::all, most_iterations_);
-  curves.relaxing = static_curve(scene_, least, most, Relaxed::nothing, most_iterations_);
+  curves.equilibrium = static_curve(scene_, least, most, Relaxed::all, most_s_);
+  curves.relaxing = static_curve(scene_, least, most, Relaxed::nothing, most_s_);
   for (std::size_t i = 0; i < curves.equilibrium.force_N.size(); ++i) {
     curves.relaxing.force_N[i] -= curves.equilibrium.force_N[i];
   }
@@ -137,10 +144,13 @@ const ContactCurves& PlanSurrogate::curves() const {
   return *curves_;
 }
 
-OperationCount PlanSurrogate::spent() const {
-  OperationCount work;
-  for (const auto* const runs : {&collocation_, &with_masses_}) {
-    for (const auto& [tolerance, run] : *runs) work += run.work;
+OperationCount PlanSurrogate::work_of_claims() const {
+  OperationCount work = coarse().work;
+  if (inertial_) {
+    work += with_masses(kTolerance).work;
+    work += with_masses(kRoughTolerance).work;
+  } else {
+    work += rough().work;
   }
   return work;
 }
@@ -152,7 +162,7 @@ double PlanSurrogate::claim_of(const Trajectory& model) const {
   // By runs, not by the linear estimate: where tissue stiffens masses do more than that says.
   const Trajectory& moving = with_masses(kTolerance);
   return kSafety * trajectory_error(model, moving, measure_) +
-         trajectory_error(with_masses(10.0 * kTolerance), moving, measure_);
+         trajectory_error(with_masses(kRoughTolerance), moving, measure_);
 }
 
 }  // namespace tpm::organ

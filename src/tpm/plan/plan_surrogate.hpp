@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -18,9 +19,9 @@ struct ContactCurves {
 class PlanSurrogate {
  public:
   /// @param inertial what is asked for is the network with masses
-  /// @param most_iterations of each run without masses, if given: QuasiStaticOptions
+  /// @param most_s that each run without masses may take, at nominal costs
   PlanSurrogate(PlanScene scene, const PlanMeasure& measure, bool inertial,
-                std::optional<int> most_iterations = std::nullopt);
+                double most_s = std::numeric_limits<double>::infinity());
 
   [[nodiscard]] const PlanScene& scene() const { return scene_; }
   [[nodiscard]] const PlanMeasure& measure() const { return measure_; }
@@ -30,11 +31,20 @@ class PlanSurrogate {
 
   /// The network without masses, by collocation at a tolerance, at times().
   [[nodiscard]] const Trajectory& collocation(double tolerance) const;
+  /// The run at `tolerance` or, if one was made, at a finer one.
+  [[nodiscard]] const Trajectory& collocation_as_fine_as(double tolerance) const;
+  /// That run was made.
+  [[nodiscard]] bool has_collocation_as_fine_as(double tolerance) const;
+  [[nodiscard]] bool has_collocation(double tolerance) const {
+    return collocation_.contains(tolerance);
+  }
   /// That at the surrogate's own tolerance, with which models are compared before they are
   /// verified.
   [[nodiscard]] const Trajectory& coarse() const;
   /// Where a run at ten times its tolerance leaves the model's limits.
   [[nodiscard]] const Validity& validity() const { return rough().validity; }
+  /// What that run, the first and coarsest, takes.
+  [[nodiscard]] const OperationCount& work_of_first() const { return rough().work; }
   /// Its difference from that run.
   [[nodiscard]] double coarse_error() const;
   /// The network with masses.
@@ -46,9 +56,10 @@ class PlanSurrogate {
   [[nodiscard]] double inertia_share() const;
   /// Curves over the depths of the coarse run.
   [[nodiscard]] const ContactCurves& curves() const;
+  [[nodiscard]] bool has_curves() const { return curves_.has_value(); }
 
-  /// What the runs of collocation() and with_masses() so far took.
-  [[nodiscard]] OperationCount spent() const;
+  /// What the runs take that any claim is made from.
+  [[nodiscard]] OperationCount work_of_claims() const;
 
   /// A bound of the error of a model without masses that answers `model` at times(): `kSafety`
   /// times its difference from the coarse run, with masses where those are asked for, and what that
@@ -65,7 +76,7 @@ class PlanSurrogate {
   PlanScene scene_;
   PlanMeasure measure_;
   bool inertial_;
-  std::optional<int> most_iterations_;
+  double most_s_;
   std::vector<double> times_;
   mutable std::map<double, Trajectory> collocation_, with_masses_;
   mutable std::optional<InertiaEstimate> inertia_;

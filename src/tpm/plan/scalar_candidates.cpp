@@ -152,6 +152,10 @@ class CurvesCandidate final : public ScalarCandidate {
     }
     return ScalarCandidate::why_not(surrogate, budget);
   }
+  [[nodiscard]] OperationCount work_to_claim(const PlanSurrogate& surrogate) const override {
+    if (surrogate.has_curves()) return {};
+    return surrogate.coarse().work.times(2.0);  // one curve instantaneous, one at equilibrium
+  }
 
  protected:
   [[nodiscard]] bool knows_field() const override { return false; }

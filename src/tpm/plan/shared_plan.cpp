@@ -15,7 +15,7 @@ constexpr double kHoldOfLongest = 10.0;  // of a hold that leaves nothing to rel
 constexpr double kStepsOfRamp = 64.0;
 // Of a run for claims; most take less than 200. Where E2 is 1000 E1 the long creep takes 20,000,
 // far more than the cells that claims are to spare: nothing is claimed there.
-constexpr int kMostIterations = 600;
+constexpr double kMostIterations = 600.0;
 // Counted in runs of the network: two at each place of the grid and the judging of the models; the
 // two static curves of a depth; the spectrum.
 constexpr double kRunsOfPlace = 3.0, kRunsOfDepth = 3.0, kRunsOfSpectrum = 3.0;
@@ -38,6 +38,10 @@ std::optional<RampAndHold> as_ramp_and_hold(const Protocol& protocol) {
 ExperimentScene with_unit_relaxation(ExperimentScene scene) {
   set_value(scene.tissue.materials.materials.front(), "tau1", 1.0, "shared plan");
   return scene;
+}
+
+double longest_run_s(const PlanScene& scene) {
+  return kMostIterations * nominal_costs().seconds_of(newton_iteration_work(scene.driven()));
 }
 
 double depth_of_place(int place) {
@@ -91,7 +95,7 @@ const SharedPlan::OfDepth& SharedPlan::of_depth(int place) {
     const ContactSpectrum& spectrum = spectrum_at_rest(scene_);
     const double depth = depth_of_place(place);
     const PlanSurrogate surrogate(scene_.with_protocol(ramp_and_hold(depth, depth, 0.0)), {}, false,
-                                  kMostIterations);
+                                  longest_run_s(scene_));
     const ContactCurves& curves = surrogate.curves();
     for (const int branches : {1, 2, 3}) {
       made.models.push_back(linear_contact(spectrum, branches));
@@ -115,7 +119,7 @@ const std::vector<double>& SharedPlan::claims_at(Place place) {
       const double depth = depth_of_place(place.first), ramp = std::exp2(place.second);
       const double hold = kHoldOfLongest * spectrum_at_rest(scene_).longest_s;
       const PlanSurrogate surrogate(scene_.with_protocol(ramp_and_hold(depth, depth / ramp, hold)),
-                                    {}, false, kMostIterations);
+                                    {}, false, longest_run_s(scene_));
       for (std::size_t m = 0; m < claims.size(); ++m) {
         Trajectory answer;
         answer.response = response_of(

@@ -59,6 +59,12 @@ Json relevance_json(const Plan& plan) {
 
 std::string change_text(const PlanChange& c) {
   constexpr double kApart = 1.1;  // above, the search ended before the two factors met
+  if (!c.factor && c.survived < kMostChange) {
+    return fmt::format(
+        "  {}: {}, and the plan may not take longer (--thorough)\n", c.change,
+        c.survived > 1.0 ? fmt::format("nothing breaks up to {} times", significant(c.survived, 3))
+                         : std::string("not tried"));
+  }
   if (!c.factor) {
     return fmt::format("  {} times {}: nothing breaks\n", shortest(kMostChange), c.change);
   }
@@ -118,14 +124,6 @@ std::optional<std::pair<std::string, double>> run_offline(const Plan& plan) {
   return std::pair{found->name, *found->cost_s_per_s * plan.duration_s};
 }
 
-std::string offline_text(const Plan& plan) {
-  constexpr double kNoPlanNeeded_s = 1.0;
-  const auto offline = run_offline(plan);
-  if (!offline || offline->second > kNoPlanNeeded_s) return {};
-  return fmt::format("  one offline run needs no plan: the network itself ({}) takes {}\n",
-                     offline->first, time_text(offline->second));
-}
-
 std::string choice_text(const Plan& plan) {
   if (plan.choice) {
     const PlannedCandidate& c = plan.chosen();
@@ -138,7 +136,8 @@ std::string choice_text(const Plan& plan) {
         significant(plan.request.tolerance / std::max(*c.verified_error, 1e-12), 3),
         time_text(*c.cost_s_per_s),
         c.period_s ? fmt::format(", {} a period", time_text(*c.period_s)) : std::string());
-    text += offline_text(plan);
+    const std::string offline = offline_text(plan);
+    if (!offline.empty()) text += "  " + offline;
     if (c.verified_response_error) {
       text += fmt::format("  nothing is claimed of the {}: verified error {}\n",
                           plan.by_depth ? "contact force" : "indentation depth",
@@ -224,6 +223,27 @@ std::string spheres_text(const SpheresPlan& plan) {
                             significant(plan.limit_peak, 5), share_text(plan.limit_uncertainty));
 }
 
+std::string offline_text(const Plan& plan) {
+  constexpr double kNoPlanNeeded_s = 1.0;
+  const auto offline = run_offline(plan);
+  if (!offline || offline->second > kNoPlanNeeded_s) return {};
+  return fmt::format("one offline run needs no plan: the network itself ({}) takes {}\n",
+                     offline->first, time_text(offline->second));
+}
+
+Json expected_plan_json(const ExpectedPlanWork& work) {
+  return {{"first_run_s", rounded(work.first_run_s, kPlanDigits)},
+          {"reference_s", rounded(work.reference_s, 2)},
+          {"all_s", work.all_s ? Json(rounded(*work.all_s, 2)) : Json(nullptr)}};
+}
+
+std::string expected_plan_text(const ExpectedPlanWork& work) {
+  if (!work.all_s)
+    return "masses count, or all is tried: no bound is known of how long planning takes\n";
+  return fmt::format("planning takes up to some {} on a usual machine\n",
+                     time_text(rounded(*work.all_s, 1)));
+}
+
 Json claim_json(const Plan& plan) {
   const PlanClaim claim = claim_of(plan);
   return {{"quantity", claim.quantity}, {"norm", claim.norm}, {"protocol", claim.protocol}};
@@ -261,6 +281,9 @@ Json plan_json(const Plan& plan) {
                        {"cross_check", plan.reference.cross_check},
                        {"difference", rounded(plan.reference.difference, 2)},
                        {"peak", rounded(plan.reference.peak, kPlanDigits)}};
+  json["work"] = {{"first_run_s", rounded(plan.work.first_run_s, kPlanDigits)},
+                  {"reference_s", rounded(plan.work.reference_s, kPlanDigits)},
+                  {"all_s", rounded(plan.work.all_s, kPlanDigits)}};
   json["frontier"] = Json::array();
   for (const PlannedCandidate& c : plan.candidates) json["frontier"].push_back(candidate_json(c));
   json["relevance"] = relevance_json(plan);
@@ -290,6 +313,9 @@ std::string plan_text(const Plan& plan) {
                   significant(plan.by_depth ? plan.reference.peak : 1e3 * plan.reference.peak, 6),
                   plan.by_depth ? "N" : "mm", plan.reference.cross_check,
                   share_text(plan.reference.difference));
+  text += fmt::format(
+      "planning took what a usual machine does in {}; reference and cross-check {} of it\n",
+      time_text(plan.work.all_s), time_text(plan.work.reference_s));
   if (!plan.relevance.empty()) text += "what leaving a part out changes:\n";
   for (const PlanRelevance& r : plan.relevance) {
     // Of masses that scene and reference leave out there is one sentence, below.

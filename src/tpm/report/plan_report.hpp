@@ -9,6 +9,9 @@
 
 namespace tpm::report {
 
+/// What planning will take (`tpm plan --estimate`).
+[[nodiscard]] Json expected_plan_json(const ExpectedPlanWork& work);
+[[nodiscard]] std::string expected_plan_text(const ExpectedPlanWork& work);
 /// A plan, as docs/plan_results.md describes the keys.
 [[nodiscard]] Json plan_json(const Plan& plan);
 [[nodiscard]] std::string plan_text(const Plan& plan);
@@ -16,6 +19,10 @@ namespace tpm::report {
 /// The choice of the number of spheres: the key `spheres_choice` of a plan.
 [[nodiscard]] Json spheres_json(const SpheresPlan& plan);
 [[nodiscard]] std::string spheres_text(const SpheresPlan& plan);
+
+/// That the network itself takes less than a second, where no loop and no budget asks for less;
+/// else empty.
+[[nodiscard]] std::string offline_text(const Plan& plan);
 
 /// What the errors of a plan are about.
 [[nodiscard]] Json claim_json(const Plan& plan);

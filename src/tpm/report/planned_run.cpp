@@ -72,6 +72,7 @@ std::string planned_run_text(const Plan& plan, const std::vector<double>& times_
       model_words(c), claim_of(plan).quantity, significant(100.0 * *c.claimed_error, 3),
       significant(100.0 * *c.verified_error, 3), claim_of(plan).norm, response_words(plan),
       trajectory_text(plan.by_depth, times_s, answer));
+  text += offline_text(plan);
   for (const std::string& limit : plan.validity) text += fmt::format("WARNING: {}\n", limit);
   return text;
 }

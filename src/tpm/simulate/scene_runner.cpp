@@ -48,6 +48,14 @@ OperationCount newton_iteration_work(const DrivenNetwork& driven) {
   return work;
 }
 
+OperationCount counted_work(const DrivenNetwork& driven, const QuasiStaticWork& work) {
+  // Back-solves are those of all lanes, one an iteration; outputs cost an evaluation per kLanes.
+  OperationCount count = iteration_work(driven).times(work.iterations);
+  count.add(Operation::solve_block, blocks_of_solve(pattern_of(driven)) * work.factorisations);
+  count += factorisation_work(driven).times(work.factorisations);
+  return count;
+}
+
 Trajectory run_quasi_static(const ExperimentScene& scene, const RunNetwork& network,
                             const QuasiStaticOptions& options, const std::vector<double>& times_s,
                             bool with_field) {
@@ -67,11 +75,7 @@ Trajectory run_quasi_static(const ExperimentScene& scene, const RunNetwork& netw
   if (!with_field) watch.see(scene.protocol.end_s(), network.spheres(run.position));
   result.response = run.response;
   result.validity = watch.seen();
-  // Back-solves are those of all lanes, one an iteration; outputs cost an evaluation per kLanes.
-  result.work += iteration_work(driven).times(run.work.iterations);
-  result.work.add(Operation::solve_block,
-                  blocks_of_solve(pattern_of(driven)) * run.work.factorisations);
-  result.work += factorisation_work(driven).times(run.work.factorisations);
+  result.work = counted_work(driven, run.work);
   result.steps = run.work.steps;
   result.error_estimate = run.error_estimate;
   return result;

@@ -25,6 +25,8 @@ class StateRunner {
                                           const std::vector<double>& times_s, bool with_field);
 /// Operations of one Newton iteration for an equilibrium: forces, a factorisation, a solution.
 [[nodiscard]] OperationCount newton_iteration_work(const DrivenNetwork& driven);
+/// Those of a run by collocation.
+[[nodiscard]] OperationCount counted_work(const DrivenNetwork& driven, const QuasiStaticWork& work);
 /// The network with masses.
 [[nodiscard]] Trajectory run_inertial(const ExperimentScene& scene, const RunNetwork& network,
                                       const InertialOptions& options,

@@ -1,0 +1,29 @@
+#pragma once
+#include <limits>
+
+#include "tpm/plan/plan_scene.hpp"
+
+namespace tpm::organ {
+
+/// How much work a plan may take, in seconds of nominal costs: on every machine the same.
+class PlanAllowance {
+ public:
+  /// @param scene whose runs, and those of scenes made from it, count
+  explicit PlanAllowance(const PlanScene& scene,
+                         double most_s = std::numeric_limits<double>::infinity())
+      : scene_(scene), most_s_(most_s) {}
+
+  void set_most(double seconds) { most_s_ = seconds; }
+  [[nodiscard]] double spent_s() const { return nominal_costs().seconds_of(scene_.spent().all()); }
+  /// May be below 0.
+  [[nodiscard]] double left_s() const { return most_s_ - spent_s(); }
+  [[nodiscard]] bool permits(const OperationCount& work) const {
+    return nominal_costs().seconds_of(work) <= left_s();
+  }
+
+ private:
+  const PlanScene& scene_;
+  double most_s_;
+};
+
+}  // namespace tpm::organ
