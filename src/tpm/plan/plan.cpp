@@ -19,9 +19,8 @@ namespace {
 
 constexpr double kLeastTolerance = 1e-6, kMostTolerance = 0.5;
 constexpr double kSlowest_Hz = 1.0, kFastest_Hz = 1e6;
-// What a plan may take: in parts of its reference and cross-check, and that anyway. Models for a
-// loop are built, which takes longer and is done once before an hour of use.
-constexpr double kMostOfReference = 2.0, kAnyway_s = 1.5, kAnywayForRate_s = 10.0;
+// What a plan may take: in parts of its reference and cross-check, and that anyway.
+constexpr double kMostOfReference = 2.0, kAnyway_s = 1.5;
 
 void require_valid(const PlanRequest& request) {
   require_number(request.tolerance >= kLeastTolerance && request.tolerance <= kMostTolerance,
@@ -53,9 +52,8 @@ bool reference_has_masses(const ExperimentScene& scene, const PlanSurrogate& mas
          massless.inertia_share() >= std::max(request.tolerance, kMassesFelt);
 }
 
-double most_work_s(const PlanRequest& request, double reference_s) {
-  const double anyway_s = request.budget.rate_Hz ? kAnywayForRate_s : kAnyway_s;
-  return std::max(kMostOfReference * reference_s, anyway_s);
+double most_work_s(double reference_s) {
+  return std::max(kMostOfReference * reference_s, kAnyway_s);
 }
 
 /// @param first_s of the run at a thousandth of the peak
@@ -67,7 +65,7 @@ ExpectedPlanWork expected_after(double first_s, bool inertial, const PlanRequest
   expected.first_run_s = first_s;
   expected.reference_s = kRuns * first_s * std::pow(request.tolerance, -kOrder);
   if (!inertial && !request.thorough) {
-    expected.all_s = most_work_s(request, expected.reference_s);
+    expected.all_s = most_work_s(expected.reference_s);
   }
   return expected;
 }
@@ -138,7 +136,7 @@ class Planning {
 
   void limit_work() {
     if (plan_.request.thorough || plan_.inertial) return;
-    allowance_.set_most(most_work_s(plan_.request, plan_.work.reference_s));
+    allowance_.set_most(most_work_s(plan_.work.reference_s));
   }
 
   [[nodiscard]] const PlanModel& model_of(const PlannedCandidate& candidate) const {

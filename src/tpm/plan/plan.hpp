@@ -37,7 +37,7 @@ struct PlanRequest {
   bool relevance = true;  ///< find out what does not matter
   bool changes = true;    ///< find out what would break first
   /// Try everything, however long it takes. Else, by nominal costs and without masses, a plan takes
-  /// about twice as long as its reference and cross-check at most, or 1.5 s (with a rate 10 s).
+  /// about twice as long as its reference and cross-check at most, or 1.5 s.
   bool thorough = false;
   std::function<void(const std::string& what)> progress;  ///< told what is being done
   std::function<void(const ExpectedPlanWork&)> expected;  ///< told after the first run
