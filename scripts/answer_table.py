@@ -392,7 +392,7 @@ SESSIONS = [
          STRICT + VIRTUAL + " --may-move", "test_vendor: A device that is not initialised"),
     Case("2", "the hand hangs 8 mm below the surface", scripted(star()),
          "echo 'place 1e9 0.008 0.008 0 0 0 0 0 0' > hand; " + LIBRARY + VIRTUAL,
-         "test_safety: A hand that hangs in the tissue", force_and_motion),
+         "test_safety: A hand that rests in the tissue", force_and_motion),
     Case("3", "E1 = E2 = 1e6 kPa", files(s__json=star(modulus="1e6 kPa")), RUN, "test_safety: What would be unstable"),
     Case("3", "the same, accepted (earlier: no such option)", files(s__json=star(modulus="1e6 kPa")),
          RUN + " $ACCEPT", "test_safety: What is unstable and accepted", force_and_motion),
@@ -427,7 +427,7 @@ SESSIONS = [
          "export TPM_STAND_IN_SCRIPT=script; timeout -s INT 2 $TPM hil run s.json -o r.tpmrec --device omega7 --dhd-library $STAND_IN "
          "--may-move; code=$?; test $code = 124 || exit $code; echo 'timeout: it was ended by the signal' >&2", "test_vendor: An initialisation that moves", calls_of_library),
     Case("8", "a stall of 29 ms at 1 kHz",
-         scripted(star(limits={"hang": "0.5 s"}), "wait 250", "period 0.001", "fault hang 1500 29"), LIBRARY + "--time real",
+         scripted(star(limits={"cycle_timeout": "0.5 s"}), "wait 250", "period 0.001", "fault hang 1500 29"), LIBRARY + "--time real",
          "test_servo_threads", lateness),
     Case("9", "`hil check --rate '4 kHz'` on a machine that stands still for 13 ms (52 periods)", files(),
          stalled("hil check --rate '4 kHz' --duration '4 s'"), "test_servo_threads: The jitter check says no", verdict),

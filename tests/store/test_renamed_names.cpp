@@ -7,9 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "hil_scenes.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/warning.hpp"
+#include "tpm/haptics/session.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/renamed_names.hpp"
@@ -162,6 +164,40 @@ TEST_CASE("scenes within other files are read by the same rule; what tpm wrote i
       CHECK(with_current_names(parse_json(text, "t"), name.schema, "t") == parse_json(text, "t"));
     }
   }
+}
+
+TEST_CASE("former keys of sessions mean the same as the new ones") {
+  Heard heard;
+  const auto session = [](const char* timeout, const char* validity, const char* rest,
+                          const char* set_point) {
+    Json json = test::short_session();
+    json["limits"][timeout] = "20 ms";
+    json["limits"][validity] = "0.25 s";
+    json["start"][rest] = "0.5 s";
+    json["virtual_device"][set_point] = "3 mm";
+    return haptics::parse_session(json, "s.json", "");
+  };
+  const haptics::HilSession by_new =
+      session("cycle_timeout", "outside_validity", "at_rest", "arm_set_point");
+  CHECK(heard.lines.empty());
+  CHECK(by_new.cycle_timeout_s == 0.02);
+  CHECK(by_new.servo.outside_validity_limit_s == 0.25);
+  CHECK(by_new.servo.gate->rest_time_s == 0.5);
+  CHECK(by_new.plant.arm_set_point_m == 3e-3);
+  const haptics::HilSession by_former = session("hang", "untrusted", "still", "limp_at");
+  CHECK(heard.lines.size() == 4);
+  CHECK(by_former.cycle_timeout_s == by_new.cycle_timeout_s);
+  CHECK(by_former.servo.outside_validity_limit_s == by_new.servo.outside_validity_limit_s);
+  CHECK(by_former.servo.gate->rest_time_s == by_new.servo.gate->rest_time_s);
+  CHECK(by_former.plant.arm_set_point_m == by_new.plant.arm_set_point_m);
+}
+
+TEST_CASE("a recording of a motion with the former key is read without a word") {
+  Heard heard;
+  const Json recorded = parse_json(R"({"motion": {"relax_s": 3.0}})", "t");
+  CHECK(with_current_names(recorded, "hil", "r.tpmrec", FormerNames::silent) ==
+        parse_json(R"({"motion": {"initial_hold_s": 3.0}})", "t"));
+  CHECK(heard.lines.empty());
 }
 
 TEST_CASE("schemas mark former keys, and no name outlives its version") {

@@ -35,7 +35,7 @@ void find_stiffness(RenderingCheck& check, const HilSession& session, ContactMod
   const double at_rest = push.dot(model.instantaneous_stiffness() * push);
   const double relaxed = push.dot(model.equilibrium_stiffness() * push);
   check.stiffness_N_per_m = at_rest;
-  check.relaxed_share = at_rest > 0.0 ? std::clamp(relaxed / at_rest, 0.0, 1.0) : 1.0;
+  check.equilibrium_share = at_rest > 0.0 ? std::clamp(relaxed / at_rest, 0.0, 1.0) : 1.0;
   const double deepest = deepest_asked_m(session, kAtLoads_m);
   for (int i = 1; i <= kDepths; ++i) {
     const double depth = deepest * i / kDepths;
@@ -53,7 +53,7 @@ RenderedContact contact_of(const RenderingCheck& check, double relaxation_time_s
   contact.delay_periods = check.delay_periods;
   contact.relaxation_time_s = relaxation_time_s;
   contact.stiffness_N_per_m = check.stiffness_N_per_m;
-  contact.relaxed_share = check.relaxed_share;
+  contact.equilibrium_share = check.equilibrium_share;
   return contact;
 }
 
@@ -140,7 +140,7 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
 
   check.recovery_s = loop.relaxation_times_s.empty()
                          ? 0.0
-                         : loop.relaxation_times_s.back() / std::max(check.relaxed_share, 1e-3);
+                         : loop.relaxation_times_s.back() / std::max(check.equilibrium_share, 1e-3);
   PlantSettings plant = session.plant;
   plant.damping_N_s_per_m = check.friction_N_s_per_m;
   // A spring that never relaxes may be worse than one that does.

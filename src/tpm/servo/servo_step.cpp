@@ -65,9 +65,9 @@ std::string_view word_of(StopCause cause) {
       {StopCause::position_not_finite, "position not finite"},
       {StopCause::force_not_finite, "force not finite"},
       {StopCause::overrun_storm, "overrun storm"},
-      {StopCause::hang, "hang"},
+      {StopCause::cycle_timeout, "cycle timeout"},
       {StopCause::not_in_place, "operator not in place"},
-      {StopCause::untrusted, "model not trusted"},
+      {StopCause::outside_validity, "model outside validity"},
       {StopCause::energy, "energy given to the hand"},
       {StopCause::oscillation, "oscillation"},
       {StopCause::position_jump, "position jumped"},
@@ -86,7 +86,7 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
                .delay_periods = settings_.delay_periods,
                .allowance_J = settings_.energy_allowance_J}),
       oscillation_({.period_s = settings_.period_s}),
-      untrusted_periods_(settings_.untrusted_limit_s / settings_.period_s),
+      outside_validity_periods_(settings_.outside_validity_limit_s / settings_.period_s),
       stiffness_N_per_m_(stiffness_of(model, settings_)),
       least_stiffness_N_per_m_(stiffness_N_per_m_),
       late_(kLateWindow, 0) {
@@ -291,7 +291,7 @@ StopCause ServoStep::check_rendering(int periods) noexcept {
   if (settings_.watch_oscillation) oscillation_.observe(sent_size_N_, periods);
   if (energy_.too_much()) return StopCause::energy;
   if (settings_.watch_oscillation && oscillation_.found()) return StopCause::oscillation;
-  return doubted_ > untrusted_periods_ ? StopCause::untrusted : StopCause::none;
+  return doubted_ > outside_validity_periods_ ? StopCause::outside_validity : StopCause::none;
 }
 
 StopCause ServoStep::write(const Eigen::Vector3d& force_N, ServoRecord& row) noexcept {

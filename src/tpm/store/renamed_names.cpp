@@ -18,7 +18,7 @@ namespace {
 using Kind = RenamedName::Kind;
 
 /// Renamed in 0.2.
-constexpr std::array<RenamedName, 6> kRenamed{{
+constexpr std::array<RenamedName, 11> kRenamed{{
     {"scene", "", Kind::key, "guides", "sliders", "0.3"},
     {"scene", "/outputs/fields", Kind::value, "remembered", "viscous", "0.3"},
     {"protocol", "/outputs/fields", Kind::value, "remembered", "viscous", "0.3"},
@@ -26,6 +26,11 @@ constexpr std::array<RenamedName, 6> kRenamed{{
     {"organ_experiments", "/materials/*", Kind::key, "hold", "fixed", "0.3"},
     {"sweep", "/outputs", Kind::value, "creep_depth_at_once", "instantaneous_creep_depth", "0.3",
      "/outputs/*/formula"},
+    {"hil", "/limits", Kind::key, "hang", "cycle_timeout", "0.3"},
+    {"hil", "/limits", Kind::key, "untrusted", "outside_validity", "0.3"},
+    {"hil", "/start", Kind::key, "still", "at_rest", "0.3"},
+    {"hil", "/motion", Kind::key, "relax_s", "initial_hold_s", "0.3"},
+    {"hil", "/virtual_device", Kind::key, "limp_at", "arm_set_point", "0.3"},
 }};
 
 /// Where a file of one kind may have one of another within it.
