@@ -135,6 +135,53 @@ TEST_CASE("a user's own name is left alone") {
   CHECK(heard.lines.empty());
 }
 
+TEST_CASE("pointers of axes to what was renamed are read as pointers to the new name") {
+  Heard heard;
+  const auto sweep = [](const std::string& key, const std::string& axes) {
+    return parse_json(R"({"model": "organ", "scene": {"organ": {"kind": "star"}, ")" + key +
+                          R"(": [2, 5]}, "outputs": ["peak_force"],
+                          "axes": )" +
+                          axes + "}",
+                      "p.json");
+  };
+  const auto single = [](const std::string& key) {
+    return R"([{"parameter": "/)" + key + R"(/0", "name": "z", "values": [1, 2]}])";
+  };
+  const auto together = [](const std::string& key) {
+    return R"([{"together": {"/)" + key + R"(/0": {"values": [0, 1], "name": "y"},
+               "/material/E1": {"values": ["6 kPa", "12 kPa"]}}}])";
+  };
+  const auto samples = [](const std::string& key) {
+    return R"([{"samples": "sobol", "count": 4, "parameters":
+               {"/)" +
+           key + R"(/0": {"from": 0, "to": 1, "name": "y"}}}])";
+  };
+  CHECK(with_current_names(sweep("guides", single("guides")), "sweep", "p.json") ==
+        sweep("sliders", single("sliders")));
+  REQUIRE(heard.lines.size() == 2);
+  CHECK(heard.lines[1] ==
+        "p.json: key /axes/0/parameter: '/guides/0' is now called '/sliders/0'; "
+        "the former name is read until version 0.3");
+  CHECK(with_current_names(sweep("guides", together("guides")), "sweep", "p2.json") ==
+        sweep("sliders", together("sliders")));
+  CHECK(with_current_names(sweep("guides", samples("guides")), "sweep", "p3.json") ==
+        sweep("sliders", samples("sliders")));
+  CHECK(heard.lines.size() == 6);
+  // Other keys that begin alike, or stand deeper, are left alone.
+  for (const char* key : {"guidesx", "organ/guides"}) {
+    const Json own = sweep("sliders", single(key));
+    CHECK(with_current_names(own, "sweep", "p4.json") == own);
+  }
+  CHECK(heard.lines.size() == 6);
+  const std::string both = R"([{"together": {"/guides/0": {"values": [0, 1]},
+                               "/sliders/0": {"values": [0, 1]}}}])";
+  CHECK(refusal_of([&] {
+          static_cast<void>(with_current_names(sweep("sliders", both), "sweep", "p5.json"));
+        }) ==
+        "p5.json: key /axes/0/together: '/guides/0': stands beside its new name "
+        "'/sliders/0'; expected '/sliders/0' alone");
+}
+
 TEST_CASE("the design's former criterion chooses the same") {
   Heard heard;
   Json design = read_json(share_dir() / "configs" / "design_liver.json");
