@@ -405,7 +405,7 @@ SESSIONS = [
            files(s__json=star(limits={"slew_N_per_s": slew}, modulus="1.4 MPa", virtual_device={"delay_periods": 2},
                               indentations={"depths": ["8 mm"], "rates": ["300 mm/s"], "hold": "1 s", "rest": "1 s"})),
            RUN + " $ACCEPT", "test_safety: A slip takes energy", force_and_motion) for slew in (2000, 400)],
-    Case("5", "a ball 30 mm deep in the organ", files(s__json=DEEP_SLIDE), RUN, "test_safety: A force in doubt",
+    Case("5", "a ball 30 mm deep in the organ", files(s__json=DEEP_SLIDE), RUN, "test_safety: A force outside validity",
          force_and_motion),
     Case("6", "damping 1e4 N s/m", files(s__json=star(limits={"damping_N_s_per_m": 1e4})), RUN,
          "test_safety: Limits have ceilings"),

@@ -400,9 +400,9 @@ TEST_CASE("A slip takes energy and never gives any: a stiff spring, limits that 
   }
 }
 
-// --- trust ----------------------------------------------------------------------------------
+// --- validity -------------------------------------------------------------------------------
 
-/// A spring of which every second answer, or none after a while, is trusted.
+/// A spring of which every second answer, or none after a while, is valid.
 class Doubtful final : public ContactModel {
  public:
   enum class Way { alternating, for_good };
@@ -411,8 +411,8 @@ class Doubtful final : public ContactModel {
   ContactAnswer step(const ToolPose& tool) noexcept override {
     ++steps_;
     ContactAnswer answer;
-    answer.trusted = way_ == Way::alternating ? steps_ < 500 || steps_ % 2 == 0 : steps_ < 500;
-    answer.force_N = (answer.trusted ? -200.0 : -600.0) * tool.displacement_m;
+    answer.valid = way_ == Way::alternating ? steps_ < 500 || steps_ % 2 == 0 : steps_ < 500;
+    answer.force_N = (answer.valid ? -200.0 : -600.0) * tool.displacement_m;
     return answer;
   }
   [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
@@ -434,7 +434,7 @@ struct Doubted {
   int cycles_after = 0;
 };
 
-/// To 2 mm in 0.4 s, held, and slowly on: 0.4 N are trusted.
+/// To 2 mm in 0.4 s, held, and slowly on: 0.4 N are valid.
 Doubted doubted(Doubtful::Way way, bool in_space) {
   Doubtful model(way);
   Puppet device;
@@ -459,7 +459,7 @@ Doubted doubted(Doubtful::Way way, bool in_space) {
   return result;
 }
 
-TEST_CASE("A force in doubt is not sent: what was trusted fades, and the session ends") {
+TEST_CASE("A force outside validity is not sent: the last valid one fades, and the session ends") {
   for (const bool in_space : {false, true}) {
     CAPTURE(in_space);
     const Doubted result = doubted(Doubtful::Way::for_good, in_space);

@@ -103,7 +103,7 @@ class FaultyDevice final : public HapticDevice {
   Eigen::Vector3d last_m_ = Eigen::Vector3d::Zero();
 };
 
-/// A model that is not to be trusted, from a period on.
+/// A model whose forces are outside its validity, from a period on.
 class DoubtfulModel final : public ContactModel {
  public:
   DoubtfulModel(ContactModel& model, Doubt doubt, std::uint64_t at)
@@ -122,7 +122,7 @@ class DoubtfulModel final : public ContactModel {
                        (doubt_ == Doubt::alternating && steps_ % 2 == 0);
     if (!wrong) return answer;
     answer.force_N *= kWrong;
-    answer.trusted = doubt_ == Doubt::tenfold;
+    answer.valid = doubt_ == Doubt::tenfold;
     return answer;
   }
   [[nodiscard]] double period_s() const noexcept override { return model_.period_s(); }

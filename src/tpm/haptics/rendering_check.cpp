@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAtLoads_m = 0.010;
 
-/// Stiffness along the push within one period at a depth, 0 where the model does not trust itself.
+/// Stiffness along the push within one period at a depth, 0 outside the validity of the model.
 double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth_m) {
   constexpr int kSteps = 200;
   constexpr double kFurther_m = 5e-5;
@@ -23,7 +23,7 @@ double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth
   for (int i = 1; i <= kSteps; ++i) there = model.step(push * (depth_m * i / kSteps));
   const ContactAnswer stays = model.step(push * depth_m);
   const ContactAnswer further = model.step(push * (depth_m + kFurther_m));
-  if (!stays.trusted || !further.trusted) return 0.0;
+  if (!stays.valid || !further.valid) return 0.0;
   // What relaxes in a period is left out: it did so in the period before as well.
   const double equilibrium_N = push.dot(stays.force_N - there.force_N);
   return (push.dot(stays.force_N - further.force_N) + equilibrium_N) / kFurther_m;

@@ -56,7 +56,7 @@ class ServoStep {
   struct Felt {
     double model_N = 0.0, withdrawn_m = 0.0;
     int steps = 1;
-    bool touching = false, trusted = true;
+    bool touching = false, valid = true;
   };
   struct Cap {
     double force_N = 0.0;
