@@ -18,6 +18,7 @@
 
 #include "command.hpp"
 #include "out_of_memory.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/file_roles.hpp"
@@ -83,10 +84,8 @@ void will_write_into(const std::filesystem::path& folder,
 }
 
 double parse_share(std::string_view text, const char* option) {
-  constexpr double kPercent = 100.0;
-  const bool percent = text.ends_with('%');
-  if (percent) text.remove_suffix(1);
-  return parse_number(text, option) / (percent ? kPercent : 1.0);
+  if (const auto share = find_share(text)) return *share;
+  throw bad_input(option, fmt::format("'{}'", printable(text)), "a share such as 10% or 0.1");
 }
 
 std::uint64_t parse_whole_number(const std::string& text, const char* option,

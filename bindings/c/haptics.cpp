@@ -62,7 +62,7 @@ constexpr Cause kCauses[] = {
     {StopCause::force_not_finite, TPM_HAPTICS_FORCE_NOT_FINITE, "force not finite"},
     {StopCause::overrun_storm, TPM_HAPTICS_LATE, "too many periods missed"},
     {StopCause::not_in_place, TPM_HAPTICS_NOT_IN_PLACE, "tool not in place"},
-    {StopCause::untrusted, TPM_HAPTICS_UNTRUSTED, "model not trusted"},
+    {StopCause::outside_validity, TPM_HAPTICS_OUTSIDE_VALIDITY, "model outside validity"},
     {StopCause::energy, TPM_HAPTICS_ENERGY, "energy given to the hand"},
     {StopCause::oscillation, TPM_HAPTICS_OSCILLATION, "oscillation"},
 };

@@ -24,7 +24,7 @@ struct ContactAnswer {
   Eigen::Vector3d force_N =
       Eigen::Vector3d::Zero();  ///< of the tissue on the tool or driven sphere
   double error_N = 0.0;         ///< estimated difference from the force of the full network
-  bool trusted = true;  ///< false outside the range for which the model was built or converges
+  bool valid = true;  ///< false outside the range for which the model was built or converges
 };
 
 /// A tissue under a tool, stepped at a fixed servo period. The tool moves linearly within a step. A

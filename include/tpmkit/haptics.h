@@ -69,7 +69,8 @@ enum tpm_haptics_cause {
   TPM_HAPTICS_FORCE_NOT_FINITE = 4,
   TPM_HAPTICS_LATE = 5,                 /**< too many periods missed */
   TPM_HAPTICS_NOT_IN_PLACE = 6,         /**< the tool was never in free air and at rest */
-  TPM_HAPTICS_UNTRUSTED = 7,            /**< the model did not trust its force for too long */
+  TPM_HAPTICS_OUTSIDE_VALIDITY = 7,     /**< forces were outside the validity of the model for too long */
+  TPM_HAPTICS_UNTRUSTED = 7,            /**< deprecated, until 0.3: TPM_HAPTICS_OUTSIDE_VALIDITY */
   TPM_HAPTICS_ENERGY = 8,               /**< the rendering delivered energy to the hand */
   TPM_HAPTICS_OSCILLATION = 9,
   TPM_HAPTICS_OTHER = 10
@@ -81,7 +82,7 @@ enum tpm_haptics_flag {
   TPM_HAPTICS_FORCE_LIMITED = 1u << 1, /**< by the session's limit, or while it grows to it */
   TPM_HAPTICS_SLIPPING = 1u << 2,      /**< the force rose faster than it may */
   TPM_HAPTICS_DAMPED = 1u << 3,        /**< by the passivity controller */
-  TPM_HAPTICS_BEYOND_MODEL = 1u << 4,  /**< the model does not trust its force; it is faded out */
+  TPM_HAPTICS_BEYOND_MODEL = 1u << 4,  /**< the force is outside the validity of the model; it is faded out */
   TPM_HAPTICS_WAITING = 1u << 5,       /**< for the tool to be in free air, in reach and at rest */
   TPM_HAPTICS_OUT_OF_REACH = 1u << 6,  /**< what it waits for */
   TPM_HAPTICS_IN_TISSUE = 1u << 7,     /**< what it waits for */

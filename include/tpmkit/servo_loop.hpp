@@ -19,8 +19,8 @@ struct StartGateSettings {
   double clearance_m = 0.5e-3;                         ///< least distance above the surface
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< of the workspace, device coordinates
   double reach_m = 0.075;                              ///< from there
-  double still_m = 0.5e-3;                             ///< how far a tool at rest may move
-  double still_s = 0.25;                               ///< for how long it has to be at rest
+  double rest_radius_m = 0.5e-3;                       ///< how far a tool at rest may move
+  double rest_time_s = 0.25;                           ///< for how long it has to be at rest
   double limit_s = 60.0;                               ///< after which the session ends
   /// Wait for the operator: a button of the device, or `confirmed` becoming true.
   bool confirm = false;
@@ -45,7 +45,8 @@ struct SessionServo {
   /// If set, the surface is placed at this distance from the tool, along the push, when the session
   /// begins.
   std::optional<double> surface_before_hand_m = std::nullopt;
-  double untrusted_limit_s = 0.5;  ///< the session stops when forces are untrusted for longer
+  double outside_validity_limit_s =
+      0.5;  ///< the session stops when forces are outside the validity of the model for longer
   /// The session stops if this many of the last 1000 cycles were late, or this many periods were
   /// missed in a row.
   int most_late = 100;
@@ -65,7 +66,7 @@ struct ServoSettings : SessionServo {
   double energy_allowance_J = 2e-3;  ///< see EnergyWatchSettings; infinite: it only counts
   bool watch_oscillation = true;
   double most_speed_m_per_s = 5.0;  ///< of a hand; positions that imply more are rejected
-  double fade_s = 0.1;              ///< time constant with which an untrusted force fades
+  double fade_s = 0.1;              ///< time constant with which a force outside validity fades
   int status_every = 2;             ///< cycles
 };
 
@@ -129,7 +130,7 @@ enum class RealTimeWish {
 
 struct RealTimeOptions {
   RealTimeWish wish = RealTimeWish::ignore;
-  double hang_limit_s = 0.008;  ///< a longer cycle ends the session
+  double cycle_timeout_s = 0.008;  ///< a longer cycle ends the session
   std::function<bool()> interrupted;
   std::function<void()> idle;  ///< called regularly on the thread of the records
 };

@@ -22,13 +22,15 @@ enum class StopCause : std::int32_t {
   forces_off,  ///< the same for an unlisted reason
   position_not_finite,
   force_not_finite,
-  overrun_storm,  ///< too many cycles were late
-  hang,           ///< a cycle did not end
-  not_in_place,   ///< the tool was not brought to a valid start position in time
-  untrusted,      ///< the model did not trust its forces for too long
-  energy,         ///< the rendering delivered energy to the hand that the tissue did not store
-  oscillation,    ///< the force oscillated without motion of the hand
-  position_jump,  ///< the device reported a motion faster than any hand
+  overrun_storm,     ///< too many cycles were late
+  cycle_timeout,     ///< a cycle did not end
+  not_in_place,      ///< the tool was not brought to a valid start position in time
+  outside_validity,  ///< forces were outside the validity of the model for too long
+  energy,            ///< the rendering delivered energy to the hand that the tissue did not store
+  oscillation,       ///< the force oscillated without motion of the hand
+  position_jump,     ///< the device reported a motion faster than any hand
+  hang [[deprecated("use cycle_timeout")]] = cycle_timeout,
+  untrusted [[deprecated("use outside_validity")]] = outside_validity,
 };
 
 [[nodiscard]] std::string_view word_of(StopCause cause);
@@ -42,7 +44,7 @@ enum ServoFlag : std::uint32_t {
   kSlipping = 1U << 4U,   ///< the model's tool slipped, because the force rose faster than allowed
   kRampingIn = 1U << 5U,  ///< the same, because forces are still growing to their limit
   kDamped = 1U << 6U,     ///< by the passivity controller
-  kBeyondModel = 1U << 7U,  ///< the model does not trust its force
+  kBeyondModel = 1U << 7U,  ///< the force is outside the validity of the model
   kLate = 1U << 8U,         ///< woke after the next deadline
   // Before the session begins (StartGate); the rows have phase -1.
   kWaiting = 1U << 9U,       ///< for the operator; forces are zero
@@ -60,8 +62,8 @@ struct ServoRecord {
   double position_m[3] = {};     ///< as the device read it
   double tool_depth_m = 0.0;     ///< of the tool, negative in the air
   double surface_depth_m = 0.0;  ///< of the tissue, input of the model; in space that of the tool
-  double model_force_N = 0.0;    ///< of the tissue against the push, one-sided, whether trusted
-                                 ///< or not
+  double model_force_N = 0.0;    ///< of the tissue against the push, one-sided, also outside
+                                 ///< the validity of the model
   double model_error_N = 0.0;    ///< error estimate of the model
   double commanded_N[3] = {};    ///< sent to the device, on the hand
   double observed_J = 0.0;       ///< work of the hand on the rendering since the start

@@ -40,6 +40,16 @@ TEST_CASE("a quantity is a number and a unit of the right dimension") {
   }
 }
 
+TEST_CASE("a share is a number or a percentage") {
+  CHECK(find_share("0.1") == 0.1);
+  CHECK(find_share("10%") == 0.1);
+  CHECK(find_share("57%") == 0.57);
+  CHECK(find_share("1 %") == 0.01);
+  for (const char* wrong : {"", "%", "5%%", "%5", "nan%", "ten", "10 % of it"}) {
+    CHECK_FALSE(find_share(wrong).has_value());
+  }
+}
+
 TEST_CASE("units take the prefixes of the SI, powers, products and quotients") {
   const auto si = [](const char* text) { return parse_unit(text, "here").to_si; };
   struct Expected {

@@ -20,8 +20,8 @@ TEST_CASE("On the clock, too, every hazard ends as it should, and in time") {
   }
   CHECK(study.safe());
   for (const StopCause cause :
-       {StopCause::finished, StopCause::hang, StopCause::watchdog, StopCause::overrun_storm,
-        StopCause::signal, StopCause::exception}) {
+       {StopCause::finished, StopCause::cycle_timeout, StopCause::watchdog,
+        StopCause::overrun_storm, StopCause::signal, StopCause::exception}) {
     CAPTURE(word_of(cause));
     CHECK(std::any_of(study.rows.begin(), study.rows.end(),
                       [cause](const ClockHazardRow& row) { return row.cause == cause; }));

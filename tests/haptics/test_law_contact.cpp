@@ -52,13 +52,13 @@ double depth_at(double t) {
 /// Largest distance of the loop's force from the law's, in parts of the peak.
 double off_the_law(const LawFile& law, double period_s, double end_s) {
   LawContact contact(
-      law, {.period_s = period_s, .longest_s = end_s, .deepest_m = 4e-3, .trusted_m = 5e-3});
+      law, {.period_s = period_s, .longest_s = end_s, .deepest_m = 4e-3, .deepest_valid_m = 5e-3});
   std::vector<double> time, depth, force;
   for (int i = 0; i * period_s <= end_s; ++i) {
     time.push_back(i * period_s);
     depth.push_back(depth_at(time.back()));
     const ContactAnswer answer = contact.step(Eigen::Vector3d(0.0, 0.0, depth.back()));
-    CHECK(answer.trusted);
+    CHECK(answer.valid);
     force.push_back(-answer.force_N.z());
   }
   const LawModel model(law.spec);

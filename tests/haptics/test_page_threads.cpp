@@ -239,7 +239,7 @@ TEST_CASE("A session on the clock is served while it runs, to friends and others
   json.erase("creep");
   json["indentations"]["hold"] = "0.3 s";
   json["indentations"]["rest"] = "0.1 s";
-  json["limits"] = {{"watchdog", "16 ms"}, {"hang", "1 s"}, {"late_cycles", 1000}};
+  json["limits"] = {{"watchdog", "16 ms"}, {"cycle_timeout", "1 s"}, {"late_cycles", 1000}};
   HilSession session = test::parsed(json);
   session.servo.most_missed = 1'000'000;
   LiveView view(session, true);

@@ -51,7 +51,7 @@ Constraints only_contact_guided(const Network& network) {
 }
 
 /// The lower layer is held.
-Constraints inner_layer_held(const Organ& organ) {
+Constraints inner_layer_fixed(const Organ& organ) {
   Constraints constraints(organ.size());
   for (std::size_t i = 0; i < organ.size(); ++i) {
     if (organ.layer[i] == 1) constraints.fix(i);
@@ -132,7 +132,7 @@ TEST_CASE("a crowded layer has first neighbours only, as the others have") {
     CHECK(s.lateral_count <= 12);
     CHECK(s.radial_count >= 4);
   }
-  Constraints held = inner_layer_held(network.organ);
+  Constraints held = inner_layer_fixed(network.organ);
   CHECK(zero_energy_modes(BondSystem(network, TpmParameters{}), network.organ.position, held)
             .is_rigid());
 }

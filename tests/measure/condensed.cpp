@@ -228,6 +228,6 @@ int main(int argc, char** argv) {
     return 0;
   }
   measure(TPM_TEST_SOURCE_DIR "/configs/liver_scene.json");
-  measure(TPM_TEST_SOURCE_DIR "/configs/liver_inner_held_scene.json");
+  measure(TPM_TEST_SOURCE_DIR "/configs/liver_inner_fixed_scene.json");
   return 0;
 }

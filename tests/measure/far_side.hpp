@@ -3,7 +3,7 @@
 
 namespace tpm_measure {
 
-/// Spheres of the outer layer beyond 60 % of the organ's extent along z are held.
+/// Spheres of the outer layer beyond 60 % of the organ's extent along z are fixed.
 inline tpm::organ::Constraints held_on_the_far_side(const tpm::organ::Organ& organ) {
   tpm::organ::Constraints constraints(organ.size());
   const Eigen::RowVectorXd z = organ.position.row(2);

@@ -225,7 +225,7 @@ void print_servo() {
 }
 
 /// Zones around a tumour along a slow push: errors and claims in parts of the largest force so far,
-/// which is what a session trusts by.
+/// by which a session tells what is valid.
 void print_zones() {
   const OrganScene scene(paper_liver());
   const Positions& rest = scene.network.organ.position;
@@ -234,7 +234,7 @@ void print_zones() {
   std::vector<double> times;
   for (int i = 1; i <= kSteps; ++i) times.push_back(kPeriod_s * i);
   fmt::print("{:<30} {:>6} {:>12} {:>12} {:>14}\n", "8 mm in 8 s", "rings", "error/force",
-             "claim/force", "not trusted");
+             "claim/force", "not valid");
   for (const Named& named : materials(scene.network)) {
     if (named.field.factor.size() == 0) continue;
     const BondSystem bonds(scene.network, named.field);
@@ -255,7 +255,7 @@ void print_zones() {
         const double missed = std::abs(answer.force_N.dot(scene.probe.direction) + force);
         error = std::max(error, missed / force);
         claim = std::max(claim, answer.error_N / force);
-        doubted += answer.trusted ? 0 : 1;
+        doubted += answer.valid ? 0 : 1;
       }
       fmt::print("{:<30} {:>6} {:>12.2e} {:>12.2e} {:>14}\n", named.name, rings, error, claim,
                  fmt::format("{} of {}", doubted, kSteps));

@@ -139,7 +139,7 @@ Measured run(const HilSession& session, const Case& of, double seconds) {
 void measure(HilSession session, double seconds, int rounds) {
   session.servo.most_late = 1001;  // it is to be measured, not stopped
   session.servo.most_missed = 1'000'000;
-  session.hang_limit_s = 1.0;
+  session.cycle_timeout_s = 1.0;
   session.plant.watchdog_s = 1e3;
   session.preparation.watchdog_s = 1e3;
   fmt::print(

@@ -51,9 +51,9 @@ Timed timed_run(const QuasiStatic& solver, const Protocol& protocol,
   return result;
 }
 
-/// The paper's liver with its far side held, or with all of its inner layer.
-OrganScene liver_scene(bool inner_held) {
-  if (!inner_held) return OrganScene(paper_liver());
+/// The paper's liver with its far side fixed, or with all of its inner layer.
+OrganScene liver_scene(bool inner_fixed) {
+  if (!inner_fixed) return OrganScene(paper_liver());
   OrganScene scene(paper_liver(), 1.0);
   for (std::size_t i = 0; i < scene.constraints.size(); ++i) {
     if (scene.network.organ.layer[i] == 1) scene.constraints.fix(i);

@@ -151,7 +151,7 @@ void measure_errors(const Setup& setup, const std::vector<double>& taus_s) {
 /// Work of the contact on the tissue from rest, by the trapezoidal rule over each period.
 void measure_energy(const Setup& setup, Eigen::Index steps, std::uint64_t seed,
                     const std::vector<double>& taus_s) {
-  fmt::print("tau_s,model,steps,least_work_J,largest_work_J,end_work_J,not_trusted\n");
+  fmt::print("tau_s,model,steps,least_work_J,largest_work_J,end_work_J,not_valid\n");
   const ContactMotion motion =
       random_motion_in_space(contact_axes(setup.into), 8e-3, 2e-3, steps, seed, kPeriod_s);
   for (const double tau_s : taus_s) {
@@ -162,7 +162,7 @@ void measure_energy(const Setup& setup, Eigen::Index steps, std::uint64_t seed,
       double work_J = 0.0;
       double least_J = 0.0;
       double largest_J = 0.0;
-      long not_trusted = 0;
+      long not_valid = 0;
       for (Eigen::Index i = 0; i < steps; ++i) {
         const Eigen::Vector3d to = motion.displacement_m.col(i);
         const ContactAnswer answer = built.model->step(to);
@@ -171,10 +171,10 @@ void measure_energy(const Setup& setup, Eigen::Index steps, std::uint64_t seed,
         at = to;
         least_J = std::min(least_J, work_J);
         largest_J = std::max(largest_J, work_J);
-        not_trusted += answer.trusted ? 0 : 1;
+        not_valid += answer.valid ? 0 : 1;
       }
       fmt::print("{:g},{},{},{:.3e},{:.3e},{:.3e},{}\n", tau_s, built.name, steps, least_J,
-                 largest_J, work_J, not_trusted);
+                 largest_J, work_J, not_valid);
       std::fflush(stdout);
     }
   }

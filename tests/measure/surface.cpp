@@ -75,11 +75,11 @@ void compare(const Setup& setup, double depth_m, double angle) {
   const Way way = slide_of(setup, depth_m, angle);
   double peak = 0.0, most = 0.0, aside = 0.0, estimate = 0.0;
   int touching = 0, compared = 0, exceeded = 0;
-  bool trusted = true;
+  bool valid = true;
   for (std::size_t i = 0; i < way.size(); ++i) {
     const ContactAnswer answer = network.step(way[i]);
     estimate = std::max(estimate, answer.error_N);
-    trusted = trusted && answer.trusted;
+    valid = valid && answer.valid;
     if ((i + 1) % kEvery != 0) continue;
     const Eigen::Vector3d force =
         full.step(setup.surface.ball.start_m + way[i], kEvery * setup.session.servo.period_s);
@@ -92,7 +92,7 @@ void compare(const Setup& setup, double depth_m, double angle) {
   }
   fmt::print("{:.0f},{:.0f},{},{:.4f},{:.4f},{:.4f},{:.4f},{} of {},{}\n", 1e3 * depth_m,
              angle * 57.29577951308232, touching, peak, aside, 100.0 * most / peak,
-             100.0 * estimate / peak, exceeded, compared, trusted ? "yes" : "no");
+             100.0 * estimate / peak, exceeded, compared, valid ? "yes" : "no");
   (void)std::fflush(stdout);
 }
 
@@ -172,7 +172,7 @@ void random_motions(const Setup& setup, long steps, std::uint64_t seed) {
   SurfaceNetwork network = setup.network();
   std::vector<double> times(way.size(), 1e9);
   double work = 0.0, least = 0.0, most = 0.0, fastest = 0.0;
-  long touching = 0, several = 0, untrusted = 0, balances = 0;
+  long touching = 0, several = 0, not_valid = 0, balances = 0;
   for (int round = 0; round < 3; ++round) {
     network.reset();
     Eigen::Vector3d before = Eigen::Vector3d::Zero(), force = before;
@@ -187,7 +187,7 @@ void random_motions(const Setup& setup, long steps, std::uint64_t seed) {
       if (i > 0) fastest = std::max(fastest, (way[i] - before).norm());
       touching += network.touching() > 0 ? 1 : 0;
       several += network.touching() > 1 ? 1 : 0;
-      untrusted += answer.trusted ? 0 : 1;
+      not_valid += answer.valid ? 0 : 1;
       balances += network.balances();
       before = way[i];
       force = answer.force_N;
@@ -199,9 +199,9 @@ void random_motions(const Setup& setup, long steps, std::uint64_t seed) {
   };
   fmt::print(
       "random: {} steps, up to {:.0f} mm/s, {} in contact, {} of them with several spheres, {} not "
-      "trusted, {:.3f} balances a step\nleast work {:.3g} J, largest {:.3g} J, at the end {:.3g} "
+      "valid, {:.3f} balances a step\nleast work {:.3g} J, largest {:.3g} J, at the end {:.3g} "
       "J\na step: p50 {:.1f} us, p99 {:.1f} us, largest {:.1f} us\n",
-      way.size(), 1e3 * fastest / setup.session.servo.period_s, touching, several, untrusted,
+      way.size(), 1e3 * fastest / setup.session.servo.period_s, touching, several, not_valid,
       static_cast<double>(balances) / static_cast<double>(way.size()), least, most, work, at(0.5),
       at(0.99), at(1.0));
 }
@@ -215,7 +215,7 @@ void run(const std::string& file, long steps, std::uint64_t seed) {
              static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
   fmt::print(
       "depth_mm,direction_degree,spheres_touched,peak_N,largest_aside_N,largest_difference_percent,"
-      "largest_estimate_percent,instants_beyond_estimate,trusted\n");
+      "largest_estimate_percent,instants_beyond_estimate,valid\n");
   for (const double depth_m : {2e-3, 4e-3, 8e-3}) {
     for (const double angle : {0.0, 2.0, 4.0}) compare(setup, depth_m, angle);
   }

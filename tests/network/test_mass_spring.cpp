@@ -25,7 +25,7 @@ namespace {
 
 constexpr double kForever = std::numeric_limits<double>::infinity();
 
-/// 4 x 4 x 2 spheres, not quite on a lattice, the lower layer held.
+/// 4 x 4 x 2 spheres, not quite on a lattice, the lower layer fixed.
 struct Plate {
   Plate() : network(build_network(organ(), {}, "plate")), constraints(network.organ.size()) {
     for (std::size_t i = 16; i < 32; ++i) constraints.fix(i);

@@ -80,7 +80,7 @@ TEST_CASE("A ball slides over the surface as over the full network", "[heavy]") 
   for (const Eigen::Vector3d& at : scene.slide(4e-3, 300)) {
     const ContactAnswer answer = servo.step(at);
     last = full.step(scene.ball.start_m + at, servo.period_s());
-    REQUIRE(answer.trusted);
+    REQUIRE(answer.valid);
     CHECK(answer.force_N.isZero(0.0) == last.isZero(0.0));
     peak = std::max(peak, last.norm());
     aside = std::max(aside, (last - last.dot(scene.into) * scene.into).norm());
@@ -313,15 +313,15 @@ TEST_CASE("Random motions of a ball draw nothing, repeat to the bit and allocate
 TEST_CASE("A network under a ball says when it is out of its range") {
   const BallScene scene(1.0);
   SurfaceNetwork servo = scene.servo({.deepest_m = 3e-3});
-  CHECK(servo.step(2e-3 * scene.into).trusted);
+  CHECK(servo.step(2e-3 * scene.into).valid);
   for (int i = 1; i <= 300; ++i) (void)servo.step((2e-3 + 1e-5 * i) * scene.into);
-  CHECK_FALSE(servo.step(5e-3 * scene.into).trusted);
+  CHECK_FALSE(servo.step(5e-3 * scene.into).valid);
   const ContactAnswer bad =
       servo.step(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  CHECK_FALSE(bad.trusted);
+  CHECK_FALSE(bad.valid);
   CHECK_FALSE(bad.force_N.allFinite());
   servo.reset();
-  CHECK(servo.step(2e-3 * scene.into).trusted);
+  CHECK(servo.step(2e-3 * scene.into).valid);
   // Stiffness at once, at rest: what a small push says.
   servo.reset();
   const Eigen::Vector3d push = 1e-5 * scene.into;
@@ -332,10 +332,10 @@ TEST_CASE("A network under a ball says when it is out of its range") {
   const BallScene small(1.0, 1e-3);
   SurfaceNetwork fits = small.servo();
   const Eigen::Vector3d between(10e-3, 10e-3, 5e-3);
-  CHECK(fits.step(between).trusted);
-  CHECK(fits.step(between + 36e-3 * small.into).trusted);
+  CHECK(fits.step(between).valid);
+  CHECK(fits.step(between + 36e-3 * small.into).valid);
   CHECK(fits.touching() == 0);
-  CHECK_FALSE(fits.step(Eigen::Vector3d(5e-3, 5e-3, -31e-3)).trusted);
+  CHECK_FALSE(fits.step(Eigen::Vector3d(5e-3, 5e-3, -31e-3)).valid);
 
   BallTool inside = scene.ball;
   inside.start_m += 1e-3 * scene.into;

@@ -22,7 +22,7 @@ SESSION = {
         "organ": {"kind": "star", "spacing": "30 mm"},
         "material": {"E1": "12 kPa", "E2": "12 kPa", "Eprime": "12 kPa", "eta1": "2.4e4 Pa s"}}},
     "rate": "500 Hz",
-    "limits": {"watchdog": "16 ms", "hang": "1 s", "late_cycles": 1000},
+    "limits": {"watchdog": "16 ms", "cycle_timeout": "1 s", "late_cycles": 1000},
     "virtual_device": {"least_watchdog": "1 s"},
     "indentations": {"depths": ["4 mm"], "rates": ["2 mm/s"], "hold": "2 s", "rest": "1 s"},
     "creep": {"loads": ["0.2 N"], "hold": "2 s", "rest": "1 s"},
@@ -226,7 +226,7 @@ def attempt(tpm, program, told, given, shot):
         try:
             seen = watched(chromium, address, 60.0, shot)
             # A machine that stalls for longer than the loop allows ends the session, and the page says so.
-            stalled = seen[-1]["texts"]["status"].startswith(("stopped: watchdog", "stopped: overrun", "stopped: hang"))
+            stalled = seen[-1]["texts"]["status"].startswith(("stopped: watchdog", "stopped: overrun", "stopped: cycle timeout"))
             if shot is None and not stalled:
                 check(seen, address, chromium, told)
             return stalled, len(seen)

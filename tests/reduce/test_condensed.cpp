@@ -66,7 +66,7 @@ TEST_CASE("a condensed contact follows the full network, force and field", "[con
   for (int i = 1; i <= 200; ++i) {
     full.advance(path(i), contact.period_s());
     const ContactAnswer answer = contact.step(path(i));
-    REQUIRE(answer.trusted);
+    REQUIRE(answer.valid);
     contact.displacements(field);
     const double off = (answer.force_N - full.force_N()).norm();
     bounded = bounded && off <= 1.5 * answer.error_N;
@@ -130,11 +130,11 @@ TEST_CASE("a condensed contact creates no energy", "[condensed][heavy]") {
 
 TEST_CASE("beyond its range a condensed contact says so", "[condensed]") {
   CondensedContact contact = built();
-  CHECK(contact.step(4e-3 * small_organ().into).trusted);
-  CHECK_FALSE(contact.step(4.5e-3 * small_organ().into).trusted);
-  CHECK_FALSE(contact.step(2e-3 * small_organ().into + 1.2e-3 * small_organ().into.unitOrthogonal())
-                  .trusted);
-  CHECK_FALSE(contact.step(-0.5e-3 * small_organ().into).trusted);
+  CHECK(contact.step(4e-3 * small_organ().into).valid);
+  CHECK_FALSE(contact.step(4.5e-3 * small_organ().into).valid);
+  CHECK_FALSE(
+      contact.step(2e-3 * small_organ().into + 1.2e-3 * small_organ().into.unitOrthogonal()).valid);
+  CHECK_FALSE(contact.step(-0.5e-3 * small_organ().into).valid);
 }
 
 TEST_CASE("what cannot be condensed is refused", "[condensed]") {

@@ -58,22 +58,22 @@ double error_of_ramp(const Liver& liver, double relaxation_time_s, double ramp_s
 
 }  // namespace
 
-TEST_CASE("ramps into the paper's liver, its far side held", "[condensed]") {
+TEST_CASE("ramps into the paper's liver, its far side fixed", "[condensed]") {
   const Liver liver("liver_scene.json");
   CHECK(error_of_ramp(liver, 0.02, 0.08, 0.1) <
-        test::allowed_error("condensed.paper_liver_far_side_held"));
+        test::allowed_error("condensed.paper_liver_far_side_fixed"));
   CHECK(error_of_ramp(liver, 0.1, 0.08, 0.3) <
-        test::allowed_error("condensed.paper_liver_far_side_held"));
+        test::allowed_error("condensed.paper_liver_far_side_fixed"));
   CHECK(error_of_ramp(liver, 1.0, 2.0, 3.0) <
-        test::allowed_error("condensed.paper_liver_far_side_held"));
+        test::allowed_error("condensed.paper_liver_far_side_fixed"));
 }
 
-TEST_CASE("ramps into the paper's liver, its inner layer held", "[condensed]") {
-  const Liver liver("liver_inner_held_scene.json");
+TEST_CASE("ramps into the paper's liver, its inner layer fixed", "[condensed]") {
+  const Liver liver("liver_inner_fixed_scene.json");
   CHECK(error_of_ramp(liver, 0.02, 0.08, 0.1) <
-        test::allowed_error("condensed.paper_liver_inner_layer_held"));
+        test::allowed_error("condensed.paper_liver_inner_layer_fixed"));
   CHECK(error_of_ramp(liver, 1.0, 0.08, 1.0) <
-        test::allowed_error("condensed.paper_liver_inner_layer_held"));
+        test::allowed_error("condensed.paper_liver_inner_layer_fixed"));
 }
 
 TEST_CASE("a million random steps in the paper's liver create no energy", "[condensed]") {

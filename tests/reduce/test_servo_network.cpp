@@ -34,7 +34,7 @@ const OrganScene& small_liver() {
 struct Answers {
   Eigen::Matrix3Xd force_N;
   double estimate_N = 0.0;
-  bool trusted = true;
+  bool valid = true;
 };
 
 Answers follow(ContactModel& model, const ContactMotion& motion) {
@@ -45,7 +45,7 @@ Answers follow(ContactModel& model, const ContactMotion& motion) {
     const ContactAnswer answer = model.step(motion.displacement_m.col(i));
     answers.force_N.col(i) = answer.force_N;
     answers.estimate_N = std::max(answers.estimate_N, answer.error_N);
-    answers.trusted = answers.trusted && answer.trusted;
+    answers.valid = answers.valid && answer.valid;
   }
   return answers;
 }
@@ -192,7 +192,7 @@ TEST_CASE("the servo network follows the network along the normal and in space",
     CHECK(error_N < test::allowed_error("servo_network.along_normal") * peak_N);
     CHECK(along.estimate_N > 0.3 * error_N);
     CHECK(along.estimate_N < 30.0 * error_N + 1e-5 * peak_N);
-    CHECK(along.trusted);
+    CHECK(along.valid);
 
     if (tau < 1e-3) continue;  // needs a finer reference: tests/test_servo_network_slow.cpp
     const ContactMotion circles = circling_motion(axes, 2e-3, 1e-3, 20.0, 0.5, servo.period_s());
@@ -282,12 +282,12 @@ TEST_CASE("the servo network says when it is out of its range", "[servo]") {
   const Positions& rest = scene.network.organ.position;
   const Eigen::Vector3d into = scene.probe.direction;
   ServoNetwork servo(bonds, rest, scene.constraints, scene.probe.sphere, into, {.deepest_m = 5e-3});
-  CHECK(servo.step(1e-3 * into).trusted);
+  CHECK(servo.step(1e-3 * into).valid);
   servo.reset();
-  CHECK_FALSE(follow(servo, ramp_motion(into, 6e-3, 0.1, 0.01, 1e-3)).trusted);
-  CHECK_FALSE(servo.step(Eigen::Vector3d::Constant(std::nan(""))).trusted);
+  CHECK_FALSE(follow(servo, ramp_motion(into, 6e-3, 0.1, 0.01, 1e-3)).valid);
+  CHECK_FALSE(servo.step(Eigen::Vector3d::Constant(std::nan(""))).valid);
   servo.reset();
-  CHECK(servo.step(1e-3 * into).trusted);
+  CHECK(servo.step(1e-3 * into).valid);
   CHECK_THROWS_AS(ServoNetwork(bonds, rest, scene.constraints, scene.probe.sphere, 2.0 * into),
                   Error);
   CHECK_THROWS_AS(

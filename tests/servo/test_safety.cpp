@@ -214,7 +214,7 @@ TEST_CASE("The borders of a set-up are those of the theory") {
   const double depth = check.depth_m, slope = 1.0 - std::pow(1.0 + depth * depth / 9e-4, -1.5);
   CHECK(check.depth_m > 3e-3);
   CHECK_THAT(check.stiffness_N_per_m, WithinRel(150.72 * (1.0 + 2.0 * slope), 0.02));
-  CHECK_THAT(check.relaxed_share, WithinRel(0.5, 1e-6));
+  CHECK_THAT(check.equilibrium_share, WithinRel(0.5, 1e-6));
   CHECK_THAT(check.passive_N_per_m, WithinRel(2.0 * 0.3 / 1e-3, 1e-9));
   CHECK_THAT(check.recovery_s, WithinRel(2.0, 1e-6));  // tau 1 s, E1 = E2
   CHECK(check.passive());
@@ -256,9 +256,9 @@ TEST_CASE("A rest in which the tissue cannot recover is warned of") {
 
 // --- the start ------------------------------------------------------------------------------
 
-TEST_CASE("A hand that hangs in the tissue feels nothing, and the session is given up") {
+TEST_CASE("A hand that rests in the tissue feels nothing, and the session is given up") {
   Json json = test::short_session();
-  json["virtual_device"]["limp_at"] = "12 mm";
+  json["virtual_device"]["arm_set_point"] = "12 mm";
   json["start"]["limit"] = "2 s";
   const test::TempFolder folder;
   SessionRunOptions options;
@@ -344,7 +344,7 @@ TEST_CASE("Limits have ceilings, and a session has to fit into the workspace") {
            "key /limits/damping_N_s_per_m: 10000; expected 0 to 30"},
       Case{"/limits/slew_N_per_s", 1e9, "key /limits/slew_N_per_s: 1000000000; expected 1 to 2000"},
       Case{"/limits/ramp_in", "0 s", "key /limits/ramp_in: 0 s; expected 0.1 to 60 s"},
-      Case{"/limits/untrusted", "1 min", "key /limits/untrusted: 60 s"},
+      Case{"/limits/outside_validity", "1 min", "key /limits/outside_validity: 60 s"},
       Case{"/indentations/depths", Json::array({"10 m"}),
            "the tool would go 10 m from the centre of the workspace; expected 0.075 m at most"},
       Case{"/surface", Json::array({"0.5 m", "0 m", "0 m"}),
@@ -400,9 +400,9 @@ TEST_CASE("A slip takes energy and never gives any: a stiff spring, limits that 
   }
 }
 
-// --- trust ----------------------------------------------------------------------------------
+// --- validity -------------------------------------------------------------------------------
 
-/// A spring of which every second answer, or none after a while, is trusted.
+/// A spring of which every second answer, or none after a while, is valid.
 class Doubtful final : public ContactModel {
  public:
   enum class Way { alternating, for_good };
@@ -411,8 +411,8 @@ class Doubtful final : public ContactModel {
   ContactAnswer step(const ToolPose& tool) noexcept override {
     ++steps_;
     ContactAnswer answer;
-    answer.trusted = way_ == Way::alternating ? steps_ < 500 || steps_ % 2 == 0 : steps_ < 500;
-    answer.force_N = (answer.trusted ? -200.0 : -600.0) * tool.displacement_m;
+    answer.valid = way_ == Way::alternating ? steps_ < 500 || steps_ % 2 == 0 : steps_ < 500;
+    answer.force_N = (answer.valid ? -200.0 : -600.0) * tool.displacement_m;
     return answer;
   }
   [[nodiscard]] double period_s() const noexcept override { return 1e-3; }
@@ -434,7 +434,7 @@ struct Doubted {
   int cycles_after = 0;
 };
 
-/// To 2 mm in 0.4 s, held, and slowly on: 0.4 N are trusted.
+/// To 2 mm in 0.4 s, held, and slowly on: 0.4 N are valid.
 Doubted doubted(Doubtful::Way way, bool in_space) {
   Doubtful model(way);
   Puppet device;
@@ -459,11 +459,11 @@ Doubted doubted(Doubtful::Way way, bool in_space) {
   return result;
 }
 
-TEST_CASE("A force in doubt is not sent: what was trusted fades, and the session ends") {
+TEST_CASE("A force outside validity is not sent: the last valid one fades, and the session ends") {
   for (const bool in_space : {false, true}) {
     CAPTURE(in_space);
     const Doubted result = doubted(Doubtful::Way::for_good, in_space);
-    CHECK(result.cause == StopCause::untrusted);
+    CHECK(result.cause == StopCause::outside_validity);
     CHECK(result.largest_N < 0.41);  // the model answers 1.2 N
     CHECK(result.largest_jump_N < 0.005);
     CHECK(result.cycles_after <= 501);
@@ -471,7 +471,7 @@ TEST_CASE("A force in doubt is not sent: what was trusted fades, and the session
     const Doubted wave = doubted(Doubtful::Way::alternating, in_space);
     CHECK(wave.largest_N < 0.45);  // the wave was one of 0.8 N at 500 Hz
     CHECK(wave.largest_jump_N < 0.02);
-    CHECK(wave.cause == StopCause::untrusted);
+    CHECK(wave.cause == StopCause::outside_validity);
   }
 }
 

@@ -7,9 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "hil_scenes.hpp"
 #include "refusal.hpp"
 #include "temp_folder.hpp"
 #include "tpm/core/warning.hpp"
+#include "tpm/haptics/session.hpp"
 #include "tpm/scene/scene.hpp"
 #include "tpm/store/file.hpp"
 #include "tpm/store/renamed_names.hpp"
@@ -133,6 +135,53 @@ TEST_CASE("a user's own name is left alone") {
   CHECK(heard.lines.empty());
 }
 
+TEST_CASE("pointers of axes to what was renamed are read as pointers to the new name") {
+  Heard heard;
+  const auto sweep = [](const std::string& key, const std::string& axes) {
+    return parse_json(R"({"model": "organ", "scene": {"organ": {"kind": "star"}, ")" + key +
+                          R"(": [2, 5]}, "outputs": ["peak_force"],
+                          "axes": )" +
+                          axes + "}",
+                      "p.json");
+  };
+  const auto single = [](const std::string& key) {
+    return R"([{"parameter": "/)" + key + R"(/0", "name": "z", "values": [1, 2]}])";
+  };
+  const auto together = [](const std::string& key) {
+    return R"([{"together": {"/)" + key + R"(/0": {"values": [0, 1], "name": "y"},
+               "/material/E1": {"values": ["6 kPa", "12 kPa"]}}}])";
+  };
+  const auto samples = [](const std::string& key) {
+    return R"([{"samples": "sobol", "count": 4, "parameters":
+               {"/)" +
+           key + R"(/0": {"from": 0, "to": 1, "name": "y"}}}])";
+  };
+  CHECK(with_current_names(sweep("guides", single("guides")), "sweep", "p.json") ==
+        sweep("sliders", single("sliders")));
+  REQUIRE(heard.lines.size() == 2);
+  CHECK(heard.lines[1] ==
+        "p.json: key /axes/0/parameter: '/guides/0' is now called '/sliders/0'; "
+        "the former name is read until version 0.3");
+  CHECK(with_current_names(sweep("guides", together("guides")), "sweep", "p2.json") ==
+        sweep("sliders", together("sliders")));
+  CHECK(with_current_names(sweep("guides", samples("guides")), "sweep", "p3.json") ==
+        sweep("sliders", samples("sliders")));
+  CHECK(heard.lines.size() == 6);
+  // Other keys that begin alike, or stand deeper, are left alone.
+  for (const char* key : {"guidesx", "organ/guides"}) {
+    const Json own = sweep("sliders", single(key));
+    CHECK(with_current_names(own, "sweep", "p4.json") == own);
+  }
+  CHECK(heard.lines.size() == 6);
+  const std::string both = R"([{"together": {"/guides/0": {"values": [0, 1]},
+                               "/sliders/0": {"values": [0, 1]}}}])";
+  CHECK(refusal_of([&] {
+          static_cast<void>(with_current_names(sweep("sliders", both), "sweep", "p5.json"));
+        }) ==
+        "p5.json: key /axes/0/together: '/guides/0': stands beside its new name "
+        "'/sliders/0'; expected '/sliders/0' alone");
+}
+
 TEST_CASE("the design's former criterion chooses the same") {
   Heard heard;
   Json design = read_json(share_dir() / "configs" / "design_liver.json");
@@ -162,6 +211,40 @@ TEST_CASE("scenes within other files are read by the same rule; what tpm wrote i
       CHECK(with_current_names(parse_json(text, "t"), name.schema, "t") == parse_json(text, "t"));
     }
   }
+}
+
+TEST_CASE("former keys of sessions mean the same as the new ones") {
+  Heard heard;
+  const auto session = [](const char* timeout, const char* validity, const char* rest,
+                          const char* set_point) {
+    Json json = test::short_session();
+    json["limits"][timeout] = "20 ms";
+    json["limits"][validity] = "0.25 s";
+    json["start"][rest] = "0.5 s";
+    json["virtual_device"][set_point] = "3 mm";
+    return haptics::parse_session(json, "s.json", "");
+  };
+  const haptics::HilSession by_new =
+      session("cycle_timeout", "outside_validity", "at_rest", "arm_set_point");
+  CHECK(heard.lines.empty());
+  CHECK(by_new.cycle_timeout_s == 0.02);
+  CHECK(by_new.servo.outside_validity_limit_s == 0.25);
+  CHECK(by_new.servo.gate->rest_time_s == 0.5);
+  CHECK(by_new.plant.arm_set_point_m == 3e-3);
+  const haptics::HilSession by_former = session("hang", "untrusted", "still", "limp_at");
+  CHECK(heard.lines.size() == 4);
+  CHECK(by_former.cycle_timeout_s == by_new.cycle_timeout_s);
+  CHECK(by_former.servo.outside_validity_limit_s == by_new.servo.outside_validity_limit_s);
+  CHECK(by_former.servo.gate->rest_time_s == by_new.servo.gate->rest_time_s);
+  CHECK(by_former.plant.arm_set_point_m == by_new.plant.arm_set_point_m);
+}
+
+TEST_CASE("a recording of a motion with the former key is read without a word") {
+  Heard heard;
+  const Json recorded = parse_json(R"({"motion": {"relax_s": 3.0}})", "t");
+  CHECK(with_current_names(recorded, "hil", "r.tpmrec", FormerNames::silent) ==
+        parse_json(R"({"motion": {"initial_hold_s": 3.0}})", "t"));
+  CHECK(heard.lines.empty());
 }
 
 TEST_CASE("schemas mark former keys, and no name outlives its version") {

@@ -246,7 +246,8 @@ TEST_CASE("stored energy never rises by more than the work") {
   Random random(2);
   for (int trial = 0; trial < 40; ++trial) {
     const LawFile law = test::random_law(random);
-    LawInLoop loop(law, {.period_s = 1e-4, .longest_s = 2.0, .deepest_m = 8e-3, .trusted_m = 1e-2});
+    LawInLoop loop(
+        law, {.period_s = 1e-4, .longest_s = 2.0, .deepest_m = 8e-3, .deepest_valid_m = 1e-2});
     double work = 0.0, worst = 0.0, scale = 0.0, before = 0.0, force_before = 0.0;
     for (int i = 0; i <= 8000; ++i) {
       const double t = 1e-4 * i;
@@ -287,7 +288,7 @@ TEST_CASE("at rest every law may take the place of every other") {
   Random random(9);
   for (int i = 0; i < 50; ++i) {
     const LawContactSettings settings{
-        .period_s = 1e-3, .longest_s = 10.0, .deepest_m = 8e-3, .trusted_m = 1e-2};
+        .period_s = 1e-3, .longest_s = 10.0, .deepest_m = 8e-3, .deepest_valid_m = 1e-2};
     const LawInLoop from(test::random_law(random), settings);
     LawInLoop to(test::random_law(random), settings);
     const HandOver decision = consider_hand_over(from, to);

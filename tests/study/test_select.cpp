@@ -1,8 +1,10 @@
 // From a recording to the least law, its configuration and its figures' data.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstdint>
 
 #include "temp_folder.hpp"
 #include "tpm/core/random.hpp"
@@ -236,6 +238,79 @@ TEST_CASE("a law with a relaxation time that the sampling cannot support is not 
   CHECK_THAT(fmt::format("{}", fmt::join(s.words, "\n")),
              Catch::Contains("linear-2 has the lowest BIC") &&
                  Catch::Contains("but is not identified: tau1 is sampled by fewer than 3 points"));
+}
+
+TEST_CASE("a stiffness whose interval ends above 0 is identified, whatever its standard error",
+          "[select]") {
+  Candidate c;
+  c.law = parse_law_name("linear-1", "test");
+  c.fit.config.law = c.law;
+  ParameterResult k1;
+  k1.parameter.name = "k1";
+  k1.parameter.scale = Scale::linear;
+  k1.parameter.lower = 0.0;
+  k1.estimate = 0.25;
+  k1.standard_error = 0.16;
+  k1.verdict = Verdict::not_profiled;
+  c.fit.parameters = {k1};
+  const ProtocolSpans spans{.hold_s = 10.0};
+  CHECK(not_identified(c, spans) == "k1 is less than 2 standard errors above 0");
+  c.fit.parameters[0].standard_error.reset();
+  CHECK(not_identified(c, spans) == "k1 has no standard error");
+  c.fit.parameters[0].lower = 0.05;
+  c.fit.parameters[0].upper = 0.76;
+  for (const Verdict verdict : {Verdict::identified, Verdict::lower_only}) {
+    c.fit.parameters[0].verdict = verdict;
+    c.fit.parameters[0].standard_error.reset();
+    CHECK(not_identified(c, spans).empty());
+    c.fit.parameters[0].standard_error = 0.16;
+    CHECK(not_identified(c, spans).empty());
+  }
+  c.fit.parameters[0].verdict = Verdict::upper_only;
+  CHECK_FALSE(not_identified(c, spans).empty());
+}
+
+namespace {
+
+/// A weak branch in noise, whose stiffness an interval tells from 0 and a standard error does not.
+Recording weak_branch(std::uint32_t seed) {
+  auto next = [state = seed]() mutable {
+    double sum = -6.0;
+    for (int i = 0; i < 12; ++i) {
+      state = 1664525U * state + 1013904223U;
+      sum += state / 4294967296.0;
+    }
+    return sum;
+  };
+  Recording r;
+  for (int i = 0; i <= 250; ++i) {
+    const double t = 0.08 * i, ramp = std::min(t, 2.0);
+    r.time_s.push_back(t);
+    r.drive.push_back(2e-3 * ramp);
+    r.response.push_back(0.12 * ramp + 1.8e-3 * (std::exp((ramp - t) / 2.0) - std::exp(-t / 2.0)) +
+                         1e-3 * next());
+  }
+  return r;
+}
+
+}  // namespace
+
+TEST_CASE("the table of laws does not contradict the table of parameters", "[select]") {
+  for (const std::uint32_t seed : {2U, 6U}) {
+    CAPTURE(seed);
+    SelectionOptions options;
+    options.laws = {parse_law_name("power-1", "test")};
+    options.only_listed = true;
+    options.held_out = false;
+    const std::vector<PreparedRecording> one{prepare_recording("r.csv", weak_branch(seed))};
+    const Selection s = select_law(one, options);
+    const Candidate& c = s.candidates.front();
+    const auto k1 = std::find_if(c.fit.parameters.begin(), c.fit.parameters.end(),
+                                 [](const auto& p) { return p.parameter.name == "k1"; });
+    REQUIRE(k1 != c.fit.parameters.end());
+    REQUIRE(k1->verdict == Verdict::identified);
+    CHECK_THAT(c.reason, !Catch::Contains("k1"));
+  }
 }
 
 TEST_CASE("a hold of three relaxation times is needed to say that nothing remains", "[select]") {

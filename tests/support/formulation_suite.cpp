@@ -49,7 +49,7 @@ ExperimentScene star(const std::string& blocks, const Formulation& f) {
 }
 
 /// A small liver, its contact guided along the push as a tool does it: else it goes so far aside
-/// that reduced contacts do not trust themselves.
+/// that reduced contacts are not valid.
 ExperimentScene liver(const std::string& blocks, const Formulation& f) {
   ExperimentScene scene = parsed(R"({"kind": "liver", "count": 40})", blocks, f);
   scene.tissue.sliders.push_back({scene.probe().sphere, scene.probe().direction});

@@ -1,5 +1,5 @@
 #pragma once
-// An organ with its far side held, pushed at its contact sphere: for tests and measurements.
+// An organ with its far side fixed, pushed at its contact sphere: for tests and measurements.
 #include <utility>
 
 #include "tpm/network/constraints.hpp"

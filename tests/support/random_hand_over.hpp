@@ -42,7 +42,7 @@ struct HandOverOutcome {
 /// Moves a random law at random through 0.2 to 2 s at 1 kHz and considers another law then.
 inline HandOverOutcome random_hand_over(Random& random) {
   const LawContactSettings settings{
-      .period_s = 1e-3, .longest_s = 10.0, .deepest_m = 8e-3, .trusted_m = 1e-2};
+      .period_s = 1e-3, .longest_s = 10.0, .deepest_m = 8e-3, .deepest_valid_m = 1e-2};
   LawInLoop from(random_law(random), settings);
   LawInLoop to(random_law(random), settings);
   const double mean = 5e-3 * random.uniform(), slow = 3.0 * random.uniform();

@@ -252,7 +252,7 @@ std::vector<std::string> broken_in_scenes(const ElongationShape& shape) {
   Random random(9);
   const ElongationFunction w = drawn(shape, random);
   for (const Formulation* f : formulations()) {
-    // The condensed model does not trust itself on a star: no spheres follow its contact.
+    // The condensed model is not valid on a star: no spheres follow its contact.
     const bool on_stars = f->can().depth && f->name() != "condensed";
     if (f->as<SceneRunner>() == nullptr || !on_stars) continue;
     in_scene(shape, w, true, *f, broken);

@@ -22,7 +22,7 @@ constexpr std::array<BenchmarkEntry, 11> kEntries{{
     {"organ_poke_mass", "424 spheres with masses, poked at 100 mm/s", organ_poke_mass_problem},
     {"servo_normal", "contact models along the normal, 424 spheres", servo_normal_problem},
     {"servo_space", "contact models in space, 424 spheres", servo_space_problem},
-    {"servo_inner", "contact models in space, inner layer held", servo_inner_problem},
+    {"servo_inner", "contact models in space, inner layer fixed", servo_inner_problem},
 }};
 
 }  // namespace

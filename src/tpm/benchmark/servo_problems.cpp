@@ -456,9 +456,9 @@ BenchmarkProblem servo_space_problem() {
 
 BenchmarkProblem servo_inner_problem() {
   return space_problem(
-      "liver_inner_held_scene.json", "servo_inner", "Contact models in space, inner layer held",
-      "The liver of 424 spheres with its inner layer held "
-      "(configs/liver_inner_held_scene.json)",
+      "liver_inner_fixed_scene.json", "servo_inner", "Contact models in space, inner layer fixed",
+      "The liver of 424 spheres with its inner layer fixed "
+      "(configs/liver_inner_fixed_scene.json)",
       {condensed_model(false, kServoPeriod_s), condensed_model(true, kServoPeriod_s),
        zone_model(3, kServoPeriod_s), full_model(kServoPeriod_s)});
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string_view>
 
 namespace tpm {
@@ -11,5 +12,8 @@ struct QuantityText {
 /// The unit begins at the first blank, or where there is none behind the number. Nothing is
 /// checked.
 [[nodiscard]] QuantityText split_quantity(std::string_view text);
+
+/// A share such as "10%" or "0.1"; none if it is no finite number.
+[[nodiscard]] std::optional<double> find_share(std::string_view text);
 
 }  // namespace tpm

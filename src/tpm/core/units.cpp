@@ -366,6 +366,15 @@ double parse_number(std::string_view text, std::string_view where) {
                   "a number such as 12.5 or 1.2e-3");
 }
 
+std::optional<double> find_share(std::string_view text) {
+  constexpr double kPercent = 100.0;
+  const bool percent = text.ends_with('%');
+  if (percent) text.remove_suffix(1);
+  std::optional<double> share = find_number(text);
+  if (share && percent) *share /= kPercent;
+  return share;
+}
+
 QuantityText split_quantity(std::string_view text) {
   const std::string_view t = trimmed(text);
   std::size_t split = std::min(t.find_first_of(" \t"), t.size());

@@ -60,7 +60,7 @@ VirtualPlant::VirtualPlant(const PlantSettings& settings, OperatorScript script)
   if (script_.pieces().empty())
     script_ = OperatorScript({{OperatorPiece::Aim::place, 0.0, 0.0, 0.0}});
   const OperatorAim first = script_.at(0.0);
-  along_ = meant_ = settings_.limp_m.value_or(first.value);
+  along_ = meant_ = settings_.arm_set_point_m.value_or(first.value);
   across_ = first.across_m;
 }
 
@@ -70,7 +70,7 @@ void VirtualPlant::begin() noexcept {
 }
 
 OperatorAim VirtualPlant::aim() noexcept {
-  if (settings_.limp_m) return {OperatorPiece::Aim::place, *settings_.limp_m};
+  if (settings_.arm_set_point_m) return {OperatorPiece::Aim::place, *settings_.arm_set_point_m};
   if (!waiting_) return script_.at(static_cast<double>(periods_ - began_) * settings_.period_s);
   const OperatorPiece& first = script_.pieces().front();
   return {OperatorPiece::Aim::place, first.aim == OperatorPiece::Aim::place ? first.from : along_,

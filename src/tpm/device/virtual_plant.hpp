@@ -28,8 +28,8 @@ struct PlantSettings {
   double watchdog_s = 0.008;       ///< forces are cut without a command for so long
   double least_watchdog_s = 0.0;   ///< what is asked of the watchdog counts only above it
   int delay_periods = 0;           ///< from a command to its force
-  /// If given: the hand hangs at this place along `push` and follows nothing.
-  std::optional<double> limp_m = std::nullopt;
+  /// If given: where the hand means to be, along `push`, in place of its script.
+  std::optional<double> arm_set_point_m = std::nullopt;
   double velocity_limit_m_per_s = 2.0;  ///< above it forces are cut
   ArmSettings arm;
   Eigen::Vector3d push = -Eigen::Vector3d::UnitZ();    ///< unit vector along which the script goes

@@ -53,20 +53,20 @@ LoopModel network_beside_model(const HilSession& session, bool threads) {
 LoopModel law_model(const HilSession& session, bool /*threads*/) {
   constexpr double kDrawnRadius_m = 5e-3;
   const LawFile& law = session.law.value();
-  const double trusted = trusted_depth_m(law, deepest_asked_m(session, law.spec.reference));
-  const double deepest = deepest_asked_m(session, trusted);
-  if (deepest > trusted) {
+  const double valid_m = valid_depth_m(law, deepest_asked_m(session, law.spec.reference));
+  const double deepest = deepest_asked_m(session, valid_m);
+  if (deepest > valid_m) {
     throw bad_input("session",
                     fmt::format("goes to a depth of {} mm, the law was fitted to {} mm",
                                 significant(1e3 * deepest, 4),
                                 significant(1e3 * law.fitted_to.value_or(0.0), 4)),
-                    fmt::format("{} mm at most", significant(1e3 * trusted, 4)));
+                    fmt::format("{} mm at most", significant(1e3 * valid_m, 4)));
   }
   auto contact =
       std::make_unique<LawContact>(law, LawContactSettings{.period_s = session.servo.period_s,
                                                            .longest_s = session.duration_s(),
                                                            .deepest_m = deepest,
-                                                           .trusted_m = trusted});
+                                                           .deepest_valid_m = valid_m});
   LoopModel loop;
   loop.name = fmt::format("law {}: {}", law_name(law.spec), law_words(law.spec));
   loop.error_bound = "each branch exact for a kernel that is linear within a period";

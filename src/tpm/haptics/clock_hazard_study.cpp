@@ -34,7 +34,7 @@ struct ClockHazard {
   StopCause expected;
   double bound_s;
   /// Of a cycle, after which it is given up: long, so that something else has to notice.
-  double hang_limit_s = 0.008;
+  double cycle_timeout_s = 0.008;
 };
 
 /// When the fault began and when the forces went off; read by the thread that started the session.
@@ -158,7 +158,8 @@ std::vector<ClockHazard> clock_hazards() {
          {std::pair{"a call of the device hangs", ClockFaultKind::read_hangs},
           std::pair{"the model hangs", ClockFaultKind::model_hangs}}) {
       list.push_back({name, fmt::format("for {} ms", ms), kind, kHeldAt, lasts_s,
-                      short_one ? finished : StopCause::hang, short_one ? 0.0 : kStopBound_s});
+                      short_one ? finished : StopCause::cycle_timeout,
+                      short_one ? 0.0 : kStopBound_s});
     }
   }
   constexpr double kPatient_s = 5.0;
@@ -190,7 +191,7 @@ struct ClockRun {
 };
 
 ClockRun run_once(const ClockHazard& hazard, HilSession session) {
-  session.hang_limit_s = hazard.hang_limit_s;
+  session.cycle_timeout_s = hazard.cycle_timeout_s;
   LoopModel loop = make_loop_model(session);
   const RenderingCheck rendering = check_rendering(session, *loop.model, loop, "virtual");
   const ServoSettings servo = loop_settings(session, loop, rendering, true);
@@ -210,7 +211,7 @@ ClockRun run_once(const ClockHazard& hazard, HilSession session) {
     throw Error(ExitCode::environment, "recording", "cannot be written");
   };
   RealTimeOptions options;
-  options.hang_limit_s = session.hang_limit_s;
+  options.cycle_timeout_s = session.cycle_timeout_s;
   options.interrupted = [&] {
     if (hazard.kind != ClockFaultKind::interrupted || seen < hazard.at) return false;
     moments->begin_fault();

@@ -39,7 +39,7 @@ ContactAnswer ElementContact::step(const ToolPose& tool) noexcept {
   ContactAnswer answer;
   answer.force_N.z() = -force;
   // Exact at any depth; beyond this the liver that it stands for is damaged.
-  answer.trusted = std::abs(depth) <= kDamageIndentation_m;
+  answer.valid = std::abs(depth) <= kDamageIndentation_m;
   return answer;
 }
 

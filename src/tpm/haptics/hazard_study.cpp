@@ -103,7 +103,7 @@ class FaultyDevice final : public HapticDevice {
   Eigen::Vector3d last_m_ = Eigen::Vector3d::Zero();
 };
 
-/// A model that is not to be trusted, from a period on.
+/// A model whose forces are outside its validity, from a period on.
 class DoubtfulModel final : public ContactModel {
  public:
   DoubtfulModel(ContactModel& model, Doubt doubt, std::uint64_t at)
@@ -122,7 +122,7 @@ class DoubtfulModel final : public ContactModel {
                        (doubt_ == Doubt::alternating && steps_ % 2 == 0);
     if (!wrong) return answer;
     answer.force_N *= kWrong;
-    answer.trusted = doubt_ == Doubt::tenfold;
+    answer.valid = doubt_ == Doubt::tenfold;
     return answer;
   }
   [[nodiscard]] double period_s() const noexcept override { return model_.period_s(); }
@@ -164,21 +164,22 @@ constexpr std::uint64_t kHeld = 1900;
 
 std::vector<Hazard> starts() {
   const Json star = star_session();
-  const Json limp = with(star, "/virtual_device", {{"limp_at", "8 mm"}});
+  const Json resting = with(star, "/virtual_device", {{"arm_set_point", "8 mm"}});
   std::vector<Hazard> list;
-  list.push_back({"start inside the tissue", "limp hand 8 mm below the surface", limp, {}, {}});
+  list.push_back(
+      {"start inside the tissue", "resting hand 8 mm below the surface", resting, {}, {}});
   list.push_back({"start inside the tissue",
-                  "limp hand 60 mm below the surface",
-                  with(star, "/virtual_device", {{"limp_at", "60 mm"}}),
+                  "resting hand 60 mm below the surface",
+                  with(star, "/virtual_device", {{"arm_set_point", "60 mm"}}),
                   {},
                   {}});
   list.push_back({"start outside the workspace",
-                  "limp hand 90 mm above the surface",
-                  with(star, "/virtual_device", {{"limp_at", "-90 mm"}}),
+                  "resting hand 90 mm above the surface",
+                  with(star, "/virtual_device", {{"arm_set_point", "-90 mm"}}),
                   {},
                   {}});
-  Json before = with(limp, "/surface_before_hand", "5 mm");
-  list.push_back({"limp hand", "surface placed 5 mm before it", before, {}, {}});
+  Json before = with(resting, "/surface_before_hand", "5 mm");
+  list.push_back({"resting hand", "surface placed 5 mm before it", before, {}, {}});
   list.push_back({"surface out of reach",
                   "0.5 m away",
                   with(star, "/surface", {"0 m", "0 m", "-0.5 m"}),
@@ -327,9 +328,9 @@ std::vector<Hazard> faults() {
   }
   add("full disk", "the recording cannot be written", {FaultKind::record, kHeld, 1, 0, {}});
   for (const auto& [doubt, setting] :
-       {std::pair{Doubt::for_good, "tenfold and untrusted, for good"},
-        std::pair{Doubt::alternating, "tenfold and untrusted, every second period"},
-        std::pair{Doubt::tenfold, "tenfold and trusted"},
+       {std::pair{Doubt::for_good, "tenfold and outside validity, for good"},
+        std::pair{Doubt::alternating, "tenfold and outside validity, every second period"},
+        std::pair{Doubt::tenfold, "tenfold and within validity"},
         std::pair{Doubt::not_finite, "not a number"}}) {
     list.push_back(
         {"force of the model", setting, star, {FaultKind::none, kHeld, 0, 0, {}}, doubt});

@@ -53,9 +53,9 @@ std::string fault_of(const JitterCheck& check) {
     return fmt::format("a stall of {} is longer than the watchdog of {}, which cuts the forces",
                        ms(stall_s), ms(check.watchdog_s));
   }
-  if (o.busy.max_s() >= check.hang_limit_s) {
+  if (o.busy.max_s() >= check.cycle_timeout_s) {
     return fmt::format("a cycle took {}, and is given up after {}", ms(o.busy.max_s()),
-                       ms(check.hang_limit_s));
+                       ms(check.cycle_timeout_s));
   }
   if (o.counts.most_consecutive_missed > check.missed_limit) {
     return fmt::format("{} consecutive periods were missed, a session stops after {}",
@@ -129,7 +129,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   check.rate_Hz = 1.0 / like.servo.period_s;
   check.duration_s = duration_s;
   check.watchdog_s = like.preparation.watchdog_s;
-  check.hang_limit_s = like.hang_limit_s;
+  check.cycle_timeout_s = like.cycle_timeout_s;
   check.late_limit = like.servo.most_late;
   check.missed_limit = like.servo.most_missed;
   DevicePreparation preparation = session.preparation;
@@ -140,7 +140,7 @@ JitterCheck check_jitter(const DeviceChoice& choice, const HilSession& like, dou
   RealTimeOptions options;
   options.wish = wish;
   constexpr double kGiveUp_s = 0.5;  // long stalls are what is looked for
-  options.hang_limit_s = kGiveUp_s;
+  options.cycle_timeout_s = kGiveUp_s;
   options.interrupted = interrupted;
   try {
     check.device = device->open();

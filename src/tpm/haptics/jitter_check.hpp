@@ -7,8 +7,8 @@ namespace tpm::haptics {
 struct JitterCheck {
   DeviceIdentity device;
   double rate_Hz = 0.0, duration_s = 0.0;
-  double watchdog_s = 0.0, hang_limit_s = 0.0;  ///< of the sessions that it speaks for
-  int late_limit = 0, missed_limit = 0;         ///< as ServoSettings::most_late, most_missed
+  double watchdog_s = 0.0, cycle_timeout_s = 0.0;  ///< of the sessions that it speaks for
+  int late_limit = 0, missed_limit = 0;            ///< as ServoSettings::most_late, most_missed
   ServoOutcome outcome;
   bool fit = false;
   std::string verdict;  ///< one line

@@ -28,7 +28,7 @@ LawAtParameters law_in_loop(const LawFile& file, const LawContactSettings& setti
   };
   positive(settings.period_s, "period");
   positive(settings.deepest_m, "deepest place");
-  positive(settings.trusted_m, "trusted depth");
+  positive(settings.deepest_valid_m, "valid depth");
   const LawModel model(spec);
   model.require_in_range(file.values);
   std::optional<ExponentialSum> rates;
@@ -76,7 +76,7 @@ ContactAnswer LawContact::step(const ToolPose& tool) noexcept {
   // V is taken as linear within a period: this is how far it is from that.
   const double between = law_.kernel.value(0.5 * (std::max(depth_m_, 0.0) + u));
   answer.error_N = law_.relaxation.stiffness.sum() * std::abs(between - 0.5 * (kernel + kernel_m_));
-  answer.trusted = depth <= settings_.trusted_m;
+  answer.valid = depth <= settings_.deepest_valid_m;
   depth_m_ = depth;
   kernel_m_ = kernel;
   return answer;
@@ -114,7 +114,7 @@ std::vector<double> LawContact::relaxation_times_s() const {
   return {fastest_s, slowest_s};
 }
 
-double trusted_depth_m(const LawFile& law, double deepest_m) {
+double valid_depth_m(const LawFile& law, double deepest_m) {
   return kRoom * (law.fitted_to ? *law.fitted_to : deepest_m);
 }
 

@@ -10,9 +10,9 @@ namespace tpm::haptics {
 /// How a law is stepped in a loop.
 struct LawContactSettings {
   double period_s = 1e-3;
-  double longest_s = 60.0;  ///< of a session: the window of a fractional law
-  double deepest_m = 4e-3;  ///< of a session, > 0: where the stiffness is told
-  double trusted_m = 5e-3;  ///< beyond this depth forces are not trusted
+  double longest_s = 60.0;        ///< of a session: the window of a fractional law
+  double deepest_m = 4e-3;        ///< of a session, > 0: where the stiffness is told
+  double deepest_valid_m = 5e-3;  ///< beyond this depth forces are not valid
 };
 
 /// One contact that answers by a law of the family (docs/laws.md),
@@ -71,8 +71,8 @@ class LawContact final : public ContactModel {
   double depth_m_ = 0.0, kernel_m_ = 0.0;  ///< u and V(u) a period ago
 };
 
-/// The depth up to which a law is trusted: somewhat beyond what it was fitted to; without that,
+/// The depth up to which a law is valid: somewhat beyond what it was fitted to; without that,
 /// beyond the deepest place asked for.
-[[nodiscard]] double trusted_depth_m(const LawFile& law, double deepest_m);
+[[nodiscard]] double valid_depth_m(const LawFile& law, double deepest_m);
 
 }  // namespace tpm::haptics

@@ -23,8 +23,8 @@ class LoopMaker {
 [[nodiscard]] bool for_sessions(const Formulation& formulation);
 
 /// The first candidate of a formulation for plans that answers the session's deepest push and
-/// trusts its forces along it at the session's slowest rate, not verified; the last one if none
-/// trusts them (the session then stops by itself). Throws Error(bad_input) with the reason where
+/// has valid forces along it at the session's slowest rate, not verified; the last one if none
+/// has (the session then stops by itself). Throws Error(bad_input) with the reason where
 /// none does.
 [[nodiscard]] LoopModel offered_loop(const Formulation& formulation, const HilSession& session);
 

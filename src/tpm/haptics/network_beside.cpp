@@ -99,7 +99,7 @@ NetworkBeside::Linearised NetworkBeside::follow(const Place& place) noexcept {
       (answer.force_N - reached_N_ + stiffness_.at(reached_.displacement_m) * moved).norm() /
       passed_s;
   result.error_N = answer.error_N;
-  result.trusted = answer.trusted;
+  result.valid = answer.valid;
   reached_ = place;
   reached_N_ = answer.force_N;
   return result;
@@ -136,7 +136,7 @@ ContactAnswer NetworkBeside::step(const ToolPose& tool) noexcept {
       0.5 * ((stiffness_.at(tool.displacement_m) - used_.stiffness) * moved).norm();
   answer.error_N =
       used_.error_N + curved_N + used_.unforeseen_N_per_s * static_cast<double>(age()) * period_s_;
-  answer.trusted = used_.trusted && age() <= kOldest * every_;
+  answer.valid = used_.valid && age() <= kOldest * every_;
   return answer;
 }
 

@@ -69,7 +69,7 @@ class NetworkBeside final : public ContactModel {
     Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero();
     double error_N = 0.0;
     double unforeseen_N_per_s = 0.0;  ///< what the answer before did not say, over its age
-    bool trusted = true;
+    bool valid = true;
   };
   void work() noexcept;
   [[nodiscard]] Linearised follow(const Place& place) noexcept;

@@ -147,7 +147,7 @@ LoopModel planned_model(const HilSession& session, const PlanningTold& told) {
 
 namespace {
 
-/// For how many periods of its slowest push to a depth a session's model does not trust its forces.
+/// For how many periods of its slowest push to a depth forces are outside a session's model.
 /// The model is at rest after it.
 int doubted_on_push(ContactModel& model, const HilSession& session, const Eigen::Vector3d& push,
                     double depth_m) {
@@ -162,7 +162,7 @@ int doubted_on_push(ContactModel& model, const HilSession& session, const Eigen:
   const int steps = static_cast<int>(std::clamp(std::ceil(periods), 1.0, kMostSteps));
   int doubted = 0;
   for (int i = 1; i <= steps; ++i) {
-    if (!model.step(static_cast<double>(i) / steps * depth_m * push).trusted) ++doubted;
+    if (!model.step(static_cast<double>(i) / steps * depth_m * push).valid) ++doubted;
   }
   model.reset();
   return doubted;

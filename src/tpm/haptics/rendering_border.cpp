@@ -121,7 +121,7 @@ bool comes_to_rest(const RenderedContact& contact, PlantSettings plant) {
 BondElement RenderedContact::material() const {
   BondElement p;
   constexpr double kLeast = 1e-6;  // of each spring
-  const double share = std::clamp(relaxed_share, kLeast, 1.0 - kLeast);
+  const double share = std::clamp(equilibrium_share, kLeast, 1.0 - kLeast);
   const double modulus_Pa = stiffness_N_per_m / p.modulus_to_stiffness_m();
   p.equilibrium_Pa = share * modulus_Pa;
   p.branches = {{(1.0 - share) * modulus_Pa, relaxation_time_s}};
@@ -132,7 +132,7 @@ double RenderedContact::dashpot_N_s_per_m() const {
   constexpr double kRatio = 0.1, kDensity_kg_m3 = 1060.0, kRadius_m = 0.010;
   const double mass =
       kDensity_kg_m3 * 4.0 / 3.0 * std::numbers::pi * kRadius_m * kRadius_m * kRadius_m;
-  return 2.0 * kRatio * std::sqrt(relaxed_share * stiffness_N_per_m * mass);
+  return 2.0 * kRatio * std::sqrt(equilibrium_share * stiffness_N_per_m * mass);
 }
 
 ElementContact RenderedContact::model() const {

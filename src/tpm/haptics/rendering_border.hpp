@@ -13,7 +13,7 @@ struct RenderedContact {
   int delay_periods = 0;             ///< from a command to its force
   double relaxation_time_s = 0.01;   ///< of no meaning for the mass-spring model
   double stiffness_N_per_m = 300.0;  ///< instantaneous
-  double relaxed_share = 0.5;  ///< of it in equilibrium, all there is of the MSM; E1 = E2: 1/2
+  double equilibrium_share = 0.5;  ///< of it in equilibrium, all there is of the MSM; E1 = E2: 1/2
 
   [[nodiscard]] BondElement material() const;
   /// Dashpot of the mass-spring model: damping ratio 0.1 of a sphere of 10 mm radius.

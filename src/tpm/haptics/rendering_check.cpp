@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAtLoads_m = 0.010;
 
-/// Stiffness along the push within one period at a depth, 0 where the model does not trust itself.
+/// Stiffness along the push within one period at a depth, 0 outside the validity of the model.
 double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth_m) {
   constexpr int kSteps = 200;
   constexpr double kFurther_m = 5e-5;
@@ -23,7 +23,7 @@ double tangent_at(ContactModel& model, const Eigen::Vector3d& push, double depth
   for (int i = 1; i <= kSteps; ++i) there = model.step(push * (depth_m * i / kSteps));
   const ContactAnswer stays = model.step(push * depth_m);
   const ContactAnswer further = model.step(push * (depth_m + kFurther_m));
-  if (!stays.trusted || !further.trusted) return 0.0;
+  if (!stays.valid || !further.valid) return 0.0;
   // What relaxes in a period is left out: it did so in the period before as well.
   const double equilibrium_N = push.dot(stays.force_N - there.force_N);
   return (push.dot(stays.force_N - further.force_N) + equilibrium_N) / kFurther_m;
@@ -35,7 +35,7 @@ void find_stiffness(RenderingCheck& check, const HilSession& session, ContactMod
   const double at_rest = push.dot(model.instantaneous_stiffness() * push);
   const double relaxed = push.dot(model.equilibrium_stiffness() * push);
   check.stiffness_N_per_m = at_rest;
-  check.relaxed_share = at_rest > 0.0 ? std::clamp(relaxed / at_rest, 0.0, 1.0) : 1.0;
+  check.equilibrium_share = at_rest > 0.0 ? std::clamp(relaxed / at_rest, 0.0, 1.0) : 1.0;
   const double deepest = deepest_asked_m(session, kAtLoads_m);
   for (int i = 1; i <= kDepths; ++i) {
     const double depth = deepest * i / kDepths;
@@ -53,7 +53,7 @@ RenderedContact contact_of(const RenderingCheck& check, double relaxation_time_s
   contact.delay_periods = check.delay_periods;
   contact.relaxation_time_s = relaxation_time_s;
   contact.stiffness_N_per_m = check.stiffness_N_per_m;
-  contact.relaxed_share = check.relaxed_share;
+  contact.equilibrium_share = check.equilibrium_share;
   return contact;
 }
 
@@ -140,7 +140,7 @@ RenderingCheck check_rendering(const HilSession& session, ContactModel& model,
 
   check.recovery_s = loop.relaxation_times_s.empty()
                          ? 0.0
-                         : loop.relaxation_times_s.back() / std::max(check.relaxed_share, 1e-3);
+                         : loop.relaxation_times_s.back() / std::max(check.equilibrium_share, 1e-3);
   PlantSettings plant = session.plant;
   plant.damping_N_s_per_m = check.friction_N_s_per_m;
   // A spring that never relaxes may be worse than one that does.

@@ -12,7 +12,7 @@ struct RenderingCheck {
   int delay_periods = 0;                    ///< of the device, known or assumed
   double friction_N_s_per_m = 0.0;          ///< of the device, known or assumed
   double stiffness_N_per_m = 0.0;           ///< largest instantaneous one up to the session's depth
-  double relaxed_share = 1.0;               ///< of it, of the equilibrium
+  double equilibrium_share = 1.0;           ///< of it, of the equilibrium
   double depth_m = 0.0;                     ///< where that stiffness was found
   double passive_friction_N_s_per_m = 0.0;  ///< K (T/2 + delay), for every passive operator
   double passive_N_per_m = 0.0;  ///< largest stiffness that is passive with this friction

@@ -78,7 +78,7 @@ void parse_tool(HilSession& session, const Json& model, const DocumentPlace& pla
 void parse_limits(HilSession& session, const Json& limits, const DeviceLimits& device,
                   const DocumentPlace& place) {
   SessionServo& servo = session.servo;
-  constexpr double kLongest_s = 60.0, kLeastSlew_N_per_s = 1.0, kMostUntrusted_s = 2.0;
+  constexpr double kLongest_s = 60.0, kLeastSlew_N_per_s = 1.0, kMostOutside_s = 2.0;
   servo.force_limit_N =
       in_range(limits, "force", Dimension::force, servo.force_limit_N, 1e-3, device.force_N, place);
   servo.slew_limit_N_per_s = number_in_range(limits, "slew_N_per_s", servo.slew_limit_N_per_s,
@@ -88,14 +88,16 @@ void parse_limits(HilSession& session, const Json& limits, const DeviceLimits& d
   servo.most_damping_N_s_per_m =
       number_in_range(limits, "damping_N_s_per_m", servo.most_damping_N_s_per_m, 0.0,
                       device.damping_N_s_per_m, place);
-  servo.untrusted_limit_s = in_range(limits, "untrusted", Dimension::time, servo.untrusted_limit_s,
-                                     servo.period_s, kMostUntrusted_s, place);
+  servo.outside_validity_limit_s =
+      in_range(limits, "outside_validity", Dimension::time, servo.outside_validity_limit_s,
+               servo.period_s, kMostOutside_s, place);
   servo.most_late = limits.value("late_cycles", servo.most_late);
   session.preparation.watchdog_s =
       in_range(limits, "watchdog", Dimension::time, 0.008, 0.004, 0.016, place);
   // The device is asked for no more than the session, whatever it could.
   session.preparation.max_force_N = servo.force_limit_N;
-  session.hang_limit_s = in_range(limits, "hang", Dimension::time, 0.008, 0.002, 1.0, place);
+  session.cycle_timeout_s =
+      in_range(limits, "cycle_timeout", Dimension::time, 0.008, 0.002, 1.0, place);
 }
 
 /// What has to be before the session begins.
@@ -105,12 +107,12 @@ void parse_start(SessionServo& servo, const Json& json, const DeviceLimits& devi
   gate.reach_m = device.reach_m;
   const Json start = json.value("start", Json::object());
   const DocumentPlace at = place.key("start");
-  constexpr double kMostClearance_m = 0.05, kLeastStill_s = 0.1, kMostStill_s = 5.0;
+  constexpr double kMostClearance_m = 0.05, kLeastRest_s = 0.1, kMostRest_s = 5.0;
   constexpr double kLeastLimit_s = 1.0, kMostLimit_s = 3600.0;
   gate.clearance_m =
       in_range(start, "clearance", Dimension::length, gate.clearance_m, 1e-4, kMostClearance_m, at);
-  gate.still_s =
-      in_range(start, "still", Dimension::time, gate.still_s, kLeastStill_s, kMostStill_s, at);
+  gate.rest_time_s =
+      in_range(start, "at_rest", Dimension::time, gate.rest_time_s, kLeastRest_s, kMostRest_s, at);
   gate.limit_s =
       in_range(start, "limit", Dimension::time, gate.limit_s, kLeastLimit_s, kMostLimit_s, at);
   gate.confirm = start.value("confirm", false);
@@ -194,8 +196,9 @@ void parse_plant(PlantSettings& plant, const Json& block, const DocumentPlace& p
   plant.arm.damping_N_s_per_m = block.value("arm_damping_N_s_per_m", plant.arm.damping_N_s_per_m);
   plant.arm.stiffness_N_per_m = in_range(block, "arm_stiffness", Dimension::stiffness,
                                          plant.arm.stiffness_N_per_m, 0.0, 1e5, place);
-  if (block.contains("limp_at")) {
-    plant.limp_m = in_range(block, "limp_at", Dimension::length, 0.0, -0.1, 0.1, place);
+  if (block.contains("arm_set_point")) {
+    plant.arm_set_point_m =
+        in_range(block, "arm_set_point", Dimension::length, 0.0, -0.1, 0.1, place);
   }
   plant.arm.correction_per_s = block.value("correction_per_s", plant.arm.correction_per_s);
 }

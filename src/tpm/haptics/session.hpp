@@ -71,7 +71,7 @@ struct HilSession {
   SessionServo servo;
   DevicePreparation preparation;
   PlantSettings plant;
-  double hang_limit_s = 0.008;
+  double cycle_timeout_s = 0.008;
   std::string text;  ///< of the file, for the record
 
   [[nodiscard]] OperatorScript operator_script() const;

@@ -139,12 +139,12 @@ void add_motion(PhaseList& list, const Json& block, const DocumentPlace& place) 
            std::min(first, 0.0));
   list.depth_m = std::max(0.0, *std::max_element(depths.begin(), depths.end()));
   list.rate_m_per_s = kUsualRate_m_per_s;
-  if (first > 0.0) {  // the recording begins in contact, and the fit took that as relaxed
+  if (first > 0.0) {  // the recording begins in contact, and the fit took that as equilibrium
     const std::string mm = significant(1e3 * first, 4);
     list.add(SessionPhaseKind::indent, fmt::format("indent to {} mm, where the motion begins", mm),
              first / kUsualRate_m_per_s, 0.0, first);
     list.add(SessionPhaseKind::hold, fmt::format("hold {} mm until equilibrium", mm),
-             block.value("relax_s", 0.0), first, first);
+             block.value("initial_hold_s", 0.0), first, first);
   }
   list.add(SessionPhaseKind::motion, block.at("name").get<std::string>(), length_s, 0.0, 0.0);
   list.follow(depths);
@@ -198,7 +198,7 @@ void embed_motion(Json& session, const LawFile& law, double period_s,
     measured.push_back(value_at(forces, time_s) - offset_N);
   }
   session["motion"] = {{"name", file.filename().string()},
-                       {"relax_s", std::min(kRelaxed * longest_time_s(law), kLongestWait_s)},
+                       {"initial_hold_s", std::min(kRelaxed * longest_time_s(law), kLongestWait_s)},
                        {"spacing_s", spacing_s},
                        {"depths_m", std::move(depths)},
                        {"measured_N", std::move(measured)}};

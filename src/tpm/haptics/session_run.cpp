@@ -49,7 +49,7 @@ ServoOutcome run_loop(const HilSession& session, const std::shared_ptr<HapticDev
   }
   RealTimeOptions real;
   real.wish = options.wish;
-  real.hang_limit_s = session.hang_limit_s;
+  real.cycle_timeout_s = session.cycle_timeout_s;
   real.interrupted = options.interrupted;
   std::int64_t passed_on_ns = now_ns();
   real.idle = [&log, &passed_on_ns] {

@@ -100,7 +100,7 @@ class ContactRun {
     force_N_ = -answer.force_N.dot(into_);
     aside_ += compliance_ * (across_.transpose() * answer.force_N);
     if (built_.balances) balances_ += built_.balances();
-    trusted_ = trusted_ && answer.trusted;
+    trusted_ = trusted_ && answer.valid;
   }
 
   const Protocol& protocol_;

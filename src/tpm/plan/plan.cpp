@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/require.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/plan/perception.hpp"
@@ -289,9 +290,7 @@ void set_tolerance(PlanRequest& request, const std::string& text) {
                     significant(100.0 * kForceJnd, 3), significant(100.0 * kStiffnessJnd, 3));
     return;
   }
-  const bool percent = !text.empty() && text.back() == '%';
-  const auto number = find_number(percent ? text.substr(0, text.size() - 1) : text);
-  const double value = number.value_or(0.0) * (percent ? 0.01 : 1.0);
+  const double value = find_share(text).value_or(0.0);
   if (!(value >= kLeastTolerance && value <= kMostTolerance)) {
     throw Error(ExitCode::usage, "--tolerance", fmt::format("'{}'", printable(text)),
                 "a share of the peak such as 1% or 0.01, 1e-6 to 0.5, or jnd");

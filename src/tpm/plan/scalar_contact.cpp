@@ -22,12 +22,12 @@ ContactAnswer ScalarContact::step(const ToolPose& tool) noexcept {
   ContactAnswer answer;
   if (!std::isfinite(depth_m)) {
     answer.force_N.setConstant(std::numeric_limits<double>::quiet_NaN());
-    answer.trusted = false;
+    answer.valid = false;
     return answer;
   }
   constexpr double kAbove = 0.05;  // of the depth: a surface that recovers may pass its rest
   answer.force_N = -model_.step_to(depth_m) * into_;
-  answer.trusted = depth_m <= range_.deepest_m && depth_m >= -kAbove * range_.deepest_m;
+  answer.valid = depth_m <= range_.deepest_m && depth_m >= -kAbove * range_.deepest_m;
   return answer;
 }
 

@@ -11,7 +11,7 @@ class ScalarContact final : public ContactModel {
   /// What is known of the contact it stands for.
   struct Range {
     double instantaneous_N_per_m = 0.0, equilibrium_N_per_m = 0.0;  ///< stiffness at rest
-    double deepest_m = 0.0;  ///< answers beyond are not trusted
+    double deepest_m = 0.0;  ///< answers beyond are not valid
   };
   /// @param into_tissue unit vector
   ScalarContact(ScalarModel model, const Eigen::Vector3d& into_tissue, const Range& range,

@@ -168,8 +168,8 @@ ContactAnswer CondensedContact::step(const ToolPose& tool) noexcept {
                                        fit_->coupling_across * across(q[1], q[2])) +
                    fit_->lag_error_N * condensed_lag(u, Eigen::Vector3d::Map(&state_.viscous[0]),
                                                      2.0 * fit_->frame.half_depth_m);
-  answer.trusted = u[0] >= fit_->least_depth_m && u[0] <= fit_->most_depth_m &&
-                   place_aside_m <= fit_->most_tangential_m;
+  answer.valid = u[0] >= fit_->least_depth_m && u[0] <= fit_->most_depth_m &&
+                 place_aside_m <= fit_->most_tangential_m;
   return answer;
 }
 

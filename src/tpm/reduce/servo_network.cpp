@@ -18,9 +18,9 @@ namespace {
 constexpr double kFieldStride_m = 2e-3;
 /// How far the fields in use may be from the true ones, beside the distance from the normal, m.
 constexpr double kFieldSlack_m = 0.3e-3;
-constexpr double kHold = 0.7;           // of an error, from one step to the next
-constexpr double kTrusted = 0.02;       // error over the largest force
-constexpr double kScaleDepth_m = 1e-4;  // at which forces begin to count
+constexpr double kHold = 0.7;              // of an error, from one step to the next
+constexpr double kValidServoError = 0.02;  // error over the largest force
+constexpr double kScaleDepth_m = 1e-4;     // at which forces begin to count
 constexpr double kAside = 2.0;  // how much faster the fields change across the normal than along it
 // Rounding, of the largest force: at once, and of the viscous elongations, a step.
 constexpr double kRounding = 3e-7;
@@ -214,8 +214,8 @@ void ServoNetwork::answer(const Eigen::Vector3d& displacement_m, double step_err
   answer_.error_N =
       std::max(field_error_N, kHold * held_error_N_) + viscous_error_.norm() + step_error_N;
   const double scale_N = std::max(largest_N_, kScaleDepth_m * equilibrium_.norm());
-  answer_.trusted = depth_m <= options_.deepest_m && depth_m >= -options_.deepest_m &&
-                    aside_m <= options_.aside_m && answer_.error_N <= kTrusted * scale_N;
+  answer_.valid = depth_m <= options_.deepest_m && depth_m >= -options_.deepest_m &&
+                  aside_m <= options_.aside_m && answer_.error_N <= kValidServoError * scale_N;
 }
 
 ContactAnswer ServoNetwork::step(const ToolPose& tool) noexcept {

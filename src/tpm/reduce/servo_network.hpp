@@ -11,7 +11,7 @@ namespace tpm::organ {
 struct ServoNetworkOptions {
   double period_s = 1e-3;        ///< > 0
   double frozen_depth_m = 4e-3;  ///< along the normal, where the stiffness is factorised; >= 0
-  double deepest_m = 10e-3;      ///< answers beyond are not trusted; > 0
+  double deepest_m = 10e-3;      ///< answers beyond are not valid; > 0
   double aside_m = 5e-3;         ///< the same across the normal; > 0
   /// Forces are balanced once more while the error estimated is above this part of the largest
   /// force so far, up to `most_balances` times a step.

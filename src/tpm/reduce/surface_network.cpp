@@ -22,7 +22,7 @@ constexpr int kMostSearches = 12;
 constexpr double kPressed = 1e-7;         // of the largest force
 constexpr double kLeastForce_N = 1e-10;   // that is told from none
 constexpr double kHoldError = 0.7;        // from one step to the next
-constexpr double kTrustedError = 0.02;    // over the largest force
+constexpr double kValidError = 0.02;      // over the largest force
 constexpr double kForceRounding = 3e-7;   // of the largest force
 constexpr double kScaleAtDepth_m = 1e-4;  // at which forces begin to count
 constexpr double kStartOverlap_m = 1e-9;
@@ -373,8 +373,8 @@ void SurfaceNetwork::answer() noexcept {
   largest_N_ = std::max(largest_N_, answer_.force_N.norm());
   const double left_N = (answer_.force_N - moved_with_N_).norm() + kForceRounding * largest_N_;
   answer_.error_N = std::max(left_N, kHoldError * held_error_N_);
-  answer_.trusted = pressed_ && !too_many_ && !held && deepest_m <= options_.deepest_m &&
-                    answer_.error_N <= kTrustedError * scale_N();
+  answer_.valid = pressed_ && !too_many_ && !held && deepest_m <= options_.deepest_m &&
+                  answer_.error_N <= kValidError * scale_N();
 }
 
 void SurfaceNetwork::add_linear_error() noexcept {
@@ -388,7 +388,7 @@ void SurfaceNetwork::add_linear_error() noexcept {
     linear_error_N_ += candidate.linearisation_N.norm();
   }
   answer_.error_N += linear_error_N_;
-  if (!(answer_.error_N <= kTrustedError * scale_N())) answer_.trusted = false;
+  if (!(answer_.error_N <= kValidError * scale_N())) answer_.valid = false;
 }
 
 double SurfaceNetwork::scale_N() const noexcept {
@@ -422,7 +422,7 @@ ContactAnswer SurfaceNetwork::step(const ToolPose& tool) noexcept {
   }
   held_error_N_ = answer_.error_N;
   add_linear_error();
-  if (has_fallen_in()) answer_.trusted = false;
+  if (has_fallen_in()) answer_.valid = false;
   bonds_.accept();
   return answer_;
 }

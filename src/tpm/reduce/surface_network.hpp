@@ -10,7 +10,7 @@ namespace tpm::organ {
 
 struct SurfaceNetworkOptions {
   double period_s = 1e-3;    ///< > 0
-  double deepest_m = 10e-3;  ///< answers are not trusted where a touched sphere is displaced more
+  double deepest_m = 10e-3;  ///< answers are not valid where a touched sphere is displaced more
   /// Forces are balanced once more while the error estimated is above this part of the largest
   /// force so far, up to `most_balances` times a step.
   double balance_again_above = 5e-4;

@@ -10,7 +10,7 @@
 namespace tpm::organ {
 namespace {
 
-constexpr double kTrustedZone = 0.05;       // error over the largest force
+constexpr double kValidZoneError = 0.05;    // error over the largest force
 constexpr double kZoneScaleDepth_m = 1e-4;  // at which forces begin to count
 constexpr double kUnbalanced = 0.1;         // what is left of the correction for what is unbalanced
 constexpr std::size_t kZoneNow = 0, kZoneNext = 4;
@@ -207,8 +207,8 @@ ContactAnswer ZoneNetwork::step(const ToolPose& tool) noexcept {
   answer.error_N = claim_.at(claim_.place(), aside_m) + kUnbalanced * correction.norm() +
                    step_error_->advance(tool.displacement_m).norm();
   const double scale_N = std::max(largest_N_, kZoneScaleDepth_m * equilibrium_.norm());
-  answer.trusted = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&
-                   answer.error_N <= kTrustedZone * scale_N;
+  answer.valid = std::abs(depth_m) <= options_.deepest_m && aside_m <= options_.aside_m &&
+                 answer.error_N <= kValidZoneError * scale_N;
   return answer;
 }
 

@@ -18,7 +18,7 @@ struct ZoneNetworkOptions {
   int rings = 3;                    ///< bonds from the contact to the edge of the zone, >= 1
   double linear_depth_m = 3.25e-3;  ///< where what surrounds the zone is linearised, >= 0
   double frozen_depth_m = 4e-3;     ///< where the zone's own stiffness is taken, >= 0
-  double deepest_m = 10e-3;         ///< answers beyond are not trusted, > 0
+  double deepest_m = 10e-3;         ///< answers beyond are not valid, > 0
   double aside_m = 5e-3;            ///< the same across the normal, > 0
   bool portable = false;            ///< as ServoNetworkOptions
 };

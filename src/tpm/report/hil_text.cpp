@@ -91,7 +91,7 @@ Json check_json(const JitterCheck& check) {
           {"most_consecutive_missed", o.counts.most_consecutive_missed},
           {"most_late_of_1000", o.counts.most_late},
           {"watchdog_s", rounded(check.watchdog_s, kHilDigits)},
-          {"hang_limit_s", rounded(check.hang_limit_s, kHilDigits)},
+          {"cycle_timeout_s", rounded(check.cycle_timeout_s, kHilDigits)},
           {"fit", check.fit},
           {"verdict", check.verdict},
           {"advice", check.advice}};

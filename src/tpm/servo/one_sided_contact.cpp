@@ -22,13 +22,12 @@ OneSidedContact::Answer OneSidedContact::press(double tool_m) noexcept {
   left_N_ = force_N;
   if (touching_ && force_N < 0.0) touching_ = false;
   // Written so that a force that is no number is passed on, and found.
-  return {touching_ ? force_N : 0.0 * force_N, surface_m_, touching_, answer.error_N,
-          answer.trusted};
+  return {touching_ ? force_N : 0.0 * force_N, surface_m_, touching_, answer.error_N, answer.valid};
 }
 
 ContactAnswer OneSidedContact::step(const ToolPose& tool) noexcept {
   const Answer answer = press(push_.dot(tool.displacement_m));
-  return {-answer.force_N * push_, answer.error_N, answer.trusted};
+  return {-answer.force_N * push_, answer.error_N, answer.valid};
 }
 
 }  // namespace tpm::haptics

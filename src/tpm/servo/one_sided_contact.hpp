@@ -14,7 +14,7 @@ class OneSidedContact final : public ContactModel {
     double surface_m = 0.0;  ///< depth of the surface
     bool touching = false;
     double error_N = 0.0;
-    bool trusted = true;
+    bool valid = true;
   };
 
   /// @param push unit vector into the tissue, in the coordinates of the model

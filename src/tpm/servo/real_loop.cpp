@@ -18,7 +18,8 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t kRingRows = 1U << 16U;  // 16 s at 4 kHz
 
-/// What the threads of a session share. The stuck thread of a hang keeps it alive.
+/// What the threads of a session share. The stuck thread of a cycle that does not end keeps it
+/// alive.
 struct Shared {
   Shared(std::shared_ptr<HapticDevice> d, std::shared_ptr<ContactModel> m, const ServoSettings& s)
       : device(std::move(d)), model(std::move(m)), settings(s), step(*device, *model, s) {}
@@ -174,7 +175,7 @@ class LoopThread {
 /// Waits for the loop; true if a cycle did not end in time.
 bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
            std::int64_t& stop_took_ns) {
-  const auto limit_ns = static_cast<std::int64_t>(options.hang_limit_s * 1e9);
+  const auto limit_ns = static_cast<std::int64_t>(options.cycle_timeout_s * 1e9);
   while (!s->over.load(std::memory_order_acquire)) {
     std::this_thread::sleep_for(500us);
     if (options.interrupted && options.interrupted()) {
@@ -183,7 +184,7 @@ bool watch(const std::shared_ptr<Shared>& s, const RealTimeOptions& options,
     const std::int64_t since = s->busy_since_ns.load(std::memory_order_acquire);
     if (since != 0 && now_ns() - since > limit_ns) {
       // Should the stuck call come back, its thread ends there.
-      s->wanted.store(StopCause::hang, std::memory_order_release);
+      s->wanted.store(StopCause::cycle_timeout, std::memory_order_release);
       cut_forces_from_outside(s);
       stop_took_ns = now_ns() - since;
       return true;
@@ -218,13 +219,13 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
   outcome.scheduling = shared->scheduling;
   shared->begin.store(true, std::memory_order_release);
   std::int64_t stop_took_ns = 0;
-  const bool hang = [&] {
+  const bool timed_out = [&] {
     const AboveRealTime watching;
     return watch(shared, options, stop_took_ns);
   }();
-  if (hang) {
+  if (timed_out) {
     loop.leave_behind();
-    outcome.cause = StopCause::hang;
+    outcome.cause = StopCause::cycle_timeout;
     outcome.cycles = shared->cycle.load(std::memory_order_acquire) + 1;
     outcome.stop_took_s = static_cast<double>(stop_took_ns) * 1e-9;
     outcome.detail = "a cycle did not end within the limit; its thread was left behind";
@@ -239,7 +240,7 @@ ServoOutcome run_in_real_time(const std::shared_ptr<HapticDevice>& device,
     outcome.detail = "something that is no error was thrown by whoever records";
   }
   outcome.dropped_records = shared->dropped;
-  if (hang) return outcome;
+  if (timed_out) return outcome;
   if (shared->refused) {
     device->stop();
     std::rethrow_exception(shared->refused);

@@ -65,9 +65,9 @@ std::string_view word_of(StopCause cause) {
       {StopCause::position_not_finite, "position not finite"},
       {StopCause::force_not_finite, "force not finite"},
       {StopCause::overrun_storm, "overrun storm"},
-      {StopCause::hang, "hang"},
+      {StopCause::cycle_timeout, "cycle timeout"},
       {StopCause::not_in_place, "operator not in place"},
-      {StopCause::untrusted, "model not trusted"},
+      {StopCause::outside_validity, "model outside validity"},
       {StopCause::energy, "energy given to the hand"},
       {StopCause::oscillation, "oscillation"},
       {StopCause::position_jump, "position jumped"},
@@ -86,7 +86,7 @@ ServoStep::ServoStep(HapticDevice& device, ContactModel& model, ServoSettings se
                .delay_periods = settings_.delay_periods,
                .allowance_J = settings_.energy_allowance_J}),
       oscillation_({.period_s = settings_.period_s}),
-      untrusted_periods_(settings_.untrusted_limit_s / settings_.period_s),
+      outside_validity_periods_(settings_.outside_validity_limit_s / settings_.period_s),
       stiffness_N_per_m_(stiffness_of(model, settings_)),
       least_stiffness_N_per_m_(stiffness_N_per_m_),
       late_(kLateWindow, 0) {
@@ -140,7 +140,7 @@ ServoStep::Cap ServoStep::cap() const noexcept {
   const double time = static_cast<double>(cycle_) * settings_.period_s;
   const double ramp = time < settings_.ramp_in_s ? time / settings_.ramp_in_s : 1.0;
   const double limit = ramp * settings_.force_limit_N;
-  // The model comes back from a time of doubt at the force that is being sent.
+  // The model comes back to its validity at the force that is being sent.
   const double rising =
       doubted_before_ ? before_N : before_N + settings_.slew_limit_N_per_s * settings_.period_s;
   if (rising < limit) return {rising, kSlipping};
@@ -164,8 +164,8 @@ void ServoStep::learn_stiffness(double rise_N, double moved_m) noexcept {
 /// What is sent of a force that the model answers.
 double ServoStep::felt_N(const Felt& felt, const Cap& cap, ServoRecord& row) noexcept {
   constexpr double kForgetting = 0.1;
-  doubted_before_ = !felt.trusted;
-  if (felt.trusted) {
+  doubted_before_ = !felt.valid;
+  if (felt.valid) {
     doubted_ = std::max(0.0, doubted_ - kForgetting * static_cast<double>(felt.steps));
     if (felt.model_N > cap.force_N) row.flags |= cap.flag;
     return std::min(felt.model_N, cap.force_N);
@@ -199,13 +199,13 @@ void ServoStep::touch_along_push(int steps, ServoRecord& row) noexcept {
     answer = contact_.press(begun_ ? from_m + part * (to_m - from_m) : to_m);
   }
   answer = contact_.press(to_m);
-  if (touched && answer.touching && answer.trusted && !doubted_before_) {
+  if (touched && answer.touching && answer.valid && !doubted_before_) {
     learn_stiffness(answer.force_N - model_N_, to_m - from_m);
   }
   const double before_N = tissue_size_N_;
   const double moved = answer.surface_m - surface_m_;
   const double now_N =
-      felt_N({answer.force_N, from_m - to_m, steps, answer.touching, answer.trusted}, most, row);
+      felt_N({answer.force_N, from_m - to_m, steps, answer.touching, answer.valid}, most, row);
   if (answer.touching) leak_J_ += 0.5 * contact_.stiffness_N_per_m() * moved * moved;
   tissue_work_J_ = 0.5 * (before_N + now_N) * moved;
   surface_m_ = answer.surface_m;
@@ -244,18 +244,18 @@ void ServoStep::touch_in_space(int steps, ServoRecord& row) noexcept {
   }
   const Eigen::Vector3d force_N = settings_.to_model->transpose() * answer.force_N;
   const double size_N = force_N.norm();
-  if (touched && size_N > 0.0 && answer.trusted && !doubted_before_) {
+  if (touched && size_N > 0.0 && answer.valid && !doubted_before_) {
     learn_stiffness(size_N - model_N_, (-model_force_N_ / model_N_).dot(to_m - from_m));
   }
   const Eigen::Vector3d before_N = tissue_N_;
   const Eigen::Vector3d along =
       before_N.isZero(0.0) ? Eigen::Vector3d::Zero() : Eigen::Vector3d(before_N.normalized());
   const double now_N =
-      felt_N({size_N, along.dot(to_m - from_m), steps, size_N > 0.0, answer.trusted}, most, row);
-  // Only the size is limited; a force in doubt keeps the direction that was trusted last.
-  tissue_N_ = !answer.trusted ? Eigen::Vector3d(now_N * along)
-              : size_N > 0.0  ? Eigen::Vector3d(force_N * (now_N / size_N))
-                              : force_N;
+      felt_N({size_N, along.dot(to_m - from_m), steps, size_N > 0.0, answer.valid}, most, row);
+  // Only the size is limited; a force outside validity keeps the last valid direction.
+  tissue_N_ = !answer.valid  ? Eigen::Vector3d(now_N * along)
+              : size_N > 0.0 ? Eigen::Vector3d(force_N * (now_N / size_N))
+                             : force_N;
   tissue_size_N_ = tissue_N_.norm();
   tissue_work_J_ = -0.5 * (before_N + tissue_N_).dot(to_m - from_m);
   leak_J_ += 0.5 * (before_N - tissue_N_).dot(moved_m_);
@@ -291,7 +291,7 @@ StopCause ServoStep::check_rendering(int periods) noexcept {
   if (settings_.watch_oscillation) oscillation_.observe(sent_size_N_, periods);
   if (energy_.too_much()) return StopCause::energy;
   if (settings_.watch_oscillation && oscillation_.found()) return StopCause::oscillation;
-  return doubted_ > untrusted_periods_ ? StopCause::untrusted : StopCause::none;
+  return doubted_ > outside_validity_periods_ ? StopCause::outside_validity : StopCause::none;
 }
 
 StopCause ServoStep::write(const Eigen::Vector3d& force_N, ServoRecord& row) noexcept {

@@ -26,10 +26,10 @@ namespace tpm::haptics {
 /// stiffer than foretold, F - C lasts one period). While the force is zero the model's tool
 /// recovers towards the hand, which costs nothing.
 ///
-/// **Trust.** A force that the model does not trust is not sent. The force that was trusted last
+/// **Validity.** A force outside the validity of the model is not sent. The last valid force
 /// stays, fades with `fade_s`, falls as the hand withdraws (by K dx, so that no more than F^2/2K
-/// comes back) and never rises. When the model trusts itself again its tool slips to the force that
-/// is being sent.
+/// comes back) and never rises. When forces are valid again the model's tool slips to the force
+/// that is being sent.
 class ServoStep {
  public:
   /// @param device, model must live as long as this
@@ -56,7 +56,7 @@ class ServoStep {
   struct Felt {
     double model_N = 0.0, withdrawn_m = 0.0;
     int steps = 1;
-    bool touching = false, trusted = true;
+    bool touching = false, valid = true;
   };
   struct Cap {
     double force_N = 0.0;
@@ -88,7 +88,7 @@ class ServoStep {
   PassivityControl passivity_;
   EnergyWatch energy_;
   OscillationWatch oscillation_;
-  double untrusted_periods_;  ///< without trust, after which the session ends
+  double outside_validity_periods_;  ///< after which the session ends
   std::optional<StartGate> gate_;
   ServoCounts counts_;
   DeviceStatus status_;
@@ -99,17 +99,17 @@ class ServoStep {
   double sent_size_N_ = 0.0;    ///< of sent_N_
   double tissue_size_N_ = 0.0;  ///< of tissue_N_
   int to_status_ = 0;           ///< cycles until the device is asked for its status
-  Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, after slip and trust
+  Eigen::Vector3d tissue_N_ = Eigen::Vector3d::Zero();  ///< on the hand, after slip and fading
   double tool_m_ = 0.0, surface_m_ = 0.0, leak_J_ = 0.0;
   double stiffness_N_per_m_;        ///< that a slip is foretold with
   double least_stiffness_N_per_m_;  ///< at rest
-  double model_N_ = 0.0;            ///< size of the model's last force, trusted or not
+  double model_N_ = 0.0;            ///< size of the model's last force, valid or not
   double slip_m_ = 0.0;             ///< of the model's tool behind the hand, along the push
   Eigen::Vector3d slip_in_space_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d model_tool_m_ = Eigen::Vector3d::Zero();   ///< in space, from surface_m
   Eigen::Vector3d model_force_N_ = Eigen::Vector3d::Zero();  ///< on it, device coordinates
   double tissue_work_J_ = 0.0;                               ///< on the surface in this cycle
-  double doubted_ = 0.0;  ///< periods without trust, forgotten ten times as slowly
+  double doubted_ = 0.0;  ///< periods outside validity, forgotten ten times as slowly
   bool doubted_before_ = false;
   int owed_ = 0;     ///< periods that the model has not lived through yet
   int stale_ = 0;    ///< periods for which the position is that of an earlier call

@@ -22,12 +22,12 @@ class StartGate {
   [[nodiscard]] bool given_up() const noexcept { return waited_ >= limit_; }
   void count(std::uint64_t periods) noexcept { waited_ += periods; }
   /// The tool was not as free as it seemed: the time at rest starts anew.
-  void restart() noexcept { still_ = 0; }
+  void restart() noexcept { at_rest_ = 0; }
 
  private:
   StartGateSettings settings_;
   std::uint64_t needed_, limit_;
-  std::uint64_t still_ = 0, waited_ = 0;
+  std::uint64_t at_rest_ = 0, waited_ = 0;
   Eigen::Vector3d anchor_m_ = Eigen::Vector3d::Zero();
 };
 

@@ -18,7 +18,7 @@ namespace {
 using Kind = RenamedName::Kind;
 
 /// Renamed in 0.2.
-constexpr std::array<RenamedName, 6> kRenamed{{
+constexpr std::array<RenamedName, 11> kRenamed{{
     {"scene", "", Kind::key, "guides", "sliders", "0.3"},
     {"scene", "/outputs/fields", Kind::value, "remembered", "viscous", "0.3"},
     {"protocol", "/outputs/fields", Kind::value, "remembered", "viscous", "0.3"},
@@ -26,6 +26,11 @@ constexpr std::array<RenamedName, 6> kRenamed{{
     {"organ_experiments", "/materials/*", Kind::key, "hold", "fixed", "0.3"},
     {"sweep", "/outputs", Kind::value, "creep_depth_at_once", "instantaneous_creep_depth", "0.3",
      "/outputs/*/formula"},
+    {"hil", "/limits", Kind::key, "hang", "cycle_timeout", "0.3"},
+    {"hil", "/limits", Kind::key, "untrusted", "outside_validity", "0.3"},
+    {"hil", "/start", Kind::key, "still", "at_rest", "0.3"},
+    {"hil", "/motion", Kind::key, "relax_s", "initial_hold_s", "0.3"},
+    {"hil", "/virtual_device", Kind::key, "limp_at", "arm_set_point", "0.3"},
 }};
 
 /// Where a file of one kind may have one of another within it.
@@ -36,6 +41,17 @@ struct Within {
 constexpr std::array<Within, 2> kWithin{{
     {"hil", "/model/scene", "scene"},
     {"sweep", "/scene", "scene"},
+}};
+
+/// Where a file has JSON pointers into one of another kind, as a value or as the keys of an object.
+struct PointersInto {
+  std::string_view schema, place, inner;
+};
+
+constexpr std::array<PointersInto, 3> kPointersInto{{
+    {"sweep", "/axes/*/parameter", "scene"},
+    {"sweep", "/axes/*/together", "scene"},
+    {"sweep", "/axes/*/parameters", "scene"},
 }};
 
 using Visit = std::function<void(Json& part, const std::string& pointer)>;
@@ -77,6 +93,45 @@ std::string with_variable(const std::string& formula, std::string_view former,
     i = end;
   }
   return text;
+}
+
+/// Takes the next part of a pointer off, "" where there is none.
+std::string_view next_part(std::string_view& pointer) {
+  if (pointer.empty()) return {};
+  const std::size_t end = std::min(pointer.find('/', 1), pointer.size());
+  const std::string_view part = pointer.substr(1, end - 1);
+  pointer.remove_prefix(end);
+  return part;
+}
+
+/// A pointer into a document of some kind, with the current name of each key.
+/// @param until of the last one renamed
+std::string with_current_keys(std::string pointer, std::string_view schema,
+                              std::string_view& until) {
+  for (const RenamedName& name : kRenamed) {
+    if (name.schema != schema || name.kind != Kind::key || !pointer.starts_with('/')) continue;
+    std::string_view place = name.place, rest = pointer;
+    bool within = true;
+    while (within && !place.empty()) {
+      const std::string_view wanted = next_part(place), found = next_part(rest);
+      within = wanted == found || (wanted == "*" && !found.empty());
+    }
+    const std::size_t begin = pointer.size() - rest.size();
+    if (!within || next_part(rest) != name.former) continue;
+    pointer.replace(begin + 1, name.former.size(), name.current);
+    until = name.until;
+  }
+  return pointer;
+}
+
+Error beside_its_new_name(const std::string& place, std::string_view current) {
+  return bad_input(place, fmt::format("stands beside its new name '{}'", current),
+                   fmt::format("'{}' alone", current));
+}
+
+void tell_former(const std::string& what, std::string_view until, FormerNames former) {
+  if (former == FormerNames::silent) return;
+  warn(fmt::format("{}; the former name is read until version {}", what, until));
 }
 
 class Renaming {
@@ -126,19 +181,34 @@ class Renaming {
   }
 
   [[nodiscard]] Error both(const std::string& place) const {
-    return bad_input(place, fmt::format("stands beside its new name '{}'", name_.current),
-                     fmt::format("'{}' alone", name_.current));
+    return beside_its_new_name(place, name_.current);
   }
 
-  void tell(const std::string& what) const {
-    if (former_ == FormerNames::silent) return;
-    warn(fmt::format("{}; the former name is read until version {}", what, name_.until));
-  }
+  void tell(const std::string& what) const { tell_former(what, name_.until, former_); }
 
   const RenamedName& name_;
   std::string_view where_;
   FormerNames former_;
 };
+
+/// The same for pointers to what was renamed: a text, or the keys of an object.
+void rename_pointers(Json& part, std::string_view inner, std::string_view where,
+                     const std::string& at, FormerNames former) {
+  const auto current = [&](const std::string& pointer) {
+    std::string_view until;
+    std::string now = with_current_keys(pointer, inner, until);
+    if (now == pointer) return now;
+    const std::string place = fmt::format("{}: key {}: '{}'", where, at, printable(pointer));
+    if (part.is_object() && part.contains(now)) throw beside_its_new_name(place, now);
+    tell_former(fmt::format("{} is now called '{}'", place, printable(now)), until, former);
+    return now;
+  };
+  if (part.is_string()) part = current(part.get<std::string>());
+  if (!part.is_object()) return;
+  Json renamed = Json::object();
+  for (auto& [pointer, member] : part.items()) renamed[current(pointer)] = std::move(member);
+  part = std::move(renamed);
+}
 
 void rename_within(Json& document, std::string_view schema, std::string_view where,
                    const std::string& pointer, FormerNames former) {
@@ -149,6 +219,12 @@ void rename_within(Json& document, std::string_view schema, std::string_view whe
     if (within.schema != schema) continue;
     visit_parts(document, within.place, pointer, [&](Json& part, const std::string& at) {
       rename_within(part, within.inner, where, at, former);
+    });
+  }
+  for (const PointersInto& pointers : kPointersInto) {
+    if (pointers.schema != schema) continue;
+    visit_parts(document, pointers.place, pointer, [&](Json& part, const std::string& at) {
+      rename_pointers(part, pointers.inner, where, at, former);
     });
   }
 }

@@ -34,7 +34,7 @@ SteppedForces law_forces(const LawFile& law, const Protocol& motion, double peri
   LawContact contact(law, {.period_s = period_s,
                            .longest_s = motion.end_s() - motion.start_s(),
                            .deepest_m = motion.peak(),
-                           .trusted_m = trusted_depth_m(law, motion.peak())});
+                           .deepest_valid_m = valid_depth_m(law, motion.peak())});
   if (motion.equilibrium_at_start()) {
     const double depth = motion.knots().front().value;
     const LawModel model(law.spec);

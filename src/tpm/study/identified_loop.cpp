@@ -65,7 +65,7 @@ class ReplayedLoop {
   [[nodiscard]] std::unique_ptr<LawInLoop> in_loop(const IdentifiedSample& known) {
     const double deepest = std::max(recording_.phases.peak_drive - surface_m_, 1e-6);
     settings_.deepest_m = deepest;
-    settings_.trusted_m = kRoomBelow * deepest;
+    settings_.deepest_valid_m = kRoomBelow * deepest;
     return std::make_unique<LawInLoop>(law_of_sample(identification_, known), settings_);
   }
 

@@ -132,6 +132,8 @@ double largest_residual_share(const FitResult& fit) {
   return std::sqrt(sum / static_cast<double>(fit.data.size())) / largest;
 }
 
+constexpr ProtocolSpans kEndlessHold{.hold_s = std::numeric_limits<double>::infinity()};
+
 Candidate fit_function(const LawSpec& law, const MaterialFunction& function, SetupOptions setup) {
   Candidate candidate;
   setup.profiles = false;
@@ -153,7 +155,7 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
     return candidate;
   }
   candidate.rms_over_peak = largest_residual_share(candidate.fit);
-  candidate.reason = not_identified(candidate, {.hold_s = std::numeric_limits<double>::infinity()});
+  candidate.reason = not_identified(candidate, kEndlessHold);
   candidate.identified = candidate.reason.empty();
   return candidate;
 }
@@ -285,6 +287,7 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
     const std::vector<DataSet> data{
         std::visit([](const auto& d) { return DataSet(d); }, function.data)};
     chosen.fit = run_fit(function_config(chosen.law, function, options.setup), data);
+    reassess(chosen, kEndlessHold);
   }
   s.warnings = range_warnings(chosen.fit, sizes_of_function(function));
   s.words.push_back(fmt::format(

@@ -10,7 +10,7 @@ namespace tpm::study {
 
 /// A tissue that the paper's experiments are done on.
 struct StudyTissue {
-  std::string name;  ///< "inner layer held"
+  std::string name;  ///< "inner layer fixed"
   std::string
       scene;  ///< file of the organ, as the configuration names it; empty: star, closed form
 };

@@ -60,7 +60,7 @@ bool may_vanish(const LawSpec& law, const std::string& parameter) {
 }  // namespace
 
 std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans) {
-  constexpr double kLeastStandardErrors = 2.0;
+  constexpr int kLeastStandardErrors = 2;
   double longest_s = 0.0;
   const auto table = law_parameters(candidate.fit.config.law.value());
   for (const ParameterResult& p : candidate.fit.parameters) {
@@ -76,14 +76,19 @@ std::string not_identified(const Candidate& candidate, const ProtocolSpans& span
       return fmt::format("{} ends at its {} bound, and {} depends on it", c.parameter,
                          c.upper ? "upper" : "lower", p.parameter.name);
     }
-    if (!p.standard_error) return fmt::format("{} is not determined", p.parameter.name);
+    // An interval says more than the standard error, and stands in the table of the parameters.
+    const bool has_interval = p.verdict == Verdict::identified || p.verdict == Verdict::lower_only;
+    if (!p.standard_error && !has_interval) {
+      return fmt::format("{} has no standard error", p.parameter.name);
+    }
     const bool from_zero = p.parameter.scale == Scale::linear && p.parameter.lower == 0.0 &&
                            !may_vanish(candidate.law, law->name);
-    if (from_zero && p.estimate < kLeastStandardErrors * *p.standard_error) {
-      return fmt::format("{} is not told from 0", p.parameter.name);
+    if (from_zero && !has_interval && p.estimate < kLeastStandardErrors * *p.standard_error) {
+      return fmt::format("{} is less than {} standard errors above 0", p.parameter.name,
+                         kLeastStandardErrors);
     }
     if (law->dimension != Dimension::time) continue;
-    if (*p.standard_error > p.estimate) {
+    if (p.standard_error && *p.standard_error > p.estimate) {
       return fmt::format("{} is known only to its order of magnitude", p.parameter.name);
     }
     if (spans.samples_too_far_for(p.estimate)) {
@@ -96,6 +101,12 @@ std::string not_identified(const Candidate& candidate, const ProtocolSpans& span
                        significant(spans.hold_s, 3));
   }
   return {};
+}
+
+void reassess(Candidate& chosen, const ProtocolSpans& spans) {
+  if (chosen.identified) return;
+  chosen.reason = not_identified(chosen, spans);
+  chosen.identified = chosen.reason.empty();
 }
 
 bool contradicts(const Candidate& candidate, const ProtocolSpans& spans) {
@@ -459,6 +470,7 @@ Selection select_law(std::span<const PreparedRecording> recordings,
   Candidate& chosen = s.candidates[s.recommended];
   if (options.setup.profiles) {
     chosen.fit = run_fit(recording_config(chosen.law, recordings, options.setup), data);
+    reassess(chosen, protocol_spans(recordings));
   }
   for (std::string& warning : protocol_warnings(chosen.fit, recordings)) {
     s.warnings.push_back(std::move(warning));

@@ -128,8 +128,13 @@ struct ProtocolSpans {
 /// "the least law that the data support is", or what else the recommended law is.
 [[nodiscard]] std::string least_law_words(const Selection& s, const std::string& data);
 
-/// The first reason why a material parameter of a fit is not known; empty if all are.
+/// The first reason why a material parameter of a fit is not known; empty if all are. By the
+/// interval of a parameter where its profile found one, else by the linearised standard error.
 [[nodiscard]] std::string not_identified(const Candidate& candidate, const ProtocolSpans& spans);
+
+/// Looks again at a recommended law that was not identified, now that its fit has profiles: its
+/// note must not contradict its intervals.
+void reassess(Candidate& chosen, const ProtocolSpans& spans);
 
 /// What the protocol of a recording cannot tell about a fitted law: relaxation times shorter than
 /// the ramp or the sampling, or longer than the hold.

@@ -73,8 +73,8 @@ bool unpack(const Sweep& sweep, std::string_view bytes, CellBlock& block) {
                               [&](std::uint16_t r) { return r <= block.reasons.size(); });
 }
 
-std::string log_head(const Sweep& sweep) {
-  return std::string(kLogMagic) + sweep.fingerprint;
+std::string log_head(const std::string& fingerprint) {
+  return std::string(kLogMagic) + fingerprint;
 }
 
 Error cannot_write_log(const std::filesystem::path& path) {
@@ -128,7 +128,7 @@ BlockLog BlockLog::to_read(std::filesystem::path path, const Sweep& sweep,
   BlockLog log(std::move(path), sweep);
   log.open(O_RDONLY);
   std::string head;
-  const std::string right = log_head(sweep);
+  const std::string right = log_head(sweep.fingerprint);
   if (!log.read_at(0, head, right.size()) || !head.starts_with(kLogMagic)) {
     throw bad_input(log.path_.string(), "is no log of a sweep",
                     "a shard that tpm sweep has written");
@@ -163,10 +163,10 @@ void BlockLog::open(int flags) {
 }
 
 void BlockLog::begin() {
-  const std::string right = log_head(*sweep_);
+  const std::string right = log_head(sweep_->fingerprint);
   std::string head;
   if (read_at(0, head, right.size())) {
-    if (head == right) return;
+    if (head == right || head == log_head(sweep_->fingerprint_as_written)) return;
     throw bad_input(path_.string(),
                     head.starts_with(kLogMagic) ? "belongs to another sweep or version of tpm"
                                                 : "is no log of a sweep",
@@ -232,7 +232,8 @@ std::uint64_t BlockLog::find_next(std::uint64_t from) const {
 }
 
 void BlockLog::find_blocks(const std::function<void(const std::string&)>& note) {
-  std::uint64_t offset = log_head(*sweep_).size(), last_end = offset, number = 0, end = 0;
+  std::uint64_t offset = log_head(sweep_->fingerprint).size(), last_end = offset, number = 0,
+                end = 0;
   bool damaged_before = false;
   int damaged = 0;
   std::string payload;

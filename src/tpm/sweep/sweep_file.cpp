@@ -278,6 +278,15 @@ void require_blocks_of_model(const Json& document, const DocumentPlace& place) {
                   organ ? "a scene's file, or a scene" : "");
 }
 
+/// The document before former names became the current ones, its scene put in: how a log stands
+/// for it that was begun when they were current.
+Json as_written(Json written, const std::filesystem::path& folder) {
+  if (written.contains("scene") && written.at("scene").is_string()) {
+    written["scene"] = read_json(folder / written.at("scene").get<std::string>());
+  }
+  return written;
+}
+
 /// Puts the scene in the place of its file's name. Returns the folder that its mesh is relative to.
 std::filesystem::path put_scene_in(Json& document, const std::filesystem::path& folder) {
   if (!document.contains("scene") || !document.at("scene").is_string()) return folder;
@@ -368,9 +377,12 @@ Sweep parse_sweep(const Json& written, std::string_view where,
     throw error.within(where);
   }
   sweep.document = document.dump();
-  sweep.fingerprint =
-      sha256_hex(fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, sweep.document,
-                             sha256_of_mesh(document, scene_folder)));
+  const std::string mesh = sha256_of_mesh(document, scene_folder);
+  const auto fingerprint = [&](const std::string& text) {
+    return sha256_hex(fmt::format("{}\n{}\n{}\n{}", version(), sweep.block_cells, text, mesh));
+  };
+  sweep.fingerprint = fingerprint(sweep.document);
+  sweep.fingerprint_as_written = fingerprint(as_written(written, folder).dump());
   return sweep;
 }
 
