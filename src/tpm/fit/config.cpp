@@ -94,6 +94,13 @@ std::unique_ptr<Model> make_model(const FitConfig& config) {
   return tpm::make_model(config.model, {config.tension, 1e-10});
 }
 
+std::vector<FitParameter> searched_parameters(const FitConfig& config) {
+  std::vector<FitParameter> parameters;
+  parameters.reserve(config.parameters.size());
+  for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
+  return parameters;
+}
+
 std::vector<double> model_parameters(const FitConfig& config, std::span<const double> natural,
                                      std::size_t choice) {
   std::vector<double> values = config.fixed;

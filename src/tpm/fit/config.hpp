@@ -130,6 +130,9 @@ struct FitConfig {
 /// The model that the configuration names.
 [[nodiscard]] std::unique_ptr<Model> make_model(const FitConfig& config);
 
+/// What is estimated, without the model parameters that it sets.
+[[nodiscard]] std::vector<FitParameter> searched_parameters(const FitConfig& config);
+
 /// All model parameters for a data set, given the estimated ones.
 [[nodiscard]] std::vector<double> model_parameters(const FitConfig& config,
                                                    std::span<const double> natural,

@@ -187,8 +187,7 @@ std::optional<LawUncertainty> uncertainty_of(const FitResult& fit, const LawSpec
   threshold.data_count = fit.value_count;
   threshold.parameter_count = static_cast<int>(fit.config.parameters.size());
   threshold.inflation = fit.inflation;
-  const bool estimable = threshold.scale_known || threshold.data_count > threshold.parameter_count;
-  if (!fit.covariance.full_rank || !estimable) return std::nullopt;
+  if (!fit.covariance.full_rank || !threshold.estimable()) return std::nullopt;
   const std::vector<Coordinate> coordinates = law_coordinates(fit, spec);
   const Eigen::MatrixXd change = coordinate_changes(fit, spec, coordinates);
   LawUncertainty u;

@@ -59,10 +59,7 @@ PlannedFit one_recording(const DesignProblem& problem, const PlannedExperiment& 
 }
 
 std::vector<double> starts_of(const FitConfig& config) {
-  std::vector<double> natural;
-  natural.reserve(config.parameters.size());
-  for (const EstimatedParameter& p : config.parameters) natural.push_back(p.fit.start);
-  return natural;
+  return start_values(searched_parameters(config));
 }
 
 const PlannedNoise& noise_for(const DesignProblem& problem, const PlannedExperiment& experiment) {

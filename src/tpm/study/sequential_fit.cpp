@@ -245,14 +245,11 @@ std::vector<std::vector<double>> SequentialFit::next_starts(const ResidualFuncti
   const std::size_t n = recording_.time_s.size();
   if (n < next_search_ && here_) return starts;
   next_search_ = 2 * n;
-  std::vector<FitParameter> parameters;
   std::vector<bool> linear;
-  for (std::size_t i = 0; i < config.parameters.size(); ++i) {
-    parameters.push_back(config.parameters[i].fit);
+  for (std::size_t i = 0; i < config.parameters.size(); ++i)
     linear.push_back(function.linear_in(i));
-  }
-  for (auto& start : projected_starts(function, parameters, linear, settings_.starts, kKeptStarts,
-                                      settings_.seed)) {
+  for (auto& start : projected_starts(function, searched_parameters(config), linear,
+                                      settings_.starts, kKeptStarts, settings_.seed)) {
     starts.push_back(std::move(start));
   }
   return starts;
@@ -273,8 +270,7 @@ void SequentialFit::pass_through_history() {
   WhitenedPrefix function(model, config, *prepared, noise, known ? estimate_->sigma : guess);
   if (function.residual_count() <= std::ssize(config.parameters) + 2) return;
   ++passes_;
-  std::vector<FitParameter> parameters;
-  for (const EstimatedParameter& p : config.parameters) parameters.push_back(p.fit);
+  const std::vector<FitParameter> parameters = searched_parameters(config);
   Minimum best = least_of(function, parameters, next_starts(function, config));
   if (!best.usable) return;
   const auto correlation = improve_in_turn(function, parameters, noise, best);
