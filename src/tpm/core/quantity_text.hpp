@@ -1,5 +1,8 @@
 #pragma once
+#include <string>
 #include <string_view>
+
+#include "tpmkit/units.hpp"
 
 namespace tpm {
 
@@ -11,5 +14,8 @@ struct QuantityText {
 /// The unit begins at the first blank, or where there is none behind the number. Nothing is
 /// checked.
 [[nodiscard]] QuantityText split_quantity(std::string_view text);
+
+/// "0.613 N"; just the number if the unit is 1.
+[[nodiscard]] std::string with_unit(std::string_view number, const Unit& unit);
 
 }  // namespace tpm

@@ -366,6 +366,11 @@ double parse_number(std::string_view text, std::string_view where) {
                   "a number such as 12.5 or 1.2e-3");
 }
 
+std::string with_unit(std::string_view number, const Unit& unit) {
+  if (unit.symbol.empty()) return std::string(number);
+  return fmt::format("{} {}", number, unit.symbol);
+}
+
 QuantityText split_quantity(std::string_view text) {
   const std::string_view t = trimmed(text);
   std::size_t split = std::min(t.find_first_of(" \t"), t.size());

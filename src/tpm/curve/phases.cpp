@@ -8,6 +8,7 @@
 
 #include "tpm/core/enum_names.hpp"
 #include "tpm/core/median.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/curve/contact_onset.hpp"
 #include "tpm/curve/drive_pieces.hpp"
@@ -250,8 +251,7 @@ class Finder {
   }
   static std::string shown(double si, Dimension dimension) {
     const Unit unit = shown_unit(dimension);
-    return fmt::format("{}{}{}", significant(si / unit.to_si, 4), unit.symbol.empty() ? "" : " ",
-                       unit.symbol);
+    return with_unit(significant(si / unit.to_si, 4), unit);
   }
   void tell(std::string sentence) { found_.words.push_back(std::move(sentence)); }
 

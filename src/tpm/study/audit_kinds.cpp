@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/cause_search.hpp"
 #include "tpmkit/error.hpp"
@@ -83,14 +84,6 @@ bool satisfied(double left, const std::string& relation, double right) {
   return left >= right;
 }
 
-void append(std::vector<AuditInput>& inputs, std::vector<AuditInput> more) {
-  for (AuditInput& input : more) {
-    const bool known = std::any_of(inputs.begin(), inputs.end(),
-                                   [&](const AuditInput& i) { return i.name == input.name; });
-    if (!known) inputs.push_back(std::move(input));
-  }
-}
-
 }  // namespace
 
 AuditVerdict audit_verdict(DigitVerdict verdict) noexcept {
@@ -119,11 +112,6 @@ std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim) {
                     "low before high");
   }
   return {std::move(low), std::move(high)};
-}
-
-std::string with_unit(std::string_view number, const Unit& unit) {
-  if (unit.symbol.empty()) return std::string(number);
-  return fmt::format("{} {}", number, unit.symbol);
 }
 
 void check_value(const ClaimReader& claim, Finding& finding) {

@@ -35,7 +35,4 @@ void check_misfit(const ClaimReader& claim, Finding& finding);
 /// Key "printed" of a range or a band: two numbers, low before high.
 [[nodiscard]] std::pair<PrintedNumber, PrintedNumber> printed_pair(const ClaimReader& claim);
 
-/// "0.613 N"; just the number if the unit is 1.
-[[nodiscard]] std::string with_unit(std::string_view number, const Unit& unit);
-
 }  // namespace tpm::study

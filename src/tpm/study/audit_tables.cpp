@@ -4,6 +4,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/study/audit_kinds.hpp"
 #include "tpm/study/printed_number.hpp"
 #include "tpmkit/error.hpp"

@@ -8,6 +8,7 @@
 
 #include "tpm/core/dense_algebra.hpp"
 #include "tpm/core/enum_names.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/random.hpp"
 #include "tpm/core/text.hpp"
 #include "tpm/study/prediction_parts.hpp"
@@ -180,7 +181,7 @@ void add_range_flags(LawPrediction& p, const LawFile& law) {
   }
   const Unit unit = shown_unit(quantity_dimension(law.spec.drive));
   const auto text = [&](double value) {
-    return significant(value / unit.to_si, 3) + (unit.symbol.empty() ? "" : " " + unit.symbol);
+    return with_unit(significant(value / unit.to_si, 3), unit);
   };
   if (law.fitted_to && deepest > 1.001 * *law.fitted_to) {
     p.flags.push_back(fmt::format("extrapolates: {} deep, and the law was fitted to {}",

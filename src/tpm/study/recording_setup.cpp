@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tpm/core/median.hpp"
+#include "tpm/core/quantity_text.hpp"
 #include "tpm/core/text.hpp"
 #include "tpmkit/error.hpp"
 #include "tpmkit/law_model.hpp"
@@ -354,8 +355,7 @@ Json import_json(const ImportOptions& import) {
 Json config_json(const FitConfig& config) {
   const std::unique_ptr<Model> model = make_model(config);
   const auto text = [](double value, const Unit& unit) {
-    return fmt::format("{}{}{}", shortest(value / unit.to_si), unit.symbol.empty() ? "" : " ",
-                       unit.symbol);
+    return with_unit(shortest(value / unit.to_si), unit);
   };
   Json j{{"title", config.title}};
   if (config.law) {
