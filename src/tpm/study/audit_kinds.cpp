@@ -132,6 +132,15 @@ void check_value(const ClaimReader& claim, Finding& finding) {
   }
 }
 
+void add_check(Finding& finding, std::string what, const DigitCheck& check, const Unit& unit) {
+  finding.verdict = std::max(finding.verdict, audit_verdict(check.verdict));
+  finding.details.push_back({std::move(what),
+                             with_unit(check.printed.text, unit),
+                             {check.computed, unit},
+                             check.words(),
+                             check.difference_percent});
+}
+
 void check_range(const ClaimReader& claim, Finding& finding) {
   const ClaimValue value(claim);
   const Unit unit = claim.unit();
@@ -147,12 +156,7 @@ void check_range(const ClaimReader& claim, Finding& finding) {
     const auto at_text = over.at(end).get<std::string>();
     scope.values[symbol] = claim.quantity(at_text, scope);
     const DigitCheck check = compare_digits(printed, value.total(scope) / unit.to_si);
-    finding.details.push_back({fmt::format("{} = {}", symbol, at_text),
-                               with_unit(printed.text, unit),
-                               {check.computed, unit},
-                               check.words(),
-                               check.difference_percent});
-    finding.verdict = std::max(finding.verdict, audit_verdict(check.verdict));
+    add_check(finding, fmt::format("{} = {}", symbol, at_text), check, unit);
     const double difference = check.difference_percent.value_or(0.0);
     if (!finding.recomputed || std::abs(difference) > std::abs(worst)) {
       finding.recomputed = {check.computed, unit};

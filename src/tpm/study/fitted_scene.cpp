@@ -103,7 +103,7 @@ std::optional<FittedScene> fitted_scene(const FitResult& fit) {
   scene["description"] = fmt::format("material: fitted, {}", config.title);
 
   const FittedRamp fitted = ramp_of(fit);
-  const Json ramp = ramp_and_hold(fitted.depth_m, fitted.rate_m_per_s, fitted.hold_s);
+  const Json ramp = ramp_hold_block(fitted.depth_m, fitted.rate_m_per_s, fitted.hold_s);
   scene["protocol"] = ramp;
   scene["contacts"] = Json::array({{{"kind", "sphere"}}});
   result.session = network_session(config.title, scene, ramp, slowest_s);

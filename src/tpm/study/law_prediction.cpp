@@ -223,6 +223,15 @@ Eigen::MatrixXd covariance_root(const Eigen::MatrixXd& covariance) {
   return sd.asDiagonal() * modes.vectors * modes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
+LawFile at_surface(const LawFile& law) {
+  LawFile plain = law;
+  const std::vector<LawParameter> parameters = law_parameters(law.spec);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters[i].nuisance) plain.values[i] = 0.0;
+  }
+  return plain;
+}
+
 bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter) {
   if (!parameter.nuisance) return false;
   return parameter.name == "offset" || spec.drive != Quantity::relative_length;
@@ -337,11 +346,8 @@ LawPrediction predict_by(const Model& model, const LawFile& law, const Protocol&
                     "surface or fitted");
   }
   const UncertainCoordinates u = fitted_coordinates(law, p.placement);
-  std::vector<double> values = law.values;
-  const std::vector<LawParameter> parameters = law_parameters(law.spec);
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (parameters[i].nuisance && p.placement == Placement::surface) values[i] = 0.0;
-  }
+  const std::vector<double> values =
+      p.placement == Placement::surface ? at_surface(law).values : law.values;
   p.contact = values[values.size() - 2];
   p.offset = values.back();
   p.time_s.assign(times_s.begin(), times_s.end());

@@ -225,7 +225,7 @@ std::string scene_quantity(double value, std::string_view unit) {
   return fmt::format("{} {}", shortest(rounded(value, kDigits)), unit);
 }
 
-Json ramp_and_hold(double depth_m, double rate_m_per_s, double hold_s) {
+Json ramp_hold_block(double depth_m, double rate_m_per_s, double hold_s) {
   constexpr int kDigits = 4;
   const auto text = [](double value, const char* unit) {
     return fmt::format("{} {}", significant(value, kDigits), unit);
@@ -288,7 +288,7 @@ void add_protocol_and_session(OrganMaterial& m) {
   const double depth_m = deepest_of(deepest);
   const double rate_m_per_s = ramp_rate(deepest);
   const double held_s = deepest.time_s.back() - deepest.time_s.front() - depth_m / rate_m_per_s;
-  const Json ramp = ramp_and_hold(depth_m, rate_m_per_s, std::max(held_s, 1.0));
+  const Json ramp = ramp_hold_block(depth_m, rate_m_per_s, std::max(held_s, 1.0));
   m.scene["description"] = fmt::format("material: law {} put on the organ {}", m.law, m.motion);
   if (!m.scene.contains("protocol")) {
     m.scene["protocol"] = ramp;

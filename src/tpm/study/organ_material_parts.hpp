@@ -12,7 +12,7 @@ namespace tpm::study {
 [[nodiscard]] std::string scene_quantity(double value, std::string_view unit);
 
 /// A ramp and hold as a block of a scene.
-[[nodiscard]] Json ramp_and_hold(double depth_m, double rate_m_per_s, double hold_s);
+[[nodiscard]] Json ramp_hold_block(double depth_m, double rate_m_per_s, double hold_s);
 
 /// A session that steps the network of a scene along a ramp and hold, and lets it recover.
 /// @param ramp with `depth`, `rate` and `hold`, as scenes write them

@@ -17,6 +17,9 @@ struct UncertainCoordinates {
   Eigen::MatrixXd root;  ///< coordinates x independent directions
 };
 
+/// The law without the recording's contact point and offset.
+[[nodiscard]] LawFile at_surface(const LawFile& law);
+
 /// The slack length of a strip belongs to the specimen: it stays, as in select_law.
 [[nodiscard]] bool belongs_to_recording(const LawSpec& spec, const LawParameter& parameter);
 

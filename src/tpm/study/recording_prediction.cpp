@@ -170,10 +170,7 @@ LawPrediction predict_recording_by(const Model& model, const LawFile& law,
     values = own.values;
     add_own_directions(u, own, model, law, recording, motion);
   } else if (p.placement == Placement::surface) {
-    const std::vector<LawParameter> parameters = law_parameters(law.spec);
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      if (parameters[i].nuisance) values[i] = 0.0;
-    }
+    values = at_surface(law).values;
   }
   p.contact = values[values.size() - 2];
   p.offset = values.back();

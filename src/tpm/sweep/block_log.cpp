@@ -49,21 +49,12 @@ bool take_all(std::string_view& from, std::vector<T>& values) {
   return true;
 }
 
-bool unpack(const Sweep& sweep, std::string_view bytes, CellBlock& block) {
-  const std::uint64_t first = block.number * sweep.block_cells;
-  const auto cells = static_cast<std::size_t>(std::min(sweep.block_cells, sweep.cells() - first));
-  block.status.resize(cells);
-  block.reason.resize(cells);
-  block.error_estimate.resize(cells);
-  block.model.resize(sweep.model->models().empty() ? 0 : cells);
+/// @param block empty_block()
+bool unpack(std::string_view bytes, CellBlock& block) {
   bool whole = take_all(bytes, block.status) && take_all(bytes, block.reason) &&
                take_all(bytes, block.error_estimate) && take_all(bytes, block.model);
-  block.counts.assign(sweep.model->counted().size(), std::vector<std::int64_t>(cells));
   for (auto& counts : block.counts) whole = whole && take_all(bytes, counts);
-  for (const SweepVariable& variable : sweep.variables) {
-    block.values.emplace_back(cells * variable.width());
-    whole = whole && take_all(bytes, block.values.back());
-  }
+  for (auto& values : block.values) whole = whole && take_all(bytes, values);
   while (whole && !bytes.empty()) {
     const std::size_t end = bytes.find('\0');
     if (end == std::string_view::npos) return false;
@@ -219,9 +210,8 @@ void BlockLog::find_blocks(const std::function<void(const std::string&)>& note) 
   std::string payload;
   while (offset < length_) {
     if (record_at(offset, number, payload, end)) {
-      CellBlock block;
-      block.number = number;
-      if (place_[number] == 0 && unpack(*sweep_, payload, block)) {
+      CellBlock block = empty_block(*sweep_, number);
+      if (place_[number] == 0 && unpack(payload, block)) {
         place_[number] = offset;
         ++size_;
       }
@@ -274,11 +264,11 @@ void BlockLog::require_room(std::uint64_t blocks) const {
 }
 
 CellBlock BlockLog::read(std::uint64_t number) const {
-  CellBlock block;
+  CellBlock block = empty_block(*sweep_, number);
   std::string payload;
   std::uint64_t end = 0;
   if (!record_at(place_[number], block.number, payload, end) || block.number != number ||
-      !unpack(*sweep_, payload, block)) {
+      !unpack(payload, block)) {
     throw bad_input(path_.string(), fmt::format("block {} is damaged", number),
                     "a log that nobody writes into; the same command computes it again");
   }
