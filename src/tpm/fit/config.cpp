@@ -180,9 +180,8 @@ FitConfig parse_fit_config(const Json& written, std::string_view where,
   if (document.contains("hypotheses")) {
     parse_hypotheses(document.at("hypotheses"), config, place.key("hypotheses"));
   }
-  const bool known = config.data.front().noise.scale_known;
   for (const DataChoice& data : config.data) {
-    if (data.noise.scale_known == known) continue;
+    if (data.noise.scale_known == config.scale_known()) continue;
     throw bad_input(place.key("data").where, "some noise scales are known and others estimated",
                     "all known or all estimated");
   }

@@ -125,6 +125,9 @@ struct FitConfig {
   std::filesystem::path folder;  ///< where relative paths of data sets are looked up
   /// Asked before each evaluation; true ends the fit with Interrupted. Not part of the result.
   std::function<bool()> interrupted;
+
+  /// Whether the size of the noise is known: of all data sets, or of none.
+  [[nodiscard]] bool scale_known() const { return data.front().noise.scale_known; }
 };
 
 /// The model that the configuration names.

@@ -61,10 +61,7 @@ CoverageResult check_coverage(const FitConfig& config, int sets, std::uint64_t s
   const std::vector<double> true_value = start_values(parameters);
   CoverageResult result;
   for (const FitParameter& p : parameters) result.parameters.push_back({p.name, 0, 0, 1.0});
-  Threshold threshold;
-  threshold.level = config.level;
-  threshold.scale_known = config.data.front().noise.scale_known;
-  threshold.data_count = function.value_count();
+  const Threshold threshold{config.level, config.scale_known(), function.value_count()};
   result.seed = seed;
   result.level = config.level;
 

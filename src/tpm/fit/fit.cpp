@@ -26,7 +26,7 @@ struct Approach {
 /// What a search with a stand-in for the function finds; no profiles.
 FitResult survey(const ExperimentResiduals& stand_in, std::span<const FitParameter> parameters) {
   Threshold threshold;
-  threshold.scale_known = stand_in.config().data.front().noise.scale_known;
+  threshold.scale_known = stand_in.config().scale_known();
   threshold.data_count = static_cast<int>(stand_in.residual_count());
   return fit_residuals(stand_in, {parameters.begin(), parameters.end()},
                        fit_starts(stand_in, parameters), threshold, false, start_kind(stand_in));
@@ -119,12 +119,8 @@ FitResult run_fit(const FitConfig& config, const std::vector<DataSet>& data) {
 FitResult fit_experiments(const ExperimentResiduals& function) {
   const FitConfig& config = function.config();
   std::vector<FitParameter> parameters = searched_parameters(config);
-  Threshold threshold;
-  threshold.level = config.level;
-  threshold.scale_known = config.data.front().noise.scale_known;
-  threshold.data_count = function.value_count();
-  threshold.parameter_count = static_cast<int>(parameters.size());
-
+  Threshold threshold{config.level, config.scale_known(), function.value_count(),
+                      static_cast<int>(parameters.size())};
   FitResult result = widened_search(function, parameters, threshold);
   threshold.inflation = result.inflation;
   result.config = config;

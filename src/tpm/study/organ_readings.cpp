@@ -244,11 +244,8 @@ ReadingsFit fit_to_readings(const OrganModel& model, const FittedBonds& bonds,
         placement_parameter("offset" + number, Dimension::force, r.offset_N, peak_N, peak_N));
   }
   const OrganLessReadings function(model, bonds, recordings, parameters.size());
-  Threshold threshold;
-  threshold.level = kReadingsLevel;
-  threshold.scale_known = false;
-  threshold.data_count = static_cast<int>(function.residual_count());
-  threshold.parameter_count = static_cast<int>(all.size());
+  Threshold threshold{kReadingsLevel, false, static_cast<int>(function.residual_count()),
+                      static_cast<int>(all.size())};
   ReadingsFit result;
   result.fit = fit_and_profile(function, all, parameters.size(), threshold, profiles);
   result.readings = threshold.data_count;
