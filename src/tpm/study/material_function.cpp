@@ -128,7 +128,7 @@ double largest_residual_share(const FitResult& fit) {
   return std::sqrt(sum / static_cast<double>(fit.data.size())) / largest;
 }
 
-std::vector<DataSet> data_of(const MaterialFunction& function) {
+std::vector<DataSet> data_set_of(const MaterialFunction& function) {
   return {std::visit([](const auto& d) { return DataSet(d); }, function.data)};
 }
 
@@ -138,7 +138,7 @@ Candidate fit_function(const LawSpec& law, const MaterialFunction& function, Set
   // against the law, not an error of the file.
   const bool refusal_counts = law.fractional != Fractional::none;
   Candidate candidate =
-      fit_candidate(function_config(law, function, setup), data_of(function), refusal_counts);
+      fit_candidate(function_config(law, function, setup), data_set_of(function), refusal_counts);
   if (candidate.failed) return candidate;
   candidate.rms_over_peak = largest_residual_share(candidate.fit);
   candidate.reason = not_identified(candidate, {.hold_s = std::numeric_limits<double>::infinity()});
@@ -270,7 +270,8 @@ Selection select_law(const MaterialFunction& function, const SelectionOptions& o
   rank_candidates(s);
   Candidate& chosen = s.candidates[s.recommended];
   if (options.setup.profiles) {
-    chosen.fit = run_fit(function_config(chosen.law, function, options.setup), data_of(function));
+    chosen.fit =
+        run_fit(function_config(chosen.law, function, options.setup), data_set_of(function));
   }
   s.warnings = range_warnings(chosen.fit, sizes_of_function(function));
   s.words.push_back(fmt::format(
